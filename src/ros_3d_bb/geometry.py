@@ -1,0 +1,103 @@
+"""Cameras and rigid transforms.
+
+Convention: pixel (u, v) is the centre of the pixel in column u and row v, both counted from 0; a camera optical frame
+has x right, y down, z forward (REP 103); lengths are metres. A transform `b_from_a` is a 4x4 matrix that takes points
+given in frame a to frame b.
+"""
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float), ('fy', float), ('cx', float),
+                                   ('cy', float)])):
+    """Intrinsics of a pinhole camera; focal lengths and principal point in pixels.
+
+    Raises
+    ------
+    ValueError
+        If the size is not positive, or a focal length is not positive and finite, or the principal point not finite.
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, width, height, fx, fy, cx, cy):
+        camera = super(Camera, cls).__new__(cls, int(width), int(height), float(fx), float(fy), float(cx), float(cy))
+        if camera.width <= 0 or camera.height <= 0:
+            raise ValueError('camera size %d x %d is not positive' % (width, height))
+        if not (np.isfinite(camera[2:]).all() and camera.fx > 0 and camera.fy > 0):
+            raise ValueError('camera intrinsics fx=%g fy=%g cx=%g cy=%g are not usable: focal lengths must be positive'
+                             % camera[2:])
+        return camera
+
+    def deproject(self, pixels, depth_m):
+        """Points in the optical frame that pixels show. Inverse of `project`. Thesis 3.4.1.
+
+        Parameters
+        ----------
+        pixels : array_like, (..., 2)
+            (u, v); need not be integers.
+        depth_m : array_like, (...)
+            Distance along z, metres.
+
+        Returns
+        -------
+        numpy.ndarray, (..., 3)
+        """
+        pixels, depth_m = np.asarray(pixels, float), np.asarray(depth_m, float)
+        x = (pixels[..., 0] - self.cx) / self.fx * depth_m
+        y = (pixels[..., 1] - self.cy) / self.fy * depth_m
+        return np.stack((x, y, np.broadcast_to(depth_m, x.shape)), axis=-1)
+
+    def project(self, points):
+        """Pixels that show points of the optical frame. Inverse of `deproject`.
+
+        Parameters
+        ----------
+        points : array_like, (..., 3)
+            Metres, z > 0.
+
+        Returns
+        -------
+        numpy.ndarray, (..., 2)
+            (u, v), also outside the image.
+        """
+        points = np.asarray(points, float)
+        u = points[..., 0] / points[..., 2] * self.fx + self.cx
+        v = points[..., 1] / points[..., 2] * self.fy + self.cy
+        return np.stack((u, v), axis=-1)
+
+
+def transform_from(translation, quaternion):
+    """The 4x4 matrix of a translation (x, y, z) in metres and a quaternion (x, y, z, w), normalised here.
+
+    Raises
+    ------
+    ValueError
+        If the quaternion has no direction (zero, nan or inf).
+    """
+    quaternion = np.asarray(quaternion, float)
+    norm = np.linalg.norm(quaternion)
+    if not (np.isfinite(norm) and norm > 1e-6):
+        raise ValueError('quaternion %s is not a rotation' % (tuple(quaternion.tolist()),))
+    x, y, z, w = quaternion / norm
+    matrix = np.eye(4)
+    matrix[:3, :3] = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
+    matrix[:3, 3] = translation
+    return matrix
+
+
+def inverse(b_from_a):
+    """`a_from_b`, the inverse of a rigid transform."""
+    rotation = b_from_a[:3, :3].T
+    a_from_b = np.eye(4)
+    a_from_b[:3, :3] = rotation
+    a_from_b[:3, 3] = -rotation.dot(b_from_a[:3, 3])
+    return a_from_b
+
+
+def transform_points(b_from_a, points):
+    """Points (..., 3) given in frame a, in frame b."""
+    return np.asarray(points, float).dot(b_from_a[:3, :3].T) + b_from_a[:3, 3]
