@@ -1,0 +1,163 @@
+"""Read official YOLOv5 checkpoints (.pt, releases 5.0 to 7.0) without running anything that is in them.
+
+A checkpoint is a pickle of a whole `models.yolo.Model` in a zip archive, beside the raw bytes of its tensors. Here
+the pickle may name only what such a file needs: containers, tensors, and classes of YOLOv5 and torch.nn, of which
+inert stand-ins are made. No class is ever imported and nothing of torch is used, so that the file decides nothing but
+numbers, names and the layout of the network.
+"""
+import collections
+import pickle
+import zipfile
+from typing import Dict, List, NamedTuple
+
+import numpy as np
+
+EXPECTED = 'expected the checkpoint (.pt) of an official YOLOv5 detection model, release 5.0 to 7.0'
+# Modules whose classes become inert stand-ins: the model itself, and what training leaves in the file beside it.
+INERT_MODULES = ('models', 'utils', 'torch.nn', 'numpy', 'pathlib', 'datetime')
+MAX_CLASSES = 10000
+STORAGE_DTYPES = {'DoubleStorage': '<f8', 'FloatStorage': '<f4', 'HalfStorage': '<f2', 'LongStorage': '<i8',
+                  'IntStorage': '<i4', 'ShortStorage': '<i2', 'CharStorage': '<i1', 'ByteStorage': '<u1',
+                  'BoolStorage': '|b1'}
+
+
+class WeightsError(ValueError):
+    """Weights that cannot be used: says which file, why, and what was expected."""
+
+
+class Checkpoint(NamedTuple):
+    """What a checkpoint says: `layout`, its `yaml` (see `network.Network`), class `names` and `weights` by name."""
+
+    layout: dict
+    names: List[str]
+    weights: Dict[str, np.ndarray]
+
+
+def read_checkpoint(path):
+    """Read a checkpoint; runs no code from it and builds no class that it names.
+
+    Raises
+    ------
+    WeightsError
+        If the file is missing, damaged, not a YOLOv5 detection model, or names anything outside the allow-list.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            root = _Unpickler(archive).load()
+        return _checkpoint_from(root)
+    except FileNotFoundError:
+        raise WeightsError('weights %s: no such file; %s' % (path, EXPECTED))
+    except zipfile.BadZipFile as error:
+        raise WeightsError('weights %s: truncated, or not a checkpoint at all (%s); %s' % (path, error, EXPECTED))
+    except Exception as error:  # a damaged or hostile pickle can raise anything; it all means the same
+        raise WeightsError('weights %s: refused (%s); %s' % (path, error, EXPECTED))
+
+
+def is_torchscript(path):
+    """Whether a file is a TorchScript archive: a zip with constants beside the data."""
+    if not zipfile.is_zipfile(path):
+        return False
+    with zipfile.ZipFile(path) as archive:
+        return any(name.endswith('/constants.pkl') for name in archive.namelist())
+
+
+class Inert(object):
+    """Stands in for an object of a foreign class: keeps the state that was pickled, has no behaviour."""
+
+    def __new__(cls, *_args, **_kwargs):
+        instance = super(Inert, cls).__new__(cls)
+        instance.state = {}
+        return instance
+
+    def __setstate__(self, state):
+        self.state = state if isinstance(state, dict) else {}
+
+
+class _Unpickler(pickle.Unpickler):
+    """Unpickle the `data.pkl` of a torch zip archive with the allow-list of this module."""
+
+    def __init__(self, archive):
+        self._archive = archive
+        pickles = [name for name in archive.namelist() if name.split('/')[1:] == ['data.pkl']]
+        if len(pickles) != 1:
+            raise pickle.UnpicklingError('the archive holds no data.pkl')
+        self._folder = pickles[0].split('/')[0]
+        compressed = [info.filename for info in archive.infolist() if info.compress_type != zipfile.ZIP_STORED]
+        if compressed:  # torch never compresses; what unpacks to more than its file could fill the memory
+            raise pickle.UnpicklingError('%s is compressed' % compressed[0])
+        super(_Unpickler, self).__init__(archive.open(pickles[0]), encoding='utf-8')
+
+    def find_class(self, module, name):
+        """The stand-in for a name in the pickle. Nothing is imported."""
+        allowed = {('collections', 'OrderedDict'): collections.OrderedDict, ('__builtin__', 'set'): set,
+                   ('builtins', 'set'): set, ('torch', 'Size'): tuple,
+                   ('torch._utils', '_rebuild_tensor_v2'): self._tensor,
+                   ('torch._utils', '_rebuild_parameter'): self._parameter}
+        if (module, name) in allowed:
+            return allowed[module, name]
+        if module == 'torch' and name in STORAGE_DTYPES:
+            return STORAGE_DTYPES[name]
+        if any(module == inert or module.startswith(inert + '.') for inert in INERT_MODULES):
+            return type(name, (Inert,), {'origin': '%s.%s' % (module, name)})
+        raise pickle.UnpicklingError('it names %s.%s, which no such checkpoint needs' % (module, name))
+
+    def persistent_load(self, reference):
+        """The numbers of one storage, a flat array over the bytes in the archive."""
+        _kind, dtype, key, _device, _count = reference
+        return np.frombuffer(self._archive.read('%s/data/%s' % (self._folder, key)), dtype)
+
+    @staticmethod
+    def _tensor(storage, offset, size, stride, *_unused):
+        """A view of a storage; strides count elements."""
+        size, stride = [int(n) for n in size], [int(n) for n in stride]
+        last = offset + sum((n - 1) * step for n, step in zip(size, stride))
+        if min(size + stride + [offset]) < 0 or len(size) != len(stride) or (0 not in size and last >= storage.size):
+            raise pickle.UnpicklingError('a tensor reaches outside its data')
+        return np.lib.stride_tricks.as_strided(storage[offset:], size, [step * storage.itemsize for step in stride],
+                                               writeable=False)
+
+    @staticmethod
+    def _parameter(tensor, *_unused):
+        return tensor
+
+
+def _checkpoint_from(root):
+    """Find the model in an unpickled checkpoint: the averaged one where training kept one, as YOLOv5 does."""
+    model = (root.get('ema') or root.get('model')) if isinstance(root, dict) else None
+    origin = getattr(model, 'origin', type(model).__name__)
+    if origin not in ('models.yolo.Model', 'models.yolo.DetectionModel'):
+        raise ValueError('it holds %s, not models.yolo.Model or DetectionModel' % origin)
+    layout = model.state.get('yaml')
+    if not isinstance(layout, dict) or not isinstance(layout.get('nc'), int):
+        raise ValueError('the model carries no yaml to rebuild it from')
+    if not 0 < layout['nc'] <= MAX_CLASSES:
+        raise ValueError('the model has %d classes; 1 to %d expected' % (layout['nc'], MAX_CLASSES))
+    return Checkpoint(layout, class_names(model.state.get('names'), layout['nc']), _tensors(model))
+
+
+def class_names(names, count):
+    """Class names as a list, from the list or the {number: name} dict in a file.
+
+    Where a file carries no names, 80 classes are taken for COCO's, whose first is person; the others get numbers.
+    """
+    if isinstance(names, (list, tuple)):
+        names = dict(enumerate(names))
+    if not isinstance(names, dict):
+        names = {0: 'person'} if count == 80 else {}
+    return [str(names.get(number, number)) for number in range(count)]
+
+
+def _tensors(model):
+    """All parameters and buffers below an inert module, {name: array}, named as by torch's state_dict."""
+    tensors, seen, to_visit = {}, set(), [('', model)]
+    while to_visit:
+        prefix, module = to_visit.pop()
+        if id(module) in seen:  # modules form a tree but for shared activations, which hold no weights
+            continue
+        seen.add(id(module))
+        for kind in ('_parameters', '_buffers'):
+            tensors.update((prefix + name, tensor) for name, tensor in (module.state.get(kind) or {}).items()
+                           if tensor is not None)
+        to_visit.extend(('%s%s.' % (prefix, name), child)
+                        for name, child in (module.state.get('_modules') or {}).items())
+    return tensors

@@ -1,0 +1,252 @@
+"""The YOLOv5 network, built from the `yaml` inside a checkpoint.
+
+Architecture: YOLOv5 releases 5.0 (Focus, SPP) and 6.0 to 7.0 (Conv, SPPF), any width and depth, three or four output
+scales (P5, P6). Attributes are named as the weights in the checkpoints are, so that these load by name.
+Images are (batch, 3, height, width), RGB, 0..1; height and width multiples of `Network.stride`.
+"""
+import math
+
+import torch
+from torch import nn
+
+ACTIVATIONS = {'nn.SiLU()': nn.SiLU, 'nn.ReLU()': nn.ReLU, 'nn.Hardswish()': nn.Hardswish,
+               'nn.LeakyReLU(0.1)': lambda: nn.LeakyReLU(0.1)}
+# Bounds on what a layout may ask for; the largest official models (x, x6) stay below half of each.
+MAX_LAYERS, MAX_REPEATS, MAX_CHANNELS, MAX_KERNEL = 100, 50, 4096, 31
+
+
+class Conv(nn.Module):
+    """Convolution, batch normalisation, activation; the normalisation is folded into the convolution by `fuse`."""
+
+    def __init__(self, in_channels, out_channels, kernel=1, stride=1, padding=None):
+        super(Conv, self).__init__()
+        self.conv = nn.Conv2d(in_channels, out_channels, kernel, stride, kernel // 2 if padding is None else padding,
+                              bias=False)
+        self.bn = nn.BatchNorm2d(out_channels, eps=1e-3)
+        self.act = nn.SiLU()
+
+    def forward(self, x):
+        return self.act(self.bn(self.conv(x)))
+
+    def fuse(self):
+        """Fold the batch normalisation into the convolution. Only for evaluation."""
+        self.conv = nn.utils.fusion.fuse_conv_bn_eval(self.conv, self.bn)
+        self.bn = nn.Identity()
+
+
+class Focus(nn.Module):
+    """Every second pixel in each direction becomes a channel of its own, then Conv (release 5.0)."""
+
+    def __init__(self, in_channels, out_channels, kernel=1):
+        super(Focus, self).__init__()
+        self.conv = Conv(4 * in_channels, out_channels, kernel)
+
+    def forward(self, x):
+        return self.conv(torch.cat((x[..., ::2, ::2], x[..., 1::2, ::2], x[..., ::2, 1::2], x[..., 1::2, 1::2]), 1))
+
+
+class Bottleneck(nn.Module):
+    """Two convolutions with a shortcut around them."""
+
+    def __init__(self, channels, shortcut):
+        super(Bottleneck, self).__init__()
+        self.cv1 = Conv(channels, channels)
+        self.cv2 = Conv(channels, channels, 3)
+        self.shortcut = shortcut
+
+    def forward(self, x):
+        y = self.cv2(self.cv1(x))
+        return x + y if self.shortcut else y
+
+
+class C3(nn.Module):
+    """Cross stage partial block: half the channels through bottlenecks, half around them."""
+
+    def __init__(self, in_channels, out_channels, repeats, shortcut=True):
+        super(C3, self).__init__()
+        hidden = out_channels // 2
+        self.cv1 = Conv(in_channels, hidden)
+        self.cv2 = Conv(in_channels, hidden)
+        self.cv3 = Conv(2 * hidden, out_channels)
+        self.m = nn.Sequential(*[Bottleneck(hidden, shortcut) for _ in range(repeats)])
+
+    def forward(self, x):
+        return self.cv3(torch.cat((self.m(self.cv1(x)), self.cv2(x)), 1))
+
+
+class SPP(nn.Module):
+    """Spatial pyramid pooling: the input beside its maxima over windows of several sizes (release 5.0)."""
+
+    def __init__(self, in_channels, out_channels, kernels=(5, 9, 13)):
+        super(SPP, self).__init__()
+        hidden = in_channels // 2
+        self.cv1 = Conv(in_channels, hidden)
+        self.cv2 = Conv(hidden * (len(kernels) + 1), out_channels)
+        self.m = nn.ModuleList([nn.MaxPool2d(kernel, 1, kernel // 2) for kernel in kernels])
+
+    def forward(self, x):
+        x = self.cv1(x)
+        return self.cv2(torch.cat([x] + [pool(x) for pool in self.m], 1))
+
+
+class SPPF(nn.Module):
+    """Spatial pyramid pooling, fast: one small window applied again and again (releases 6.0 to 7.0)."""
+
+    def __init__(self, in_channels, out_channels, kernel=5):
+        super(SPPF, self).__init__()
+        hidden = in_channels // 2
+        self.cv1 = Conv(in_channels, hidden)
+        self.cv2 = Conv(4 * hidden, out_channels)
+        self.m = nn.MaxPool2d(kernel, 1, kernel // 2)
+
+    def forward(self, x):
+        levels = [self.cv1(x)]
+        for _ in range(3):
+            levels.append(self.m(levels[-1]))
+        return self.cv2(torch.cat(levels, 1))
+
+
+class Concat(nn.Module):
+    """Several inputs, one after the other along the channels."""
+
+    def forward(self, inputs):
+        return torch.cat(inputs, 1)
+
+
+class Detect(nn.Module):
+    """The output layer: boxes and scores at each cell, anchor and scale.
+
+    `anchors` (scales, anchors per scale, 2), width and height in cells, come with the weights.
+    """
+
+    def __init__(self, class_count, anchor_count, in_channels, strides):
+        super(Detect, self).__init__()
+        self.columns = class_count + 5
+        self.strides = strides
+        self.m = nn.ModuleList([nn.Conv2d(channels, anchor_count * self.columns, 1) for channels in in_channels])
+        self.register_buffer('anchors', torch.zeros(len(in_channels), anchor_count, 2))
+
+    def forward(self, inputs):
+        """(batch, rows, 5 + classes): x, y, width, height in pixels, objectness, class scores."""
+        return torch.cat([self._decode(scale, x) for scale, x in enumerate(inputs)], 1)
+
+    def _decode(self, scale, x):
+        stride, anchors = self.strides[scale], self.anchors[scale]
+        y = self.m[scale](x)
+        batch, _, height, width = y.shape
+        y = y.view(batch, len(anchors), self.columns, height, width).permute(0, 1, 3, 4, 2).sigmoid()
+        column = torch.arange(width, device=y.device, dtype=y.dtype).view(1, 1, 1, width)
+        row = torch.arange(height, device=y.device, dtype=y.dtype).view(1, 1, height, 1)
+        center_x = (y[..., 0] * 2 - 0.5 + column) * stride
+        center_y = (y[..., 1] * 2 - 0.5 + row) * stride
+        size = (y[..., 2:4] * 2) ** 2 * (anchors * stride).view(1, -1, 1, 1, 2)
+        y = torch.cat((center_x.unsqueeze(-1), center_y.unsqueeze(-1), size, y[..., 4:]), -1)
+        return y.view(batch, -1, self.columns)
+
+
+class Network(nn.Module):
+    """A YOLOv5 detection network.
+
+    Parameters
+    ----------
+    layout : dict
+        The `yaml` of a checkpoint: nc, anchors, depth_multiple, width_multiple, backbone and head, whose rows are
+        [inputs, repeats, layer, arguments].
+
+    Raises
+    ------
+    ValueError
+        If the layout asks for a layer or a size that no YOLOv5 release has.
+    """
+
+    def __init__(self, layout):
+        super(Network, self).__init__()
+        rows = list(layout['backbone']) + list(layout['head'])
+        if len(rows) > MAX_LAYERS:
+            raise ValueError('the layout has %d layers, more than %d' % (len(rows), MAX_LAYERS))
+        builder = _Builder(layout)
+        self.model = nn.ModuleList([builder.layer(*row) for row in rows])
+        self.inputs = [row[0] for row in rows]
+        if not isinstance(self.model[-1], Detect):
+            raise ValueError('the last layer is %s, not Detect' % rows[-1][2])
+        self.stride = max(self.model[-1].strides)
+
+    def forward(self, x):
+        outputs = []
+        for inputs, layer in zip(self.inputs, self.model):
+            x = layer([outputs[i] for i in inputs] if isinstance(inputs, list) else outputs[inputs] if outputs else x)
+            outputs.append(x)
+        return x
+
+    def fuse(self):
+        """Fold all batch normalisations and switch to evaluation. Returns self."""
+        self.eval()
+        for module in self.modules():
+            if isinstance(module, Conv):
+                module.fuse()
+        return self
+
+
+class _Builder(object):
+    """Build layer after layer, keeping the channels and the stride of each."""
+
+    def __init__(self, layout):
+        self._class_count = layout['nc']
+        anchors = layout['anchors']
+        self._anchor_count = len(anchors[0]) // 2 if isinstance(anchors, (list, tuple)) else int(anchors)
+        self._width, self._depth = float(layout['width_multiple']), float(layout['depth_multiple'])
+        activation = layout.get('activation') or 'nn.SiLU()'
+        if activation not in ACTIVATIONS:
+            raise ValueError('unknown activation %r' % (activation,))
+        self._activation = ACTIVATIONS[activation]
+        self._channels, self._strides = [], []
+
+    def layer(self, inputs, repeats, kind, arguments):
+        """The next layer; arguments as in the layout."""
+        first = inputs[0] if isinstance(inputs, list) else inputs
+        channels = self._channels[first] if self._channels else 3
+        stride = self._strides[first] if self._strides else 1
+        repeats = max(int(round(repeats * self._depth)), 1) if repeats > 1 else repeats
+        if repeats > MAX_REPEATS:
+            raise ValueError('%s is repeated %d times, more than %d' % (kind, repeats, MAX_REPEATS))
+        if kind in ('Conv', 'C3', 'SPP', 'SPPF', 'Focus'):
+            layer, channels, factor = self._block(kind, channels, repeats, list(arguments))
+        elif kind == 'nn.Upsample':
+            layer, factor = nn.Upsample(scale_factor=2, mode='nearest'), 0.5
+        elif kind == 'Concat':
+            layer, channels, factor = Concat(), sum(self._channels[i] for i in inputs), 1
+        elif kind == 'Detect':
+            strides = [int(self._strides[i]) for i in inputs]
+            layer, factor = Detect(self._class_count, self._anchor_count, [self._channels[i] for i in inputs],
+                                   strides), 1
+        else:
+            raise ValueError('unknown layer %r' % (kind,))
+        self._channels.append(channels)
+        self._strides.append(stride * factor)
+        return layer
+
+    def _block(self, kind, in_channels, repeats, arguments):
+        """A layer with weights, the channels it puts out, and the factor by which it shrinks the image."""
+        out_channels, rest = self._scaled(arguments[0]), arguments[1:]
+        if max([0] + [n for n in rest if isinstance(n, int)]) > MAX_KERNEL:
+            raise ValueError('%s asks for a kernel of %s' % (kind, rest))
+        make = {'Conv': Conv, 'SPP': SPP, 'SPPF': SPPF, 'Focus': Focus, 'C3': C3}[kind]
+        if kind == 'C3':
+            layers = [C3(in_channels, out_channels, repeats, *rest)]
+        else:
+            layers = [make(in_channels if i == 0 else out_channels, out_channels, *rest) for i in range(repeats)]
+        for layer in layers:
+            for module in layer.modules():
+                if isinstance(module, Conv):
+                    module.act = self._activation()
+        factor = {'Conv': rest[1] if len(rest) > 1 else 1, 'Focus': 2}.get(kind, 1)
+        return layers[0] if len(layers) == 1 else nn.Sequential(*layers), out_channels, factor
+
+    def _scaled(self, channels):
+        """Channels times the width multiple, rounded up to a multiple of 8, as YOLOv5 does."""
+        if channels == self._anchor_count * (self._class_count + 5):
+            return channels
+        scaled = int(math.ceil(channels * self._width / 8) * 8)
+        if not 0 < scaled <= MAX_CHANNELS:
+            raise ValueError('%d channels asked for, at most %d expected' % (scaled, MAX_CHANNELS))
+        return scaled

@@ -1,0 +1,191 @@
+"""Find objects in an image with YOLOv5: letterbox, network, decoding, non-maximum suppression.
+
+Convention: boxes are (x1, y1, x2, y2) in pixels of the image, x to the right, y down, x2 and y2 exclusive.
+"""
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+GREY = (114, 114, 114)  # the colour around letterboxed images that YOLOv5 is trained with
+MAX_CANDIDATES = 5000  # the best so many go into the suppression; its matrix grows with their square
+
+
+class DetectionParams(NamedTuple):
+    """What counts as a detection; see config/yolov5.yaml."""
+
+    classes: list = ('person',)
+    confidence: float = 0.25
+    iou: float = 0.45
+    max_det: int = 100
+    image_size: int = 640
+
+
+class Detections(NamedTuple):
+    """Boxes (n, 4) float pixels, scores (n,) 0..1 and class numbers (n,), best first."""
+
+    boxes: np.ndarray
+    scores: np.ndarray
+    classes: np.ndarray
+
+
+class Letterbox(NamedTuple):
+    """How an image was scaled and shifted into the network's input."""
+
+    scale: float
+    left: int
+    top: int
+
+    def undo(self, boxes, image_hw):
+        """Boxes of the input as boxes of the image, cut at its border."""
+        boxes = (boxes - np.array([self.left, self.top] * 2)) / self.scale
+        height, width = image_hw
+        return np.clip(boxes, 0, [width, height, width, height])
+
+
+class Yolov5(object):
+    """A YOLOv5 detector.
+
+    Parameters
+    ----------
+    runtime : callable
+        See `ros_3d_bb.detection.runtime`.
+    params : DetectionParams
+
+    Raises
+    ------
+    ValueError
+        If a class or a threshold does not exist in this model.
+    """
+
+    def __init__(self, runtime, params=DetectionParams()):
+        check_params(params)
+        self._runtime, self._params = runtime, params
+        self._classes = [class_number(entry, runtime.names) for entry in params.classes]
+        size = int(np.ceil(params.image_size / float(runtime.stride))) * runtime.stride
+        self._input_hw = runtime.input_hw or (size, size)
+        self._stride = runtime.stride if runtime.input_hw is None else None
+
+    @property
+    def names(self):
+        """Class names by number."""
+        return self._runtime.names
+
+    def warm_up(self):
+        """Run the network once on nothing: the first run takes several times as long as those after it."""
+        self._runtime(np.zeros((1, 3) + self._input_hw, np.float32))
+
+    def detect(self, image):
+        """Find objects in an RGB image (height, width, 3), uint8.
+
+        Returns
+        -------
+        Detections
+        """
+        batch, letterbox = letterboxed(image, self._input_hw, self._stride)
+        rows = self._runtime(batch)
+        found = suppressed(decoded(rows, self._params.confidence, self._classes), self._params.iou,
+                           self._params.max_det)
+        return found._replace(boxes=letterbox.undo(found.boxes, image.shape[:2]))
+
+
+def check_params(params):
+    """Raise ValueError, naming the value, where a threshold or a size makes no sense."""
+    for name in ('confidence', 'iou'):
+        if not 0 <= getattr(params, name) <= 1:
+            raise ValueError('%s is %g; 0 to 1 expected' % (name, getattr(params, name)))
+    for name in ('max_det', 'image_size'):
+        if getattr(params, name) < 1:
+            raise ValueError('%s is %d; at least 1 expected' % (name, getattr(params, name)))
+
+
+def class_number(entry, names):
+    """The number of a class given by name or number."""
+    if entry in names:
+        return names.index(entry)
+    if str(entry).isdigit() and int(entry) < len(names):
+        return int(entry)
+    raise ValueError('class %r is not one of this model\'s %d: %s' % (entry, len(names), ', '.join(names)))
+
+
+def letterboxed(image, input_hw, stride=None):
+    """Scale an image into the network's input, keeping its proportions.
+
+    Parameters
+    ----------
+    image : numpy.ndarray, (height, width, 3), uint8, RGB
+    input_hw : (int, int)
+        Largest size of the input.
+    stride : int, optional
+        Where given, the padding is cut to the next multiple of it: a 640x480 image stays 640x480.
+
+    Returns
+    -------
+    batch : numpy.ndarray, (1, 3, height, width), float32, 0..1
+    letterbox : Letterbox
+    """
+    height, width = image.shape[:2]
+    scale = min(input_hw[0] / float(height), input_hw[1] / float(width))
+    scaled_hw = max(int(round(height * scale)), 1), max(int(round(width * scale)), 1)
+    if scaled_hw != (height, width):
+        image = cv2.resize(image, scaled_hw[::-1], interpolation=cv2.INTER_LINEAR)
+    pad_y, pad_x = (outer - inner for outer, inner in zip(input_hw, scaled_hw))
+    if stride is not None:
+        pad_y, pad_x = pad_y % stride, pad_x % stride
+    top, left = pad_y // 2, pad_x // 2
+    if pad_x or pad_y:
+        image = cv2.copyMakeBorder(image, top, pad_y - top, left, pad_x - left, cv2.BORDER_CONSTANT, value=GREY)
+    batch = np.ascontiguousarray(image.transpose(2, 0, 1)[None], np.float32)
+    batch /= 255
+    return batch, Letterbox(scale, left, top)
+
+
+def decoded(rows, confidence, classes):
+    """The predictions whose best class is one of `classes` with a score above `confidence`.
+
+    Parameters
+    ----------
+    rows : numpy.ndarray, (n, 5 + classes)
+        x, y, width, height, objectness, class scores, as the network puts them out.
+
+    Returns
+    -------
+    Detections
+        Best first; boxes in pixels of the network's input.
+    """
+    rows = rows[rows[:, 4] > confidence]
+    best = rows[:, 5:].argmax(axis=1)
+    scores = rows[np.arange(len(rows)), 5 + best] * rows[:, 4]
+    keep = (scores > confidence) & np.isin(best, classes) & np.isfinite(rows[:, :4]).all(axis=1)
+    rows, scores, best = rows[keep], scores[keep], best[keep]
+    order = np.argsort(-scores, kind='stable')[:MAX_CANDIDATES]
+    center, half = rows[order, :2], rows[order, 2:4] / 2
+    return Detections(np.hstack((center - half, center + half)), scores[order], best[order])
+
+
+def suppressed(detections, iou_limit, max_det):
+    """Non-maximum suppression: of boxes of one class that overlap by more than `iou_limit`, the best stays.
+
+    Parameters
+    ----------
+    detections : Detections
+        Best first.
+    """
+    boxes, kept = detections.boxes, []
+    alive = np.ones(len(boxes), bool)
+    while alive.any() and len(kept) < max_det:
+        best = int(alive.argmax())
+        kept.append(best)
+        rivals = alive & (detections.classes == detections.classes[best])
+        rivals[rivals] = iou(boxes[best], boxes[rivals]) > iou_limit
+        alive &= ~rivals
+        alive[best] = False
+    return Detections(*(column[kept] for column in detections))
+
+
+def iou(box, boxes):
+    """Intersection over union of one box (4,) with each of boxes (n, 4); 0 where both are empty."""
+    overlap = np.minimum(box[2:], boxes[:, 2:]) - np.maximum(box[:2], boxes[:, :2])
+    intersection = np.clip(overlap, 0, None).prod(axis=1)
+    union = (box[2:] - box[:2]).prod() + (boxes[:, 2:] - boxes[:, :2]).prod(axis=1) - intersection
+    return np.divide(intersection, union, out=np.zeros_like(intersection), where=union > 0)
