@@ -1,0 +1,30 @@
+"""Which detection belongs to which track."""
+import numpy as np
+
+
+def match_greedily(distances):
+    """Pair rows with columns, nearest pair first, each at most once (thesis 3.6).
+
+    Parameters
+    ----------
+    distances : array_like, (n, m)
+
+    Returns
+    -------
+    list of (int, int)
+        min(n, m) pairs (row, column), nearest first; ties by row, then column.
+    """
+    distances = np.asarray(distances, float)
+    pairs, rows, columns = [], set(), set()
+    for row, column in zip(*np.unravel_index(np.argsort(distances, axis=None, kind='stable'), distances.shape)):
+        if row not in rows and column not in columns:
+            pairs.append((int(row), int(column)))
+            rows.add(row)
+            columns.add(column)
+    return pairs
+
+
+def plane_distances(positions, others):
+    """Distances (n, m) between points (n, 3) and (m, 3) seen from above, in the x-y plane, metres."""
+    difference = np.asarray(positions, float)[:, None, :2] - np.asarray(others, float)[None, :, :2]
+    return np.linalg.norm(difference, axis=2)

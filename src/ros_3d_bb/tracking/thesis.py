@@ -1,0 +1,136 @@
+"""The thesis' tracker (3.6): greedy nearest neighbour, smoothed velocity, straight prediction.
+
+Kept from the thesis: matching in the plane seen from above, closest pair first and without a gate; an object that is
+not matched stays where it was and is deleted after a limit; an exponential moving average of the velocity, which
+starts at zero; a prediction along the averaged velocity. Mended: velocities are metres per second by the stamps of the
+images, where the original counted frames; the limit is in seconds; time without an answer (no transform) ages nobody.
+"""
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.association import match_greedily, plane_distances
+from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject
+
+
+class ThesisTrackerParams(NamedTuple):
+    """`alpha` weighs the newest velocity, 0..1; `moving_speed` in m/s; the rest in seconds."""
+
+    alpha: float = 0.2
+    disappearance_limit: float = 1.0
+    prediction_time: float = 2.0
+    prediction_step: float = 0.25
+    moving_speed: float = 0.2
+
+
+class _Track(object):
+    """One object between its images."""
+
+    def __init__(self, track_id, stamp_ns, detection):
+        self.id = track_id
+        self.first_seen_ns = self.last_seen_ns = stamp_ns
+        self.unseen_ns = 0
+        self.position_m, self.size_m = detection.position_m, detection.size_m
+        self.velocity_mps = self.instant_velocity_mps = np.zeros(3)
+
+    def update(self, stamp_ns, detection, alpha):
+        """Move to where the object was seen."""
+        elapsed_s = (stamp_ns - self.last_seen_ns) / float(NS)
+        self.instant_velocity_mps = (detection.position_m - self.position_m) / elapsed_s
+        self.velocity_mps = alpha * self.instant_velocity_mps + (1 - alpha) * self.velocity_mps
+        self.position_m, self.size_m = detection.position_m, detection.size_m
+        self.last_seen_ns, self.unseen_ns = stamp_ns, 0
+
+
+class ThesisTracker(object):
+    """Tracks objects from image to image.
+
+    Call `update` with the detections of each image in the order of their stamps, `skip` for an image whose detections
+    could not be used, `reset` where time jumped.
+
+    Raises
+    ------
+    ValueError
+        If a parameter makes no sense; names it.
+    """
+
+    def __init__(self, params=ThesisTrackerParams()):
+        _check(params)
+        self._params = params
+        self._tracks = []
+        self._last_id = 0
+        self._now_ns = None
+
+    def update(self, stamp_ns, detections):
+        """Take the detections of one image.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Stamp of the image, later than that of the image before.
+        detections : list of Detection
+
+        Returns
+        -------
+        list of TrackedObject
+            By id.
+
+        Raises
+        ------
+        ValueError
+            If the stamp is not later; nothing changes then.
+        """
+        elapsed_ns = self._advance(stamp_ns)
+        pairs = []
+        if self._tracks and detections:
+            pairs = match_greedily(plane_distances([track.position_m for track in self._tracks],
+                                                   [detection.position_m for detection in detections]))
+        for track in self._tracks:
+            track.unseen_ns += elapsed_ns
+        for row, column in pairs:
+            self._tracks[row].update(stamp_ns, detections[column], self._params.alpha)
+        limit_ns = self._params.disappearance_limit * NS
+        self._tracks = [track for track in self._tracks if track.unseen_ns <= limit_ns]
+        matched = set(column for _row, column in pairs)
+        for column, detection in enumerate(detections):
+            if column not in matched:
+                self._last_id += 1
+                self._tracks.append(_Track(self._last_id, stamp_ns, detection))
+        return [self._published(track) for track in self._tracks]
+
+    def skip(self, stamp_ns):
+        """Let an image pass whose detections could not be used: nobody ages. Raises ValueError as `update`."""
+        self._advance(stamp_ns)
+
+    def reset(self):
+        """Forget all tracks, as after a jump in time. Numbers are not used again."""
+        self._tracks, self._now_ns = [], None
+
+    def _advance(self, stamp_ns):
+        """Nanoseconds since the image before, 0 for the first."""
+        elapsed_ns = stamp_ns - self._now_ns if self._now_ns is not None else 0
+        if self._now_ns is not None and elapsed_ns <= 0:
+            raise ValueError('stamp %.9f is not later than the last, %.9f' % (stamp_ns / NS, self._now_ns / NS))
+        self._now_ns = stamp_ns
+        return elapsed_ns
+
+    def _published(self, track):
+        params = self._params
+        steps = int(round(params.prediction_time / params.prediction_step))
+        times_s = params.prediction_step * np.arange(1, steps + 1)
+        return TrackedObject(
+            track.id, track.position_m, track.size_m, track.velocity_mps, track.instant_velocity_mps,
+            OCCLUDED if track.unseen_ns else VISIBLE, bool(np.linalg.norm(track.velocity_mps) >= params.moving_speed),
+            track.first_seen_ns, track.last_seen_ns, track.position_m + times_s[:, None] * track.velocity_mps,
+            params.prediction_step)
+
+
+def _check(params):
+    if not 0 < params.alpha <= 1:
+        raise ValueError('alpha is %g; more than 0 and at most 1 expected' % params.alpha)
+    for name in ('disappearance_limit', 'prediction_time', 'moving_speed'):
+        if not getattr(params, name) >= 0:
+            raise ValueError('%s is %g; 0 or more expected' % (name, getattr(params, name)))
+    if not params.prediction_step > 0:
+        raise ValueError('prediction_step is %g; more than 0 expected' % params.prediction_step)
