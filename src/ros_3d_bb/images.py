@@ -1,0 +1,101 @@
+"""Between sensor_msgs/Image and numpy, without copying where the layout allows it.
+
+Done here rather than with cv_bridge: its Python 3 build does not exist on Melodic, and it trusts the message's size.
+The functions take and fill any object with the fields of sensor_msgs/Image and import no ROS.
+"""
+import numpy as np
+
+from ros_3d_bb.estimation import DepthImage
+
+# encoding: (dtype without byte order, channels)
+LAYOUTS = {'rgb8': ('u1', 3), 'bgr8': ('u1', 3), 'rgba8': ('u1', 4), 'bgra8': ('u1', 4), 'mono8': ('u1', 1),
+           '8UC1': ('u1', 1), '8UC3': ('u1', 3), '16UC1': ('u2', 1), 'mono16': ('u2', 1), '32FC1': ('f4', 1)}
+COLOR_ENCODINGS = ('rgb8', 'bgr8', 'rgba8', 'bgra8', 'mono8', '8UC1', '8UC3')
+# REP 118: depth is millimetres in 16UC1 (Gazebo and some drivers call it mono16) and metres in 32FC1.
+DEPTH_SCALES = {'16UC1': 0.001, 'mono16': 0.001, '32FC1': 1.0}
+
+
+def array_from(message):
+    """The pixels of an image message, a read-only view of its data with its own row step and byte order.
+
+    Returns
+    -------
+    numpy.ndarray, (height, width) or (height, width, channels)
+
+    Raises
+    ------
+    ValueError
+        If the encoding is unknown, the size zero, or the data shorter than the size says.
+    """
+    if message.encoding not in LAYOUTS:
+        raise ValueError('image encoding %r is unknown; expected one of %s' % (message.encoding, ', '.join(LAYOUTS)))
+    kind, channels = LAYOUTS[message.encoding]
+    dtype = np.dtype(('>' if message.is_bigendian else '<') + kind)
+    row_bytes = message.width * channels * dtype.itemsize
+    if row_bytes == 0 or message.height == 0:
+        raise ValueError('image is empty: %d x %d pixels' % (message.width, message.height))
+    if message.step < row_bytes or len(message.data) < message.step * (message.height - 1) + row_bytes:
+        raise ValueError('image data is too short: %d bytes in rows of %d, for %d x %d pixels of %s'
+                         % (len(message.data), message.step, message.width, message.height, message.encoding))
+    pixel_bytes = channels * dtype.itemsize
+    pixels = np.ndarray((message.height, message.width, channels), dtype, buffer=message.data,
+                        strides=(message.step, pixel_bytes, dtype.itemsize))
+    return pixels[..., 0] if channels == 1 else pixels
+
+
+def rgb_from(message):
+    """The pixels of a colour image message as RGB, (height, width, 3), uint8; a view where the encoding allows it.
+
+    Raises
+    ------
+    ValueError
+        As `array_from`, and if the encoding is not a colour or grey one.
+    """
+    if message.encoding not in COLOR_ENCODINGS:
+        raise ValueError('colour image has encoding %r; expected one of %s'
+                         % (message.encoding, ', '.join(COLOR_ENCODINGS)))
+    pixels = array_from(message)
+    if pixels.ndim == 2:
+        return np.repeat(pixels[..., None], 3, axis=2)
+    return pixels[..., 2::-1] if message.encoding in ('bgr8', 'bgra8', '8UC3') else pixels[..., :3]
+
+
+def depth_from(message, scale_m=None):
+    """The depth image in an image message.
+
+    Parameters
+    ----------
+    scale_m : float, optional
+        Metres per unit, where the camera does not follow REP 118 (16UC1: millimetres, 32FC1: metres).
+
+    Returns
+    -------
+    DepthImage
+
+    Raises
+    ------
+    ValueError
+        As `array_from`, and if the encoding is not one of depth.
+    """
+    if message.encoding not in DEPTH_SCALES:
+        raise ValueError('depth image has encoding %r; expected one of %s'
+                         % (message.encoding, ', '.join(DEPTH_SCALES)))
+    return DepthImage(array_from(message), scale_m or DEPTH_SCALES[message.encoding])
+
+
+def fill_image(message, pixels, encoding):
+    """Put pixels (height, width[, channels]) into an image message; its header is left alone. Returns the message.
+
+    Raises
+    ------
+    ValueError
+        If the pixels do not have the encoding's type and channels.
+    """
+    kind, channels = LAYOUTS[encoding]
+    if pixels.dtype.newbyteorder('=') != np.dtype(kind) or pixels.shape[2:] != ((channels,) if channels > 1 else ()):
+        raise ValueError('pixels of type %s and shape %s are not %s' % (pixels.dtype, pixels.shape, encoding))
+    message.height, message.width = pixels.shape[:2]
+    message.encoding, message.is_bigendian = encoding, 0
+    message.step = message.width * channels * pixels.dtype.itemsize
+    message.data = np.ascontiguousarray(pixels, pixels.dtype.newbyteorder('<')).tobytes()
+    return message

@@ -1,0 +1,177 @@
+"""Between ROS messages and the types of this package."""
+from typing import NamedTuple, Optional
+
+import genpy
+import numpy as np
+from geometry_msgs.msg import PoseWithCovariance
+from std_msgs.msg import Int32MultiArray, MultiArrayDimension
+
+from ros_3d_bb.geometry import Camera, transform_from, transform_points
+from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.tracked import Detection
+
+MAX_BOXES = 1000  # more in one image are a fault of their sender, and would stall the pipeline
+
+
+class Boxes2D(NamedTuple):
+    """The 2D boxes of one image: (n, 4) integer pixels x1, y1, x2, y2, and the stamp and frame of the image.
+
+    `stamp_ns` is None in a plain array, which does not say what image it belongs to.
+    """
+
+    boxes: np.ndarray
+    stamp_ns: Optional[int]
+    frame_id: str
+
+
+def time_from(stamp_ns):
+    """A ROS time of integer nanoseconds."""
+    return genpy.Time(*divmod(stamp_ns, NS))
+
+
+def stamp_of(message):
+    """The stamp of a message, integer nanoseconds.
+
+    Raises
+    ------
+    ValueError
+        If it is zero: such a message cannot be paired or transformed.
+    """
+    stamp_ns = message.header.stamp.to_nsec()
+    if stamp_ns == 0:
+        raise ValueError('the %s of frame %r carries no stamp (zero)' % (type(message).__name__,
+                                                                         message.header.frame_id))
+    return stamp_ns
+
+
+def boxes2d_to_message(boxes, header):
+    """2D boxes as std_msgs/Int32MultiArray, with the stamp and frame of their image in the layout.
+
+    Parameters
+    ----------
+    boxes : numpy.ndarray, (n, 4)
+        Rounded to whole pixels here.
+    header : std_msgs.msg.Header
+        Of the image.
+    """
+    message = Int32MultiArray(data=np.rint(boxes).astype(int).ravel().tolist())
+    label = 'boxes;stamp=%d.%09d;frame=%s' % (header.stamp.secs, header.stamp.nsecs, header.frame_id)
+    message.layout.dim = [MultiArrayDimension(label=label, size=len(boxes), stride=4 * len(boxes)),
+                          MultiArrayDimension(label='x1 y1 x2 y2', size=4, stride=4)]
+    return message
+
+
+def boxes2d_from_message(message):
+    """The 2D boxes in an Int32MultiArray, with or without a stamp in its layout.
+
+    Raises
+    ------
+    ValueError
+        If the length is not a multiple of 4, there are too many boxes, or the label carries a damaged stamp.
+    """
+    if len(message.data) % 4:
+        raise ValueError('2D boxes have %d numbers; a multiple of 4 expected (x1 y1 x2 y2 each)' % len(message.data))
+    if len(message.data) > 4 * MAX_BOXES:
+        raise ValueError('%d 2D boxes in one image; at most %d expected' % (len(message.data) // 4, MAX_BOXES))
+    boxes = np.array(message.data, np.int64).reshape(-1, 4)
+    label = message.layout.dim[0].label if message.layout.dim else ''
+    fields = dict(field.partition('=')[::2] for field in label.split(';', 2))
+    if 'stamp' not in fields:
+        return Boxes2D(boxes, None, '')
+    secs, _dot, nsecs = fields['stamp'].partition('.')
+    if not (secs.isdigit() and nsecs.isdigit() and len(nsecs) == 9):
+        raise ValueError('2D boxes carry the label %r; boxes;stamp=<secs>.<nsecs, 9 digits>;frame=<frame_id> expected'
+                         % label)
+    return Boxes2D(boxes, int(secs) * NS + int(nsecs), fields.get('frame', ''))
+
+
+def camera_from_message(message):
+    """The intrinsics in a sensor_msgs/CameraInfo.
+
+    Raises
+    ------
+    ValueError
+        If they are not usable: an uncalibrated camera has zeros there.
+    """
+    return Camera(message.width, message.height, message.K[0], message.K[4], message.K[2], message.K[5])
+
+
+def transform_from_message(message):
+    """The 4x4 matrix of a geometry_msgs/TransformStamped: header.frame_id from child_frame_id."""
+    translation, rotation = message.transform.translation, message.transform.rotation
+    return transform_from((translation.x, translation.y, translation.z),
+                          (rotation.x, rotation.y, rotation.z, rotation.w))
+
+
+def boxes3d_to_message(boxes, header, camera):
+    """3D boxes (`estimation.Box3D`) as BoundingBox3DArray."""
+    return BoundingBox3DArray(header=header, boxes=[_box3d_to_message(box, camera) for box in boxes])
+
+
+def _box3d_to_message(box, camera):
+    message = BoundingBox3D(support=box.support, truncated=box.truncated)
+    _set_xyz(message.center.position, box.center_m)
+    message.center.orientation.w = 1.0
+    _set_xyz(message.size, box.size_m)
+    x1, x2 = (min(max(edge, 0), camera.width) for edge in box.rect_px[::2])
+    y1, y2 = (min(max(edge, 0), camera.height) for edge in box.rect_px[1::2])
+    message.roi.x_offset, message.roi.width = x1, x2 - x1
+    message.roi.y_offset, message.roi.height = y1, y2 - y1
+    return message
+
+
+def detections_from_message(message, fixed_from_camera):
+    """The 3D boxes in a BoundingBox3DArray as detections in the fixed frame.
+
+    Parameters
+    ----------
+    fixed_from_camera : numpy.ndarray, (4, 4)
+
+    Returns
+    -------
+    list of Detection
+
+    Raises
+    ------
+    ValueError
+        If a centre is not finite or a size not positive.
+    """
+    detections = []
+    for number, box in enumerate(message.boxes):
+        center, size = box.center.position, box.size
+        values = np.array([center.x, center.y, center.z, size.x, size.y])
+        if not (np.isfinite(values).all() and (values[3:] > 0).all()):
+            raise ValueError('3D box %d has centre (%g, %g, %g) and size (%g, %g); finite and positive expected'
+                             % ((number,) + tuple(values)))
+        detections.append(Detection(transform_points(fixed_from_camera, values[:3]),
+                                    np.array([size.x, size.x, size.y])))
+    return detections
+
+
+def tracks_to_message(tracks, header):
+    """Tracks (`tracked.TrackedObject`) as TrackedObjectArray."""
+    return TrackedObjectArray(header=header, objects=[_track_to_message(track) for track in tracks])
+
+
+def _track_to_message(track):
+    message = TrackedObject(id=track.id, status=track.status, moving=track.moving)
+    message.pose = _pose_at(track.position_m)
+    _set_xyz(message.twist.twist.linear, track.velocity_mps)
+    _set_xyz(message.size, track.size_m)
+    message.first_seen, message.last_seen = time_from(track.first_seen_ns), time_from(track.last_seen_ns)
+    message.prediction = [_pose_at(position_m) for position_m in track.prediction_m]
+    message.prediction_step = genpy.Duration.from_sec(track.prediction_step_s)
+    return message
+
+
+def _pose_at(position_m):
+    """A pose without orientation and of unknown covariance."""
+    pose = PoseWithCovariance()
+    _set_xyz(pose.pose.position, position_m)
+    pose.pose.orientation.w = 1.0
+    return pose
+
+
+def _set_xyz(message, values):
+    message.x, message.y, message.z = (float(value) for value in values)

@@ -1,0 +1,158 @@
+"""The node that lifts 2D boxes into space with the depth image they belong to."""
+import threading
+import time
+from typing import NamedTuple
+
+import rospy
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header, Int32MultiArray
+
+from ros_3d_bb.estimation import estimate_median, sample_median
+from ros_3d_bb.images import depth_from
+from ros_3d_bb.messages import boxes2d_from_message, boxes3d_to_message, camera_from_message, stamp_of, time_from
+from ros_3d_bb.msg import BoundingBox3DArray
+from ros_3d_bb.nodes.diagnostics import Diagnostics
+from ros_3d_bb.nodes.sample_images import SampleImages
+from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.stamped import NS, Pairing, StampedCache
+
+DEPTH_TOPIC = 'camera/aligned_depth_to_color/image_raw'
+CAMERA_INFO_TOPIC = 'camera/color/camera_info'
+
+
+class Bbox3dParams(NamedTuple):
+    """See config/bbox3d.yaml."""
+
+    estimator: str = 'median'
+    stride: int = 20
+    depth_scale: float = 0.0
+    frame_id: str = ''
+    cache_length: float = 1.0
+    stamp_tolerance: float = 0.005
+    assumed_delay: float = 0.05
+    depth_image_range: float = 6.0
+
+
+class Bbox3dNode(object):
+    """Lift 2D boxes into the camera's optical frame.
+
+    Subscribes: camera/aligned_depth_to_color/image_raw, camera/color/camera_info, yolo_bounding_box.
+    Publishes: ros_3d_bb/bb_3d, with the stamp of the image that the boxes were found in; images to look at (see
+    `SampleImages`) while somebody subscribes. Parameters: config/bbox3d.yaml.
+    """
+
+    def __init__(self):
+        self._params, = read_params(Bbox3dParams)
+        _check(self._params)
+        cache_ns, tolerance_ns, delay_ns = (int(seconds * NS) for seconds in (
+            self._params.cache_length, self._params.stamp_tolerance, self._params.assumed_delay))
+        self._pairing = Pairing(cache_ns, tolerance_ns, delay_ns)
+        self._cameras = StampedCache(cache_ns)
+        self._lock = threading.Lock()
+        self._diagnostics = Diagnostics()
+        self._boxes_pub = rospy.Publisher('ros_3d_bb/bb_3d', BoundingBox3DArray, queue_size=10)
+        self._images = SampleImages(cache_ns, self._params.stride, self._params.depth_image_range)
+        # Each depth image is kept for boxes that may come for it later, so none may be dropped on the way.
+        rospy.Subscriber(DEPTH_TOPIC, Image, self._on_depth, queue_size=10, buff_size=2 ** 24)
+        rospy.Subscriber(CAMERA_INFO_TOPIC, CameraInfo, self._on_camera_info, queue_size=10)
+        rospy.Subscriber('yolo_bounding_box', Int32MultiArray, self._on_boxes, queue_size=10)
+
+    def _on_camera_info(self, message):
+        try:
+            camera = camera_from_message(message)
+        except ValueError as error:
+            self._diagnostics.warn('camera_info refused', 'camera_info refused: %s; waiting for the next' % error)
+            return
+        if any(message.D):
+            rospy.logwarn_once('camera_info of %s carries lens distortion %s, which is not corrected: positions near '
+                               'the image border will be off', message.header.frame_id, message.D)
+        with self._lock:
+            self._cameras.add(message.header.stamp.to_nsec(), _clock_ns(), camera)
+
+    def _on_depth(self, message):
+        try:
+            stamp_ns = stamp_of(message)
+        except ValueError as error:
+            self._diagnostics.warn('depth images refused', 'depth image refused: %s; waiting for the next' % error)
+            return
+        with self._lock:
+            self._lift(self._pairing.add_depth(stamp_ns, _clock_ns(), message))
+
+    def _on_boxes(self, message):
+        try:
+            boxes = boxes2d_from_message(message)
+        except ValueError as error:
+            self._diagnostics.warn('2D boxes refused', '2D boxes refused: %s; waiting for the next' % error)
+            return
+        if boxes.stamp_ns is None:
+            rospy.loginfo_once('the 2D boxes carry no stamp: each array is paired with the depth image that came '
+                               'nearest to %.3f s before it (~assumed_delay)', self._params.assumed_delay)
+        with self._lock:
+            self._lift(self._pairing.add_boxes(boxes.stamp_ns, _clock_ns(), boxes))
+
+    def _lift(self, pairs):
+        """Publish the 3D boxes of arrays of 2D boxes, each with the depth image that belongs to it."""
+        for entry, boxes in pairs:
+            try:
+                depth, camera = self._depth_and_camera(entry, boxes)
+            except ValueError as error:
+                self._diagnostics.warn('2D boxes dropped', '2D boxes dropped: %s; waiting for the next' % error)
+                continue
+            found = [self._box3d(depth, tuple(rect), camera) for rect in boxes.boxes.tolist()]
+            found = [box for box in found if box is not None]
+            header = Header(stamp=time_from(entry.stamp_ns if boxes.stamp_ns is None else boxes.stamp_ns),
+                            frame_id=self._params.frame_id or entry.value.header.frame_id)
+            self._boxes_pub.publish(boxes3d_to_message(found, header, camera))
+            self._images.publish(header, depth, found)
+            self._diagnostics.count('images lifted')
+
+    def _box3d(self, depth, rect_px, camera):
+        """The 3D box of one rectangle, None where the rectangle is unusable or shows no depth."""
+        try:
+            box = estimate_median(sample_median(depth, rect_px, self._params.stride), rect_px, camera)
+        except ValueError as error:
+            self._diagnostics.warn('2D boxes refused', '2D %s; the others in this image are used' % error)
+            return None
+        self._diagnostics.count('boxes without depth' if box is None else 'boxes lifted')
+        return box
+
+    def _depth_and_camera(self, entry, boxes):
+        """The depth image that belongs to the boxes, and the intrinsics that came with it, or else the nearest."""
+        if entry is None:
+            raise ValueError(self._why_no_depth(boxes))
+        depth = depth_from(entry.value, self._params.depth_scale)
+        camera = self._cameras.at(entry.stamp_ns, float('inf'))
+        if camera is None:
+            raise ValueError('no camera_info has come on %s' % rospy.resolve_name(CAMERA_INFO_TOPIC))
+        if depth.values.shape != (camera.value.height, camera.value.width):
+            raise ValueError('the depth image has %d x %d pixels, the colour camera %d x %d; depth must be aligned to '
+                             'colour (realsense2_camera: align_depth:=true)'
+                             % (depth.values.shape[::-1] + camera.value[:2]))
+        return depth, camera.value
+
+    def _why_no_depth(self, boxes):
+        newest_ns = self._pairing.newest_ns
+        if newest_ns is None or boxes.stamp_ns is None:
+            return 'no depth image has come on %s' % rospy.resolve_name(DEPTH_TOPIC)
+        return ('no depth image has their stamp %.3f; the newest has %.3f, and %.1f s are kept (~cache_length)'
+                % (boxes.stamp_ns / NS, newest_ns / NS, self._params.cache_length))
+
+
+def _clock_ns():
+    """The machine's clock: tells how long something took, whatever /clock does; never a stamp."""
+    return int(time.monotonic() * NS)
+
+
+def _check(params):
+    if params.estimator != 'median':
+        raise ValueError('parameter ~estimator is %r; median expected' % params.estimator)
+    if params.stride < 1:
+        raise ValueError('parameter ~stride is %d; at least 1 expected' % params.stride)
+    for name in ('depth_scale', 'cache_length', 'stamp_tolerance', 'assumed_delay', 'depth_image_range'):
+        if not 0 <= getattr(params, name) < 1e6:
+            raise ValueError('parameter ~%s is %g; 0 or more expected' % (name, getattr(params, name)))
+
+
+def main():
+    """Run the node."""
+    run_node('bbox3d_node', Bbox3dNode)

@@ -1,0 +1,57 @@
+"""Images of what bbox3d_node works on, made only while somebody looks at them."""
+import rospy
+from sensor_msgs.msg import Image
+
+from ros_3d_bb.estimation import sample_median
+from ros_3d_bb.images import fill_image, rgb_from
+from ros_3d_bb.messages import stamp_of
+from ros_3d_bb.overlay import draw_boxes, draw_samples, visible_depth
+from ros_3d_bb.stamped import StampedCache
+
+
+class SampleImages(object):
+    """Publishes ros_3d_bb/raw (the colour image), ros_3d_bb/color (with boxes and samples, thesis Fig. 3.5) and
+    ros_3d_bb/depth (as grey). Subscribes camera/color/image_raw only while one of the first two is subscribed.
+    """
+
+    def __init__(self, cache_ns, stride_px, depth_range_m):
+        self._cache_ns, self._stride_px, self._depth_range_m = cache_ns, stride_px, depth_range_m
+        self._raw_pub, self._color_pub, self._depth_pub = (
+            rospy.Publisher('ros_3d_bb/' + name, Image, queue_size=1) for name in ('raw', 'color', 'depth'))
+        self._colors, self._subscriber = None, None
+
+    def publish(self, header, depth, boxes):
+        """Publish the images of one set of 3D boxes, as far as somebody subscribes."""
+        self._follow_subscribers()
+        if self._depth_pub.get_num_connections():
+            grey = visible_depth(depth, self._depth_range_m)
+            self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))
+        color = self._colors.at(header.stamp.to_nsec()) if self._colors is not None else None
+        if color is None:
+            return
+        if self._raw_pub.get_num_connections():
+            self._raw_pub.publish(color.value)
+        if self._color_pub.get_num_connections():
+            self._color_pub.publish(fill_image(Image(header=header), self._drawn(color.value, depth, boxes), 'rgb8'))
+
+    def _drawn(self, color_message, depth, boxes):
+        image = draw_boxes(rgb_from(color_message).copy(), [box.rect_px for box in boxes],
+                           ['%.2f m' % box.center_m[2] for box in boxes])
+        for box in boxes:
+            draw_samples(image, box.rect_px, sample_median(depth, box.rect_px, self._stride_px))
+        return image
+
+    def _follow_subscribers(self):
+        wanted = self._raw_pub.get_num_connections() or self._color_pub.get_num_connections()
+        if wanted and self._subscriber is None:
+            self._colors = StampedCache(self._cache_ns)
+            self._subscriber = rospy.Subscriber('camera/color/image_raw', Image, self._on_color, queue_size=10,
+                                                buff_size=2 ** 24)
+        elif not wanted and self._subscriber is not None:
+            self._subscriber.unregister()
+            self._subscriber, self._colors = None, None
+
+    def _on_color(self, message):
+        colors = self._colors
+        if colors is not None:
+            colors.add(stamp_of(message), 0, message)

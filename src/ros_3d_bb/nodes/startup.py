@@ -1,0 +1,22 @@
+"""What every node does first: read its parameters, or say why it cannot start."""
+import sys
+
+import rospy
+
+from ros_3d_bb.params import params_from
+
+
+def read_params(*kinds):
+    """The node's private parameters as instances of NamedTuple types. Raises ValueError, see `params_from`."""
+    return params_from(rospy.get_param('~', {}), *kinds)
+
+
+def run_node(name, node_class):
+    """Run a node until ROS shuts down. A ValueError at its start is a fault of the set-up: say it and exit with 1."""
+    rospy.init_node(name)
+    try:
+        node = node_class()  # noqa: F841  the subscribers hold it by its methods; the name keeps that visible
+    except ValueError as error:
+        rospy.logfatal('%s cannot start: %s', rospy.get_name(), error)
+        sys.exit(1)
+    rospy.spin()

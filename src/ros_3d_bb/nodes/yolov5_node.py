@@ -1,0 +1,83 @@
+"""The node that finds people in colour images with YOLOv5."""
+import os
+from typing import NamedTuple
+
+import rospy
+from sensor_msgs.msg import Image
+from std_msgs.msg import Int32MultiArray
+from std_srvs.srv import SetBool, SetBoolResponse
+
+from ros_3d_bb.detection.runtime import open_runtime
+from ros_3d_bb.detection.yolov5 import DetectionParams, Yolov5
+from ros_3d_bb.images import fill_image, rgb_from
+from ros_3d_bb.messages import boxes2d_to_message, stamp_of
+from ros_3d_bb.nodes.diagnostics import Diagnostics
+from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.overlay import draw_boxes
+from ros_3d_bb.worker import NewestWorker
+
+
+class Yolov5NodeParams(NamedTuple):
+    """See config/yolov5.yaml."""
+
+    weights: str = ''
+    device: str = 'auto'
+    enabled: bool = True
+    publish_empty: bool = True
+
+
+class Yolov5Node(object):
+    """Find people in colour images.
+
+    Subscribes: camera/color/image_raw. Publishes: yolo_bounding_box; yolo_result_out while somebody subscribes.
+    Services: ~enable (std_srvs/SetBool) pauses and resumes. Parameters: config/yolov5.yaml.
+    """
+
+    def __init__(self):
+        self._params, detection = read_params(Yolov5NodeParams, DetectionParams)
+        if not self._params.weights:
+            raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
+                             'checkpoint such as yolov5n.pt')
+        runtime = open_runtime(os.path.expanduser(self._params.weights), self._params.device)
+        self._detector = Yolov5(runtime, detection)
+        self._detector.warm_up()
+        self._enabled = self._params.enabled
+        self._diagnostics = Diagnostics()
+        self._boxes_pub = rospy.Publisher('yolo_bounding_box', Int32MultiArray, queue_size=10)
+        self._image_pub = rospy.Publisher('yolo_result_out', Image, queue_size=1)
+        self._worker = NewestWorker(self._detect, self._on_error)
+        rospy.on_shutdown(self._worker.stop)
+        rospy.Service('~enable', SetBool, self._on_enable)
+        rospy.Subscriber('camera/color/image_raw', Image, self._on_image, queue_size=1, buff_size=2 ** 24)
+        rospy.loginfo('looking for %s with %s', ', '.join(map(str, detection.classes)), self._params.weights)
+
+    def _on_image(self, message):
+        if self._enabled and self._worker.offer(message):
+            self._diagnostics.count('images skipped for a newer one')
+
+    def _on_enable(self, request):
+        self._enabled = request.data
+        return SetBoolResponse(True, 'detector %s' % ('enabled' if request.data else 'paused'))
+
+    def _detect(self, message):
+        stamp_of(message)
+        image = rgb_from(message)
+        found = self._detector.detect(image)
+        self._diagnostics.count('images searched')
+        if len(found.boxes) or self._params.publish_empty:
+            self._boxes_pub.publish(boxes2d_to_message(found.boxes, message.header))
+        if self._image_pub.get_num_connections():
+            labels = ['%s %.2f' % (self._detector.names[number], score)
+                      for number, score in zip(found.classes, found.scores)]
+            drawn = fill_image(Image(header=message.header), draw_boxes(image.copy(), found.boxes, labels), 'rgb8')
+            self._image_pub.publish(drawn)
+
+    def _on_error(self, error):
+        if rospy.is_shutdown():
+            return
+        self._diagnostics.warn('images refused', 'no detection in this image: %s; waiting for the next' % error)
+
+
+def main():
+    """Run the node."""
+    run_node('yolov5_node', Yolov5Node)

@@ -1,0 +1,39 @@
+"""Draw what the pipeline saw into images. Images are (height, width, 3), uint8, RGB, and drawn on in place."""
+import cv2
+import numpy as np
+
+BOX_COLOR, TEXT_COLOR = (40, 220, 60), (0, 0, 0)
+VALID_COLOR, INVALID_COLOR, CORNER_COLOR = (255, 0, 0), (0, 0, 255), (160, 32, 240)
+
+
+def draw_boxes(image, boxes, labels):
+    """Draw 2D boxes (n, 4) with a label each. Returns the image."""
+    for box, label in zip(np.rint(boxes).astype(int).tolist(), labels):
+        cv2.rectangle(image, tuple(box[:2]), tuple(box[2:]), BOX_COLOR, 2)
+        (width, height), below = cv2.getTextSize(label, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)
+        top = max(box[1], height + below)  # inside the image, where the box begins above it
+        cv2.rectangle(image, (box[0], top - height - below), (box[0] + width, top), BOX_COLOR, cv2.FILLED)
+        cv2.putText(image, label, (box[0], top - below // 2 - 1), cv2.FONT_HERSHEY_SIMPLEX, 0.5, TEXT_COLOR, 1,
+                    cv2.LINE_AA)
+    return image
+
+
+def draw_samples(image, rect_px, samples):
+    """Draw the depth samples of a box as in the thesis' Fig. 3.5. Returns the image.
+
+    Red: depth measured; blue: no depth there; purple: the box's corners.
+    """
+    for u, v, valid in zip(samples.u.tolist(), samples.v.tolist(), samples.valid.tolist()):
+        cv2.circle(image, (u, v), 2, VALID_COLOR if valid else INVALID_COLOR, cv2.FILLED)
+    height, width = image.shape[:2]
+    x1, y1, x2, y2 = np.clip(rect_px, 0, [width, height] * 2).tolist()
+    for corner in ((x1, y1), (x2, y2)):
+        cv2.circle(image, corner, 5, CORNER_COLOR, 2)
+    return image
+
+
+def visible_depth(depth, farthest_m):
+    """A depth image to look at: (height, width), uint8, from near (bright) to `farthest_m` (dark); 0 is no depth."""
+    depth_m = np.nan_to_num(depth.values.astype(np.float32) * np.float32(depth.scale_m), posinf=0, neginf=0)
+    grey = 255 - 254 * np.clip(depth_m / farthest_m, 0, 1)
+    return np.where(depth_m > 0, grey, 0).astype(np.uint8)
