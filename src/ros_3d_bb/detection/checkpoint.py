@@ -14,7 +14,7 @@ import numpy as np
 
 EXPECTED = 'expected the checkpoint (.pt) of an official YOLOv5 detection model, release 5.0 to 7.0'
 # Modules whose classes become inert stand-ins: the model itself, and what training leaves in the file beside it.
-INERT_MODULES = ('models', 'utils', 'torch.nn', 'numpy', 'pathlib', 'datetime')
+INERT_MODULES = ('models', 'utils', 'torch.nn', 'numpy', '_codecs', 'pathlib', 'datetime')
 MAX_CLASSES = 10000
 STORAGE_DTYPES = {'DoubleStorage': '<f8', 'FloatStorage': '<f4', 'HalfStorage': '<f2', 'LongStorage': '<i8',
                   'IntStorage': '<i4', 'ShortStorage': '<i2', 'CharStorage': '<i1', 'ByteStorage': '<u1',

@@ -134,7 +134,7 @@ class Detect(nn.Module):
         stride, anchors = self.strides[scale], self.anchors[scale]
         y = self.m[scale](x)
         batch, _, height, width = y.shape
-        y = y.view(batch, len(anchors), self.columns, height, width).permute(0, 1, 3, 4, 2).sigmoid()
+        y = y.view(batch, anchors.shape[0], self.columns, height, width).permute(0, 1, 3, 4, 2).sigmoid()
         column = torch.arange(width, device=y.device, dtype=y.dtype).view(1, 1, 1, width)
         row = torch.arange(height, device=y.device, dtype=y.dtype).view(1, 1, height, 1)
         center_x = (y[..., 0] * 2 - 0.5 + column) * stride

@@ -1,0 +1,53 @@
+"""Where the tests find real data, and what they make themselves where there is none.
+
+ROS_3D_BB_DATA names a folder with data/thesis (a measurement session), weights/yolov5n.pt and
+weights/yolov5n_reference.npz. Without it each test runs on a session and a detector that the package makes.
+"""
+import importlib.util
+import os
+import sys
+
+import pytest
+from hypothesis import settings
+
+settings.register_profile('repeatable', derandomize=True, database=None, deadline=None)
+settings.load_profile('repeatable')
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path.insert(0, HERE)
+if importlib.util.find_spec('ros_3d_bb') is None:  # no workspace is sourced: the pure modules need none
+    sys.path.insert(0, os.path.join(os.path.dirname(HERE), 'src'))
+DATA = os.environ.get('ROS_3D_BB_DATA', '')
+
+
+def pytest_report_header(config):
+    return 'ROS_3D_BB_DATA: %s' % (DATA or 'not set; the tests use data that they make themselves')
+
+
+@pytest.fixture(scope='session')
+def session_folder(tmp_path_factory):
+    """A measurement session: the real one, or a synthetic one."""
+    if DATA:
+        return os.path.join(DATA, 'data', 'thesis')
+    from support.synthetic_session import write_synthetic_session
+    return write_synthetic_session(str(tmp_path_factory.mktemp('session')))
+
+
+@pytest.fixture(scope='session')
+def weights(tmp_path_factory):
+    """Weights that find the person in `session_folder`: YOLOv5n, or a stand-in that looks for red."""
+    if DATA:
+        return os.path.join(DATA, 'weights', 'yolov5n.pt')
+    from support.red_detector import write_red_detector
+    return write_red_detector(str(tmp_path_factory.mktemp('weights') / 'red.torchscript'))
+
+
+@pytest.fixture(scope='session')
+def official_output(tmp_path_factory):
+    """A checkpoint, and what YOLOv5's own code says to given images: (path, [(image, rows, values)]).
+
+    Without the real one: a checkpoint of random weights in the official form, and a plain numpy forward pass.
+    """
+    from support import official_reference
+    if DATA:
+        return official_reference.recorded(DATA)
+    return official_reference.made(str(tmp_path_factory.mktemp('reference') / 'random.pt'))

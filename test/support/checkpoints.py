@@ -1,0 +1,75 @@
+"""Checkpoints in the form of the official ones, of random weights: pickled instances of classes of `models`."""
+import contextlib
+import sys
+import types
+
+import numpy as np
+import torch
+
+from ros_3d_bb.detection.network import Bottleneck, C3, Concat, Conv, Detect, Focus, Network, SPP, SPPF
+
+
+def write_checkpoint(path, layout, yaml=None, root='Model', anchor_grid=False, **extra):
+    """Write a checkpoint of random float16 weights; returns the network it was made of, with the same weights.
+
+    Parameters
+    ----------
+    yaml : dict, optional
+        The layout that the file claims, where it is not that of the weights.
+    root : str
+        Name of the model's class in `models.yolo`: Model (to release 6.1), DetectionModel (6.2 on), or another.
+    anchor_grid : bool
+        Whether the anchors are kept twice, as in release 5.0.
+    **extra
+        More entries of the checkpoint, beside `model`.
+    """
+    network = random_network(layout).half()
+    if anchor_grid:
+        network.model[-1].register_buffer('anchor_grid', network.model[-1].anchors.clone().view(-1, 1, 3, 1, 1, 2))
+    with official_classes(root) as classes:
+        for module in network.modules():
+            module.__class__ = classes.get(type(module), type(module))
+        network.yaml = yaml or layout
+        network.names = ['person'] + ['thing %d' % number for number in range(1, layout['nc'])]
+        torch.save(dict({'epoch': -1, 'model': network, 'ema': None, 'updates': None, 'optimizer': None}, **extra), path)
+        ours = {official: own for own, official in classes.items()}
+        for module in network.modules():
+            module.__class__ = ours.get(type(module), type(module))
+    return network.float()
+
+
+def random_network(layout, seed=0):
+    """A network of ours with random weights, statistics that keep the signal alive, and the layout's anchors."""
+    torch.manual_seed(seed)
+    network = Network(layout)
+    for module in network.modules():
+        if isinstance(module, torch.nn.BatchNorm2d):
+            module.running_mean.uniform_(-0.1, 0.1)
+            module.running_var.uniform_(0.5, 1.5)
+    detect = network.model[-1]
+    anchors = torch.tensor(np.reshape(layout['anchors'], (len(detect.strides), -1, 2)), dtype=torch.float32)
+    detect.anchors.copy_(anchors / torch.tensor(detect.strides, dtype=torch.float32).view(-1, 1, 1))
+    return network.eval()
+
+
+@contextlib.contextmanager
+def official_classes(root='Model'):
+    """Modules `models`, `models.common` and `models.yolo` with empty classes of the official names, while it lasts.
+
+    Yields {our class: the official one}.
+    """
+    places = {Conv: 'models.common', C3: 'models.common', Bottleneck: 'models.common', SPP: 'models.common',
+              SPPF: 'models.common', Focus: 'models.common', Concat: 'models.common', Detect: 'models.yolo',
+              Network: 'models.yolo'}
+    modules = {name: types.ModuleType(name) for name in ('models', 'models.common', 'models.yolo')}
+    classes = {}
+    for own, place in places.items():
+        name = root if own is Network else own.__name__
+        classes[own] = type(name, (torch.nn.Module,), {'__module__': place})
+        setattr(modules[place], name, classes[own])
+    sys.modules.update(modules)
+    try:
+        yield classes
+    finally:
+        for name in modules:
+            del sys.modules[name]

@@ -1,0 +1,79 @@
+"""Image messages of every layout, and those that do not hold what they say."""
+import types
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+
+from ros_3d_bb.images import array_from, depth_from, fill_image, rgb_from
+
+
+def message_of(pixels, encoding, padding=0, big_endian=False):
+    """An image message, duck-typed, with padding bytes after each row."""
+    pixels = pixels.astype(pixels.dtype.newbyteorder('>' if big_endian else '<'))
+    rows = [row.tobytes() + b'\xee' * padding for row in pixels]
+    return types.SimpleNamespace(height=pixels.shape[0], width=pixels.shape[1], encoding=encoding,
+                                 is_bigendian=int(big_endian), step=len(rows[0]), data=b''.join(rows))
+
+
+@given(st.integers(1, 9), st.integers(1, 9), st.integers(0, 5), st.booleans(),
+       st.sampled_from([('16UC1', np.uint16), ('32FC1', np.float32), ('mono16', np.uint16)]))
+def test_any_row_step_and_byte_order(height, width, padding, big_endian, layout):
+    encoding, dtype = layout
+    pixels = (np.arange(height * width).reshape(height, width) * 257 % 65521).astype(dtype)
+    depth = depth_from(message_of(pixels, encoding, padding, big_endian))
+    np.testing.assert_array_equal(depth.values, pixels)
+    assert depth.scale_m == (1.0 if encoding == '32FC1' else 0.001)
+
+
+def test_depth_scale_can_be_given():
+    assert depth_from(message_of(np.ones((2, 2), np.uint16), '16UC1'), 0.00025).scale_m == 0.00025
+
+
+@pytest.mark.parametrize('encoding,channels', [('rgb8', [0, 1, 2]), ('bgr8', [2, 1, 0]), ('rgba8', [0, 1, 2]),
+                                               ('bgra8', [2, 1, 0]), ('mono8', [0, 0, 0])])
+def test_colours_come_out_as_rgb(encoding, channels):
+    depth = 1 if encoding == 'mono8' else 4 if 'a' in encoding else 3
+    pixels = np.random.RandomState(0).randint(0, 256, (4, 5, depth)).astype(np.uint8)
+    rgb = rgb_from(message_of(pixels[..., 0] if depth == 1 else pixels, encoding, padding=3))
+    np.testing.assert_array_equal(rgb, pixels[..., channels])
+
+
+def test_views_are_not_copies():
+    message = message_of(np.zeros((4, 5), np.uint16), '16UC1')
+    message.data = bytearray(message.data)
+    view = array_from(message)
+    message.data[0] = 7
+    assert view[0, 0] == 7
+
+
+@pytest.mark.parametrize('change,reason', [
+    ({'encoding': 'yuv422'}, 'yuv422'), ({'encoding': ''}, 'unknown'), ({'width': 0}, 'empty'),
+    ({'height': 0}, 'empty'), ({'step': 1}, 'too short'), ({'data': b'\0'}, 'too short'), ({'height': 99}, 'too short'),
+    ({'width': 99}, 'too short')])
+def test_images_that_cannot_be_are_refused(change, reason):
+    message = message_of(np.zeros((4, 5), np.uint16), '16UC1')
+    vars(message).update(change)
+    with pytest.raises(ValueError, match=reason):
+        array_from(message)
+
+
+def test_colour_is_no_depth_and_depth_no_colour():
+    with pytest.raises(ValueError, match="'rgb8'"):
+        depth_from(message_of(np.zeros((2, 2, 3), np.uint8), 'rgb8'))
+    with pytest.raises(ValueError, match="'16UC1'"):
+        rgb_from(message_of(np.zeros((2, 2), np.uint16), '16UC1'))
+
+
+@pytest.mark.parametrize('encoding,pixels', [('rgb8', np.arange(24, dtype=np.uint8).reshape(2, 4, 3)),
+                                             ('16UC1', np.arange(8, dtype=np.uint16).reshape(2, 4)),
+                                             ('mono8', np.arange(8, dtype=np.uint8).reshape(2, 4)),
+                                             ('rgb8', np.arange(24, dtype=np.uint8).reshape(2, 4, 3)[..., ::-1])])
+def test_filling_undoes_reading(encoding, pixels):
+    message = fill_image(types.SimpleNamespace(), pixels, encoding)
+    np.testing.assert_array_equal(array_from(message), pixels)
+
+
+def test_filling_with_the_wrong_type_is_refused():
+    with pytest.raises(ValueError, match='mono8'):
+        fill_image(types.SimpleNamespace(), np.zeros((2, 2), float), 'mono8')

@@ -1,0 +1,48 @@
+"""Who may import what: pure modules know no ROS, nodes no mathematics and not each other."""
+import ast
+import os
+
+import pytest
+
+SOURCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'src', 'ros_3d_bb')
+MODULES = sorted(os.path.relpath(os.path.join(folder, name), SOURCE)
+                 for folder, _folders, names in os.walk(SOURCE) for name in names if name.endswith('.py'))
+PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime'}
+STANDARD_LIBRARY = {'ast', 'bisect', 'collections', 'difflib', 'json', 'math', 'os', 'pickle', 'threading', 'typing',
+                    'zipfile', 'argparse', 'sys', 'time'}
+ROS_TYPES = {'bags.py', 'markers.py', 'messages.py'}  # convert to and from ROS messages, but run in no node
+
+
+def imports_of(module):
+    """Top-level names of other packages, and dotted names of ours, that a module imports."""
+    with open(os.path.join(SOURCE, module)) as stream:
+        tree = ast.parse(stream.read())
+    names = [name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names]
+    names += [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    ours = set(name for name in names if name.startswith('ros_3d_bb'))
+    return set(name.split('.')[0] for name in names) - {'ros_3d_bb'}, ours
+
+
+def test_there_is_something_to_check():
+    assert len(MODULES) > 15 and 'nodes/bbox3d_node.py' in MODULES
+
+
+@pytest.mark.parametrize('module', [m for m in MODULES if not m.startswith('nodes/') and m not in ROS_TYPES])
+def test_pure_modules_know_no_ros(module):
+    others, ours = imports_of(module)
+    assert others <= PURE_LIBRARIES | STANDARD_LIBRARY
+    assert not any(name.startswith(('ros_3d_bb.nodes', 'ros_3d_bb.msg', 'ros_3d_bb.messages')) for name in ours)
+
+
+@pytest.mark.parametrize('module', MODULES)
+def test_rospy_is_for_nodes_and_torch_for_detection(module):
+    others, _ours = imports_of(module)
+    assert 'rospy' not in others or module.startswith('nodes/')
+    assert 'torch' not in others or module.startswith('detection/')
+
+
+@pytest.mark.parametrize('module', [m for m in MODULES if m.startswith('nodes/')])
+def test_nodes_know_no_mathematics_and_not_each_other(module):
+    others, ours = imports_of(module)
+    assert not others & {'numpy', 'math', 'cv2', 'torch'}
+    assert not any(name.endswith('_node') for name in ours)

@@ -1,0 +1,121 @@
+"""Measurement sessions: what is in them, and what is wrong with those that cannot be read."""
+import json
+import os
+import shutil
+
+import cv2
+import numpy as np
+import pytest
+
+from ros_3d_bb.measurements import SessionError, read_color, read_depth, read_session
+from support.synthetic_session import FRAMES_PER_PLACE, PLACES_M, write_synthetic_session
+
+
+@pytest.fixture(scope='module')
+def original(tmp_path_factory):
+    return write_synthetic_session(str(tmp_path_factory.mktemp('original')))
+
+
+@pytest.fixture
+def folder(original, tmp_path):
+    """A copy of the session with one frame, to be damaged."""
+    for name in ('color', 'depth'):
+        os.makedirs(str(tmp_path / name))
+        shutil.copy(os.path.join(original, name, '000.png'), str(tmp_path / name))
+    with open(os.path.join(original, 'frames.json')) as stream:
+        content = json.load(stream)
+    content['frames'] = content['frames'][:1]
+    (tmp_path / 'frames.json').write_text(json.dumps(content))
+    return str(tmp_path)
+
+
+def change(folder, edit):
+    path = os.path.join(folder, 'frames.json')
+    with open(path) as stream:
+        content = json.load(stream)
+    edit(content)
+    with open(path, 'w') as stream:
+        json.dump(content, stream)
+
+
+def test_reads_a_session(session_folder):
+    session = read_session(session_folder)
+    frame = session.frames[0]
+    assert session.camera.fx == pytest.approx(614.686) and session.depth_scale_m == 0.001
+    assert session.frame_id == 'camera_color_optical_frame'
+    assert len(session.frames) in (110, len(PLACES_M) * FRAMES_PER_PLACE)
+    color, depth = read_color(frame, session.camera), read_depth(frame, session)
+    assert color.shape == (480, 640, 3) and color.dtype == np.uint8
+    assert depth.values.shape == (480, 640) and depth.values.dtype == np.uint16 and depth.scale_m == 0.001
+    assert abs(frame.estimate_m[2] - frame.truth_m[1]) < 0.1 and len(frame.boxes_px) == 1
+
+
+def test_colour_is_read_as_rgb(original):
+    session = read_session(original)
+    x1, y1, x2, y2 = session.frames[0].boxes_px[0]
+    assert read_color(session.frames[0], session.camera)[(y1 + y2) // 2, (x1 + x2) // 2].tolist() == [200, 30, 30]
+
+
+def test_frames_need_not_be_annotated(folder):
+    def bare(content):
+        for field in ('box', 'estimate_mm', 'truth_mm'):
+            del content['frames'][0][field]
+    change(folder, bare)
+    frame = read_session(folder).frames[0]
+    assert frame.boxes_px == () and frame.estimate_m is None and frame.truth_m is None
+
+
+def test_several_boxes_in_a_frame(folder):
+    boxes = [{'box': [1, 2, 3, 4], 'estimate_mm': [1, 2, 3]}, {'box': [5, 6, 7, 8]}]
+    change(folder, lambda content: content['frames'][0].update(detections=boxes))
+    frame = read_session(folder).frames[0]
+    assert frame.boxes_px == ((1, 2, 3, 4), (5, 6, 7, 8)) and frame.estimate_m.tolist() == [0.001, 0.002, 0.003]
+
+
+@pytest.mark.parametrize('edit,reason', [
+    (lambda content: content.pop('camera'), "'camera' is missing"),
+    (lambda content: content['camera'].pop('fx'), "'fx' is missing"),
+    (lambda content: content['camera'].update(fx=0), 'intrinsics'),
+    (lambda content: content['camera'].update(width='wide'), 'wide'),
+    (lambda content: content.update(frames=3), 'not iterable'),
+    (lambda content: content['frames'][0].pop('depth'), "'depth' is missing"),
+    (lambda content: content['frames'][0].update(box=['a']), "'a'"),
+    (lambda content: content['frames'].append(7), 'int')])
+def test_descriptions_with_faults_are_refused(folder, edit, reason):
+    change(folder, edit)
+    with pytest.raises(SessionError) as error:
+        read_session(folder)
+    assert 'frames.json' in str(error.value) and reason in str(error.value)
+
+
+def test_a_folder_without_session_is_named(tmp_path):
+    with pytest.raises(SessionError, match='%s: not a measurement session' % tmp_path):
+        read_session(str(tmp_path))
+
+
+def test_broken_json_is_named(folder):
+    with open(os.path.join(folder, 'frames.json'), 'a') as stream:
+        stream.write('}')
+    with pytest.raises(SessionError, match='frames.json'):
+        read_session(folder)
+
+
+@pytest.mark.parametrize('pixels,reason', [
+    (None, 'missing'), (np.zeros((480, 640), np.uint8), '16-bit'), (np.zeros((480, 640, 3), np.uint16), 'one channel'),
+    (np.zeros((48, 64), np.uint16), '64 x 48 pixels, where the camera has 640 x 480')])
+def test_depth_that_cannot_be_used_is_named(folder, pixels, reason):
+    path = os.path.join(folder, 'depth', '000.png')
+    os.remove(path)
+    if pixels is not None:
+        cv2.imwrite(path, pixels)
+    session = read_session(folder)
+    with pytest.raises(SessionError) as error:
+        read_depth(session.frames[0], session)
+    assert path in str(error.value) and reason in str(error.value)
+
+
+def test_colour_that_is_grey_is_named(folder):
+    cv2.imwrite(os.path.join(folder, 'color', '000.png'), np.zeros((480, 640), np.uint8))
+    session = read_session(folder)
+    with pytest.raises(SessionError, match='8-bit colour'):
+        read_color(session.frames[0], session.camera)

@@ -1,0 +1,31 @@
+"""Drawing: where it is asked for, inside the image, and nowhere else."""
+import numpy as np
+
+from ros_3d_bb.estimation import DepthImage, sample_median
+from ros_3d_bb.overlay import BOX_COLOR, INVALID_COLOR, VALID_COLOR, draw_boxes, draw_samples, visible_depth
+
+
+def test_boxes_are_drawn_with_their_edges():
+    image = draw_boxes(np.zeros((100, 100, 3), np.uint8), np.array([(20.4, 40.0, 60.0, 80.0)]), ['person 0.9'])
+    assert image[60, 20].tolist() == list(BOX_COLOR) and image[60, 40].tolist() == [0, 0, 0]
+
+
+def test_boxes_outside_the_image_do_no_harm():
+    boxes = np.array([(-500.0, -10.0, 5000.0, 3.0), (10.0, 0.0, 20.0, 2.0)])
+    assert draw_boxes(np.zeros((50, 50, 3), np.uint8), boxes, ['a', 'b']).any()
+
+
+def test_samples_show_where_depth_was_measured():
+    values = np.full((60, 60), 2000, np.uint16)
+    values[:, 30:] = 0
+    rect = (5, 5, 55, 55)
+    samples = sample_median(DepthImage(values, 0.001), rect, 10)
+    image = draw_samples(np.zeros((60, 60, 3), np.uint8), rect, samples)
+    for u, v, valid in zip(samples.u, samples.v, samples.valid):
+        assert image[v, u].tolist() == list(VALID_COLOR if valid else INVALID_COLOR)
+
+
+def test_near_is_bright_far_is_dark_and_nothing_is_black():
+    grey = visible_depth(DepthImage(np.array([[0, 500, 3000, 9000]], np.uint16), 0.001), 6.0)[0]
+    assert grey[0] == 0 and grey[1] > grey[2] > grey[3] > 0
+    assert visible_depth(DepthImage(np.array([[np.nan, np.inf, -1, 1]], np.float32), 1.0), 6.0)[0].tolist()[:3] == [0] * 3

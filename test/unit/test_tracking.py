@@ -1,0 +1,153 @@
+"""The thesis' tracker: numbers, velocities by the clock of the images, and who ages when."""
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from hypothesis.extra import numpy as hnp
+
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.association import match_greedily, plane_distances
+from ros_3d_bb.tracking.thesis import ThesisTracker, ThesisTrackerParams
+from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, Detection
+
+SIZE = np.array([0.5, 0.5, 1.7])
+
+
+def at(x, y, z=0.9):
+    return Detection(np.array([x, y, z], float), SIZE)
+
+
+def seconds(value):
+    return int(round(value * NS))
+
+
+@given(hnp.arrays(float, st.tuples(st.integers(0, 6), st.integers(0, 6)), elements=st.floats(0, 10)))
+def test_matching_takes_the_nearest_pair_first(distances):
+    pairs = match_greedily(distances)
+    assert len(pairs) == min(distances.shape)
+    left = distances.copy()
+    for row, column in pairs:
+        assert left[row, column] == left.min()
+        left[row], left[:, column] = np.inf, np.inf
+
+
+def test_distances_are_seen_from_above():
+    np.testing.assert_allclose(plane_distances([(0, 0, 0), (1, 1, 9)], [(3, 4, -7)]), [[5], [np.hypot(2, 3)]])
+
+
+def test_numbers_start_at_1_and_are_not_used_again():
+    tracker = ThesisTracker(ThesisTrackerParams(disappearance_limit=0.1))
+    assert [track.id for track in tracker.update(0, [at(0, 0), at(5, 0)])] == [1, 2]
+    assert tracker.update(seconds(1), []) == []
+    assert [track.id for track in tracker.update(seconds(2), [at(0, 0)])] == [3]
+    tracker.reset()
+    assert [track.id for track in tracker.update(0, [at(0, 0)])] == [4]
+
+
+def test_people_who_pass_each_other_keep_their_numbers():
+    """Thesis Fig. 4.1: two people pass each other at walking speed, seen at 30 Hz."""
+    tracker = ThesisTracker()
+    for frame in range(120):
+        time_s = frame / 30
+        tracks = tracker.update(seconds(time_s), [at(-2 + 1.2 * time_s, 0), at(2 - 1.2 * time_s, 0.8)][::(-1) ** frame])
+    assert [track.id for track in tracks] == [1, 2]
+    assert tracks[0].position_m[0] > 0 or tracks[1].position_m[0] < 0
+
+
+@pytest.mark.parametrize('rate_hz', [5, 10, 30, 60])
+def test_velocity_is_metres_per_second_at_any_rate(rate_hz):
+    tracker = ThesisTracker()
+    for frame in range(5 * rate_hz):
+        track, = tracker.update(seconds(frame / rate_hz), [at(1.2 * frame / rate_hz, -0.5 * frame / rate_hz)])
+    np.testing.assert_allclose(track.velocity_mps, [1.2, -0.5, 0], atol=0.01)
+    np.testing.assert_allclose(track.instant_velocity_mps, [1.2, -0.5, 0], atol=1e-6)
+    assert track.moving
+
+
+def test_velocity_survives_irregular_and_dropped_images():
+    tracker, random, time_s = ThesisTracker(), np.random.RandomState(0), 0.0
+    for _ in range(200):
+        time_s += random.choice([0.02, 0.033, 0.1, 0.3])
+        track, = tracker.update(seconds(time_s), [at(0.8 * time_s, 0)])
+    np.testing.assert_allclose(track.velocity_mps, [0.8, 0, 0], atol=0.001)
+
+
+def test_velocity_is_averaged_with_alpha():
+    """v' = alpha * v_new + (1 - alpha) * v, from zero."""
+    tracker = ThesisTracker(ThesisTrackerParams(alpha=0.25))
+    tracker.update(0, [at(0, 0)])
+    track, = tracker.update(seconds(0.5), [at(1, 0)])
+    np.testing.assert_allclose(track.velocity_mps, [0.5, 0, 0])
+    track, = tracker.update(seconds(1.0), [at(1, 0)])
+    np.testing.assert_allclose(track.velocity_mps, [0.375, 0, 0])
+    np.testing.assert_allclose(track.instant_velocity_mps, 0)
+
+
+def test_prediction_is_straight_on_for_two_seconds():
+    tracker = ThesisTracker(ThesisTrackerParams(alpha=1.0))
+    tracker.update(0, [at(0, 0)])
+    track, = tracker.update(seconds(1), [at(0.5, 1)])
+    assert track.prediction_m.shape == (8, 3) and track.prediction_step_s == 0.25
+    np.testing.assert_allclose(track.prediction_m[[3, 7]], [(1.0, 2.0, 0.9), (1.5, 3.0, 0.9)])
+
+
+@pytest.mark.parametrize('rate_hz', [5, 30])
+def test_an_unseen_object_stays_for_the_limit_in_seconds_and_is_then_gone(rate_hz):
+    tracker = ThesisTracker(ThesisTrackerParams(disappearance_limit=1.0))
+    tracker.update(0, [at(1, 2)])
+    for frame in range(1, rate_hz + 1):
+        track, = tracker.update(seconds(frame / rate_hz), [])
+        assert track.status == OCCLUDED and track.position_m.tolist() == [1, 2, 0.9] and track.last_seen_ns == 0
+    assert tracker.update(seconds(1 + 1 / rate_hz), []) == []
+
+
+def test_an_object_seen_again_in_time_keeps_its_number_and_its_true_velocity():
+    tracker = ThesisTracker(ThesisTrackerParams(alpha=1.0))
+    tracker.update(0, [at(0, 0)])
+    tracker.update(seconds(0.5), [])
+    track, = tracker.update(seconds(0.9), [at(0.9, 0)])
+    assert track.id == 1 and track.status == VISIBLE and track.first_seen_ns == 0
+    np.testing.assert_allclose(track.velocity_mps, [1, 0, 0])
+
+
+def test_time_without_an_answer_ages_nobody():
+    """tf failed for 10 s: the images in between are skipped."""
+    tracker = ThesisTracker(ThesisTrackerParams(disappearance_limit=1.0))
+    tracker.update(0, [at(0, 0)])
+    for frame in range(1, 300):
+        tracker.skip(seconds(frame / 30))
+    assert [track.id for track in tracker.update(seconds(10), [])] == [1]
+    assert [track.id for track in tracker.update(seconds(10.5), [])] == [1]
+    assert tracker.update(seconds(11.1), []) == []
+
+
+@pytest.mark.parametrize('stamp_s', [1.0, 0.5])
+def test_a_late_or_repeated_image_is_refused_and_changes_nothing(stamp_s):
+    tracker = ThesisTracker()
+    tracker.update(seconds(1), [at(0, 0)])
+    for take in (lambda: tracker.update(seconds(stamp_s), [at(5, 5)]), lambda: tracker.skip(seconds(stamp_s))):
+        with pytest.raises(ValueError, match='not later'):
+            take()
+    assert [track.id for track in tracker.update(seconds(1.1), [at(0, 0)])] == [1]
+
+
+def test_nobody_is_tracked_where_nobody_was_seen():
+    assert ThesisTracker().update(0, []) == []
+
+
+@given(st.lists(st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), max_size=5), max_size=12))
+def test_each_detection_belongs_to_exactly_one_track(frames):
+    tracker, seen = ThesisTracker(), set()
+    for number, places in enumerate(frames):
+        tracks = tracker.update(seconds(number / 30), [at(*place) for place in places])
+        ids = [track.id for track in tracks]
+        assert ids == sorted(set(ids)) and sum(track.status == VISIBLE for track in tracks) == len(places)
+        assert all(id_ in seen or id_ > max(seen, default=0) for id_ in ids)
+        seen.update(ids)
+
+
+@pytest.mark.parametrize('name,value', [('alpha', 0.0), ('alpha', 1.1), ('disappearance_limit', -1.0),
+                                        ('prediction_step', 0.0), ('prediction_time', float('nan')),
+                                        ('moving_speed', -0.1)])
+def test_parameters_that_make_no_sense_are_named(name, value):
+    with pytest.raises(ValueError, match=name):
+        ThesisTracker(ThesisTrackerParams()._replace(**{name: value}))
