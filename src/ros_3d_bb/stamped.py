@@ -65,7 +65,7 @@ class Pairing(object):
     """Pairs the boxes found in colour images with the depth images of the same stamp.
 
     Boxes come later than their depth image by the time the detector takes; those that come before it wait for it.
-    Boxes without a stamp are paired by the time of arrival: with the depth image that came nearest to `assumed_delay_ns`
+    Boxes without a stamp are paired by their arrival: with the depth image that came nearest to `assumed_delay_ns`
     before them.
 
     Parameters

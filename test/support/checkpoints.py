@@ -31,7 +31,7 @@ def write_checkpoint(path, layout, yaml=None, root='Model', anchor_grid=False, *
             module.__class__ = classes.get(type(module), type(module))
         network.yaml = yaml or layout
         network.names = ['person'] + ['thing %d' % number for number in range(1, layout['nc'])]
-        torch.save(dict({'epoch': -1, 'model': network, 'ema': None, 'updates': None, 'optimizer': None}, **extra), path)
+        torch.save(dict({'epoch': -1, 'model': network, 'ema': None, 'optimizer': None}, **extra), path)
         ours = {official: own for own, official in classes.items()}
         for module in network.modules():
             module.__class__ = ours.get(type(module), type(module))

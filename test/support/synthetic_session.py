@@ -1,6 +1,10 @@
-"""A measurement session of a red cardboard person in front of a wall, with exact ground truth."""
+"""A measurement session of a red cardboard person in front of a wall, with exact ground truth.
+
+As a command: `python3 synthetic_session.py FOLDER` writes one.
+"""
 import json
 import os
+import sys
 
 import cv2
 import numpy as np
@@ -63,3 +67,7 @@ def _median_by_loops(depth_mm, box, stride=20):
             if z > 0:
                 points.append(((u - CX) / FX * z, (v - CY) / FY * z, z))
     return [float(np.median([point[axis] for point in points])) for axis in range(3)]
+
+
+if __name__ == '__main__':
+    print(write_synthetic_session(sys.argv[1]))

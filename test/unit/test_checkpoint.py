@@ -131,9 +131,10 @@ def compressed(path):
 
 def outside_its_data(path):
     """A tensor that claims more numbers than its storage holds."""
-    archive = b"ctorch._utils\n_rebuild_tensor_v2\n((X\x07\0\0\0storagectorch\nFloatStorage\nX\1\0\0\x000X\3\0\0\0cpuK\1t"
+    storage = b'(X\x07\0\0\0storagectorch\nFloatStorage\nX\1\0\0\x000X\3\0\0\0cpuK\1tQ'
+    call = b'ctorch._utils\n_rebuild_tensor_v2\n(' + storage + b'K\0(M\xff\xfft(K\1t\x89NtR'
     with zipfile.ZipFile(path, 'w') as out:
-        out.writestr('archive/data.pkl', b'\x80\x02' + archive + b'QK\0(M\xff\xfft(K\1t\x89NtR.')
+        out.writestr('archive/data.pkl', b'\x80\x02' + call + b'.')
         out.writestr('archive/data/0', b'\0' * 4)
 
 

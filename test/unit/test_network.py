@@ -49,13 +49,13 @@ def changed(change):
 
 
 @pytest.mark.parametrize('change,reason', [
-    (lambda l: l['backbone'].__setitem__(0, [-1, 1, 'os.system', ['x']]), 'unknown layer'),
-    (lambda l: l['backbone'].__setitem__(0, [-1, 1, 'Conv', [10 ** 9, 3]]), 'channels'),
-    (lambda l: l['backbone'].__setitem__(0, [-1, 10 ** 6, 'Conv', [64, 3]]), 'repeated'),
-    (lambda l: l['backbone'].__setitem__(0, [-1, 1, 'Conv', [64, 10 ** 6]]), 'kernel'),
-    (lambda l: l['backbone'].extend([[-1, 1, 'Conv', [8]]] * 200), 'layers'),
-    (lambda l: l['head'].pop(), 'not Detect'),
-    (lambda l: l.update(activation='__import__("os")'), 'unknown activation')])
+    (lambda given: given['backbone'].__setitem__(0, [-1, 1, 'os.system', ['x']]), 'unknown layer'),
+    (lambda given: given['backbone'].__setitem__(0, [-1, 1, 'Conv', [10 ** 9, 3]]), 'channels'),
+    (lambda given: given['backbone'].__setitem__(0, [-1, 10 ** 6, 'Conv', [64, 3]]), 'repeated'),
+    (lambda given: given['backbone'].__setitem__(0, [-1, 1, 'Conv', [64, 10 ** 6]]), 'kernel'),
+    (lambda given: given['backbone'].extend([[-1, 1, 'Conv', [8]]] * 200), 'layers'),
+    (lambda given: given['head'].pop(), 'not Detect'),
+    (lambda given: given.update(activation='__import__("os")'), 'unknown activation')])
 def test_layouts_that_no_release_has_are_refused(change, reason):
     with pytest.raises(ValueError, match=reason):
         Network(changed(change))

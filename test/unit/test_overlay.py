@@ -28,4 +28,5 @@ def test_samples_show_where_depth_was_measured():
 def test_near_is_bright_far_is_dark_and_nothing_is_black():
     grey = visible_depth(DepthImage(np.array([[0, 500, 3000, 9000]], np.uint16), 0.001), 6.0)[0]
     assert grey[0] == 0 and grey[1] > grey[2] > grey[3] > 0
-    assert visible_depth(DepthImage(np.array([[np.nan, np.inf, -1, 1]], np.float32), 1.0), 6.0)[0].tolist()[:3] == [0] * 3
+    unknown = DepthImage(np.array([[np.nan, np.inf, -1]], np.float32), 1.0)
+    assert visible_depth(unknown, 6.0)[0].tolist() == [0, 0, 0]

@@ -30,7 +30,8 @@ def test_values_of_a_kindred_type_are_converted(given, field, value):
     assert getattr(params, field) == value and type(getattr(params, field)) is type(value)
 
 
-@pytest.mark.parametrize('given,value', [(['a', 1], ['a', 1]), ('a, b', ['a', 'b']), ('person', ['person']), (3, ['3'])])
+@pytest.mark.parametrize('given,value', [(['a', 1], ['a', 1]), ('a, b', ['a', 'b']), ('person', ['person']),
+                                         (3, ['3'])])
 def test_lists_can_be_written_with_commas(given, value):
     assert params_from({'classes': given}, Filter)[0].classes == value
 

@@ -1,0 +1,87 @@
+"""What the tests of nodes share: recording topics, and sending what a camera and a detector send."""
+import threading
+import time
+
+import numpy as np
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
+
+from ros_3d_bb.images import fill_image
+from ros_3d_bb.messages import time_from
+
+TIMEOUT_S = 20.0
+
+
+def wait_until(condition, what, timeout_s=TIMEOUT_S):
+    """Wait by the machine's clock, whatever /clock does; fail saying what never came."""
+    deadline_s = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline_s and not rospy.is_shutdown(), 'never happened: %s' % what
+        time.sleep(0.01)
+
+
+class Recorder(object):
+    """Keeps all messages of a topic; use as a context manager."""
+
+    def __init__(self, topic, kind, publisher_expected=True):
+        self.topic, self.messages = topic, []
+        self._lock = threading.Lock()
+        self._subscriber = rospy.Subscriber(topic, kind, self._keep, queue_size=1000, buff_size=2 ** 26)
+        if publisher_expected:
+            wait_until(lambda: self._subscriber.get_num_connections() > 0, 'a publisher on ' + topic)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._subscriber.unregister()
+
+    def _keep(self, message):
+        with self._lock:
+            self.messages.append(message)
+
+    def wait_for(self, count, timeout_s=TIMEOUT_S):
+        """The first `count` messages, once they are there."""
+        wait_until(lambda: len(self.messages) >= count, '%d messages on %s' % (count, self.topic), timeout_s)
+        return self.messages[:count]
+
+    def stays_at(self, count, seconds=0.7):
+        """Whether there are `count` messages and no more come for a while."""
+        time.sleep(seconds)
+        return len(self.messages) == count
+
+
+def publisher(topic, kind):
+    """A publisher that somebody listens to already."""
+    result = rospy.Publisher(topic, kind, queue_size=100)
+    wait_until(lambda: result.get_num_connections() > 0, 'a subscriber on ' + topic)
+    return result
+
+
+def header_at(stamp_ns, frame_id='camera_color_optical_frame'):
+    return Header(stamp=time_from(stamp_ns), frame_id=frame_id)
+
+
+def depth_message(stamp_ns, depth_mm, shape=(48, 64)):
+    """A depth image of one depth everywhere, 16UC1."""
+    return fill_image(Image(header=header_at(stamp_ns)), np.full(shape, depth_mm, np.uint16), '16UC1')
+
+
+def camera_info(stamp_ns, width=64, height=48, focal=60.0):
+    """The camera of `depth_message`: its principal point is the centre of the image."""
+    info = CameraInfo(header=header_at(stamp_ns), width=width, height=height, distortion_model='plumb_bob', D=[0.0] * 5)
+    info.K = [focal, 0, (width - 1) / 2.0, 0, focal, (height - 1) / 2.0, 0, 0, 1]
+    return info
+
+
+def diagnostics_of(node, timeout_s=TIMEOUT_S):
+    """The next diagnostic status of a node: (level, message, {event: count})."""
+    with Recorder('/diagnostics', DiagnosticArray) as recorder:
+        def mine():
+            return [status for message in recorder.messages for status in message.status
+                    if status.name.startswith(node)]
+        wait_until(mine, 'diagnostics of ' + node, timeout_s)
+        status = mine()[-1]
+        return status.level, status.message, {entry.key: int(entry.value) for entry in status.values}

@@ -1,0 +1,94 @@
+"""A session as a bag: the same pixels, the intrinsics, and a robot that stands in the map."""
+import json
+import os
+import subprocess
+
+import numpy as np
+import pytest
+import rosbag
+import tf2_py
+
+from ros_3d_bb.bags import START_NS, write_bag
+from ros_3d_bb.images import depth_from, rgb_from
+from ros_3d_bb.measurements import read_color, read_depth, read_session
+from ros_3d_bb.messages import boxes2d_from_message, camera_from_message, time_from, transform_from_message
+from ros_3d_bb.stamped import NS
+
+
+@pytest.fixture(scope='module')
+def session(session_folder):
+    """The first frames of a session."""
+    session = read_session(session_folder)
+    return session._replace(frames=session.frames[:7])
+
+
+@pytest.fixture(scope='module')
+def messages(session, tmp_path_factory):
+    """{topic: messages} of a bag at 10 Hz."""
+    path = str(tmp_path_factory.mktemp('bag') / 'session.bag')
+    assert write_bag(session, path, 10.0, with_boxes=True) == 7
+    by_topic = {}
+    with rosbag.Bag(path) as bag:
+        for topic, message, time in bag.read_messages():
+            by_topic.setdefault(topic, []).append(message)
+            stamped = message.transforms[0] if topic == '/tf' else message
+            assert topic == '/yolo_bounding_box' or stamped.header.stamp == time
+    return by_topic
+
+
+def test_topics_are_those_of_a_realsense_on_a_robot(messages):
+    assert set(messages) == {'/camera/color/image_raw', '/camera/aligned_depth_to_color/image_raw', '/tf',
+                             '/camera/color/camera_info', '/camera/aligned_depth_to_color/camera_info',
+                             '/yolo_bounding_box'}
+    assert all(len(of_topic) == 7 for of_topic in messages.values())
+
+
+def test_pixels_boxes_and_intrinsics_are_those_of_the_session(session, messages):
+    for number, frame in enumerate(session.frames):
+        color = messages['/camera/color/image_raw'][number]
+        depth = messages['/camera/aligned_depth_to_color/image_raw'][number]
+        assert color.header.stamp == depth.header.stamp == time_from(START_NS + number * NS // 10)
+        assert color.header.frame_id == depth.header.frame_id == session.frame_id
+        np.testing.assert_array_equal(rgb_from(color), read_color(frame, session.camera))
+        np.testing.assert_array_equal(depth_from(depth).values, read_depth(frame, session).values)
+        boxes = boxes2d_from_message(messages['/yolo_bounding_box'][number])
+        assert boxes.stamp_ns == color.header.stamp.to_nsec()
+        assert [tuple(box) for box in boxes.boxes.tolist()] == list(frame.boxes_px)
+        assert camera_from_message(messages['/camera/color/camera_info'][number]) == session.camera
+
+
+def test_the_camera_stands_on_a_jackal_in_the_map(session, messages):
+    """0.17 m forward and 0.20 m up of base_link (thesis 3.5.1), looking ahead."""
+    buffer = tf2_py.BufferCore()
+    for transform in messages['/tf'][3].transforms:
+        buffer.set_transform(transform, 'test')
+    stamp = messages['/camera/color/image_raw'][3].header.stamp
+    map_from_camera = transform_from_message(buffer.lookup_transform_core('map', session.frame_id, stamp))
+    np.testing.assert_allclose(map_from_camera.dot([0, 0, 2, 1]), [2.17, 0, 0.2, 1], atol=1e-9)
+    assert buffer.can_transform_core('odom', 'base_link', stamp)[0]
+
+
+def run_tool(*arguments):
+    return subprocess.run(['rosrun', 'ros_3d_bb', 'session_to_bag'] + list(arguments), stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, universal_newlines=True)
+
+
+def test_the_command_says_what_it_wrote(session_folder, tmp_path):
+    result = run_tool(session_folder, str(tmp_path / 'out.bag'), '--rate', '15')
+    assert result.returncode == 0 and 'frames at 15 Hz' in result.stdout
+    with rosbag.Bag(str(tmp_path / 'out.bag')) as bag:
+        assert '/yolo_bounding_box' not in bag.get_type_and_topic_info().topics
+
+
+@pytest.mark.parametrize('depth', ['depth/missing.png', None])
+def test_a_broken_session_leaves_no_bag_and_says_why(session_folder, tmp_path, depth):
+    folder, bag = tmp_path / 'broken', str(tmp_path / 'out.bag')
+    folder.mkdir()
+    if depth:
+        with open(os.path.join(session_folder, 'frames.json')) as stream:
+            content = json.load(stream)
+        content['frames'][0]['depth'] = depth
+        (folder / 'frames.json').write_text(json.dumps(content))
+    result = run_tool(str(folder), bag)
+    assert result.returncode == 1 and str(folder) in result.stdout and 'no bag was written' in result.stdout
+    assert 'Traceback' not in result.stdout and os.listdir(str(tmp_path)) == ['broken']

@@ -1,0 +1,154 @@
+"""Between messages and our types: nothing is lost, and what cannot be meant is refused."""
+import io
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import TransformStamped
+from hypothesis import given, strategies as st
+from sensor_msgs.msg import CameraInfo
+from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
+
+from ros_3d_bb.estimation import Box3D
+from ros_3d_bb.geometry import Camera, inverse, transform_from
+from ros_3d_bb.messages import (boxes2d_from_message, boxes2d_to_message, boxes3d_to_message, camera_from_message,
+                                detections_from_message, stamp_of, time_from, tracks_to_message,
+                                transform_from_message)
+from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.thesis import ThesisTracker
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
+
+INT32 = st.integers(-2 ** 31, 2 ** 31 - 1)
+STAMP = st.integers(1, 2 ** 32 * NS - 1)
+
+
+def header(stamp_ns, frame_id='camera'):
+    return Header(stamp=time_from(stamp_ns), frame_id=frame_id)
+
+
+def on_the_wire(message):
+    """The message as a subscriber gets it: what does not fit its fields fails here."""
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    return type(message)().deserialize(buffer.getvalue())
+
+
+@given(st.lists(st.tuples(INT32, INT32, INT32, INT32), max_size=20), STAMP, st.sampled_from(['camera', 'a/b_c', '']))
+def test_2d_boxes_and_their_stamp_survive_to_the_nanosecond(boxes, stamp_ns, frame_id):
+    message = boxes2d_to_message(np.array(boxes, float).reshape(-1, 4), header(stamp_ns, frame_id))
+    back = boxes2d_from_message(on_the_wire(message))
+    assert back.boxes.tolist() == [list(box) for box in boxes]
+    assert back.stamp_ns == stamp_ns and back.frame_id == frame_id
+    assert message.layout.dim[0].size == len(boxes) and message.layout.data_offset == 0
+
+
+def test_the_label_is_as_documented():
+    label = boxes2d_to_message(np.zeros((1, 4)), header(12 * NS + 34, 'camera')).layout.dim[0].label
+    assert label == 'boxes;stamp=12.000000034;frame=camera'
+
+
+def test_boxes_are_rounded_to_whole_pixels():
+    assert boxes2d_to_message(np.array([[0.4, 1.6, 2.5, -0.6]]), header(1)).data == [0, 2, 2, -1]
+
+
+def test_plain_arrays_have_no_stamp():
+    plain = boxes2d_from_message(Int32MultiArray(data=[1, 2, 3, 4]))
+    assert plain.stamp_ns is None and plain.boxes.tolist() == [[1, 2, 3, 4]]
+    labelled = Int32MultiArray(data=[1, 2, 3, 4])
+    labelled.layout.dim = [MultiArrayDimension(label='boxes')]
+    assert boxes2d_from_message(labelled).stamp_ns is None
+
+
+@pytest.mark.parametrize('label', ['boxes;stamp=1.5', 'boxes;stamp=;frame=a', 'boxes;stamp=-1.000000000',
+                                   'boxes;stamp=x.000000000', 'boxes;stamp=1e3.000000000'])
+def test_damaged_stamps_are_refused(label):
+    message = Int32MultiArray(data=[1, 2, 3, 4])
+    message.layout.dim = [MultiArrayDimension(label=label)]
+    with pytest.raises(ValueError, match='expected'):
+        boxes2d_from_message(message)
+
+
+@pytest.mark.parametrize('count,reason', [(3, 'multiple of 4'), (4004, '1001 2D boxes')])
+def test_arrays_of_the_wrong_length_are_refused(count, reason):
+    with pytest.raises(ValueError, match=reason):
+        boxes2d_from_message(Int32MultiArray(data=[1] * count))
+
+
+def test_a_stamp_of_zero_is_refused():
+    with pytest.raises(ValueError, match="BoundingBox3DArray of frame 'camera' carries no stamp"):
+        stamp_of(BoundingBox3DArray(header=Header(frame_id='camera')))
+
+
+def test_camera_info():
+    info = CameraInfo(width=640, height=480, K=[600, 0, 320, 0, 610, 240, 0, 0, 1])
+    assert camera_from_message(info) == Camera(640, 480, 600, 610, 320, 240)
+    with pytest.raises(ValueError, match='fx=0'):
+        camera_from_message(CameraInfo(width=640, height=480))
+
+
+def test_transforms():
+    message = TransformStamped()
+    message.transform.translation.x, message.transform.rotation.w = 3.0, 1.0
+    np.testing.assert_allclose(transform_from_message(message), transform_from((3, 0, 0), (0, 0, 0, 1)))
+
+
+def test_3d_boxes_fill_every_field():
+    box = Box3D(np.array([0.1, 0.2, 3.0]), np.array([0.5, 1.7, 0.5]), (-10, 20, 700, 300), 0.75, True)
+    message = on_the_wire(boxes3d_to_message([box], header(5), Camera(640, 480, 600, 600, 320, 240)))
+    assert message.header.stamp == time_from(5) and message.header.frame_id == 'camera'
+    box, = message.boxes
+    assert (box.center.position.x, box.center.position.y, box.center.position.z) == (0.1, 0.2, 3.0)
+    assert (box.center.orientation.x, box.center.orientation.w) == (0, 1)
+    assert (box.size.x, box.size.y, box.size.z) == (0.5, 1.7, 0.5)
+    roi = box.roi
+    assert (roi.x_offset, roi.y_offset, roi.width, roi.height, roi.do_rectify) == (0, 20, 640, 280, False)
+    assert box.support == 0.75 and box.truncated
+
+
+def test_detections_are_upright_in_the_fixed_frame():
+    """Camera 1 m above the map, looking along x: width and depth of the cylinder are level, its height is z."""
+    map_from_camera = transform_from((0, 0, 1), (-0.5, 0.5, -0.5, 0.5))
+    box = BoundingBox3D()
+    box.center.position.x, box.center.position.y, box.center.position.z = 0.5, 0.1, 3.0
+    box.size.x, box.size.y, box.size.z = 0.6, 1.8, 0.6
+    detection, = detections_from_message(BoundingBox3DArray(boxes=[box]), map_from_camera)
+    np.testing.assert_allclose(detection.position_m, (3, -0.5, 0.9))
+    np.testing.assert_allclose(detection.size_m, (0.6, 0.6, 1.8))
+    np.testing.assert_allclose(inverse(map_from_camera)[:3, 3], (0, 1, 0), atol=1e-12)
+
+
+@pytest.mark.parametrize('field,value', [('center', float('nan')), ('center', float('inf')), ('size', 0.0),
+                                         ('size', -1.0), ('size', float('nan'))])
+def test_3d_boxes_that_cannot_be_are_refused(field, value):
+    box = BoundingBox3D()
+    box.size.x = box.size.y = box.size.z = 1.0
+    (box.center.position if field == 'center' else box.size).x = value
+    with pytest.raises(ValueError, match='3D box 1'):
+        good = BoundingBox3D()
+        good.size.x = good.size.y = 1.0
+        detections_from_message(BoundingBox3DArray(boxes=[good, box]), np.eye(4))
+
+
+def test_tracks_fill_every_field():
+    tracker = ThesisTracker()
+    box = BoundingBox3D()
+    box.size.x, box.size.y = 0.5, 1.7
+    for frame in range(5):
+        box.center.position.x = 0.1 * frame
+        detections = detections_from_message(BoundingBox3DArray(boxes=[box]), np.eye(4))
+        tracks = tracker.update(NS + frame * NS // 10, detections)
+    message = on_the_wire(tracks_to_message(tracks, header(NS, 'map')))
+    assert isinstance(message, TrackedObjectArray) and message.header.frame_id == 'map'
+    track, = message.objects
+    assert track.id == 1 and track.status == TrackedObject.VISIBLE and track.moving
+    assert track.pose.pose.position.x == pytest.approx(0.4) and track.pose.pose.orientation.w == 1
+    assert track.twist.twist.linear.x == pytest.approx(1 - 0.8 ** 4)
+    assert (track.size.x, track.size.y, track.size.z) == (0.5, 0.5, 1.7)
+    assert track.first_seen == time_from(NS) and track.last_seen == time_from(NS + 4 * NS // 10)
+    assert len(track.prediction) == 8 and track.prediction_step.to_sec() == 0.25
+    assert track.prediction[-1].pose.position.x == pytest.approx(0.4 + 2 * (1 - 0.8 ** 4))
+
+
+def test_states_have_the_numbers_of_the_message():
+    numbers = TrackedObject.VISIBLE, TrackedObject.OCCLUDED, TrackedObject.OUT_OF_VIEW
+    assert numbers == (VISIBLE, OCCLUDED, OUT_OF_VIEW)

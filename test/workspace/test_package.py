@@ -1,0 +1,146 @@
+"""The package as a whole: what it declares, installs and promises is what it has."""
+import ast
+import glob
+import os
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+import roslaunch
+import yaml
+
+from ros_3d_bb.detection.yolov5 import DetectionParams
+from ros_3d_bb.nodes.bbox3d_node import Bbox3dParams
+from ros_3d_bb.nodes.tracker_node import TrackerNodeParams
+from ros_3d_bb.nodes.yolov5_node import Yolov5NodeParams
+from ros_3d_bb.params import params_from
+from ros_3d_bb.tracking.thesis import ThesisTrackerParams
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+# rosdep keys of what is no ROS package; None: optional, imported where it is used, with an error that says so.
+KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-pytorch-pip', 'onnxruntime': None}
+TEST_KEYS = {'pytest': 'python3-pytest', 'yaml': 'python3-yaml', 'roslaunch': 'roslaunch'}
+STANDARD_LIBRARY = {'argparse', 'ast', 'bisect', 'collections', 'difflib', 'json', 'math', 'os', 'pickle', 'sys',
+                    'threading', 'time', 'typing', 'zipfile'}
+CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams), 'bbox3d.yaml': (Bbox3dParams,),
+           'tracker.yaml': (TrackerNodeParams, ThesisTrackerParams)}
+SET_BY_LAUNCH = {'yolov5.yaml': {'weights'}, 'bbox3d.yaml': set(), 'tracker.yaml': {'target_frame', 'camera_frame'}}
+REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag']
+
+
+def inside(*parts):
+    return os.path.join(ROOT, *parts)
+
+
+def python_files():
+    return sorted(glob.glob(inside('src', '**', '*.py'), recursive=True) + glob.glob(inside('scripts', '*')))
+
+
+def declared(*kinds):
+    tree = ElementTree.parse(inside('package.xml'))
+    return set(element.text for kind in kinds for element in tree.iter(kind))
+
+
+def imported():
+    names = set()
+    for path in python_files():
+        with open(path) as stream:
+            for node in ast.walk(ast.parse(stream.read())):
+                if isinstance(node, ast.Import):
+                    names.update(name.name.split('.')[0] for name in node.names)
+                elif isinstance(node, ast.ImportFrom):
+                    names.add(node.module.split('.')[0])
+    return names - STANDARD_LIBRARY - {'ros_3d_bb'}
+
+
+def test_every_import_is_declared_and_every_dependency_is_used():
+    needed = set(KEYS.get(name, name) for name in imported()) - {None}
+    for path in glob.glob(inside('launch', '*')):
+        needed.update(element.get('pkg') for element in ElementTree.parse(path).iter('node'))
+    for path in glob.glob(inside('msg', '*')):
+        with open(path) as stream:
+            needed.update(re.findall(r'^(\w+)/', stream.read(), re.MULTILINE))
+    assert declared('depend', 'exec_depend') == (needed - {'ros_3d_bb'}) | {'message_runtime'}
+
+
+def test_what_the_tests_import_is_declared():
+    assert set(TEST_KEYS.values()) | {'rostest'} == declared('test_depend')
+
+
+def test_the_robot_needs_no_more_than_python_3_6():
+    subprocess.check_call([sys.executable, '-c', 'from vermin import main; main()', '--no-tips', '--target=3.6-',
+                           '--violations'] + python_files())
+
+
+def test_nothing_names_a_machine_or_stamps_with_now():
+    for path in python_files() + glob.glob(inside('launch', '*')) + glob.glob(inside('config', '*')) + [inside('run')]:
+        with open(path) as stream:
+            text = stream.read()
+        assert not re.search(r'(^|[\s"\'=])/(work|home|root)/|\.\./shared|Time\.now\(\)', text), path
+
+
+@pytest.mark.parametrize('name', sorted(CONFIGS))
+def test_parameter_files_hold_every_parameter_with_its_default(name):
+    with open(inside('config', name)) as stream:
+        text = stream.read()
+    given = yaml.safe_load(text)
+    expected = {key: value for kind in CONFIGS[name] for key, value in kind()._asdict().items()}
+    assert set(given) == set(expected) - SET_BY_LAUNCH[name]
+    for key, value in given.items():
+        assert value == (list(expected[key]) if isinstance(expected[key], tuple) else expected[key])
+    params_from(given, *CONFIGS[name])
+
+
+@pytest.mark.parametrize('name', sorted(CONFIGS))
+def test_parameters_have_a_comment_with_the_default(name):
+    with open(inside('config', name)) as stream:
+        text = stream.read()
+    comment = ''
+    for line in filter(None, text.splitlines()):
+        if line.startswith('#'):
+            comment += line
+            continue
+        key, value = line.split(': ')
+        assert re.search(r'Default: %s' % re.escape(value.replace("''", 'empty')), comment), key
+        comment = ''
+
+
+@pytest.mark.parametrize('name', sorted(os.path.basename(path) for path in glob.glob(inside('launch', '*'))))
+def test_launch_files_load_and_document_their_arguments(name):
+    path = inside('launch', name)
+    for argument in ElementTree.parse(path).getroot().findall('arg'):
+        assert argument.get('doc') or argument.get('value'), '%s: %s' % (name, argument.get('name'))
+    loader = roslaunch.xmlloader.XmlLoader(resolve_anon=False)
+    config = roslaunch.config.ROSLaunchConfig()
+    loader.load(path, config, argv=REQUIRED_ARGUMENTS, verbose=False)
+    assert config.nodes
+    for node in config.nodes:
+        assert node.package != 'ros_3d_bb' or os.path.exists(inside('scripts', node.type))
+
+
+@pytest.mark.parametrize('name', ['yolov5.launch', 'bbox3d.launch', 'tracker.launch'])
+def test_launch_files_set_no_parameter_that_the_node_does_not_know(name):
+    loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
+    loader.load(inside('launch', name), config, argv=REQUIRED_ARGUMENTS, verbose=False)
+    given = {key.split('/', 2)[2]: parameter.value for key, parameter in config.params.items()}
+    params_from(given, *CONFIGS[name.replace('.launch', '.yaml')])
+
+
+def test_rviz_shows_what_the_pipeline_publishes():
+    with open(inside('rviz', 'pipeline.rviz')) as stream:
+        content = yaml.safe_load(stream)
+    topics = [display.get('Image Topic') or display.get('Marker Topic')
+              for display in content['Visualization Manager']['Displays']]
+    assert set(filter(None, topics)) == {'visualization_marker_array', 'camera/color/image_raw', 'yolo_result_out'}
+    assert content['Window Geometry']['QMainWindow State']
+    assert (content['Window Geometry']['Width'], content['Window Geometry']['Height']) == (1280, 800)
+
+
+def test_python_packages_are_all_named_in_setup_py():
+    with open(inside('setup.py')) as stream:
+        text = stream.read()
+    packages = set(os.path.relpath(os.path.dirname(path), inside('src')).replace(os.sep, '.')
+                   for path in glob.glob(inside('src', '**', '__init__.py'), recursive=True))
+    assert packages == set(re.findall(r"'(ros_3d_bb[\w.]*)'", text))
