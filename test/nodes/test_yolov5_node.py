@@ -37,9 +37,11 @@ def images(session_folder):
 def camera(weights):
     rospy.init_node('test_yolov5_node')
     process = launched('weights:=' + weights)
-    yield publisher('camera/color/image_raw', Image)
-    process.send_signal(signal.SIGINT)
-    process.wait()
+    try:
+        yield publisher('camera/color/image_raw', Image)
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait()
 
 
 @pytest.fixture
