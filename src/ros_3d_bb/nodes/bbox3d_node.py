@@ -58,46 +58,30 @@ class Bbox3dNode(object):
         rospy.Subscriber('yolo_bounding_box', Int32MultiArray, self._on_boxes, queue_size=10)
 
     def _on_camera_info(self, message):
-        try:
-            camera = camera_from_message(message)
-        except ValueError as error:
-            self._diagnostics.warn('camera_info refused', 'camera_info refused: %s; waiting for the next' % error)
-            return
+        with self._diagnostics.refusing('camera_info'), self._lock:
+            self._cameras.add(message.header.stamp.to_nsec(), _clock_ns(), camera_from_message(message))
         if any(message.D):
             rospy.logwarn_once('camera_info of %s carries lens distortion %s, which is not corrected: positions near '
                                'the image border will be off', message.header.frame_id, message.D)
-        with self._lock:
-            self._cameras.add(message.header.stamp.to_nsec(), _clock_ns(), camera)
 
     def _on_depth(self, message):
-        try:
-            stamp_ns = stamp_of(message)
-        except ValueError as error:
-            self._diagnostics.warn('depth images refused', 'depth image refused: %s; waiting for the next' % error)
-            return
-        with self._lock:
-            self._lift(self._pairing.add_depth(stamp_ns, _clock_ns(), message))
+        with self._diagnostics.refusing('depth images'), self._lock:
+            for entry, boxes in self._pairing.add_depth(stamp_of(message), _clock_ns(), message):
+                self._lift(entry, boxes)
 
     def _on_boxes(self, message):
-        try:
+        with self._diagnostics.refusing('2D boxes'), self._lock:
             boxes = boxes2d_from_message(message)
-        except ValueError as error:
-            self._diagnostics.warn('2D boxes refused', '2D boxes refused: %s; waiting for the next' % error)
-            return
-        if boxes.stamp_ns is None:
-            rospy.loginfo_once('the 2D boxes carry no stamp: each array is paired with the depth image that came '
-                               'nearest to %.3f s before it (~assumed_delay)', self._params.assumed_delay)
-        with self._lock:
-            self._lift(self._pairing.add_boxes(boxes.stamp_ns, _clock_ns(), boxes))
+            if boxes.stamp_ns is None:
+                rospy.loginfo_once('the 2D boxes carry no stamp: each array is paired with the depth image that came '
+                                   'nearest to %.3f s before it (~assumed_delay)', self._params.assumed_delay)
+            for entry, boxes in self._pairing.add_boxes(boxes.stamp_ns, _clock_ns(), boxes):
+                self._lift(entry, boxes)
 
-    def _lift(self, pairs):
-        """Publish the 3D boxes of arrays of 2D boxes, each with the depth image that belongs to it."""
-        for entry, boxes in pairs:
-            try:
-                depth, camera = self._depth_and_camera(entry, boxes)
-            except ValueError as error:
-                self._diagnostics.warn('2D boxes dropped', '2D boxes dropped: %s; waiting for the next' % error)
-                continue
+    def _lift(self, entry, boxes):
+        """Publish the 3D boxes of one array of 2D boxes and the depth image that belongs to it."""
+        with self._diagnostics.refusing('2D boxes'):
+            depth, camera = self._depth_and_camera(entry, boxes)
             found = [self._box3d(depth, tuple(rect), camera) for rect in boxes.boxes.tolist()]
             found = [box for box in found if box is not None]
             header = Header(stamp=time_from(entry.stamp_ns if boxes.stamp_ns is None else boxes.stamp_ns),

@@ -1,5 +1,6 @@
 """What a node did with its input, on /diagnostics and in the log."""
 import collections
+import contextlib
 import threading
 import time
 
@@ -40,6 +41,17 @@ class Diagnostics(object):
         if now_s - self._logged_at.get(event, -WARNING_LASTS_S) >= WARNING_LASTS_S:
             self._logged_at[event] = now_s
             rospy.logwarn('%s', sentence)
+
+    @contextlib.contextmanager
+    def refusing(self, inputs):
+        """Around what a callback does with its input: a ValueError there refuses that one, and the node goes on."""
+        try:
+            yield
+        except ValueError as error:
+            self.warn('%s refused' % inputs, '%s refused: %s; waiting for the next' % (inputs, error))
+        except rospy.ROSException:  # publishers close before the last callback has returned
+            if not rospy.is_shutdown():
+                raise
 
     def _report(self, status):
         recent = self._warned_at is not None and time.monotonic() - self._warned_at < WARNING_LASTS_S

@@ -50,14 +50,10 @@ class TrackerNode(object):
         rospy.Subscriber('ros_3d_bb/bb_3d', BoundingBox3DArray, self._on_boxes, queue_size=10)
 
     def _on_boxes(self, message):
-        with self._lock:
-            try:
-                stamp_ns = stamp_of(message)
-                self._follow_time(stamp_ns)
-                tracks = self._track(stamp_ns, message)
-            except ValueError as error:
-                self._diagnostics.warn('3D boxes refused', '3D boxes refused: %s; waiting for the next' % error)
-                return
+        with self._diagnostics.refusing('3D boxes'), self._lock:
+            stamp_ns = stamp_of(message)
+            self._follow_time(stamp_ns)
+            tracks = self._track(stamp_ns, message)
             if tracks is None:
                 return
             header = Header(stamp=message.header.stamp, frame_id=self._params.target_frame)

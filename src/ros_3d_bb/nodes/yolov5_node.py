@@ -45,7 +45,7 @@ class Yolov5Node(object):
         self._diagnostics = Diagnostics()
         self._boxes_pub = rospy.Publisher('yolo_bounding_box', Int32MultiArray, queue_size=10)
         self._image_pub = rospy.Publisher('yolo_result_out', Image, queue_size=1)
-        self._worker = NewestWorker(self._detect, self._on_error)
+        self._worker = NewestWorker(self._search, self._on_error)
         rospy.on_shutdown(self._worker.stop)
         rospy.Service('~enable', SetBool, self._on_enable)
         rospy.Subscriber('camera/color/image_raw', Image, self._on_image, queue_size=1, buff_size=2 ** 24)
@@ -58,6 +58,10 @@ class Yolov5Node(object):
     def _on_enable(self, request):
         self._enabled = request.data
         return SetBoolResponse(True, 'detector %s' % ('enabled' if request.data else 'paused'))
+
+    def _search(self, message):
+        with self._diagnostics.refusing('images'):
+            self._detect(message)
 
     def _detect(self, message):
         stamp_of(message)
@@ -73,9 +77,7 @@ class Yolov5Node(object):
             self._image_pub.publish(drawn)
 
     def _on_error(self, error):
-        if rospy.is_shutdown():
-            return
-        self._diagnostics.warn('images refused', 'no detection in this image: %s; waiting for the next' % error)
+        self._diagnostics.warn('searches failed', 'the detector failed: %s; waiting for the next image' % error)
 
 
 def main():
