@@ -133,8 +133,8 @@ def test_rviz_shows_what_the_pipeline_publishes():
         content = yaml.safe_load(stream)
     topics = [display.get('Image Topic') or display.get('Marker Topic')
               for display in content['Visualization Manager']['Displays']]
-    assert set(filter(None, topics)) == {'visualization_marker_array', 'camera/color/image_raw', 'yolo_result_out',
-                                        'ros_3d_bb/color'}
+    published = {'visualization_marker_array', 'camera/color/image_raw', 'yolo_result_out', 'ros_3d_bb/color'}
+    assert set(filter(None, topics)) == published
     assert content['Window Geometry']['QMainWindow State']
     assert (content['Window Geometry']['Width'], content['Window Geometry']['Height']) == (1280, 800)
 
