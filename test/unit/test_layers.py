@@ -4,12 +4,12 @@ import os
 
 import pytest
 
+from support.standard_library import STANDARD_LIBRARY
+
 SOURCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'src', 'ros_3d_bb')
 MODULES = sorted(os.path.relpath(os.path.join(folder, name), SOURCE)
                  for folder, _folders, names in os.walk(SOURCE) for name in names if name.endswith('.py'))
 PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime'}
-STANDARD_LIBRARY = {'ast', 'bisect', 'collections', 'difflib', 'json', 'math', 'os', 'pickle', 'threading', 'typing',
-                    'zipfile', 'argparse', 'sys', 'time'}
 ROS_TYPES = {'bags.py', 'markers.py', 'messages.py'}  # convert to and from ROS messages, but run in no node
 
 

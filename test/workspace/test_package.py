@@ -17,13 +17,12 @@ from ros_3d_bb.nodes.tracker_node import TrackerNodeParams
 from ros_3d_bb.nodes.yolov5_node import Yolov5NodeParams
 from ros_3d_bb.params import params_from
 from ros_3d_bb.tracking.thesis import ThesisTrackerParams
+from support.standard_library import STANDARD_LIBRARY
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 # rosdep keys of what is no ROS package; None: optional, imported where it is used, with an error that says so.
 KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-pytorch-pip', 'onnxruntime': None}
 TEST_KEYS = {'pytest': 'python3-pytest', 'yaml': 'python3-yaml', 'roslaunch': 'roslaunch'}
-STANDARD_LIBRARY = {'argparse', 'ast', 'bisect', 'collections', 'difflib', 'json', 'math', 'os', 'pickle', 'sys',
-                    'threading', 'time', 'typing', 'zipfile'}
 CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams), 'bbox3d.yaml': (Bbox3dParams,),
            'tracker.yaml': (TrackerNodeParams, ThesisTrackerParams)}
 SET_BY_LAUNCH = {'yolov5.yaml': {'weights'}, 'bbox3d.yaml': set(), 'tracker.yaml': {'target_frame', 'camera_frame'}}
