@@ -2,6 +2,7 @@
 import argparse
 import os
 import sys
+from typing import NamedTuple, Tuple
 
 import numpy as np
 import rosbag
@@ -23,22 +24,27 @@ INFO_TOPICS = ('/camera/color/camera_info', '/camera/aligned_depth_to_color/came
 BOXES_TOPIC = '/yolo_bounding_box'
 
 
-def write_bag(session, path, rate_hz=30.0, mount_m=MOUNT_M, with_boxes=False, compression='lz4'):
+class BagOptions(NamedTuple):
+    """How a session is written: frames per second; the camera in base_link (x forward, y left, z up), metres, looking
+    straight ahead; whether the session's 2D boxes go to yolo_bounding_box; none, bz2 or lz4.
+    """
+
+    rate_hz: float = 30.0
+    mount_m: Tuple[float, float, float] = MOUNT_M
+    with_boxes: bool = False
+    compression: str = 'lz4'
+
+
+def write_bag(session, path, options=BagOptions()):
     """Write a session as a bag: colour, aligned depth, camera_info of both, and /tf.
+
+    The bag is written beside its place and moved there when it is complete.
 
     Parameters
     ----------
     session : measurements.Session
     path : str
-        The bag; written beside its place and moved there when it is complete.
-    rate_hz : float
-        Frames per second.
-    mount_m : (float, float, float)
-        The camera in base_link (x forward, y left, z up), metres. It looks straight ahead.
-    with_boxes : bool
-        Whether to write the session's 2D boxes to yolo_bounding_box, for playback without a detector.
-    compression : str
-        none, bz2 or lz4.
+    options : BagOptions
 
     Returns
     -------
@@ -52,11 +58,11 @@ def write_bag(session, path, rate_hz=30.0, mount_m=MOUNT_M, with_boxes=False, co
     """
     partial = path + '.active'
     try:
-        with rosbag.Bag(partial, 'w', compression=compression) as bag:
+        with rosbag.Bag(partial, 'w', compression=options.compression) as bag:
             for number, frame in enumerate(session.frames):
-                header = Header(stamp=time_from(START_NS + int(number * NS / rate_hz)), frame_id=session.frame_id)
-                for topic, message in _messages(session, frame, header, mount_m, with_boxes):
-                    bag.write(topic, message, header.stamp)
+                stamp = time_from(START_NS + int(number * NS / options.rate_hz))
+                for topic, message in _messages(session, frame, stamp, options):
+                    bag.write(topic, message, stamp)
         os.replace(partial, path)
     finally:
         if os.path.exists(partial):
@@ -64,15 +70,23 @@ def write_bag(session, path, rate_hz=30.0, mount_m=MOUNT_M, with_boxes=False, co
     return len(session.frames)
 
 
-def _messages(session, frame, header, mount_m, with_boxes):
+def _messages(session, frame, stamp, options):
     """Yield (topic, message) of one frame, in the order in which a robot would send them."""
-    yield '/tf', TFMessage(_transforms(header, mount_m))
+    header = Header(stamp=stamp, frame_id=session.frame_id)
+    yield '/tf', TFMessage(_transforms(header, options.mount_m))
     for topic in INFO_TOPICS:
         yield topic, _camera_info(session, header)
-    yield DEPTH_TOPIC, fill_image(Image(header=header), read_depth(frame, session).values, '16UC1')
+    yield DEPTH_TOPIC, _depth_image(read_depth(frame, session), header)
     yield COLOR_TOPIC, fill_image(Image(header=header), read_color(frame, session.camera), 'rgb8')
-    if with_boxes:
+    if options.with_boxes:
         yield BOXES_TOPIC, boxes2d_to_message(np.array(frame.boxes_px, int).reshape(-1, 4), header)
+
+
+def _depth_image(depth, header):
+    """16UC1 where the camera counts millimetres, else metres as 32FC1 (REP 118)."""
+    if depth.scale_m == 0.001:
+        return fill_image(Image(header=header), depth.values, '16UC1')
+    return fill_image(Image(header=header), (depth.values * depth.scale_m).astype(np.float32), '32FC1')
 
 
 def _camera_info(session, header):
@@ -112,9 +126,9 @@ def main():
     arguments = parser.parse_args()
     if not arguments.rate > 0:
         parser.error('--rate %g: more than 0 expected' % arguments.rate)
+    options = BagOptions(arguments.rate, tuple(arguments.mount), arguments.boxes, arguments.compression)
     try:
-        count = write_bag(read_session(arguments.session), arguments.bag, arguments.rate, tuple(arguments.mount),
-                          arguments.boxes, arguments.compression)
+        count = write_bag(read_session(arguments.session), arguments.bag, options)
     except (SessionError, OSError) as error:
         print('session_to_bag: %s; no bag was written' % error, file=sys.stderr)
         sys.exit(1)

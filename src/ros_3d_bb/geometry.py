@@ -89,15 +89,6 @@ def transform_from(translation, quaternion):
     return matrix
 
 
-def inverse(b_from_a):
-    """`a_from_b`, the inverse of a rigid transform."""
-    rotation = b_from_a[:3, :3].T
-    a_from_b = np.eye(4)
-    a_from_b[:3, :3] = rotation
-    a_from_b[:3, 3] = -rotation.dot(b_from_a[:3, 3])
-    return a_from_b
-
-
 def transform_points(b_from_a, points):
     """Points (..., 3) given in frame a, in frame b."""
     return np.asarray(points, float).dot(b_from_a[:3, :3].T) + b_from_a[:3, 3]

@@ -34,6 +34,7 @@ def draw_samples(image, rect_px, samples):
 
 def visible_depth(depth, farthest_m):
     """A depth image to look at: (height, width), uint8, from near (bright) to `farthest_m` (dark); 0 is no depth."""
-    depth_m = np.nan_to_num(depth.values.astype(np.float32) * np.float32(depth.scale_m), posinf=0, neginf=0)
-    grey = 255 - 254 * np.clip(depth_m / farthest_m, 0, 1)
-    return np.where(depth_m > 0, grey, 0).astype(np.uint8)
+    depth_m = depth.values.astype(np.float32) * np.float32(depth.scale_m)
+    measured = np.isfinite(depth_m) & (depth_m > 0)
+    grey = 255 - 254 * np.clip(np.where(measured, depth_m, 0) / farthest_m, 0, 1)
+    return np.where(measured, grey, 0).astype(np.uint8)

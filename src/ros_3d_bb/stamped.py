@@ -3,6 +3,7 @@ import collections
 from typing import Any, NamedTuple
 
 NS = 1000000000  # nanoseconds in a second
+MAX_WAITING = 100  # boxes that wait at once; more than any camera sends in a second
 
 
 class Stamped(NamedTuple):
@@ -49,74 +50,122 @@ class StampedCache(object):
 
     def at(self, stamp_ns, tolerance_ns=0):
         """The entry whose stamp is nearest, within the tolerance; None where there is none."""
-        best = min(self._entries, key=lambda entry: abs(entry.stamp_ns - stamp_ns), default=None)
-        return best if best is not None and abs(best.stamp_ns - stamp_ns) <= tolerance_ns else None
+        return self._nearest(lambda entry: abs(entry.stamp_ns - stamp_ns), tolerance_ns)
 
-    def arrived_at(self, arrival_ns):
-        """The entry that arrived nearest to a time; None where the cache is empty."""
-        return min(self._entries, key=lambda entry: abs(entry.arrival_ns - arrival_ns), default=None)
+    def arrived_at(self, arrival_ns, tolerance_ns):
+        """The entry that arrived nearest to a time, within the tolerance; None where there is none."""
+        return self._nearest(lambda entry: abs(entry.arrival_ns - arrival_ns), tolerance_ns)
+
+    def _nearest(self, distance_ns, tolerance_ns):
+        best = min(self._entries, key=distance_ns, default=None)
+        return best if best is not None and distance_ns(best) <= tolerance_ns else None
 
     def clear(self):
         """Forget everything."""
         self._entries.clear()
 
 
-class Pairing(object):
-    """Pairs the boxes found in colour images with the depth images of the same stamp.
+class Frame(NamedTuple):
+    """A depth image and the camera it was taken with."""
 
-    Boxes come later than their depth image by the time the detector takes; those that come before it wait for it.
+    stamp_ns: int
+    depth: Any
+    camera: Any
+
+
+class Pairing(object):
+    """Pairs the boxes found in colour images with the depth image and the camera of the same stamp.
+
+    Boxes come later than their depth image by the time the detector takes. Those that come first wait for it, and for
+    its camera; where that is lost, the one nearest in time serves once the next image shows that it will not come.
     Boxes without a stamp are paired by their arrival: with the depth image that came nearest to `assumed_delay_ns`
     before them.
+
+    Each `add_` returns what it settled, a list of (Frame, boxes) in the order in which the boxes came; (None, boxes)
+    where the image did not come in time, or was lost.
 
     Parameters
     ----------
     length_ns : int
-        How long depth images are kept, and how long boxes wait.
+        How long images are kept, and how long boxes wait.
     tolerance_ns : int
         By how much the stamps of a pair may differ.
     assumed_delay_ns : int
         How long the detector takes, for boxes without a stamp.
-    capacity : int
-        How many arrays of boxes can wait at once; one more drives out the one that waits longest.
     """
 
-    def __init__(self, length_ns, tolerance_ns, assumed_delay_ns, capacity=10):
+    def __init__(self, length_ns, tolerance_ns, assumed_delay_ns):
         self._length_ns, self._tolerance_ns, self._assumed_delay_ns = length_ns, tolerance_ns, assumed_delay_ns
-        self._depths = StampedCache(length_ns)
-        self._waiting = collections.deque(maxlen=capacity)
+        self._depths, self._cameras = StampedCache(length_ns), StampedCache(length_ns)
+        self._waiting = []
+        self._end_before_ns = 0  # the last stamp before time went back
 
     @property
     def newest_ns(self):
-        """The stamp of the newest depth image, None where there is none."""
+        """The stamp of the newest depth image, None where none has come."""
         return self._depths.newest_ns
 
-    def add_depth(self, stamp_ns, arrival_ns, depth):
-        """Take a depth image; where its stamp goes back, everything of the time before is forgotten.
+    @property
+    def has_camera(self):
+        """Whether any camera has come."""
+        return len(self._cameras) > 0
 
-        Returns
-        -------
-        list of (Stamped or None, boxes)
-            Boxes that need wait no longer and their depth image; None where it did not come.
-        """
-        if self._depths.add(stamp_ns, arrival_ns, depth):
-            self._waiting.clear()
-        called, staying = [], []
-        for boxes in self._waiting:
-            due = boxes.stamp_ns <= stamp_ns or arrival_ns - boxes.arrival_ns > self._length_ns
-            (called if due or self._matching(boxes) else staying).append(boxes)
-        self._waiting.clear()
-        self._waiting.extend(staying)
-        return [(self._matching(boxes), boxes.value) for boxes in called]
+    def add_depth(self, stamp_ns, now_ns, depth):
+        """Take a depth image; where its stamp goes back, everything of the time before is forgotten."""
+        newest_ns = self.newest_ns
+        if self._depths.add(stamp_ns, now_ns, depth):
+            if (self._cameras.newest_ns or 0) > stamp_ns + self._length_ns:  # no camera of the new time has come yet
+                self._cameras.clear()
+            self._waiting = []
+            self._end_before_ns = newest_ns
+        return self._settled(now_ns)
 
-    def add_boxes(self, stamp_ns, arrival_ns, boxes):
-        """Take the boxes of one image; `stamp_ns` None where they carry no stamp. Returns as `add_depth`."""
+    def add_camera(self, stamp_ns, now_ns, camera):
+        """Take the camera of an image."""
+        self._cameras.add(stamp_ns, now_ns, camera)
+        return self._settled(now_ns)
+
+    def add_boxes(self, stamp_ns, now_ns, boxes):
+        """Take the boxes of one image; `stamp_ns` None where they carry no stamp."""
         if stamp_ns is None:
-            return [(self._depths.arrived_at(arrival_ns - self._assumed_delay_ns), boxes)]
-        entry = Stamped(stamp_ns, arrival_ns, boxes)
-        if self._matching(entry) is None and (self.newest_ns is None or stamp_ns > self.newest_ns):
-            self._waiting.append(entry)
-            return []
-        return [(self._matching(entry), boxes)]
+            depth = self._depths.arrived_at(now_ns - self._assumed_delay_ns, self._length_ns)
+            if depth is None:
+                return self._settled(now_ns) + [(None, boxes)]
+            stamp_ns = depth.stamp_ns
+        if self._is_of_time_before(stamp_ns):
+            return self._settled(now_ns)
+        self._waiting.append(Stamped(stamp_ns, now_ns, boxes))
+        return self._settled(now_ns)
 
-    def _matching(self, boxes):
-        return self._depths.at(boxes.stamp_ns, self._tolerance_ns)
+    def _is_of_time_before(self, stamp_ns):
+        """Whether boxes were still on their way when time went back; they are dropped without a word."""
+        return self.newest_ns is not None and self.newest_ns + self._length_ns < stamp_ns <= self._end_before_ns
+
+    def _settled(self, now_ns):
+        settled, waiting = [], []
+        for number, entry in enumerate(self._waiting):
+            frame = self._frame(entry.stamp_ns)
+            crowded = len(self._waiting) - number > MAX_WAITING
+            if frame is not None or crowded or self._is_hopeless(entry, now_ns):
+                settled.append((frame, entry.value))
+            else:
+                waiting.append(entry)
+        self._waiting = waiting
+        return settled
+
+    def _frame(self, stamp_ns):
+        """The frame of a stamp, None as long as a part of it is missing."""
+        depth = self._depths.at(stamp_ns, self._tolerance_ns)
+        if depth is None:
+            return None
+        camera = self._cameras.at(depth.stamp_ns, self._tolerance_ns)
+        if camera is None and max(self._depths.newest_ns, self._cameras.newest_ns or 0) > depth.stamp_ns:
+            camera = self._cameras.at(depth.stamp_ns, float('inf'))
+        return None if camera is None else Frame(depth.stamp_ns, depth.value, camera.value)
+
+    def _is_hopeless(self, entry, now_ns):
+        """Whether boxes have waited too long, or belong to an image that was lost or came too long ago."""
+        newest_ns = self.newest_ns
+        lost = newest_ns is not None and entry.stamp_ns < newest_ns and (
+            self._depths.at(entry.stamp_ns, self._tolerance_ns) is None)
+        return lost or now_ns - entry.arrival_ns > self._length_ns

@@ -40,10 +40,15 @@ def rig():
     return Rig()
 
 
-@pytest.fixture
-def output(rig):
+@pytest.fixture(scope='module')
+def recorder(rig):
     with Recorder('ros_3d_bb/bb_3d', BoundingBox3DArray) as recorder:
         yield recorder
+
+
+@pytest.fixture
+def output(recorder):
+    return recorder.emptied()
 
 
 @pytest.fixture
@@ -91,12 +96,34 @@ def test_boxes_that_come_before_their_image_wait_for_it(rig, output, now):
 
 
 def test_plain_arrays_get_the_image_that_came_before_them(rig, output, now):
-    """A detector that knows nothing of stamps: 0.05 s (~assumed_delay) after an image that stands for a while."""
-    rig.send_camera(now, 1500)
-    rospy.sleep(0.2)
+    """A detector that knows nothing of stamps: of two images 0.4 s apart, the one 0.05 s (~assumed_delay) before."""
+    for number in range(2):
+        rig.send_camera(now + number * PERIOD, 1500 + 500 * number)
+        rospy.sleep(0.4 if number == 0 else 0.05)
     rig.boxes.publish(Int32MultiArray(data=[20, 10, 44, 38]))
     message, = output.wait_for(1)
-    assert message.header.stamp == time_from(now) and message.boxes[0].center.position.z == pytest.approx(1.5)
+    assert message.header.stamp == time_from(now + PERIOD)
+    assert message.boxes[0].center.position.z == pytest.approx(2.0)
+
+
+def test_without_depth_the_topic_is_named(rig, output, now):
+    """Boxes come and no depth does: nothing is published, and the node says what is missing."""
+    rig.send_camera(now)
+    for frame in range(1, 40):
+        rig.send_boxes(now + frame * PERIOD)
+        rospy.sleep(1 / 30)
+    wait_until(lambda: 'no depth image with their stamp' in diagnostics_of('bbox3d_node')[1], 'a warning')
+    assert '/camera/aligned_depth_to_color/image_raw' in diagnostics_of('bbox3d_node')[1] and output.messages == []
+
+
+def test_the_camera_of_the_same_stamp_is_used_though_it_comes_last(rig, output, now):
+    """The intrinsics change, and their message comes after the depth image and the boxes."""
+    rig.send_camera(now)
+    rig.depth.publish(depth_message(now + PERIOD, 2000))
+    rig.send_boxes(now + PERIOD)
+    assert output.stays_at(0, 0.2)
+    rig.info.publish(camera_info(now + PERIOD, focal=120.0))
+    assert output.wait_for(1)[0].boxes[0].size.x == pytest.approx(24 / 120 * 2.0)
 
 
 def test_nobody_is_an_answer_and_is_published(rig, output, now):

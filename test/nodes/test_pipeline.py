@@ -1,6 +1,5 @@
 """The whole pipeline on a bag of a measurement session, as a user starts it. Needs a master and the bag's clock."""
 import collections
-import signal
 import subprocess
 import threading
 import time
@@ -11,12 +10,12 @@ import rospy
 from std_msgs.msg import Int32MultiArray
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_3d_bb.bags import MOUNT_M, START_NS, write_bag
+from ros_3d_bb.bags import MOUNT_M, START_NS, BagOptions, write_bag
 from ros_3d_bb.estimation import estimate_median, sample_median
 from ros_3d_bb.measurements import read_depth, read_session
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.stamped import NS
-from support.ros import Recorder, wait_until
+from support.ros import Recorder, launched, wait_until
 
 
 @pytest.fixture(scope='module', autouse=True)
@@ -32,7 +31,7 @@ def session(session_folder):
 def make_bag(session, folder, rate_hz):
     """A bag of the session with its recorded boxes; returns its path and {stamp: frame}."""
     path = str(folder / ('%g_hz.bag' % rate_hz))
-    write_bag(session, path, rate_hz, with_boxes=True)
+    write_bag(session, path, BagOptions(rate_hz=rate_hz, with_boxes=True))
     return path, {START_NS + int(number * NS / rate_hz): frame for number, frame in enumerate(session.frames)}
 
 
@@ -42,7 +41,10 @@ def bag(session, tmp_path_factory):
 
 
 class Delayed(object):
-    """Sends on the boxes of a topic after a delay by the machine's clock, as a detector of that speed would."""
+    """Sends on the boxes of a topic after a delay by the machine's clock, as a detector of that speed would.
+
+    Use as a context manager.
+    """
 
     def __init__(self, source, target, delay_s):
         self._queue, self._delay_s, self._running = collections.deque(), delay_s, True
@@ -50,8 +52,12 @@ class Delayed(object):
         self._subscriber = rospy.Subscriber(source, Int32MultiArray,
                                             lambda message: self._queue.append((time.monotonic(), message)))
         self._thread = threading.Thread(target=self._run)
+        self._thread.daemon = True
         self._thread.start()
-        wait_until(lambda: self._publisher.get_num_connections(), 'a subscriber on ' + target)
+
+    def __enter__(self):
+        wait_until(lambda: self._publisher.get_num_connections(), 'a subscriber to the delayed boxes')
+        return self
 
     def _run(self):
         while self._running:
@@ -59,39 +65,28 @@ class Delayed(object):
                 self._publisher.publish(self._queue.popleft()[1])
             time.sleep(0.001)
 
-    def stop(self):
+    def __exit__(self, *_):
         self._running = False
         self._thread.join()
         self._subscriber.unregister()
         self._publisher.unregister()
 
 
-def launched(*arguments):
-    return subprocess.Popen(['roslaunch', 'ros_3d_bb'] + list(arguments))
-
-
-def ended(process):
-    process.send_signal(signal.SIGINT)
-    process.wait()
-
-
 @pytest.fixture(scope='module')
 def bbox3d():
-    process = launched('bbox3d.launch')
-    yield
-    ended(process)
+    with launched('bbox3d.launch'):
+        yield
 
 
 @pytest.mark.parametrize('delay_s', [0.0, 0.05, 0.2])
 def test_at_30_hz_every_array_gets_its_own_depth_image(session, bag, bbox3d, delay_s):
     """All frames are answered, each with its own stamp and with the numbers that its own depth image gives."""
     path, frames = bag
-    with Recorder('ros_3d_bb/bb_3d', BoundingBox3DArray) as output:
-        detector = Delayed('recorded_boxes', 'yolo_bounding_box', delay_s)
+    with Recorder('ros_3d_bb/bb_3d', BoundingBox3DArray) as output, \
+            Delayed('recorded_boxes', 'yolo_bounding_box', delay_s):
         subprocess.check_call(['rosbag', 'play', '--quiet', '--clock', '--delay', '2', path,
                                'yolo_bounding_box:=recorded_boxes'])
         wait_until(lambda: len(output.messages) >= len(frames), '%d arrays of boxes' % len(frames), 5)
-        detector.stop()
     assert [message.header.stamp.to_nsec() for message in output.messages] == sorted(frames)
     for message in output.messages:
         frame = frames[message.header.stamp.to_nsec()]
@@ -106,10 +101,10 @@ def test_playback_shows_the_person_tracked_in_the_map(session, weights, tmp_path
     path, frames = make_bag(session, tmp_path, 10.0)
     with Recorder('ros_3d_bb/bb_3d', BoundingBox3DArray, False) as boxes, \
             Recorder('ros_3d_bb/tracks', TrackedObjectArray, False) as tracks, \
-            Recorder('visualization_marker_array', MarkerArray, False) as markers:
-        process = launched('playback.launch', 'bag:=' + path, 'weights:=' + weights, 'rviz:=false', 'exit_at_end:=true',
-                           'delay:=6')
-        assert process.wait() == 0
+            Recorder('visualization_marker_array', MarkerArray, False) as markers, \
+            launched('playback.launch', 'bag:=' + path, 'weights:=' + weights, 'rviz:=false', 'exit_at_end:=true',
+                     'delay:=6') as process:
+        process.wait()
     assert len(boxes.messages) > len(frames) / 2
     assert all(message.header.stamp.to_nsec() in frames for message in boxes.messages + tracks.messages)
     assert all(message.header.frame_id == session.frame_id for message in boxes.messages)

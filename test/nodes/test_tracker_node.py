@@ -53,16 +53,21 @@ def rig():
     return Rig()
 
 
-@pytest.fixture
-def tracks(rig):
-    with Recorder('ros_3d_bb/tracks', TrackedObjectArray) as recorder:
-        yield recorder
+@pytest.fixture(scope='module')
+def recorders(rig):
+    with Recorder('ros_3d_bb/tracks', TrackedObjectArray) as tracks, \
+            Recorder('visualization_marker_array', MarkerArray) as markers:
+        yield tracks, markers
 
 
 @pytest.fixture
-def markers(rig):
-    with Recorder('visualization_marker_array', MarkerArray) as recorder:
-        yield recorder
+def tracks(recorders):
+    return recorders[0].emptied()
+
+
+@pytest.fixture
+def markers(recorders):
+    return recorders[1].emptied()
 
 
 @pytest.fixture
@@ -124,7 +129,7 @@ def test_without_transform_nothing_is_published_and_nobody_ages(rig, tracks, now
 
 def test_a_transform_that_comes_a_little_late_is_waited_for(rig, tracks, now):
     rig.send_boxes(now, (0.0, 0.0, 3.0))
-    time.sleep(0.05)
+    time.sleep(0.02)
     rig.send_tf(now)
     assert tracks.wait_for(1)[0].header.stamp == time_from(now)
 

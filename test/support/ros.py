@@ -1,4 +1,7 @@
 """What the tests of nodes share: recording topics, and sending what a camera and a detector send."""
+import contextlib
+import signal
+import subprocess
 import threading
 import time
 
@@ -22,6 +25,18 @@ def wait_until(condition, what, timeout_s=TIMEOUT_S):
         time.sleep(0.01)
 
 
+@contextlib.contextmanager
+def launched(*arguments):
+    """A launch file of the package as a process of its own on this test's master, ended afterwards."""
+    process = subprocess.Popen(['roslaunch', 'ros_3d_bb'] + list(arguments))
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+        process.wait()
+
+
 class Recorder(object):
     """Keeps all messages of a topic; use as a context manager."""
 
@@ -31,12 +46,18 @@ class Recorder(object):
         self._subscriber = rospy.Subscriber(topic, kind, self._keep, queue_size=1000, buff_size=2 ** 26)
         if publisher_expected:
             wait_until(lambda: self._subscriber.get_num_connections() > 0, 'a publisher on ' + topic)
+            time.sleep(0.3)  # the publisher counts a connection a moment later than the subscriber
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
         self._subscriber.unregister()
+
+    def emptied(self):
+        """Itself, without what came before: a connection that lasts over several tests loses nothing at its start."""
+        self.messages = []
+        return self
 
     def _keep(self, message):
         with self._lock:

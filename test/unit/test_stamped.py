@@ -2,87 +2,136 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.stamped import NS, Pairing, StampedCache
+from ros_3d_bb.stamped import NS, Frame, Pairing, StampedCache
 
 MS = NS // 1000
 PERIOD = 33 * MS
 
 
-def play(delay_ns, stamped=True, frames=60, pairing=None):
-    """Send depth images at 30 Hz and their boxes `delay_ns` later; returns (box frame, depth frame) numbers."""
+def play(delay_ns, stamped=True, frames=60, pairing=None, info_delay_ns=0):
+    """Send images at 30 Hz and their boxes `delay_ns` later; returns numbers (of boxes, of depth, of camera)."""
     pairing = pairing or Pairing(NS, 5 * MS, delay_ns)
-    events = [(n * PERIOD, 1, n) for n in range(frames)] + [(n * PERIOD + delay_ns, 0, n) for n in range(frames)]
-    pairs = []
-    for time_ns, is_depth, number in sorted(events):
-        if is_depth:
-            got = pairing.add_depth(number * PERIOD, time_ns, number)
+    events = [(n * PERIOD, 'depth', n) for n in range(frames)]
+    events += [(n * PERIOD + info_delay_ns, 'camera', n) for n in range(frames)]
+    events += [(n * PERIOD + delay_ns, 'boxes', n) for n in range(frames)]
+    settled = []
+    for now_ns, kind, number in sorted(events):
+        if kind == 'boxes':
+            settled += pairing.add_boxes(number * PERIOD if stamped else None, now_ns, number)
         else:
-            got = pairing.add_boxes(number * PERIOD if stamped else None, time_ns, number)
-        pairs += [(boxes, entry and entry.value) for entry, boxes in got]
-    return pairs
+            add = pairing.add_depth if kind == 'depth' else pairing.add_camera
+            settled += add(number * PERIOD, now_ns, number)
+    return [(boxes, frame and frame.depth, frame and frame.camera) for frame, boxes in settled]
 
 
-@given(st.integers(-300 * MS, 900 * MS))
-def test_every_array_gets_its_own_depth_image_at_any_delay(delay_ns):
-    pairs = play(delay_ns)
-    assert all(boxes == depth for boxes, depth in pairs)
-    assert len(pairs) >= 60 - 30  # the last ones of a late detector come after the last image
+@given(st.integers(-900 * MS, 900 * MS), st.integers(-100 * MS, 100 * MS))
+def test_every_array_gets_its_own_frame_at_any_delay(delay_ns, info_delay_ns):
+    """Depth always its own; the camera too, unless it comes later than the next depth image."""
+    settled = play(delay_ns, info_delay_ns=info_delay_ns)
+    assert all(boxes == depth for boxes, depth, _camera in settled)
+    assert [boxes for boxes, _depth, _camera in settled] == list(range(len(settled)))
+    assert len(settled) >= 60 - max(0, delay_ns - 900 * MS) // PERIOD - max(0, info_delay_ns) // PERIOD - 1
+    if info_delay_ns < PERIOD:
+        assert all(boxes == camera for boxes, _depth, camera in settled)
 
 
 @pytest.mark.parametrize('delay_ms', [0, 50, 200])
 def test_all_arrays_are_paired_at_the_delays_of_real_detectors(delay_ms):
-    assert play(delay_ms * MS) == [(n, n) for n in range(60)]
+    assert play(delay_ms * MS) == [(n, n, n) for n in range(60)]
 
 
 @pytest.mark.parametrize('delay_ms', [1, 50, 200])
 def test_arrays_without_stamp_are_paired_by_the_assumed_delay(delay_ms):
-    assert all(boxes == depth for boxes, depth in play(delay_ms * MS, stamped=False) if depth is not None)
+    assert play(delay_ms * MS, stamped=False) == [(n, n, n) for n in range(60)]
 
 
-def test_boxes_that_come_first_wait_for_their_image():
-    pairing = Pairing(NS, 5 * MS, 0)
+@pytest.fixture
+def pairing():
+    """With the camera of image 0 and nothing else."""
+    pairing = Pairing(NS, 5 * MS, 50 * MS)
+    pairing.add_camera(0, 0, 'camera')
+    return pairing
+
+
+def test_arrays_without_stamp_and_without_recent_depth_get_nothing(pairing):
+    assert pairing.add_boxes(None, 0, 'boxes') == [(None, 'boxes')]
+    pairing.add_depth(PERIOD, 0, 'depth')
+    assert pairing.add_boxes(None, 3 * NS, 'boxes') == [(None, 'boxes')]
+
+
+def test_boxes_that_come_first_wait_for_their_image(pairing):
     assert pairing.add_boxes(2 * PERIOD, 0, 'boxes') == []
-    assert pairing.add_depth(1 * PERIOD, 1, 'one') == []
-    (entry, boxes), = pairing.add_depth(2 * PERIOD, 2, 'two')
-    assert (entry.value, boxes) == ('two', 'boxes')
-    assert pairing.add_depth(3 * PERIOD, 3, 'three') == []
+    assert pairing.add_depth(PERIOD, 1, 'one') == []
+    assert pairing.add_depth(2 * PERIOD, 2, 'two') == []
+    assert pairing.add_camera(2 * PERIOD, 3, 'its own') == [(Frame(2 * PERIOD, 'two', 'its own'), 'boxes')]
+    assert pairing.add_depth(3 * PERIOD, 4, 'three') == []
 
 
-def test_boxes_whose_image_was_lost_are_given_up_when_the_next_comes():
+def test_a_camera_that_is_sent_once_serves_all_images(pairing):
+    pairing.add_boxes(2 * PERIOD, 0, 'boxes')
+    assert pairing.add_depth(2 * PERIOD, 1, 'two') == []
+    assert pairing.add_depth(3 * PERIOD, 2, 'three') == [(Frame(2 * PERIOD, 'two', 'camera'), 'boxes')]
+
+
+def test_without_any_camera_boxes_are_given_up_in_time():
     pairing = Pairing(NS, 5 * MS, 0)
+    pairing.add_boxes(PERIOD, 0, 'boxes')
+    assert pairing.add_depth(PERIOD, 1, 'one') == [] and not pairing.has_camera
+    assert pairing.add_depth(40 * PERIOD, 40 * PERIOD, 'later') == [(None, 'boxes')]
+
+
+def test_without_any_depth_boxes_are_given_up_in_time():
+    """Nothing comes but boxes: they themselves show that too much time has passed."""
+    pairing = Pairing(NS, 5 * MS, 0)
+    settled = [pair for n in range(60) for pair in pairing.add_boxes(n * PERIOD, n * PERIOD, n)]
+    assert settled == [(None, n) for n in range(60 - 31)] and pairing.newest_ns is None
+
+
+def test_boxes_whose_image_was_lost_are_given_up_when_the_next_comes(pairing):
     pairing.add_depth(1 * PERIOD, 0, 'one')
     pairing.add_boxes(2 * PERIOD, 1, 'boxes')
     assert pairing.add_depth(3 * PERIOD, 2, 'three') == [(None, 'boxes')]
 
 
-def test_boxes_from_the_future_do_not_wait_for_ever():
-    pairing = Pairing(NS, 5 * MS, 0)
-    pairing.add_boxes(3600 * NS, 0, 'boxes')
-    assert pairing.add_depth(PERIOD, NS // 2, 'early') == []
-    assert pairing.add_depth(2 * PERIOD, 2 * NS, 'late') == [(None, 'boxes')]
+def test_boxes_that_were_on_their_way_when_a_bag_looped_are_dropped(pairing):
+    pairing.add_depth(3600 * NS, 0, 'end')
+    pairing.add_depth(PERIOD, 1, 'start')
+    assert pairing.add_boxes(3600 * NS, 2, 'boxes') == []
+    assert pairing.add_depth(2 * PERIOD, 9 * NS, 'two') == []
 
 
-def test_boxes_older_than_the_cache_get_nothing():
-    pairing = Pairing(NS, 5 * MS, 0)
+def test_after_a_pause_boxes_may_come_before_their_image(pairing):
+    pairing.add_depth(PERIOD, 0, 'one')
+    assert pairing.add_boxes(3600 * NS, 1, 'boxes') == []
+    pairing.add_camera(3600 * NS, 2, 'new camera')
+    (frame, boxes), = pairing.add_depth(3600 * NS, 3, 'two')
+    assert (frame.depth, frame.camera, boxes) == ('two', 'new camera', 'boxes')
+
+
+def test_no_more_than_so_many_boxes_wait(pairing):
+    settled = [pair for n in range(150) for pair in pairing.add_boxes(PERIOD + n, 0, n)]
+    assert settled == [(None, n) for n in range(50)]
+
+
+def test_boxes_older_than_the_cache_get_nothing(pairing):
     for number in range(40):
         pairing.add_depth(number * PERIOD, number, number)
     assert pairing.add_boxes(0, 99, 'boxes') == [(None, 'boxes')]
 
 
-def test_a_slightly_different_stamp_is_the_same_image():
-    pairing = Pairing(NS, 5 * MS, 0)
-    pairing.add_depth(PERIOD, 0, 'one')
-    pairing.add_depth(2 * PERIOD, 0, 'two')
-    (entry, _boxes), = pairing.add_boxes(PERIOD + 2 * MS, 0, 'boxes')
-    assert entry.value == 'one'
+def test_a_slightly_different_stamp_is_the_same_image(pairing):
+    for number in (1, 2, 3):
+        pairing.add_depth(number * PERIOD, 0, number)
+    (frame, _boxes), = pairing.add_boxes(PERIOD + 2 * MS, 0, 'boxes')
+    assert frame.depth == 1
     assert pairing.add_boxes(PERIOD + 10 * MS, 0, 'boxes') == [(None, 'boxes')]
 
 
 def test_time_that_goes_back_clears_everything():
     pairing = Pairing(NS, 5 * MS, 50 * MS)
     play(50 * MS, pairing=pairing)
-    pairing.add_boxes(99 * PERIOD, 0, 'of the time before')
-    assert play(50 * MS, pairing=pairing) == [(n, n) for n in range(60)]
+    pairing.add_boxes(60 * PERIOD, 60 * PERIOD, 'of the time before')
+    assert play(50 * MS, pairing=pairing) == [(n, n, n) for n in range(60)]
 
 
 @given(st.lists(st.integers(0, 5 * NS), min_size=1, max_size=50))
@@ -97,4 +146,4 @@ def test_the_cache_keeps_no_more_than_its_length_in_order(stamps):
 
 def test_an_empty_cache_has_no_answer():
     cache = StampedCache(NS)
-    assert cache.newest_ns is None and cache.at(0, NS) is None and cache.arrived_at(0) is None
+    assert cache.newest_ns is None and cache.at(0, NS) is None and cache.arrived_at(0, NS) is None

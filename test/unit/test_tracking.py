@@ -109,6 +109,13 @@ def test_an_object_seen_again_in_time_keeps_its_number_and_its_true_velocity():
     np.testing.assert_allclose(track.velocity_mps, [1, 0, 0])
 
 
+def test_whoever_comes_after_a_long_gap_is_somebody_else():
+    """The camera paused for 10 minutes; nobody was seen meanwhile, and nobody failed to be seen by a lack of tf."""
+    tracker = ThesisTracker(ThesisTrackerParams(disappearance_limit=1.0))
+    tracker.update(0, [at(0, 0)])
+    assert [track.id for track in tracker.update(seconds(600), [at(0.1, 0)])] == [2]
+
+
 def test_time_without_an_answer_ages_nobody():
     """tf failed for 10 s: the images in between are skipped."""
     tracker = ThesisTracker(ThesisTrackerParams(disappearance_limit=1.0))

@@ -8,7 +8,7 @@ import pytest
 import rosbag
 import tf2_py
 
-from ros_3d_bb.bags import START_NS, write_bag
+from ros_3d_bb.bags import START_NS, BagOptions, write_bag
 from ros_3d_bb.images import depth_from, rgb_from
 from ros_3d_bb.measurements import read_color, read_depth, read_session
 from ros_3d_bb.messages import boxes2d_from_message, camera_from_message, time_from, transform_from_message
@@ -26,7 +26,11 @@ def session(session_folder):
 def messages(session, tmp_path_factory):
     """{topic: messages} of a bag at 10 Hz."""
     path = str(tmp_path_factory.mktemp('bag') / 'session.bag')
-    assert write_bag(session, path, 10.0, with_boxes=True) == 7
+    assert write_bag(session, path, BagOptions(rate_hz=10.0, with_boxes=True)) == 7
+    return messages_in(path)
+
+
+def messages_in(path):
     by_topic = {}
     with rosbag.Bag(path) as bag:
         for topic, message, time in bag.read_messages():
@@ -66,6 +70,15 @@ def test_the_camera_stands_on_a_jackal_in_the_map(session, messages):
     map_from_camera = transform_from_message(buffer.lookup_transform_core('map', session.frame_id, stamp))
     np.testing.assert_allclose(map_from_camera.dot([0, 0, 2, 1]), [2.17, 0, 0.2, 1], atol=1e-9)
     assert buffer.can_transform_core('odom', 'base_link', stamp)[0]
+
+
+def test_depth_that_is_not_in_millimetres_keeps_its_scale(session, tmp_path):
+    """A camera that counts 0.25 mm: metres in the bag, as the session says."""
+    path = str(tmp_path / 'fine.bag')
+    write_bag(session._replace(depth_scale_m=0.00025, frames=session.frames[:1]), path, BagOptions(compression='none'))
+    depth = depth_from(messages_in(path)['/camera/aligned_depth_to_color/image_raw'][0])
+    assert depth.scale_m == 1.0
+    np.testing.assert_allclose(depth.values, read_depth(session.frames[0], session).values * 0.00025, rtol=1e-6)
 
 
 def run_tool(*arguments):

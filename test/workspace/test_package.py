@@ -25,7 +25,7 @@ KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-pyt
 TEST_KEYS = {'pytest': 'python3-pytest', 'yaml': 'python3-yaml', 'roslaunch': 'roslaunch'}
 CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams), 'bbox3d.yaml': (Bbox3dParams,),
            'tracker.yaml': (TrackerNodeParams, ThesisTrackerParams)}
-SET_BY_LAUNCH = {'yolov5.yaml': {'weights'}, 'bbox3d.yaml': set(), 'tracker.yaml': {'target_frame', 'camera_frame'}}
+SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id'}, 'tracker.yaml': {'target_frame', 'camera_frame'}}
 REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag']
 
 

@@ -158,7 +158,7 @@ def decoded(rows, confidence, classes):
     scores = rows[np.arange(len(rows)), 5 + best] * rows[:, 4]
     keep = (scores > confidence) & np.isin(best, classes) & np.isfinite(rows[:, :4]).all(axis=1)
     rows, scores, best = rows[keep], scores[keep], best[keep]
-    order = np.argsort(-scores, kind='stable')[:MAX_CANDIDATES]
+    order = np.argsort(-scores, kind='mergesort')[:MAX_CANDIDATES]
     center, half = rows[order, :2], rows[order, 2:4] / 2
     return Detections(np.hstack((center - half, center + half)), scores[order], best[order])
 

@@ -14,7 +14,7 @@ from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.sample_images import SampleImages
 from ros_3d_bb.nodes.startup import read_params, run_node
-from ros_3d_bb.stamped import NS, Pairing, StampedCache
+from ros_3d_bb.stamped import NS, Pairing
 
 DEPTH_TOPIC = 'camera/aligned_depth_to_color/image_raw'
 CAMERA_INFO_TOPIC = 'camera/color/camera_info'
@@ -47,7 +47,6 @@ class Bbox3dNode(object):
         cache_ns, tolerance_ns, delay_ns = (int(seconds * NS) for seconds in (
             self._params.cache_length, self._params.stamp_tolerance, self._params.assumed_delay))
         self._pairing = Pairing(cache_ns, tolerance_ns, delay_ns)
-        self._cameras = StampedCache(cache_ns)
         self._lock = threading.Lock()
         self._diagnostics = Diagnostics()
         self._boxes_pub = rospy.Publisher('ros_3d_bb/bb_3d', BoundingBox3DArray, queue_size=10)
@@ -58,16 +57,16 @@ class Bbox3dNode(object):
         rospy.Subscriber('yolo_bounding_box', Int32MultiArray, self._on_boxes, queue_size=10)
 
     def _on_camera_info(self, message):
-        with self._diagnostics.refusing('camera_info'), self._lock:
-            self._cameras.add(message.header.stamp.to_nsec(), _clock_ns(), camera_from_message(message))
         if any(message.D):
             rospy.logwarn_once('camera_info of %s carries lens distortion %s, which is not corrected: positions near '
                                'the image border will be off', message.header.frame_id, message.D)
+        with self._diagnostics.refusing('camera_info'), self._lock:
+            camera = camera_from_message(message)
+            self._lift(self._pairing.add_camera(message.header.stamp.to_nsec(), _clock_ns(), camera))
 
     def _on_depth(self, message):
         with self._diagnostics.refusing('depth images'), self._lock:
-            for entry, boxes in self._pairing.add_depth(stamp_of(message), _clock_ns(), message):
-                self._lift(entry, boxes)
+            self._lift(self._pairing.add_depth(stamp_of(message), _clock_ns(), message))
 
     def _on_boxes(self, message):
         with self._diagnostics.refusing('2D boxes'), self._lock:
@@ -75,20 +74,21 @@ class Bbox3dNode(object):
             if boxes.stamp_ns is None:
                 rospy.loginfo_once('the 2D boxes carry no stamp: each array is paired with the depth image that came '
                                    'nearest to %.3f s before it (~assumed_delay)', self._params.assumed_delay)
-            for entry, boxes in self._pairing.add_boxes(boxes.stamp_ns, _clock_ns(), boxes):
-                self._lift(entry, boxes)
+            self._diagnostics.count('arrays of 2D boxes')
+            self._lift(self._pairing.add_boxes(boxes.stamp_ns, _clock_ns(), boxes))
 
-    def _lift(self, entry, boxes):
-        """Publish the 3D boxes of one array of 2D boxes and the depth image that belongs to it."""
-        with self._diagnostics.refusing('2D boxes'):
-            depth, camera = self._depth_and_camera(entry, boxes)
-            found = [self._box3d(depth, tuple(rect), camera) for rect in boxes.boxes.tolist()]
-            found = [box for box in found if box is not None]
-            header = Header(stamp=time_from(entry.stamp_ns if boxes.stamp_ns is None else boxes.stamp_ns),
-                            frame_id=self._params.frame_id or entry.value.header.frame_id)
-            self._boxes_pub.publish(boxes3d_to_message(found, header, camera))
-            self._images.publish(header, depth, found)
-            self._diagnostics.count('images lifted')
+    def _lift(self, pairs):
+        """Publish the 3D boxes of arrays of 2D boxes, each with the frame that belongs to it."""
+        for frame, boxes in pairs:
+            with self._diagnostics.refusing('2D boxes'):
+                depth = self._depth_of(frame, boxes)
+                found = [self._box3d(depth, tuple(rect), frame.camera) for rect in boxes.boxes.tolist()]
+                found = [box for box in found if box is not None]
+                header = Header(stamp=time_from(frame.stamp_ns if boxes.stamp_ns is None else boxes.stamp_ns),
+                                frame_id=self._params.frame_id or frame.depth.header.frame_id)
+                self._boxes_pub.publish(boxes3d_to_message(found, header, frame.camera))
+                self._images.publish(header, depth, found)
+                self._diagnostics.count('images lifted')
 
     def _box3d(self, depth, rect_px, camera):
         """The 3D box of one rectangle, None where the rectangle is unusable or shows no depth."""
@@ -100,26 +100,28 @@ class Bbox3dNode(object):
         self._diagnostics.count('boxes without depth' if box is None else 'boxes lifted')
         return box
 
-    def _depth_and_camera(self, entry, boxes):
-        """The depth image that belongs to the boxes, and the intrinsics that came with it, or else the nearest."""
-        if entry is None:
-            raise ValueError(self._why_no_depth(boxes))
-        depth = depth_from(entry.value, self._params.depth_scale)
-        camera = self._cameras.at(entry.stamp_ns, float('inf'))
-        if camera is None:
-            raise ValueError('no camera_info has come on %s' % rospy.resolve_name(CAMERA_INFO_TOPIC))
-        if depth.values.shape != (camera.value.height, camera.value.width):
+    def _depth_of(self, frame, boxes):
+        """The depth image of a frame. Raises ValueError where there is none, or it cannot belong to the camera."""
+        if frame is None:
+            raise ValueError(self._why_no_frame(boxes))
+        depth = depth_from(frame.depth, self._params.depth_scale)
+        if depth.values.shape != (frame.camera.height, frame.camera.width):
             raise ValueError('the depth image has %d x %d pixels, the colour camera %d x %d; depth must be aligned to '
                              'colour (realsense2_camera: align_depth:=true)'
-                             % (depth.values.shape[::-1] + camera.value[:2]))
-        return depth, camera.value
+                             % (depth.values.shape[::-1] + frame.camera[:2]))
+        return depth
 
-    def _why_no_depth(self, boxes):
-        newest_ns = self._pairing.newest_ns
-        if newest_ns is None or boxes.stamp_ns is None:
+    def _why_no_frame(self, boxes):
+        """What did not come, and on which topic it was expected."""
+        newest_ns, kept_s = self._pairing.newest_ns, self._params.cache_length
+        if newest_ns is None:
             return 'no depth image has come on %s' % rospy.resolve_name(DEPTH_TOPIC)
-        return ('no depth image has their stamp %.3f; the newest has %.3f, and %.1f s are kept (~cache_length)'
-                % (boxes.stamp_ns / NS, newest_ns / NS, self._params.cache_length))
+        if not self._pairing.has_camera:
+            return 'no camera_info has come on %s' % rospy.resolve_name(CAMERA_INFO_TOPIC)
+        if boxes.stamp_ns is None:
+            return 'no depth image has come on %s within %.1f s' % (rospy.resolve_name(DEPTH_TOPIC), kept_s)
+        return ('no depth image with their stamp %.3f came on %s; the newest has %.3f, and %.1f s are kept '
+                '(~cache_length)' % (boxes.stamp_ns / NS, rospy.resolve_name(DEPTH_TOPIC), newest_ns / NS, kept_s))
 
 
 def _clock_ns():

@@ -79,7 +79,7 @@ class TrackerNode(object):
             rospy.loginfo('time went back from %.3f to %.3f: tracks and transforms of the time before are forgotten',
                           self._last_stamp_ns / NS, stamp_ns / NS)
             self._tracker.reset()
-            self._transforms.clear()
+            self._transforms.go_back()
             self._last_stamp_ns = stamp_ns
         self._last_stamp_ns = max(stamp_ns, self._last_stamp_ns)
 

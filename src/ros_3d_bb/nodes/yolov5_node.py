@@ -38,7 +38,7 @@ class Yolov5Node(object):
         if not self._params.weights:
             raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
                              'checkpoint such as yolov5n.pt')
-        runtime = open_runtime(os.path.expanduser(self._params.weights), self._params.device)
+        runtime = open_runtime(os.path.abspath(os.path.expanduser(self._params.weights)), self._params.device)
         self._detector = Yolov5(runtime, detection)
         self._detector.warm_up()
         self._enabled = self._params.enabled
@@ -61,7 +61,8 @@ class Yolov5Node(object):
 
     def _search(self, message):
         with self._diagnostics.refusing('images'):
-            self._detect(message)
+            if self._enabled:  # it may have been paused since the image came
+                self._detect(message)
 
     def _detect(self, message):
         stamp_of(message)

@@ -16,7 +16,7 @@ def match_greedily(distances):
     """
     distances = np.asarray(distances, float)
     pairs, rows, columns = [], set(), set()
-    for row, column in zip(*np.unravel_index(np.argsort(distances, axis=None, kind='stable'), distances.shape)):
+    for row, column in zip(*np.unravel_index(np.argsort(distances, axis=None, kind='mergesort'), distances.shape)):
         if row not in rows and column not in columns:
             pairs.append((int(row), int(column)))
             rows.add(row)

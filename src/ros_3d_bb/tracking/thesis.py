@@ -82,16 +82,16 @@ class ThesisTracker(object):
             If the stamp is not later; nothing changes then.
         """
         elapsed_ns = self._advance(stamp_ns)
+        limit_ns = self._params.disappearance_limit * NS
+        for track in self._tracks:
+            track.unseen_ns += elapsed_ns
+        self._tracks = [track for track in self._tracks if track.unseen_ns <= limit_ns]
         pairs = []
         if self._tracks and detections:
             pairs = match_greedily(plane_distances([track.position_m for track in self._tracks],
                                                    [detection.position_m for detection in detections]))
-        for track in self._tracks:
-            track.unseen_ns += elapsed_ns
         for row, column in pairs:
             self._tracks[row].update(stamp_ns, detections[column], self._params.alpha)
-        limit_ns = self._params.disappearance_limit * NS
-        self._tracks = [track for track in self._tracks if track.unseen_ns <= limit_ns]
         matched = set(column for _row, column in pairs)
         for column, detection in enumerate(detections):
             if column not in matched:
