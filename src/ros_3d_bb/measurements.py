@@ -53,6 +53,8 @@ def read_session(folder):
         with open(path, encoding='utf-8') as stream:
             content = json.load(stream)
         camera = content['camera']
+        if not 0 < float(camera['depth_scale']) < 1:
+            raise ValueError('depth_scale is %s; metres per unit expected, such as 0.001' % camera['depth_scale'])
         intrinsics = Camera(*(camera[name] for name in Camera._fields))
         return Session(intrinsics, tuple(float(k) for k in camera.get('distortion', ())), float(camera['depth_scale']),
                        str(camera['frame']), tuple(_frame_from(str(folder), entry) for entry in content['frames']))
@@ -61,7 +63,7 @@ def read_session(folder):
                            % (folder, error.strerror))
     except KeyError as error:
         raise SessionError('%s: the field %s is missing' % (path, error))
-    except (TypeError, ValueError, AttributeError) as error:
+    except (TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         raise SessionError('%s: not the description of a measurement session (%s)' % (path, error))
 
 
@@ -83,7 +85,10 @@ def read_depth(frame, session):
 
 
 def _read_image(path, camera):
-    image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
+    try:
+        image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
+    except cv2.error:  # more pixels than OpenCV reads
+        image = None
     if image is None:
         raise SessionError('%s: missing, or not an image' % path)
     if image.shape[:2] != (camera.height, camera.width):
@@ -98,6 +103,15 @@ def _frame_from(folder, entry):
     truth_mm = entry.get('truth_mm')
     return Frame(
         str(entry['id']), os.path.join(folder, entry['color']), os.path.join(folder, entry['depth']),
-        tuple(tuple(int(edge) for edge in detection['box']) for detection in detections if detection.get('box')),
-        None if estimate_mm is None else np.array(estimate_mm, float) / 1000,
-        None if truth_mm is None else np.array([truth_mm['x'], truth_mm['z']], float) / 1000)
+        tuple(tuple(int(edge) for edge in _numbers(detection['box'], 4))
+              for detection in detections if detection.get('box')),
+        None if estimate_mm is None else _numbers(estimate_mm, 3) / 1000,
+        None if truth_mm is None else _numbers([truth_mm['x'], truth_mm['z']], 2) / 1000)
+
+
+def _numbers(values, count):
+    """`count` numbers as an array. Raises ValueError."""
+    numbers = np.array(values, float)
+    if numbers.shape != (count,) or not np.isfinite(numbers).all():
+        raise ValueError('%s is not %d numbers' % (str(values)[:100], count))
+    return numbers

@@ -18,9 +18,9 @@ def recorded(data):
     return os.path.join(data, 'weights', 'yolov5n.pt'), cases
 
 
-def made(path):
+def made(path, given=None):
     """A checkpoint of random weights and the output that numpy computes for two small images."""
-    network = write_checkpoint(path, layout('6.0', 'n'))
+    network = write_checkpoint(path, given or layout('6.0', 'n'))
     random = np.random.RandomState(2)
     cases = []
     for height, width in ((64, 96), (96, 64)):
@@ -43,7 +43,7 @@ def _forward(network, x):
         elif kind == 'Detect':
             return np.concatenate([_decoded(layer, scale, y) for scale, y in enumerate(given)])
         else:
-            given = {'Conv': _conv, 'C3': _c3, 'SPPF': _sppf}[kind](layer, given)
+            given = {'Conv': _conv, 'C3': _c3, 'SPPF': _sppf, 'Focus': _focus, 'SPP': _spp}[kind](layer, given)
         outputs.append(given)
 
 
@@ -71,12 +71,28 @@ def _c3(layer, x):
     return _conv(layer.cv3, np.concatenate((y, _conv(layer.cv2, x))))
 
 
+def _focus(layer, x):
+    """Rows and columns: both even, odd rows, odd columns, both odd."""
+    return _conv(layer.conv, np.concatenate([x[:, row::2, column::2] for column in (0, 1) for row in (0, 1)]))
+
+
 def _sppf(layer, x):
     levels = [_conv(layer.cv1, x)]
     for _ in range(3):
-        padded = np.pad(levels[-1], ((0, 0), (2, 2), (2, 2)), constant_values=-np.inf)
-        levels.append(np.lib.stride_tricks.sliding_window_view(padded, (5, 5), axis=(1, 2)).max(axis=(3, 4)))
+        levels.append(_pooled(levels[-1], 5))
     return _conv(layer.cv2, np.concatenate(levels))
+
+
+def _spp(layer, x):
+    x = _conv(layer.cv1, x)
+    return _conv(layer.cv2, np.concatenate([x] + [_pooled(x, size) for size in (5, 9, 13)]))
+
+
+def _pooled(x, size):
+    """The largest of each window."""
+    half = size // 2
+    padded = np.pad(x, ((0, 0), (half, half), (half, half)), constant_values=-np.inf)
+    return np.lib.stride_tricks.sliding_window_view(padded, (size, size), axis=(1, 2)).max(axis=(3, 4))
 
 
 def _decoded(detect, scale, x):

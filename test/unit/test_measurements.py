@@ -80,6 +80,10 @@ def test_several_boxes_in_a_frame(folder):
     (lambda content: content.update(frames=3), 'not iterable'),
     (lambda content: content['frames'][0].pop('depth'), "'depth' is missing"),
     (lambda content: content['frames'][0].update(box=['a']), "'a'"),
+    (lambda content: content['frames'][0].update(box=[1, 2, 3]), '[1, 2, 3] is not 4 numbers'),
+    (lambda content: content['frames'][0].update(box=[1, 2, 3, float('inf')]), 'is not 4 numbers'),
+    (lambda content: content['camera'].update(depth_scale=-0.001), 'depth_scale is -0.001'),
+    (lambda content: content['camera'].update(width=float('inf')), 'infinity'),
     (lambda content: content['frames'].append(7), 'int')])
 def test_descriptions_with_faults_are_refused(folder, edit, reason):
     change(folder, edit)

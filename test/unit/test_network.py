@@ -50,9 +50,9 @@ def changed(change):
 
 @pytest.mark.parametrize('change,reason', [
     (lambda given: given['backbone'].__setitem__(0, [-1, 1, 'os.system', ['x']]), 'unknown layer'),
-    (lambda given: given['backbone'].__setitem__(0, [-1, 1, 'Conv', [10 ** 9, 3]]), 'channels'),
+    (lambda given: given['backbone'].__setitem__(0, [-1, 1, 'Conv', [10 ** 9, 3]]), 'million parameters'),
     (lambda given: given['backbone'].__setitem__(0, [-1, 10 ** 6, 'Conv', [64, 3]]), 'repeated'),
-    (lambda given: given['backbone'].__setitem__(0, [-1, 1, 'Conv', [64, 10 ** 6]]), 'kernel'),
+    (lambda given: given['backbone'].__setitem__(0, [-1, 1, 'Conv', [64, 10 ** 6]]), 'kernels'),
     (lambda given: given['backbone'].extend([[-1, 1, 'Conv', [8]]] * 200), 'layers'),
     (lambda given: given['head'].pop(), 'not Detect'),
     (lambda given: given.update(activation='__import__("os")'), 'unknown activation')])

@@ -11,6 +11,7 @@ from ros_3d_bb.detection.runtime import open_runtime, torch_device
 from ros_3d_bb.detection.yolov5 import letterboxed
 from support.checkpoints import random_network, write_checkpoint
 from support.layouts import layout
+from support.official_reference import made
 from support.red_detector import write_red_detector
 
 
@@ -38,6 +39,17 @@ def test_raw_output_agrees_with_the_official_code(official_output):
         difference = np.abs(runtime(batch)[rows] - values)
         assert difference[:, :4].max() <= 0.01
         assert difference[:, 4:].max() <= 1e-4
+
+
+@pytest.mark.parametrize('release,model', [('6.0', 'n'), ('5.0', 's')])
+def test_raw_output_agrees_with_plain_numpy(tmp_path, release, model):
+    """Focus and SPP of release 5.0 too, of which there is no recorded output."""
+    path, cases = made(str(tmp_path / 'random.pt'), layout(release, model))
+    runtime = open_runtime(path, 'cpu')
+    for image, rows, values in cases:
+        batch, _letterbox = letterboxed(image, (96, 96), runtime.stride)
+        difference = np.abs(runtime(batch)[rows] - values)
+        assert difference[:, :4].max() <= 0.01 and difference[:, 4:].max() <= 1e-4
 
 
 def test_anchors_kept_twice_as_in_release_5_are_read_once(tmp_path):
@@ -76,15 +88,31 @@ def test_torchscript_exports_give_the_same_predictions(tmp_path):
     config = {'shape': [1, 3, 96, 128], 'stride': 32, 'names': {'0': 'person'}}
     torch.jit.trace(network, torch.zeros(1, 3, 96, 128)).save(path, _extra_files={'config.txt': json.dumps(config)})
     runtime = open_runtime(path, 'cpu')
-    assert runtime.input_hw == (96, 128) and runtime.stride == 32
+    assert runtime.input_hw == (96, 128) and runtime.stride == 32 and runtime.names[0] == 'person'
     batch = np.random.RandomState(0).random_sample((1, 3, 96, 128)).astype(np.float32)
     with torch.no_grad():
         expected = network(torch.from_numpy(batch))[0].numpy()
     np.testing.assert_allclose(runtime(batch), expected, atol=1e-3, rtol=1e-4)
 
 
-def test_torchscript_with_the_name_of_a_checkpoint_is_recognised(tmp_path):
-    assert open_runtime(write_red_detector(str(tmp_path / 'red.pt')), 'cpu').names[0] == 'person'
+def test_torchscript_runs_only_by_its_name(tmp_path):
+    """It is a program, and a checkpoint must never be one."""
+    assert open_runtime(write_red_detector(str(tmp_path / 'red.torchscript.pt')), 'cpu').names[0] == 'person'
+    with pytest.raises(WeightsError, match='must end in .torchscript'):
+        open_runtime(write_red_detector(str(tmp_path / 'red.pt')), 'cpu')
+
+
+@pytest.mark.parametrize('edit', [
+    lambda given: given['head'].__setitem__(-2, [-1, 1, 'C3', [1024, False]]) or given['backbone'].pop(),
+    lambda given: given['backbone'].__setitem__(0, [-1, 1, 'Conv', [64, 6, 0, 2]]),
+    lambda given: given['backbone'].__setitem__(1, [-1, 0, 'Conv', [128, 3, 2]]),
+    lambda given: given['head'].__setitem__(2, [[-1, 4], 1, 'Concat', [1]])])
+def test_layouts_that_cannot_run_are_refused_when_the_file_is_opened(tmp_path, edit):
+    path, given = str(tmp_path / 'odd.pt'), layout('6.0', 'n')
+    edit(given)
+    write_checkpoint(path, layout('6.0', 'n'), yaml=given)
+    with pytest.raises(WeightsError, match='cannot be rebuilt'):
+        open_runtime(path, 'cpu')
 
 
 class NotADetector(torch.nn.Module):

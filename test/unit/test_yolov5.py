@@ -117,12 +117,26 @@ def test_classes_by_name_and_number(entry, number):
     assert class_number(entry, ['person', 'cat']) == number
 
 
-@pytest.mark.parametrize('change,reason', [({'classes': ['ghost']}, "'ghost'"), ({'classes': [7]}, '7'),
+@pytest.mark.parametrize('change,reason', [({'classes': ['ghost']}, "'ghost'"), ({'classes': []}, 'classes'),
+                                           ({'classes': [7]}, '7'),
                                            ({'confidence': 2.0}, 'confidence'), ({'iou': -1.0}, 'iou'),
                                            ({'max_det': 0}, 'max_det'), ({'image_size': 0}, 'image_size')])
 def test_parameters_that_make_no_sense_are_named(change, reason):
     with pytest.raises(ValueError, match=reason):
         Yolov5(FixedRuntime(), DetectionParams()._replace(**change))
+
+
+def test_exports_of_a_fixed_size_get_that_size_with_grey_on_both_sides():
+    class Fixed(FixedRuntime):
+        input_hw = (64, 128)
+
+        def __call__(self, batch):
+            assert batch.shape == (1, 3, 64, 128)
+            edges = np.nonzero(np.abs(batch[0, 0, 32] - 114 / 255) > 1e-6)[0]
+            assert (edges[0], edges[-1]) == (21, 105)  # 85 of 128 columns, 43 of them padded
+            return np.array([(64, 32, 85, 64, 0.9, 1, 0)], np.float32)
+    found = Yolov5(Fixed()).detect(np.zeros((300, 400, 3), np.uint8))
+    np.testing.assert_allclose(found.boxes, [[0, 0, 400, 300]], atol=3)
 
 
 def test_the_input_is_rounded_up_to_the_stride():

@@ -6,7 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 import rosbag
-import tf2_py
+import tf2_ros
 
 from ros_3d_bb.bags import START_NS, BagOptions, write_bag
 from ros_3d_bb.images import depth_from, rgb_from
@@ -63,7 +63,7 @@ def test_pixels_boxes_and_intrinsics_are_those_of_the_session(session, messages)
 
 def test_the_camera_stands_on_a_jackal_in_the_map(session, messages):
     """0.17 m forward and 0.20 m up of base_link (thesis 3.5.1), looking ahead."""
-    buffer = tf2_py.BufferCore()
+    buffer = tf2_ros.BufferCore()
     for transform in messages['/tf'][3].transforms:
         buffer.set_transform(transform, 'test')
     stamp = messages['/camera/color/image_raw'][3].header.stamp

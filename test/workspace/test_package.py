@@ -17,15 +17,16 @@ from ros_3d_bb.nodes.tracker_node import TrackerNodeParams
 from ros_3d_bb.nodes.yolov5_node import Yolov5NodeParams
 from ros_3d_bb.params import params_from
 from ros_3d_bb.tracking.thesis import ThesisTrackerParams
-from support.standard_library import STANDARD_LIBRARY
+from support.standard_library import STANDARD_LIBRARY, TEST_STANDARD_LIBRARY
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 # rosdep keys of what is no ROS package; None: optional, imported where it is used, with an error that says so.
 KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-pytorch-pip', 'onnxruntime': None}
-TEST_KEYS = {'pytest': 'python3-pytest', 'yaml': 'python3-yaml', 'roslaunch': 'roslaunch'}
+TEST_KEYS = {'pytest': 'python3-pytest', 'yaml': 'python3-yaml'}
 CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams), 'bbox3d.yaml': (Bbox3dParams,),
            'tracker.yaml': (TrackerNodeParams, ThesisTrackerParams)}
-SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id'}, 'tracker.yaml': {'target_frame', 'camera_frame'}}
+SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id'},
+                 'tracker.yaml': {'target_frame', 'camera_frame'}}
 REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag']
 
 
@@ -42,9 +43,10 @@ def declared(*kinds):
     return set(element.text for kind in kinds for element in tree.iter(kind))
 
 
-def imported():
+def imported(paths):
+    """Top-level names of other packages that Python files import."""
     names = set()
-    for path in python_files():
+    for path in paths:
         with open(path) as stream:
             for node in ast.walk(ast.parse(stream.read())):
                 if isinstance(node, ast.Import):
@@ -55,7 +57,7 @@ def imported():
 
 
 def test_every_import_is_declared_and_every_dependency_is_used():
-    needed = set(KEYS.get(name, name) for name in imported()) - {None}
+    needed = set(KEYS.get(name, name) for name in imported(python_files())) - {None}
     for path in glob.glob(inside('launch', '*')):
         needed.update(element.get('pkg') for element in ElementTree.parse(path).iter('node'))
     for path in glob.glob(inside('msg', '*')):
@@ -64,8 +66,14 @@ def test_every_import_is_declared_and_every_dependency_is_used():
     assert declared('depend', 'exec_depend') == (needed - {'ros_3d_bb'}) | {'message_runtime'}
 
 
-def test_what_the_tests_import_is_declared():
-    assert set(TEST_KEYS.values()) | {'rostest'} == declared('test_depend')
+def test_what_the_tests_import_is_declared_or_in_their_requirements():
+    names = imported(glob.glob(inside('test', '**', '*.py'), recursive=True)) - {'support'} - TEST_STANDARD_LIBRARY
+    with open(inside('test', 'requirements.txt')) as stream:
+        required = set(re.findall(r'^([\w-]+)', stream.read(), re.MULTILINE))
+    known = declared('depend', 'exec_depend', 'test_depend')
+    assert [name for name in names
+            if TEST_KEYS.get(name, KEYS.get(name) or name) not in known and name not in required] == []
+    assert declared('test_depend') - set(TEST_KEYS.values()) - names == {'rostest'}
 
 
 def test_the_robot_needs_no_more_than_python_3_6():

@@ -11,8 +11,8 @@ from torch import nn
 
 ACTIVATIONS = {'nn.SiLU()': nn.SiLU, 'nn.ReLU()': nn.ReLU, 'nn.Hardswish()': nn.Hardswish,
                'nn.LeakyReLU(0.1)': lambda: nn.LeakyReLU(0.1)}
-# Bounds on what a layout may ask for; the largest official models (x, x6) stay below half of each.
-MAX_LAYERS, MAX_REPEATS, MAX_CHANNELS, MAX_KERNEL = 100, 50, 4096, 31
+# Bounds on what a layout may ask for. The largest official model, x6, has 1.4e8 parameters, 4 scales and 3 anchors.
+MAX_LAYERS, MAX_REPEATS, MAX_KERNEL, MAX_SCALES, MAX_ANCHORS, MAX_PARAMETERS = 100, 50, 31, 5, 10, 2e8
 
 
 class Conv(nn.Module):
@@ -161,9 +161,10 @@ class Network(nn.Module):
 
     def __init__(self, layout):
         super(Network, self).__init__()
-        rows = list(layout['backbone']) + list(layout['head'])
-        if len(rows) > MAX_LAYERS:
-            raise ValueError('the layout has %d layers, more than %d' % (len(rows), MAX_LAYERS))
+        backbone, head = layout['backbone'], layout['head']
+        if not (isinstance(backbone, list) and isinstance(head, list) and len(backbone) + len(head) <= MAX_LAYERS):
+            raise ValueError('the layout is no list of at most %d layers' % MAX_LAYERS)
+        rows = backbone + head
         builder = _Builder(layout)
         self.model = nn.ModuleList([builder.layer(*row) for row in rows])
         self.inputs = [row[0] for row in rows]
@@ -194,21 +195,25 @@ class _Builder(object):
         self._class_count = layout['nc']
         anchors = layout['anchors']
         self._anchor_count = len(anchors[0]) // 2 if isinstance(anchors, (list, tuple)) else int(anchors)
+        if not 0 < self._anchor_count <= MAX_ANCHORS:
+            raise ValueError('%d anchors a scale; 1 to %d expected' % (self._anchor_count, MAX_ANCHORS))
         self._width, self._depth = float(layout['width_multiple']), float(layout['depth_multiple'])
         activation = layout.get('activation') or 'nn.SiLU()'
-        if activation not in ACTIVATIONS:
-            raise ValueError('unknown activation %r' % (activation,))
+        if not isinstance(activation, str) or activation not in ACTIVATIONS:
+            raise ValueError('unknown activation; one of %s expected' % ', '.join(sorted(ACTIVATIONS)))
         self._activation = ACTIVATIONS[activation]
-        self._channels, self._strides = [], []
+        self._channels, self._strides, self._parameters = [], [], 0
 
     def layer(self, inputs, repeats, kind, arguments):
         """The next layer; arguments as in the layout."""
+        if not isinstance(kind, str) or (isinstance(inputs, list) and len(inputs) > MAX_SCALES):
+            raise ValueError('layer %d is none of YOLOv5' % len(self._channels))
         first = inputs[0] if isinstance(inputs, list) else inputs
         channels = self._channels[first] if self._channels else 3
         stride = self._strides[first] if self._strides else 1
         repeats = max(int(round(repeats * self._depth)), 1) if repeats > 1 else repeats
         if repeats > MAX_REPEATS:
-            raise ValueError('%s is repeated %d times, more than %d' % (kind, repeats, MAX_REPEATS))
+            raise ValueError('%s is repeated %d times, more than %d' % (kind[:20], repeats, MAX_REPEATS))
         if kind in ('Conv', 'C3', 'SPP', 'SPPF', 'Focus'):
             layer, channels, factor = self._block(kind, channels, repeats, list(arguments))
         elif kind == 'nn.Upsample':
@@ -220,7 +225,7 @@ class _Builder(object):
             layer, factor = Detect(self._class_count, self._anchor_count, [self._channels[i] for i in inputs],
                                    strides), 1
         else:
-            raise ValueError('unknown layer %r' % (kind,))
+            raise ValueError('unknown layer %r' % kind[:50])
         self._channels.append(channels)
         self._strides.append(stride * factor)
         return layer
@@ -228,8 +233,10 @@ class _Builder(object):
     def _block(self, kind, in_channels, repeats, arguments):
         """A layer with weights, the channels it puts out, and the factor by which it shrinks the image."""
         out_channels, rest = self._scaled(arguments[0]), arguments[1:]
-        if max([0] + [n for n in rest if isinstance(n, int)]) > MAX_KERNEL:
-            raise ValueError('%s asks for a kernel of %s' % (kind, rest))
+        sizes = rest[0] if kind == 'SPP' and rest else rest
+        if len(sizes) > 4 or not all(isinstance(n, int) and 0 <= n <= MAX_KERNEL for n in sizes):
+            raise ValueError('%s asks for kernels, strides or padding that no YOLOv5 has' % kind)
+        self._spend(kind, in_channels, out_channels, repeats, sizes)
         make = {'Conv': Conv, 'SPP': SPP, 'SPPF': SPPF, 'Focus': Focus, 'C3': C3}[kind]
         if kind == 'C3':
             layers = [C3(in_channels, out_channels, repeats, *rest)]
@@ -242,11 +249,23 @@ class _Builder(object):
         factor = {'Conv': rest[1] if len(rest) > 1 else 1, 'Focus': 2}.get(kind, 1)
         return layers[0] if len(layers) == 1 else nn.Sequential(*layers), out_channels, factor
 
+    def _spend(self, kind, in_channels, out_channels, repeats, sizes):
+        """Count the weights of a layer before memory is taken for them."""
+        window = (sizes[0] if sizes else 1) ** 2
+        self._parameters += {
+            'Conv': repeats * in_channels * out_channels * window,
+            'Focus': repeats * 4 * in_channels * out_channels * window,
+            'C3': out_channels * (in_channels + out_channels) + 2.5 * repeats * out_channels ** 2,
+            'SPP': repeats * (in_channels ** 2 / 2.0 + 2.5 * in_channels * out_channels),
+            'SPPF': repeats * (in_channels ** 2 / 2.0 + 2 * in_channels * out_channels)}[kind]
+        if self._parameters > MAX_PARAMETERS:
+            raise ValueError('the layout asks for more than %d million parameters' % (MAX_PARAMETERS / 1e6))
+
     def _scaled(self, channels):
         """Channels times the width multiple, rounded up to a multiple of 8, as YOLOv5 does."""
         if channels == self._anchor_count * (self._class_count + 5):
             return channels
         scaled = int(math.ceil(channels * self._width / 8) * 8)
-        if not 0 < scaled <= MAX_CHANNELS:
-            raise ValueError('%d channels asked for, at most %d expected' % (scaled, MAX_CHANNELS))
+        if scaled <= 0:
+            raise ValueError('%d channels asked for' % scaled)
         return scaled

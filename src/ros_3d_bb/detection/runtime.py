@@ -11,7 +11,7 @@ import json
 import numpy as np
 import torch
 
-from ros_3d_bb.detection.checkpoint import (EXPECTED, WeightsError, class_names, is_torchscript, read_checkpoint)
+from ros_3d_bb.detection.checkpoint import EXPECTED, WeightsError, cause, class_names, read_checkpoint
 from ros_3d_bb.detection.network import Network
 
 
@@ -22,6 +22,7 @@ def open_runtime(path, device='auto'):
     ----------
     path : str
         An official checkpoint (.pt), or a model exported by YOLOv5 to TorchScript (.torchscript) or ONNX (.onnx).
+        A TorchScript file is a program: run only those that you trust.
     device : str
         'auto' (CUDA where there is a GPU, else the CPU), or a torch device: 'cpu', 'cuda', 'cuda:1'.
 
@@ -35,7 +36,7 @@ def open_runtime(path, device='auto'):
     path = str(path)
     if path.endswith('.onnx'):
         return OnnxRuntime(path)
-    if path.endswith('.torchscript') or (path.endswith('.pt') and is_torchscript(path)):
+    if path.endswith(('.torchscript', '.torchscript.pt')):
         return TorchScriptRuntime(path, torch_device(device))
     return TorchRuntime(path, torch_device(device))
 
@@ -49,7 +50,7 @@ def torch_device(name):
         torch.zeros(1, device=device)
     except (RuntimeError, AssertionError, NotImplementedError) as error:
         raise ValueError('device %r cannot be used (%s); use auto, cpu or, with an NVIDIA GPU, cuda'
-                         % (name, str(error).splitlines()[0]))
+                         % (name, cause(error)))
     return device
 
 
@@ -60,17 +61,18 @@ class TorchRuntime(object):
 
     def __init__(self, path, device):
         checkpoint = read_checkpoint(path)
-        self.names = checkpoint.names
+        self.names, self._device = checkpoint.names, device
         try:
             network = Network(checkpoint.layout)
             network.load_state_dict({name: torch.from_numpy(array.astype(np.float32))
                                      for name, array in checkpoint.weights.items()
                                      if not name.endswith('.anchor_grid')})  # release 5.0 keeps the anchors twice
+            self.stride = checked_stride(network.stride)
+            self._network = network.fuse().to(device)
+            self(np.zeros((1, 3, self.stride, self.stride), np.float32))
         except Exception as error:  # a layout is data from outside: whatever is wrong with it, say so once
             raise WeightsError('weights %s: the network cannot be rebuilt from the yaml inside (%s); %s'
-                               % (path, str(error).splitlines()[0], EXPECTED))
-        self.stride = network.stride
-        self._network, self._device = network.fuse().to(device), device
+                               % (path, cause(error), EXPECTED))
 
     def __call__(self, batch):
         with torch.no_grad():
@@ -86,12 +88,12 @@ class TorchScriptRuntime(object):
             self._module = torch.jit.load(path, map_location=device, _extra_files=extra).eval()
             config = json.loads(extra['config.txt'] or '{}')
             self.input_hw = tuple(config.get('shape', (1, 3, 640, 640))[2:])
-            self.stride = int(config.get('stride', 32))
+            self.stride = checked_stride(config.get('stride', 32))
             self._device = device
             columns = self(np.zeros((1, 3) + self.input_hw, np.float32)).shape[1]
         except Exception as error:  # a damaged file can raise anything; it all means the same
             raise WeightsError('weights %s: not a YOLOv5 TorchScript export (%s); expected the file that its export.py '
-                               'writes (release 5.0: with --grid)' % (path, str(error).strip().splitlines()[-1]))
+                               'writes (release 5.0: with --grid; without --half)' % (path, cause(error)))
         self.names = class_names(config.get('names'), columns - 5)
 
     def __call__(self, batch):
@@ -116,17 +118,24 @@ class OnnxRuntime(object):
             size = entry.shape[2:]
             self.input_hw = tuple(size) if all(isinstance(n, int) for n in size) else None
             metadata = self._session.get_modelmeta().custom_metadata_map
-            self.stride = int(metadata.get('stride', 32))
+            self.stride = checked_stride(metadata.get('stride', 32))
             columns = self(np.zeros((1, 3) + (self.input_hw or (self.stride, self.stride)), np.float32)).shape[1]
             names = ast.literal_eval(metadata.get('names', 'None'))  # literals only: runs nothing
         except Exception as error:  # a damaged file can raise anything; it all means the same
             raise WeightsError('weights %s: not a YOLOv5 ONNX export (%s); expected the file that its export.py writes'
-                               % (path, str(error).strip().splitlines()[0]))
+                               % (path, cause(error)))
         self.names = class_names(names, columns - 5)
 
     def __call__(self, batch):
         output = self._session.run(None, {self._input: batch.astype(self._dtype, copy=False)})[0]
         return predictions(output).astype(np.float32, copy=False)
+
+
+def checked_stride(stride):
+    """A stride as a positive int. Raises ValueError."""
+    if not 1 <= int(stride) <= 1024:
+        raise ValueError('its stride is %s' % stride)
+    return int(stride)
 
 
 def predictions(output):

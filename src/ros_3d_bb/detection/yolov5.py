@@ -91,6 +91,8 @@ class Yolov5(object):
 
 def check_params(params):
     """Raise ValueError, naming the value, where a threshold or a size makes no sense."""
+    if not params.classes:
+        raise ValueError('classes is empty; at least one class expected, such as person')
     for name in ('confidence', 'iou'):
         if not 0 <= getattr(params, name) <= 1:
             raise ValueError('%s is %g; 0 to 1 expected' % (name, getattr(params, name)))
