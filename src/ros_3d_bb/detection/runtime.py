@@ -48,7 +48,7 @@ def torch_device(name):
     try:
         device = torch.device(name)
         torch.zeros(1, device=device)
-    except (RuntimeError, AssertionError, NotImplementedError) as error:
+    except (RuntimeError, AssertionError) as error:
         raise ValueError('device %r cannot be used (%s); use auto, cpu or, with an NVIDIA GPU, cuda'
                          % (name, cause(error)))
     return device
