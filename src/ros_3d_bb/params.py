@@ -33,6 +33,13 @@ def params_from(given, *kinds):
                     for name in kind._fields if name in given}) for kind in kinds]
 
 
+def check_not_negative(params, *names):
+    """Raise ValueError, naming the parameter, where one of the named numbers is negative, nan or absurdly large."""
+    for name in names:
+        if not 0 <= getattr(params, name) < 1e6:
+            raise ValueError('parameter ~%s is %g; 0 or more expected' % (name, getattr(params, name)))
+
+
 def _converted(name, value, kind):
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if isinstance(value, kind) and isinstance(value, bool) == (kind is bool):

@@ -132,9 +132,8 @@ class Pairing(object):
             if depth is None:
                 return self._settled(now_ns) + [(None, boxes)]
             stamp_ns = depth.stamp_ns
-        if self._is_of_time_before(stamp_ns):
-            return self._settled(now_ns)
-        self._waiting.append(Stamped(stamp_ns, now_ns, boxes))
+        if not self._is_of_time_before(stamp_ns):
+            self._waiting.append(Stamped(stamp_ns, now_ns, boxes))
         return self._settled(now_ns)
 
     def _is_of_time_before(self, stamp_ns):

@@ -2,7 +2,6 @@
 import contextlib
 import signal
 import subprocess
-import threading
 import time
 
 import numpy as np
@@ -42,7 +41,6 @@ class Recorder(object):
 
     def __init__(self, topic, kind, publisher_expected=True):
         self.topic, self.messages = topic, []
-        self._lock = threading.Lock()
         self._subscriber = rospy.Subscriber(topic, kind, self._keep, queue_size=1000, buff_size=2 ** 26)
         if publisher_expected:
             wait_until(lambda: self._subscriber.get_num_connections() > 0, 'a publisher on ' + topic)
@@ -60,8 +58,7 @@ class Recorder(object):
         return self
 
     def _keep(self, message):
-        with self._lock:
-            self.messages.append(message)
+        self.messages.append(message)
 
     def wait_for(self, count, timeout_s=TIMEOUT_S):
         """The first `count` messages, once they are there."""

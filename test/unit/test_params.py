@@ -3,7 +3,7 @@ from typing import NamedTuple
 
 import pytest
 
-from ros_3d_bb.params import params_from
+from ros_3d_bb.params import check_not_negative, params_from
 
 
 class Camera(NamedTuple):
@@ -48,3 +48,10 @@ def test_values_of_another_type_are_named(given):
 def test_unknown_keys_name_the_nearest_known_one():
     with pytest.raises(ValueError, match='unknown parameter ~strid; did you mean ~stride'):
         params_from({'strid': 5}, Camera, Filter)
+
+
+@pytest.mark.parametrize('rate', [-0.1, float('nan'), float('inf'), 1e6])
+def test_numbers_that_make_no_sense_are_named(rate):
+    check_not_negative(Camera(rate=0.0), 'rate')
+    with pytest.raises(ValueError, match='parameter ~rate is .*; 0 or more expected'):
+        check_not_negative(Camera(rate=rate), 'rate')

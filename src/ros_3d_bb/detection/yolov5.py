@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 GREY = (114, 114, 114)  # the colour around letterboxed images that YOLOv5 is trained with
-MAX_CANDIDATES = 5000  # the best so many go into the suppression; its matrix grows with their square
+MAX_CANDIDATES = 5000  # the best so many go into the suppression; more come only of a useless confidence
 
 
 class DetectionParams(NamedTuple):

@@ -14,6 +14,7 @@ from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.sample_images import SampleImages
 from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.stamped import NS, Pairing
 
 DEPTH_TOPIC = 'camera/aligned_depth_to_color/image_raw'
@@ -134,9 +135,7 @@ def _check(params):
         raise ValueError('parameter ~estimator is %r; median expected' % params.estimator)
     if params.stride < 1:
         raise ValueError('parameter ~stride is %d; at least 1 expected' % params.stride)
-    for name in ('depth_scale', 'cache_length', 'stamp_tolerance', 'assumed_delay', 'depth_image_range'):
-        if not 0 <= getattr(params, name) < 1e6:
-            raise ValueError('parameter ~%s is %g; 0 or more expected' % (name, getattr(params, name)))
+    check_not_negative(params, 'depth_scale', 'cache_length', 'stamp_tolerance', 'assumed_delay', 'depth_image_range')
 
 
 def main():

@@ -13,6 +13,7 @@ from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
+from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.thesis import ThesisTracker, ThesisTrackerParams
 
@@ -89,9 +90,7 @@ def _check(params):
         raise ValueError('parameter ~tracker is %r; thesis expected' % params.tracker)
     if not params.target_frame:
         raise ValueError('parameter ~target_frame is empty; map or odom expected')
-    for name in ('tf_timeout', 'marker_lifetime'):
-        if not 0 <= getattr(params, name) < 1e6:
-            raise ValueError('parameter ~%s is %g; 0 or more expected' % (name, getattr(params, name)))
+    check_not_negative(params, 'tf_timeout', 'marker_lifetime')
 
 
 def main():
