@@ -12,6 +12,11 @@ PERIOD_S = 1.0
 WARNING_LASTS_S = 5.0
 
 
+def is_ending():
+    """Whether rospy shuts down. It closes the publishers first, under callbacks at work, and then says is_shutdown."""
+    return rospy.is_shutdown() or rospy.core.is_shutdown_requested()
+
+
 class Diagnostics(object):
     """Counts what happened to each input and publishes the counts on /diagnostics once a second.
 
@@ -49,8 +54,8 @@ class Diagnostics(object):
             yield
         except ValueError as error:
             self.warn('%s refused' % inputs, '%s refused: %s; waiting for the next' % (inputs, error))
-        except rospy.ROSException:  # publishers close before the last callback has returned
-            if not rospy.is_shutdown():
+        except rospy.ROSException:
+            if not is_ending():
                 raise
 
     def _report(self, status):
@@ -70,6 +75,6 @@ class Diagnostics(object):
             try:
                 self._updater.force_update()
             except rospy.ROSException:
-                if not rospy.is_shutdown():
+                if not is_ending():
                     raise
             time.sleep(PERIOD_S)
