@@ -9,8 +9,9 @@ from support.standard_library import STANDARD_LIBRARY
 SOURCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'src', 'ros_3d_bb')
 MODULES = sorted(os.path.relpath(os.path.join(folder, name), SOURCE)
                  for folder, _folders, names in os.walk(SOURCE) for name in names if name.endswith('.py'))
-PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime'}
-ROS_TYPES = {'bags.py', 'markers.py', 'messages.py'}  # convert to and from ROS messages, but run in no node
+PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime', 'yaml'}
+# convert to and from ROS messages, but run in no node
+ROS_TYPES = {'bags.py', 'camera_messages.py', 'markers.py', 'messages.py', 'report.py', 'simulator_messages.py'}
 
 
 def imports_of(module):

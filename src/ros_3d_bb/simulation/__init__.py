@@ -1,0 +1,1 @@
+"""A simulated room with walking people, seen by a RealSense D435i on a Jackal; numpy and OpenCV only."""

@@ -1,0 +1,103 @@
+"""A skeleton, and the postures of walking, standing and crouching.
+
+Convention: as in `body`: facing +x, left +y, z up; metres for a person of `TABLE_HEIGHT_M`, angles in radians.
+"""
+from typing import NamedTuple
+
+import numpy as np
+
+TABLE_HEIGHT_M = 1.75
+PARENTS = (('pelvis', None), ('chest', 'pelvis'), ('head', 'chest'),
+           ('arm_l', 'chest'), ('forearm_l', 'arm_l'), ('thigh_l', 'pelvis'), ('shin_l', 'thigh_l'),
+           ('foot_l', 'shin_l'), ('arm_r', 'chest'), ('forearm_r', 'arm_r'), ('thigh_r', 'pelvis'),
+           ('shin_r', 'thigh_r'), ('foot_r', 'shin_r'))
+BONES = [name for name, _parent in PARENTS]
+# The joint at which each bone hangs; the hand and the fingertip hang on the forearm.
+JOINTS_M = {'pelvis': (0, 0, .95), 'chest': (0, 0, 1.12), 'head': (-.01, 0, 1.50),
+            'arm_l': (-.005, .175, 1.41), 'forearm_l': (-.02, .225, 1.12), 'hand_l': (.04, .243, .87),
+            'fingertip_l': (.06, .241, .69), 'thigh_l': (0, .085, .93), 'shin_l': (.01, .09, .50),
+            'foot_l': (-.015, .095, .09)}
+JOINTS_M.update({name[:-1] + 'r': (x, -y, z) for name, (x, y, z) in JOINTS_M.items() if name.endswith('_l')})
+
+# Flexion of hip, knee and ankle in tenths of a gait cycle from heel strike on, degrees: normal walking, read off
+# J. Perry, Gait Analysis (1992), and changed by up to 12 degrees: these shoes do not bend at the ball of the foot, and
+# would slide over the floor. The stride is 0.67 body heights.
+CYCLE = np.linspace(0, 1, 11)
+HIP = np.radians([24, 22, 16, 5, -5, -12, -15, 8, 26, 30, 24])
+KNEE = np.radians([5, 15, 18, 14, 9, 14, 43, 63, 49, 18, 5])
+ANKLE = np.radians([1, -3, -1, 3, 8, 16, -12, -4, 2, 2, 1])
+ARM_SWING, ELBOW = 0.42, 0.18
+STANCE = 0.5  # share of the cycle in which one foot carries the body forward
+# A deep crouch: flexion of hip, knee and ankle, and the lean of the chest.
+CROUCH = np.radians([105, 130, 25, 20])
+
+
+class Posture(NamedTuple):
+    """`phase` of the gait in cycles from the left heel strike on; `swing` 0 (standing) to 1 (walking); `crouch` 0 to 1.
+    """
+
+    phase: float = 0.0
+    swing: float = 0.0
+    crouch: float = 0.0
+
+
+def bone_transforms(posture):
+    """Where a posture takes each bone: (bones, 3, 4) rigid transforms of points of the standing body.
+
+    The feet of a standing body are under the origin, and those of a crouching one within 12 cm; the height above the
+    floor is left open.
+    """
+    turns = _joint_turns(posture)
+    transforms = {None: np.eye(4)}
+    for name, parent in PARENTS:
+        joint = np.array(JOINTS_M[name])
+        turn = np.eye(4)
+        turn[:3, :3] = turns[name]
+        turn[:3, 3] = joint - turns[name].dot(joint)
+        transforms[name] = transforms[parent].dot(turn)
+    result = np.stack([transforms[name][:3] for name in BONES])
+    soles_x = [transforms['foot_' + side][0].dot([.04, 0, 0, 1]) for side in 'lr']
+    result[:, 0, 3] -= posture.crouch * np.mean(soles_x)
+    return result
+
+
+def stride_m(height_m, swing=1.0):
+    """Length of one gait cycle: what the foot on the floor moves back while it carries the body, over `STANCE`."""
+    def ankle_x(phase):
+        foot = bone_transforms(Posture(phase, swing))[BONES.index('foot_l')]
+        return foot.dot(np.append(JOINTS_M['foot_l'], 1))[0]
+
+    return (ankle_x(0) - ankle_x(STANCE)) / STANCE * height_m / TABLE_HEIGHT_M
+
+
+def _joint_turns(posture):
+    swing, crouch = posture.swing, posture.crouch
+    twist = .10 * swing * np.cos(2 * np.pi * posture.phase)
+    turns = {'pelvis': _about_z(-twist), 'chest': _about_z(1.2 * twist).dot(_about_y(.03 * swing + CROUCH[3] * crouch)),
+             'head': _about_z(-.3 * twist).dot(_about_y(-.7 * CROUCH[3] * crouch))}
+    for side, offset, sign in (('_l', 0, 1), ('_r', .5, -1)):
+        phase = (posture.phase + offset) % 1
+        hip, knee, ankle = (swing * (1 - crouch) * np.interp(phase, CYCLE, curve) + crouch * bend
+                            for curve, bend in zip((HIP, KNEE, ANKLE), CROUCH))
+        turns['thigh' + side] = _about_y(-hip).dot(_about_x(-.03 * sign))
+        turns['shin' + side] = _about_y(knee)
+        turns['foot' + side] = _about_y(-ankle)
+        arm = ARM_SWING * swing * np.cos(2 * np.pi * phase) - .5 * crouch
+        turns['arm' + side] = _about_y(arm).dot(_about_x(.03 * sign))
+        turns['forearm' + side] = _about_y(-ELBOW * (1 + swing * max(0, np.sin(2 * np.pi * phase))) - .8 * crouch)
+    return turns
+
+
+def _about_x(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+
+
+def _about_y(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+
+def _about_z(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])

@@ -1,0 +1,105 @@
+"""Surfaces of quadrilaterals: tubes lofted through superellipses, and boxes.
+
+Convention: metres; faces are wound counter-clockwise seen from outside.
+"""
+from typing import NamedTuple
+
+import numpy as np
+
+CELL_M = 0.5  # largest edge of a face of a box: what is partly behind the camera is dropped by whole faces
+
+
+class Mesh(NamedTuple):
+    """`vertices` and unit `normals` (n, 3); `faces` (m, 4) vertex numbers; `colors` (m, 3) uint8 RGB of the faces;
+    `tone` (n,) brightness of the vertices, 1 unchanged.
+    """
+
+    vertices: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+    colors: np.ndarray
+    tone: np.ndarray
+
+    def moved(self, position_m, heading_rad):
+        """Turned about z (counter-clockwise from above), then shifted by (x, y, z)."""
+        c, s = np.cos(heading_rad), np.sin(heading_rad)
+        turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]], np.float32)
+        return self._replace(vertices=self.vertices.dot(turn) + np.asarray(position_m, np.float32),
+                             normals=self.normals.dot(turn))
+
+
+def loft(centers, forward, sideways, exponent, sides):
+    """A closed tube through rings.
+
+    Parameters
+    ----------
+    centers, forward, sideways : array_like, (rings, 3)
+        Centre and the two half axes of each ring.
+    exponent : float
+        Of the superellipse: 2 is an ellipse, more is squarer.
+    sides : int
+        Even number of vertices in a ring.
+
+    Returns
+    -------
+    vertices : numpy.ndarray, (rings * sides, 3)
+    faces : numpy.ndarray, (m, 4)
+    """
+    centers, forward, sideways = (np.asarray(axis, float)[:, None] for axis in (centers, forward, sideways))
+    angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    ring = [np.sign(f) * np.abs(f) ** (2.0 / exponent) for f in (np.cos(angles), np.sin(angles))]
+    vertices = centers + ring[0][:, None] * forward + ring[1][:, None] * sideways
+    low = np.arange((len(centers) - 1) * sides).reshape(-1, sides)
+    walls = np.stack([low, np.roll(low, -1, 1), np.roll(low, -1, 1) + sides, low + sides], axis=-1).reshape(-1, 4)
+    strip = np.arange(sides // 2 - 1)
+    cap = np.stack([strip, sides - 1 - strip, sides - 2 - strip, strip + 1], axis=-1)
+    top = cap[:, ::-1] + (len(centers) - 1) * sides
+    faces = np.concatenate([walls, cap, top])
+    vertices = vertices.reshape(-1, 3)
+    return vertices, faces if volume(vertices, faces) > 0 else faces[:, ::-1]
+
+
+def volume(vertices, faces):
+    """Volume inside a closed surface; negative where its faces are wound the wrong way round."""
+    a, b, c, d = (vertices[faces[:, corner]] for corner in range(4))
+    return float(np.sum(np.cross(c - a, d - b) * (a + b + c + d)) / 24)
+
+
+def vertex_normals(vertices, faces):
+    """Unit normals (n, 3): the mean of the faces around each vertex, by area."""
+    a, b, c, d = (vertices[faces[:, corner]] for corner in range(4))
+    face_normals = np.cross(c - a, d - b)
+    normals = np.zeros_like(vertices)
+    for corner in range(4):
+        np.add.at(normals, faces[:, corner], face_normals)
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+
+
+def box(size_m, color, random):
+    """A box standing on z = 0 above the origin, (x, y, z) in size, slightly mottled. Its faces share no vertices."""
+    parts, offset = [], 0
+    for axis in range(3):
+        for side in (-1, 1):
+            corners, faces = _side(np.asarray(size_m, float), axis, side)
+            normal = np.zeros(3)
+            normal[axis] = side
+            parts.append((corners, np.tile(normal, (len(corners), 1)), faces + offset))
+            offset += len(corners)
+    vertices, normals, faces = (np.concatenate(column) for column in zip(*parts))
+    return Mesh(vertices.astype(np.float32), normals.astype(np.float32), faces,
+                np.tile(np.asarray(color, np.uint8), (len(faces), 1)),
+                (1 + 0.05 * random.standard_normal(len(vertices)).clip(-2, 2)).astype(np.float32))
+
+
+def _side(size, axis, side):
+    """One side of a box as a grid of cells."""
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    counts = [int(np.ceil(size[a] / CELL_M)) + 1 for a in (u, v)]
+    grid_u, grid_v = np.meshgrid(*[np.linspace(-size[a] / 2, size[a] / 2, n) for a, n in zip((u, v), counts)],
+                                 indexing='ij')
+    corners = np.empty((grid_u.size, 3))
+    corners[:, u], corners[:, v], corners[:, axis] = grid_u.ravel(), grid_v.ravel(), side * size[axis] / 2
+    corners[:, 2] += size[2] / 2
+    number = np.arange(grid_u.size).reshape(counts)
+    faces = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1).reshape(-1, 4)
+    return corners, faces if side > 0 else faces[:, ::-1]

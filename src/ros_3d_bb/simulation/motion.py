@@ -1,0 +1,162 @@
+"""Where people and the robot are at any time: moves of a scenario as smooth functions of time.
+
+A motion is made of knots between which everything changes evenly; what is asked for is the mean over `SMOOTHING_S`
+around the time, so that nobody starts, stops or turns at once. Convention: map frame, metres, radians, seconds.
+"""
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_3d_bb.simulation.gait import Posture, stride_m
+
+SMOOTHING_S = 0.6
+WALKING_MPS = 1.3  # speed at which legs and arms swing fully
+FOLLOW_STEP_S = 0.05
+AFTER_S = 3.0  # people go on beyond the end of the scene: the truth says where they will be
+SHORTEST_ROUND_S = 0.1  # moves that take less are not repeated
+COLUMNS = X, Y, HEADING, PHASE, SWING, CROUCH = range(6)
+
+
+class State(NamedTuple):
+    """`position_m` (2,), `velocity_mps` (2,), heading (counter-clockwise from x), and what the body does."""
+
+    position_m: np.ndarray
+    velocity_mps: np.ndarray
+    heading_rad: float
+    posture: Posture
+
+
+class Motion(object):
+    """A motion through knots.
+
+    Parameters
+    ----------
+    times_s : array_like, (n,)
+        Not decreasing; two knots at the same time are a jump.
+    values : array_like, (n, 6)
+        Of the `COLUMNS`.
+    """
+
+    def __init__(self, times_s, values):
+        self._times_s, self._values = np.asarray(times_s, float), np.asarray(values, float)
+        steps_s = np.diff(self._times_s)[:, None]
+        means = (self._values[1:] + self._values[:-1]) / 2
+        self._integrals = np.concatenate([np.zeros((1, len(COLUMNS))), np.cumsum(steps_s * means, axis=0)])
+        self._slopes = np.diff(self._values, axis=0) / np.where(steps_s > 0, steps_s, 1)
+
+    def at(self, time_s):
+        """The state at a time, seconds from the start; before the first and after the last knot nothing moves."""
+        before, after = (self._evaluated(time_s + shift) for shift in (-SMOOTHING_S / 2, SMOOTHING_S / 2))
+        mean = (after[1] - before[1]) / SMOOTHING_S
+        velocity = (after[0] - before[0]) / SMOOTHING_S
+        return State(mean[:2], velocity[:2], float(mean[HEADING]),
+                     Posture(float(mean[PHASE]), float(mean[SWING]), float(mean[CROUCH])))
+
+    def _evaluated(self, time_s):
+        """Values at a time, and their integrals up to it."""
+        knot = int(np.clip(np.searchsorted(self._times_s, time_s, side='right') - 1, 0, len(self._times_s) - 1))
+        beyond_s = time_s - self._times_s[knot]
+        outside = knot == len(self._times_s) - 1 or beyond_s < 0
+        slope = np.zeros(len(COLUMNS)) if outside else self._slopes[knot]
+        value, integral = self._values[knot], self._integrals[knot]
+        return value + slope * beyond_s, integral + beyond_s * (value + slope * beyond_s / 2)
+
+
+def person_motion(person, height_m, duration_s):
+    """The motion of a person (`scenario.Person`) of a height."""
+    knots = _Knots(person.start, person.facing, crouch=person.crouch)
+    for move in _repeated(person, knots, duration_s):
+        if move.to is not None:
+            knots.walk(move.to, move.speed, height_m)
+        elif move.turn is not None:
+            knots.turn(move.turn, move.rate)
+        else:
+            knots.wait(move)
+    return knots.motion()
+
+
+def robot_motion(robot, people, duration_s):
+    """The motion of the robot (`scenario.Robot`) among people, a list of Motion."""
+    if robot.follow is not None:
+        return _following(robot, people[robot.follow.person - 1], duration_s)
+    knots = _Knots(robot.pose[:2], robot.pose[2])
+    for move in _repeated(robot, knots, duration_s):
+        if move.to is not None:
+            knots.turn(knots.angle_to(move.to), move.rate)
+            knots.walk(move.to, move.speed)
+        elif move.turn is not None:
+            knots.turn(move.turn, move.rate)
+        else:
+            knots.wait(move)
+    return knots.motion()
+
+
+class _Knots(object):
+    """Collects knots, move by move."""
+
+    def __init__(self, place, heading, crouch=0.0):
+        self.time_s = 0.0
+        self._value = np.array([place[0], place[1], heading, 0, 0, crouch], float)
+        self._times_s, self._values = [0.0], [self._value.copy()]
+
+    def motion(self):
+        return Motion(self._times_s, self._values)
+
+    def angle_to(self, place):
+        """By how much to turn to face a place, -pi to pi."""
+        x, y = place - self._value[:2]
+        return (np.arctan2(y, x) - self._value[HEADING] + np.pi) % (2 * np.pi) - np.pi if x or y else 0.0
+
+    def walk(self, place, speed_mps, height_m=None):
+        """Go straight to a place; with legs where a height is given."""
+        place = np.array(place, float)
+        distance_m = np.linalg.norm(place - self._value[:2])
+        swing = min(1.0, speed_mps / WALKING_MPS) ** .5 if height_m else 0.0
+        self._value[HEADING] += self.angle_to(place)
+        self._value[SWING], self._value[CROUCH] = swing, 0
+        self._add(0)
+        self._value[:2] = place
+        self._value[PHASE] += distance_m / stride_m(height_m, swing) if height_m else 0
+        self._add(distance_m / speed_mps)
+        self._value[SWING] = 0
+        self._add(0)
+
+    def turn(self, angle, rate):
+        self._value[HEADING] += angle
+        self._add(abs(angle) / rate)
+
+    def wait(self, move):
+        if move.facing is not None:
+            self._value[HEADING] += (move.facing - self._value[HEADING] + np.pi) % (2 * np.pi) - np.pi
+        self._value[CROUCH] = move.crouch
+        self._add(0)
+        self._add(move.wait)
+
+    def _add(self, elapsed_s):
+        self.time_s += elapsed_s
+        self._times_s.append(self.time_s)
+        self._values.append(self._value.copy())
+
+
+def _repeated(mover, knots, duration_s):
+    """The moves of a person or robot, again and again where it repeats them, until `AFTER_S` after the scene."""
+    while True:
+        began_s = knots.time_s
+        for move in mover.moves:
+            yield move
+        if not mover.repeat or knots.time_s > duration_s + AFTER_S or knots.time_s < began_s + SHORTEST_ROUND_S:
+            return
+
+
+def _following(robot, person, duration_s):
+    """A robot that turns to a person and drives up to its distance."""
+    follow, (x, y, heading) = robot.follow, robot.pose
+    values, times_s = [], np.arange(0, duration_s + SMOOTHING_S, FOLLOW_STEP_S)
+    for time_s in times_s:
+        values.append([x, y, heading, 0, 0, 0])
+        dx, dy = person.at(time_s).position_m - (x, y)
+        angle = (np.arctan2(dy, dx) - heading + np.pi) % (2 * np.pi) - np.pi
+        heading += np.clip(angle, -follow.rate * FOLLOW_STEP_S, follow.rate * FOLLOW_STEP_S)
+        step_m = np.clip(np.hypot(dx, dy) - follow.distance, 0, follow.speed * FOLLOW_STEP_S) * max(0, np.cos(angle))
+        x, y = x + step_m * np.cos(heading), y + step_m * np.sin(heading)
+    return Motion(times_s, values)

@@ -1,0 +1,178 @@
+"""Draw a room with meshes in it: colour, inverse depth, and which object each pixel shows.
+
+Each object is painted from back to front into a picture of face numbers; its planes give inverse depth and brightness
+of each pixel, and the nearest object wins. Convention: as in `geometry`; inverse depth is 1/m along the optical axis.
+"""
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from ros_3d_bb.simulation.room import FLOOR, copy_where
+
+NEAREST_M = 0.1  # faces that come nearer to the camera are not drawn
+SUBPIXEL_BITS = 4
+LIGHT = np.array([.34, .25, .9], np.float32)  # where most of it comes from; a unit vector, near enough
+AMBIENT, DIFFUSE, HEADLIGHT = .52, .36, .16
+BRIGHTNESS_STEPS = 128
+SHADOW_DARKNESS, SHADOW_REDUCTION = .38, 4
+
+
+class Rendering(NamedTuple):
+    """`color` (h, w, 3) uint8 RGB; `inverse_depth` (h, w) float32; `objects` (h, w) uint8, 1 + the object's number,
+    0 is the room; `areas` the pixels of each object in the image as if it stood alone; `inside` the share 0..1 of it
+    that lies in the image.
+    """
+
+    color: np.ndarray
+    inverse_depth: np.ndarray
+    objects: np.ndarray
+    areas: list
+    inside: list
+
+
+class _Layer(NamedTuple):
+    """One object alone, in the rectangle of the image that it covers."""
+
+    rows: slice
+    columns: slice
+    color: np.ndarray
+    inverse_depth: np.ndarray
+    inside: float
+
+
+def render(room, meshes, shadows, camera, world_from_camera):
+    """Draw a room and the meshes in it.
+
+    Parameters
+    ----------
+    room : Room
+    meshes : list of Mesh
+        At most 254, in world coordinates.
+    shadows : list of (x, y, radius)
+        Where soft shadows lie on the floor, metres.
+    camera : geometry.Camera
+    world_from_camera : numpy.ndarray, (4, 4)
+
+    Returns
+    -------
+    Rendering
+    """
+    color, inverse_depth, surfaces = room.draw(camera, world_from_camera)
+    _draw_shadows(color, surfaces, shadows, camera, world_from_camera)
+    objects, areas, inside = np.zeros(inverse_depth.shape, np.uint8), [], []
+    for number, mesh in enumerate(meshes):
+        layer = _layer(mesh, camera, world_from_camera)
+        areas.append(0 if layer is None else cv2.countNonZero(layer.inverse_depth))
+        inside.append(0.0 if layer is None else layer.inside)
+        if layer is None:
+            continue
+        place = layer.rows, layer.columns
+        nearer = cv2.compare(layer.inverse_depth, inverse_depth[place], cv2.CMP_GT)
+        copy_where(nearer, layer.inverse_depth, inverse_depth[place])
+        copy_where(nearer, layer.color, color[place])
+        objects[place][nearer > 0] = number + 1
+    return Rendering(color, inverse_depth, objects, areas, inside)
+
+
+def _layer(mesh, camera, world_from_camera):
+    """An object alone; None where it is out of view."""
+    rotation, position = (part.astype(np.float32) for part in (world_from_camera[:3, :3], world_from_camera[:3, 3]))
+    points = (mesh.vertices - position).dot(rotation)
+    inverse = 1 / np.maximum(points[:, 2], np.float32(NEAREST_M))
+    pixels = np.stack([points[:, 0] * inverse * np.float32(camera.fx) + np.float32(camera.cx),
+                       points[:, 1] * inverse * np.float32(camera.fy) + np.float32(camera.cy)])
+    corners = pixels[:, mesh.faces.T]
+    seen, inside = _seen(corners, points[:, 2][mesh.faces.T], camera)
+    if seen.size == 0:
+        return None
+    faces, corners = mesh.faces[seen], corners[:, :, seen]
+    low, high = corners.min(axis=(1, 2)), corners.max(axis=(1, 2))
+    x0, y0 = np.maximum(low.astype(int) - 1, 0).tolist()
+    x1, y1 = np.minimum(high.astype(int) + 2, (camera.width, camera.height)).tolist()
+    corners = corners - np.array([[[x0]], [[y0]]], np.float32)
+    numbers = _paint_numbers(corners, inverse[faces].sum(axis=1), (y1 - y0, x1 - x0))
+    planes = _planes(corners, np.stack([inverse, _brightness(mesh, world_from_camera)])[:, faces.T])
+    limits = (inverse[faces].min(), inverse[faces].max()), (0, 255. / BRIGHTNESS_STEPS)
+    inverse_depth, brightness = _images(numbers, planes, limits)
+    brightness = (brightness * BRIGHTNESS_STEPS).astype(np.uint8)
+    colors = np.concatenate([np.zeros((1, 3), np.uint8), mesh.colors[seen]])
+    color = cv2.multiply(np.take(colors, numbers, axis=0), cv2.merge([brightness] * 3), scale=1. / BRIGHTNESS_STEPS)
+    return _Layer(slice(y0, y1), slice(x0, x1), color, inverse_depth, inside)
+
+
+def _seen(corners, depth_m, camera):
+    """Numbers of the faces that look at the camera, in front of it and in the image; the share of the area of those
+    in front of it that lies in the image.
+    """
+    area = _cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    facing = (area < -.04) & (depth_m.min(axis=0) > NEAREST_M)
+    low, high, center = corners.min(axis=1), corners.max(axis=1), corners.mean(axis=1)
+    seen = facing & (high >= 0).all(axis=0) & (low[0] < camera.width) & (low[1] < camera.height)
+    inside = facing & (center >= 0).all(axis=0) & (center[0] < camera.width) & (center[1] < camera.height)
+    return np.flatnonzero(seen), float(area[inside].sum() / min(area[facing].sum(), -1e-9))
+
+
+def _cross(a, b):
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def _brightness(mesh, world_from_camera):
+    """Of each vertex: light from above, and from where the camera is."""
+    lit = AMBIENT + DIFFUSE * np.maximum(mesh.normals.dot(LIGHT), -.4)
+    return (lit + HEADLIGHT * np.maximum(-mesh.normals.dot(world_from_camera[:3, 2].astype(np.float32)), 0)) * mesh.tone
+
+
+def _paint_numbers(corners, nearness, shape):
+    """The number of the face, from 1, that each pixel shows (0: none); faces painted from far to near."""
+    numbers = np.zeros(shape, np.int32)
+    polygons = np.rint(np.clip(corners, -4000, 4000) * 2 ** SUBPIXEL_BITS).astype(np.int32).transpose(2, 1, 0)
+    order = np.argsort(nearness, kind='mergesort')
+    for number, polygon in zip((order + 1).tolist(), polygons[order]):
+        cv2.fillConvexPoly(numbers, polygon, number, 8, SUBPIXEL_BITS)
+    return numbers
+
+
+def _planes(corners, values):
+    """What varies linearly over each face in the image: (k, 3, m) coefficients a u + b v + c of values (k, 4, m).
+
+    The gradient is that between the ends of the two diagonals, the value that of the centre.
+    """
+    first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+    area = _cross(first, second)
+    rise_first, rise_second = values[:, 2] - values[:, 0], values[:, 3] - values[:, 1]
+    a = (rise_first * second[1] - rise_second * first[1]) / area
+    b = (rise_second * first[0] - rise_first * second[0]) / area
+    center = corners.mean(axis=1)
+    return np.stack([a, b, values.mean(axis=1) - a * center[0] - b * center[1]], axis=1).astype(np.float32)
+
+
+def _images(numbers, planes, limits):
+    """Images (k, h, w) of k values, each within its limits; 0 where no face is."""
+    covered = np.flatnonzero(numbers)
+    face = np.take(numbers, covered) - 1
+    v, u = (part.astype(np.float32) for part in np.divmod(covered, numbers.shape[1]))
+    images = np.zeros((len(planes), numbers.size), np.float32)
+    for image, (a, b, c), (low, high) in zip(images, planes, limits):
+        image[covered] = np.clip(a[face] * u + b[face] * v + c[face], low, high)
+    return images.reshape((-1,) + numbers.shape)
+
+
+def _draw_shadows(color, surfaces, shadows, camera, world_from_camera):
+    """Darken the floor under people, softly."""
+    mask = np.zeros((camera.height // SHADOW_REDUCTION, camera.width // SHADOW_REDUCTION), np.float32)
+    angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+    rotation, position = world_from_camera[:3, :3], world_from_camera[:3, 3]
+    for x, y, radius in shadows:
+        ring = np.stack([x + radius * np.cos(angles), y + radius * np.sin(angles), np.zeros(16)], axis=-1)
+        points = (ring - position).dot(rotation)
+        if points[:, 2].min() > NEAREST_M:
+            pixels = camera.project(points) / SHADOW_REDUCTION
+            cv2.fillConvexPoly(mask, np.rint(np.clip(pixels, -999, 9999)).astype(np.int32), SHADOW_DARKNESS)
+    rows = np.flatnonzero(mask.any(axis=1))
+    if rows.size == 0:
+        return
+    mask = cv2.resize(cv2.GaussianBlur(mask, (0, 0), 2.2), (camera.width, camera.height))
+    band = slice(max(0, (rows[0] - 7) * SHADOW_REDUCTION), (rows[-1] + 8) * SHADOW_REDUCTION)
+    keep = 255 - np.rint(mask[band] * 255 * (surfaces[band] == FLOOR)).astype(np.uint8)
+    color[band] = cv2.multiply(color[band], cv2.merge([keep] * 3), scale=1 / 255.)

@@ -1,0 +1,111 @@
+"""A rectangular room: six textured planes, each seen as one perspective warp of its texture."""
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from ros_3d_bb.simulation import textures
+
+FLOOR = 0  # number of the floor among the surfaces
+WALL_COLORS = ((210, 206, 196), (205, 200, 190), (196, 192, 180), (202, 196, 186))
+
+
+class Surface(NamedTuple):
+    """A plane: outward `normal` (3,) and `distance_m`, normal . p = distance_m on it; its texture begins at `origin`
+    and runs along the unit vectors `right` and `down`, with `ppm` pixels per metre.
+    """
+
+    normal: np.ndarray
+    distance_m: float
+    texture: np.ndarray
+    origin: np.ndarray
+    right: np.ndarray
+    down: np.ndarray
+    ppm: float
+
+
+class Room(object):
+    """The room x0..x1, y0..y1, 0..height, seen from inside.
+
+    Parameters
+    ----------
+    bounds_m : (x0, x1, y0, y1)
+    height_m : float
+    random : numpy.random.RandomState
+    """
+
+    def __init__(self, bounds_m, height_m, random):
+        x0, x1, y0, y1 = bounds_m
+        width, depth = x1 - x0, y1 - y0
+        self._surfaces = [
+            _surface((0, 0, -1), (x0, y0, 0), (1, 0, 0), (0, 1, 0), textures.floor(width, depth, random),
+                     textures.FLOOR_PPM),
+            _surface((0, 0, 1), (x0, y0, height_m), (1, 0, 0), (0, 1, 0), textures.ceiling(width, depth),
+                     textures.CEILING_PPM)]
+        corners = (((1, 0, 0), (x1, y1), (0, -1, 0), depth), ((-1, 0, 0), (x0, y0), (0, 1, 0), depth),
+                   ((0, 1, 0), (x0, y1), (1, 0, 0), width), ((0, -1, 0), (x1, y0), (-1, 0, 0), width))
+        for (normal, corner, right, length), color in zip(corners, WALL_COLORS):
+            self._surfaces.append(_surface(normal, corner + (height_m,), right, (0, 0, -1),
+                                           textures.wall(length, height_m, color, random), textures.WALL_PPM))
+
+    def draw(self, camera, world_from_camera):
+        """What a camera inside sees.
+
+        Returns
+        -------
+        color : numpy.ndarray, (height, width, 3), uint8
+            RGB.
+        inverse_depth : numpy.ndarray, (height, width), float32
+            1/m along the optical axis.
+        surfaces : numpy.ndarray, (height, width), uint8
+            Number of the surface; `FLOOR` is the floor.
+        """
+        shape = (camera.height, camera.width)
+        inverse_depth, surfaces = np.full(shape, 1e-3, np.float32), np.full(shape, 255, np.uint8)
+        color = np.zeros(shape + (3,), np.uint8)
+        plane, lines = np.empty(shape, np.float32), []
+        for number, surface in enumerate(self._surfaces):
+            a, b, c = line = _inverse_depth_of(surface, camera, world_from_camera)
+            lines.append(line)
+            if c + max(0, a * camera.width) + max(0, b * camera.height) > 0:  # else all of it is behind the camera
+                np.add((b * np.arange(camera.height) + c).astype(np.float32)[:, None],
+                       (a * np.arange(camera.width)).astype(np.float32), out=plane)
+                surfaces[cv2.compare(plane, inverse_depth, cv2.CMP_GT) > 0] = number
+                cv2.max(plane, inverse_depth, inverse_depth)
+        for number, line in enumerate(lines):
+            _paint(color, cv2.inRange(surfaces, number, number), self._surfaces[number], line, camera,
+                   world_from_camera)
+        return color, inverse_depth, surfaces
+
+
+def _surface(normal, origin, right, down, texture, ppm):
+    normal, origin, right, down = (np.array(vector, float) for vector in (normal, origin, right, down))
+    return Surface(normal, float(normal.dot(origin)), texture, origin, right, down, ppm)
+
+
+def _inverse_depth_of(surface, camera, world_from_camera):
+    """(a, b, c) so that a u + b v + c is the inverse depth of the plane at pixel (u, v)."""
+    rotation, position = world_from_camera[:3, :3], world_from_camera[:3, 3]
+    along = rotation.T.dot(surface.normal) / (surface.distance_m - surface.normal.dot(position))
+    a, b = along[0] / camera.fx, along[1] / camera.fy
+    return np.array([a, b, along[2] - a * camera.cx - b * camera.cy])
+
+
+def _paint(color, mask, surface, line, camera, world_from_camera):
+    """Warp the texture of a surface into the pixels of a mask."""
+    x, y, width, height = cv2.boundingRect(mask)
+    if width == 0:
+        return
+    ray = np.array([[1 / camera.fx, 0, -camera.cx / camera.fx], [0, 1 / camera.fy, -camera.cy / camera.fy], [0, 0, 1]])
+    rotation, from_origin = world_from_camera[:3, :3], world_from_camera[:3, 3] - surface.origin
+    texture_from_pixel = np.stack(
+        [(axis.dot(rotation).dot(ray) + axis.dot(from_origin) * line) * surface.ppm
+         for axis in (surface.right, surface.down)] + [line]).dot([[1, 0, x], [0, 1, y], [0, 0, 1]])
+    part = cv2.warpPerspective(surface.texture, texture_from_pixel, (width, height),
+                               flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE)
+    copy_where(mask[y:y + height, x:x + width], part, color[y:y + height, x:x + width])
+
+
+def copy_where(mask, source, target):
+    """Copy the pixels of an image that a mask shows into another one (OpenCV 3.2 has no cv2.copyTo)."""
+    cv2.bitwise_or(source, source, target, mask)

@@ -1,0 +1,235 @@
+"""Scenario files: a room, a robot, and people in it, as YAML. `config/scenarios/README.md` describes the form."""
+import difflib
+import os
+from typing import NamedTuple, Optional, Tuple
+
+import yaml
+
+Color = Tuple[int, int, int]
+Point = Tuple[float, float]
+
+
+class ScenarioError(ValueError):
+    """A scenario file that cannot be used; says where in it, what was expected and what is there."""
+
+
+class Furniture(NamedTuple):
+    """A box on the floor: centre (x, y), size (x, y, z) in metres, turned by `yaw`, RGB colour."""
+
+    at: Point
+    size: Tuple[float, float, float]
+    yaw: float = 0.0
+    color: Color = (150, 140, 125)
+
+
+class Room(NamedTuple):
+    """`bounds` (x0, x1, y0, y1) and `height` in metres."""
+
+    bounds: Tuple[float, float, float, float] = (-3.0, 9.0, -4.0, 4.0)
+    height: float = 2.8
+    furniture: Tuple[Furniture, ...] = ()
+
+
+class Move(NamedTuple):
+    """One of: go `to` a point with `speed` (m/s); `turn` by an angle with `rate` (rad/s); `wait` (s). A person who
+    waits may face a direction (`facing`, map frame) and `crouch` (0 to 1).
+    """
+
+    to: Optional[Point] = None
+    speed: float = 1.2
+    turn: Optional[float] = None
+    rate: float = 1.0
+    wait: Optional[float] = None
+    facing: Optional[float] = None
+    crouch: float = 0.0
+
+
+class Follow(NamedTuple):
+    """Keep `distance` metres behind a person (number, from 1), no faster than `speed` and turning at most at `rate`."""
+
+    person: int
+    distance: float = 2.5
+    speed: float = 1.5
+    rate: float = 1.0
+
+
+class Robot(NamedTuple):
+    """`pose` (x, y, yaw) at the start; `mount` of the camera in base_link, tilted up by `pitch`; `base_height` of
+    base_link above the floor (Jackal: wheels of radius 0.098 m, hung 0.033 m above it); `odometry_drift` (x, y, yaw) a
+    second, of the odom frame in the map.
+    """
+
+    pose: Tuple[float, float, float] = (0.0, 0.0, 0.0)
+    moves: Tuple[Move, ...] = ()
+    repeat: bool = False
+    follow: Optional[Follow] = None
+    mount: Tuple[float, float, float] = (0.17, 0.0, 0.20)
+    pitch: float = 0.0
+    base_height: float = 0.065
+    odometry_drift: Tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class Person(NamedTuple):
+    """A person: where they start and what they do, again and again with `repeat`; how they look (see `body.Build`),
+    where None by the seed.
+    """
+
+    start: Point
+    facing: float = 0.0
+    crouch: float = 0.0
+    moves: Tuple[Move, ...] = ()
+    repeat: bool = False
+    height: Optional[float] = None
+    girth: Optional[float] = None
+    hips: Optional[float] = None
+    long_hair: Optional[bool] = None
+    short_sleeves: Optional[bool] = None
+    skin: Optional[Color] = None
+    hair: Optional[Color] = None
+    shirt: Optional[Color] = None
+    trousers: Optional[Color] = None
+
+
+class Scenario(NamedTuple):
+    """A scene of `duration` seconds with `rate` images a second. The same `seed` gives the same images.
+
+    `depth_noise`: whether depth is that of a D435 or exact; `color_noise`: standard deviation in grey levels.
+    """
+
+    duration: float = 12.0
+    rate: float = 15.0
+    seed: int = 1
+    depth_noise: bool = True
+    color_noise: float = 2.2
+    room: Room = Room()
+    robot: Robot = Robot()
+    people: Tuple[Person, ...] = ()
+
+
+MOVE_KEYS = {'to': ('to', 'speed', 'rate'), 'turn': ('turn', 'rate'), 'wait': ('wait', 'facing', 'crouch')}
+RECORDS = {'room': Room, 'robot': Robot, 'follow': Follow}
+LISTS = {'furniture': Furniture, 'people': Person, 'moves': Move}
+VECTORS = {'bounds': 4, 'at': 2, 'size': 3, 'to': 2, 'start': 2, 'pose': 3, 'mount': 3, 'odometry_drift': 3, 'color': 3,
+           'skin': 3, 'hair': 3, 'shirt': 3, 'trousers': 3}
+FLAGS, WHOLE = {'repeat', 'long_hair', 'short_sleeves', 'depth_noise'}, {'seed', 'person'}
+COLORS = {'color', 'skin', 'hair', 'shirt', 'trousers'}
+POSITIVE = {'duration', 'rate', 'height', 'speed', 'girth', 'distance', 'size'}
+FRACTIONS = {'crouch', 'hips'}
+
+
+def read_scenario(path):
+    """Read a scenario file. Its `room` may be the name of another file, relative to it.
+
+    Raises
+    ------
+    ScenarioError
+        If it is not YAML, or holds a key or value that a scenario has not.
+    OSError
+        If it cannot be opened.
+    """
+    content = _loaded(path)
+    if isinstance(content, dict) and isinstance(content.get('room'), str):
+        content['room'] = _loaded(os.path.join(os.path.dirname(path), content['room']))
+    try:
+        return scenario_from(content)
+    except ScenarioError as error:
+        raise ScenarioError('%s: %s' % (path, error))
+
+
+def _loaded(path):
+    with open(path) as stream:
+        try:
+            content = yaml.safe_load(stream)
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            raise ScenarioError('%s is not YAML: %s' % (path, error))
+    return {} if content is None else content
+
+
+def scenario_from(content):
+    """A scenario of the dictionary in a file. Raises ScenarioError."""
+    scenario = _record(Scenario, content, 'scenario')
+    room, robot = scenario.room, scenario.robot
+    if not (room.bounds[0] < room.bounds[1] and room.bounds[2] < room.bounds[3]):
+        raise ScenarioError('room.bounds is %s; x0 < x1 and y0 < y1 expected' % (list(room.bounds),))
+    camera_m = sum(abs(part) for part in robot.mount[:2])  # the camera has to stay inside, whichever way it looks
+    _check_inside(room.bounds, 'robot', robot.pose[:2], robot.moves, camera_m)
+    for number, person in enumerate(scenario.people, 1):
+        _check_inside(room.bounds, 'people[%d]' % number, person.start, person.moves)
+    if not 0 < robot.base_height + robot.mount[2] < room.height:
+        raise ScenarioError('robot.mount is %s, with robot.base_height %g, outside the room, which is %g high'
+                            % (list(robot.mount), robot.base_height, room.height))
+    if robot.follow is not None and not 1 <= robot.follow.person <= len(scenario.people):
+        raise ScenarioError('robot.follow.person is %d; 1 to %d expected' % (robot.follow.person, len(scenario.people)))
+    return scenario
+
+
+def _check_inside(bounds, name, start, moves, margin_m=0.0):
+    x0, x1, y0, y1 = bounds = [bound + sign * margin_m for bound, sign in zip(bounds, (1, -1, 1, -1))]
+    for x, y in [start] + [move.to for move in moves if move.to is not None]:
+        if not (x0 < x < x1 and y0 < y < y1):
+            raise ScenarioError('%s is at (%g, %g), outside the room %s' % (name, x, y, bounds))
+
+
+def _record(kind, given, where):
+    if not isinstance(given, dict):
+        raise ScenarioError('%s is %r; keys and values expected' % (where, given))
+    for name in given:
+        if name not in kind._fields:
+            near = difflib.get_close_matches(str(name), kind._fields, 1, 0.0)
+            raise ScenarioError('%s has the unknown key %r; did you mean %s? Known: %s'
+                                % (where, name, near[0], ', '.join(kind._fields)))
+    try:
+        record = kind(**{name: _value(name, value, '%s.%s' % (where, name)) for name, value in given.items()})
+    except TypeError:
+        raise ScenarioError('%s has only the keys %s; one of %s is missing' % (where, list(given), kind._fields))
+    if kind is Move:
+        _check_move(given, where)
+    return record
+
+
+def _check_move(given, where):
+    verbs = [name for name in MOVE_KEYS if given.get(name) is not None]
+    if len(verbs) != 1:
+        raise ScenarioError('%s is %s; exactly one of to, turn, wait expected' % (where, given))
+    for name in given:
+        if name not in MOVE_KEYS[verbs[0]]:
+            raise ScenarioError('%s is %s; %s goes with %s only'
+                                % (where, given, name, ' or '.join(v for v in MOVE_KEYS if name in MOVE_KEYS[v])))
+
+
+def _value(name, value, where):
+    if name in RECORDS:
+        return _record(RECORDS[name], value, where)
+    if name in LISTS:
+        if not isinstance(value, list):
+            raise ScenarioError('%s is %r; a list expected' % (where, value))
+        return tuple(_record(LISTS[name], entry, '%s[%d]' % (where, number)) for number, entry in enumerate(value, 1))
+    if name in VECTORS:
+        if not (isinstance(value, list) and len(value) == VECTORS[name]):
+            raise ScenarioError('%s is %r; %d numbers expected' % (where, value, VECTORS[name]))
+        return tuple(_checked(name, _number(entry, where), where) for entry in value)
+    if name in FLAGS:
+        if not isinstance(value, bool):
+            raise ScenarioError('%s is %r; true or false expected' % (where, value))
+        return value
+    return _checked(name, _number(value, where), where)
+
+
+def _checked(name, number, where):
+    if name in WHOLE and not (number == int(number) and 0 <= number < 2 ** 32):
+        raise ScenarioError('%s is %r; a whole number from 0 expected' % (where, number))
+    if name in POSITIVE and not number > 0:
+        raise ScenarioError('%s is %g; more than 0 expected' % (where, number))
+    if name in FRACTIONS and not 0 <= number <= 1:
+        raise ScenarioError('%s is %g; 0 to 1 expected' % (where, number))
+    if name in COLORS and not 0 <= number <= 255:
+        raise ScenarioError('%s has %g; 0 to 255 expected' % (where, number))
+    if name in ('wait', 'color_noise') and not number >= 0 or name == 'rate' and number > 1000:
+        raise ScenarioError('%s is %g; 0 or more expected, and a rate of at most 1000' % (where, number))
+    return int(number) if name in WHOLE else float(number)
+
+
+def _number(value, where):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e10:
+        raise ScenarioError('%s is %r; a number expected' % (where, value))
+    return value

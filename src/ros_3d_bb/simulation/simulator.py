@@ -1,0 +1,175 @@
+"""Frames of a scenario: what the camera sees, where everything is, and who is who."""
+from typing import List, NamedTuple, Tuple
+
+import cv2
+import numpy as np
+
+from ros_3d_bb.geometry import Camera
+from ros_3d_bb.simulation import mesh
+from ros_3d_bb.simulation.body import Body, Build
+from ros_3d_bb.simulation.color import ColorSensor
+from ros_3d_bb.simulation.motion import person_motion, robot_motion
+from ros_3d_bb.simulation.renderer import render
+from ros_3d_bb.simulation.room import Room
+from ros_3d_bb.simulation.stereo import StereoCamera
+
+D435I_COLOR = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)  # the camera of the thesis' measurements
+FRONT_FROM_OPTICAL = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)  # REP 103
+SHADOW_RADIUS_M = 0.28
+SKINS = ((225, 180, 150), (215, 170, 140), (185, 140, 110), (230, 185, 155), (145, 105, 80))
+HAIRS = ((60, 45, 35), (35, 30, 25), (25, 22, 20), (130, 95, 60), (120, 120, 120))
+SHIRTS = ((30, 40, 60), (170, 45, 50), (185, 180, 165), (70, 130, 80), (60, 150, 190), (200, 150, 60), (90, 60, 120))
+TROUSERS = ((85, 75, 60), (45, 60, 95), (40, 40, 45), (110, 100, 85), (60, 60, 65))
+SHOES = ((45, 40, 40), (35, 35, 35), (205, 200, 200))
+
+
+class Truth(NamedTuple):
+    """A person in one frame, in the map, metres.
+
+    `id` from 1 in the order of the scenario; `position_m` (3,) the middle of the body's axis; `size_m` (3,) x = y =
+    width, z = height; `inside` the share 0..1 of the body that lies in the image, `hidden` the share of that which
+    others hide, `visible` what the image shows of the body; `box_px` (x1, y1, x2, y2) around what is seen, None where
+    nothing is.
+    """
+
+    id: int
+    position_m: np.ndarray
+    velocity_mps: np.ndarray
+    size_m: np.ndarray
+    visible: float
+    hidden: float
+    inside: float
+    box_px: Tuple[int, int, int, int]
+
+
+class Poses(NamedTuple):
+    """Rigid transforms (4, 4) of one moment. The camera's frame is the optical one."""
+
+    map_from_odom: np.ndarray
+    odom_from_base: np.ndarray
+    base_from_camera: np.ndarray
+
+    @property
+    def map_from_camera(self):
+        """The camera in the map."""
+        return self.map_from_odom.dot(self.odom_from_base).dot(self.base_from_camera)
+
+
+class Frame(NamedTuple):
+    """`time_s` since the start; `color` (h, w, 3) uint8 RGB; `depth_mm` (h, w) uint16, aligned to colour, 0 is none."""
+
+    number: int
+    time_s: float
+    color: np.ndarray
+    depth_mm: np.ndarray
+    poses: Poses
+    people: List[Truth]
+
+
+class Simulator(object):
+    """Renders a scenario. Each frame is a function of the scenario and its number alone.
+
+    Parameters
+    ----------
+    scenario : scenario.Scenario
+    camera : geometry.Camera
+    """
+
+    def __init__(self, scenario, camera=D435I_COLOR):
+        self.scenario, self.camera = scenario, camera
+        self._room = Room(scenario.room.bounds, scenario.room.height, np.random.RandomState(scenario.seed))
+        self._furniture = [_furniture(item, number) for number, item in enumerate(scenario.room.furniture)]
+        self._bodies = [Body(_build(person, scenario.seed, number), np.random.RandomState(number))
+                        for number, person in enumerate(scenario.people)]
+        self._motions = [person_motion(person, body.build.height_m, scenario.duration)
+                         for person, body in zip(scenario.people, self._bodies)]
+        self._robot = robot_motion(scenario.robot, self._motions, scenario.duration)
+        self._color_sensor = ColorSensor(camera, scenario.seed, scenario.color_noise)
+        self._stereo = StereoCamera(camera, scenario.seed) if scenario.depth_noise else None
+
+    @property
+    def frame_count(self):
+        """Number of frames in the scene."""
+        return int(np.ceil(self.scenario.duration * self.scenario.rate))
+
+    def time_s(self, number):
+        """When a frame is taken, seconds from the start."""
+        return number / self.scenario.rate
+
+    def frame(self, number):
+        """Render a frame.
+
+        Returns
+        -------
+        Frame
+        """
+        time_s = self.time_s(number)
+        poses, states = self.poses_at(time_s), [motion.at(time_s) for motion in self._motions]
+        bodies = [body.posed(state.posture).moved(np.append(state.position_m, 0), state.heading_rad)
+                  for body, state in zip(self._bodies, states)]
+        shadows = [(state.position_m[0], state.position_m[1], SHADOW_RADIUS_M) for state in states]
+        drawn = render(self._room, bodies + self._furniture, shadows, self.camera, poses.map_from_camera)
+        depth_mm = (self._stereo.measure(drawn.inverse_depth, number) if self._stereo is not None
+                    else np.rint(1000 / drawn.inverse_depth).clip(0, 65535).astype(np.uint16))
+        people = [self._truth(index, state, bodies[index], drawn) for index, state in enumerate(states)]
+        return Frame(number, time_s, self._color_sensor.take(drawn.color, number), depth_mm, poses, people)
+
+    def poses_at(self, time_s):
+        """Where odometry, robot and camera are at a time.
+
+        Returns
+        -------
+        Poses
+        """
+        robot, state = self.scenario.robot, self._robot.at(time_s)
+        x, y, yaw = np.array(robot.odometry_drift) * time_s
+        map_from_odom = _upright(x, y, 0, yaw)
+        map_from_base = _upright(state.position_m[0], state.position_m[1], robot.base_height, state.heading_rad)
+        base_from_mount = _upright(*robot.mount + (0,))
+        c, s = np.cos(robot.pitch), np.sin(robot.pitch)
+        base_from_mount[:3, :3] = [[c, 0, -s], [0, 1, 0], [s, 0, c]]
+        return Poses(map_from_odom, np.linalg.inv(map_from_odom).dot(map_from_base),
+                     base_from_mount.dot(FRONT_FROM_OPTICAL))
+
+    def positions_at(self, time_s):
+        """Where the people stand, (n, 2) in the map; also beyond the scene's end."""
+        return np.array([motion.at(time_s).position_m for motion in self._motions]).reshape(-1, 2)
+
+    def _truth(self, index, state, body, drawn):
+        height_m = float(body.vertices[:, 2].max())
+        width_m = self._bodies[index].width_m
+        shown = cv2.inRange(drawn.objects, index + 1, index + 1)
+        count = cv2.countNonZero(shown)
+        x, y, width, height = cv2.boundingRect(shown)
+        hidden = 1 - count / float(drawn.areas[index]) if drawn.areas[index] else 0.0
+        return Truth(index + 1, np.append(state.position_m, height_m / 2), np.append(state.velocity_mps, 0),
+                     np.array([width_m, width_m, height_m]), (1 - hidden) * drawn.inside[index], hidden,
+                     drawn.inside[index], (x, y, x + width, y + height) if count else None)
+
+
+def _upright(x, y, z, yaw):
+    """The transform of a place and a turn about z."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, z], [0, 0, 0, 1]], float)
+
+
+def _furniture(item, number):
+    return mesh.box(item.size, item.color, np.random.RandomState(number)).moved(item.at + (0,), item.yaw)
+
+
+def _build(person, seed, number):
+    """How a person looks: as the scenario says, else by chance from the seed."""
+    random = np.random.RandomState([seed, number])
+
+    def one_of(colors):
+        return colors[random.randint(len(colors))]
+
+    shirts = np.random.RandomState(seed).permutation(len(SHIRTS))  # neighbours wear different ones
+
+    drawn = Build(random.uniform(1.58, 1.92), random.uniform(.95, 1.25), float(random.randint(2)),
+                  bool(random.randint(2)), bool(random.randint(2)), one_of(SKINS), one_of(HAIRS),
+                  SHIRTS[shirts[number % len(SHIRTS)]], one_of(TROUSERS), one_of(SHOES))
+    names = {'height': 'height_m'}
+    given = {names.get(name, name): getattr(person, name) for name in (
+        'height', 'girth', 'hips', 'long_hair', 'short_sleeves', 'skin', 'hair', 'shirt', 'trousers')}
+    return drawn._replace(**{name: value for name, value in given.items() if value is not None})

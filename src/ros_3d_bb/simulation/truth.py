@@ -1,0 +1,38 @@
+"""Ground truth in the form of tracks, so that it can be published and compared."""
+import numpy as np
+
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject
+
+LEAST_VISIBLE = 0.25  # share of the body that an image must show for the person to count as visible
+MOVING_MPS = 0.05
+PREDICTION_S, PREDICTION_STEP_S = 2.0, 0.25
+
+
+def truth_at(simulator, frame, stamp_ns):
+    """The people of a frame as tracks, in the map; the prediction is where they really will be.
+
+    Parameters
+    ----------
+    simulator : Simulator
+    frame : Frame
+    stamp_ns : int
+        Stamp of the frame. Each person counts as seen from the start of the scene on.
+
+    Returns
+    -------
+    list of TrackedObject
+    """
+    times_s = PREDICTION_STEP_S * np.arange(1, int(round(PREDICTION_S / PREDICTION_STEP_S)) + 1)
+    paths = np.stack([simulator.positions_at(frame.time_s + time_s) for time_s in times_s], axis=1)
+    start_ns = stamp_ns - int(round(frame.time_s * NS))
+    return [TrackedObject(person.id, person.position_m, person.size_m, person.velocity_mps, person.velocity_mps,
+                          _status(person), bool(np.linalg.norm(person.velocity_mps) > MOVING_MPS), start_ns, stamp_ns,
+                          np.c_[path, np.full(len(path), person.position_m[2])], PREDICTION_STEP_S)
+            for person, path in zip(frame.people, paths)]
+
+
+def _status(person):
+    if person.visible >= LEAST_VISIBLE:
+        return VISIBLE
+    return OCCLUDED if person.hidden > 1 - person.inside else OUT_OF_VIEW  # whatever takes the larger part

@@ -1,0 +1,201 @@
+"""Where people and the robot are: what the moves ask for, smoothly."""
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ros_3d_bb.simulation.gait import stride_m
+from ros_3d_bb.simulation.motion import SMOOTHING_S, person_motion, robot_motion
+from ros_3d_bb.simulation.scenario import Follow, Move, Person, Robot
+
+HEIGHT_M, LONG_S = 1.75, 60.0
+TINY_S = 1e-5
+points = st.tuples(st.floats(-4, 4), st.floats(-4, 4)).map(lambda point: (round(point[0], 2), round(point[1], 2)))
+moves = st.lists(st.one_of(
+    st.builds(lambda to, speed: Move(to=to, speed=speed), points, st.floats(.3, 2)),
+    st.builds(lambda turn, rate: Move(turn=turn, rate=rate), st.floats(-6, 6), st.floats(.3, 2)),
+    st.builds(lambda wait, facing, crouch: Move(wait=wait, facing=facing, crouch=crouch), st.floats(.1, 3),
+              st.one_of(st.none(), st.floats(-6, 6)), st.floats(0, 1))), max_size=5).map(tuple)
+times = st.floats(-1, 40)
+
+
+def walker(*person_moves, **others):
+    start = others.pop('start', (0.0, 0.0))
+    return person_motion(Person(start, moves=person_moves, **others), HEIGHT_M, LONG_S)
+
+
+def speed_of(state):
+    return np.linalg.norm(state.velocity_mps)
+
+
+def angle_between(a, b):
+    return abs((a - b + np.pi) % (2 * np.pi) - np.pi)
+
+
+@given(points, moves, times)
+@settings(max_examples=100)
+def test_velocity_is_the_derivative_of_position(start, person_moves, time_s):
+    motion = walker(*person_moves, start=start)
+    before, state, after = (motion.at(time_s + shift) for shift in (-TINY_S, 0, TINY_S))
+    np.testing.assert_allclose((after.position_m - before.position_m) / (2 * TINY_S), state.velocity_mps, atol=1e-3)
+
+
+@given(points, moves, times)
+@settings(max_examples=100)
+def test_nobody_starts_stops_turns_or_crouches_at_once(start, person_moves, time_s):
+    """Walking at up to 2 m/s; the largest turn in no time is that of facing another way: half a turn."""
+    motion, step_s = walker(*person_moves, start=start), .01
+    now, later = motion.at(time_s), motion.at(time_s + step_s)
+    assert np.linalg.norm(later.velocity_mps - now.velocity_mps) <= 4 / SMOOTHING_S * step_s + 1e-9
+    knots_in_between = len(person_moves)
+    assert abs(later.heading_rad - now.heading_rad) <= (np.pi / SMOOTHING_S * (knots_in_between + 1) + 2) * step_s
+    assert abs(later.posture.crouch - now.posture.crouch) <= (knots_in_between + 1) / SMOOTHING_S * step_s + 1e-9
+
+
+@given(points, moves)
+@settings(max_examples=50)
+def test_everyone_ends_where_the_moves_say_and_stays(start, person_moves):
+    motion = walker(*person_moves, start=start)
+    end = ([start] + [move.to for move in person_moves if move.to])[-1]
+    for time_s in (150, 1000):
+        state = motion.at(time_s)
+        np.testing.assert_allclose(state.position_m, end, atol=1e-9)
+        assert speed_of(state) < 1e-9 and state.posture.swing < 1e-9
+
+
+@given(points, st.floats(-3, 3), st.floats(0, 1))
+@settings(max_examples=20)
+def test_who_has_no_moves_stands_as_they_started(start, facing, crouch):
+    motion = walker(start=start, facing=facing, crouch=crouch)
+    for time_s in (-5, 0, .1, 99):
+        state = motion.at(time_s)
+        np.testing.assert_allclose(state.position_m, start, atol=1e-9)
+        np.testing.assert_allclose((state.heading_rad, speed_of(state)), (facing, 0), atol=1e-9)
+        np.testing.assert_allclose(state.posture, (0, 0, crouch), atol=1e-9)
+
+
+@given(st.floats(.3, 2), st.floats(-3, 3))
+@settings(max_examples=30)
+def test_a_straight_walk_has_its_speed_and_heading(speed, direction):
+    motion = walker(Move(to=(6 * np.cos(direction), 6 * np.sin(direction)), speed=speed))
+    state = motion.at(3 / speed)
+    expected = speed * np.array([np.cos(direction), np.sin(direction)])
+    np.testing.assert_allclose(state.velocity_mps, expected, atol=1e-9)
+    np.testing.assert_allclose(state.position_m, expected * 3 / speed, atol=1e-9)
+    assert angle_between(state.heading_rad, direction) < 1e-9
+
+
+def test_a_walk_takes_as_long_as_its_length_and_speed_say():
+    motion = walker(Move(wait=2.0), Move(to=(3, 0), speed=1.5))
+    assert speed_of(motion.at(2 - SMOOTHING_S / 2)) == 0 and speed_of(motion.at(2)) == pytest.approx(.75)
+    assert motion.at(3).position_m[0] == pytest.approx(1.5)
+    assert speed_of(motion.at(4 + SMOOTHING_S / 2)) == pytest.approx(0, abs=1e-12)
+
+
+@given(st.floats(.3, 2))
+@settings(max_examples=20)
+def test_legs_make_a_stride_for_each_cycle(speed):
+    """So that the feet do not slide."""
+    motion = walker(Move(to=(20, 0), speed=speed))
+    start, end = motion.at(2), motion.at(4)
+    assert end.posture.swing == pytest.approx(start.posture.swing)
+    cycles = end.posture.phase - start.posture.phase
+    assert cycles * stride_m(HEIGHT_M, start.posture.swing) == pytest.approx(2 * speed)
+
+
+def test_faster_people_swing_more():
+    swings = [walker(Move(to=(20, 0), speed=speed)).at(2).posture.swing for speed in (.3, .6, 1.0, 1.3, 2.0)]
+    assert (np.diff(swings[:4]) > .1).all() and swings[3:] == pytest.approx([1, 1])
+
+
+@given(st.floats(-7, 7), st.floats(-3, 3), st.floats(-3, 3), st.floats(0, 1))
+@settings(max_examples=50)
+def test_people_look_where_they_walk(facing, first, second, share):
+    """Two legs of 3 m: on each, but for the corner."""
+    corner = 3 * np.array([np.cos(first), np.sin(first)])
+    end = corner + 3 * np.array([np.cos(second), np.sin(second)])
+    motion = walker(Move(to=tuple(corner), speed=1.0), Move(to=tuple(end), speed=1.0), facing=facing)
+    for began_s, direction in ((0, first), (3, second)):
+        state = motion.at(began_s + SMOOTHING_S / 2 + share * (3 - SMOOTHING_S))
+        assert angle_between(state.heading_rad, direction) < 1e-9
+        assert angle_between(np.arctan2(*state.velocity_mps[::-1]), direction) < 1e-6
+
+
+def test_repeated_moves_are_periodic():
+    person_moves = Move(to=(2, 0), speed=1.0), Move(wait=1.0, crouch=.5), Move(to=(0, 0), speed=.5)
+    motion = walker(*person_moves, repeat=True)
+    for time_s in np.arange(1, 50, 1.7):
+        now, later = motion.at(time_s), motion.at(time_s + 7)
+        np.testing.assert_allclose(later.position_m, now.position_m, atol=1e-9)
+        np.testing.assert_allclose(later.velocity_mps, now.velocity_mps, atol=1e-9)
+        assert later.posture[1:] == pytest.approx(now.posture[1:], abs=1e-9)
+    assert speed_of(motion.at(LONG_S)) > 0 or speed_of(motion.at(LONG_S - 1)) > 0
+
+
+@pytest.mark.parametrize('person_moves', [(), (Move(wait=0.0),), (Move(to=(0.0, 0.0)),)])
+def test_repeating_what_takes_no_time_comes_to_an_end(person_moves):
+    np.testing.assert_array_equal(walker(*person_moves, repeat=True).at(9).position_m, (0, 0))
+
+
+def test_who_waits_may_face_another_way_and_crouch():
+    motion = walker(Move(wait=2.0), Move(wait=2.0, facing=1.0, crouch=.7), Move(wait=2.0))
+    assert [motion.at(time_s).heading_rad for time_s in (1, 3, 5)] == pytest.approx([0, 1, 1])
+    assert [motion.at(time_s).posture.crouch for time_s in (1, 3, 5)] == pytest.approx([0, .7, 0])
+
+
+def test_facing_and_walking_turn_the_short_way():
+    motion = walker(Move(wait=2.0, facing=-3.0), Move(to=(1, 1), speed=1.0), facing=3.0)
+    headings = [motion.at(time_s).heading_rad for time_s in np.arange(0, 1.5, .05)]
+    assert 2.99 < min(headings) and max(headings) == pytest.approx(2 * np.pi - 3)
+    assert angle_between(motion.at(2.7).heading_rad, np.pi / 4) < 1e-9
+
+
+@given(st.floats(-6, 6).filter(lambda angle: abs(angle) > 2), st.floats(.3, 2))
+@settings(max_examples=30)
+def test_the_robot_turns_on_the_spot_at_its_rate(angle, rate):
+    motion = robot_motion(Robot((1.0, 2.0, .5), (Move(wait=1.0), Move(turn=angle, rate=rate))), [], LONG_S)
+    middle_s = 1 + abs(angle) / rate / 2
+    before, after = motion.at(middle_s - .1), motion.at(middle_s + .1)
+    assert (after.heading_rad - before.heading_rad) / .2 == pytest.approx(np.copysign(rate, angle))
+    np.testing.assert_allclose([before.position_m, after.position_m], [(1, 2)] * 2, atol=1e-9)
+    assert motion.at(LONG_S).heading_rad == pytest.approx(.5 + angle)
+
+
+def test_the_robot_turns_before_it_drives():
+    motion = robot_motion(Robot(moves=(Move(to=(0.0, 2.0), speed=.5, rate=.5),)), [], LONG_S)
+    turning, driving = motion.at(1), motion.at(np.pi + 2)
+    assert turning.heading_rad == pytest.approx(.5) and speed_of(turning) == 0
+    np.testing.assert_allclose(driving.velocity_mps, (0, .5), atol=1e-9)
+    assert driving.heading_rad == pytest.approx(np.pi / 2) and driving.posture == (0, 0, 0)
+
+
+@pytest.fixture(scope='module')
+def chase():
+    person = walker(Move(to=(8.0, 0.0), speed=.8), Move(to=(8.0, 6.0), speed=.8), start=(2.0, 0.0))
+    robot = Robot((-1.0, -1.0, 3.0), follow=Follow(1, distance=2.0, speed=1.2, rate=1.0))
+    motion = robot_motion(robot, [person], LONG_S)
+    return [(motion.at(time_s), person.at(time_s)) for time_s in np.arange(0, 25, .1)]
+
+
+def test_a_following_robot_keeps_its_distance(chase):
+    distances_m = [np.linalg.norm(robot.position_m - person.position_m) for robot, person in chase]
+    assert min(distances_m) > 1.9
+    assert max(distances_m[100:]) < 2.4  # while the person walks on: some cm per m/s behind, and in the bend
+    assert distances_m[-1] == pytest.approx(2, abs=.01)
+
+
+def test_a_following_robot_looks_at_the_person(chase):
+    angles = [angle_between(robot.heading_rad, np.arctan2(*(person.position_m - robot.position_m)[::-1]))
+              for robot, person in chase]
+    assert angles[0] > 1 and max(angles[40:]) < .1 and angles[-1] < .01
+
+
+def test_a_following_robot_does_not_drive_while_it_looks_away(chase):
+    assert max(speed_of(robot) for robot, _person in chase[:7]) == 0 < speed_of(chase[20][0])
+
+
+def test_a_following_robot_is_no_faster_than_asked(chase):
+    states = [robot for robot, _person in chase]
+    assert max(speed_of(state) for state in states) <= 1.2 + 1e-9
+    turned = np.abs(np.diff([state.heading_rad for state in states]))
+    assert max(turned) <= 1.0 * .1 + 1e-9

@@ -1,0 +1,211 @@
+"""Scenario files: what is refused and how, and that those we ship are possible."""
+import glob
+import os
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ros_3d_bb.simulation.motion import person_motion, robot_motion
+from ros_3d_bb.simulation.scenario import (Follow, Furniture, Move, Person, Robot, Room, Scenario, ScenarioError,
+                                           read_scenario, scenario_from)
+
+FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'config', 'scenarios')
+SHIPPED = sorted(os.path.basename(path) for path in glob.glob(os.path.join(FOLDER, '*.yaml')))
+RATE_HZ, AFTER_S, HEIGHT_M = 10, 2.0, 1.75  # also while the last prediction lasts
+# Where each record stands in a scenario, as the messages write it.
+PLACES = {'scenario': (Scenario, lambda record: record),
+          'scenario.room': (Room, lambda record: {'room': record}),
+          'scenario.room.furniture[2]': (Furniture, lambda record: {'room': {'furniture': [
+              {'at': [0, 0], 'size': [1, 1, 1]}, dict({'at': [1, 1], 'size': [1, 1, 1]}, **record)]}}),
+          'scenario.robot': (Robot, lambda record: {'robot': record}),
+          'scenario.robot.follow': (Follow, lambda record: {'people': [{'start': [1, 1]}], 'robot': {
+              'follow': dict({'person': 1}, **record)}}),
+          'scenario.people[1]': (Person, lambda record: {'people': [dict({'start': [1, 1]}, **record)]}),
+          'scenario.people[1].moves[1]': (Move, lambda record: {'people': [{'start': [1, 1], 'moves': [
+              dict({'wait': 1.0}, **record)]}]})}
+KEYS = [(where, name) for where, (kind, _wrap) in PLACES.items() for name in kind._fields]
+
+
+def refusal_of(content):
+    with pytest.raises(ScenarioError) as caught:
+        scenario_from(content)
+    return str(caught.value)
+
+
+def content_with(where, name, value):
+    return PLACES[where][1]({name: value})
+
+
+@pytest.mark.parametrize('where,name', KEYS)
+def test_a_misspelled_key_is_refused_with_its_place_and_the_key_that_was_meant(where, name):
+    text = refusal_of(content_with(where, name + 'x', 1))
+    assert text.startswith("%s has the unknown key '%sx'; did you mean %s? Known: " % (where, name, name))
+
+
+@pytest.mark.parametrize('where,name', KEYS)
+def test_a_value_of_the_wrong_type_is_refused_with_its_place(where, name):
+    for value in (None, 'much', '1.0', object(), float('nan'), float('inf'), [[1]], [1, 'a', 2], {'a': 1}, {1: 2}):
+        text = refusal_of(content_with(where, name, value))
+        assert text.startswith('%s.%s' % (where, name)) and ('expected' in text or 'unknown key' in text)
+
+
+@pytest.mark.parametrize('where,name,value,reason', [
+    ('scenario', 'duration', 0, 'is 0; more than 0 expected'),
+    ('scenario', 'rate', -15, 'is -15; more than 0 expected'),
+    ('scenario', 'rate', 5000, 'at most 1000'),
+    ('scenario', 'seed', -1, 'is -1; a whole number from 0 expected'),
+    ('scenario', 'seed', 1.5, 'is 1.5; a whole number from 0 expected'),
+    ('scenario', 'seed', 2 ** 32, 'a whole number from 0 expected'),
+    ('scenario', 'seed', True, 'is True; a number expected'),
+    ('scenario', 'depth_noise', 1, 'is 1; true or false expected'),
+    ('scenario', 'color_noise', -1, 'is -1; 0 or more expected'),
+    ('scenario', 'people', {}, 'a list expected'),
+    ('scenario.room', 'height', 0, 'more than 0 expected'),
+    ('scenario.room', 'bounds', [0, 1, 2], '4 numbers expected'),
+    ('scenario.room.furniture[2]', 'size', [1, 1, 0], 'is 0; more than 0 expected'),
+    ('scenario.room.furniture[2]', 'color', [1, 2, 256], 'has 256; 0 to 255 expected'),
+    ('scenario.robot', 'mount', [0, 0], '3 numbers expected'),
+    ('scenario.robot.follow', 'distance', -1, 'more than 0 expected'),
+    ('scenario.robot.follow', 'person', .5, 'a whole number from 0 expected'),
+    ('scenario.people[1]', 'crouch', 1.1, 'is 1.1; 0 to 1 expected'),
+    ('scenario.people[1]', 'hips', -.1, 'is -0.1; 0 to 1 expected'),
+    ('scenario.people[1]', 'girth', 0, 'more than 0 expected'),
+    ('scenario.people[1]', 'shirt', [-1, 0, 0], 'has -1; 0 to 255 expected'),
+    ('scenario.people[1].moves[1]', 'wait', -1, 'is -1; 0 or more expected'),
+    ('scenario.people[1].moves[1]', 'speed', 0, 'more than 0 expected')])
+def test_a_value_out_of_range_is_refused_with_its_place(where, name, value, reason):
+    text = refusal_of(content_with(where, name, value))
+    assert text.startswith('%s.%s' % (where, name)) and reason in text
+
+
+@pytest.mark.parametrize('content,text', [
+    ([], 'scenario is []; keys and values expected'),
+    ({'people': [{}]}, 'scenario.people[1] has only the keys []; one of'),
+    ({'people': [{'start': [1, 1], 'moves': [{'wait': 1.0, 'turn': 1.0}]}]}, 'exactly one of to, turn, wait expected'),
+    ({'people': [{'start': [1, 1], 'moves': [{'speed': 1.0}]}]}, 'exactly one of to, turn, wait expected'),
+    ({'people': [{'start': [1, 1], 'moves': [{'to': [2, 2], 'crouch': 1.0}]}]}, 'crouch goes with wait only'),
+    ({'room': {'bounds': [1, -1, 0, 1]}}, 'room.bounds is [1.0, -1.0, 0.0, 1.0]; x0 < x1 and y0 < y1 expected'),
+    ({'people': [{'start': [99, 0]}]}, 'people[1] is at (99, 0), outside the room [-3.0, 9.0, -4.0, 4.0]'),
+    ({'people': [{'start': [0, 0], 'moves': [{'to': [0, 9]}]}]}, 'people[1] is at (0, 9), outside the room'),
+    ({'robot': {'pose': [0, -5, 0]}}, 'robot is at (0, -5), outside the room'),
+    ({'robot': {'pose': [8.9, 0, 0]}}, 'robot is at (8.9, 0), outside the room [-2.83, 8.83, -3.83, 3.83]'),
+    ({'robot': {'moves': [{'to': [10, 0]}]}}, 'robot is at (10, 0), outside the room'),
+    ({'robot': {'mount': [0, 0, 3]}}, 'robot.mount is [0.0, 0.0, 3.0], with robot.base_height 0.065, outside the room'),
+    ({'robot': {'follow': {'person': 1}}}, 'robot.follow.person is 1; 1 to 0 expected'),
+    ({'robot': {'follow': {'person': 0}}, 'people': [{'start': [1, 1]}]}, 'robot.follow.person is 0; 1 to 1 expected')])
+def test_what_cannot_be_is_refused(content, text):
+    assert text in refusal_of(content)
+
+
+@given(st.recursive(st.one_of(st.none(), st.booleans(), st.floats(), st.integers(), st.text(max_size=5)),
+                    lambda inner: st.one_of(st.lists(inner, max_size=4), st.dictionaries(
+                        st.sampled_from(sorted({name for _where, name in KEYS}) + ['oops', 7]), inner, max_size=4))))
+@settings(max_examples=150)
+def test_whatever_a_file_holds_it_is_a_scenario_or_a_scenario_error(content):
+    try:
+        assert isinstance(scenario_from(content), Scenario)
+    except ScenarioError as error:
+        assert str(error)
+
+
+def test_an_empty_file_is_the_default_scenario(tmp_path):
+    path = tmp_path / 'empty.yaml'
+    path.write_text('# nothing\n')
+    assert read_scenario(str(path)) == Scenario() == scenario_from({})
+
+
+def test_every_key_arrives_where_it_belongs():
+    scenario = scenario_from({
+        'duration': 3, 'rate': 10, 'seed': 2 ** 32 - 1, 'depth_noise': False, 'color_noise': 0,
+        'room': {'bounds': [-5, 5, -6, 6], 'height': 3, 'furniture': [{'at': [1, 2], 'size': [1, 1, 2], 'yaw': .5}]},
+        'robot': {'pose': [0, 1, 2], 'moves': [{'turn': -1}], 'pitch': .1},
+        'people': [{'start': [3, 3], 'repeat': True, 'long_hair': True, 'shirt': [1, 2, 3],
+                    'moves': [{'to': [4, 3], 'speed': 1}, {'wait': 1, 'facing': 2, 'crouch': .5}]}]})
+    assert scenario == Scenario(
+        3.0, 10.0, 2 ** 32 - 1, False, 0.0, Room((-5, 5, -6, 6), 3.0, (Furniture((1, 2), (1, 1, 2), .5),)),
+        Robot((0, 1, 2), (Move(turn=-1.0),), pitch=.1),
+        (Person((3, 3), moves=(Move(to=(4, 3), speed=1.0), Move(wait=1.0, facing=2.0, crouch=.5)), repeat=True,
+                long_hair=True, shirt=(1, 2, 3)),))
+    assert isinstance(scenario.seed, int) and isinstance(scenario.duration, float)
+
+
+def test_the_room_may_be_another_file(tmp_path):
+    (tmp_path / 'rooms').mkdir()
+    (tmp_path / 'rooms' / 'small.yaml').write_text('bounds: [-1, 1, -1, 1]')
+    path = tmp_path / 'scene.yaml'
+    path.write_text('room: rooms/small.yaml')
+    assert read_scenario(str(path)).room == Room((-1, 1, -1, 1))
+    path.write_text('room: rooms/none.yaml')
+    with pytest.raises(OSError, match='none.yaml'):
+        read_scenario(str(path))
+
+
+@pytest.mark.parametrize('content,text', [(b'people: [', 'is not YAML'), (b'\xff\xfe\xfa: 1', 'is not YAML'),
+                                          (b'seeed: 1', 'did you mean seed?')])
+def test_errors_name_the_file(tmp_path, content, text):
+    path = tmp_path / 'scene.yaml'
+    path.write_bytes(content)
+    with pytest.raises(ScenarioError, match=r'scene\.yaml.*') as caught:
+        read_scenario(str(path))
+    assert text in str(caught.value)
+
+
+def courses(scenario):
+    """Times, where the people are (times, n, 2), and where the robot is (times, 2)."""
+    times_s = np.arange(0, scenario.duration + AFTER_S, 1. / RATE_HZ)
+    motions = [person_motion(person, HEIGHT_M, scenario.duration) for person in scenario.people]
+    robot = robot_motion(scenario.robot, motions, scenario.duration)
+    people = np.array([[motion.at(time_s).position_m for motion in motions] for time_s in times_s])
+    return times_s, people.reshape(len(times_s), -1, 2), np.array([robot.at(time_s).position_m for time_s in times_s])
+
+
+def distance_to(furniture, points):
+    """Of points (..., 2) to the rectangle that a piece of furniture covers; 0 inside."""
+    c, s = np.cos(furniture.yaw), np.sin(furniture.yaw)
+    inside = (points - np.array(furniture.at)).dot([[c, -s], [s, c]])
+    return np.linalg.norm(np.maximum(np.abs(inside) - np.array(furniture.size[:2]) / 2, 0), axis=-1)
+
+
+def assert_apart(distances_m, least_m, times_s, who):
+    """The first axis of the distances is time."""
+    place = np.unravel_index(np.argmin(distances_m), distances_m.shape) if distances_m.size else None
+    assert place is None or distances_m[place] > least_m, '%s: %.2f m at %.1f s, numbers %s from 1' % (
+        who, distances_m[place], times_s[place[0]], [number + 1 for number in place[1:]])
+
+
+def test_scenarios_are_shipped():
+    assert len(SHIPPED) >= 13 and 'demo.yaml' in SHIPPED
+
+
+@pytest.mark.parametrize('name', SHIPPED)
+def test_in_a_shipped_scenario_nobody_walks_into_anything(name):
+    scenario = read_scenario(os.path.join(FOLDER, name))
+    times_s, people, robot = courses(scenario)
+    low, high = np.array(scenario.room.bounds).reshape(2, 2).T
+    assert_apart(np.minimum(people - low, high - people).min(axis=-1), .3, times_s, 'a person and the wall')
+    assert_apart(np.minimum(robot - low, high - robot).min(axis=-1), .4, times_s, 'the robot and the wall')
+    for number, item in enumerate(scenario.room.furniture, 1):
+        assert_apart(distance_to(item, people), .2, times_s, 'a person and furniture %d' % number)
+        assert_apart(distance_to(item, robot), .4, times_s, 'the robot and furniture %d' % number)
+    between = np.linalg.norm(people[:, :, None] - people[:, None], axis=-1)
+    assert_apart(between + 9 * np.eye(people.shape[1]), .45, times_s, 'two people')
+    assert_apart(np.linalg.norm(people - robot[:, None], axis=-1), .6, times_s, 'a person and the robot')
+
+
+@pytest.mark.parametrize('name', SHIPPED)
+def test_a_shipped_scenario_says_what_happens_in_it(name):
+    with open(os.path.join(FOLDER, name)) as stream:
+        first = stream.readline()
+    assert first.startswith('# ') and first.rstrip().endswith('.') and len(first) > 30
+
+
+def test_shipped_rooms_hold_nothing_but_rooms():
+    for path in glob.glob(os.path.join(FOLDER, 'rooms', '*.yaml')):
+        with open(path) as stream:
+            room = scenario_from({'room': yaml.safe_load(stream)}).room
+        for item in room.furniture:
+            assert room.bounds[0] < item.at[0] < room.bounds[1] and room.bounds[2] < item.at[1] < room.bounds[3]
+            assert item.size[2] <= room.height

@@ -1,0 +1,242 @@
+"""Frames of a scenario, and the ground truth in them."""
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ros_3d_bb.geometry import Camera
+from ros_3d_bb.simulation.scenario import Follow, Furniture, Move, Person, Robot, Room, Scenario
+from ros_3d_bb.simulation.simulator import D435I_COLOR, Simulator
+from ros_3d_bb.simulation.truth import PREDICTION_STEP_S, truth_at
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
+
+CAMERA = Camera(160, 120, 153.7, 153.7, 79.8, 60.5)
+HALL = Room(furniture=(Furniture((3.0, 0.0), (.4, .8, 2.8)),))
+PILLAR_WALK = Person((5.0, 2.0), moves=(Move(to=(5.0, -2.0), speed=1.0),))
+START_NS = 1600000000 * 10 ** 9
+
+
+def scene(*people, **others):
+    """A scenario without noise, 3 s long."""
+    values = dict(duration=3.0, rate=10.0, seed=4, depth_noise=False, color_noise=0.0, people=people)
+    return Scenario(**dict(values, **others))
+
+
+def frame_of(*people, **others):
+    return Simulator(scene(*people, **others), CAMERA).frame(0)
+
+
+def seen(frame):
+    """Numbers of the people with a 2D box."""
+    return [person.id for person in frame.people if person.box_px is not None]
+
+
+@pytest.fixture(scope='module')
+def pillar():
+    """A person who walks behind a pillar: the simulator and a frame every 0.2 s."""
+    simulator = Simulator(scene(PILLAR_WALK, room=HALL, duration=4.0), CAMERA)
+    return simulator, [simulator.frame(number) for number in range(0, simulator.frame_count, 2)]
+
+
+def test_a_frame_is_a_function_of_scenario_and_number_alone():
+    noisy = scene(Person((3, 0), moves=(Move(to=(5, 1)),)), depth_noise=True, color_noise=2.0, room=HALL)
+    forth, back = Simulator(noisy, CAMERA), Simulator(noisy, CAMERA)
+    numbers = (0, 5, 9)
+    one = {number: forth.frame(number) for number in numbers}
+    for number in reversed(numbers):
+        other = back.frame(number)
+        assert other.color.tobytes() == one[number].color.tobytes()
+        assert other.depth_mm.tobytes() == one[number].depth_mm.tobytes()
+        assert str(other.people) == str(one[number].people)
+    different = Simulator(noisy._replace(seed=5), CAMERA).frame(5)
+    assert different.color.tobytes() != one[5].color.tobytes()
+    assert different.depth_mm.tobytes() != one[5].depth_mm.tobytes()
+
+
+def test_frames_have_the_form_that_the_camera_has():
+    frame = Simulator(scene(Person((3, 0)))).frame(3)
+    assert frame.color.shape == (480, 640, 3) and frame.color.dtype == np.uint8
+    assert frame.depth_mm.shape == (480, 640) and frame.depth_mm.dtype == np.uint16
+    assert (frame.number, frame.time_s) == (3, .3)
+    assert D435I_COLOR[:2] == (640, 480)
+
+
+@pytest.mark.parametrize('duration,rate,count', [(3, 10, 30), (2.05, 10, 21), (.1, 1, 1), (1, 30, 30)])
+def test_frames_fill_the_duration_at_the_rate(duration, rate, count):
+    simulator = Simulator(scene(duration=duration, rate=rate), Camera(8, 6, 8, 8, 4, 3))
+    assert simulator.frame_count == count
+    assert [simulator.time_s(number) for number in (0, count)] == [0, count / float(rate)]
+
+
+@pytest.fixture(scope='module')
+def simulator_of_nobody():
+    return Simulator(scene(), CAMERA)
+
+
+def test_without_noise_depth_is_exact():
+    """The wall ahead is at x = 9 m; the camera 0.17 m before the robot, 0.265 m above the floor."""
+    depth_mm = frame_of().depth_mm
+    assert depth_mm[60, 80] == 8830
+    for v in (80, 110):
+        assert depth_mm[v, 80] == pytest.approx(.265 / (v - CAMERA.cy) * CAMERA.fy * 1000, abs=1)
+
+
+def test_with_noise_depth_is_that_of_a_d435():
+    noisy, exact = (frame_of(Person((2.5, 0)), depth_noise=noise).depth_mm.astype(float) for noise in (True, False))
+    assert (noisy == 0).any() and not (exact == 0).any()
+    errors = (noisy / exact - 1)[noisy > 0]
+    assert .001 < np.median(np.abs(errors)) < .03
+
+
+@given(st.floats(2.5, 7), st.floats(-2, 2), st.floats(-3, 3))
+@settings(max_examples=12)
+def test_the_box_encloses_exactly_what_the_person_changes(simulator_of_nobody, x, y, facing):
+    """In the depth image, against the empty room; a row of soles that is nearer by less than 1 mm may be missing."""
+    frame = frame_of(Person((x, y), facing=facing))
+    changed, (truth,) = frame.depth_mm != simulator_of_nobody.frame(0).depth_mm, frame.people
+    if truth.box_px is None:
+        assert not changed.any()
+        return
+    x1, y1, x2, y2 = truth.box_px
+    rows, columns = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
+    assert (x1, y1, x2) == (columns[0], rows[0], columns[-1] + 1) and 0 <= y2 - rows[-1] - 1 <= 1
+
+
+def test_who_stands_alone_in_view_is_visible_and_nothing_hides_them():
+    truth, = frame_of(Person((5.0, 0.5))).people
+    assert truth.visible == pytest.approx(1, abs=.03) and truth.hidden == pytest.approx(0, abs=.03)
+
+
+@pytest.mark.parametrize('start', [(-2.0, 0.0), (1.0, 3.5), (-1.0, -1.0)])
+def test_who_is_behind_the_camera_or_beside_the_image_is_not_visible(start):
+    truth, = frame_of(Person(start)).people
+    assert (truth.visible, truth.hidden, truth.box_px) == (0, 0, None)
+
+
+def test_truth_has_the_place_and_size_of_the_body():
+    simulator = Simulator(scene(Person((5.0, 1.0), height=1.8, girth=1.0), Person((5.0, -1.0), height=1.8, crouch=1.0)),
+                          CAMERA)
+    standing, crouching = simulator.frame(0).people
+    assert standing.size_m[2] == pytest.approx(1.8, abs=.004) and .4 < standing.size_m[0] < .55
+    assert standing.size_m[0] == standing.size_m[1]
+    np.testing.assert_allclose(standing.position_m, (5, 1, standing.size_m[2] / 2), atol=1e-6)
+    assert 1.0 < crouching.size_m[2] < 1.3 and crouching.position_m[2] == crouching.size_m[2] / 2
+    assert (standing.id, crouching.id) == (1, 2)
+
+
+@given(st.floats(-2, 0), st.floats(-1, 1), st.floats(-.3, .3), st.floats(-.1, .2), st.floats(2.5, 6), st.floats(-1, 1))
+@settings(max_examples=12)
+def test_the_camera_sees_people_where_the_poses_say(x, y, yaw, pitch, ahead, beside):
+    robot = Robot((x, y, yaw), pitch=pitch, mount=(.2, .1, .6), odometry_drift=(.1, -.05, .02))
+    frame = Simulator(scene(Person((ahead, beside)), robot=robot), CAMERA).frame(20)
+    truth, = frame.people
+    camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
+    point = camera_from_map.dot(np.append(truth.position_m, 1))[:3]
+    u, v = CAMERA.project(point)
+    if not (5 < u < 155 and 5 < v < 115):
+        return
+    x1, y1, x2, y2 = truth.box_px
+    assert x1 <= u < x2 and y1 <= v < y2
+    assert frame.depth_mm[int(round(v)), int(round(u))] / 1000. == pytest.approx(point[2], abs=.25)
+
+
+def test_poses_are_rigid_and_the_camera_is_where_it_is_mounted():
+    robot = Robot((1.0, 2.0, np.pi / 2), mount=(.2, .1, .5), base_height=.1, pitch=.3)
+    poses = Simulator(scene(robot=robot), CAMERA).poses_at(0)
+    for matrix in poses + (poses.map_from_camera,):
+        np.testing.assert_allclose(matrix[:3, :3].dot(matrix[:3, :3].T), np.eye(3), atol=1e-12)
+        np.testing.assert_array_equal(matrix[3], (0, 0, 0, 1))
+    camera = poses.map_from_camera
+    np.testing.assert_allclose(camera[:3, 3], (.9, 2.2, .6), atol=1e-12)
+    np.testing.assert_allclose(camera[:3, 2], (0, np.cos(.3), np.sin(.3)), atol=1e-12)  # looks along y, tilted up
+    np.testing.assert_allclose(camera[:3, 0], (1, 0, 0), atol=1e-12)
+
+
+def test_odometry_drifts_in_odom_and_not_in_the_map():
+    robot = Robot((1.0, 0.0, 0.3), (Move(to=(3.0, 1.0), speed=.5),))
+    still, drifting = (Simulator(scene(robot=robot._replace(odometry_drift=drift)), CAMERA).poses_at(2.5)
+                       for drift in ((0, 0, 0), (.02, .01, -.03)))
+    np.testing.assert_allclose(drifting.map_from_camera, still.map_from_camera, atol=1e-12)
+    np.testing.assert_allclose(drifting.map_from_odom[:2, 3], (.05, .025))
+    assert np.abs(drifting.odom_from_base - still.odom_from_base).max() > .03
+    np.testing.assert_array_equal(still.map_from_odom, np.eye(4))
+
+
+def test_the_robot_follows_a_person():
+    robot = Robot(follow=Follow(1, distance=2.0))
+    walker = Person((2.5, 0), moves=(Move(to=(7, 0), speed=.8),))
+    simulator = Simulator(scene(walker, robot=robot, duration=5.0), CAMERA)
+    assert simulator.poses_at(5).odom_from_base[0, 3] > 3
+    assert seen(simulator.frame(40)) == [1]
+
+
+def test_looks_are_drawn_by_the_seed_unless_they_are_given():
+    looks = {seed: [body.build for body in Simulator(scene(*[Person((5, y)) for y in (-1, 0, 1)], seed=seed),
+                                                     CAMERA)._bodies] for seed in (1, 2)}
+    assert looks[1] != looks[2] and len({build.shirt for build in looks[1]}) == 3
+    given_look = Person((5, 0), height=1.6, girth=1.2, hips=.5, long_hair=True, short_sleeves=False, skin=(1, 2, 3),
+                        hair=(4, 5, 6), shirt=(7, 8, 9), trousers=(10, 11, 12))
+    build = Simulator(scene(given_look), CAMERA)._bodies[0].build
+    assert build._replace(shoes=None) == (1.6, 1.2, .5, True, False, (1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12),
+                                          None)
+
+
+def test_who_walks_behind_a_pillar_is_hidden_and_comes_out_again(pillar):
+    simulator, frames = pillar
+    status = [truth_at(simulator, frame, START_NS)[0].status for frame in frames]
+    hidden = [frame.people[0].hidden for frame in frames]
+    assert status[0] == status[-1] == VISIBLE and max(hidden) == 1
+    occluded = [number for number, value in enumerate(status) if value == OCCLUDED]
+    assert occluded == list(range(occluded[0], occluded[-1] + 1)) and len(occluded) >= 2
+    assert set(status) == {VISIBLE, OCCLUDED}
+    for frame, value in zip(frames, status):
+        person = frame.people[0]
+        assert (value == OCCLUDED) == (person.hidden > .75)
+        assert person.visible == pytest.approx(1 - person.hidden, abs=.01)  # the image cuts nobody
+
+
+@pytest.mark.parametrize('start,status', [((4.0, 0.0), VISIBLE), ((4.0, 2.6), OUT_OF_VIEW), ((-2.0, 0.0), OUT_OF_VIEW)])
+def test_status_tells_who_is_out_of_view(start, status):
+    simulator = Simulator(scene(Person(start)), CAMERA)
+    assert truth_at(simulator, simulator.frame(0), START_NS)[0].status == status
+
+
+def test_someone_nearer_hides_someone_farther_and_not_the_other_way_round():
+    near, far = frame_of(Person((3.0, 0.0), height=1.9), Person((6.0, 0.0), height=1.6)).people
+    assert near.hidden < .05 and far.hidden > .6
+
+
+def test_the_predicted_truth_is_where_people_are_later(pillar):
+    simulator, frames = pillar
+    track, = truth_at(simulator, frames[3], START_NS)
+    assert track.prediction_step_s == PREDICTION_STEP_S and len(track.prediction_m) * PREDICTION_STEP_S == 2.0
+    for step, place in enumerate(track.prediction_m, 1):
+        time_s = frames[3].time_s + step * PREDICTION_STEP_S
+        np.testing.assert_allclose(place[:2], simulator.positions_at(time_s)[0])
+    np.testing.assert_allclose(track.prediction_m[3, :2], frames[8].people[0].position_m[:2])  # one second later
+
+
+def test_true_tracks_say_what_the_frame_does(pillar):
+    simulator, frames = pillar
+    frame = frames[6]
+    track, = truth_at(simulator, frame, START_NS)
+    person = frame.people[0]
+    assert track.id == person.id == 1 and track.moving
+    np.testing.assert_array_equal(track.position_m, person.position_m)
+    np.testing.assert_array_equal(track.size_m, person.size_m)
+    np.testing.assert_allclose(track.velocity_mps, (0, -1, 0), atol=1e-9)
+    np.testing.assert_array_equal(track.velocity_mps, track.instant_velocity_mps)
+    assert (track.first_seen_ns, track.last_seen_ns) == (START_NS - 1200000000, START_NS)
+
+
+def test_who_stands_does_not_move():
+    simulator = Simulator(scene(Person((4.0, 0.0))), CAMERA)
+    track, = truth_at(simulator, simulator.frame(5), START_NS)
+    assert not track.moving and not track.velocity_mps.any()
+    np.testing.assert_allclose(track.prediction_m, [track.position_m] * 8)
+
+
+def test_an_empty_room_has_no_truth(simulator_of_nobody):
+    frame = simulator_of_nobody.frame(0)
+    assert frame.people == [] and truth_at(simulator_of_nobody, frame, START_NS) == []
+    assert simulator_of_nobody.positions_at(1.0).shape == (0, 2)
