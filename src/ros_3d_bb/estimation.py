@@ -3,7 +3,7 @@
 Convention: a rectangle (x1, y1, x2, y2) holds the pixels x1 <= u < x2, y1 <= v < y2. Positions are in the camera
 optical frame, metres.
 """
-from typing import NamedTuple, Tuple
+from typing import Any, NamedTuple, Tuple
 
 import numpy as np
 
@@ -12,6 +12,14 @@ import numpy as np
 BORDER_PX = 2
 # Depth of a person with stretched arms around its median depth; what lies further off is something else.
 BODY_HALF_DEPTH_M = 0.35
+TRUNK_HALF_DEPTH_M = 0.25  # without arms and legs: a wall close behind must not draw the median
+# The foreground estimator: how many pixels it looks at, and how it finds the person's layer among them.
+SAMPLES_WANTED = 2000
+BIN_M, LAYER_BINS = 0.05, 5  # a layer is the depth in so many bins of a histogram
+FIRST_LAYER_SHARE = 0.5  # the nearest layer with this share of the strongest one's weight is the person
+AXIS_BEHIND_SURFACE_M = 0.09  # mean over standing and walking bodies of the simulation, seen from all sides
+LEAST_OWN_SHARE = 0.05  # of the samples must not belong to somebody in front
+EDGE_PERCENT = 2  # of the pixels of the layer beyond its left and right edge: flying pixels, fingers
 
 
 class DepthImage(NamedTuple):
@@ -72,7 +80,7 @@ def sample_median(depth, rect_px, stride_px=20):
     return Samples(u, v, *depth.at(u, v))
 
 
-def estimate_median(samples, rect_px, camera):
+def estimate_median(samples, rect_px, camera, _nearer=()):
     """The thesis' estimator (3.4.2): per-axis median of the sampled points, size from the box at the median depth.
 
     Returns
@@ -90,6 +98,114 @@ def estimate_median(samples, rect_px, camera):
     on_body = np.abs(depth_m - center_m[2]) <= BODY_HALF_DEPTH_M
     return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px),
                  np.count_nonzero(on_body) / float(samples.u.size), is_truncated(rect_px, camera))
+
+
+def sample_foreground(depth, rect_px):
+    """Sample a rectangle on a grid of about `SAMPLES_WANTED` pixels, whatever its size, the part inside the image.
+
+    Returns
+    -------
+    Samples
+
+    Raises
+    ------
+    ValueError
+        If the rectangle is empty or reversed.
+    """
+    height, width = depth.values.shape
+    columns, rows = (min(max(rect_px[axis + 2], 0), size) - min(max(rect_px[axis], 0), size)
+                     for axis, size in enumerate((width, height)))
+    return sample_median(depth, rect_px, max(1, int(np.sqrt(max(0, columns) * max(0, rows) / SAMPLES_WANTED))))
+
+
+def estimate_foreground(samples, rect_px, camera, nearer=()):
+    """The person's own layer of depth: the nearest one that is strong near the middle of the box.
+
+    Background seen beside and between the limbs may fill most of a box, and is farther away; so are flying pixels,
+    which fill no bin. The position is that of the body's axis: across the middle between the edges of the layer, and
+    `AXIS_BEHIND_SURFACE_M` behind its median depth.
+
+    Parameters
+    ----------
+    samples : Samples
+    rect_px : (x1, y1, x2, y2)
+    camera : geometry.Camera
+    nearer : sequence of Box3D
+        Of people who may stand in front: their pixels are not taken for this one's.
+
+    Returns
+    -------
+    Box3D or None
+        None where no sample carries a depth, or all belong to somebody in front.
+    """
+    own = samples.valid & ~_explained(samples, nearer)
+    if np.count_nonzero(own) < LEAST_OWN_SHARE * samples.u.size or not own.any():
+        return None
+    u, v, depth_m = (part[own] for part in (samples.u, samples.v, samples.depth_m))
+    x1, y1, x2, y2 = rect_px
+    weights = np.exp(-0.5 * ((u - (x1 + x2) / 2.0) / ((x2 - x1) / 4.0)) ** 2)
+    layer_m = _first_layer(depth_m, weights)
+    for _ in range(3):
+        layer_m = np.median(depth_m[np.abs(depth_m - layer_m) <= TRUNK_HALF_DEPTH_M])
+    on_body = np.abs(depth_m - layer_m) <= BODY_HALF_DEPTH_M
+    points = camera.deproject(np.stack((u, v), axis=-1)[on_body], depth_m[on_body])
+    left_m, right_m = np.percentile(points[:, 0], [EDGE_PERCENT, 100 - EDGE_PERCENT])
+    height_m = (y2 - y1) / camera.fy * layer_m
+    surface_m = np.array([(left_m + right_m) / 2, ((y1 + y2) / 2.0 - camera.cy) / camera.fy * layer_m, layer_m])
+    center_m = surface_m * (1 + AXIS_BEHIND_SURFACE_M / layer_m)
+    width_m = max(right_m - left_m, BIN_M)
+    return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px),
+                 np.count_nonzero(on_body) / float(samples.u.size), is_truncated(rect_px, camera))
+
+
+def _explained(samples, boxes):
+    """Which samples lie in the rectangle and in the layer of depth of one of the boxes, (n,)."""
+    explained = np.zeros(samples.u.shape, bool)
+    for box in boxes:
+        x1, y1, x2, y2 = box.rect_px
+        explained |= ((samples.u >= x1) & (samples.u < x2) & (samples.v >= y1) & (samples.v < y2)
+                      & (np.abs(samples.depth_m - box.center_m[2]) <= BODY_HALF_DEPTH_M))
+    return explained
+
+
+def _first_layer(depth_m, weights):
+    """Depth of the nearest strong layer of weighted depths."""
+    bins = ((depth_m - depth_m.min()) / BIN_M).astype(int)
+    histogram = np.convolve(np.bincount(bins, weights), np.ones(LAYER_BINS), 'same')
+    first = np.flatnonzero(histogram >= FIRST_LAYER_SHARE * histogram.max())[0]
+    best = first + np.argmax(histogram[first:first + LAYER_BINS])
+    return np.median(depth_m[np.abs(bins - best) <= LAYER_BINS // 2])
+
+
+class Estimator(NamedTuple):
+    """`sample(depth, rect_px)` gives Samples; `estimate(samples, rect_px, camera, nearer)` makes a Box3D of them, or
+    None, knowing the boxes of those in front (see `near_first`).
+    """
+
+    sample: Any
+    estimate: Any
+
+
+def estimator_named(name, stride_px=20):
+    """An estimator by name: foreground, or median with its stride.
+
+    Raises
+    ------
+    ValueError
+        If there is no such one, or the stride is not positive.
+    """
+    if stride_px < 1:
+        raise ValueError('stride is %d; at least 1 expected' % stride_px)
+    if name == 'foreground':
+        return Estimator(sample_foreground, estimate_foreground)
+    if name == 'median':
+        return Estimator(lambda depth, rect_px: sample_median(depth, rect_px, stride_px), estimate_median)
+    raise ValueError('estimator is %r; foreground or median expected' % name)
+
+
+def near_first(rects_px):
+    """Numbers of rectangles, those of nearer people first: they stand lower in the image, and are larger."""
+    return sorted(range(len(rects_px)), key=lambda number: (-rects_px[number][3], rects_px[number][1], number))
 
 
 def is_truncated(rect_px, camera):

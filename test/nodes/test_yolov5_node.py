@@ -9,7 +9,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool
 
-from ros_3d_bb.detection.yolov5 import iou
+from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.images import fill_image, rgb_from
 from ros_3d_bb.measurements import read_color, read_session
 from ros_3d_bb.messages import boxes2d_from_message, stamp_of

@@ -1,9 +1,10 @@
-"""The thesis' estimator: its recorded positions, its grid, and what it does with what it cannot use."""
+"""The estimators: the thesis' recorded positions and grid, the person's layer, and what cannot be used."""
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.estimation import DepthImage, estimate_median, is_truncated, sample_median
+from ros_3d_bb.estimation import (AXIS_BEHIND_SURFACE_M, DepthImage, estimate_foreground, estimate_median,
+                                  estimator_named, is_truncated, near_first, sample_foreground, sample_median)
 from ros_3d_bb.geometry import Camera
 from ros_3d_bb.measurements import read_depth, read_session
 
@@ -81,6 +82,67 @@ def test_support_is_the_share_of_samples_on_the_body():
     box = estimate_median(sample_median(depth, rect, 1), rect, CAMERA)
     assert box.center_m[2] == pytest.approx(2.0)
     assert box.support == pytest.approx((40 / 64) * (38 / 48))
+
+
+def foreground(depth, rect, nearer=()):
+    return estimate_foreground(sample_foreground(depth, rect), rect, CAMERA, nearer)
+
+
+@given(st.integers(500, 5000), st.floats(0.4, 1), st.integers(400, 3000))
+def test_foreground_is_the_person_however_much_background_the_box_holds(person_mm, share, behind_mm):
+    """A plate before a wall that fills up to two thirds of the box: the median would be the wall."""
+    depth = flat(person_mm + behind_mm)
+    half = max(2, int(30 * share / 2))
+    depth.values[:, 32 - half:32 + half] = person_mm
+    box = foreground(depth, (17, 4, 47, 44))
+    assert box.center_m[2] == pytest.approx(person_mm * 0.001 + AXIS_BEHIND_SURFACE_M, abs=1e-9)
+    assert box.center_m[0] == pytest.approx(0, abs=0.5 / 60 * person_mm * 0.001)
+    assert box.size_m[0] <= (2 * half) / 60 * person_mm * 0.001 + 1e-9
+    assert box.size_m[1] == pytest.approx(40 / 60 * person_mm * 0.001)
+
+
+def test_foreground_leaves_pixels_to_somebody_in_front():
+    """A person half hidden by a nearer one, with boxes around what is seen of each."""
+    depth = flat(5000)
+    depth.values[10:40, 30:50] = 3000
+    depth.values[5:45, 10:34] = 2000
+    near, far = (10, 5, 34, 45), (28, 10, 50, 40)
+    in_front = foreground(depth, near)
+    assert in_front.center_m[2] == pytest.approx(2.0 + AXIS_BEHIND_SURFACE_M)
+    assert foreground(depth, far, [in_front]).center_m[2] == pytest.approx(3.0 + AXIS_BEHIND_SURFACE_M)
+    assert foreground(depth, (12, 8, 30, 44), [in_front]) is None
+
+
+def test_foreground_ignores_flying_pixels():
+    depth = flat(2000)
+    depth.values[:, 30:34] = np.linspace(2000, 4000, 4).astype(np.uint16)
+    depth.values[:, 34:] = 4000
+    box = foreground(depth, (14, 4, 50, 44))
+    assert box.center_m[2] == pytest.approx(2.0 + AXIS_BEHIND_SURFACE_M)
+
+
+def test_foreground_looks_at_about_as_many_pixels_in_every_box():
+    depth = DepthImage(np.full((480, 640), 1000, np.uint16), 0.001)
+    rects = ((0, 0, 640, 480), (100, 100, 260, 400), (-5000, -5000, 5000, 5000), (300, 200, 350, 240))
+    counts = [sample_foreground(depth, rect).u.size for rect in rects]
+    assert all(1500 <= count <= 4500 for count in counts)
+    assert sample_foreground(depth, (300, 200, 310, 220)).u.size == 200
+
+
+@pytest.mark.parametrize('depth,scale_m,dtype', [(0, 0.001, np.uint16), (np.nan, 1.0, np.float32)])
+def test_foreground_finds_nothing_without_depth(depth, scale_m, dtype):
+    assert foreground(flat(depth, scale_m, dtype), (0, 0, 64, 48)) is None
+    assert foreground(flat(2000), (70, 10, 90, 20)) is None
+
+
+def test_those_who_stand_lower_in_the_image_come_first():
+    assert near_first([(0, 10, 5, 30), (0, 5, 5, 45), (0, 2, 5, 45)]) == [2, 1, 0]
+
+
+@pytest.mark.parametrize('name,stride,complaint', [('mean', 20, "estimator is 'mean'"), ('median', 0, 'stride is 0')])
+def test_unknown_estimators_and_strides_are_refused(name, stride, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        estimator_named(name, stride)
 
 
 @pytest.mark.parametrize('rect,truncated', [((10, 10, 40, 40), False), ((0, 10, 40, 40), True),

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from hypothesis.extra import numpy as hnp
 
+from ros_3d_bb.detection.boxes import Detections, iou, suppressed
 from ros_3d_bb.detection.runtime import open_runtime
-from ros_3d_bb.detection.yolov5 import (DetectionParams, Detections, Yolov5, class_number, decoded, iou, letterboxed,
-                                        suppressed)
+from ros_3d_bb.detection.yolov5 import DetectionParams, Yolov5, class_number, decoded, letterboxed
 from ros_3d_bb.measurements import read_color, read_session
 
 

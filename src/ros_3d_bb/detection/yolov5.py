@@ -7,6 +7,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from ros_3d_bb.detection.boxes import Detections, suppressed
+
 GREY = (114, 114, 114)  # the colour around letterboxed images that YOLOv5 is trained with
 MAX_CANDIDATES = 5000  # the best so many go into the suppression; more come only of a useless confidence
 
@@ -19,14 +21,6 @@ class DetectionParams(NamedTuple):
     iou: float = 0.45
     max_det: int = 100
     image_size: int = 640
-
-
-class Detections(NamedTuple):
-    """Boxes (n, 4) float pixels, scores (n,) 0..1 and class numbers (n,), best first."""
-
-    boxes: np.ndarray
-    scores: np.ndarray
-    classes: np.ndarray
 
 
 class Letterbox(NamedTuple):
@@ -163,31 +157,3 @@ def decoded(rows, confidence, classes):
     order = np.argsort(-scores, kind='mergesort')[:MAX_CANDIDATES]
     center, half = rows[order, :2], rows[order, 2:4] / 2
     return Detections(np.hstack((center - half, center + half)), scores[order], best[order])
-
-
-def suppressed(detections, iou_limit, max_det):
-    """Non-maximum suppression: of boxes of one class that overlap by more than `iou_limit`, the best stays.
-
-    Parameters
-    ----------
-    detections : Detections
-        Best first.
-    """
-    boxes, kept = detections.boxes, []
-    alive = np.ones(len(boxes), bool)
-    while alive.any() and len(kept) < max_det:
-        best = int(alive.argmax())
-        kept.append(best)
-        rivals = alive & (detections.classes == detections.classes[best])
-        rivals[rivals] = iou(boxes[best], boxes[rivals]) > iou_limit
-        alive &= ~rivals
-        alive[best] = False
-    return Detections(*(column[kept] for column in detections))
-
-
-def iou(box, boxes):
-    """Intersection over union of one box (4,) with each of boxes (n, 4); 0 where both are empty."""
-    overlap = np.minimum(box[2:], boxes[:, 2:]) - np.maximum(box[:2], boxes[:, :2])
-    intersection = np.clip(overlap, 0, None).prod(axis=1)
-    union = (box[2:] - box[:2]).prod() + (boxes[:, 2:] - boxes[:, :2]).prod(axis=1) - intersection
-    return np.divide(intersection, union, out=np.zeros_like(intersection), where=union > 0)

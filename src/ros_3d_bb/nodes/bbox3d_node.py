@@ -7,7 +7,7 @@ import rospy
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header, Int32MultiArray
 
-from ros_3d_bb.estimation import estimate_median, sample_median
+from ros_3d_bb.estimation import estimator_named, near_first
 from ros_3d_bb.images import depth_from
 from ros_3d_bb.messages import boxes2d_from_message, boxes3d_to_message, camera_from_message, stamp_of, time_from
 from ros_3d_bb.msg import BoundingBox3DArray
@@ -24,7 +24,7 @@ CAMERA_INFO_TOPIC = 'camera/color/camera_info'
 class Bbox3dParams(NamedTuple):
     """See config/bbox3d.yaml."""
 
-    estimator: str = 'median'
+    estimator: str = 'foreground'
     stride: int = 20
     depth_scale: float = 0.0
     frame_id: str = ''
@@ -44,14 +44,16 @@ class Bbox3dNode(object):
 
     def __init__(self):
         self._params, = read_params(Bbox3dParams)
-        _check(self._params)
+        check_not_negative(self._params, 'depth_scale', 'cache_length', 'stamp_tolerance', 'assumed_delay',
+                           'depth_image_range')
+        self._estimator = estimator_named(self._params.estimator, self._params.stride)
         cache_ns, tolerance_ns, delay_ns = (int(seconds * NS) for seconds in (
             self._params.cache_length, self._params.stamp_tolerance, self._params.assumed_delay))
         self._pairing = Pairing(cache_ns, tolerance_ns, delay_ns)
         self._lock = threading.Lock()
         self._diagnostics = Diagnostics()
         self._boxes_pub = rospy.Publisher('ros_3d_bb/bb_3d', BoundingBox3DArray, queue_size=10)
-        self._images = SampleImages(cache_ns, self._params.stride, self._params.depth_image_range)
+        self._images = SampleImages(cache_ns, self._estimator.sample, self._params.depth_image_range)
         # Each depth image is kept for boxes that may come for it later, so none may be dropped on the way.
         rospy.Subscriber(DEPTH_TOPIC, Image, self._on_depth, queue_size=10, buff_size=2 ** 24)
         rospy.Subscriber(CAMERA_INFO_TOPIC, CameraInfo, self._on_camera_info, queue_size=10)
@@ -83,18 +85,26 @@ class Bbox3dNode(object):
         for frame, boxes in pairs:
             with self._diagnostics.refusing('2D boxes'):
                 depth = self._depth_of(frame, boxes)
-                found = [self._box3d(depth, tuple(rect), frame.camera) for rect in boxes.boxes.tolist()]
-                found = [box for box in found if box is not None]
+                found = self._boxes3d(depth, [tuple(rect) for rect in boxes.boxes.tolist()], frame.camera)
                 header = Header(stamp=time_from(frame.stamp_ns if boxes.stamp_ns is None else boxes.stamp_ns),
                                 frame_id=self._params.frame_id or frame.depth.header.frame_id)
                 self._boxes_pub.publish(boxes3d_to_message(found, header, frame.camera))
                 self._images.publish(header, depth, found)
                 self._diagnostics.count('images lifted')
 
-    def _box3d(self, depth, rect_px, camera):
-        """The 3D box of one rectangle, None where the rectangle is unusable or shows no depth."""
+    def _boxes3d(self, depth, rects_px, camera):
+        """The 3D boxes of rectangles, in their order, without those that are unusable or show no depth."""
+        found = {}
+        for number in near_first(rects_px):
+            box = self._box3d(depth, rects_px[number], camera, list(found.values()))
+            if box is not None:
+                found[number] = box
+        return [found[number] for number in sorted(found)]
+
+    def _box3d(self, depth, rect_px, camera, nearer):
+        """The 3D box of one rectangle, None where the rectangle is unusable or shows no depth of its own."""
         try:
-            box = estimate_median(sample_median(depth, rect_px, self._params.stride), rect_px, camera)
+            box = self._estimator.estimate(self._estimator.sample(depth, rect_px), rect_px, camera, nearer)
         except ValueError as error:
             self._diagnostics.warn('2D boxes refused', '2D %s; the others in this image are used' % error)
             return None
@@ -128,14 +138,6 @@ class Bbox3dNode(object):
 def _clock_ns():
     """The machine's clock: tells how long something took, whatever /clock does; never a stamp."""
     return int(time.monotonic() * NS)
-
-
-def _check(params):
-    if params.estimator != 'median':
-        raise ValueError('parameter ~estimator is %r; median expected' % params.estimator)
-    if params.stride < 1:
-        raise ValueError('parameter ~stride is %d; at least 1 expected' % params.stride)
-    check_not_negative(params, 'depth_scale', 'cache_length', 'stamp_tolerance', 'assumed_delay', 'depth_image_range')
 
 
 def main():

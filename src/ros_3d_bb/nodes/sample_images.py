@@ -2,7 +2,6 @@
 import rospy
 from sensor_msgs.msg import Image
 
-from ros_3d_bb.estimation import sample_median
 from ros_3d_bb.images import fill_image, rgb_from
 from ros_3d_bb.messages import stamp_of
 from ros_3d_bb.overlay import draw_boxes, draw_samples, visible_depth
@@ -14,8 +13,8 @@ class SampleImages(object):
     ros_3d_bb/depth (as grey). Subscribes camera/color/image_raw only while one of the first two is subscribed.
     """
 
-    def __init__(self, cache_ns, stride_px, depth_range_m):
-        self._cache_ns, self._stride_px, self._depth_range_m = cache_ns, stride_px, depth_range_m
+    def __init__(self, cache_ns, sample, depth_range_m):
+        self._cache_ns, self._sample, self._depth_range_m = cache_ns, sample, depth_range_m
         self._raw_pub, self._color_pub, self._depth_pub = (
             rospy.Publisher('ros_3d_bb/' + name, Image, queue_size=1) for name in ('raw', 'color', 'depth'))
         self._colors, self._subscriber = None, None
@@ -38,7 +37,7 @@ class SampleImages(object):
         image = draw_boxes(rgb_from(color_message).copy(), [box.rect_px for box in boxes],
                            ['%.2f m' % box.center_m[2] for box in boxes])
         for box in boxes:
-            draw_samples(image, box.rect_px, sample_median(depth, box.rect_px, self._stride_px))
+            draw_samples(image, box.rect_px, self._sample(depth, box.rect_px))
         return image
 
     def _follow_subscribers(self):

@@ -4,16 +4,14 @@ from typing import NamedTuple
 
 import rospy
 from sensor_msgs.msg import Image
-from std_msgs.msg import Int32MultiArray
-from std_srvs.srv import SetBool, SetBoolResponse
 
 from ros_3d_bb.detection.runtime import open_runtime
 from ros_3d_bb.detection.yolov5 import DetectionParams, Yolov5
-from ros_3d_bb.images import fill_image, rgb_from
-from ros_3d_bb.messages import boxes2d_to_message, stamp_of
+from ros_3d_bb.images import rgb_from
+from ros_3d_bb.messages import stamp_of
+from ros_3d_bb.nodes.boxes_output import BoxesOutput, Switch
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
-from ros_3d_bb.overlay import draw_boxes
 from ros_3d_bb.worker import NewestWorker
 
 
@@ -41,27 +39,21 @@ class Yolov5Node(object):
         runtime = open_runtime(os.path.abspath(os.path.expanduser(self._params.weights)), self._params.device)
         self._detector = Yolov5(runtime, detection)
         self._detector.warm_up()
-        self._enabled = self._params.enabled
         self._diagnostics = Diagnostics()
-        self._boxes_pub = rospy.Publisher('yolo_bounding_box', Int32MultiArray, queue_size=10)
-        self._image_pub = rospy.Publisher('yolo_result_out', Image, queue_size=1)
+        self._output = BoxesOutput(self._params.publish_empty)
         self._worker = NewestWorker(self._search, self._on_error)
         rospy.on_shutdown(self._worker.stop)
-        rospy.Service('~enable', SetBool, self._on_enable)
+        self._switch = Switch(self._params.enabled)
         rospy.Subscriber('camera/color/image_raw', Image, self._on_image, queue_size=1, buff_size=2 ** 24)
         rospy.loginfo('looking for %s with %s', ', '.join(map(str, detection.classes)), self._params.weights)
 
     def _on_image(self, message):
-        if self._enabled and self._worker.offer(message):
+        if self._switch.on and self._worker.offer(message):
             self._diagnostics.count('images skipped for a newer one')
-
-    def _on_enable(self, request):
-        self._enabled = request.data
-        return SetBoolResponse(True, 'detector %s' % ('enabled' if request.data else 'paused'))
 
     def _search(self, message):
         with self._diagnostics.refusing('images'):
-            if self._enabled:  # it may have been paused since the image came
+            if self._switch.on:  # it may have been paused since the image came
                 self._detect(message)
 
     def _detect(self, message):
@@ -69,13 +61,7 @@ class Yolov5Node(object):
         image = rgb_from(message)
         found = self._detector.detect(image)
         self._diagnostics.count('images searched')
-        if len(found.boxes) or self._params.publish_empty:
-            self._boxes_pub.publish(boxes2d_to_message(found.boxes, message.header))
-        if self._image_pub.get_num_connections():
-            labels = ['%s %.2f' % (self._detector.names[number], score)
-                      for number, score in zip(found.classes, found.scores)]
-            drawn = fill_image(Image(header=message.header), draw_boxes(image.copy(), found.boxes, labels), 'rgb8')
-            self._image_pub.publish(drawn)
+        self._output.publish(message.header, image, found, self._detector.names)
 
     def _on_error(self, error):
         self._diagnostics.warn('searches failed', 'the detector failed: %s; waiting for the next image' % error)

@@ -1,0 +1,249 @@
+"""What stands above the floor and has the size of a person, in a depth image.
+
+Convention: blobs live on a grid of every few pixels of the depth image; a cell (row, column) of it stands for the
+pixels [step * column, step * (column + 1)) of [step * row, step * (row + 1)).
+"""
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from ros_3d_bb.params import check_not_negative
+
+MIN_CELLS = 20  # smaller blobs are no use: a person 6 m away has some 300
+HEADROOM_M = 0.15  # two people side by side have a valley this deep between their heads
+HIP_M = 0.95  # where the image ends below, the two legs of one person have a valley between them too
+TWO_LAYERS = 0.7  # share of the variance between two layers of depth; 0.64 for noise, 0.75 for a slanted wall
+
+
+class DepthPeopleParams(NamedTuple):
+    """What counts as a person; see config/depth_detector.yaml. A person cut by the image border may be smaller."""
+
+    min_depth: float = 0.4  # nearest and farthest person
+    max_depth: float = 6.5
+    cell_angle: float = 0.0065  # grid of depth pixels that are looked at; 4 pixels of a RealSense at 640x480
+    floor_margin: float = 0.12  # what is lower is floor
+    max_height: float = 2.15  # what is higher is ceiling
+    depth_step: float = 0.08  # a step of depth_step + depth_step_growth * depth**2 parts two surfaces
+    depth_step_growth: float = 0.006
+    min_width: float = 0.2
+    max_width: float = 1.15
+    max_thickness: float = 0.9  # along the line of sight: a long stride
+    min_top: float = 1.25  # crown above the floor
+    max_top: float = 2.1
+    max_bottom: float = 0.8  # lowest part seen above the floor: legs may be hidden
+    min_visible: float = 0.9  # height of the visible part
+    min_visible_cut: float = 0.5  # the same where the image ends below the head
+    min_score: float = 0.7  # of shape and HOG together, 0 to 1
+
+
+class Grid(NamedTuple):
+    """Cells of `step` pixels, (rows, columns) float32 each, metres: depth (0: none), height above the floor, and the
+    way along the floor, `ahead_m`, which is the same from top to bottom of what stands upright before a tilted camera.
+    """
+
+    depth_m: np.ndarray
+    height_m: np.ndarray
+    ahead_m: np.ndarray
+    step: int
+
+
+class Blob(NamedTuple):
+    """Connected cells: `mask` (rows, columns) with its first cell at (row, column) of the grid."""
+
+    row: int
+    column: int
+    mask: np.ndarray
+
+    def of(self, values):
+        """The blob's cells of an array of the grid, (n,)."""
+        return self.window(values)[self.mask]
+
+    def window(self, values):
+        """The part of an array of the grid under the mask."""
+        rows, columns = self.mask.shape
+        return values[self.row:self.row + rows, self.column:self.column + columns]
+
+
+class Shape(NamedTuple):
+    """Size of a blob in metres, heights above the floor, and where the image border cuts it."""
+
+    depth_m: float
+    width_m: float
+    thickness_m: float
+    bottom_m: float
+    top_m: float
+    cut_top: bool
+    cut_bottom: bool
+    cut_side: bool
+
+
+def check_params(params):
+    """Raise ValueError, naming the value, where a parameter makes no sense."""
+    check_not_negative(params, *params._fields)
+    for name in ('depth', 'width', 'top'):
+        low, high = getattr(params, 'min_%s' % name), getattr(params, 'max_%s' % name)
+        if not low < high:
+            raise ValueError('min_%s is %g and max_%s is %g; the first must be less' % (name, low, name, high))
+
+
+def grid_of(depth, camera, floor, params):
+    """Sample a depth image on the grid. Returns Grid."""
+    step = max(1, int(round(params.cell_angle * camera.fx)))
+    values = depth.values[step // 2::step, step // 2::step]
+    depth_m = values.astype(np.float32) * np.float32(depth.scale_m)
+    depth_m[~((depth_m > params.min_depth) & (depth_m < 100))] = 0
+    rows, columns = np.arange(depth_m.shape[0])[:, None], np.arange(depth_m.shape[1])
+    x = (columns * step + step // 2 - camera.cx) / camera.fx
+    y = (rows * step + step // 2 - camera.cy) / camera.fy
+    ahead = np.array([0, 0, 1]) - floor.normal[2] * floor.normal
+    ahead /= np.linalg.norm(ahead)
+    up_per_m, ahead_per_m = (np.float32(axis[0] * x + axis[1] * y + axis[2]) for axis in (floor.normal, ahead))
+    return Grid(depth_m, depth_m * up_per_m + np.float32(floor.offset_m), depth_m * ahead_per_m, step)
+
+
+def find_bodies(grid, camera, params):
+    """Blobs of human size: list of (Blob, Shape)."""
+    bodies = []
+    for blob in _joined(_parts(grid, camera, params), grid, camera, params):
+        shape = shape_of(blob, grid, camera)
+        if _is_human(shape, params):
+            bodies.append((blob, shape))
+    return bodies
+
+
+def standing_cells(grid, params):
+    """Cells between floor and ceiling that no depth step crosses, (rows, columns) bool.
+
+    Of the two cells at a step the farther is left out, so that blobs part and the nearer one keeps its outline. The
+    step grows with the square of depth, as the error of stereo does.
+    """
+    depth_m = grid.depth_m
+    cells = (depth_m > 0) & (depth_m < params.max_depth)
+    cells &= (grid.height_m > params.floor_margin) & (grid.height_m < params.max_height)
+    for after, before in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
+        change = depth_m[after] - depth_m[before]
+        step = params.depth_step + params.depth_step_growth * np.minimum(depth_m[after], depth_m[before]) ** 2
+        cells[after] &= change <= step
+        cells[before] &= change >= -step
+    return cells
+
+
+def shape_of(blob, grid, camera):
+    """Size of a blob; extremes leave some percent out, as depth noise has no bounds. Returns Shape."""
+    rows, columns = blob.mask.shape
+    depth_m, ahead_m, height_m = (np.sort(blob.of(values)) for values in (grid.depth_m, grid.ahead_m, grid.height_m))
+    last = depth_m.size - 1
+    middle = float(depth_m[last // 2])
+    return Shape(middle, columns * grid.step * middle / camera.fx, ahead_m[last - last // 20] - ahead_m[last // 20],
+                 height_m[last // 100], height_m[last - last // 100], blob.row <= 1,
+                 blob.row + rows >= grid.depth_m.shape[0] - 1,
+                 blob.column == 0 or blob.column + columns >= grid.depth_m.shape[1])
+
+
+def _is_human(shape, params):
+    cut = 0.6 if shape.cut_side else 1.0
+    visible_m = params.min_visible_cut if shape.cut_top else params.min_visible
+    return (cut * params.min_width <= shape.width_m <= params.max_width
+            and shape.thickness_m <= params.max_thickness and shape.top_m - shape.bottom_m >= visible_m
+            and (shape.cut_top or params.min_top <= shape.top_m) and shape.top_m <= params.max_top
+            and (shape.cut_bottom or shape.bottom_m <= params.max_bottom))
+
+
+def _connected(cells, row=0, column=0):
+    """The blobs of a mask whose first cell is at (row, column)."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(cells.astype(np.uint8), connectivity=4)
+    for label in range(1, count):
+        x, y, width, height, size = stats[label].tolist()
+        if size >= MIN_CELLS:
+            yield Blob(row + y, column + x, labels[y:y + height, x:x + width] == label)
+
+
+def _parts(grid, camera, params):
+    """Blobs, those parted that are too large for one person or have two heads."""
+    waiting = [(blob, 0) for blob in _connected(standing_cells(grid, params))]
+    parts = []
+    while waiting:
+        blob, splits = waiting.pop()
+        shape = shape_of(blob, grid, camera)
+        too_large = shape.width_m > params.max_width or shape.thickness_m > params.max_thickness
+        pieces = _split_between_heads(blob, grid) if shape.width_m > 2 * params.min_width else []
+        if too_large and not pieces:
+            pieces = _split_in_depth(blob, grid)
+        if pieces and splits < 4:
+            waiting.extend((piece, splits + 1) for piece in pieces)
+        elif not too_large:
+            parts.append(blob)
+    return parts
+
+
+def _split_in_depth(blob, grid):
+    """The nearer and the farther part, at Otsu's threshold of inverse depth, whose noise is the same everywhere.
+
+    Where there are no two layers (a wall, straight or slanted) there are no parts: those of a noisy wall are rags that
+    look like anything.
+    """
+    inverse = 1 / blob.of(grid.ahead_m)
+    low, high = inverse.min(), inverse.max()
+    levels = ((inverse - low) * (255 / max(high - low, 1e-6))).astype(np.uint8)
+    near = levels > cv2.threshold(levels.reshape(1, -1), 0, 255, cv2.THRESH_OTSU)[0]
+    between = near.mean() * (1 - near.mean()) * (levels[near].mean() - levels[~near].mean()) ** 2 if near.any() else 0
+    if between < TWO_LAYERS * levels.var():
+        return []
+    nearer = np.zeros_like(blob.mask)
+    nearer[blob.mask] = near
+    return [piece for cells in (nearer, blob.mask & ~nearer) for piece in _connected(cells, blob.row, blob.column)]
+
+
+def _split_between_heads(blob, grid):
+    """Left and right of the deepest valley in the outline of a blob, where both sides rise above it by a head."""
+    outline = np.where(blob.mask, blob.window(grid.height_m), 0).max(axis=0)
+    left, right = np.maximum.accumulate(outline), np.maximum.accumulate(outline[::-1])[::-1]
+    peaks = np.minimum(left, right)
+    rise = np.where(peaks > HIP_M, peaks - outline, 0)
+    valley = int(rise.argmax())
+    if rise[valley] < HEADROOM_M:
+        return []
+    halves = [blob.mask.copy(), blob.mask.copy()]
+    halves[0][:, valley:] = False
+    halves[1][:, :valley] = False
+    return [piece for half in halves for piece in _connected(half, blob.row, blob.column)]
+
+
+def _joined(parts, grid, camera, params):
+    """Put together what the arm of somebody in front cut apart: parts at one depth, one above the other."""
+    parts = sorted(parts, key=lambda part: -part.mask.size)
+    shapes = [shape_of(part, grid, camera) for part in parts]
+    joined = []
+    while parts:
+        blob, shape = parts.pop(0), shapes.pop(0)
+        for i in range(len(parts) - 1, -1, -1):
+            if _are_stacked(blob, shape, parts[i], shapes[i], params):
+                blob = _union(blob, parts.pop(i))
+                shapes.pop(i)
+        joined.append(blob)
+    return joined
+
+
+def _are_stacked(blob, shape, other, other_shape, params):
+    columns = _overlap(blob.column, blob.mask.shape[1], other.column, other.mask.shape[1])
+    rows = _overlap(blob.row, blob.mask.shape[0], other.row, other.mask.shape[0])
+    step_m = 0.2 + 2 * params.depth_step_growth * shape.depth_m ** 2
+    return (columns > 0.5 and rows < 0.3 and abs(shape.depth_m - other_shape.depth_m) < step_m
+            and max(shape.top_m, other_shape.top_m) < params.max_top)
+
+
+def _overlap(start, length, other_start, other_length):
+    """Overlap of two ranges as a share of the shorter one; negative where there is a gap."""
+    common = min(start + length, other_start + other_length) - max(start, other_start)
+    return common / float(min(length, other_length))
+
+
+def _union(blob, other):
+    row, column = min(blob.row, other.row), min(blob.column, other.column)
+    mask = np.zeros((max(b.row + b.mask.shape[0] for b in (blob, other)) - row,
+                     max(b.column + b.mask.shape[1] for b in (blob, other)) - column), bool)
+    whole = Blob(row, column, mask)
+    for part in (blob, other):
+        Blob(part.row - row, part.column - column, part.mask).window(mask)[part.mask] = True
+    return whole

@@ -1,0 +1,130 @@
+"""The node that stands in for a robot with a camera among people."""
+import threading
+import time
+from typing import NamedTuple
+
+import rospy
+from rosgraph_msgs.msg import Clock
+
+from ros_3d_bb.camera_messages import TYPES
+from ros_3d_bb.messages import time_from
+from ros_3d_bb.msg import TrackedObjectArray
+from ros_3d_bb.nodes.diagnostics import Diagnostics, is_ending
+from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.simulation.scenario import read_scenario
+from ros_3d_bb.simulation.simulator import Simulator
+from ros_3d_bb.simulator_messages import TRUTH_TOPIC, simulated_messages
+from ros_3d_bb.stamped import NS
+
+START_NS = 1600000000 * NS  # when a scene starts, where this node tells the time: the same stamps in every run
+CLOCK_LEAD_NS = NS  # between the time that is told while waiting and the first image
+PAUSE_NS = 3 * NS  # between two rounds of a scene, so that the people of one are not taken for those of the next
+POLL_S = 0.05
+PROGRESS_S = 1.0  # between two lines of the log
+
+
+class SimulatorParams(NamedTuple):
+    """See config/simulator.yaml."""
+
+    scenario: str = ''
+    rate: float = 0.0
+    seed: int = -1
+    publish_clock: bool = False
+    speed: float = 1.0
+    repeat: bool = True
+    wait_for_subscribers: int = 0
+
+
+class SimulatorNode(object):
+    """Play a scenario: colour, aligned depth, camera_info, tf from the map to the camera, and ground truth.
+
+    Publishes: camera/color/image_raw, camera/aligned_depth_to_color/image_raw, camera_info of both, ground_truth, /tf,
+    and /clock where it tells the time. Without it, images that the machine is too slow for are left out; with it, time
+    waits for them. Parameters: config/simulator.yaml.
+    """
+
+    def __init__(self):
+        self._params, = read_params(SimulatorParams)
+        self._simulator = Simulator(_scenario(self._params))
+        self._diagnostics = Diagnostics()
+        self._pubs = {topic: rospy.Publisher('/tf' if topic == 'tf' else topic, kind, queue_size=10)
+                      for topic, kind in TYPES.items()}
+        self._pubs[TRUTH_TOPIC] = rospy.Publisher(TRUTH_TOPIC, TrackedObjectArray, queue_size=10)
+        self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=10) if self._params.publish_clock else None
+        self._worker = threading.Thread(target=self._run)
+        self._worker.daemon = True
+        self._worker.start()
+
+    def _run(self):
+        """Play the scene, once or again and again; rospy publishes from any thread but the main one."""
+        try:
+            self._wait_for_subscribers()
+            start_ns = START_NS + CLOCK_LEAD_NS if self._clock_pub is not None else rospy.get_rostime().to_nsec()
+            while not rospy.is_shutdown():
+                self._play(start_ns)
+                start_ns += int(self._simulator.scenario.duration * NS) + PAUSE_NS
+                if not self._params.repeat:
+                    rospy.loginfo('the scene is over')
+                    rospy.signal_shutdown('the scene is over')
+        except rospy.ROSException:
+            if not is_ending():
+                raise
+
+    def _wait_for_subscribers(self):
+        """Some of them, rosbag among them, do not even subscribe before there is a time."""
+        color_pub = self._pubs['camera/color/image_raw']
+        while color_pub.get_num_connections() < self._params.wait_for_subscribers and not rospy.is_shutdown():
+            self._tell_time(START_NS)
+            time.sleep(POLL_S)
+
+    def _play(self, start_ns):
+        """One round of the scene, its first image at a stamp."""
+        began_s, number = time.monotonic(), 0
+        while number < self._simulator.frame_count and not rospy.is_shutdown():
+            due_s = began_s + self._simulator.time_s(number) / self._params.speed
+            time.sleep(max(0.0, due_s - time.monotonic()))
+            self._publish(number, start_ns)
+            number += 1
+            rospy.loginfo_throttle(PROGRESS_S, 'image %d of %d' % (number, self._simulator.frame_count))
+            if self._clock_pub is None:
+                late_s = (time.monotonic() - began_s) * self._params.speed
+                missed = int(late_s * self._simulator.scenario.rate) - number
+                if missed > 0:
+                    self._diagnostics.count('images left out', missed)
+                    number += missed
+            else:
+                began_s = max(began_s, time.monotonic() - self._simulator.time_s(number) / self._params.speed)
+
+    def _publish(self, number, start_ns):
+        frame = self._simulator.frame(number)
+        stamp_ns = start_ns + int(round(frame.time_s * NS))
+        messages = simulated_messages(self._simulator, frame, stamp_ns)
+        self._tell_time(stamp_ns)
+        for topic, message in messages:
+            self._pubs[topic].publish(message)
+        self._diagnostics.count('images')
+
+    def _tell_time(self, stamp_ns):
+        if self._clock_pub is not None:
+            self._clock_pub.publish(Clock(time_from(stamp_ns)))
+
+
+def _scenario(params):
+    if not params.scenario:
+        raise ValueError('no scenario given; set ~scenario (launch argument scenario:=) to the path of a file such as '
+                         'those in config/scenarios')
+    check_not_negative(params, 'rate', 'wait_for_subscribers')
+    if not 0 < params.speed <= 1000:
+        raise ValueError('parameter ~speed is %g; more than 0 expected' % params.speed)
+    try:
+        scenario = read_scenario(params.scenario)
+    except OSError as error:
+        raise ValueError('the scenario cannot be read: %s' % error)
+    return scenario._replace(rate=params.rate or scenario.rate,
+                             seed=scenario.seed if params.seed < 0 else params.seed)
+
+
+def main():
+    """Run the node."""
+    run_node('simulator_node', SimulatorNode)

@@ -1,0 +1,79 @@
+"""The floor in a depth image: found where it is, whatever the camera's height and tilt, and not made up."""
+import numpy as np
+from hypothesis import given, settings, strategies as st
+
+from ros_3d_bb.detection.floor import Floor, fit_floor, floor_from_transform
+from ros_3d_bb.estimation import DepthImage
+from ros_3d_bb.geometry import Camera, transform_points
+
+CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
+V, U = np.mgrid[:CAMERA.height, :CAMERA.width]
+RAYS = CAMERA.deproject(np.stack((U, V), axis=-1), np.ones(U.shape))
+
+
+def floor_of(pitch, roll, height_m):
+    """The floor of a camera that looks down by `pitch` and leans by `roll`, radians."""
+    return Floor(np.array([np.sin(roll), -np.cos(roll) * np.cos(pitch), -np.cos(roll) * np.sin(pitch)]), height_m)
+
+
+def depth_of(floor, wall_m=5.0, noise=0.0):
+    """What a camera sees of a plane and of a wall behind it; noise as stereo has it, a share of depth squared."""
+    slope = RAYS.dot(floor.normal)
+    plane_m = np.where(slope < -1e-6, -floor.offset_m / np.minimum(slope, -1e-6), np.inf)
+    depth_m = np.minimum(plane_m, wall_m)
+    return depth_m + noise * depth_m ** 2 * np.random.RandomState(1).randn(*depth_m.shape)
+
+
+@settings(max_examples=60)
+@given(st.floats(-0.1, 0.43), st.floats(-0.3, 0.3), st.floats(0.15, 2.0), st.booleans())
+def test_is_found_at_any_height_and_tilt(pitch, roll, height_m, in_millimetres):
+    truth = floor_of(pitch, roll, height_m)
+    if np.mean(depth_of(truth) < 4.9) < 0.15 or -truth.normal[1] < np.cos(np.radians(25)):
+        return  # hardly any floor in view, or tilted more than promised
+    depth_m = depth_of(truth, noise=0.002)
+    depth = DepthImage((depth_m * 1000).astype(np.uint16), 0.001) if in_millimetres else DepthImage(depth_m, 1.0)
+    floor = fit_floor(depth, CAMERA)
+    assert abs(floor.offset_m - height_m) < 0.01 + 0.02 * height_m
+    assert np.degrees(np.arccos(min(1, floor.normal.dot(truth.normal)))) < 1
+
+
+def test_same_image_gives_same_floor():
+    depth = DepthImage(depth_of(floor_of(0.1, 0, 1), noise=0.003), 1.0)
+    np.testing.assert_array_equal(fit_floor(depth, CAMERA).normal, fit_floor(depth, CAMERA).normal)
+
+
+def test_a_table_is_no_floor():
+    """It covers more of the image than the floor, but there is something below it."""
+    floor, table = floor_of(0.3, 0, 1.2), floor_of(0.3, 0, 0.5)
+    depth_m = depth_of(floor)
+    on_table = (depth_of(table) < 2) & (np.abs(U - 160) < 110)
+    depth_m[on_table] = depth_of(table)[on_table]
+    assert np.mean(on_table) > np.mean((depth_m < 5) & ~on_table)
+    assert abs(fit_floor(DepthImage(depth_m, 1.0), CAMERA).offset_m - 1.2) < 0.02
+
+
+def test_no_floor_is_no_answer():
+    for depth_m in (np.zeros(U.shape), np.full(U.shape, np.nan), np.full(U.shape, 2.0), 1 + U / 300.0,
+                    depth_of(floor_of(0.2, 0, 3.5))):
+        assert fit_floor(DepthImage(depth_m, 1.0), CAMERA) is None
+
+
+@given(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.floats(0.2, 2))
+def test_transform_gives_the_height_of_every_point(pitch, yaw, height_m):
+    """A transform from base_link to the optical frame: x forward, y left, z up, the camera pitched and turned."""
+    turned = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+    pitched = np.array([[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]])
+    optical = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
+    camera_from_base = np.eye(4)
+    camera_from_base[:3, :3] = optical.dot((turned.dot(pitched)).T)
+    camera_from_base[:3, 3] = -camera_from_base[:3, :3].dot([0.1, -0.2, height_m])
+    floor = floor_from_transform(camera_from_base)
+    points = np.array([[2, 1, 0], [3, -1, 1.7], [1, 0, -0.4]])
+    np.testing.assert_allclose(floor.height(transform_points(camera_from_base, points)), points[:, 2], atol=1e-9)
+    assert abs(floor.offset_m - height_m) < 1e-9
+
+
+def test_row_is_where_the_floor_is_seen():
+    floor = floor_of(0.2, 0.1, 0.8)
+    row = floor.row(CAMERA, 100.0, 2.5)
+    assert abs(floor.height(CAMERA.deproject([100.0, row], 2.5))) < 1e-9
