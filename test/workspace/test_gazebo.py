@@ -1,0 +1,262 @@
+"""What can be tested of the simulation without Gazebo: the camera, the people, and what the launch file hands on."""
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from itertools import combinations
+
+import numpy as np
+import pytest
+import xacro
+import yaml
+
+from ros_3d_bb.geometry import transform_from, transform_points
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+CAMERA, LAUNCH = os.path.join(ROOT, 'urdf', 'd435i.urdf.xacro'), os.path.join(ROOT, 'launch', 'gazebo.launch')
+CAMERA_POSITION = (0.17, 0.0, 0.20)  # in base_link, thesis 3.5.1
+FX, WIDTH, HEIGHT = 614.686, 640, 480  # what the thesis' D435i said of itself
+OWN_ARGUMENTS = {'world', 'gui', 'x', 'y', 'yaw'}
+# A robot that takes in the camera as jackal.urdf.xacro does.
+ROBOT = """<robot name="jackal" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <link name="base_link"/>
+  <xacro:include filename="$(optenv JACKAL_URDF_EXTRAS empty.urdf)"/>
+</robot>"""
+# The arguments that the launch files of gazebo_ros 2.9 and jackal_gazebo 0.4 declare.
+STUBS = {'gazebo_ros/launch/empty_world.launch': ('paused', 'use_sim_time', 'extra_gazebo_args', 'gui', 'headless',
+                                                  'debug', 'physics', 'verbose', 'world_name', 'enable_ros_network'),
+         'jackal_gazebo/launch/spawn_jackal.launch': ('x', 'y', 'z', 'yaw', 'joystick', 'config')}
+
+
+def write(path, text):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+
+
+def default_of(launch_file):
+    arguments = ElementTree.parse(os.path.join(ROOT, 'launch', launch_file)).getroot().findall('arg')
+    return {argument.get('name'): argument.get('default') for argument in arguments}
+
+
+@pytest.fixture
+def robot(tmp_path, monkeypatch):
+    """The robot's description with the camera, as a function of xacro arguments."""
+    write(tmp_path / 'robot.urdf.xacro', ROBOT)
+    monkeypatch.setenv('JACKAL_URDF_EXTRAS', CAMERA)
+    return lambda **arguments: ElementTree.fromstring(
+        xacro.process_file(str(tmp_path / 'robot.urdf.xacro'), mappings=arguments).toxml())
+
+
+def parent_from_child(joint):
+    """The 4x4 transform of a URDF joint; rpy are rotations about the fixed axes x, y, z in this order."""
+    origin = joint.find('origin')
+    xyz, rpy = ([float(value) for value in (origin.get(key, '0 0 0') if origin is not None else '0 0 0').split()]
+                for key in ('xyz', 'rpy'))
+    roll, pitch, yaw = (transform_from((0, 0, 0), np.append(np.sin(angle / 2) * axis, np.cos(angle / 2)))
+                        for angle, axis in zip(rpy, np.eye(3)))
+    return transform_from(xyz, (0, 0, 0, 1)).dot(yaw).dot(pitch).dot(roll)
+
+
+def base_from(frame, description):
+    joints = {joint.find('child').get('link'): joint for joint in description.findall('joint')}
+    transform = np.eye(4)
+    while frame != 'base_link':
+        transform = parent_from_child(joints[frame]).dot(transform)
+        frame = joints[frame].find('parent').get('link')
+    return transform
+
+
+def test_the_camera_adds_its_frames_to_the_robot_as_one_tree(robot):
+    description = robot()
+    links = [link.get('name') for link in description.findall('link')]
+    children = [joint.find('child').get('link') for joint in description.findall('joint')]
+    assert sorted(children + ['base_link']) == sorted(links)
+    assert {'camera_link', 'camera_color_frame', 'camera_color_optical_frame', 'camera_depth_frame',
+            'camera_depth_optical_frame'} == set(children)
+    assert all(joint.get('type') == 'fixed' for joint in description.findall('joint'))
+    assert all(np.isfinite(base_from(link, description)).all() for link in links)
+
+
+@pytest.mark.parametrize('stream', ['color', 'depth'])
+def test_the_optical_frames_are_where_the_thesis_has_the_camera_and_look_ahead(robot, stream):
+    base_from_optical = base_from('camera_%s_optical_frame' % stream, robot())
+    right, down, ahead = (0, -1, 0), (0, 0, -1), (1, 0, 0)
+    expected = np.array([CAMERA_POSITION] * 4) + [(0, 0, 0), right, down, ahead]
+    np.testing.assert_allclose(transform_points(base_from_optical, np.vstack((np.zeros(3), np.eye(3)))), expected,
+                               atol=1e-12)
+
+
+def test_no_lens_looks_into_the_body_of_the_camera(robot):
+    link = robot().find("link[@name='camera_link']")
+    for kind in ('visual', 'collision'):
+        body = link.find(kind)
+        size = [float(value) for value in body.find('geometry/box').get('size').split()]
+        assert sorted(size) == [0.025, 0.025, 0.09]
+        assert float(body.find('origin').get('xyz').split()[0]) + size[0] / 2 <= 0
+
+
+def test_gazebo_publishes_what_the_pipeline_listens_to(robot):
+    description, pipeline = robot(), default_of('pipeline.launch')
+    plugin = description.find('.//plugin')
+    topics = {key: plugin.findtext('cameraName') + '/' + plugin.findtext(element)
+              for key, element in (('camera_image', 'imageTopicName'), ('camera_depth', 'depthImageTopicName'),
+                                   ('camera_info', 'cameraInfoTopicName'))}
+    assert topics == {key: pipeline[key] for key in topics}
+    sensor_frame = description.find('.//sensor/..').get('reference')
+    np.testing.assert_allclose(base_from(sensor_frame, description)[:3, 3],
+                               base_from(plugin.findtext('frameName'), description)[:3, 3])
+
+
+def test_the_simulated_camera_has_the_intrinsics_of_the_real_one(robot):
+    sensor = robot(d435i_rate='15').find('.//sensor')
+    width, height = (int(sensor.findtext('camera/image/' + key)) for key in ('width', 'height'))
+    assert (width, height, sensor.findtext('update_rate')) == (WIDTH, HEIGHT, '15')
+    assert width / 2 / np.tan(float(sensor.findtext('camera/horizontal_fov')) / 2) == pytest.approx(FX, rel=1e-3)
+    centre = [float(sensor.findtext('plugin/' + key)) for key in ('Cx', 'Cy')]
+    assert centre == [(width - 1) / 2, (height - 1) / 2]
+    cutoffs = [float(sensor.findtext('plugin/pointCloudCutoff' + end)) for end in ('', 'Max')]
+    near, far = (float(sensor.findtext('camera/clip/' + key)) for key in ('near', 'far'))
+    assert near <= cutoffs[0] < cutoffs[1] <= far
+
+
+def test_the_camera_is_simulated_at_the_rate_of_the_real_one(robot):
+    assert robot().findtext('.//sensor/update_rate') == '30'
+
+
+@pytest.fixture(scope='module')
+def world():
+    return ElementTree.parse(os.path.join(ROOT, 'worlds', 'people.world')).find('world')
+
+
+def waypoints(actor):
+    """Times (n,) in seconds, and (x, y, yaw) (n, 3)."""
+    times_s = [float(point.findtext('time')) for point in actor.iter('waypoint')]
+    poses = [[float(value) for value in point.findtext('pose').split()] for point in actor.iter('waypoint')]
+    assert all(pose[2:5] == [0, 0, 0] for pose in poses)
+    return np.array(times_s), np.array(poses)[:, [0, 1, 5]]
+
+
+def positions(world, times_s):
+    """Where everybody is, {name: (n, 2)}; straight from waypoint to waypoint, round and round."""
+    result = {}
+    for actor in world.findall('actor'):
+        known_s, poses = waypoints(actor)
+        result[actor.get('name')] = np.stack([np.interp(times_s % known_s[-1], known_s, poses[:, axis])
+                                              for axis in (0, 1)], axis=-1)
+    return result
+
+
+def in_view(points):
+    """Tangent of the bearing in the camera of a robot at the origin, (n,); nan outside of the picture."""
+    tangent = points[:, 1] / (points[:, 0] - CAMERA_POSITION[0])
+    return np.where((points[:, 0] > CAMERA_POSITION[0]) & (np.abs(tangent) < WIDTH / 2 / FX), tangent, np.nan)
+
+
+def crossings(first, second):
+    """Indices at which two people have just changed sides in the picture."""
+    with np.errstate(invalid='ignore'):
+        side = np.sign(in_view(first) - in_view(second))
+        return np.flatnonzero(side[1:] * side[:-1] < 0) + 1
+
+
+TIMES_S = np.arange(0, 120, 0.1)
+
+
+def test_four_people_are_made_of_what_comes_with_gazebo(world):
+    actors = world.findall('actor')
+    assert len(set(actor.get('name') for actor in actors)) == len(actors) == 4
+    for actor in actors:
+        files = [actor.findtext('skin/filename'), actor.findtext('animation/filename')]
+        assert set(files) <= {'walk.dae', 'moonwalk.dae', 'stand.dae'}
+        assert actor.find('script/trajectory').get('type') == actor.find('animation').get('name')
+
+
+def test_people_walk_round_in_even_steps_facing_where_they_go(world):
+    walkers = [actor for actor in world.findall('actor') if actor.findtext('animation/filename') == 'walk.dae']
+    assert len(walkers) == 3
+    for actor in walkers:
+        times_s, poses = waypoints(actor)
+        assert times_s[0] == 0 and (poses[0, :2] == poses[-1, :2]).all()
+        assert abs(poses[-1, 2] - poses[0, 2]) == pytest.approx(2 * np.pi, abs=2e-3)
+        assert np.abs(np.diff(poses[:, 2])).max() < np.pi / 2
+        speed = np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1) / np.diff(times_s)
+        assert speed.min() > 0.5 and speed.max() < 1.0 and np.ptp(speed) < 0.1
+        course = poses[2:, :2] - poses[:-2, :2]
+        facing = np.stack((np.cos(poses[1:-1, 2]), np.sin(poses[1:-1, 2])), axis=-1)
+        assert ((course * facing).sum(axis=1) > 0.9 * np.linalg.norm(course, axis=1)).all()
+
+
+def test_nobody_comes_close_to_anybody_or_to_furniture_or_to_the_robot(world):
+    people = positions(world, TIMES_S)
+    for first, second in combinations(people.values(), 2):
+        assert np.linalg.norm(first - second, axis=1).min() > 0.5
+    boxes = world.findall("model[@name='room']/link/collision")
+    assert len(boxes) == 8
+    for box in boxes:
+        centre, size = (np.array([float(value) for value in box.findtext(path).split()[:2]])
+                        for path in ('pose', 'geometry/box/size'))
+        for points in people.values():
+            gap = np.maximum(np.abs(points - centre) - size / 2, 0)
+            assert np.linalg.norm(gap, axis=1).min() > 0.4, box.get('name')
+    assert min(np.linalg.norm(points, axis=1).min() for points in people.values()) > 2.0
+
+
+def test_what_is_seen_is_what_is_bumped_into(world):
+    link = world.find("model[@name='room']/link")
+    shapes = [[(shape.get('name'), shape.findtext('pose'), shape.findtext('geometry/box/size'))
+               for shape in link.findall(kind)] for kind in ('collision', 'visual')]
+    assert shapes[0] == shapes[1]
+
+
+def test_two_people_pass_each_other_and_one_passes_in_front_of_two_others(world):
+    people = positions(world, TIMES_S)
+    passing = crossings(people['near'], people['far'])
+    assert len(passing) >= 10
+    for index in passing:
+        velocity = [people[name][index] - people[name][index - 1] for name in ('near', 'far')]
+        assert velocity[0][1] * velocity[1][1] < 0
+    away = np.flatnonzero(np.isnan(in_view(people['front'])))
+    traverses = [(start, end) for start, end in zip(away[:-1], away[1:]) if end - start > 1]
+    assert len(traverses) >= 10
+    others = [people[name] for name in ('near', 'far', 'standing')]
+    assert people['front'][:, 0].max() < min(points[:, 0].min() for points in others)
+    for start, end in traverses:
+        crossed = [crossings(people['front'][start:end], points[start:end]).size > 0 for points in others]
+        assert sum(crossed) >= 2
+
+
+def test_the_launch_file_documents_its_arguments_and_hands_on_only_what_the_pipeline_knows():
+    assert all(argument.get('doc') for argument in ElementTree.parse(LAUNCH).getroot().findall('arg'))
+    assert set(default_of('gazebo.launch')) - OWN_ARGUMENTS <= set(default_of('pipeline.launch'))
+
+
+@pytest.fixture
+def simulators(tmp_path):
+    """Packages in place of Gazebo's and Jackal's: their launch files put what they are given into parameters."""
+    for name, arguments in STUBS.items():
+        lines = ['<arg name="%s" default=""/><param name="stub/%s" type="str" value="$(arg %s)"/>' % (arg, arg, arg)
+                 for arg in arguments]
+        write(tmp_path / name, '<launch><param name="robot_description" value="bare"/>%s</launch>' % ''.join(lines))
+    write(tmp_path / 'jackal_description' / 'urdf' / 'jackal.urdf.xacro', ROBOT)
+    write(tmp_path / 'xacro' / 'xacro', '#!%s\nimport xacro\nxacro.main()\n' % sys.executable)
+    (tmp_path / 'xacro' / 'xacro').chmod(0o755)
+    for folder in tmp_path.iterdir():
+        write(folder / 'package.xml', '<package format="2"><name>%s</name></package>' % folder.name)
+    return tmp_path
+
+
+def loaded(simulators, *arguments):
+    """The parameters that roslaunch would set."""
+    path = '%s:%s:%s' % (simulators, ROOT, os.environ.get('ROS_PACKAGE_PATH', ''))
+    command = [sys.executable, '-c', 'import roslaunch; roslaunch.main()', '--dump-params', LAUNCH] + list(arguments)
+    return yaml.safe_load(subprocess.check_output(command, env=dict(os.environ, ROS_PACKAGE_PATH=path)))
+
+
+def test_the_launch_file_starts_gazebo_the_robot_with_the_camera_and_the_pipeline(simulators):
+    parameters = loaded(simulators, 'weights:=/some/yolov5n.pt', 'gui:=false', 'y:=-1.5', 'yaw:=0.3')
+    given = {key.split('/')[-1]: value for key, value in parameters.items() if key.startswith('/stub/') and value}
+    assert os.path.samefile(given.pop('world_name'), os.path.join(ROOT, 'worlds', 'people.world'))
+    assert given == {'gui': 'false', 'x': '0.0', 'y': '-1.5', 'yaw': '0.3', 'z': '0.1'}
+    assert 'camera_color_optical_frame' in parameters['/robot_description']
+    assert parameters['/yolov5_node/weights'] == '/some/yolov5n.pt'
+    assert parameters['/tracker_node/target_frame'] == 'odom'
