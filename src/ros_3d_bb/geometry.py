@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+OPTICAL_ROTATION = (-0.5, 0.5, -0.5, 0.5)  # quaternion of an optical frame that looks along the body's x (REP 103)
+
 
 class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float), ('fy', float), ('cx', float),
                                    ('cy', float)])):
@@ -87,6 +89,21 @@ def transform_from(translation, quaternion):
                       [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
     matrix[:3, 3] = translation
     return matrix
+
+
+def quaternion_from(matrix):
+    """The quaternion (x, y, z, w), w >= 0, of the rotation in a 4x4 matrix. Inverse of `transform_from`."""
+    m = matrix
+    xx, yy, zz = np.diag(m)[:3]
+    # 4 q q^T, whose rows are all multiples of q; the row of the largest component is the most exact one
+    squares = np.array([1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz])
+    products = np.array([[squares[0], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[2, 1] - m[1, 2]],
+                         [m[0, 1] + m[1, 0], squares[1], m[1, 2] + m[2, 1], m[0, 2] - m[2, 0]],
+                         [m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], squares[2], m[1, 0] - m[0, 1]],
+                         [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], squares[3]]])
+    row = products[int(np.argmax(squares))]
+    quaternion = row / np.linalg.norm(row)
+    return quaternion if quaternion[3] >= 0 else -quaternion
 
 
 def transform_points(b_from_a, points):

@@ -6,10 +6,11 @@ import numpy as np
 from geometry_msgs.msg import PoseWithCovariance
 from std_msgs.msg import Int32MultiArray, MultiArrayDimension
 
+from ros_3d_bb import msg
 from ros_3d_bb.geometry import Camera, transform_from, transform_points
-from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
+from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tracking.tracked import Detection
+from ros_3d_bb.tracking.tracked import Detection, TrackedObject
 
 MAX_BOXES = 1000  # more in one image are a fault of their sender, and would stall the pipeline
 
@@ -155,7 +156,7 @@ def tracks_to_message(tracks, header):
 
 
 def _track_to_message(track):
-    message = TrackedObject(id=track.id, status=track.status, moving=track.moving)
+    message = msg.TrackedObject(id=track.id, status=track.status, moving=track.moving)
     message.pose = _pose_at(track.position_m)
     _set_xyz(message.twist.twist.linear, track.velocity_mps)
     _set_xyz(message.size, track.size_m)
@@ -163,6 +164,19 @@ def _track_to_message(track):
     message.prediction = [_pose_at(position_m) for position_m in track.prediction_m]
     message.prediction_step = genpy.Duration.from_sec(track.prediction_step_s)
     return message
+
+
+def tracks_from_message(message):
+    """The tracks in a TrackedObjectArray; the instant velocity is not in the message and is that of the track."""
+    return [_track_from_message(track) for track in message.objects]
+
+
+def _track_from_message(track):
+    velocity_mps = _xyz(track.twist.twist.linear)
+    prediction_m = np.array([_xyz(pose.pose.position) for pose in track.prediction]).reshape(-1, 3)
+    return TrackedObject(track.id, _xyz(track.pose.pose.position), _xyz(track.size), velocity_mps, velocity_mps,
+                         track.status, track.moving, track.first_seen.to_nsec(), track.last_seen.to_nsec(),
+                         prediction_m, track.prediction_step.to_sec())
 
 
 def _pose_at(position_m):
@@ -175,3 +189,7 @@ def _pose_at(position_m):
 
 def _set_xyz(message, values):
     message.x, message.y, message.z = (float(value) for value in values)
+
+
+def _xyz(message):
+    return np.array([message.x, message.y, message.z])

@@ -10,8 +10,8 @@ import rospy
 from std_msgs.msg import Int32MultiArray
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_3d_bb.bags import MOUNT_M, START_NS, BagOptions, write_bag
-from ros_3d_bb.estimation import estimate_median, sample_median
+from ros_3d_bb.bags import MOUNT_M, START_NS, SessionBagOptions, session_images, write_bag
+from ros_3d_bb.estimation import estimator_named
 from ros_3d_bb.measurements import read_depth, read_session
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.stamped import NS
@@ -31,7 +31,7 @@ def session(session_folder):
 def make_bag(session, folder, rate_hz):
     """A bag of the session with its recorded boxes; returns its path and {stamp: frame}."""
     path = str(folder / ('%g_hz.bag' % rate_hz))
-    write_bag(session, path, BagOptions(rate_hz=rate_hz, with_boxes=True))
+    write_bag(session_images(session, SessionBagOptions(rate_hz=rate_hz, with_boxes=True)), path)
     return path, {START_NS + int(number * NS / rate_hz): frame for number, frame in enumerate(session.frames)}
 
 
@@ -82,6 +82,7 @@ def bbox3d():
 def test_at_30_hz_every_array_gets_its_own_depth_image(session, bag, bbox3d, delay_s):
     """All frames are answered, each with its own stamp and with the numbers that its own depth image gives."""
     path, frames = bag
+    foreground = estimator_named('foreground')
     with Recorder('ros_3d_bb/bb_3d', BoundingBox3DArray) as output, \
             Delayed('recorded_boxes', 'yolo_bounding_box', delay_s):
         subprocess.check_call(['rosbag', 'play', '--quiet', '--clock', '--delay', '2', path,
@@ -90,8 +91,8 @@ def test_at_30_hz_every_array_gets_its_own_depth_image(session, bag, bbox3d, del
     assert [message.header.stamp.to_nsec() for message in output.messages] == sorted(frames)
     for message in output.messages:
         frame = frames[message.header.stamp.to_nsec()]
-        expected = estimate_median(sample_median(read_depth(frame, session), frame.boxes_px[0]), frame.boxes_px[0],
-                                   session.camera)
+        samples = foreground.sample(read_depth(frame, session), frame.boxes_px[0])
+        expected = foreground.estimate(samples, frame.boxes_px[0], session.camera, ())
         center = message.boxes[0].center.position
         np.testing.assert_allclose((center.x, center.y, center.z), expected.center_m, atol=1e-9)
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as hnp
 
-from ros_3d_bb.geometry import Camera, transform_from, transform_points
+from ros_3d_bb.geometry import OPTICAL_ROTATION, Camera, quaternion_from, transform_from, transform_points
 
 D435I = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)
 COORDINATE = st.floats(-100, 100)
@@ -41,9 +41,17 @@ def test_transforms_are_rigid_and_can_be_undone(translation, quaternion, points)
     assert np.linalg.det(b_from_a[:3, :3]) == pytest.approx(1)
 
 
+@given(st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1))
+def test_the_quaternion_of_a_transform_is_the_one_it_was_made_from(quaternion):
+    found = quaternion_from(transform_from((1, 2, 3), quaternion))
+    expected = np.array(quaternion) / np.linalg.norm(quaternion)
+    assert found[3] >= 0
+    np.testing.assert_allclose(found * np.sign(found.dot(expected)), expected, atol=1e-9)
+
+
 def test_optical_frame_of_a_camera_that_looks_ahead():
     """REP 103: in the body frame x is forward, y left, z up; the optical z is forward, x right, y down."""
-    body_from_optical = transform_from((0.17, 0, 0.2), (-0.5, 0.5, -0.5, 0.5))
+    body_from_optical = transform_from((0.17, 0, 0.2), OPTICAL_ROTATION)
     np.testing.assert_allclose(transform_points(body_from_optical, [(1, 2, 3)]), [(3.17, -1, -1.8)], atol=1e-12)
 
 

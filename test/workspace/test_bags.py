@@ -1,4 +1,4 @@
-"""A session as a bag: the same pixels, the intrinsics, and a robot that stands in the map."""
+"""Sessions and scenarios as bags: the same pixels, the intrinsics, and a robot in the map."""
 import json
 import os
 import subprocess
@@ -8,10 +8,14 @@ import pytest
 import rosbag
 import tf2_ros
 
-from ros_3d_bb.bags import START_NS, BagOptions, write_bag
+from ros_3d_bb.bags import START_NS, SessionBagOptions, scenario_images, session_images, write_bag
 from ros_3d_bb.images import depth_from, rgb_from
 from ros_3d_bb.measurements import read_color, read_depth, read_session
-from ros_3d_bb.messages import boxes2d_from_message, camera_from_message, time_from, transform_from_message
+from ros_3d_bb.messages import (boxes2d_from_message, camera_from_message, time_from, tracks_from_message,
+                                transform_from_message)
+from ros_3d_bb.simulation.scenario import scenario_from
+from ros_3d_bb.simulation.simulator import Simulator
+from ros_3d_bb.simulation.truth import truth_at
 from ros_3d_bb.stamped import NS
 
 
@@ -26,7 +30,7 @@ def session(session_folder):
 def messages(session, tmp_path_factory):
     """{topic: messages} of a bag at 10 Hz."""
     path = str(tmp_path_factory.mktemp('bag') / 'session.bag')
-    assert write_bag(session, path, BagOptions(rate_hz=10.0, with_boxes=True)) == 7
+    assert write_bag(session_images(session, SessionBagOptions(10.0, with_boxes=True)), path) == 7
     return messages_in(path)
 
 
@@ -75,20 +79,20 @@ def test_the_camera_stands_on_a_jackal_in_the_map(session, messages):
 def test_depth_that_is_not_in_millimetres_keeps_its_scale(session, tmp_path):
     """A camera that counts 0.25 mm: metres in the bag, as the session says."""
     path = str(tmp_path / 'fine.bag')
-    write_bag(session._replace(depth_scale_m=0.00025, frames=session.frames[:1]), path, BagOptions(compression='none'))
+    write_bag(session_images(session._replace(depth_scale_m=0.00025, frames=session.frames[:1])), path, 'none')
     depth = depth_from(messages_in(path)['/camera/aligned_depth_to_color/image_raw'][0])
     assert depth.scale_m == 1.0
     np.testing.assert_allclose(depth.values, read_depth(session.frames[0], session).values * 0.00025, rtol=1e-6)
 
 
-def run_tool(*arguments):
-    return subprocess.run(['rosrun', 'ros_3d_bb', 'session_to_bag'] + list(arguments), stdout=subprocess.PIPE,
+def run_tool(tool, *arguments):
+    return subprocess.run(['rosrun', 'ros_3d_bb', tool] + list(arguments), stdout=subprocess.PIPE,
                           stderr=subprocess.STDOUT, universal_newlines=True)
 
 
 def test_the_command_says_what_it_wrote(session_folder, tmp_path):
-    result = run_tool(session_folder, str(tmp_path / 'out.bag'), '--rate', '15')
-    assert result.returncode == 0 and 'frames at 15 Hz' in result.stdout
+    result = run_tool('session_to_bag', session_folder, str(tmp_path / 'out.bag'), '--rate', '15')
+    assert result.returncode == 0 and 'out.bag: ' in result.stdout
     with rosbag.Bag(str(tmp_path / 'out.bag')) as bag:
         assert '/yolo_bounding_box' not in bag.get_type_and_topic_info().topics
 
@@ -102,6 +106,79 @@ def test_a_broken_session_leaves_no_bag_and_says_why(session_folder, tmp_path, d
             content = json.load(stream)
         content['frames'][0]['depth'] = depth
         (folder / 'frames.json').write_text(json.dumps(content))
-    result = run_tool(str(folder), bag)
+    result = run_tool('session_to_bag', str(folder), bag)
     assert result.returncode == 1 and str(folder) in result.stdout and 'no bag was written' in result.stdout
     assert 'Traceback' not in result.stdout and os.listdir(str(tmp_path)) == ['broken']
+
+
+SCENE = {'duration': 0.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}],
+         'robot': {'moves': [{'to': [1.0, 0.0]}], 'odometry_drift': [0.2, 0.1, 0.3]}}
+
+
+@pytest.fixture(scope='module')
+def scene(tmp_path_factory):
+    """A simulator, and {topic: messages} of the bag of its scenario."""
+    path = str(tmp_path_factory.mktemp('bag') / 'scene.bag')
+    assert write_bag(scenario_images(scenario_from(SCENE)), path) == 5
+    return Simulator(scenario_from(SCENE)), messages_in(path)
+
+
+def test_a_scene_has_the_topics_of_a_robot_and_the_truth(scene):
+    _simulator, messages = scene
+    assert set(messages) == {'/camera/color/image_raw', '/camera/aligned_depth_to_color/image_raw', '/tf',
+                             '/camera/color/camera_info', '/camera/aligned_depth_to_color/camera_info', '/ground_truth'}
+    assert [message.header.stamp.to_nsec() - START_NS for message in messages['/ground_truth']] == [
+        number * NS // 10 for number in range(5)]
+    assert set(message.header.frame_id for message in messages['/ground_truth']) == {'map'}
+
+
+def test_a_scene_holds_what_the_simulator_renders(scene):
+    simulator, messages = scene
+    for number in (0, 4):
+        frame = simulator.frame(number)
+        np.testing.assert_array_equal(rgb_from(messages['/camera/color/image_raw'][number]), frame.color)
+        depth = depth_from(messages['/camera/aligned_depth_to_color/image_raw'][number])
+        assert depth.scale_m == 0.001
+        np.testing.assert_array_equal(depth.values, frame.depth_mm)
+        assert camera_from_message(messages['/camera/color/camera_info'][number]) == simulator.camera
+        written, = tracks_from_message(messages['/ground_truth'][number])
+        person, = truth_at(simulator, frame, START_NS + number * NS // 10)
+        assert (written.id, written.status, written.moving) == (person.id, person.status, person.moving)
+        for field in ('position_m', 'velocity_mps', 'size_m', 'prediction_m'):
+            np.testing.assert_allclose(getattr(written, field), getattr(person, field), atol=1e-12)
+
+
+def test_the_transforms_of_a_scene_lead_from_the_map_to_the_camera(scene):
+    simulator, messages = scene
+    buffer = tf2_ros.BufferCore()
+    for message in messages['/tf']:
+        for transform in message.transforms:
+            buffer.set_transform(transform, 'test')
+    for number in range(5):
+        found = buffer.lookup_transform_core('map', 'camera_color_optical_frame',
+                                             messages['/ground_truth'][number].header.stamp)
+        np.testing.assert_allclose(transform_from_message(found),
+                                   simulator.poses_at(simulator.time_s(number)).map_from_camera, atol=1e-9)
+
+
+def raw_messages(path):
+    with rosbag.Bag(str(path)) as bag:
+        return [(topic, data[1], stamp) for topic, data, stamp in bag.read_messages(raw=True)]
+
+
+def test_the_same_scenario_gives_the_same_bytes_and_another_seed_others(tmp_path):
+    scenario = tmp_path / 'scene.yaml'
+    scenario.write_text(json.dumps(dict(SCENE, duration=0.2)))
+    for name, seed in (('one', '5'), ('two', '5'), ('other', '6')):
+        result = run_tool('scenario_to_bag', str(scenario), str(tmp_path / name), '--seed', seed, '--rate', '20')
+        assert result.returncode == 0 and ': 4 images' in result.stdout
+    one, two, other = (raw_messages(tmp_path / name) for name in ('one', 'two', 'other'))
+    assert one == two and one != other
+
+
+def test_a_broken_scenario_leaves_no_bag_and_says_why(tmp_path):
+    scenario = tmp_path / 'scene.yaml'
+    scenario.write_text('people:\n- {strat: [1, 2]}\n')
+    result = run_tool('scenario_to_bag', str(scenario), str(tmp_path / 'out.bag'))
+    assert result.returncode == 1 and 'did you mean start' in result.stdout and 'no bag was written' in result.stdout
+    assert 'Traceback' not in result.stdout and os.listdir(str(tmp_path)) == ['scene.yaml']

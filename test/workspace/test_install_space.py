@@ -34,7 +34,7 @@ def run_in(prefix, command):
 
 def test_launch_config_rviz_and_scripts_are_installed(installed):
     share = os.path.join(installed, 'share', 'ros_3d_bb')
-    for folder in ('launch', 'config', 'rviz', 'msg'):
+    for folder in ('launch', 'config', 'rviz', 'msg', 'urdf', 'worlds'):
         assert sorted(os.listdir(os.path.join(share, folder))) == sorted(os.listdir(os.path.join(ROOT, folder)))
     scripts = sorted(os.path.basename(path) for path in glob.glob(os.path.join(ROOT, 'scripts', '*')))
     assert sorted(os.listdir(os.path.join(installed, 'lib', 'ros_3d_bb'))) == scripts

@@ -1,0 +1,65 @@
+"""What an RGB-D camera on a robot sends: images, camera_info and transforms, with the topics of realsense2_camera."""
+from typing import Any, NamedTuple, Optional, Sequence
+
+import numpy as np
+from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+from ros_3d_bb.estimation import DepthImage
+from ros_3d_bb.geometry import Camera, quaternion_from
+from ros_3d_bb.images import fill_image
+
+TF_TOPIC = 'tf'
+COLOR_TOPIC, DEPTH_TOPIC = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
+INFO_TOPICS = ('camera/color/camera_info', 'camera/aligned_depth_to_color/camera_info')
+TYPES = {TF_TOPIC: TFMessage, COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPICS[0]: CameraInfo,
+         INFO_TOPICS[1]: CameraInfo}
+
+
+class CameraFrame(NamedTuple):
+    """One image of a camera. `color` (h, w, 3) uint8 RGB; `transforms`: (parent, child, parent_from_child (4, 4))
+    from the map to the camera's optical frame; `distortion` of plumb_bob, empty for none.
+    """
+
+    header: Header
+    camera: Camera
+    color: np.ndarray
+    depth: DepthImage
+    transforms: Sequence[Any]
+    distortion: Optional[Sequence[float]] = ()
+
+
+def messages_of(frame):
+    """Yield (topic, message) of one image, in the order in which a robot would send them."""
+    yield TF_TOPIC, TFMessage([_transform(frame.header.stamp, *link) for link in frame.transforms])
+    for topic in INFO_TOPICS:
+        yield topic, _camera_info(frame)
+    yield DEPTH_TOPIC, _depth_image(frame.depth, frame.header)
+    yield COLOR_TOPIC, fill_image(Image(header=frame.header), frame.color, 'rgb8')
+
+
+def _depth_image(depth, header):
+    """16UC1 where the camera counts millimetres, else metres as 32FC1 (REP 118)."""
+    if depth.scale_m == 0.001:
+        return fill_image(Image(header=header), depth.values, '16UC1')
+    return fill_image(Image(header=header), (depth.values * depth.scale_m).astype(np.float32), '32FC1')
+
+
+def _camera_info(frame):
+    camera = frame.camera
+    info = CameraInfo(header=frame.header, width=camera.width, height=camera.height, distortion_model='plumb_bob')
+    info.D = list(frame.distortion) or [0.0] * 5
+    info.K = [camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1]
+    info.R = [1, 0, 0, 0, 1, 0, 0, 0, 1]
+    info.P = [camera.fx, 0, camera.cx, 0, 0, camera.fy, camera.cy, 0, 0, 0, 1, 0]
+    return info
+
+
+def _transform(stamp, parent, child, parent_from_child):
+    message = TransformStamped(header=Header(stamp=stamp, frame_id=parent), child_frame_id=child)
+    place, turn = message.transform.translation, message.transform.rotation
+    place.x, place.y, place.z = parent_from_child[:3, 3].tolist()
+    turn.x, turn.y, turn.z, turn.w = quaternion_from(parent_from_child).tolist()
+    return message

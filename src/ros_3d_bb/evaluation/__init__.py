@@ -1,0 +1,1 @@
+"""What the pipeline found, against what was there."""

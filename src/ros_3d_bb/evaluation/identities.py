@@ -1,0 +1,126 @@
+"""Tracks against ground truth: who got which number, kept it, and how far off was the position.
+
+In each image people and tracks are paired within `GATE_M` in the plane seen from above; a pair of the image before is
+kept as long as it is within the gate (as in CLEAR MOT, Bernardin and Stiefelhagen 2008), the rest is paired nearest
+first. What counts is what the images show: a person in an image where their status is VISIBLE.
+"""
+from typing import List, NamedTuple
+
+import numpy as np
+
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.association import match_greedily, plane_distances
+from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
+
+GATE_M = 1.0
+
+
+class Moment(NamedTuple):
+    """One image: its stamp, the people who are there and the tracks of them, in the same fixed frame."""
+
+    stamp_ns: int
+    truth: List[TrackedObject]
+    tracks: List[TrackedObject]
+
+
+class Pair(NamedTuple):
+    """A person and a track in one image; `error_m` is where the track lies, seen from the person, in x and y (2,)."""
+
+    person: int
+    track: int
+    error_m: np.ndarray
+
+
+class PersonScore(NamedTuple):
+    """How one person was tracked. `visible_s`: how long the images showed them, `longest_s` without a break;
+    `followed`: share 0..1 of those images with a track; `ids`: the tracks' numbers, each change one entry; `rmse_m`
+    and `worst_m`: position error of the images with a track, nan without any.
+    """
+
+    person: int
+    visible_s: float
+    longest_s: float
+    followed: float
+    ids: List[int]
+    rmse_m: float
+    worst_m: float
+
+    @property
+    def switches(self):
+        """How often the number changed."""
+        return max(0, len(self.ids) - 1)
+
+
+class SceneScore(NamedTuple):
+    """How a scene was tracked; `false_share` is the number of visible tracks of nobody, for each image."""
+
+    people: List[PersonScore]
+    images: int
+    false_share: float
+
+
+def score(moments):
+    """Compare tracks with the truth.
+
+    Parameters
+    ----------
+    moments : list of Moment
+        In the order of their stamps.
+
+    Returns
+    -------
+    SceneScore
+    """
+    pairs, false = [], 0
+    for moment in moments:
+        pairs.append(_pairs(moment, {pair.person: pair.track for pair in pairs[-1]} if pairs else {}))
+        paired = set(pair.track for pair in pairs[-1])
+        false += sum(track.status == VISIBLE and track.id not in paired for track in moment.tracks)
+    people = sorted(set(person.id for moment in moments for person in moment.truth))
+    return SceneScore([_person_score(person, moments, pairs) for person in people], len(moments),
+                      false / float(max(1, len(moments))))
+
+
+def _pairs(moment, before):
+    """The pairs of one image; `before`: track by person in the image before."""
+    if not moment.truth or not moment.tracks:
+        return []
+    distances = plane_distances([person.position_m for person in moment.truth],
+                                [track.position_m for track in moment.tracks])
+    near = distances <= GATE_M
+    kept = [[before.get(person.id) == track.id for track in moment.tracks] for person in moment.truth]
+    cost = np.where(np.array(kept) & near, distances - 2 * GATE_M, distances)
+    return [Pair(moment.truth[row].id, moment.tracks[column].id,
+                 moment.tracks[column].position_m[:2] - moment.truth[row].position_m[:2])
+            for row, column in match_greedily(cost) if near[row, column]]
+
+
+def _person_score(person, moments, pairs):
+    ids, errors_m, shown, followed, stretches = [], [], 0, 0, [[]]
+    for moment, found in zip(moments, pairs):
+        if not any(other.id == person and other.status == VISIBLE for other in moment.truth):
+            stretches.append([])
+            continue
+        stretches[-1].append(moment.stamp_ns)
+        shown += 1
+        for pair in found:
+            if pair.person == person:
+                followed += 1
+                errors_m.append(np.linalg.norm(pair.error_m))
+                if ids[-1:] != [pair.track]:
+                    ids.append(pair.track)
+    lengths_s = [(stretch[-1] - stretch[0]) / NS for stretch in stretches if stretch]
+    return PersonScore(person, sum(lengths_s), max(lengths_s, default=0.0), followed / float(max(1, shown)), ids,
+                       float(np.sqrt(np.mean(np.square(errors_m)))) if errors_m else float('nan'),
+                       max(errors_m, default=float('nan')))
+
+
+def table(scene_score):
+    """The scores as lines of text."""
+    lines = ['person  visible  followed  switches  numbers     RMSE     worst']
+    for person in scene_score.people:
+        lines.append('%6d  %5.1f s  %6.0f %%  %8d  %-9s  %6.3f m  %6.3f m'
+                     % (person.person, person.visible_s, 100 * person.followed, person.switches,
+                        ' '.join(map(str, person.ids)) or '-', person.rmse_m, person.worst_m))
+    lines.append('%d images, %.3f tracks of nobody for each' % (scene_score.images, scene_score.false_share))
+    return lines

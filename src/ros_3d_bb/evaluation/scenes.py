@@ -1,0 +1,104 @@
+"""The pipeline without ROS on a simulated scene: detector, 3D boxes, tracks, image by image."""
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_3d_bb.detection.boxes import iou
+from ros_3d_bb.estimation import DepthImage, estimator_named, near_first
+from ros_3d_bb.evaluation.identities import Moment
+from ros_3d_bb.geometry import transform_points
+from ros_3d_bb.simulation.simulator import Frame
+from ros_3d_bb.simulation.truth import truth_at
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.thesis import ThesisTracker
+from ros_3d_bb.tracking.tracked import Detection
+
+FOUND_IOU = 0.5  # a detection is that of a person where the boxes overlap by so much
+FALSE_IOU = 0.3  # and of nobody where it overlaps with no person by so much
+
+
+class Step(NamedTuple):
+    """One image: the frame without its pixels, the 2D boxes (n, 4) found in it, and the tracks after it."""
+
+    frame: Frame
+    boxes: np.ndarray
+    moment: Moment
+
+
+class DetectionScore(NamedTuple):
+    """`people` to be found, how many were `found`; `false` boxes in `images`."""
+
+    people: int
+    found: int
+    false: int
+    images: int
+
+    @property
+    def recall(self):
+        """Share 0..1, 1 where there was nobody to be found."""
+        return self.found / float(self.people) if self.people else 1.0
+
+    @property
+    def false_rate(self):
+        """False boxes an image."""
+        return self.false / float(self.images)
+
+
+def run_scene(simulator, detect, every=1, estimator=estimator_named('foreground')):
+    """Run the pipeline on a scene.
+
+    Parameters
+    ----------
+    simulator : Simulator
+    detect : callable
+        Called with a Frame; returns 2D boxes (n, 4).
+    every : int
+        Use one image of so many.
+    estimator : Estimator
+
+    Returns
+    -------
+    list of Step
+    """
+    tracker, steps = ThesisTracker(), []
+    for number in range(0, simulator.frame_count, every):
+        frame = simulator.frame(number)
+        boxes = np.asarray(detect(frame), float).reshape(-1, 4)
+        stamp_ns = int(round(frame.time_s * NS))
+        tracks = tracker.update(stamp_ns, _detections(frame, boxes, simulator.camera, estimator))
+        moment = Moment(stamp_ns, truth_at(simulator, frame, stamp_ns), tracks)
+        steps.append(Step(frame._replace(color=None, depth_mm=None), boxes, moment))
+    return steps
+
+
+def _detections(frame, boxes, camera, estimator):
+    """The 2D boxes as bbox3d_node and tracker_node take them: 3D boxes, in the map."""
+    depth, found = DepthImage(frame.depth_mm, 0.001), []
+    rects_px = [tuple(rect) for rect in np.rint(boxes).astype(int).tolist() if rect[0] < rect[2] and rect[1] < rect[3]]
+    for number in near_first(rects_px):
+        box = estimator.estimate(estimator.sample(depth, rects_px[number]), rects_px[number], camera, found)
+        found += [] if box is None else [box]
+    return [Detection(transform_points(frame.poses.map_from_camera, box.center_m), box.size_m[[0, 2, 1]])
+            for box in found]
+
+
+def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):
+    """How many of the people in a range of depth, who are visible enough, the detector found, and what else.
+
+    Returns
+    -------
+    DetectionScore
+    """
+    people = found = false = 0
+    for step in steps:
+        shown = [person for person in step.frame.people if person.box_px is not None]
+        overlaps = np.array([iou(box, np.array([person.box_px for person in shown], float)) for box in step.boxes])
+        overlaps = overlaps.reshape(len(step.boxes), len(shown))
+        false += int(np.count_nonzero(overlaps.max(axis=1) < FALSE_IOU)) if shown else len(step.boxes)
+        camera_from_map = np.linalg.inv(step.frame.poses.map_from_camera)
+        for column, person in enumerate(shown):
+            depth_m = transform_points(camera_from_map, person.position_m)[2]
+            if person.visible >= least_visible and nearest_m <= depth_m <= farthest_m:
+                people += 1
+                found += bool((overlaps[:, column] >= FOUND_IOU).any())
+    return DetectionScore(people, found, false, len(steps))

@@ -1,0 +1,115 @@
+"""From the bag of a scene with ground truth to a report: a picture, and a table of errors and numbers."""
+import argparse
+import os
+import sys
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import rosbag
+
+from ros_3d_bb.camera_messages import COLOR_TOPIC
+from ros_3d_bb.evaluation.identities import Moment, score, table
+from ros_3d_bb.evaluation.picture import Paths, scene_picture
+from ros_3d_bb.images import rgb_from
+from ros_3d_bb.messages import boxes2d_from_message, stamp_of, tracks_from_message, transform_from_message
+from ros_3d_bb.overlay import draw_boxes
+from ros_3d_bb.simulator_messages import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
+from ros_3d_bb.tracking.tracked import VISIBLE
+
+TRACKS_TOPIC, BOXES_TOPIC = 'ros_3d_bb/tracks', 'yolo_bounding_box'
+PANELS = 6
+
+
+class Recording(NamedTuple):
+    """What a bag holds of a scene: `moments` in the order of their stamps; `boxes` (n, 4) by stamp; the robot's path
+    (n, 2) in the map.
+    """
+
+    moments: list
+    boxes: dict
+    robot: np.ndarray
+
+
+def read_recording(bag):
+    """Read tracks and ground truth of an open bag.
+
+    Raises
+    ------
+    ValueError
+        If one of them is missing, or they are not in the same frame; says what was expected.
+    """
+    truth, tracks, boxes, links, robot = {}, {}, {}, {}, []
+    for topic, message, _time in bag.read_messages(['/' + name for name in (
+            TRUTH_TOPIC, TRACKS_TOPIC, BOXES_TOPIC, 'tf')]):
+        if topic == '/tf':
+            links.update({(link.header.frame_id, link.child_frame_id): transform_from_message(link)
+                          for link in message.transforms})
+            if {(MAP_FRAME, ODOM_FRAME), (ODOM_FRAME, BASE_FRAME)} <= set(links):
+                robot.append(links[MAP_FRAME, ODOM_FRAME].dot(links[ODOM_FRAME, BASE_FRAME])[:2, 3])
+        elif topic == '/' + BOXES_TOPIC:
+            found = boxes2d_from_message(message)
+            boxes[found.stamp_ns] = found.boxes
+        else:
+            by_stamp = truth if topic == '/' + TRUTH_TOPIC else tracks
+            by_stamp[stamp_of(message)] = message
+    for name, by_stamp in ((TRUTH_TOPIC, truth), (TRACKS_TOPIC, tracks)):
+        if not by_stamp:
+            raise ValueError('the bag has no messages on /%s; a recorded run of simulation.launch expected' % name)
+    frames = set(message.header.frame_id for by_stamp in (truth, tracks) for message in by_stamp.values())
+    if len(frames) > 1:
+        raise ValueError('truth and tracks are in the frames %s; one frame expected' % ', '.join(sorted(frames)))
+    moments = [Moment(stamp_ns, tracks_from_message(truth[stamp_ns]), tracks_from_message(tracks[stamp_ns]))
+               for stamp_ns in sorted(set(truth) & set(tracks))]
+    return Recording(moments, boxes, np.array(robot).reshape(-1, 2))
+
+
+def paths_of(recording):
+    """Who was where, for the view from above."""
+    people, tracks = {}, {}
+    for moment in recording.moments:
+        for person in moment.truth:
+            people.setdefault(person.id, []).append(person.position_m[:2])
+        for track in moment.tracks:
+            if track.status == VISIBLE:
+                tracks.setdefault(track.id, []).append(track.position_m[:2])
+    return Paths(people, tracks, recording.robot)
+
+
+def panels_of(bag, recording, count=PANELS):
+    """The colour images of moments spread over the scene, with their 2D boxes."""
+    picks = np.linspace(0, len(recording.moments) - 1, count + 2)[1:-1].astype(int)
+    wanted = set(recording.moments[pick].stamp_ns for pick in picks)
+    panels = []
+    for _topic, message, _time in bag.read_messages(['/' + COLOR_TOPIC]):
+        stamp_ns = message.header.stamp.to_nsec()
+        if stamp_ns in wanted:
+            boxes = recording.boxes.get(stamp_ns, np.zeros((0, 4), int))
+            panels.append(draw_boxes(rgb_from(message).copy(), boxes, [''] * len(boxes)))
+    return panels
+
+
+def write_report(bag_path, picture_path):
+    """Write the picture and return the table, a list of lines. Raises ValueError as `read_recording`."""
+    with rosbag.Bag(bag_path) as bag:
+        recording = read_recording(bag)
+        lines = table(score(recording.moments))
+        picture = scene_picture(panels_of(bag, recording), paths_of(recording), lines)
+    if not cv2.imwrite(picture_path, np.ascontiguousarray(picture[..., ::-1])):
+        raise OSError('%s cannot be written' % picture_path)
+    return lines
+
+
+def main():
+    """The command `scene_report`."""
+    parser = argparse.ArgumentParser(prog='scene_report', description=__doc__)
+    parser.add_argument('bag', help='a bag recorded by simulation.launch record:=...')
+    parser.add_argument('picture', nargs='?', help='where to write the picture (default: beside the bag, .png)')
+    arguments = parser.parse_args()
+    picture = arguments.picture or os.path.splitext(arguments.bag)[0] + '.png'
+    try:
+        lines = write_report(arguments.bag, picture)
+    except (ValueError, OSError, rosbag.ROSBagException) as error:
+        print('scene_report: %s; no report was written' % error, file=sys.stderr)
+        sys.exit(1)
+    print('\n'.join(lines + ['picture: %s' % picture]))

@@ -1,0 +1,101 @@
+"""simulator_node as a user starts it. Needs a master: it is about what is published, when, and with what time."""
+import os
+import subprocess
+import time
+
+import numpy as np
+import pytest
+import rospy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import CameraInfo, Image
+from tf2_msgs.msg import TFMessage
+
+from ros_3d_bb.images import depth_from, rgb_from
+from ros_3d_bb.msg import TrackedObjectArray
+from ros_3d_bb.simulation.scenario import read_scenario
+from ros_3d_bb.simulation.simulator import Simulator
+from ros_3d_bb.stamped import NS
+from support.ros import Recorder, wait_until
+
+SCENE = """
+duration: 1.0
+rate: 10.0
+people:
+- {start: [3.0, 0.5], facing: 3.0, moves: [{to: [3.0, -0.5]}]}
+"""
+TOPICS = {'camera/color/image_raw': Image, 'camera/aligned_depth_to_color/image_raw': Image,
+          'camera/color/camera_info': CameraInfo, 'camera/aligned_depth_to_color/camera_info': CameraInfo,
+          '/tf': TFMessage, 'ground_truth': TrackedObjectArray}
+
+
+@pytest.fixture(scope='module')
+def path(tmp_path_factory):
+    rospy.init_node('test_simulator_node')
+    path = tmp_path_factory.mktemp('scenario') / 'scene.yaml'
+    path.write_text(SCENE)
+    return str(path)
+
+
+def simulator(*params):
+    if rospy.has_param('/simulator_node'):  # of the run before
+        rospy.delete_param('/simulator_node')
+    return subprocess.Popen(['rosrun', 'ros_3d_bb', 'simulator_node'] + ['_' + param for param in params],
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
+
+
+@pytest.fixture(scope='module')
+def round_of_scene(path):
+    """{topic: messages} of one round, where the node tells the time."""
+    recorders = {topic: Recorder(topic, kind, publisher_expected=False) for topic, kind in TOPICS.items()}
+    recorders['/clock'] = Recorder('/clock', Clock, publisher_expected=False)
+    process = simulator('scenario:=' + path, 'publish_clock:=true', 'repeat:=false', 'wait_for_subscribers:=1')
+    assert process.wait(timeout=60) == 0
+    wait_until(lambda: len(recorders['ground_truth'].messages) == 10, 'ten images')
+    return {topic: recorder.messages for topic, recorder in recorders.items()}
+
+
+def test_everything_comes_with_the_stamps_of_the_scene(round_of_scene):
+    stamps = [message.header.stamp for message in round_of_scene['ground_truth']]
+    assert [(stamp - stamps[0]).to_nsec() for stamp in stamps] == [number * NS // 10 for number in range(10)]
+    for topic in set(TOPICS) - {'/tf'}:
+        assert [message.header.stamp for message in round_of_scene[topic]] == stamps
+    assert [message.transforms[0].header.stamp for message in round_of_scene['/tf']] == stamps
+    assert set(stamps) <= set(message.clock for message in round_of_scene['/clock'])
+    times = [message.clock for message in round_of_scene['/clock']]
+    assert times == sorted(times)
+
+
+def test_the_images_are_those_of_the_scenario(round_of_scene, path):
+    expected = Simulator(read_scenario(path))
+    for number in (0, 9):
+        frame = expected.frame(number)
+        np.testing.assert_array_equal(rgb_from(round_of_scene['camera/color/image_raw'][number]), frame.color)
+        depth = depth_from(round_of_scene['camera/aligned_depth_to_color/image_raw'][number])
+        np.testing.assert_array_equal(depth.values, frame.depth_mm)
+        person, = round_of_scene['ground_truth'][number].objects
+        place = person.pose.pose.position
+        np.testing.assert_allclose((place.x, place.y, place.z), frame.people[0].position_m)
+
+
+def test_without_its_own_clock_the_stamps_are_the_time_and_go_on_in_the_next_round(path):
+    began = time.time()
+    with Recorder('ground_truth', TrackedObjectArray, publisher_expected=False) as truth:
+        process = simulator('scenario:=' + path, 'speed:=5.0')
+        wait_until(lambda: len(truth.messages) >= 12 and (
+            truth.messages[-1].header.stamp - truth.messages[0].header.stamp).to_sec() > 3, 'a second round')
+        process.terminate()
+        process.wait()
+    stamps = [message.header.stamp.to_sec() for message in truth.messages]
+    assert began - 1 < stamps[0] < began + 15
+    assert stamps == sorted(stamps)
+    gap_s = max(np.diff(stamps))
+    assert 3 < gap_s < 4.5
+
+
+@pytest.mark.parametrize('params,complaint', [
+    ((), 'no scenario given'), (('scenario:=/nowhere.yaml',), '/nowhere.yaml'),
+    (('scenario:=' + os.devnull, 'speed:=0'), '~speed is 0'), (('scenario:=x', 'sped:=2'), 'did you mean ~speed')])
+def test_what_is_missing_or_wrong_is_said_at_the_start(path, params, complaint):
+    process = simulator(*params)
+    output, _none = process.communicate(timeout=30)
+    assert process.returncode == 1 and complaint in output and 'Traceback' not in output

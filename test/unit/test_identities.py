@@ -1,0 +1,66 @@
+"""Tracks against the truth: numbers that are kept or change, errors, people and tracks without each other."""
+import numpy as np
+import pytest
+
+from ros_3d_bb.evaluation.identities import GATE_M, Moment, score, table
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject
+
+
+def at(number, x, y, status=VISIBLE):
+    zero = np.zeros(3)
+    return TrackedObject(number, np.array([x, y, 0.9]), zero, zero, zero, status, False, 0, 0, np.zeros((0, 3)), 0.25)
+
+
+def moments(*images):
+    """Two images a second; each is (people, tracks)."""
+    return [Moment(number * NS // 2, truth, tracks) for number, (truth, tracks) in enumerate(images)]
+
+
+def test_a_person_followed_well():
+    result = score(moments(*[([at(1, 3 + 0.1 * n, 0)], [at(7, 3 + 0.1 * n, 0.3)]) for n in range(5)]))
+    person, = result.people
+    assert (person.person, person.ids, person.switches, person.followed) == (1, [7], 0, 1.0)
+    assert person.visible_s == person.longest_s == pytest.approx(2.0)
+    assert person.rmse_m == person.worst_m == pytest.approx(0.3)
+    assert result.false_share == 0
+
+
+def test_two_who_pass_each_other_and_swap_their_numbers():
+    """Each is 0.2 m from the other's place at the crossing; the tracks turn round instead of crossing."""
+    crossing = [([at(1, 0, y), at(2, 1.2, -y)],
+                 [at(5, 0 if y < 0 else 1.2, -abs(y)), at(6, 1.2 if y < 0 else 0, abs(y))])
+                for y in (-2.0, -1.0, 1.0, 2.0)]
+    assert [person.ids for person in score(moments(*crossing)).people] == [[5, 6], [6, 5]]
+
+
+def test_a_pair_is_kept_while_it_is_within_the_gate_though_another_is_nearer():
+    near = moments(([at(1, 0, 0)], [at(5, 0.1, 0)]), ([at(1, 0, 0)], [at(5, GATE_M - 0.1, 0), at(6, 0.1, 0)]))
+    person, = score(near).people
+    assert person.ids == [5]
+    assert score(near).false_share == 0.5
+    gone = near + [Moment(NS, [at(1, 0, 0)], [at(5, GATE_M + 0.1, 0), at(6, 0.1, 0)])]
+    assert score(gone).people[0].ids == [5, 6]
+
+
+def test_nobody_there_and_nobody_tracked():
+    result = score(moments(([], [at(1, 0, 0), at(2, 5, 5, OCCLUDED)]), ([at(3, 0, 0)], [])))
+    assert result.false_share == 0.5
+    person, = result.people
+    assert person.ids == [] and person.followed == 0 and np.isnan(person.rmse_m) and person.switches == 0
+    assert score([]).people == [] and score([]).false_share == 0
+
+
+def test_only_images_that_show_the_person_count():
+    hidden = [([at(1, 0, 0)], [at(5, 0, 0)]), ([at(1, 0, 0, OCCLUDED)], []), ([at(1, 0, 0, OCCLUDED)], [at(6, 0.5, 0)]),
+              ([at(1, 0, 0)], [at(5, 0, 0)]), ([at(1, 0, 0)], [at(5, 0, 0)])]
+    person, = score(moments(*hidden)).people
+    assert person.ids == [5] and person.followed == 1.0
+    assert person.visible_s == person.longest_s == pytest.approx(0.5)
+
+
+def test_the_table_has_a_line_for_each_person():
+    lines = table(score(moments(([at(1, 0, 0), at(2, 3, 0)], [at(5, 0.25, 0)]))))
+    assert lines[0].split() == ['person', 'visible', 'followed', 'switches', 'numbers', 'RMSE', 'worst']
+    assert len(lines) == 4
+    assert '5' in lines[1].split() and '0.250' in lines[1] and 'nan' in lines[2]

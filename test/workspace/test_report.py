@@ -1,0 +1,83 @@
+"""From the bag of a scene to its report."""
+import os
+import subprocess
+
+import cv2
+import numpy as np
+import pytest
+import rosbag
+from std_msgs.msg import Header
+
+from ros_3d_bb.bags import START_NS, scenario_images, write_bag
+from ros_3d_bb.messages import boxes2d_to_message, time_from, tracks_from_message, tracks_to_message
+from ros_3d_bb.report import BOXES_TOPIC, TRACKS_TOPIC, paths_of, read_recording, write_report
+from ros_3d_bb.simulation.scenario import scenario_from
+from ros_3d_bb.stamped import NS
+
+SCENE = {'duration': 1.0, 'rate': 10.0, 'people': [{'start': [3.0, 1.0], 'moves': [{'to': [3.0, -1.0]}]}],
+         'robot': {'moves': [{'to': [1.0, 0.0]}]}}
+SHIFT_M = 0.2
+
+
+def images_with_tracks(frame_id):
+    """The scene, and tracks that lie aside of the truth by `SHIFT_M` with the number 7, but for the first image."""
+    for number, (stamp_ns, messages) in enumerate(scenario_images(scenario_from(SCENE))):
+        messages, header = list(messages), Header(stamp=time_from(stamp_ns), frame_id=frame_id)
+        truth = dict(messages)['ground_truth']
+        tracks = [track._replace(id=7, position_m=track.position_m + [0, SHIFT_M, 0])
+                  for track in tracks_from_message(truth)]
+        messages.append((BOXES_TOPIC, boxes2d_to_message(np.array([[100, 50, 200, 300]]), header)))
+        if number:
+            messages.append((TRACKS_TOPIC, tracks_to_message(tracks, header)))
+        yield stamp_ns, messages
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    path = str(tmp_path_factory.mktemp('bag') / 'scene.bag')
+    write_bag(images_with_tracks('map'), path)
+    return path
+
+
+def test_tracks_meet_the_truth_of_their_own_stamp(bag):
+    with rosbag.Bag(bag) as opened:
+        recording = read_recording(opened)
+    assert [moment.stamp_ns for moment in recording.moments] == [START_NS + n * NS // 10 for n in range(1, 10)]
+    paths = paths_of(recording)
+    np.testing.assert_allclose(np.array(paths.tracks[7]) - paths.people[1], [[0, SHIFT_M]] * 9)
+    assert paths.robot.shape == (10, 2) and 0.2 < paths.robot[-1, 0] < 1.0
+
+
+def test_the_report_is_a_table_and_a_picture(bag, tmp_path):
+    picture = str(tmp_path / 'report.png')
+    lines = write_report(bag, picture)
+    assert lines[1].split()[0] == '1' and '0.200 m' in lines[1] and ' 7 ' in lines[1]
+    assert cv2.imread(picture).shape[1] == 1456
+
+
+def test_the_command_prints_it_and_puts_the_picture_beside_the_bag(bag):
+    output = subprocess.check_output(['rosrun', 'ros_3d_bb', 'scene_report', bag], universal_newlines=True)
+    assert '0.200 m' in output and 'picture: %s' % bag.replace('.bag', '.png') in output
+    assert os.path.exists(bag.replace('.bag', '.png'))
+
+
+@pytest.mark.parametrize('images,complaint', [
+    (lambda: scenario_images(scenario_from(SCENE)), 'no messages on /ros_3d_bb/tracks'),
+    (lambda: images_with_tracks('odom'), 'frames map, odom')])
+def test_a_bag_that_cannot_be_compared_is_refused(tmp_path, images, complaint):
+    path = str(tmp_path / 'other.bag')
+    write_bag(images(), path)
+    result = subprocess.run(['rosrun', 'ros_3d_bb', 'scene_report', path], stdout=subprocess.PIPE,
+                            stderr=subprocess.STDOUT, universal_newlines=True)
+    assert result.returncode == 1 and complaint in result.stdout and 'no report was written' in result.stdout
+    assert 'Traceback' not in result.stdout and os.listdir(str(tmp_path)) == ['other.bag']
+
+
+@pytest.mark.parametrize('content', [None, b'not a bag'])
+def test_what_is_no_bag_is_refused(tmp_path, content):
+    path = tmp_path / 'some.bag'
+    if content:
+        path.write_bytes(content)
+    result = subprocess.run(['rosrun', 'ros_3d_bb', 'scene_report', str(path)], stdout=subprocess.PIPE,
+                            stderr=subprocess.STDOUT, universal_newlines=True)
+    assert result.returncode == 1 and 'no report was written' in result.stdout and 'Traceback' not in result.stdout
