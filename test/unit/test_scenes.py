@@ -6,17 +6,12 @@ truth stand in for it, so that estimator and tracker are tested all the same.
 import glob
 import os
 
-import numpy as np
 import pytest
 import torch
 
 from conftest import DATA
-from ros_3d_bb.detection.depth_people import DepthPeople
-from ros_3d_bb.detection.floor import floor_from_transform
-from ros_3d_bb.detection.runtime import open_runtime
-from ros_3d_bb.detection.yolov5 import Yolov5
-from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.evaluation.identities import score
+from ros_3d_bb.evaluation.scene_benchmark import RANGE_M, depth_detector, result_of, yolov5_detector
 from ros_3d_bb.evaluation.scenes import run_scene, score_detections
 from ros_3d_bb.simulation.scenario import read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
@@ -27,7 +22,6 @@ THESIS_SCENES = [name for name in SCENES if name.startswith('thesis_')]
 # Of the 15 images a second, so that as many remain as a small computer manages: 7.5 and 5 a second.
 EVERY = {'depth': 2, 'yolov5': 3}
 OTHERS_EVERY = {'depth': 6, 'yolov5': 12}  # in the scenes where only detections count
-RANGE_M = {'yolov5': (2.0, 8.0), 'depth': (2.0, 6.0)}
 
 
 @pytest.fixture(scope='module')
@@ -35,15 +29,7 @@ def yolov5():
     if not DATA:
         return lambda frame: [person.box_px for person in frame.people if person.visible > 0.3]
     torch.set_num_threads(1)  # more wait for each other where other tests or programs are at work
-    detector = Yolov5(open_runtime(os.path.join(DATA, 'weights', 'yolov5n.pt'), 'cpu'))
-    return lambda frame: detector.detect(frame.color).boxes
-
-
-def depth_people(simulator):
-    """The weight-free detector, told the floor as by tf."""
-    detector = DepthPeople()
-    return lambda frame: detector.detect(frame.color, DepthImage(frame.depth_mm, 0.001), simulator.camera,
-                                         floor_from_transform(np.linalg.inv(frame.poses.map_from_camera))).boxes
+    return yolov5_detector(os.path.join(DATA, 'weights', 'yolov5n.pt'))
 
 
 @pytest.fixture(scope='module')
@@ -53,7 +39,7 @@ def runs(yolov5):
     for name in SCENES:
         simulator = Simulator(read_scenario(os.path.join(FOLDER, name)))
         every = EVERY if name in THESIS_SCENES else OTHERS_EVERY
-        found['depth', name] = run_scene(simulator, depth_people(simulator), every['depth'])
+        found['depth', name] = run_scene(simulator, depth_detector(simulator), every['depth'])
         found['yolov5', name] = run_scene(simulator, yolov5, every['yolov5'])
     return found
 
@@ -89,3 +75,12 @@ def test_detectors_find_people_and_nothing_else(runs, detector, recall, false_ra
 def test_nobody_is_found_in_an_empty_room(runs):
     steps = runs['depth', 'empty_room.yaml']
     assert sum(len(step.boxes) for step in steps) <= 0.05 * len(steps)
+
+
+def test_the_benchmark_says_what_the_scores_say(runs):
+    result = result_of(runs['depth', 'thesis_e_passing.yaml'], 'depth')
+    tracked = score([step.moment for step in runs['depth', 'thesis_e_passing.yaml']])
+    assert result['people'] == 4 and result['id_switches'] == 0 and result['images'] == 90
+    assert result['worst_m'] == max(person.worst_m for person in tracked.people)
+    empty = result_of(runs['depth', 'empty_room.yaml'], 'depth')
+    assert empty['people'] == 0 and empty['rmse_m'] is None and empty['recall'] == 1.0

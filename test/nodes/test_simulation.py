@@ -1,0 +1,59 @@
+"""simulation.launch as ./run demo starts it: a scene through the whole pipeline into a bag, and the report of it.
+
+Needs a master, as it is about all nodes together, with the simulator's clock.
+"""
+import os
+
+import pytest
+import rosbag
+import rospy
+
+from ros_3d_bb.evaluation.identities import score
+from ros_3d_bb.report import read_recording, write_report
+from support.ros import launched
+
+SCENE = """
+duration: 4.0
+rate: 10.0
+people:
+- {start: [4.0, 0.9], facing: 3.0, moves: [{to: [4.0, -0.6], speed: 0.8}]}
+- {start: [5.2, -0.8], facing: 2.0}
+robot: {moves: [{to: [0.4, 0.0], speed: 0.2}]}
+"""
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    """The bag of a run; the folder has a space in its name, as folders may."""
+    rospy.init_node('test_simulation')
+    folder = tmp_path_factory.mktemp('a scene')
+    (folder / 'scene.yaml').write_text(SCENE)
+    path = str(folder / 'run.bag')
+    with launched('simulation.launch', 'scenario:=%s' % (folder / 'scene.yaml'), 'record:=' + path, 'rviz:=false',
+                  'repeat:=false', 'wait_for_subscribers:=2') as process:
+        assert process.wait(timeout=120) == 0
+    return path
+
+
+def test_the_scene_ends_by_itself_and_everybody_was_followed(bag):
+    with rosbag.Bag(bag) as opened:
+        result = score(read_recording(opened).moments)
+    assert result.images > 30
+    assert [person.person for person in result.people] == [1, 2]
+    for person in result.people:
+        assert len(person.ids) == 1 and person.followed > 0.8 and person.rmse_m < 0.25, person
+    assert result.false_share < 0.1
+
+
+def test_the_bag_holds_what_is_needed_to_play_it_again(bag):
+    with rosbag.Bag(bag) as opened:
+        topics = opened.get_type_and_topic_info().topics
+    assert {'/camera/color/image_raw', '/camera/aligned_depth_to_color/image_raw', '/camera/color/camera_info', '/tf',
+            '/ground_truth', '/yolo_bounding_box', '/ros_3d_bb/bb_3d', '/ros_3d_bb/tracks',
+            '/visualization_marker_array'} <= set(topics)
+    assert not {'/ros_3d_bb/color', '/yolo_result_out'} & set(topics)
+
+
+def test_the_report_is_made_of_it(bag, tmp_path):
+    assert len(write_report(bag, str(tmp_path / 'report.png'))) == 4
+    assert os.path.getsize(str(tmp_path / 'report.png')) > 10000
