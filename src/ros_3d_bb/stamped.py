@@ -1,9 +1,15 @@
 """Pairing by stamp: the last second of messages, and those that wait for one. Stamps are integer nanoseconds."""
 import collections
+import time
 from typing import Any, NamedTuple
 
 NS = 1000000000  # nanoseconds in a second
 MAX_WAITING = 100  # boxes that wait at once; more than any camera sends in a second
+
+
+def arrival_clock_ns():
+    """The machine's clock: tells when something arrived, whatever /clock does; never a stamp."""
+    return int(time.monotonic() * NS)
 
 
 class Stamped(NamedTuple):

@@ -1,6 +1,5 @@
 """The node that lifts 2D boxes into space with the depth image they belong to."""
 import threading
-import time
 from typing import NamedTuple
 
 import rospy
@@ -15,7 +14,7 @@ from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.sample_images import SampleImages
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.params import check_not_negative
-from ros_3d_bb.stamped import NS, Pairing
+from ros_3d_bb.stamped import NS, Pairing, arrival_clock_ns
 
 DEPTH_TOPIC = 'camera/aligned_depth_to_color/image_raw'
 CAMERA_INFO_TOPIC = 'camera/color/camera_info'
@@ -65,11 +64,11 @@ class Bbox3dNode(object):
                                'the image border will be off', message.header.frame_id, message.D)
         with self._diagnostics.refusing('camera_info'), self._lock:
             camera = camera_from_message(message)
-            self._lift(self._pairing.add_camera(message.header.stamp.to_nsec(), _clock_ns(), camera))
+            self._lift(self._pairing.add_camera(message.header.stamp.to_nsec(), arrival_clock_ns(), camera))
 
     def _on_depth(self, message):
         with self._diagnostics.refusing('depth images'), self._lock:
-            self._lift(self._pairing.add_depth(stamp_of(message), _clock_ns(), message))
+            self._lift(self._pairing.add_depth(stamp_of(message), arrival_clock_ns(), message))
 
     def _on_boxes(self, message):
         with self._diagnostics.refusing('2D boxes'), self._lock:
@@ -78,7 +77,7 @@ class Bbox3dNode(object):
                 rospy.loginfo_once('the 2D boxes carry no stamp: each array is paired with the depth image that came '
                                    'nearest to %.3f s before it (~assumed_delay)', self._params.assumed_delay)
             self._diagnostics.count('arrays of 2D boxes')
-            self._lift(self._pairing.add_boxes(boxes.stamp_ns, _clock_ns(), boxes))
+            self._lift(self._pairing.add_boxes(boxes.stamp_ns, arrival_clock_ns(), boxes))
 
     def _lift(self, pairs):
         """Publish the 3D boxes of arrays of 2D boxes, each with the frame that belongs to it."""
@@ -133,11 +132,6 @@ class Bbox3dNode(object):
             return 'no depth image has come on %s within %.1f s' % (rospy.resolve_name(DEPTH_TOPIC), kept_s)
         return ('no depth image with their stamp %.3f came on %s; the newest has %.3f, and %.1f s are kept '
                 '(~cache_length)' % (boxes.stamp_ns / NS, rospy.resolve_name(DEPTH_TOPIC), newest_ns / NS, kept_s))
-
-
-def _clock_ns():
-    """The machine's clock: tells how long something took, whatever /clock does; never a stamp."""
-    return int(time.monotonic() * NS)
 
 
 def main():

@@ -1,6 +1,5 @@
 """The node that finds people without a trained network's weights, in depth and colour."""
 import threading
-import time
 from typing import NamedTuple
 
 import rospy
@@ -18,7 +17,7 @@ from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
 from ros_3d_bb.params import check_not_negative
-from ros_3d_bb.stamped import NS, Pairing
+from ros_3d_bb.stamped import NS, Pairing, arrival_clock_ns
 from ros_3d_bb.worker import NewestWorker
 
 CACHE_NS = NS  # how long images wait for each other
@@ -64,15 +63,15 @@ class DepthDetectorNode(object):
     def _on_camera_info(self, message):
         with self._diagnostics.refusing('camera_info'), self._lock:
             camera = camera_from_message(message)
-            self._offer(self._pairing.add_camera(message.header.stamp.to_nsec(), _clock_ns(), camera))
+            self._offer(self._pairing.add_camera(message.header.stamp.to_nsec(), arrival_clock_ns(), camera))
 
     def _on_depth(self, message):
         with self._diagnostics.refusing('depth images'), self._lock:
-            self._offer(self._pairing.add_depth(stamp_of(message), _clock_ns(), message))
+            self._offer(self._pairing.add_depth(stamp_of(message), arrival_clock_ns(), message))
 
     def _on_color(self, message):
         with self._diagnostics.refusing('colour images'), self._lock:
-            self._offer(self._pairing.add_boxes(stamp_of(message), _clock_ns(), message))
+            self._offer(self._pairing.add_boxes(stamp_of(message), arrival_clock_ns(), message))
 
     def _offer(self, pairs):
         """Hand colour images on whose depth image has come."""
@@ -109,11 +108,6 @@ class DepthDetectorNode(object):
 
     def _on_error(self, error):
         self._diagnostics.warn('searches failed', 'the detector failed: %s; waiting for the next image' % error)
-
-
-def _clock_ns():
-    """The machine's clock: tells how long something took, whatever /clock does; never a stamp."""
-    return int(time.monotonic() * NS)
 
 
 def main():
