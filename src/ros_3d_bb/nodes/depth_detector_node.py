@@ -56,9 +56,9 @@ class DepthDetectorNode(object):
         rospy.on_shutdown(self._worker.stop)
         self._switch = Switch(self._params.enabled)
         rospy.Subscriber('camera/color/camera_info', CameraInfo, self._on_camera_info, queue_size=10)
-        rospy.Subscriber('camera/aligned_depth_to_color/image_raw', Image, self._on_depth, queue_size=2,
+        rospy.Subscriber('camera/aligned_depth_to_color/image_raw', Image, self._on_depth, queue_size=10,
                          buff_size=2 ** 24)
-        rospy.Subscriber('camera/color/image_raw', Image, self._on_color, queue_size=2, buff_size=2 ** 24)
+        rospy.Subscriber('camera/color/image_raw', Image, self._on_color, queue_size=10, buff_size=2 ** 24)
 
     def _on_camera_info(self, message):
         with self._diagnostics.refusing('camera_info'), self._lock:
