@@ -11,15 +11,13 @@ from std_msgs.msg import Header
 from ros_3d_bb.camera_messages import CameraFrame, messages_of
 from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.measurements import SessionError, read_color, read_depth, read_session
-from ros_3d_bb.messages import boxes2d_to_message, time_from
-from ros_3d_bb.simulation.scenario import ScenarioError, read_scenario
+from ros_3d_bb.messages import BOXES_TOPIC, boxes2d_to_message, time_from
+from ros_3d_bb.simulation.scenario import ScenarioError, overridden, read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulator_messages import simulated_messages
+from ros_3d_bb.simulator_messages import START_NS, simulated_messages
 from ros_3d_bb.stamped import NS
 
-START_NS = 1600000000 * NS  # any time will do, but the same for each bag of a session
 MOUNT_M = (0.17, 0.0, 0.20)  # camera on a Jackal, metres forward, left and up of base_link (thesis 3.5.1)
-BOXES_TOPIC = 'yolo_bounding_box'
 
 
 class SessionBagOptions(NamedTuple):
@@ -109,11 +107,8 @@ def scenario_to_bag():
     parser.add_argument('--seed', type=int, help="of the noise and the people's looks (default: the scenario's)")
     arguments = parser.parse_args()
 
-    def images():
-        given = {name: getattr(arguments, name) for name in ('rate', 'seed') if getattr(arguments, name) is not None}
-        return scenario_images(read_scenario(arguments.scenario)._replace(**given))
-
-    _write(parser, arguments, images)
+    _write(parser, arguments, lambda: scenario_images(overridden(read_scenario(arguments.scenario), arguments.rate,
+                                                                 arguments.seed)))
 
 
 def _parser(name, doc):

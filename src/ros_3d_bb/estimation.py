@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Tuple
 
 import numpy as np
 
+FARTHEST_M = 100.0  # farther away no depth camera measures anything
 # A box whose edge is this close to the image border is taken to be cut by it: detectors round to whole pixels and
 # regress the edge of a cut person a pixel or two inside the image.
 BORDER_PX = 2
@@ -18,14 +19,14 @@ SAMPLES_WANTED = 2000
 BIN_M, LAYER_BINS = 0.05, 5  # a layer is the depth in so many bins of a histogram
 FIRST_LAYER_SHARE = 0.5  # the nearest layer with this share of the strongest one's weight is the person
 AXIS_BEHIND_SURFACE_M = 0.09  # mean over standing and walking bodies of the simulation, seen from all sides
-LEAST_OWN_SHARE = 0.05  # of the samples must not belong to somebody in front
+LEAST_SUPPORT = 0.1  # what carries less of the samples is no person that anything can be said about
 EDGE_PERCENT = 2  # of the pixels of the layer beyond its left and right edge: flying pixels, fingers
 
 
 class DepthImage(NamedTuple):
     """A depth image as the camera sent it: `values` (height, width) of any numeric type, times `scale_m` is metres.
 
-    Zero, negative, nan and inf mean: no depth measured there.
+    Zero, negative, nan, inf and more than `FARTHEST_M` mean: no depth measured there.
     """
 
     values: np.ndarray
@@ -34,7 +35,7 @@ class DepthImage(NamedTuple):
     def at(self, u, v):
         """Depth in metres at integer pixels (columns u, rows v), and whether it was measured; arrays of u's shape."""
         depth_m = self.values[v, u].astype(float) * self.scale_m
-        return depth_m, np.isfinite(depth_m) & (depth_m > 0)
+        return depth_m, (depth_m > 0) & (depth_m <= FARTHEST_M)
 
 
 class Samples(NamedTuple):
@@ -73,8 +74,7 @@ def sample_median(depth, rect_px, stride_px=20):
         If the rectangle is empty or reversed.
     """
     x1, y1, x2, y2 = (int(edge) for edge in rect_px)
-    if x1 >= x2 or y1 >= y2:
-        raise ValueError('box (%d, %d, %d, %d) is empty or reversed: x1 < x2 and y1 < y2 expected' % (x1, y1, x2, y2))
+    check_rect((x1, y1, x2, y2))
     height, width = depth.values.shape
     u, v = (grid.ravel() for grid in np.meshgrid(_ticks(x1, x2, width, stride_px), _ticks(y1, y2, height, stride_px)))
     return Samples(u, v, *depth.at(u, v))
@@ -136,10 +136,10 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     Returns
     -------
     Box3D or None
-        None where no sample carries a depth, or all belong to somebody in front.
+        None where no sample carries a depth, or less than `LEAST_SUPPORT` of them are in a layer of their own.
     """
-    own = samples.valid & ~_explained(samples, nearer)
-    if np.count_nonzero(own) < LEAST_OWN_SHARE * samples.u.size or not own.any():
+    own = samples.valid & ~_explained(samples, rect_px, nearer)
+    if not own.any():
         return None
     u, v, depth_m = (part[own] for part in (samples.u, samples.v, samples.depth_m))
     x1, y1, x2, y2 = rect_px
@@ -148,23 +148,27 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     for _ in range(3):
         layer_m = np.median(depth_m[np.abs(depth_m - layer_m) <= TRUNK_HALF_DEPTH_M])
     on_body = np.abs(depth_m - layer_m) <= BODY_HALF_DEPTH_M
+    support = np.count_nonzero(on_body) / float(samples.u.size)
+    if support < LEAST_SUPPORT:
+        return None
     points = camera.deproject(np.stack((u, v), axis=-1)[on_body], depth_m[on_body])
     left_m, right_m = np.percentile(points[:, 0], [EDGE_PERCENT, 100 - EDGE_PERCENT])
     height_m = (y2 - y1) / camera.fy * layer_m
     surface_m = np.array([(left_m + right_m) / 2, ((y1 + y2) / 2.0 - camera.cy) / camera.fy * layer_m, layer_m])
     center_m = surface_m * (1 + AXIS_BEHIND_SURFACE_M / layer_m)
     width_m = max(right_m - left_m, BIN_M)
-    return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px),
-                 np.count_nonzero(on_body) / float(samples.u.size), is_truncated(rect_px, camera))
+    return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px), support,
+                 is_truncated(rect_px, camera))
 
 
-def _explained(samples, boxes):
-    """Which samples lie in the rectangle and in the layer of depth of one of the boxes, (n,)."""
+def _explained(samples, rect_px, boxes):
+    """Which samples of a rectangle lie in the rectangle and in the layer of depth of one of the boxes, (n,)."""
     explained = np.zeros(samples.u.shape, bool)
     for box in boxes:
         x1, y1, x2, y2 = box.rect_px
-        explained |= ((samples.u >= x1) & (samples.u < x2) & (samples.v >= y1) & (samples.v < y2)
-                      & (np.abs(samples.depth_m - box.center_m[2]) <= BODY_HALF_DEPTH_M))
+        if x1 < rect_px[2] and x2 > rect_px[0] and y1 < rect_px[3] and y2 > rect_px[1]:
+            explained |= ((samples.u >= x1) & (samples.u < x2) & (samples.v >= y1) & (samples.v < y2)
+                          & (np.abs(samples.depth_m - box.center_m[2]) <= BODY_HALF_DEPTH_M))
     return explained
 
 
@@ -179,7 +183,7 @@ def _first_layer(depth_m, weights):
 
 class Estimator(NamedTuple):
     """`sample(depth, rect_px)` gives Samples; `estimate(samples, rect_px, camera, nearer)` makes a Box3D of them, or
-    None, knowing the boxes of those in front (see `near_first`).
+    None, knowing the boxes of those in front.
     """
 
     sample: Any
@@ -203,9 +207,41 @@ def estimator_named(name, stride_px=20):
     raise ValueError('estimator is %r; foreground or median expected' % name)
 
 
+def estimate_boxes(depth, rects_px, camera, estimator):
+    """The 3D boxes of all rectangles of one image, those in front first, so that nobody gets the depth of another.
+
+    Parameters
+    ----------
+    depth : DepthImage
+    rects_px : list of (x1, y1, x2, y2)
+        Usable ones, see `check_rect`.
+    camera : geometry.Camera
+    estimator : Estimator
+
+    Returns
+    -------
+    list of Box3D or None
+        In the order of the rectangles.
+    """
+    found = {}
+    for number in near_first(rects_px):
+        rect_px = rects_px[number]
+        box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, camera, list(found.values()))
+        if box is not None:
+            found[number] = box
+    return [found.get(number) for number in range(len(rects_px))]
+
+
 def near_first(rects_px):
     """Numbers of rectangles, those of nearer people first: they stand lower in the image, and are larger."""
     return sorted(range(len(rects_px)), key=lambda number: (-rects_px[number][3], rects_px[number][1], number))
+
+
+def check_rect(rect_px):
+    """Raise ValueError where a rectangle is empty or reversed."""
+    x1, y1, x2, y2 = rect_px
+    if x1 >= x2 or y1 >= y2:
+        raise ValueError('box (%d, %d, %d, %d) is empty or reversed: x1 < x2 and y1 < y2 expected' % (x1, y1, x2, y2))
 
 
 def is_truncated(rect_px, camera):

@@ -7,15 +7,22 @@ VALID_COLOR, INVALID_COLOR, CORNER_COLOR = (255, 0, 0), (0, 0, 255), (160, 32, 2
 
 
 def draw_boxes(image, boxes, labels):
-    """Draw 2D boxes (n, 4) with a label each. Returns the image."""
+    """Draw 2D boxes (n, 4) with a label each, which may be empty. Returns the image."""
     for box, label in zip(np.rint(boxes).astype(int).tolist(), labels):
         cv2.rectangle(image, tuple(box[:2]), tuple(box[2:]), BOX_COLOR, 2)
+        if not label:
+            continue
         (width, height), below = cv2.getTextSize(label, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)
         top = max(box[1], height + below)  # inside the image, where the box begins above it
         cv2.rectangle(image, (box[0], top - height - below), (box[0] + width, top), BOX_COLOR, cv2.FILLED)
         cv2.putText(image, label, (box[0], top - below // 2 - 1), cv2.FONT_HERSHEY_SIMPLEX, 0.5, TEXT_COLOR, 1,
                     cv2.LINE_AA)
     return image
+
+
+def draw_caption(image, text):
+    """Write a line into the upper left corner. Returns the image."""
+    return cv2.putText(image, text, (8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.8, TEXT_COLOR, 2, cv2.LINE_AA)
 
 
 def draw_samples(image, rect_px, samples):

@@ -12,21 +12,23 @@ from ros_3d_bb.camera_messages import COLOR_TOPIC
 from ros_3d_bb.evaluation.identities import Moment, score, table
 from ros_3d_bb.evaluation.picture import Paths, scene_picture
 from ros_3d_bb.images import rgb_from
-from ros_3d_bb.messages import boxes2d_from_message, stamp_of, tracks_from_message, transform_from_message
-from ros_3d_bb.overlay import draw_boxes
+from ros_3d_bb.messages import (BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message, stamp_of, tracks_from_message,
+                                transform_from_message)
+from ros_3d_bb.overlay import draw_boxes, draw_caption
 from ros_3d_bb.simulator_messages import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
+from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.tracked import VISIBLE
 
-TRACKS_TOPIC, BOXES_TOPIC = 'ros_3d_bb/tracks', 'yolo_bounding_box'
 PANELS = 6
 
 
 class Recording(NamedTuple):
-    """What a bag holds of a scene: `moments` in the order of their stamps; `boxes` (n, 4) by stamp; the robot's path
-    (n, 2) in the map.
+    """What a bag holds of a scene: `moments`, one for each image of it, without tracks where no answer came; how many
+    were `answered`; `boxes` (n, 4) by stamp; the robot's path (n, 2) in the map.
     """
 
     moments: list
+    answered: int
     boxes: dict
     robot: np.ndarray
 
@@ -59,9 +61,10 @@ def read_recording(bag):
     frames = set(message.header.frame_id for by_stamp in (truth, tracks) for message in by_stamp.values())
     if len(frames) > 1:
         raise ValueError('truth and tracks are in the frames %s; one frame expected' % ', '.join(sorted(frames)))
-    moments = [Moment(stamp_ns, tracks_from_message(truth[stamp_ns]), tracks_from_message(tracks[stamp_ns]))
-               for stamp_ns in sorted(set(truth) & set(tracks))]
-    return Recording(moments, boxes, np.array(robot).reshape(-1, 2))
+    moments = [Moment(stamp_ns, tracks_from_message(truth[stamp_ns]),
+                      tracks_from_message(tracks[stamp_ns]) if stamp_ns in tracks else [])
+               for stamp_ns in sorted(truth)]
+    return Recording(moments, len(set(truth) & set(tracks)), boxes, np.array(robot).reshape(-1, 2))
 
 
 def paths_of(recording):
@@ -85,7 +88,8 @@ def panels_of(bag, recording, count=PANELS):
         stamp_ns = message.header.stamp.to_nsec()
         if stamp_ns in wanted:
             boxes = recording.boxes.get(stamp_ns, np.zeros((0, 4), int))
-            panels.append(draw_boxes(rgb_from(message).copy(), boxes, [''] * len(boxes)))
+            panel = draw_boxes(rgb_from(message).copy(), boxes, [''] * len(boxes))
+            panels.append(draw_caption(panel, '%.1f s' % ((stamp_ns - recording.moments[0].stamp_ns) / NS)))
     return panels
 
 
@@ -94,9 +98,14 @@ def write_report(bag_path, picture_path):
     with rosbag.Bag(bag_path) as bag:
         recording = read_recording(bag)
         lines = table(score(recording.moments))
+        lines.append('%d of %d images answered' % (recording.answered, len(recording.moments)))
         picture = scene_picture(panels_of(bag, recording), paths_of(recording), lines)
-    if not cv2.imwrite(picture_path, np.ascontiguousarray(picture[..., ::-1])):
-        raise OSError('%s cannot be written' % picture_path)
+    try:
+        written = cv2.imwrite(picture_path, np.ascontiguousarray(picture[..., ::-1]))
+    except cv2.error:  # a name without an ending that it knows
+        written = False
+    if not written:
+        raise OSError('%s cannot be written; a name that ends in .png or .jpg expected' % picture_path)
     return lines
 
 

@@ -5,7 +5,9 @@ from ros_3d_bb.camera_messages import CameraFrame, messages_of
 from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.messages import time_from, tracks_to_message
 from ros_3d_bb.simulation.truth import truth_at
+from ros_3d_bb.stamped import NS
 
+START_NS = 1600000000 * NS  # when scenes and bags begin: any time will do, but the same each time
 TRUTH_TOPIC = 'ground_truth'
 CAMERA_FRAME, MAP_FRAME, ODOM_FRAME, BASE_FRAME = 'camera_color_optical_frame', 'map', 'odom', 'base_link'
 

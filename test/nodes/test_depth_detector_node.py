@@ -29,12 +29,14 @@ class Rig(object):
                       INFO: publisher(INFO, CameraInfo), 'tf': publisher('/tf', TFMessage)}
         self._sent = 0
 
-    def send(self, leave_out=()):
-        """Send the next image; returns its stamp and the true boxes."""
+    def send(self, leave_out=(), frame_id=None):
+        """Send the next image, in another frame where given; returns its stamp and the true boxes."""
         frame = self.simulator.frame(self._sent)
         stamp_ns = START_NS + self._sent * NS // 10
         self._sent += 1
         for topic, message in simulated_messages(self.simulator, frame, stamp_ns):
+            if frame_id and topic != 'tf':
+                message.header.frame_id = frame_id
             if topic in self._pubs and topic not in leave_out:
                 self._pubs[topic].publish(message)
         return stamp_ns, [person.box_px for person in frame.people]
@@ -63,6 +65,15 @@ def is_found(message, true_boxes):
         iou(np.array(true_box, float), boxes).max() > 0.5 for true_box in true_boxes)
 
 
+def test_an_image_without_any_floor_is_not_answered(rig, output):
+    """Neither from tf nor in the depth image, nor seen before: an empty array would say that nobody is there."""
+    known, rig.simulator = rig.simulator, Simulator(scenario_from({'rate': 10.0, 'robot': {'pitch': 0.9}}))
+    rig.send(frame_id='another_camera')
+    rig.simulator = known
+    assert output.stays_at(0)
+    assert diagnostics_of('depth_detector_node')[2]['images without floor'] == 1
+
+
 def test_people_are_found_and_carry_the_stamp_of_their_image(rig, output):
     sent = [rig.send()]
     output.wait_for(1)
@@ -75,11 +86,10 @@ def test_people_are_found_and_carry_the_stamp_of_their_image(rig, output):
 
 
 def test_without_transform_the_floor_is_looked_for_in_the_image(rig, output):
-    """A gap of ten seconds, which tf cannot bridge."""
-    rig._sent += 100
-    _stamp, true_boxes = rig.send(leave_out=['tf'])
+    """The camera is in a frame that tf does not know."""
+    _stamp, true_boxes = rig.send(frame_id='another_camera')
     assert is_found(output.wait_for(1)[0], true_boxes)
-    assert diagnostics_of('depth_detector_node')[2]['images without transform'] == 1
+    assert diagnostics_of('depth_detector_node')[2]['images without transform'] == 2
 
 
 def test_an_image_without_depth_is_not_searched_and_the_next_one_is(rig, output):

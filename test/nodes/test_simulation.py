@@ -55,5 +55,5 @@ def test_the_bag_holds_what_is_needed_to_play_it_again(bag):
 
 
 def test_the_report_is_made_of_it(bag, tmp_path):
-    assert len(write_report(bag, str(tmp_path / 'report.png'))) == 4
+    assert len(write_report(bag, str(tmp_path / 'report.png'))) == 5
     assert os.path.getsize(str(tmp_path / 'report.png')) > 10000

@@ -194,9 +194,12 @@ def test_only_floor_is_nobody(floor):
 @pytest.mark.parametrize('depth', [DepthImage(np.zeros((480, 640), np.uint16), 0.001),
                                    DepthImage(np.full((480, 640), np.nan, np.float32), 1.0)])
 def test_no_depth_is_nobody(depth):
-    room = Room()
-    for floor in (room.floor, None):
-        assert DepthPeople().detect(room.color, depth, CAMERA, floor).boxes.shape == (0, 4)
+    assert DepthPeople().detect(Room().color, depth, CAMERA, Room().floor).boxes.shape == (0, 4)
+
+
+def test_without_any_floor_nobody_knows():
+    depth = DepthImage(np.zeros((480, 640), np.uint16), 0.001)
+    assert DepthPeople().detect(Room().color, depth, CAMERA) is None
 
 
 def test_last_floor_is_kept_where_none_is_seen():
@@ -207,17 +210,29 @@ def test_last_floor_is_kept_where_none_is_seen():
     detector.detect(color, depth, CAMERA)
     hidden = DepthImage(np.where(room.depth_m[:, :1] == room.depth_m, 0, depth.values), 0.001)
     assert_boxes(detector.detect(color, hidden, CAMERA).boxes, expected)
-    assert len(DepthPeople().detect(color, hidden, CAMERA).boxes) == 0
+    assert DepthPeople().detect(color, hidden, CAMERA) is None
 
 
-def test_images_of_two_sizes_are_refused():
-    depth = DepthImage(np.zeros((240, 320), np.uint16), 0.001)
-    with pytest.raises(ValueError, match='640 x 480 pixels and depth image 320 x 240'):
-        DepthPeople().detect(np.zeros((480, 640, 3), np.uint8), depth, CAMERA)
+@pytest.mark.parametrize('image,depth,message', [
+    ((480, 640), (240, 320), 'depth image has 320 x 240 pixels and the colour camera 640 x 480'),
+    ((240, 320), (240, 320), 'depth image has 320 x 240 pixels and the colour camera 640 x 480'),
+    ((240, 320), (480, 640), 'colour image has 320 x 240 pixels and depth image 640 x 480')])
+def test_images_and_cameras_of_two_sizes_are_refused(image, depth, message):
+    with pytest.raises(ValueError, match=message):
+        DepthPeople().detect(np.zeros(image + (3,), np.uint8), DepthImage(np.zeros(depth, np.uint16), 0.001), CAMERA)
+
+
+@pytest.mark.parametrize('normal', [(0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)])
+def test_a_floor_that_is_not_below_is_refused(normal):
+    room = Room()
+    with pytest.raises(ValueError, match='the floor has the normal'):
+        DepthPeople().detect(*(room.images() + (CAMERA, Floor(np.array(normal), 1.0))))
 
 
 @pytest.mark.parametrize('params,message', [({'min_depth': 7.0}, 'min_depth is 7 and max_depth is 6.5'),
                                             ({'min_score': -1.0}, 'min_score is -1'),
+                                            ({'cell_angle': 2.0}, 'cell_angle is 2'),
+                                            ({'cell_angle': 0.0}, 'cell_angle is 0'),
                                             ({'depth_step': float('nan')}, 'depth_step is nan')])
 def test_senseless_parameters_are_refused(params, message):
     with pytest.raises(ValueError, match=message):
@@ -232,7 +247,8 @@ def test_finds_the_people_of_a_session_and_nobody_else(session_folder):
     session = read_session(session_folder)
     detector, inside, hits, false = DepthPeople(), 0, 0, 0
     for frame in session.frames:
-        boxes = detector.detect(read_color(frame, session.camera), read_depth(frame, session), session.camera).boxes
+        found = detector.detect(read_color(frame, session.camera), read_depth(frame, session), session.camera)
+        boxes = np.zeros((0, 4)) if found is None else found.boxes  # no floor is seen in the synthetic session
         hit = len(boxes) > 0 and iou(np.array(frame.boxes_px[0], float), boxes).max() >= 0.4
         false += len(boxes) - hit
         x, z = np.abs(frame.truth_m)

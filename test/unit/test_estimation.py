@@ -3,8 +3,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.estimation import (AXIS_BEHIND_SURFACE_M, DepthImage, estimate_foreground, estimate_median,
-                                  estimator_named, is_truncated, near_first, sample_foreground, sample_median)
+from ros_3d_bb.estimation import (AXIS_BEHIND_SURFACE_M, DepthImage, estimate_boxes, estimate_foreground,
+                                  estimate_median, estimator_named, is_truncated, near_first, sample_foreground,
+                                  sample_median)
 from ros_3d_bb.geometry import Camera
 from ros_3d_bb.measurements import read_depth, read_session
 
@@ -133,6 +134,32 @@ def test_foreground_looks_at_about_as_many_pixels_in_every_box():
 def test_foreground_finds_nothing_without_depth(depth, scale_m, dtype):
     assert foreground(flat(depth, scale_m, dtype), (0, 0, 64, 48)) is None
     assert foreground(flat(2000), (70, 10, 90, 20)) is None
+
+
+def test_foreground_says_nothing_of_a_few_pixels():
+    """A twentieth of the box is not enough for a person; the wall behind fills none of it."""
+    depth = flat(0)
+    depth.values[20:24, 30:33] = 2000
+    assert foreground(depth, (20, 10, 42, 40)) is None
+
+
+def test_one_absurd_depth_neither_stalls_nor_counts():
+    depth = flat(2.0, 1.0, np.float32)
+    depth.values[10, 10], depth.values[20, 20] = 1e30, 1e7
+    box = foreground(depth, (5, 5, 60, 45))
+    assert box.center_m[2] == pytest.approx(2.0 + AXIS_BEHIND_SURFACE_M) and box.support < 1
+
+
+@pytest.mark.parametrize('name', ['foreground', 'median'])
+def test_boxes_come_in_the_order_of_their_rectangles(name):
+    depth = flat(5000)
+    depth.values[10:40, 30:50] = 3000
+    depth.values[5:45, 10:34] = 2000
+    depth.values[:, 60:] = 0
+    rects = [(28, 10, 50, 40), (60, 0, 64, 40), (10, 5, 34, 45)]
+    far, nobody, near = estimate_boxes(depth, rects, CAMERA, estimator_named(name))
+    assert nobody is None and near.rect_px == rects[2] and far.rect_px == rects[0]
+    assert near.center_m[2] < 2.2 and far.center_m[2] > near.center_m[2] + 0.4
 
 
 def test_those_who_stand_lower_in_the_image_come_first():

@@ -59,6 +59,23 @@ def test_only_images_that_show_the_person_count():
     assert person.visible_s == person.longest_s == pytest.approx(0.5)
 
 
+def test_a_track_that_was_not_seen_follows_nobody():
+    person, = score(moments(([at(1, 0, 0)], [at(5, 0, 0)]), ([at(1, 0.2, 0)], [at(5, 0, 0, OCCLUDED)]))).people
+    assert person.followed == 0.5 and person.ids == [5]
+
+
+def test_time_without_images_is_no_time_in_view():
+    images = [Moment(int(time_s * NS), [at(1, 0, 0)], [at(5, 0, 0)]) for time_s in (0, 1, 2, 100, 101)]
+    person, = score(images).people
+    assert (person.longest_s, person.visible_s) == (2.0, 3.0)
+
+
+def test_a_number_is_remembered_over_images_without_tracks():
+    gap = [([at(1, 0, 0)], [at(5, 0, 0)]), ([at(1, 0, 0)], []), ([at(1, 0, 0)], [at(5, 0.4, 0), at(6, 0.1, 0)])]
+    person, = score(moments(*gap)).people
+    assert person.ids == [5] and person.followed == pytest.approx(2 / 3)
+
+
 def test_the_table_has_a_line_for_each_person():
     lines = table(score(moments(([at(1, 0, 0), at(2, 3, 0)], [at(5, 0.25, 0)]))))
     assert lines[0].split() == ['person', 'visible', 'followed', 'switches', 'numbers', 'RMSE', 'worst']

@@ -176,6 +176,16 @@ def test_the_same_scenario_gives_the_same_bytes_and_another_seed_others(tmp_path
     assert one == two and one != other
 
 
+@pytest.mark.parametrize('option,complaint', [(('--rate', '0'), 'rate is 0'), (('--rate', 'nan'), 'rate is nan'),
+                                              (('--seed', '-1'), 'seed is -1')])
+def test_a_rate_or_seed_that_makes_no_sense_leaves_no_bag(tmp_path, option, complaint):
+    scenario = tmp_path / 'scene.yaml'
+    scenario.write_text(json.dumps(SCENE))
+    result = run_tool('scenario_to_bag', str(scenario), str(tmp_path / 'out.bag'), *option)
+    assert result.returncode == 1 and complaint in result.stdout and 'Traceback' not in result.stdout
+    assert os.listdir(str(tmp_path)) == ['scene.yaml']
+
+
 def test_a_broken_scenario_leaves_no_bag_and_says_why(tmp_path):
     scenario = tmp_path / 'scene.yaml'
     scenario.write_text('people:\n- {strat: [1, 2]}\n')

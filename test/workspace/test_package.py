@@ -32,7 +32,7 @@ CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams), 'bbox3d.yaml': (B
            'depth_detector.yaml': (DepthDetectorParams, DepthPeopleParams)}
 SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id'},
                  'tracker.yaml': {'target_frame', 'camera_frame'}, 'simulator.yaml': {'scenario'},
-                 'depth_detector.yaml': {'floor_frame'}}
+                 'depth_detector.yaml': {'floor_frame', 'frame_id'}}
 REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag']
 
 

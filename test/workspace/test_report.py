@@ -42,9 +42,10 @@ def bag(tmp_path_factory):
 def test_tracks_meet_the_truth_of_their_own_stamp(bag):
     with rosbag.Bag(bag) as opened:
         recording = read_recording(opened)
-    assert [moment.stamp_ns for moment in recording.moments] == [START_NS + n * NS // 10 for n in range(1, 10)]
+    assert [moment.stamp_ns for moment in recording.moments] == [START_NS + n * NS // 10 for n in range(10)]
+    assert recording.answered == 9 and recording.moments[0].tracks == []
     paths = paths_of(recording)
-    np.testing.assert_allclose(np.array(paths.tracks[7]) - paths.people[1], [[0, SHIFT_M]] * 9)
+    np.testing.assert_allclose(np.array(paths.tracks[7]) - paths.people[1][1:], [[0, SHIFT_M]] * 9)
     assert paths.robot.shape == (10, 2) and 0.2 < paths.robot[-1, 0] < 1.0
 
 
@@ -52,6 +53,7 @@ def test_the_report_is_a_table_and_a_picture(bag, tmp_path):
     picture = str(tmp_path / 'report.png')
     lines = write_report(bag, picture)
     assert lines[1].split()[0] == '1' and '0.200 m' in lines[1] and ' 7 ' in lines[1]
+    assert ' 90 %' in lines[1] and lines[-1] == '9 of 10 images answered'
     assert cv2.imread(picture).shape[1] == 1456
 
 
@@ -59,6 +61,11 @@ def test_the_command_prints_it_and_puts_the_picture_beside_the_bag(bag):
     output = subprocess.check_output(['rosrun', 'ros_3d_bb', 'scene_report', bag], universal_newlines=True)
     assert '0.200 m' in output and 'picture: %s' % bag.replace('.bag', '.png') in output
     assert os.path.exists(bag.replace('.bag', '.png'))
+
+
+def test_a_picture_that_cannot_be_written_is_said(bag, tmp_path):
+    with pytest.raises(OSError, match='a name that ends in .png'):
+        write_report(bag, str(tmp_path / 'picture'))
 
 
 @pytest.mark.parametrize('images,complaint', [

@@ -81,6 +81,8 @@ class Shape(NamedTuple):
 def check_params(params):
     """Raise ValueError, naming the value, where a parameter makes no sense."""
     check_not_negative(params, *params._fields)
+    if not 0 < params.cell_angle <= 0.05:
+        raise ValueError('cell_angle is %g; more than 0 and at most 0.05 expected' % params.cell_angle)
     for name in ('depth', 'width', 'top'):
         low, high = getattr(params, 'min_%s' % name), getattr(params, 'max_%s' % name)
         if not low < high:

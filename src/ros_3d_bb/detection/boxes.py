@@ -37,6 +37,7 @@ def suppressed(detections, iou_limit, max_det):
 
 def iou(box, boxes):
     """Intersection over union of one box (4,) with each of boxes (n, 4); 0 where both are empty."""
+    box, boxes = np.asarray(box, float), np.asarray(boxes, float).reshape(-1, 4)
     overlap = np.minimum(box[2:], boxes[:, 2:]) - np.maximum(box[:2], boxes[:, :2])
     intersection = np.clip(overlap, 0, None).prod(axis=1)
     union = (box[2:] - box[:2]).prod() + (boxes[:, 2:] - boxes[:, :2]).prod(axis=1) - intersection

@@ -9,7 +9,7 @@ import numpy as np
 
 from ros_3d_bb.detection.bodies import DepthPeopleParams, check_params, find_bodies, grid_of
 from ros_3d_bb.detection.boxes import Detections
-from ros_3d_bb.detection.floor import fit_floor
+from ros_3d_bb.detection.floor import check_upright, fit_floor
 from ros_3d_bb.detection.hog import BEST_HOG, Figure, PersonHog, evidence_of, person_score, pyramid_of
 
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # of a person who is partly outside the image
@@ -56,21 +56,25 @@ class DepthPeople(object):
 
         Returns
         -------
-        ros_3d_bb.detection.boxes.Detections
-            All of class 0. Nobody is found while there was never a floor.
+        ros_3d_bb.detection.boxes.Detections or None
+            All of class 0. None while no floor was found yet: nobody knows who is there.
 
         Raises
         ------
         ValueError
-            If the images differ in size.
+            If the images or the camera differ in size, or the camera does not stand upright above the floor.
         """
+        if depth.values.shape != (camera.height, camera.width):
+            raise ValueError('depth image has %d x %d pixels and the colour camera %d x %d; depth aligned to colour '
+                             'expected' % (depth.values.shape[::-1] + camera[:2]))
         if image.shape[:2] != depth.values.shape:
             raise ValueError('colour image has %d x %d pixels and depth image %d x %d; depth aligned to colour expected'
                              % (image.shape[1::-1] + depth.values.shape[::-1]))
         if floor is None:
             floor = self._floor = fit_floor(depth, camera) or self._floor
         if floor is None:
-            return _detections([])
+            return None
+        check_upright(floor)
         grid = grid_of(depth, camera, floor, self._params)
         pyramid = pyramid_of(image)
         found = []

@@ -11,7 +11,8 @@ STEP_PX = 10  # the floor is fitted to every so many pixels: about 3000 points o
 HYPOTHESES = 300  # enough for a floor that fills a quarter of the image: 300 / 4**3 triples lie on it
 SCORING_POINTS = 600
 FAR_M = 6.0
-MAX_TILT_RAD = np.radians(27)
+MAX_TILT_RAD = np.radians(27)  # of a floor that is looked for
+MOST_TILT_RAD = np.radians(50)  # of one that is known
 CAMERA_HEIGHT_M = (0.12, 2.2)
 MIN_POINTS, MIN_SHARE = 60, 0.04  # of the points with depth, for a plane to be credible
 MAX_BELOW = 0.05  # share of the points
@@ -44,6 +45,14 @@ def floor_from_transform(camera_from_floor):
     """
     normal = camera_from_floor[:3, 2]
     return Floor(normal, -float(np.dot(normal, camera_from_floor[:3, 3])))
+
+
+def check_upright(floor):
+    """Raise ValueError where the floor is not below the camera and more or less level in its image."""
+    if not (-floor.normal[1] > np.cos(MOST_TILT_RAD) and floor.offset_m > 0):
+        raise ValueError('the floor has the normal (%.2f, %.2f, %.2f) in the camera\'s optical frame, and the camera '
+                         'is %.2f m above it; about (0, -1, 0) and more than 0 expected: is that frame an optical one, '
+                         'and does the z axis of the floor point up?' % (tuple(floor.normal) + (floor.offset_m,)))
 
 
 def fit_floor(depth, camera, seed=0):

@@ -1,8 +1,8 @@
 """Tracks against ground truth: who got which number, kept it, and how far off was the position.
 
-In each image people and tracks are paired within `GATE_M` in the plane seen from above; a pair of the image before is
-kept as long as it is within the gate (as in CLEAR MOT, Bernardin and Stiefelhagen 2008), the rest is paired nearest
-first. What counts is what the images show: a person in an image where their status is VISIBLE.
+In each image people and the tracks that were seen in it are paired within `GATE_M` in the plane seen from above; a pair
+of before is kept as long as it is within the gate (as in CLEAR MOT, Bernardin and Stiefelhagen 2008), the rest is
+paired nearest first. What counts is what the images show: people and tracks whose status is VISIBLE.
 """
 from typing import List, NamedTuple
 
@@ -13,6 +13,7 @@ from ros_3d_bb.tracking.association import match_greedily, plane_distances
 from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
 
 GATE_M = 1.0
+LONGEST_GAP = 1.5  # in periods between images; where more is missing, a stretch ends
 
 
 class Moment(NamedTuple):
@@ -71,48 +72,52 @@ def score(moments):
     -------
     SceneScore
     """
-    pairs, false = [], 0
+    pairs, false, last_track = [], 0, {}
     for moment in moments:
-        pairs.append(_pairs(moment, {pair.person: pair.track for pair in pairs[-1]} if pairs else {}))
-        paired = set(pair.track for pair in pairs[-1])
-        false += sum(track.status == VISIBLE and track.id not in paired for track in moment.tracks)
+        seen = [track for track in moment.tracks if track.status == VISIBLE]
+        pairs.append(_pairs(moment.truth, seen, last_track))
+        last_track.update({pair.person: pair.track for pair in pairs[-1]})
+        false += len(seen) - len(pairs[-1])
     people = sorted(set(person.id for moment in moments for person in moment.truth))
     return SceneScore([_person_score(person, moments, pairs) for person in people], len(moments),
                       false / float(max(1, len(moments))))
 
 
-def _pairs(moment, before):
-    """The pairs of one image; `before`: track by person in the image before."""
-    if not moment.truth or not moment.tracks:
+def _pairs(people, tracks, before):
+    """The pairs of one image; `before`: the last track of each person."""
+    if not people or not tracks:
         return []
-    distances = plane_distances([person.position_m for person in moment.truth],
-                                [track.position_m for track in moment.tracks])
+    distances = plane_distances([person.position_m for person in people], [track.position_m for track in tracks])
     near = distances <= GATE_M
-    kept = [[before.get(person.id) == track.id for track in moment.tracks] for person in moment.truth]
+    kept = [[before.get(person.id) == track.id for track in tracks] for person in people]
     cost = np.where(np.array(kept) & near, distances - 2 * GATE_M, distances)
-    return [Pair(moment.truth[row].id, moment.tracks[column].id,
-                 moment.tracks[column].position_m[:2] - moment.truth[row].position_m[:2])
+    return [Pair(people[row].id, tracks[column].id, tracks[column].position_m[:2] - people[row].position_m[:2])
             for row, column in match_greedily(cost) if near[row, column]]
 
 
 def _person_score(person, moments, pairs):
-    ids, errors_m, shown, followed, stretches = [], [], 0, 0, [[]]
+    ids, errors_m, shown_ns = [], [], []
     for moment, found in zip(moments, pairs):
         if not any(other.id == person and other.status == VISIBLE for other in moment.truth):
-            stretches.append([])
             continue
-        stretches[-1].append(moment.stamp_ns)
-        shown += 1
+        shown_ns.append(moment.stamp_ns)
         for pair in found:
             if pair.person == person:
-                followed += 1
                 errors_m.append(np.linalg.norm(pair.error_m))
                 if ids[-1:] != [pair.track]:
                     ids.append(pair.track)
-    lengths_s = [(stretch[-1] - stretch[0]) / NS for stretch in stretches if stretch]
-    return PersonScore(person, sum(lengths_s), max(lengths_s, default=0.0), followed / float(max(1, shown)), ids,
+    lengths_s = _stretches_s(shown_ns, [moment.stamp_ns for moment in moments])
+    return PersonScore(person, sum(lengths_s), max(lengths_s, default=0.0),
+                       len(errors_m) / float(max(1, len(shown_ns))), ids,
                        float(np.sqrt(np.mean(np.square(errors_m)))) if errors_m else float('nan'),
                        max(errors_m, default=float('nan')))
+
+
+def _stretches_s(shown_ns, all_ns):
+    """How long a person was shown at a time: stamps that follow each other, without longer gaps in the images."""
+    period_ns = np.median(np.diff(all_ns)) if len(all_ns) > 1 else 0
+    gaps = np.flatnonzero(np.diff(shown_ns) > LONGEST_GAP * period_ns) + 1
+    return [(stretch[-1] - stretch[0]) / NS for stretch in np.split(np.array(shown_ns, np.int64), gaps) if len(stretch)]
 
 
 def table(scene_score):

@@ -60,8 +60,11 @@ def top_view(paths):
 
     image = np.full((height, width, 3), PAPER, np.uint8)
     _draw_grid(image, pixels, low, high)
-    for path in paths.people.values():
-        cv2.polylines(image, [pixels(path)], False, TRUTH_COLOR, 7, cv2.LINE_AA)
+    for number, path in sorted(paths.people.items()):
+        corners = pixels(path)
+        cv2.polylines(image, [corners], False, TRUTH_COLOR, 7, cv2.LINE_AA)
+        cv2.putText(image, 'person %d' % number, tuple((corners[-1] + [8, 18]).tolist()), FONT, 0.5, INK, 1,
+                    cv2.LINE_AA)
     for number, path in sorted(paths.tracks.items()):
         color = TRACK_COLORS[number % len(TRACK_COLORS)]
         corners = pixels(path)

@@ -4,17 +4,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.estimation import DepthImage, estimator_named, near_first
+from ros_3d_bb.estimation import DepthImage, estimate_boxes, estimator_named
 from ros_3d_bb.evaluation.identities import Moment
 from ros_3d_bb.geometry import transform_points
 from ros_3d_bb.simulation.simulator import Frame
 from ros_3d_bb.simulation.truth import truth_at
 from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.association import match_greedily
 from ros_3d_bb.tracking.thesis import ThesisTracker
 from ros_3d_bb.tracking.tracked import Detection
 
-FOUND_IOU = 0.5  # a detection is that of a person where the boxes overlap by so much
-FALSE_IOU = 0.3  # and of nobody where it overlaps with no person by so much
+FOUND_IOU = 0.5  # a detection is that of a person where the boxes overlap by so much, else it is false
 
 
 class Step(NamedTuple):
@@ -41,7 +41,7 @@ class DetectionScore(NamedTuple):
     @property
     def false_rate(self):
         """False boxes an image."""
-        return self.false / float(self.images)
+        return self.false / float(max(1, self.images))
 
 
 def run_scene(simulator, detect, every=1, estimator=estimator_named('foreground')):
@@ -73,17 +73,16 @@ def run_scene(simulator, detect, every=1, estimator=estimator_named('foreground'
 
 def _detections(frame, boxes, camera, estimator):
     """The 2D boxes as bbox3d_node and tracker_node take them: 3D boxes, in the map."""
-    depth, found = DepthImage(frame.depth_mm, 0.001), []
     rects_px = [tuple(rect) for rect in np.rint(boxes).astype(int).tolist() if rect[0] < rect[2] and rect[1] < rect[3]]
-    for number in near_first(rects_px):
-        box = estimator.estimate(estimator.sample(depth, rects_px[number]), rects_px[number], camera, found)
-        found += [] if box is None else [box]
+    found = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, camera, estimator)
     return [Detection(transform_points(frame.poses.map_from_camera, box.center_m), box.size_m[[0, 2, 1]])
-            for box in found]
+            for box in found if box is not None]
 
 
 def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):
     """How many of the people in a range of depth, who are visible enough, the detector found, and what else.
+
+    In each image boxes and people are paired one to one, best overlap first.
 
     Returns
     -------
@@ -92,13 +91,15 @@ def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):
     people = found = false = 0
     for step in steps:
         shown = [person for person in step.frame.people if person.box_px is not None]
-        overlaps = np.array([iou(box, np.array([person.box_px for person in shown], float)) for box in step.boxes])
+        overlaps = np.array([iou(box, np.array([person.box_px for person in shown])) for box in step.boxes])
         overlaps = overlaps.reshape(len(step.boxes), len(shown))
-        false += int(np.count_nonzero(overlaps.max(axis=1) < FALSE_IOU)) if shown else len(step.boxes)
+        pairs = [pair for pair in match_greedily(-overlaps) if overlaps[pair] >= FOUND_IOU]
+        false += len(step.boxes) - len(pairs)
+        found_people = set(column for _row, column in pairs)
         camera_from_map = np.linalg.inv(step.frame.poses.map_from_camera)
         for column, person in enumerate(shown):
             depth_m = transform_points(camera_from_map, person.position_m)[2]
             if person.visible >= least_visible and nearest_m <= depth_m <= farthest_m:
                 people += 1
-                found += bool((overlaps[:, column] >= FOUND_IOU).any())
+                found += column in found_people
     return DetectionScore(people, found, false, len(steps))

@@ -6,7 +6,7 @@ import rospy
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header, Int32MultiArray
 
-from ros_3d_bb.estimation import estimator_named, near_first
+from ros_3d_bb.estimation import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.images import depth_from
 from ros_3d_bb.messages import boxes2d_from_message, boxes3d_to_message, camera_from_message, stamp_of, time_from
 from ros_3d_bb.msg import BoundingBox3DArray
@@ -92,23 +92,20 @@ class Bbox3dNode(object):
                 self._diagnostics.count('images lifted')
 
     def _boxes3d(self, depth, rects_px, camera):
-        """The 3D boxes of rectangles, in their order, without those that are unusable or show no depth."""
-        found = {}
-        for number in near_first(rects_px):
-            box = self._box3d(depth, rects_px[number], camera, list(found.values()))
-            if box is not None:
-                found[number] = box
-        return [found[number] for number in sorted(found)]
+        """The 3D boxes of rectangles, without those that are unusable or show no depth of their own."""
+        usable = [rect_px for rect_px in rects_px if self._is_usable(rect_px)]
+        boxes = [box for box in estimate_boxes(depth, usable, camera, self._estimator) if box is not None]
+        self._diagnostics.count('boxes lifted', len(boxes))
+        self._diagnostics.count('boxes without depth', len(usable) - len(boxes))
+        return boxes
 
-    def _box3d(self, depth, rect_px, camera, nearer):
-        """The 3D box of one rectangle, None where the rectangle is unusable or shows no depth of its own."""
+    def _is_usable(self, rect_px):
         try:
-            box = self._estimator.estimate(self._estimator.sample(depth, rect_px), rect_px, camera, nearer)
+            check_rect(rect_px)
+            return True
         except ValueError as error:
             self._diagnostics.warn('2D boxes refused', '2D %s; the others in this image are used' % error)
-            return None
-        self._diagnostics.count('boxes without depth' if box is None else 'boxes lifted')
-        return box
+            return False
 
     def _depth_of(self, frame, boxes):
         """The depth image of a frame. Raises ValueError where there is none, or it cannot belong to the camera."""

@@ -29,7 +29,7 @@ class DepthDetectorParams(NamedTuple):
 
     floor_frame: str = 'base_link'
     floor_height: float = -0.065
-    tf_timeout: float = 0.2
+    frame_id: str = ''
     stamp_tolerance: float = 0.005
     enabled: bool = True
     publish_empty: bool = True
@@ -45,12 +45,12 @@ class DepthDetectorNode(object):
 
     def __init__(self):
         self._params, people = read_params(DepthDetectorParams, DepthPeopleParams)
-        check_not_negative(self._params, 'tf_timeout', 'stamp_tolerance')
+        check_not_negative(self._params, 'stamp_tolerance')
         self._detector = DepthPeople(people)
         self._pairing = Pairing(CACHE_NS, int(self._params.stamp_tolerance * NS), 0)
         self._lock = threading.Lock()
         self._diagnostics = Diagnostics()
-        self._transforms = Transforms(self._params.tf_timeout) if self._params.floor_frame else None
+        self._transforms = Transforms(wait_s=0) if self._params.floor_frame else None
         self._output = BoxesOutput(self._params.publish_empty)
         self._worker = NewestWorker(self._search, self._on_error)
         rospy.on_shutdown(self._worker.stop)
@@ -89,19 +89,27 @@ class DepthDetectorNode(object):
 
     def _detect(self, frame, color):
         image = rgb_from(color)
-        found = self._detector.detect(image, depth_from(frame.depth), frame.camera, self._floor(color.header))
+        camera_frame = self._params.frame_id or color.header.frame_id
+        found = self._detector.detect(image, depth_from(frame.depth), frame.camera, self._floor(camera_frame))
+        if found is None:
+            self._diagnostics.warn('images without floor', 'no floor is known from tf nor seen in the depth image: '
+                                   'nobody is looked for; waiting for the next image')
+            return
         self._diagnostics.count('images searched')
         self._output.publish(color.header, image, found, NAMES)
 
-    def _floor(self, header):
-        """The floor where tf says it is; None where it does not, so that it is fitted."""
+    def _floor(self, camera_frame):
+        """The floor where tf says it is; None where it does not, so that it is fitted.
+
+        The newest transform serves: the camera stands still in the robot, and nothing has to be waited for.
+        """
         if self._transforms is None:
             return None
         try:
-            camera_from_base = self._transforms.lookup(header.frame_id, self._params.floor_frame, header.stamp)
+            camera_from_base = self._transforms.lookup(camera_frame, self._params.floor_frame, rospy.Time(0))
         except tf2_ros.TransformException as error:
             self._diagnostics.warn('images without transform', 'no transform from %s to %s: %s; the floor is looked '
-                                   'for in the depth image' % (self._params.floor_frame, header.frame_id, error))
+                                   'for in the depth image' % (self._params.floor_frame, camera_frame, error))
             return None
         base_from_floor = transform_from((0, 0, self._params.floor_height), (0, 0, 0, 1))
         return floor_from_transform(camera_from_base.dot(base_from_floor))

@@ -1,4 +1,5 @@
 """The node that stands in for a robot with a camera among people."""
+import sys
 import threading
 import time
 from typing import NamedTuple
@@ -6,21 +7,22 @@ from typing import NamedTuple
 import rospy
 from rosgraph_msgs.msg import Clock
 
-from ros_3d_bb.camera_messages import TYPES
+from ros_3d_bb.camera_messages import COLOR_TOPIC, TYPES
 from ros_3d_bb.messages import time_from
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics, is_ending
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.params import check_not_negative
-from ros_3d_bb.simulation.scenario import read_scenario
+from ros_3d_bb.simulation.scenario import overridden, read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulator_messages import TRUTH_TOPIC, simulated_messages
+from ros_3d_bb.simulator_messages import START_NS, TRUTH_TOPIC, simulated_messages
 from ros_3d_bb.stamped import NS
 
-START_NS = 1600000000 * NS  # when a scene starts, where this node tells the time: the same stamps in every run
 CLOCK_LEAD_NS = NS  # between the time that is told while waiting and the first image
 PAUSE_NS = 3 * NS  # between two rounds of a scene, so that the people of one are not taken for those of the next
 POLL_S = 0.05
+SETTLING_S = 1.0  # who has subscribed one topic still connects to the others
+LONGEST_WAIT_S = 60.0  # for subscribers: those who have not come by then will not come
 PROGRESS_S = 1.0  # between two lines of the log
 
 
@@ -52,6 +54,7 @@ class SimulatorNode(object):
                       for topic, kind in TYPES.items()}
         self._pubs[TRUTH_TOPIC] = rospy.Publisher(TRUTH_TOPIC, TrackedObjectArray, queue_size=10)
         self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=10) if self._params.publish_clock else None
+        self.failed = False
         self._worker = threading.Thread(target=self._run)
         self._worker.daemon = True
         self._worker.start()
@@ -63,20 +66,31 @@ class SimulatorNode(object):
             start_ns = START_NS + CLOCK_LEAD_NS if self._clock_pub is not None else rospy.get_rostime().to_nsec()
             while not rospy.is_shutdown():
                 self._play(start_ns)
-                start_ns += int(self._simulator.scenario.duration * NS) + PAUSE_NS
-                if not self._params.repeat:
+                if not self._params.repeat and not rospy.is_shutdown():
                     rospy.loginfo('the scene is over')
                     rospy.signal_shutdown('the scene is over')
-        except rospy.ROSException:
+                if self._clock_pub is not None:
+                    start_ns += int(self._simulator.scenario.duration * NS) + PAUSE_NS
+                else:
+                    time.sleep(PAUSE_NS / NS)
+                    start_ns = rospy.get_rostime().to_nsec()
+        except Exception as error:  # without this thread the node does nothing: better no node than such a one
             if not is_ending():
-                raise
+                self.failed = True
+                rospy.logfatal('the simulation ends: %s: %s', type(error).__name__, error)
+                rospy.signal_shutdown('the simulation failed')
 
     def _wait_for_subscribers(self):
         """Some of them, rosbag among them, do not even subscribe before there is a time."""
-        color_pub = self._pubs['camera/color/image_raw']
-        while color_pub.get_num_connections() < self._params.wait_for_subscribers and not rospy.is_shutdown():
+        color_pub, wanted, began_s = self._pubs[COLOR_TOPIC], self._params.wait_for_subscribers, time.monotonic()
+        while color_pub.get_num_connections() < wanted and not rospy.is_shutdown():
+            if time.monotonic() - began_s > LONGEST_WAIT_S:
+                raise RuntimeError('%d subscribers of %s came within %.0f s; %d expected (~wait_for_subscribers)' % (
+                    color_pub.get_num_connections(), color_pub.resolved_name, LONGEST_WAIT_S, wanted))
             self._tell_time(START_NS)
             time.sleep(POLL_S)
+        if wanted:
+            time.sleep(SETTLING_S)
 
     def _play(self, start_ns):
         """One round of the scene, its first image at a stamp."""
@@ -88,8 +102,7 @@ class SimulatorNode(object):
             number += 1
             rospy.loginfo_throttle(PROGRESS_S, 'image %d of %d' % (number, self._simulator.frame_count))
             if self._clock_pub is None:
-                late_s = (time.monotonic() - began_s) * self._params.speed
-                missed = int(late_s * self._simulator.scenario.rate) - number
+                missed = int((time.monotonic() - began_s) * self._simulator.scenario.rate) - number
                 if missed > 0:
                     self._diagnostics.count('images left out', missed)
                     number += missed
@@ -114,17 +127,19 @@ def _scenario(params):
     if not params.scenario:
         raise ValueError('no scenario given; set ~scenario (launch argument scenario:=) to the path of a file such as '
                          'those in config/scenarios')
-    check_not_negative(params, 'rate', 'wait_for_subscribers')
+    check_not_negative(params, 'wait_for_subscribers')
     if not 0 < params.speed <= 1000:
         raise ValueError('parameter ~speed is %g; more than 0 expected' % params.speed)
+    if params.speed != 1 and not params.publish_clock:
+        raise ValueError('parameter ~speed is %g; only where this node tells the time (~publish_clock) can it go '
+                         'faster or slower' % params.speed)
     try:
         scenario = read_scenario(params.scenario)
     except OSError as error:
-        raise ValueError('the scenario cannot be read: %s' % error)
-    return scenario._replace(rate=params.rate or scenario.rate,
-                             seed=scenario.seed if params.seed < 0 else params.seed)
+        raise ValueError('the scenario cannot be read: %s; an absolute path expected' % error)
+    return overridden(scenario, params.rate or None, None if params.seed < 0 else params.seed)
 
 
 def main():
-    """Run the node."""
-    run_node('simulator_node', SimulatorNode)
+    """Run the node; the exit status is 1 where the simulation failed."""
+    sys.exit(run_node('simulator_node', SimulatorNode).failed)

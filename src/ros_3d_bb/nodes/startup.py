@@ -12,11 +12,15 @@ def read_params(*kinds):
 
 
 def run_node(name, node_class):
-    """Run a node until ROS shuts down. A ValueError at its start is a fault of the set-up: say it and exit with 1."""
+    """Run a node until ROS shuts down, and return it.
+
+    A ValueError at its start is a fault of the set-up: it is said, and the exit status is 1.
+    """
     rospy.init_node(name)
     try:
-        node = node_class()  # noqa: F841  the subscribers hold it by its methods; the name keeps that visible
+        node = node_class()
     except ValueError as error:
         rospy.logfatal('%s cannot start: %s', rospy.get_name(), error)
         sys.exit(1)
     rospy.spin()
+    return node

@@ -163,6 +163,12 @@ def scenario_from(content):
     return scenario
 
 
+def overridden(scenario, rate=None, seed=None):
+    """A scenario with another rate or seed, as far as given. Raises ScenarioError where they make no sense."""
+    given = {name: _value(name, value, name) for name, value in (('rate', rate), ('seed', seed)) if value is not None}
+    return scenario._replace(**given)
+
+
 def _check_inside(bounds, name, start, moves, margin_m=0.0):
     x0, x1, y0, y1 = bounds = [bound + sign * margin_m for bound, sign in zip(bounds, (1, -1, 1, -1))]
     for x, y in [start] + [move.to for move in moves if move.to is not None]:
