@@ -80,9 +80,10 @@ def paths_of(recording):
 
 
 def panels_of(bag, recording, count=PANELS):
-    """The colour images of moments spread over the scene, with their 2D boxes."""
-    picks = np.linspace(0, len(recording.moments) - 1, count + 2)[1:-1].astype(int)
-    wanted = set(recording.moments[pick].stamp_ns for pick in picks)
+    """The colour images of moments spread over the scene, with their 2D boxes: of those that were searched, if any."""
+    stamps = [moment.stamp_ns for moment in recording.moments]
+    stamps = [stamp_ns for stamp_ns in stamps if stamp_ns in recording.boxes] or stamps
+    wanted = set(stamps[pick] for pick in np.linspace(0, len(stamps) - 1, count + 2)[1:-1].astype(int))
     panels = []
     for _topic, message, _time in bag.read_messages(['/' + COLOR_TOPIC]):
         stamp_ns = message.header.stamp.to_nsec()
