@@ -67,7 +67,7 @@ def session_images(session, options=SessionBagOptions()):
         stamp_ns = START_NS + int(number * NS / options.rate_hz)
         header = Header(stamp=time_from(stamp_ns), frame_id=session.frame_id)
         messages = list(messages_of(CameraFrame(header, session.camera, read_color(frame, session.camera),
-                                                read_depth(frame, session), chain, session.distortion)))
+                                                read_depth(frame, session), chain)))
         if options.with_boxes:
             messages.append((BOXES_TOPIC, boxes2d_to_message(np.array(frame.boxes_px, int).reshape(-1, 4), header)))
         yield stamp_ns, messages

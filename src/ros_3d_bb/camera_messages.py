@@ -1,5 +1,5 @@
 """What an RGB-D camera on a robot sends: images, camera_info and transforms, with the topics of realsense2_camera."""
-from typing import Any, NamedTuple, Optional, Sequence
+from typing import Any, NamedTuple, Sequence
 
 import numpy as np
 from geometry_msgs.msg import TransformStamped
@@ -7,6 +7,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.distortion import PLUMB_BOB
 from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.geometry import Camera, quaternion_from
 from ros_3d_bb.images import fill_image
@@ -20,7 +21,7 @@ TYPES = {TF_TOPIC: TFMessage, COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPIC
 
 class CameraFrame(NamedTuple):
     """One image of a camera. `color` (h, w, 3) uint8 RGB; `transforms`: (parent, child, parent_from_child (4, 4))
-    from the map to the camera's optical frame; `distortion` of plumb_bob, empty for none.
+    from the map to the camera's optical frame.
     """
 
     header: Header
@@ -28,14 +29,13 @@ class CameraFrame(NamedTuple):
     color: np.ndarray
     depth: DepthImage
     transforms: Sequence[Any]
-    distortion: Optional[Sequence[float]] = ()
 
 
 def messages_of(frame):
     """Yield (topic, message) of one image, in the order in which a robot would send them."""
     yield TF_TOPIC, TFMessage([_transform(frame.header.stamp, *link) for link in frame.transforms])
     for topic in INFO_TOPICS:
-        yield topic, _camera_info(frame)
+        yield topic, _camera_info(frame.camera, frame.header)
     yield DEPTH_TOPIC, _depth_image(frame.depth, frame.header)
     yield COLOR_TOPIC, fill_image(Image(header=frame.header), frame.color, 'rgb8')
 
@@ -47,10 +47,9 @@ def _depth_image(depth, header):
     return fill_image(Image(header=header), (depth.values * depth.scale_m).astype(np.float32), '32FC1')
 
 
-def _camera_info(frame):
-    camera = frame.camera
-    info = CameraInfo(header=frame.header, width=camera.width, height=camera.height, distortion_model='plumb_bob')
-    info.D = list(frame.distortion) or [0.0] * 5
+def _camera_info(camera, header):
+    info = CameraInfo(header=header, width=camera.width, height=camera.height)
+    info.distortion_model, info.D = camera.distortion_model or PLUMB_BOB, list(camera.distortion) or [0.0] * 5
     info.K = [camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1]
     info.R = [1, 0, 0, 0, 1, 0, 0, 0, 1]
     info.P = [camera.fx, 0, camera.cx, 0, 0, camera.fy, camera.cy, 0, 0, 0, 1, 0]

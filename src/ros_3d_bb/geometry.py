@@ -4,32 +4,39 @@ Convention: pixel (u, v) is the centre of the pixel in column u and row v, both 
 has x right, y down, z forward (REP 103); lengths are metres. A transform `b_from_a` is a 4x4 matrix that takes points
 given in frame a to frame b.
 """
-from typing import NamedTuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
+
+from ros_3d_bb.distortion import checked_distortion, distort, undistort
 
 OPTICAL_ROTATION = (-0.5, 0.5, -0.5, 0.5)  # quaternion of an optical frame that looks along the body's x (REP 103)
 
 
 class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float), ('fy', float), ('cx', float),
-                                   ('cy', float)])):
-    """Intrinsics of a pinhole camera; focal lengths and principal point in pixels.
+                                   ('cy', float), ('distortion_model', str), ('distortion', Tuple[float, ...])])):
+    """Intrinsics of a camera; focal lengths and principal point in pixels.
+
+    `distortion_model` and `distortion` are as in sensor_msgs/CameraInfo: see `distortion.MODELS`. A camera without
+    lens distortion has '' and () there, whatever it was made of.
 
     Raises
     ------
     ValueError
-        If the size is not positive, or a focal length is not positive and finite, or the principal point not finite.
+        If the size is not positive, or a focal length is not positive and finite, or the principal point not finite,
+        or the distortion is none that `checked_distortion` knows.
     """
 
     __slots__ = ()
 
-    def __new__(cls, width, height, fx, fy, cx, cy):
-        camera = super(Camera, cls).__new__(cls, int(width), int(height), float(fx), float(fy), float(cx), float(cy))
+    def __new__(cls, width, height, fx, fy, cx, cy, distortion_model='', distortion=()):
+        camera = super(Camera, cls).__new__(cls, int(width), int(height), float(fx), float(fy), float(cx), float(cy),
+                                            *checked_distortion(distortion_model, distortion))
         if camera.width <= 0 or camera.height <= 0:
             raise ValueError('camera size %d x %d is not positive' % (width, height))
-        if not (np.isfinite(camera[2:]).all() and camera.fx > 0 and camera.fy > 0):
+        if not (np.isfinite(camera[2:6]).all() and camera.fx > 0 and camera.fy > 0):
             raise ValueError('camera intrinsics fx=%g fy=%g cx=%g cy=%g are not usable: focal lengths must be positive'
-                             % camera[2:])
+                             % camera[2:6])
         return camera
 
     def deproject(self, pixels, depth_m):
@@ -45,10 +52,13 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
         Returns
         -------
         numpy.ndarray, (..., 3)
+            nan for x and y where the distortion gives the pixel no ray.
         """
         pixels, depth_m = np.asarray(pixels, float), np.asarray(depth_m, float)
-        x = (pixels[..., 0] - self.cx) / self.fx * depth_m
-        y = (pixels[..., 1] - self.cy) / self.fy * depth_m
+        x, y = (pixels[..., 0] - self.cx) / self.fx, (pixels[..., 1] - self.cy) / self.fy
+        if self.distortion_model:
+            x, y = np.moveaxis(undistort(self.distortion_model, self.distortion, np.stack((x, y), axis=-1)), -1, 0)
+        x, y = x * depth_m, y * depth_m
         return np.stack((x, y, np.broadcast_to(depth_m, x.shape)), axis=-1)
 
     def project(self, points):
@@ -62,12 +72,22 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
         Returns
         -------
         numpy.ndarray, (..., 2)
-            (u, v), also outside the image.
+            (u, v), also outside the image; nan where the distortion gives the ray no pixel.
         """
         points = np.asarray(points, float)
-        u = points[..., 0] / points[..., 2] * self.fx + self.cx
-        v = points[..., 1] / points[..., 2] * self.fy + self.cy
-        return np.stack((u, v), axis=-1)
+        x, y = points[..., 0] / points[..., 2], points[..., 1] / points[..., 2]
+        if self.distortion_model:
+            x, y = np.moveaxis(distort(self.distortion_model, self.distortion, np.stack((x, y), axis=-1)), -1, 0)
+        return np.stack((x * self.fx + self.cx, y * self.fy + self.cy), axis=-1)
+
+    def undistort(self, pixels):
+        """Pixels (..., 2) at which a camera without distortion, with the same fx, fy, cx and cy, shows the same.
+
+        nan where the distortion gives the pixel no ray.
+        """
+        if not self.distortion_model:
+            return pixels
+        return self.deproject(pixels, 1.0)[..., :2] * (self.fx, self.fy) + (self.cx, self.cy)
 
 
 def transform_from(translation, quaternion):

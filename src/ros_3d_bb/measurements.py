@@ -1,7 +1,8 @@
 """Read a measurement session: a folder of colour and depth images with boxes, estimates and ground truth.
 
-The folder holds `frames.json` with the camera and the frames, colour as 8-bit PNG and depth as 16-bit PNG in units of
-the camera's depth_scale, never normalised. Lengths in the file are millimetres, here metres.
+The folder holds `frames.json` with the camera (its lens distortion as k1, k2, p1, p2, k3 of plumb_bob) and the frames,
+colour as 8-bit PNG and depth as 16-bit PNG in units of the camera's depth_scale, never normalised. Lengths in the file
+are millimetres, here metres.
 """
 import json
 import os
@@ -10,6 +11,7 @@ from typing import NamedTuple, Optional, Tuple
 import cv2
 import numpy as np
 
+from ros_3d_bb.distortion import PLUMB_BOB
 from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.geometry import Camera
 
@@ -31,10 +33,9 @@ class Frame(NamedTuple):
 
 
 class Session(NamedTuple):
-    """A measurement session: intrinsics, lens distortion (k1, k2, p1, p2, k3), metres per depth unit, camera frame."""
+    """A measurement session: camera, metres per depth unit, camera frame."""
 
     camera: Camera
-    distortion: Tuple[float, ...]
     depth_scale_m: float
     frame_id: str
     frames: Tuple[Frame, ...]
@@ -55,9 +56,10 @@ def read_session(folder):
         camera = content['camera']
         if not 0 < float(camera['depth_scale']) < 1:
             raise ValueError('depth_scale is %s; metres per unit expected, such as 0.001' % camera['depth_scale'])
-        intrinsics = Camera(*(camera[name] for name in Camera._fields))
-        return Session(intrinsics, tuple(float(k) for k in camera.get('distortion', ())), float(camera['depth_scale']),
-                       str(camera['frame']), tuple(_frame_from(str(folder), entry) for entry in content['frames']))
+        intrinsics = (camera[name] for name in ('width', 'height', 'fx', 'fy', 'cx', 'cy'))
+        return Session(Camera(*intrinsics, distortion_model=PLUMB_BOB, distortion=camera.get('distortion', ())),
+                       float(camera['depth_scale']), str(camera['frame']),
+                       tuple(_frame_from(str(folder), entry) for entry in content['frames']))
     except OSError as error:
         raise SessionError('%s: not a measurement session (%s); expected a folder with frames.json, color/ and depth/'
                            % (folder, error.strerror))

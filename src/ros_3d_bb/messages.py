@@ -89,14 +89,18 @@ def boxes2d_from_message(message):
 
 
 def camera_from_message(message):
-    """The intrinsics in a sensor_msgs/CameraInfo.
+    """The intrinsics and the lens distortion in a sensor_msgs/CameraInfo.
+
+    realsense2_camera names librealsense's inverse Brown-Conrady plumb_bob, which it is but for a few hundredths of a
+    pixel.
 
     Raises
     ------
     ValueError
-        If they are not usable: an uncalibrated camera has zeros there.
+        If they are not usable: an uncalibrated camera has zeros there; or the distortion model is not known.
     """
-    return Camera(message.width, message.height, message.K[0], message.K[4], message.K[2], message.K[5])
+    return Camera(message.width, message.height, message.K[0], message.K[4], message.K[2], message.K[5],
+                  message.distortion_model, message.D)
 
 
 def transform_from_message(message):

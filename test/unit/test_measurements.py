@@ -50,6 +50,13 @@ def test_reads_a_session(session_folder):
     assert abs(frame.estimate_m[2] - frame.truth_m[1]) < 0.1 and len(frame.boxes_px) == 1
 
 
+def test_lens_distortion_is_that_of_plumb_bob(folder):
+    assert read_session(folder).camera.distortion_model == ''
+    change(folder, lambda content: content['camera'].update(distortion=[0.1, 0, 0, 0, 0.2]))
+    camera = read_session(folder).camera
+    assert (camera.distortion_model, camera.distortion) == ('plumb_bob', (0.1, 0, 0, 0, 0.2))
+
+
 def test_colour_is_read_as_rgb(original):
     session = read_session(original)
     x1, y1, x2, y2 = session.frames[0].boxes_px[0]
@@ -76,6 +83,7 @@ def test_several_boxes_in_a_frame(folder):
     (lambda content: content.pop('camera'), "'camera' is missing"),
     (lambda content: content['camera'].pop('fx'), "'fx' is missing"),
     (lambda content: content['camera'].update(fx=0), 'intrinsics'),
+    (lambda content: content['camera'].update(distortion=[0.1, 0.2]), 'plumb_bob has 2 coefficients'),
     (lambda content: content['camera'].update(width='wide'), 'wide'),
     (lambda content: content.update(frames=3), 'not iterable'),
     (lambda content: content['frames'][0].pop('depth'), "'depth' is missing"),

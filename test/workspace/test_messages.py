@@ -8,7 +8,8 @@ from hypothesis import given, strategies as st
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
-from ros_3d_bb.estimation import Box3D
+from ros_3d_bb.camera_messages import CameraFrame, messages_of
+from ros_3d_bb.estimation import Box3D, DepthImage
 from ros_3d_bb.geometry import Camera, transform_from
 from ros_3d_bb.messages import (boxes2d_from_message, boxes2d_to_message, boxes3d_to_message, camera_from_message,
                                 detections_from_message, stamp_of, time_from, tracks_to_message,
@@ -84,6 +85,24 @@ def test_camera_info():
     assert camera_from_message(info) == Camera(640, 480, 600, 610, 320, 240)
     with pytest.raises(ValueError, match='fx=0'):
         camera_from_message(CameraInfo(width=640, height=480))
+
+
+@pytest.mark.parametrize('lens', [('', ()), ('plumb_bob', (0.1, -0.2, 0.001, 0.002, 0.3)),
+                                  ('rational_polynomial', (8.5, 5.2, 1e-4, -5e-5, 0.21, 8.9, 8.0, 1.35)),
+                                  ('equidistant', (0.0, 0.0, 0.0, 0.0))])
+def test_camera_info_carries_the_lens_distortion_there_and_back(lens):
+    camera = Camera(640, 480, 600, 610, 320, 240, *lens)
+    frame = CameraFrame(header(5), camera, np.zeros((480, 640, 3), np.uint8),
+                        DepthImage(np.zeros((480, 640), np.uint16), 0.001), [])
+    infos = [on_the_wire(message) for _topic, message in messages_of(frame) if isinstance(message, CameraInfo)]
+    assert [camera_from_message(info) for info in infos] == [camera, camera]
+    assert infos[0].distortion_model == (lens[0] or 'plumb_bob') and len(infos[0].D) == (len(lens[1]) or 5)
+
+
+def test_camera_info_of_an_unknown_lens_is_refused():
+    info = CameraInfo(width=640, height=480, K=[600, 0, 320, 0, 610, 240, 0, 0, 1], distortion_model='ftheta', D=[0.9])
+    with pytest.raises(ValueError, match="distortion model is 'ftheta'; one of equidistant"):
+        camera_from_message(info)
 
 
 def test_transforms():

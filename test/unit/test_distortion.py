@@ -1,0 +1,171 @@
+"""Lens distortion over the whole image: against OpenCV and librealsense, there and back, and what cannot be used."""
+import cv2
+import numpy as np
+import pyrealsense2
+import pytest
+from hypothesis import given, strategies as st
+
+from ros_3d_bb.distortion import EQUIDISTANT, INVERSE_BROWN_CONRADY, PLUMB_BOB, RATIONAL_POLYNOMIAL
+from ros_3d_bb.geometry import Camera
+
+# Horizontal field of view in degrees, where the camera has 640 x 480, and the lens. The first is a D435's colour
+# camera, the second a D455's, then a wide-angle lens, an Azure Kinect's, and T265's fisheye cut to 120 degrees.
+LENSES = [(55, PLUMB_BOB, (0.16, -0.5, -0.001, 0.0006, 0.47)),
+          (79, PLUMB_BOB, (-0.055, 0.065, -0.0003, 0.0009, -0.021)),
+          (94, RATIONAL_POLYNOMIAL, (8.5, 5.2, 1e-4, -5e-5, 0.21, 8.9, 8.0, 1.35)),
+          (56, RATIONAL_POLYNOMIAL, (0.52, -2.73, 7.4e-4, -8e-5, 1.57, 0.40, -2.55, 1.50)),
+          (55, INVERSE_BROWN_CONRADY, (0.16, -0.5, -0.001, 0.0006, 0.47)),
+          (120, EQUIDISTANT, (-0.0022, 0.0376, -0.0364, 0.0059)), (120, EQUIDISTANT, (0, 0, 0, 0))]
+SIZES = [(640, 480), (1280, 720)]
+REALSENSE = {PLUMB_BOB: pyrealsense2.distortion.brown_conrady, EQUIDISTANT: pyrealsense2.distortion.kannala_brandt4,
+             INVERSE_BROWN_CONRADY: pyrealsense2.distortion.inverse_brown_conrady}
+
+
+def camera_of(lens, size):
+    fov_deg, model, coefficients = lens
+    half = np.radians(fov_deg / 2)
+    focal = size[0] / 2 / (half if model == EQUIDISTANT else np.tan(half))
+    return Camera(size[0], size[1], focal, 1.001 * focal, size[0] / 2 - 0.8, size[1] / 2 + 2.1, model, coefficients)
+
+
+CAMERAS = [camera_of(lens, size) for size in SIZES for lens in LENSES]
+FOR_OPENCV = [camera for camera in CAMERAS if camera.distortion_model != INVERSE_BROWN_CONRADY]
+FOR_REALSENSE = [camera for camera in CAMERAS if camera.distortion_model in REALSENSE]
+
+
+def named(camera):
+    return '%s-%d' % (camera.distortion_model, camera.width)
+
+
+def every_pixel(camera, step=1):
+    """(n, 2), with the corners whatever the step."""
+    u, v = np.meshgrid(*(np.unique(np.append(np.arange(0, size, step), size - 1)) for size in camera[:2]))
+    return np.stack((u, v), axis=-1).reshape(-1, 2).astype(float)
+
+
+@pytest.mark.parametrize('camera', CAMERAS, ids=named)
+def test_project_undoes_deproject_at_every_pixel(camera):
+    pixels = every_pixel(camera, camera.width // 640)
+    points = camera.deproject(pixels, 2.5)
+    assert (points[:, 2] == 2.5).all()
+    assert np.abs(camera.project(points) - pixels).max() < 1e-6
+
+
+@pytest.mark.parametrize('camera', FOR_OPENCV, ids=named)
+def test_is_what_opencv_computes(camera):
+    """Rays to 1e-6 pixels where OpenCV iterates until it is there, and back again by its own projection."""
+    pixels = every_pixel(camera, 3)
+    matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])
+    points, lens = camera.deproject(pixels, 1.0), np.array(camera.distortion)
+    if camera.distortion_model == EQUIDISTANT:
+        rays = cv2.fisheye.undistortPoints(pixels[:, None], matrix, lens)
+        back = cv2.fisheye.distortPoints(points[:, None, :2], matrix, lens)
+    else:
+        until = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-14)
+        rays = cv2.undistortPointsIter(pixels[:, None], matrix, lens, None, None, until)
+        back, _jacobian = cv2.projectPoints(points[:, None], np.zeros(3), np.zeros(3), matrix, lens)
+    assert np.abs((rays[:, 0] - points[:, :2]) * camera[2:4]).max() < 1e-6
+    assert np.abs(back[:, 0] - pixels).max() < 1e-6
+
+
+@pytest.mark.parametrize('camera', FOR_REALSENSE, ids=named)
+def test_is_what_librealsense_computes(camera):
+    """To the rounding of its single precision: 0.002 pixels, for the fisheye at most 70 degrees off its axis."""
+    intrinsics = pyrealsense2.intrinsics()
+    intrinsics.width, intrinsics.height, intrinsics.fx, intrinsics.fy, intrinsics.ppx, intrinsics.ppy = camera[:6]
+    intrinsics.model = REALSENSE[camera.distortion_model]
+    intrinsics.coeffs = (list(camera.distortion) + [0.0])[:5]
+    pixels = every_pixel(camera, 29)
+    points = camera.deproject(pixels, 1.0)
+    back = [pyrealsense2.rs2_project_point_to_pixel(intrinsics, point) for point in points.tolist()]
+    np.testing.assert_allclose(back, pixels, atol=0.002)
+    expected = np.array([pyrealsense2.rs2_deproject_pixel_to_point(intrinsics, pixel, 1.0)
+                         for pixel in pixels.tolist()])
+    np.testing.assert_allclose((points - expected)[:, :2] * camera[2:4], 0, atol=0.002)
+
+
+@pytest.mark.parametrize('size', SIZES)
+def test_a_realsense_that_is_called_plumb_bob_is_off_by_a_few_hundredths_of_a_pixel(size):
+    """realsense2_camera does not tell the two apart, so this is what believing it costs."""
+    inverse = camera_of(LENSES[4], size)
+    believed = inverse._replace(distortion_model=PLUMB_BOB)
+    pixels = every_pixel(inverse, 5)
+    assert np.abs(inverse.undistort(pixels) - believed.undistort(pixels)).max() < 0.03
+
+
+BENT = st.floats(-0.5, 0.5)
+SKEWED = st.floats(-0.001, 0.001)
+WAVY = st.one_of(st.tuples(st.just(PLUMB_BOB), st.tuples(BENT, BENT, SKEWED, SKEWED, BENT)),
+                 st.tuples(st.just(INVERSE_BROWN_CONRADY), st.tuples(BENT, BENT, SKEWED, SKEWED, BENT)),
+                 st.tuples(st.just(RATIONAL_POLYNOMIAL),
+                           st.tuples(BENT, BENT, SKEWED, SKEWED, BENT, *[st.floats(0, 0.5)] * 3)),
+                 st.tuples(st.just(EQUIDISTANT), st.tuples(*[st.floats(-0.1, 0.1)] * 4)))
+
+
+@given(WAVY, st.sampled_from(SIZES))
+def test_a_pixel_comes_back_or_has_no_ray(lens, size):
+    camera = camera_of((70,) + lens, size)
+    pixels = every_pixel(camera, 40)
+    points = camera.deproject(pixels, 1.0)
+    lost = np.isnan(points[:, 0])
+    np.testing.assert_allclose(camera.project(points)[~lost], pixels[~lost], rtol=0, atol=1e-6)
+
+
+@given(WAVY, st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4)))
+def test_rays_before_any_fold_come_back(lens, ray):
+    camera = camera_of((70,) + lens, SIZES[0])
+    np.testing.assert_allclose(camera.deproject(camera.project(ray + (1,)), 3.0), np.array(ray + (1,)) * 3, atol=1e-8)
+
+
+def test_a_polynomial_that_folds_gives_no_ray_beyond_the_fold_and_no_image_from_there():
+    """r - 0.4 r^3 grows up to r = 0.913, where it is 0.609."""
+    camera = Camera(640, 480, 500, 500, 320, 240, PLUMB_BOB, (-0.4, 0, 0, 0, 0))
+    pixels = np.array([(320 + 500 * 0.6, 240), (320 + 500 * 0.62, 240)])
+    points = camera.deproject(pixels, 2.0)
+    assert 1.6 < points[0, 0] < 2 * 0.913 and np.isnan(points[1, :2]).all() and points[1, 2] == 2.0
+    assert np.isfinite(camera.project((0.9, 0, 1))).all() and np.isnan(camera.project((0.93, 0, 1))).all()
+
+
+def test_a_fisheye_shows_nothing_flat_at_right_angles():
+    camera = Camera(640, 640, 200, 200, 320, 320, EQUIDISTANT, (0, 0, 0, 0))
+    assert np.isfinite(camera.deproject((320 + 200 * np.pi / 2 * 0.98, 320), 1.0)).all()
+    assert np.isnan(camera.deproject((320 + 200 * np.pi / 2 * 1.01, 320), 1.0)[:2]).all()
+
+
+@pytest.mark.parametrize('model', ['', PLUMB_BOB, RATIONAL_POLYNOMIAL, INVERSE_BROWN_CONRADY, 'none'])
+@pytest.mark.parametrize('coefficients', [(), (0, 0, 0, 0, 0)])
+def test_coefficients_of_zero_are_no_distortion(model, coefficients):
+    assert Camera(640, 480, 600, 600, 320, 240, model, coefficients) == Camera(640, 480, 600, 600, 320, 240)
+
+
+@pytest.mark.parametrize('model,given,kept', [
+    (PLUMB_BOB, (0.1, 0, 0, 0), (0.1, 0, 0, 0, 0)), (PLUMB_BOB, (0.1, 0, 0, 0, 0.2, 0, 0, 0), (0.1, 0, 0, 0, 0.2)),
+    (EQUIDISTANT, (0, 0, 0, 0, 0), (0, 0, 0, 0)), (EQUIDISTANT, (), ())])
+def test_lists_that_drivers_cut_or_fill_up_are_those_of_the_model(model, given, kept):
+    assert Camera(640, 480, 600, 600, 320, 240, model, given).distortion == kept
+
+
+@pytest.mark.parametrize('model,coefficients,reason', [
+    ('thin_prism', (0.1,) * 5, "'thin_prism'; one of equidistant, inverse_brown_conrady, plumb_bob, rational"),
+    ('', (0.1,) * 5, "model is ''"), (PLUMB_BOB, (0.1,) * 3, r'plumb_bob has 3 .*; 5 expected \(k1, k2, p1, p2, k3\)'),
+    (PLUMB_BOB, (0.1,) * 8, 'has 8 coefficients'), (RATIONAL_POLYNOMIAL, (0.1,) * 5, '8 expected'),
+    (EQUIDISTANT, (0.1,) * 5, '4 expected'), (INVERSE_BROWN_CONRADY, (0.1,) * 4, '5 expected'),
+    (PLUMB_BOB, (float('nan'), 0, 0, 0, 0), 'finite'), (EQUIDISTANT, (0, 0, 0, float('inf')), 'finite'),
+    (PLUMB_BOB, (1e9, 0, 0, 0, 0), 'below 1e')])
+def test_unusable_distortion_is_refused(model, coefficients, reason):
+    with pytest.raises(ValueError, match=reason):
+        Camera(640, 480, 600, 600, 320, 240, model, coefficients)
+
+
+@pytest.mark.parametrize('model', [PLUMB_BOB, RATIONAL_POLYNOMIAL, INVERSE_BROWN_CONRADY, EQUIDISTANT])
+def test_any_coefficients_give_numbers_or_nothing(model):
+    """No exception, no endless search: only nan where there is no ray."""
+    random = np.random.RandomState(4)
+    for _ in range(50):
+        coefficients = random.choice([-1e5, -1, -1e-9, 0, 1e-30, 1, 1e5], 8)
+        coefficients = coefficients[:{RATIONAL_POLYNOMIAL: 8, EQUIDISTANT: 4}.get(model, 5)]
+        camera = Camera(64, 48, 60, 60, 31.5, 23.5, model, coefficients)
+        pixels = every_pixel(camera, 5)
+        back = camera.project(camera.deproject(pixels, 1.0))
+        seen = ~np.isnan(back[:, 0])
+        np.testing.assert_allclose(back[seen], pixels[seen], rtol=0, atol=1e-6)
