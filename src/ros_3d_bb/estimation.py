@@ -86,14 +86,15 @@ def estimate_median(samples, rect_px, camera, _nearer=()):
     Returns
     -------
     Box3D or None
-        None where no sample carries a depth.
+        None where no sample carries a depth, or the camera sees nothing there.
     """
-    if not samples.valid.any():
-        return None
     depth_m = samples.depth_m[samples.valid]
-    pixels = np.stack((samples.u, samples.v), axis=-1)[samples.valid]
-    center_m = np.median(camera.deproject(pixels, depth_m), axis=0)
-    x1, y1, x2, y2 = rect_px
+    points = _points(samples.u[samples.valid], samples.v[samples.valid], depth_m, camera)
+    flat_px = _without_distortion(rect_px, camera)
+    if flat_px is None or not points.size:
+        return None
+    x1, y1, x2, y2 = flat_px
+    center_m = np.median(points, axis=0)
     width_m, height_m = (x2 - x1) / camera.fx * center_m[2], (y2 - y1) / camera.fy * center_m[2]
     on_body = np.abs(depth_m - center_m[2]) <= BODY_HALF_DEPTH_M
     return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px),
@@ -136,7 +137,8 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     Returns
     -------
     Box3D or None
-        None where no sample carries a depth, or less than `LEAST_SUPPORT` of them are in a layer of their own.
+        None where no sample carries a depth, or less than `LEAST_SUPPORT` of them are in a layer of their own, or the
+        camera sees nothing there.
     """
     own = samples.valid & ~_explained(samples, rect_px, nearer)
     if not own.any():
@@ -149,9 +151,11 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
         layer_m = np.median(depth_m[np.abs(depth_m - layer_m) <= TRUNK_HALF_DEPTH_M])
     on_body = np.abs(depth_m - layer_m) <= BODY_HALF_DEPTH_M
     support = np.count_nonzero(on_body) / float(samples.u.size)
-    if support < LEAST_SUPPORT:
+    points = _points(u[on_body], v[on_body], depth_m[on_body], camera)
+    flat_px = _without_distortion(rect_px, camera)
+    if support < LEAST_SUPPORT or flat_px is None or not points.size:
         return None
-    points = camera.deproject(np.stack((u, v), axis=-1)[on_body], depth_m[on_body])
+    x1, y1, x2, y2 = flat_px
     left_m, right_m = np.percentile(points[:, 0], [EDGE_PERCENT, 100 - EDGE_PERCENT])
     height_m = (y2 - y1) / camera.fy * layer_m
     surface_m = np.array([(left_m + right_m) / 2, ((y1 + y2) / 2.0 - camera.cy) / camera.fy * layer_m, layer_m])
@@ -159,6 +163,27 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     width_m = max(right_m - left_m, BIN_M)
     return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px), support,
                  is_truncated(rect_px, camera))
+
+
+def _points(u, v, depth_m, camera):
+    """What pixels show, (n, 3), without those that see nothing (see `Camera.deproject`)."""
+    points = camera.deproject(np.stack((u, v), axis=-1), depth_m)
+    return points[~np.isnan(points[:, 0])]
+
+
+def _without_distortion(rect_px, camera):
+    """The rectangle in the image of the same camera without distortion, by the middles of its edges.
+
+    None where an edge sees nothing. Outside the image, where no distortion is known, it is that of the border.
+    """
+    if not camera.distortion_model:
+        return rect_px
+    x1, y1, x2, y2 = rect_px
+    middles = np.array([(x1, (y1 + y2) / 2.0), ((x1 + x2) / 2.0, y1), (x2, (y1 + y2) / 2.0), ((x1 + x2) / 2.0, y2)])
+    inside = np.clip(middles, 0, (camera.width, camera.height))
+    left, top, right, bottom = (middles + camera.undistort(inside) - inside).tolist()
+    flat_px = left[0], top[1], right[0], bottom[1]
+    return None if np.isnan(flat_px).any() else flat_px
 
 
 def _explained(samples, rect_px, boxes):

@@ -211,6 +211,16 @@ def test_an_uncalibrated_camera_is_named(rig, output, now):
     output.wait_for(1)
 
 
+def test_a_lens_that_is_not_known_is_named(rig, output, now):
+    unknown = camera_info(now)
+    unknown.distortion_model, unknown.D = 'ftheta', [0.9]
+    rig.info.publish(unknown)
+    wait_until(lambda: "distortion model is 'ftheta'" in diagnostics_of('bbox3d_node')[1], 'a warning')
+    rig.send_camera(now + PERIOD)
+    rig.send_boxes(now + PERIOD)
+    output.wait_for(1)
+
+
 def test_images_to_look_at_come_while_somebody_looks(rig, output, now):
     color = publisher_later('camera/color/image_raw')
     with Recorder('ros_3d_bb/color', Image) as drawn, Recorder('ros_3d_bb/raw', Image) as raw, \

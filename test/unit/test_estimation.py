@@ -1,4 +1,5 @@
 """The estimators: the thesis' recorded positions and grid, the person's layer, and what cannot be used."""
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -177,3 +178,67 @@ def test_unknown_estimators_and_strides_are_refused(name, stride, complaint):
                                             ((10, 10, 40, 48), True), ((-9, 10, 90, 40), True)])
 def test_boxes_at_the_border_are_truncated(rect, truncated):
     assert is_truncated(rect, CAMERA) is truncated
+
+
+WIDE = Camera(640, 480, 420, 420, 319.5, 239.5, 'plumb_bob', (-0.25, 0.06, 0.0005, -0.0004, 0))
+FISHEYE = Camera(640, 480, 306, 306, 319.5, 239.5, 'equidistant', (-0.0022, 0.0376, -0.0364, 0.0059))
+
+
+def plate_seen_by(camera, center_m, size_m):
+    """Depth image of an upright plate before a wall at 6 m, and the rectangle around the plate, by OpenCV."""
+    matrix, lens = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]]), camera.distortion
+    v, u = np.mgrid[:camera.height, :camera.width]
+    pixels = np.stack((u, v), axis=-1).reshape(-1, 1, 2).astype(float)
+    sides = np.linspace(-0.5, 0.5, 200)
+    outline = np.array([edge for side in sides for edge in ((side, -0.5), (side, 0.5), (-0.5, side), (0.5, side))])
+    outline = np.append(outline * size_m + center_m[:2], np.full((len(outline), 1), center_m[2]), axis=1)[:, None]
+    if camera.distortion_model == 'equidistant':
+        rays = cv2.fisheye.undistortPoints(pixels, matrix, np.array(lens))
+        seen = cv2.fisheye.projectPoints(outline, np.zeros(3), np.zeros(3), matrix, np.array(lens))[0]
+    else:
+        until = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-12)
+        rays = cv2.undistortPointsIter(pixels, matrix, np.array(lens), None, None, until)
+        seen = cv2.projectPoints(outline, np.zeros(3), np.zeros(3), matrix, np.array(lens))[0]
+    on_plate = (np.abs(rays[:, 0] * center_m[2] - center_m[:2]) <= np.array(size_m) / 2).all(axis=1)
+    depth_m = np.where(on_plate, center_m[2], 6.0).reshape(v.shape)
+    low, high = np.floor(seen.min(axis=(0, 1))).astype(int), np.ceil(seen.max(axis=(0, 1))).astype(int)
+    return DepthImage(depth_m, 1.0), tuple(low.tolist() + high.tolist())
+
+
+@pytest.mark.parametrize('camera', [WIDE, FISHEYE], ids=['plumb_bob', 'equidistant'])
+@pytest.mark.parametrize('x_m', [-1.6, 0.0, 1.5])
+def test_lens_distortion_is_taken_out(camera, x_m):
+    """Within 3 cm in position and 6 cm in height; what the same camera without it would say is off at the sides."""
+    center_m = np.array([x_m, 0.3, 3.0])
+    depth, rect = plate_seen_by(camera, center_m, (0.5, 1.7))
+    samples, axis_m = sample_foreground(depth, rect), center_m * (1 + AXIS_BEHIND_SURFACE_M / 3)
+    box = estimate_foreground(samples, rect, camera)
+    np.testing.assert_allclose(box.center_m, axis_m, atol=0.03)
+    assert box.size_m[1] == pytest.approx(1.7, abs=0.06) and box.size_m[0] == pytest.approx(0.5, abs=0.05)
+    flat = estimate_foreground(samples, rect, Camera(*camera[:6]))
+    assert x_m == 0 or abs(flat.center_m[0] - axis_m[0]) > 0.08
+
+
+@pytest.mark.parametrize('camera', [WIDE, FISHEYE], ids=['plumb_bob', 'equidistant'])
+def test_the_median_is_that_of_points_without_distortion(camera):
+    """The rectangle of a small plate, and depth that fills it, so that the median is in its middle."""
+    center_m = np.array([1.5, 0.3, 3.0])
+    _depth, rect = plate_seen_by(camera, center_m, (0.1, 0.1))
+    depth, _rect = plate_seen_by(camera, center_m, (1, 1))
+    box = estimate_median(sample_median(depth, rect, 1), rect, camera)
+    np.testing.assert_allclose(box.center_m, center_m, atol=0.01)  # a pixel
+    np.testing.assert_allclose(box.size_m, 0.1, atol=0.03)
+
+
+@pytest.mark.parametrize('name', ['foreground', 'median'])
+def test_what_a_fisheye_sees_at_right_angles_is_no_box(name):
+    camera = Camera(640, 480, 150, 150, 319.5, 239.5, 'equidistant', (0, 0, 0, 0))
+    estimator, rect = estimator_named(name), (10, 200, 60, 280)
+    samples = estimator.sample(DepthImage(np.full((480, 640), 2.0), 1.0), rect)
+    assert estimator.estimate(samples, rect, camera, ()) is None
+
+
+def test_a_rectangle_that_leaves_the_image_is_lifted_by_a_camera_with_distortion():
+    rect = (-2 ** 31, 100, 300, 2 ** 31 - 1)
+    estimator, depth = estimator_named('foreground'), DepthImage(np.full((480, 640), 2.0), 1.0)
+    assert np.isfinite(estimator.estimate(estimator.sample(depth, rect), rect, WIDE, ()).center_m).all()

@@ -59,9 +59,6 @@ class Bbox3dNode(object):
         rospy.Subscriber('yolo_bounding_box', Int32MultiArray, self._on_boxes, queue_size=10)
 
     def _on_camera_info(self, message):
-        if any(message.D):
-            rospy.logwarn_once('camera_info of %s carries lens distortion %s, which is not corrected: positions near '
-                               'the image border will be off', message.header.frame_id, message.D)
         with self._diagnostics.refusing('camera_info'), self._lock:
             camera = camera_from_message(message)
             self._lift(self._pairing.add_camera(message.header.stamp.to_nsec(), arrival_clock_ns(), camera))
