@@ -20,6 +20,7 @@ BIN_M, LAYER_BINS = 0.05, 5  # a layer is the depth in so many bins of a histogr
 FIRST_LAYER_SHARE = 0.5  # the nearest layer with this share of the strongest one's weight is the person
 AXIS_BEHIND_SURFACE_M = 0.09  # mean over standing and walking bodies of the simulation, seen from all sides
 LEAST_SUPPORT = 0.1  # what carries less of the samples is no person that anything can be said about
+USUAL_WIDTH_M, USUAL_HEIGHT_M = 0.46, 1.7  # of a body that the image border cuts
 EDGE_PERCENT = 2  # of the pixels of the layer beyond its left and right edge: flying pixels, fingers
 
 
@@ -124,7 +125,8 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
 
     Background seen beside and between the limbs may fill most of a box, and is farther away; so are flying pixels,
     which fill no bin. The position is that of the body's axis: across the middle between the edges of the layer, and
-    `AXIS_BEHIND_SURFACE_M` behind its median depth.
+    `AXIS_BEHIND_SURFACE_M` behind its mean depth. Where the image border cuts the body, the part that is not seen is
+    taken to be as large as it usually is.
 
     Parameters
     ----------
@@ -145,8 +147,7 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
         return None
     u, v, depth_m = (part[own] for part in (samples.u, samples.v, samples.depth_m))
     x1, y1, x2, y2 = rect_px
-    weights = np.exp(-0.5 * ((u - (x1 + x2) / 2.0) / ((x2 - x1) / 4.0)) ** 2)
-    layer_m = _first_layer(depth_m, weights)
+    layer_m = _first_layer(depth_m, np.exp(-0.5 * ((u - (x1 + x2) / 2.0) / ((x2 - x1) / 4.0)) ** 2))
     for _ in range(3):
         layer_m = np.median(depth_m[np.abs(depth_m - layer_m) <= TRUNK_HALF_DEPTH_M])
     on_body = np.abs(depth_m - layer_m) <= BODY_HALF_DEPTH_M
@@ -155,14 +156,30 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     flat_px = _without_distortion(rect_px, camera)
     if support < LEAST_SUPPORT or flat_px is None or not points.size:
         return None
-    x1, y1, x2, y2 = flat_px
+    layer_m = _trimmed_mean(points[:, 2])
     left_m, right_m = np.percentile(points[:, 0], [EDGE_PERCENT, 100 - EDGE_PERCENT])
-    height_m = (y2 - y1) / camera.fy * layer_m
-    surface_m = np.array([(left_m + right_m) / 2, ((y1 + y2) / 2.0 - camera.cy) / camera.fy * layer_m, layer_m])
-    center_m = surface_m * (1 + AXIS_BEHIND_SURFACE_M / layer_m)
+    top_m, bottom_m = ((edge - camera.cy) / camera.fy * layer_m for edge in flat_px[1::2])
+    cut_left, cut_top, cut_right, cut_bottom = _cut_edges(rect_px, camera)
+    left_m, right_m = _whole(left_m, right_m, cut_left, cut_right, USUAL_WIDTH_M)
+    top_m, bottom_m = _whole(top_m, bottom_m, cut_top, cut_bottom, USUAL_HEIGHT_M)
+    surface_m = np.array([(left_m + right_m) / 2, (top_m + bottom_m) / 2, layer_m])
     width_m = max(right_m - left_m, BIN_M)
-    return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px), support,
-                 is_truncated(rect_px, camera))
+    return Box3D(surface_m * (1 + AXIS_BEHIND_SURFACE_M / layer_m), np.array([width_m, bottom_m - top_m, width_m]),
+                 tuple(rect_px), support, is_truncated(rect_px, camera))
+
+
+def _trimmed_mean(values):
+    """The mean without the lowest and the highest tenth: finer than the median, which is one of the camera's steps."""
+    low, high = np.percentile(values, [10, 90])
+    return values[(values >= low) & (values <= high)].mean()
+
+
+def _whole(low, high, cut_low, cut_high, usual):
+    """The extent low..high of a body that the image border cuts on one side, where it is at least the usual one."""
+    missing = max(0.0, usual - (high - low))
+    if cut_low and not cut_high:
+        return low - missing, high
+    return low, high + (missing if cut_high and not cut_low else 0.0)
 
 
 def _points(u, v, depth_m, camera):
@@ -271,8 +288,14 @@ def check_rect(rect_px):
 
 def is_truncated(rect_px, camera):
     """Whether a rectangle touches the border of the image."""
+    return any(_cut_edges(rect_px, camera))
+
+
+def _cut_edges(rect_px, camera):
+    """Whether the left, the upper, the right and the lower edge touch the border of the image."""
     x1, y1, x2, y2 = rect_px
-    return bool(min(x1, y1) <= BORDER_PX or x2 >= camera.width - BORDER_PX or y2 >= camera.height - BORDER_PX)
+    return (bool(x1 <= BORDER_PX), bool(y1 <= BORDER_PX), bool(x2 >= camera.width - BORDER_PX),
+            bool(y2 >= camera.height - BORDER_PX))
 
 
 def _ticks(low, high, limit, stride):
