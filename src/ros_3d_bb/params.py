@@ -26,11 +26,15 @@ def params_from(given, *kinds):
     known = [name for kind in kinds for name in kind._fields]
     for name in sorted(given):
         if name not in known:
-            near = difflib.get_close_matches(name, known, 1, 0.0)
             raise ValueError('unknown parameter ~%s; did you mean ~%s? Known: %s'
-                             % (name, near[0], ', '.join(sorted(known))))
+                             % (name, nearest_name(name, known), ', '.join(sorted(known))))
     return [kind(**{name: _converted(name, given[name], kind.__annotations__[name])
                     for name in kind._fields if name in given}) for kind in kinds]
+
+
+def nearest_name(name, known):
+    """The one of the known names that a wrong one is most like."""
+    return difflib.get_close_matches(name, known, 1, 0.0)[0]
 
 
 def check_not_negative(params, *names):

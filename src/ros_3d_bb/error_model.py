@@ -1,0 +1,258 @@
+"""How far off a measured position is: its bias, which is taken out, and its covariance.
+
+Convention: positions (x, y, z) are in the camera optical frame, metres; error = measured - truth. The bias is a function
+of the TRUE position, as in the thesis: truth is what a tape measured, the noise is in what the camera measured, and
+a fit the other way round would pull every position towards the middle of the data. A node knows only the measured
+position, so `ErrorModel.corrected` solves measured = truth + bias(truth). The model is fitted by
+ros_3d_bb.evaluation.error_fit; its file is described in config/error_models/README.md.
+"""
+from typing import NamedTuple, Optional
+
+import numpy as np
+import yaml
+
+from ros_3d_bb.params import nearest_name
+
+STEEPEST_BIAS = 0.5  # metres a metre; a steeper one has no safe inverse
+SOLVER_STEPS = 30  # each at least halves the error: below a micrometre from any range
+
+
+class XBias(NamedTuple):
+    """Sideways error at true (x, z): slope * x + per_angle_m * x / z + offset_m, metres."""
+
+    slope: float
+    per_angle_m: float
+    offset_m: float
+
+
+class Spread(NamedTuple):
+    """A standard deviation by range: sqrt(constant_m ** 2 + (growth * z ** power) ** 2), metres.
+
+    With power 2 it is a constant and the law of stereo, where growth is s / (f * b): pixels of matching error by focal
+    length in pixels times baseline in metres (thesis 5.2).
+    """
+
+    constant_m: float
+    growth: float
+    power: int
+
+    def at(self, z_m):
+        """The standard deviation at range z_m, metres, of its shape."""
+        return np.hypot(self.constant_m, self.growth * np.asarray(z_m, float) ** self.power)
+
+
+class MeasuredRange(NamedTuple):
+    """Where there were measurements: z_min_m <= z <= z_max_m, |x| <= x_max_m, and z >= x_z_min_m off the middle."""
+
+    z_min_m: float
+    z_max_m: float
+    x_max_m: float
+    x_z_min_m: float
+
+
+class Provenance(NamedTuple):
+    """Where a model comes from: files or publication, the estimator that it is for, the camera, date (ISO), and the
+    number of measurements and of different positions."""
+
+    source: str
+    estimator: str
+    camera: str
+    date: str
+    measurements: int
+    positions: int
+
+
+class Scores(NamedTuple):
+    """What is left, each position corrected by a model of all others: root mean squares in metres, and the share of
+    positions in the 68 % and the 95 % ellipse of the horizontal plane."""
+
+    rmse_x_m: float
+    rmse_z_m: float
+    rmse_plane_m: float
+    coverage_68: float
+    coverage_95: float
+
+
+class ErrorModel(NamedTuple):
+    """Bias and spread of measured positions.
+
+    `z_bias` are coefficients of a polynomial in z, highest power first; `y_sigma_m` is an assumption, as no ground
+    truth has y; `growth_outside` is how many metres of standard deviation come to each axis for a metre outside of
+    `measured_range`; `cross_validated` is None where nobody measured it.
+    """
+
+    z_bias: tuple
+    x_bias: XBias
+    z_sigma: Spread
+    x_sigma: Spread
+    y_sigma_m: float
+    measured_range: MeasuredRange
+    growth_outside: float
+    provenance: Provenance
+    cross_validated: Optional[Scores]
+
+    def corrected(self, position_m):
+        """Measured positions without their bias.
+
+        Outside of the measured range the bias stays what it is at the range's end. y goes with z, along the ray.
+
+        Parameters
+        ----------
+        position_m : array_like, (..., 3)
+            As measured, z > 0.
+
+        Returns
+        -------
+        numpy.ndarray, (..., 3)
+
+        Raises
+        ------
+        ValueError
+            If a position is not in front of the camera.
+        """
+        position_m = np.asarray(position_m, float)
+        if not (position_m[..., 2] > 0).all():
+            raise ValueError('z is %g m; a position in front of the camera expected' % np.min(position_m[..., 2]))
+        x_m, y_m, measured_z_m = np.moveaxis(position_m, -1, 0)
+        z_m = self._true_z(measured_z_m)
+        return np.stack((self._true_x(x_m, z_m), y_m * z_m / measured_z_m, z_m), axis=-1)
+
+    def biased(self, position_m):
+        """What is measured of true positions, (..., 3), but for noise. Inverse of `corrected`."""
+        x_m, y_m, z_m = np.moveaxis(np.asarray(position_m, float), -1, 0)
+        inside_m = np.clip(x_m, -self.measured_range.x_max_m, self.measured_range.x_max_m)
+        measured_z_m = z_m + self._z_bias_at(z_m)
+        measured_x_m = x_m + inside_m * self._x_slope_at(z_m) + self.x_bias.offset_m
+        return np.stack((measured_x_m, y_m * measured_z_m / z_m, measured_z_m), axis=-1)
+
+    def covariance(self, position_m):
+        """Covariance of corrected positions in the camera optical frame, square metres.
+
+        Diagonal: in the measurements, errors along the ray do not move x with z.
+
+        Parameters
+        ----------
+        position_m : array_like, (..., 3)
+            As `corrected` gives them.
+
+        Returns
+        -------
+        numpy.ndarray, (..., 3, 3)
+        """
+        z_m = np.asarray(position_m, float)[..., 2]
+        sigmas_m = np.stack((self.x_sigma.at(z_m), np.full(z_m.shape, self.y_sigma_m), self.z_sigma.at(z_m)), axis=-1)
+        outside_m = self.growth_outside * self.distance_outside(position_m)
+        return (sigmas_m ** 2 + outside_m[..., np.newaxis] ** 2)[..., np.newaxis] * np.eye(3)
+
+    def distance_outside(self, position_m):
+        """How far corrected positions (..., 3) are outside of the measured range, metres, (...); 0 inside."""
+        position_m, limits = np.asarray(position_m, float), self.measured_range
+        z_m = position_m[..., 2]
+        return (np.maximum(0, np.maximum(limits.z_min_m - z_m, z_m - limits.z_max_m))
+                + np.maximum(0, np.abs(position_m[..., 0]) - limits.x_max_m))
+
+    def _z_bias_at(self, z_m):
+        return np.polyval(self.z_bias, np.clip(z_m, self.measured_range.z_min_m, self.measured_range.z_max_m))
+
+    def _x_slope_at(self, z_m):
+        nearest_m, farthest_m = self.measured_range.x_z_min_m, self.measured_range.z_max_m
+        return self.x_bias.slope + self.x_bias.per_angle_m / np.clip(z_m, nearest_m, farthest_m)
+
+    def _true_z(self, measured_z_m):
+        z_m = measured_z_m
+        for _ in range(SOLVER_STEPS):
+            z_m = measured_z_m - self._z_bias_at(z_m)
+        return z_m
+
+    def _true_x(self, measured_x_m, z_m):
+        x_m, slope = measured_x_m - self.x_bias.offset_m, self._x_slope_at(z_m)
+        inside_m = x_m / (1 + slope)
+        limit_m = self.measured_range.x_max_m
+        return np.where(np.abs(inside_m) <= limit_m, inside_m, x_m - slope * limit_m * np.sign(x_m))
+
+
+def checked(model):
+    """The model itself. Raises ValueError where it cannot be used: what is wrong, and the value."""
+    limits = model.measured_range
+    if not (0 < limits.z_min_m < limits.z_max_m and limits.z_min_m <= limits.x_z_min_m <= limits.z_max_m
+            and limits.x_max_m > 0):
+        raise ValueError('measured_range is %s; 0 < z_min_m <= x_z_min_m <= z_max_m and x_max_m > 0 expected'
+                         % (tuple(limits),))
+    z_m = np.linspace(limits.z_min_m, limits.z_max_m, 101)
+    for name, slopes in (('z_bias', np.polyval(np.polyder(model.z_bias), z_m)), ('x_bias', model._x_slope_at(z_m))):
+        if np.abs(slopes).max() > STEEPEST_BIAS:
+            raise ValueError('%s changes by %.2g m a metre; at most %g expected, for it has to be undone'
+                             % (name, np.abs(slopes).max(), STEEPEST_BIAS))
+    sigmas_m = {'z_sigma': model.z_sigma.at(limits.z_min_m), 'x_sigma': model.x_sigma.at(limits.z_min_m),
+                'y_sigma_m': model.y_sigma_m}
+    for name, sigma_m in sorted(sigmas_m.items()):
+        if not sigma_m > 0:
+            raise ValueError('%s is %g m at %g m; more than 0 expected' % (name, sigma_m, limits.z_min_m))
+    if model.growth_outside < 0:
+        raise ValueError('growth_outside is %g; 0 or more expected' % model.growth_outside)
+    return model
+
+
+def read_error_model(path):
+    """Read an error model; nothing in the file is run.
+
+    Raises
+    ------
+    ValueError
+        If the file is not YAML, or a key is unknown (names the nearest one), missing, or has a value that cannot be.
+    OSError
+        If there is no such file.
+    """
+    with open(str(path), encoding='utf-8') as stream:
+        try:
+            return checked(_filled(ErrorModel, yaml.safe_load(stream), ''))
+        except (ValueError, yaml.YAMLError) as error:
+            raise ValueError('%s: not an error model: %s' % (path, error))
+
+
+def write_error_model(path, model):
+    """Write an error model that `read_error_model` reads. Raises OSError."""
+    with open(str(path), 'w', encoding='utf-8') as stream:
+        stream.write('# Error model of measured positions; the keys are explained in config/error_models/README.md.\n')
+        for name, value in model._asdict().items():
+            if hasattr(value, '_fields'):
+                stream.write(name + ':\n' + ''.join('  ' + _line(*pair) for pair in value._asdict().items()))
+            else:
+                stream.write(_line(name, value))
+
+
+def _line(name, value):
+    """One line of YAML."""
+    if isinstance(value, tuple):
+        return '%s: [%s]\n' % (name, ', '.join(yaml.safe_dump(number).split()[0] for number in value))
+    return yaml.safe_dump({name: value}, default_flow_style=False, width=1000, allow_unicode=True)
+
+
+def _filled(kind, content, where):
+    """A value of the kind, a NamedTuple or a plain type, from what YAML gave; `where` is its key."""
+    if kind is Optional[Scores]:
+        return None if content is None else _filled(Scores, content, where)
+    if hasattr(kind, '_fields'):
+        return _filled_fields(kind, content, where)
+    if kind is tuple and isinstance(content, list) and content:
+        return tuple(_filled(float, value, where) for value in content)
+    if kind is float and isinstance(content, int) and not isinstance(content, bool):
+        content = float(content)
+    if not isinstance(content, kind) or isinstance(content, bool) or (kind is float and not np.isfinite(content)):
+        raise ValueError('%s is %r; %s expected' % (where, content, {
+            tuple: 'a list of numbers', float: 'a number', int: 'a whole number', str: 'text'}[kind]))
+    return content
+
+
+def _filled_fields(kind, content, where):
+    if not isinstance(content, dict):
+        raise ValueError('%s is %.50r; the keys %s expected' % (where or 'it', content, ', '.join(kind._fields)))
+    prefix = where + '.' if where else ''
+    for name in content:
+        if name not in kind._fields:
+            raise ValueError('unknown key %s%s; did you mean %s%s?'
+                             % (prefix, name, prefix, nearest_name(str(name), kind._fields)))
+    for name in kind._fields:
+        if name not in content:
+            raise ValueError('the key %s%s is missing' % (prefix, name))
+    return kind(**{name: _filled(kind.__annotations__[name], content[name], prefix + name) for name in kind._fields})

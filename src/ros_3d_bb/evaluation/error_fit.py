@@ -1,0 +1,183 @@
+"""Fit an error model to measured positions with ground truth, and say how well it does at positions it never saw.
+
+A position counts once, however often it was measured: its repetitions share one bias of where the person stood.
+"""
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_3d_bb.error_model import ErrorModel, MeasuredRange, Provenance, Scores, Spread, XBias, checked
+
+DEGREES = (0, 1, 2, 3)  # of the polynomial of z_bias
+X_TERMS = ((True, False), (False, True), (True, True))  # whether x_bias has slope, and per_angle_m
+BETTER = 0.98  # a model with more coefficients must be better by so much
+LEAST_SIGMA_M = 0.001
+Y_SIGMA_M = 0.1  # a box whose top or bottom is cut or missed by 0.2 m
+POWERS = (2, 1)  # of the range, in the law of the spread; the law of stereo first
+STEREO_SHARES = np.linspace(0, 1, 41)[:, np.newaxis]  # of the variance at the farthest range that grows with range
+GROWTH_OUTSIDE = 0.2  # about the steepest bias that the thesis' data show
+OFF_THE_MIDDLE_M = 0.1
+SHARES_68_95 = np.array([0.68, 0.95])
+NOBODY = Provenance('', '', '', '', 0, 0)
+
+
+class Data(NamedTuple):
+    """`measured_m` (n, 3), `truth_m` (n, 2) as (x, z), `position` (n,): the number of the position of each."""
+
+    measured_m: np.ndarray
+    truth_m: np.ndarray
+    position: np.ndarray
+
+    def part(self, mask):
+        """Those that the mask (n,) marks."""
+        return Data(*(values[mask] for values in self))
+
+    def weights(self):
+        """Of each measurement, (n,): 1 in total for each position."""
+        return 1.0 / np.bincount(self.position)[self.position]
+
+
+def fit_error_model(measured_m, truth_m, source='', estimator='', camera='', date=''):
+    """The model of measured positions with the fewest coefficients that does about best at positions it never saw.
+
+    Parameters
+    ----------
+    measured_m : array_like, (n, 3)
+        x, y, z as estimated, metres.
+    truth_m : array_like, (n, 2)
+        True x, z. Measurements with the same truth are repetitions at one position.
+    source, estimator, camera, date : str
+        Kept in the model.
+
+    Returns
+    -------
+    ErrorModel
+
+    Raises
+    ------
+    ValueError
+        If there are too few positions, all at one range or all at one x, or the bias is too steep to be undone.
+    """
+    data = data_of(measured_m, truth_m)
+    model = _fit(data)
+    corrected_m, covariances = held_out(data)
+    provenance = Provenance(source, estimator, camera, date, len(data.truth_m), int(data.position.max()) + 1)
+    return checked(model._replace(provenance=provenance, cross_validated=scores_of(corrected_m, covariances, truth_m)))
+
+
+def data_of(measured_m, truth_m):
+    """Check measurements, and number their positions. Raises ValueError."""
+    measured_m, truth_m = np.asarray(measured_m, float), np.asarray(truth_m, float)
+    if measured_m.shape != (len(truth_m), 3) or truth_m.shape != (len(truth_m), 2):
+        raise ValueError('measured %s and truth %s; (n, 3) and (n, 2) expected' % (measured_m.shape, truth_m.shape))
+    if not np.isfinite(measured_m).all() or not np.isfinite(truth_m).all():
+        raise ValueError('a measurement is not finite')
+    positions, position = np.unique(truth_m, axis=0, return_inverse=True)
+    for axis, name in enumerate('xz'):
+        if len(np.unique(positions[:, axis])) < 3:
+            raise ValueError('measurements at %d different %s; at least 3 expected'
+                             % (len(np.unique(positions[:, axis])), name))
+    return Data(measured_m, truth_m, position.reshape(-1))
+
+
+def held_out(data):
+    """Correct each position by a model of all others.
+
+    Returns
+    -------
+    tuple
+        Corrected positions (n, 3) and their covariances (n, 3, 3).
+    """
+    corrected_m, covariances = np.empty((len(data.truth_m), 3)), np.empty((len(data.truth_m), 3, 3))
+    for held, others in _folds(data):
+        model = _fit(others)
+        corrected_m[held] = model.corrected(data.measured_m[held])
+        covariances[held] = model.covariance(corrected_m[held])
+    return corrected_m, covariances
+
+
+def scores_of(corrected_m, covariances, truth_m):
+    """How far corrected positions (n, 3) with covariances (n, 3, 3) are from the truth (n, 2), as Scores."""
+    error_m = corrected_m[:, [0, 2]] - truth_m
+    in_plane = covariances[:, [0, 2]][:, :, [0, 2]]
+    distances = np.einsum('ni,nij,nj->n', error_m, np.linalg.inv(in_plane), error_m)
+    shares = (distances[:, np.newaxis] <= -2 * np.log(1 - SHARES_68_95)).mean(axis=0)  # chi square with two axes
+    rmse_m = np.sqrt((error_m ** 2).mean(axis=0))
+    return Scores(*(float(value) for value in (rmse_m[0], rmse_m[1], np.hypot(*rmse_m), shares[0], shares[1])))
+
+
+def _folds(data):
+    """For each position: the mask (n,) of its measurements, and the data of all others."""
+    for number in range(data.position.max() + 1):
+        held = data.position == number
+        others = data.part(~held)
+        yield held, others._replace(position=np.unique(others.position, return_inverse=True)[1].reshape(-1))
+
+
+def _fit(data):
+    """A model without provenance and scores."""
+    degrees = [degree for degree in DEGREES if degree + 2 <= len(np.unique(data.truth_m[:, 1]))]
+    degree = _simplest([(degree, _residuals(data, degree, X_TERMS[0])[:, 1]) for degree in degrees], data)
+    terms = _simplest([(terms, _residuals(data, degree, terms)[:, 0]) for terms in X_TERMS], data)
+    residuals_m = _residuals(data, degree, terms)
+    x_sigma, z_sigma = (_fit_spread(residuals_m[:, axis], data) for axis in (0, 1))
+    return _fit_bias(data, degree, terms)._replace(x_sigma=x_sigma, z_sigma=z_sigma)
+
+
+def _simplest(candidates, data):
+    """The first of (what, residuals (n,)), simplest first, that is about as good as the best."""
+    costs = [np.sqrt(np.average(residuals_m ** 2, weights=data.weights())) for _what, residuals_m in candidates]
+    best = 0
+    for number, cost in enumerate(costs):
+        if cost < BETTER * costs[best]:
+            best = number
+    return candidates[best][0]
+
+
+def _residuals(data, degree, terms):
+    """Errors (n, 2) in x and z that are left at each position after correction by the bias at all others."""
+    residuals_m = np.empty_like(data.truth_m)
+    for held, others in _folds(data):
+        corrected_m = _fit_bias(others, degree, terms).corrected(data.measured_m[held])
+        residuals_m[held] = corrected_m[:, [0, 2]] - data.truth_m[held]
+    return residuals_m
+
+
+def _fit_bias(data, degree, terms):
+    """A model with the bias of the data, by weighted least squares."""
+    x_m, z_m = data.truth_m.T
+    roots = np.sqrt(data.weights())
+    z_bias = np.polyfit(z_m, data.measured_m[:, 2] - z_m, degree, w=roots)
+    columns = np.stack((x_m * terms[0], x_m / z_m * terms[1], np.ones_like(x_m)), axis=1)
+    x_bias = np.linalg.lstsq(columns * roots[:, np.newaxis], (data.measured_m[:, 0] - x_m) * roots, rcond=1e-9)[0]
+    aside = np.abs(x_m) > OFF_THE_MIDDLE_M
+    limits = MeasuredRange(*(float(value) for value in (
+        z_m.min(), z_m.max(), np.abs(x_m).max(), z_m[aside].min() if aside.any() else z_m.min())))
+    spread = Spread(LEAST_SIGMA_M, 0.0, 2)
+    return ErrorModel(tuple(z_bias.tolist()), XBias(*x_bias.tolist()), spread, spread, Y_SIGMA_M, limits,
+                      GROWTH_OUTSIDE, NOBODY, None)
+
+
+def _fit_spread(residuals_m, data):
+    """The law of the spread of residuals (n,) that is likeliest at positions it never saw."""
+    z_m, weights = data.truth_m[:, 1], data.weights()
+    likelihoods = []
+    for power in POWERS:
+        likelihoods.append(0)
+        for number in range(data.position.max() + 1):
+            held = data.position == number
+            sigma_m = _spread_of(residuals_m[~held], z_m[~held], weights[~held], power).at(z_m[held])
+            likelihoods[-1] -= np.mean(np.log(sigma_m) + (residuals_m[held] / sigma_m) ** 2 / 2)
+    return _spread_of(residuals_m, z_m, weights, POWERS[int(np.argmax(likelihoods))])
+
+
+def _spread_of(residuals_m, z_m, weights, power):
+    """The likeliest Spread of weighted Gaussian residuals: for each share of its parts the scale is known exactly."""
+    farthest_m = z_m.max()
+    shapes = 1 - STEREO_SHARES + STEREO_SHARES * (z_m / farthest_m) ** (2 * power)
+    variances_m2 = np.maximum(LEAST_SIGMA_M ** 2, np.average(residuals_m ** 2 / shapes, axis=1, weights=weights))
+    costs = np.log(variances_m2) + np.average(np.log(shapes), axis=1, weights=weights)
+    best = int(np.argmin(costs))
+    constant_m, farthest_sigma_m = (np.sqrt(variances_m2[best] * share)
+                                    for share in (1 - STEREO_SHARES[best, 0], STEREO_SHARES[best, 0]))
+    return Spread(float(max(constant_m, LEAST_SIGMA_M)), float(farthest_sigma_m / farthest_m ** power), power)
