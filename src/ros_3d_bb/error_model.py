@@ -1,7 +1,7 @@
 """How far off a measured position is: its bias, which is taken out, and its covariance.
 
-Convention: positions (x, y, z) are in the camera optical frame, metres; error = measured - truth. The bias is a function
-of the TRUE position, as in the thesis: truth is what a tape measured, the noise is in what the camera measured, and
+Convention: positions (x, y, z) are in the camera optical frame, metres; error = measured - truth. The bias is a
+function of the TRUE position, as in the thesis: the noise is in what the camera measured, not in the tape's truth, and
 a fit the other way round would pull every position towards the middle of the data. A node knows only the measured
 position, so `ErrorModel.corrected` solves measured = truth + bias(truth). The model is fitted by
 ros_3d_bb.evaluation.error_fit; its file is described in config/error_models/README.md.
@@ -14,7 +14,7 @@ import yaml
 from ros_3d_bb.params import nearest_name
 
 STEEPEST_BIAS = 0.5  # metres a metre; a steeper one has no safe inverse
-SOLVER_STEPS = 30  # each at least halves the error: below a micrometre from any range
+SOLVER_STEPS = 20  # each at least halves what is left of the bias: a micrometre of a metre in the end
 
 
 class XBias(NamedTuple):

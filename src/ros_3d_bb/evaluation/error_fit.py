@@ -9,15 +9,15 @@ import numpy as np
 from ros_3d_bb.error_model import ErrorModel, MeasuredRange, Provenance, Scores, Spread, XBias, checked
 
 DEGREES = (0, 1, 2, 3)  # of the polynomial of z_bias
-X_TERMS = ((True, False), (False, True), (True, True))  # whether x_bias has slope, and per_angle_m
-BETTER = 0.98  # a model with more coefficients must be better by so much
+X_TERMS = ((False, True), (True, False), (True, True))  # whether x_bias has slope, and per_angle_m
+BETTER = 0.95  # a model with more coefficients must be better by so much
 LEAST_SIGMA_M = 0.001
 Y_SIGMA_M = 0.1  # a box whose top or bottom is cut or missed by 0.2 m
 POWERS = (2, 1)  # of the range, in the law of the spread; the law of stereo first
 STEREO_SHARES = np.linspace(0, 1, 41)[:, np.newaxis]  # of the variance at the farthest range that grows with range
 GROWTH_OUTSIDE = 0.2  # about the steepest bias that the thesis' data show
 OFF_THE_MIDDLE_M = 0.1
-SHARES_68_95 = np.array([0.68, 0.95])
+CHI_SQUARE_68_95 = -2 * np.log(1 - np.array([0.68, 0.95]))  # of two axes
 NOBODY = Provenance('', '', '', '', 0, 0)
 
 
@@ -101,7 +101,7 @@ def scores_of(corrected_m, covariances, truth_m):
     error_m = corrected_m[:, [0, 2]] - truth_m
     in_plane = covariances[:, [0, 2]][:, :, [0, 2]]
     distances = np.einsum('ni,nij,nj->n', error_m, np.linalg.inv(in_plane), error_m)
-    shares = (distances[:, np.newaxis] <= -2 * np.log(1 - SHARES_68_95)).mean(axis=0)  # chi square with two axes
+    shares = (distances[:, np.newaxis] <= CHI_SQUARE_68_95).mean(axis=0)
     rmse_m = np.sqrt((error_m ** 2).mean(axis=0))
     return Scores(*(float(value) for value in (rmse_m[0], rmse_m[1], np.hypot(*rmse_m), shares[0], shares[1])))
 
@@ -121,7 +121,9 @@ def _fit(data):
     terms = _simplest([(terms, _residuals(data, degree, terms)[:, 0]) for terms in X_TERMS], data)
     residuals_m = _residuals(data, degree, terms)
     x_sigma, z_sigma = (_fit_spread(residuals_m[:, axis], data) for axis in (0, 1))
-    return _fit_bias(data, degree, terms)._replace(x_sigma=x_sigma, z_sigma=z_sigma)
+    sigmas_m = np.stack([spread.at(data.truth_m[:, 1]) for spread in (x_sigma, z_sigma)], axis=1)
+    widening = _widening(sigmas_m, residuals_m)
+    return _fit_bias(data, degree, terms)._replace(x_sigma=_wider(x_sigma, widening), z_sigma=_wider(z_sigma, widening))
 
 
 def _simplest(candidates, data):
@@ -156,6 +158,19 @@ def _fit_bias(data, degree, terms):
     spread = Spread(LEAST_SIGMA_M, 0.0, 2)
     return ErrorModel(tuple(z_bias.tolist()), XBias(*x_bias.tolist()), spread, spread, Y_SIGMA_M, limits,
                       GROWTH_OUTSIDE, NOBODY, None)
+
+
+def _widening(sigmas_m, residuals_m):
+    """By how much to stretch ellipses of sigmas (n, 2) so that 95 % of them hold their residual (n, 2); at least 1.
+
+    Errors have longer tails than a Gaussian, and planners count on the ellipse of 95 %.
+    """
+    distances = ((residuals_m / sigmas_m) ** 2).sum(axis=1)
+    return max(1.0, float(np.sqrt(np.percentile(distances, 95) / CHI_SQUARE_68_95[1])))
+
+
+def _wider(spread, factor):
+    return spread._replace(constant_m=spread.constant_m * factor, growth=spread.growth * factor)
 
 
 def _fit_spread(residuals_m, data):

@@ -1,0 +1,120 @@
+"""The figures of the thesis' chapter 5, as PNG files."""
+import matplotlib
+import numpy as np
+from scipy import stats
+
+from ros_3d_bb.evaluation.noise import theory
+from ros_3d_bb.evaluation.noise.analysis import RMS_FIT_FROM_M
+
+matplotlib.use('Agg')  # no screen is needed
+import matplotlib.pyplot as plt  # noqa: E402
+
+SIZE_IN, DPI = (7.2, 4.2), 110
+COLUMNS = 3
+MEASURED, FITTED, THEORY, OTHER = 'tab:blue', 'tab:orange', 'tab:green', '0.55'
+
+
+def write_figures(folder, analysis, z_clusters, x_clusters):
+    """Write all figures into a folder; the clusters' errors are for the histograms. Returns nothing."""
+    rms(folder / 'figure_5_2.png', analysis)
+    error_by_truth(folder / 'figure_5_3.png', analysis.z, 'Z')
+    variances(folder / 'figure_5_4.png', analysis.z, 'Z')
+    error_by_truth(folder / 'figure_5_5.png', analysis.x, 'X')
+    variances(folder / 'figure_5_6.png', analysis.x_variance, 'X')
+    histograms(folder / 'figure_5_7.png', z_clusters, 'Z')
+    histograms(folder / 'figure_5_8.png', x_clusters, 'X')
+
+
+def polynomial_text(poly, variable):
+    """A polynomial as people write it: −0.040 z² + 0.060 z + 0.008."""
+    text = ''
+    for power, value in zip(range(len(poly) - 1, -1, -1), poly):
+        sign = ('−' if value < 0 else '+') if text else ('−' if value < 0 else '')
+        term = ('%.3f' % abs(value)) + {0: '', 1: ' ' + variable, 2: ' %s²' % variable}[power]
+        text += (' %s ' % sign if text else sign) + term
+    return text
+
+
+def rms(path, analysis):
+    """Figure 5.2: RMS of the depth error by distance, against the theory of stereo cameras."""
+    clusters = analysis.z.clusters
+    distance_m = np.linspace(0, 1.05 * max(cluster.truth_m for cluster in clusters), 100)
+    figure, axes = plt.subplots(figsize=SIZE_IN)
+    axes.plot([cluster.truth_m for cluster in clusters], [cluster.rms_m for cluster in clusters], 'o', color=MEASURED,
+              label='measured RMS, bias included')
+    axes.plot([cluster.truth_m for cluster in clusters], [cluster.sigma_m for cluster in clusters], 'x', color=MEASURED,
+              label='measured standard deviation')
+    if analysis.rms_poly is not None:
+        far_m = distance_m[distance_m >= RMS_FIT_FROM_M]
+        axes.plot(far_m, np.polyval(analysis.rms_poly, far_m), color=FITTED,
+                  label='fit to RMS: ' + polynomial_text(analysis.rms_poly, 'd'))
+    axes.plot(distance_m, theory.stereo_rms_m(distance_m, theory.STEREO_PX_M), color=THEORY,
+              label='theory, stereo pair: f·b = %.2f px·m' % theory.STEREO_PX_M)
+    for name, focal, style in (
+            ("theory, thesis' 69°", theory.focal_px(theory.THESIS_FOV_DEG, theory.THESIS_WIDTH_PX), '--'),
+            ('theory, colour intrinsics', theory.COLOR_FOCAL_PX, ':')):
+        axes.plot(distance_m, theory.stereo_rms_m(distance_m, focal * theory.THESIS_BASELINE_M), style, color=OTHER,
+                  label='%s: f = %.0f px' % (name, focal))
+    _finish(figure, axes, path, 'distance [m]', 'depth error [m]')
+
+
+def error_by_truth(path, axis, name):
+    """Figures 5.3 and 5.5: mean error by true value, one standard deviation as bars, and the fitted polynomial."""
+    truth_m = np.array([cluster.truth_m for cluster in axis.clusters])
+    figure, axes = plt.subplots(figsize=SIZE_IN)
+    axes.axhline(0, color='0.8', linewidth=1)
+    axes.errorbar(truth_m, [cluster.mean_m for cluster in axis.clusters],
+                  [cluster.sigma_m for cluster in axis.clusters], fmt='o', capsize=4, color=MEASURED,
+                  label='mean ± one standard deviation')
+    line_m = np.linspace(truth_m.min(), truth_m.max(), 100)
+    axes.plot(line_m, np.polyval(axis.poly, line_m), color=FITTED,
+              label='f(%s) = %s' % (name.lower(), polynomial_text(axis.poly, name.lower())))
+    _finish(figure, axes, path, 'true %s [m]' % name, '%s error [m]' % name)
+
+
+def variances(path, axis, name):
+    """Figures 5.4 and 5.6: the variance of each cluster."""
+    figure, axes = plt.subplots(figsize=SIZE_IN)
+    places = np.arange(len(axis.clusters))
+    axes.bar(places, [cluster.variance_m2 for cluster in axis.clusters], color=MEASURED)
+    axes.axhline(axis.max_variance_m2, color=FITTED, linestyle='--',
+                 label='largest: %.5f m² (standard deviation %.4f m)' % (axis.max_variance_m2, axis.max_sigma_m))
+    axes.set_xticks(places)
+    axes.set_xticklabels(['%.2f\nn=%d' % (cluster.truth_m, cluster.count) for cluster in axis.clusters])
+    axes.set_ylim(0, 1.2 * axis.max_variance_m2 or 1)
+    _finish(figure, axes, path, 'true %s of the cluster [m], number of measurements' % name,
+            'variance of the %s error [m²]' % name)
+
+
+def histograms(path, clusters, name):
+    """Figures 5.7 and 5.8: the errors of each cluster as a density, with the best Gaussian."""
+    rows = -(-len(clusters) // COLUMNS)
+    figure, grid = plt.subplots(rows, COLUMNS, figsize=(9, 2.4 * rows), squeeze=False)
+    for axes, cluster in zip(grid.ravel(), clusters):
+        mean_m, sigma_m = cluster.error_m.mean(), max(cluster.error_m.std(), 1e-6)
+        axes.hist(cluster.error_m, bins='sturges', density=True, color=MEASURED, alpha=0.6)
+        line_m = mean_m + sigma_m * np.linspace(-3.5, 3.5, 100)
+        axes.plot(line_m, stats.norm(mean_m, sigma_m).pdf(line_m), color=FITTED)
+        axes.set_title('%s = %.2f m, n = %d' % (name, cluster.truth_m, len(cluster.error_m)), fontsize=9)
+        axes.tick_params(labelsize=8)
+    for axes in grid.ravel()[len(clusters):]:
+        axes.set_visible(False)
+    for axes in grid[:, 0]:
+        axes.set_ylabel('density [1/m]', fontsize=8)
+    for axes in grid.ravel()[max(0, len(clusters) - COLUMNS):len(clusters)]:
+        axes.set_xlabel('%s error [m]' % name, fontsize=8)
+    _save(figure, path)
+
+
+def _finish(figure, axes, path, x_label, y_label):
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.25)
+    _save(figure, path)
+
+
+def _save(figure, path):
+    figure.tight_layout()
+    figure.savefig(str(path), dpi=DPI)
+    plt.close(figure)

@@ -1,0 +1,154 @@
+"""Clusters of errors in numbers: moments, tests for a Gaussian, and which distribution predicts the errors best."""
+from typing import NamedTuple, Optional
+
+import numpy as np
+from scipy import stats
+
+from ros_3d_bb.evaluation.noise.tables import AXES
+
+LEAST_SCALE_M = 0.001  # values come in whole millimetres: a density must not rise above what that can show
+FOLDS = 5
+EM_STEPS = 60
+NARROWEST_PART = 0.25  # of a mixture, in standard deviations of the whole: a part must not settle on one value
+SIGNIFICANCE = 0.05
+
+
+class ClusterStatistics(NamedTuple):
+    """Of one cluster, metres: variance as the thesis has it (divided by n); `shapiro_p` the p value of Shapiro-Wilk;
+    `anderson` the statistic of Anderson-Darling and its critical value at 5 %; `log_likelihoods` of the distributions
+    in DISTRIBUTIONS, a measurement held out. The last four are None where all errors are equal."""
+
+    truth_m: float
+    count: int
+    mean_m: float
+    variance_m2: float
+    rms_m: float
+    shapiro_p: Optional[float]
+    anderson: Optional[float]
+    anderson_critical: Optional[float]
+    log_likelihoods: Optional[dict]
+
+    @property
+    def sigma_m(self):
+        """Standard deviation."""
+        return float(np.sqrt(self.variance_m2))
+
+    @property
+    def looks_gaussian(self):
+        """Whether neither test rejects a Gaussian at 5 %."""
+        return self.shapiro_p is not None and self.shapiro_p >= SIGNIFICANCE and self.anderson < self.anderson_critical
+
+
+class AxisStatistics(NamedTuple):
+    """Of one axis: the polynomial of the clusters' mean error by true value, highest power first, and the clusters."""
+
+    poly: tuple
+    clusters: tuple
+
+    @property
+    def max_variance_m2(self):
+        """The largest variance of all clusters."""
+        return max(cluster.variance_m2 for cluster in self.clusters)
+
+    @property
+    def max_sigma_m(self):
+        """The largest standard deviation of all clusters."""
+        return float(np.sqrt(self.max_variance_m2))
+
+
+def axis_statistics(clusters, degree):
+    """Statistics of clusters, and the polynomial through their means, each of equal weight (as in the thesis).
+
+    Raises
+    ------
+    ValueError
+        If there are too few clusters for the degree.
+    """
+    if len(clusters) <= degree:
+        raise ValueError('%d clusters; at least %d needed for a polynomial of degree %d'
+                         % (len(clusters), degree + 1, degree))
+    described = tuple(cluster_statistics(cluster) for cluster in clusters)
+    poly = np.polyfit([cluster.truth_m for cluster in described], [cluster.mean_m for cluster in described], degree)
+    return AxisStatistics(tuple(poly.tolist()), described)
+
+
+def share_between_positions(measurements, axis):
+    """Share 0..1 of the variance within the clusters of an axis that is between positions with another true value on
+    the other axis; None where not both are known."""
+    known = measurements.complete()
+    number = AXES.index(axis)
+    error_m = known.measured_m[:, 2 * number] - known.truth_m[:, number]
+    if not len(error_m):
+        return None
+    clusters, positions = (np.unique(truth, axis=0, return_inverse=True)[1].reshape(-1)
+                           for truth in (known.truth_m[:, [number]], known.truth_m))
+    whole, within = (_variance_within(error_m, group) for group in (clusters, positions))
+    return float(1 - within / whole) if whole > 0 else None
+
+
+def _variance_within(values, group):
+    """Mean square of values (n,) around the mean of their group (n,)."""
+    counts = np.bincount(group)
+    return float(np.mean((values - (np.bincount(group, values) / counts)[group]) ** 2))
+
+
+def cluster_statistics(cluster):
+    """ClusterStatistics of a Cluster."""
+    error_m = cluster.error_m
+    moments = (cluster.truth_m, len(error_m), float(error_m.mean()), float(error_m.var()),
+               float(np.sqrt((error_m ** 2).mean())))
+    if np.ptp(error_m) == 0:
+        return ClusterStatistics(*(moments + (None,) * 4))
+    anderson = stats.anderson(error_m, 'norm')
+    return ClusterStatistics(*moments + (
+        float(stats.shapiro(error_m)[1]), float(anderson[0]), float(anderson[1][list(anderson[2]).index(5.0)]),
+        {name: held_out_log_likelihood(error_m, fit) for name, fit in DISTRIBUTIONS}))
+
+
+def held_out_log_likelihood(values_m, fit):
+    """Mean log density of values, each under the distribution that `fit` makes of the other folds (of five)."""
+    fold = np.random.RandomState(0).permutation(len(values_m)) % FOLDS
+    total = sum(fit(values_m[fold != number])(values_m[fold == number]).sum() for number in np.unique(fold))
+    return float(total / len(values_m))
+
+
+def fit_gaussian(values_m):
+    """The log density function of the likeliest Gaussian."""
+    return stats.norm(values_m.mean(), max(values_m.std(), LEAST_SCALE_M)).logpdf
+
+
+def fit_laplace(values_m):
+    """The log density function of the likeliest Laplace distribution: sharper, with longer tails."""
+    location, scale = stats.laplace.fit(values_m)
+    return stats.laplace(location, max(scale, LEAST_SCALE_M)).logpdf
+
+
+def fit_student(values_m):
+    """The log density function of the likeliest Student t distribution: a Gaussian with outliers."""
+    location, scale = np.median(values_m), max(values_m.std(), LEAST_SCALE_M)
+    freedom, location, scale = stats.t.fit(values_m, 5, loc=location, scale=scale)
+    return stats.t(max(freedom, 1.0), location, max(scale, LEAST_SCALE_M)).logpdf
+
+
+def fit_mixture(values_m):
+    """The log density function of two Gaussians, by expectation maximisation from the lower and the upper half."""
+    upper = values_m > np.median(values_m)
+    narrowest_m = max(LEAST_SCALE_M, NARROWEST_PART * values_m.std())
+    share = np.stack((~upper, upper)).astype(float)  # (2, n): of each value in each Gaussian
+    for _ in range(EM_STEPS):
+        weights = np.maximum(share.mean(axis=1), 1e-6)
+        means_m = (share * values_m).sum(axis=1) / (weights * len(values_m))
+        deviations_m2 = (values_m - means_m[:, np.newaxis]) ** 2
+        sigmas_m = np.maximum(np.sqrt((share * deviations_m2).sum(axis=1) / (weights * len(values_m))), narrowest_m)
+        parts = _log_parts(values_m, weights, means_m, sigmas_m)
+        share = np.exp(parts - np.logaddexp(*parts))
+    return lambda at_m: np.logaddexp(*_log_parts(at_m, weights, means_m, sigmas_m))
+
+
+def _log_parts(values_m, weights, means_m, sigmas_m):
+    return np.stack([np.log(weight) + stats.norm(mean_m, sigma_m).logpdf(values_m)
+                     for weight, mean_m, sigma_m in zip(weights, means_m, sigmas_m)])
+
+
+DISTRIBUTIONS = (('Gaussian', fit_gaussian), ('Laplace', fit_laplace), ('Student t', fit_student),
+                 ('two Gaussians', fit_mixture))

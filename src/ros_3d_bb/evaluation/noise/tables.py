@@ -1,0 +1,175 @@
+"""Measurements with ground truth, from tables of the thesis' form or from a measurement session, in clusters.
+
+A table is a CSV file in millimetres with the columns `X measured`, `X true`, `Z measured`, `Z true`; cells of an axis
+that was not measured are empty, or its columns missing. Columns `X error`, `Z error` are checked; others are not read.
+"""
+import csv
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_3d_bb.estimation import estimator_named, near_first
+from ros_3d_bb.measurements import read_depth, read_session
+
+AXES = ('X', 'Z')
+LEAST_IN_CLUSTER = 3
+ROUNDING_MM = 1.01  # errors may be differences of values that were rounded afterwards
+EDGE_PX = 2
+
+
+class TableError(ValueError):
+    """Measurements that cannot be used: says where, what is wrong and what was expected."""
+
+
+class Measurements(NamedTuple):
+    """`measured_m` (n, 3) as x, y, z, and `truth_m` (n, 2) as x, z, metres; nan where not measured. `name` says where
+    they come from; `cut` (n,) whether the person is cut by the left or right edge of the image, where known."""
+
+    name: str
+    measured_m: np.ndarray
+    truth_m: np.ndarray
+    cut: np.ndarray
+
+    def complete(self):
+        """Those with all of x and z."""
+        return self._part(np.isfinite(self.measured_m[:, [0, 2]]).all(axis=1) & np.isfinite(self.truth_m).all(axis=1))
+
+    def whole(self):
+        """Those of people who are not cut by the left or right edge."""
+        return self._part(~self.cut)
+
+    def _part(self, mask):
+        return self._replace(measured_m=self.measured_m[mask], truth_m=self.truth_m[mask], cut=self.cut[mask])
+
+
+class Cluster(NamedTuple):
+    """Errors (n,) of all measurements with one true value on an axis, metres."""
+
+    truth_m: float
+    error_m: np.ndarray
+
+
+def clusters_of(measurements, axis):
+    """The clusters of an axis, 'X' or 'Z', by their true value.
+
+    Raises
+    ------
+    TableError
+        If there are no measurements of the axis, all are in one cluster, or a cluster has fewer than 3.
+    """
+    number = AXES.index(axis)
+    truth_m, measured_m = measurements.truth_m[:, number], measurements.measured_m[:, 2 * number]
+    known = np.isfinite(truth_m) & np.isfinite(measured_m)
+    if not known.any():
+        raise TableError('%s: no measurement of %s' % (measurements.name, axis))
+    truth_m, error_m = truth_m[known], (measured_m - truth_m)[known]
+    clusters = [Cluster(float(value), error_m[truth_m == value]) for value in np.unique(truth_m)]
+    if len(clusters) == 1:
+        raise TableError('%s: all measurements have %s true = %g m; several true values are needed to see how the '
+                         'error goes with it' % (measurements.name, axis, clusters[0].truth_m))
+    for cluster in clusters:
+        if len(cluster.error_m) < LEAST_IN_CLUSTER:
+            raise TableError('%s: only %d measurements with %s true = %g m; at least %d needed for a variance'
+                             % (measurements.name, len(cluster.error_m), axis, cluster.truth_m, LEAST_IN_CLUSTER))
+    return clusters
+
+
+def read_table(path, axis):
+    """Read a CSV table that has at least the columns of an axis, 'X' or 'Z'.
+
+    Returns
+    -------
+    Measurements
+
+    Raises
+    ------
+    TableError
+        If the file cannot be read, a column is missing, or a cell is no number (names the line).
+    """
+    try:
+        with open(path, encoding='utf-8-sig', newline='') as stream:
+            reader = csv.DictReader(stream)
+            columns = [name.strip() for name in reader.fieldnames or ()]
+            reader.fieldnames = columns
+            for kind in ('measured', 'true'):
+                if '%s %s' % (axis, kind) not in columns:
+                    raise TableError('%s: no column "%s %s"; there are: %s'
+                                     % (path, axis, kind, ', '.join(columns) or 'none'))
+            rows = [[_axis_of(row, name, '%s, line %d' % (path, reader.line_num)) for name in AXES] for row in reader]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise TableError('%s: cannot be read as a table (%s)' % (path, error))
+    if not rows:
+        raise TableError('%s: a table without rows' % path)
+    values_m = np.array(rows).reshape(-1, 2, 2) / 1000  # row, axis, (measured, true)
+    measured_m = np.stack((values_m[:, 0, 0], np.zeros(len(rows)), values_m[:, 1, 0]), axis=1)
+    return Measurements(path, measured_m, values_m[:, :, 1], np.zeros(len(rows), bool))
+
+
+def read_session_measurements(folder, estimator):
+    """What an estimator makes of a measurement session.
+
+    Parameters
+    ----------
+    folder : str
+    estimator : str
+        A name for `estimator_named`, or 'recorded': the estimates stored in the session.
+
+    Returns
+    -------
+    Measurements
+        Of the frames with ground truth and an estimate.
+
+    Raises
+    ------
+    ValueError
+        If the session cannot be read, or no frame of it can be used.
+    """
+    session = read_session(folder)
+    found = [(frame, _estimate(frame, session, estimator)) for frame in session.frames if frame.truth_m is not None]
+    found = [(frame, position_m) for frame, position_m in found if position_m is not None]
+    if not found:
+        raise TableError('%s: no frame with ground truth and an estimate (%s)' % (folder, estimator))
+    return Measurements(str(folder), np.array([position_m for _frame, position_m in found]),
+                        np.array([frame.truth_m for frame, _position in found]),
+                        np.array([_is_cut(frame, session.camera) for frame, _position in found]))
+
+
+def _estimate(frame, session, name):
+    """Position (3,) of the person of a frame, the first box, or None."""
+    if name == 'recorded':
+        return frame.estimate_m
+    estimator, depth, found = estimator_named(name), read_depth(frame, session), {}
+    for number in near_first(frame.boxes_px):
+        rect_px = frame.boxes_px[number]
+        nearer = [box for box in found.values() if box is not None]
+        found[number] = estimator.estimate(estimator.sample(depth, rect_px), rect_px, session.camera, nearer)
+    return None if found.get(0) is None else found[0].center_m
+
+
+def _is_cut(frame, camera):
+    return bool(frame.boxes_px) and (frame.boxes_px[0][0] <= EDGE_PX or frame.boxes_px[0][2] >= camera.width - EDGE_PX)
+
+
+def _axis_of(row, axis, where):
+    """(measured, true) of one axis of a row, millimetres; nan where the row has none."""
+    measured, true, error = (_number(row.get('%s %s' % (axis, kind)), where, '%s %s' % (axis, kind))
+                             for kind in ('measured', 'true', 'error'))
+    if np.isnan(measured) != np.isnan(true):
+        raise TableError('%s: "%s measured" is %g and "%s true" is %g; both or none expected'
+                         % (where, axis, measured, axis, true))
+    if abs(measured - true - error) > ROUNDING_MM:
+        raise TableError('%s: "%s error" is %g, but measured minus true is %g'
+                         % (where, axis, error, measured - true))
+    return measured, true
+
+
+def _number(text, where, column):
+    if text is None or not text.strip():
+        return np.nan
+    try:
+        number = float(text)
+    except ValueError:
+        number = np.inf
+    if not np.isfinite(number):
+        raise TableError('%s: "%s" is %.40r; a number of millimetres expected' % (where, column, text))
+    return number
