@@ -2,6 +2,6 @@ from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
 setup(**generate_distutils_setup(
-    packages=['ros_3d_bb', 'ros_3d_bb.detection', 'ros_3d_bb.evaluation', 'ros_3d_bb.nodes', 'ros_3d_bb.simulation',
-              'ros_3d_bb.tracking'],
+    packages=['ros_3d_bb', 'ros_3d_bb.detection', 'ros_3d_bb.evaluation', 'ros_3d_bb.evaluation.noise',
+              'ros_3d_bb.nodes', 'ros_3d_bb.simulation', 'ros_3d_bb.tracking'],
     package_dir={'': 'src'}))

@@ -1,5 +1,5 @@
 """The modules of Python's standard library that are in use here (sys.stdlib_module_names is Python 3.10's)."""
-STANDARD_LIBRARY = {'argparse', 'ast', 'bisect', 'collections', 'contextlib', 'difflib', 'functools', 'json', 'math',
-                    'os', 'pickle', 'sys', 'threading', 'time', 'typing', 'zipfile'}
+STANDARD_LIBRARY = {'argparse', 'ast', 'bisect', 'collections', 'contextlib', 'csv', 'datetime', 'difflib', 'functools',
+                    'html', 'json', 'math', 'os', 'pathlib', 'pickle', 'sys', 'threading', 'time', 'typing', 'zipfile'}
 TEST_STANDARD_LIBRARY = {'copy', 'glob', 'importlib', 'io', 'itertools', 'random', 're', 'shutil', 'signal',
                          'subprocess', 'types', 'xml'}

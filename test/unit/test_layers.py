@@ -9,7 +9,8 @@ from support.standard_library import STANDARD_LIBRARY
 SOURCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'src', 'ros_3d_bb')
 MODULES = sorted(os.path.relpath(os.path.join(folder, name), SOURCE)
                  for folder, _folders, names in os.walk(SOURCE) for name in names if name.endswith('.py'))
-PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime', 'yaml'}
+PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime', 'yaml', 'matplotlib', 'scipy'}
+NOISE = os.path.join('evaluation', 'noise')  # a desk tool: no node may come to need its libraries
 # convert to and from ROS messages, but run in no node
 ROS_TYPES = {'bags.py', 'camera_messages.py', 'markers.py', 'messages.py', 'report.py', 'simulator_messages.py'}
 
@@ -36,10 +37,12 @@ def test_pure_modules_know_no_ros(module):
 
 
 @pytest.mark.parametrize('module', MODULES)
-def test_rospy_is_for_nodes_and_torch_for_detection(module):
-    others, _ours = imports_of(module)
+def test_rospy_is_for_nodes_torch_for_detection_and_scipy_for_the_noise_analysis(module):
+    others, ours = imports_of(module)
     assert 'rospy' not in others or module.startswith('nodes/')
     assert 'torch' not in others or module.startswith('detection/')
+    assert not others & {'matplotlib', 'scipy'} or module.startswith(NOISE)
+    assert not any(name.startswith('ros_3d_bb.evaluation.noise') for name in ours) or module.startswith(NOISE)
 
 
 @pytest.mark.parametrize('module', [m for m in MODULES if m.startswith('nodes/')])

@@ -97,6 +97,7 @@ def histograms(path, clusters, name):
         axes.plot(line_m, stats.norm(mean_m, sigma_m).pdf(line_m), color=FITTED)
         axes.set_title('%s = %.2f m, n = %d' % (name, cluster.truth_m, len(cluster.error_m)), fontsize=9)
         axes.tick_params(labelsize=8)
+        axes.locator_params(axis='x', nbins=5)
     for axes in grid.ravel()[len(clusters):]:
         axes.set_visible(False)
     for axes in grid[:, 0]:

@@ -19,7 +19,7 @@ def _summary(analysis):
     clusters, gaussian = _gaussian_count(analysis)
     return [
         paragraph('How far 3D boxes are from where people really stood. Error is what was measured minus the truth; X '
-                  'is to the right of the camera, Z ahead of it. A cluster is all measurements with the same true value.'),
+                  'is to the right of the camera, Z ahead of it. A cluster is all measurements with one true value.'),
         table(('', 'X', 'Z'), (
             ('measurements of the mean', _count(analysis.x), _count(analysis.z)),
             ('measurements of the variance', _count(analysis.x_variance), _count(analysis.z)),
@@ -40,6 +40,20 @@ def _summary(analysis):
 
 
 def _theory(analysis):
+    far = analysis.z.clusters[-1]
+    return [
+        heading('Depth error and the theory of stereo cameras'),
+        paragraph('A stereo camera that matches to s pixels has a depth error of d² · s / (f · b) at distance d. It is '
+                  'the least to be expected: it is for a flat plane; a person is round, and is found by a detector.',
+                  'The measured RMS holds the mean error too; the standard deviation is what is left without it.',
+                  'Where the RMS is far above the standard deviation, most of the error is bias.',
+                  'Here, at %.2f m: RMS %.4f m, standard deviation %.4f m, theory %.4f m.' % (
+                      far.truth_m, far.rms_m, far.sigma_m, theory.stereo_rms_m(far.truth_m, theory.STEREO_PX_M))),
+        figure('figure_5_2.png', 'Figure 5.2: depth error by distance.' + (
+            '' if analysis.rms_poly is None else ' The fit begins at %.1f m.' % RMS_FIT_FROM_M))] + _focal_lengths()
+
+
+def _focal_lengths():
     thesis_px = theory.focal_px(theory.THESIS_FOV_DEG, theory.THESIS_WIDTH_PX)
     color_deg = theory.fov_deg(theory.COLOR_FOCAL_PX, theory.THESIS_WIDTH_PX)
     stereo_px = theory.STEREO_PX_M / theory.THESIS_BASELINE_M
@@ -48,24 +62,16 @@ def _theory(analysis):
             for name, focal in (("thesis: from the colour camera's 69°", thesis_px),
                                 ('colour intrinsics', theory.COLOR_FOCAL_PX), ('stereo pair (used here)', stereo_px))]
     return [
-        heading('Depth error and the theory of stereo cameras'),
-        paragraph('A stereo camera that matches to s pixels has a depth error of d² · s / (f · b) at distance d. It is '
-                  'the least to be expected: it is for a flat plane; a person is round, and is found by a detector.',
-                  'The measured RMS holds the mean error too; the standard deviation is what is left without it.',
-                  'Where the RMS is far above the standard deviation, most of the error is bias.'),
-        figure('figure_5_2.png', 'Figure 5.2: depth error by distance.' + (
-            '' if analysis.rms_poly is None else ' The fit begins at %.1f m.' % RMS_FIT_FROM_M)),
         table(('focal length f', 'f [px]', 'field of view at 640 px [°]', 'theory at 3 m [m]'), rows),
         paragraph("Which f? The thesis takes %.0f px from the data sheet's 69°. That is the whole 16:9 colour sensor; "
                   'its images have 640×480 pixels (4:3), cut from the middle: the intrinsics that the camera reports '
                   'say f = %.1f px, %.1f°. So 69° does not fit them: with 69° theory is %.0f %% above what they give.'
-                  % (thesis_px, theory.COLOR_FOCAL_PX, color_deg,
-                                        100 * (theory.COLOR_FOCAL_PX / thesis_px - 1)),
+                  % (thesis_px, theory.COLOR_FOCAL_PX, color_deg, 100 * (theory.COLOR_FOCAL_PX / thesis_px - 1)),
                   'Yet depth is not measured by the colour camera. Its error is that of the infrared stereo pair, and '
-                  "aligning it to colour does not change it. The pair's f · b can be read from the thesis' depth images: "
-                  'their depths are all 610.14 m / n with whole n (1/32 pixel of disparity), so f · b = %.3f px·m, '
-                  'f = %.0f px with the baseline of 50 mm. That is used here, with s = %.2f px as Intel recommends.'
-                  % (theory.STEREO_PX_M, stereo_px, theory.SUBPIXEL_PX))]
+                  "aligning it to colour does not change it. The pair's f · b can be read from the thesis' depth "
+                  'images: their depths are all 610.14 m / n with whole n (1/32 pixel of disparity), so f · b is %.3f '
+                  'px·m, and f is %.0f px with the baseline of 50 mm. That is used here, with s = %.2f px as Intel '
+                  'recommends.' % (theory.STEREO_PX_M, stereo_px, theory.SUBPIXEL_PX))]
 
 
 def _z(analysis):
@@ -76,12 +82,14 @@ def _z(analysis):
 
 
 def _x(analysis):
-    return [heading('X'), figure('figure_5_5.png', 'Figure 5.5: X error by true X.'), _cluster_table(analysis.x, 'X'),
-            figure('figure_5_6.png', 'Figure 5.6: variance of the X error in each cluster.'),
-            paragraph('The mean error is of all measurements, the variance of %s (%s measurements).' % (
-                'the same' if analysis.x_variance == analysis.x
-                else 'those in which nobody is cut by the edge of the image', _count(analysis.x_variance)),
-                _between_text(analysis.x_between, 'X', 'Z'))]
+    pieces = [heading('X'), figure('figure_5_5.png', 'Figure 5.5: X error by true X.'),
+              _cluster_table(analysis.x, 'X')]
+    if analysis.x_variance != analysis.x:
+        pieces += [paragraph('The mean error is that of all measurements. Variance and distribution are those of %s '
+                             'measurements without people who are cut by the edge of the image:'
+                             % _count(analysis.x_variance)), _cluster_table(analysis.x_variance, 'X')]
+    return pieces + [figure('figure_5_6.png', 'Figure 5.6: variance of the X error in each cluster.'),
+                     paragraph(_between_text(analysis.x_between, 'X', 'Z'))]
 
 
 def _distributions(analysis):
@@ -94,10 +102,11 @@ def _distributions(analysis):
         figure('figure_5_7.png', 'Figure 5.7: Z error in each cluster, as a density, and the best Gaussian.'),
         figure('figure_5_8.png', 'Figure 5.8: X error in each cluster, as a density, and the best Gaussian.'),
         paragraph('Two tests: Shapiro–Wilk rejects a Gaussian where p is below 0.05, Anderson–Darling where its '
-                  'statistic is above the critical value. %d of %d clusters are rejected by neither.' % (gaussian, clusters),
+                  'statistic is above the critical value. %d of %d clusters are rejected by neither.' % (
+                      gaussian, clusters),
                   'A small cluster is hard to reject; that it is not does not make it Gaussian.'),
-        paragraph('The last columns compare distributions by what they say of measurements that they were not fitted to: '
-                  'the mean log density in five-fold cross-validation, larger is better.', _best_text(analysis)),
+        paragraph('The last columns compare distributions by what they say of measurements that they were not fitted '
+                  'to: the mean log density in five-fold cross-validation, larger is better (★).', _best_text(analysis)),
         table(header, rows)]
 
 
@@ -122,7 +131,7 @@ def _model_pieces(model):
                   'positions; each position has the same weight. The form was chosen by cross-validation.'
                   % (model.provenance.measurements, model.provenance.positions)),
         table(('part', 'value'), (
-            ('bias of Z', ' '.join('%+.4f z^%d' % (value, len(model.z_bias) - 1 - number)
+            ('bias of Z', ' '.join('%+.4f%s' % (value, _power_text('z', len(model.z_bias) - 1 - number))
                                    for number, value in enumerate(model.z_bias))),
             ('bias of X', '%+.4f x %+.4f x/z %+.4f' % bias),
             ('σ of Z [m]', _spread_text(model.z_sigma)), ('σ of X [m]', _spread_text(model.x_sigma)),
@@ -194,7 +203,11 @@ def _gaussian_count(analysis):
 def _spread_text(spread):
     if spread.growth == 0:
         return '%.4f' % spread.constant_m
-    return '√(%.4f² + (%.4f z^%d)²)' % spread
+    return '√(%.4f² + (%.4f%s)²)' % (spread.constant_m, spread.growth, _power_text('z', spread.power))
+
+
+def _power_text(variable, power):
+    return ('', ' ' + variable, ' %s²' % variable, ' %s³' % variable)[power]
 
 
 def _count(axis):

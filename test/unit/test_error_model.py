@@ -1,0 +1,156 @@
+"""Error models: the bias is undone, the covariance is honest outside of the data, files say what is wrong with them."""
+import glob
+import os
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ros_3d_bb.error_model import STEEPEST_BIAS, Scores, Spread, XBias, checked, read_error_model, write_error_model
+from support.error_models import MODEL
+
+SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'error_models')
+small = st.floats(-0.05, 0.05)
+positions = st.tuples(st.floats(-5, 5), st.floats(-2, 2), st.floats(0.6, 20))
+models = st.builds(lambda z, x, angle, offset: MODEL._replace(z_bias=z, x_bias=XBias(x, angle, offset)),
+                   st.lists(small, min_size=1, max_size=3).map(tuple), small, small, small)
+
+
+@given(models, st.lists(positions, min_size=1, max_size=5))
+def test_correction_undoes_the_bias(model, true_m):
+    assert np.allclose(checked(model).corrected(model.biased(true_m)), true_m, atol=1e-5)
+
+
+@given(positions)
+def test_boxes_are_corrected_alone_as_they_are_together(measured_m):
+    together = MODEL.corrected([[measured_m, (0.1, 0.2, 1.0)]])
+    assert together.shape == (1, 2, 3)
+    assert np.array_equal(MODEL.corrected(measured_m), together[0, 0])
+    assert np.array_equal(MODEL.covariance(measured_m), MODEL.covariance([measured_m, measured_m])[1])
+
+
+def test_no_boxes_are_no_boxes():
+    assert MODEL.corrected(np.empty((0, 3))).shape == (0, 3) and MODEL.covariance(np.empty((0, 3))).shape == (0, 3, 3)
+
+
+def test_the_bias_is_that_of_the_true_position():
+    x_m, _y, z_m = MODEL.biased([1.0, 0.0, 3.0])
+    assert z_m == pytest.approx(3.0 - 0.36 + 0.18 + 0.008)
+    assert x_m == pytest.approx(1.0 - 0.05 - 0.1 / 3 + 0.02)
+
+
+def test_height_goes_along_the_ray():
+    corrected = MODEL.corrected([0.0, 0.3, 2.0])
+    assert corrected[1] / corrected[2] == pytest.approx(0.15)
+
+
+def test_outside_of_the_measured_range_the_bias_stays_as_at_its_end():
+    end, beyond = MODEL.biased([[0.0, 0.0, 4.0], [0.0, 0.0, 9.0]])
+    assert beyond[2] - 9.0 == pytest.approx(end[2] - 4.0)
+    assert np.diff(MODEL.corrected([[0, 0, 8.0], [0, 0, 9.0]])[:, 2]) == pytest.approx(1.0)
+
+
+def test_covariance_is_the_spread_inside_and_grows_outside():
+    inside, far, aside, near = MODEL.covariance([[0, 0, 2.0], [0, 0, 7.0], [2.5, 0, 2.0], [0, 0, 0.4]])
+    assert np.allclose(inside, np.diag([0.02 ** 2, 0.1 ** 2, 0.01 ** 2 + 0.016 ** 2]))
+    assert far[2, 2] == pytest.approx(0.01 ** 2 + (0.004 * 49) ** 2 + 0.6 ** 2)
+    assert np.allclose(aside - inside, 0.2 ** 2 * np.eye(3))
+    assert (np.diag(near) > np.diag(MODEL.covariance([0, 0, 0.5]))).all()
+
+
+@given(st.floats(4, 30), st.floats(0, 5))
+def test_farther_out_is_never_surer(z_m, further_m):
+    nearer, farther = MODEL.covariance([[0, 0, z_m], [0, 0, z_m + further_m]])
+    assert (np.diag(farther) >= np.diag(nearer)).all()
+
+
+def test_the_model_says_how_far_outside_a_position_is():
+    assert MODEL.distance_outside([[0, 0, 2], [-1.7, 0, 4.3], [0, 0, 0.4]]) == pytest.approx([0, 0.5, 0.1])
+
+
+def test_positions_behind_the_camera_are_refused():
+    with pytest.raises(ValueError, match='z is -1 m'):
+        MODEL.corrected([[0, 0, 1], [0, 0, -1]])
+
+
+@pytest.mark.parametrize('change,reason', [
+    ({'z_bias': (-0.2, 0.0, 0.0)}, 'z_bias changes by 1.6 m a metre'),
+    ({'x_bias': XBias(0.1, -2.0, 0.0)}, 'x_bias changes by 1.9 m'),
+    ({'z_sigma': Spread(0.0, 0.0, 2)}, 'z_sigma is 0 m'),
+    ({'y_sigma_m': -1.0}, 'y_sigma_m is -1'),
+    ({'growth_outside': -0.1}, 'growth_outside is -0.1'),
+    ({'measured_range': MODEL.measured_range._replace(z_max_m=0.1)}, r'measured_range is \(0.5, 0.1')])
+def test_models_that_cannot_be_used_are_refused(change, reason):
+    with pytest.raises(ValueError, match=reason):
+        checked(MODEL._replace(**change))
+
+
+def test_a_bias_that_just_can_be_undone_is_undone():
+    model = checked(MODEL._replace(z_bias=(STEEPEST_BIAS, 0.1)))
+    assert model.corrected(model.biased([0.3, 0.1, 3.0])) == pytest.approx([0.3, 0.1, 3.0], abs=1e-5)
+
+
+@given(models, st.one_of(st.none(), st.builds(Scores, *[st.floats(0, 1)] * 5)))
+def test_files_hold_the_whole_model(tmp_path_factory, model, scores):
+    path = str(tmp_path_factory.getbasetemp() / 'model.yaml')
+    write_error_model(path, model._replace(cross_validated=scores))
+    assert read_error_model(path) == model._replace(cross_validated=scores)
+
+
+def edited(folder, edit):
+    path = str(folder / 'model.yaml')
+    write_error_model(path, MODEL)
+    with open(path) as stream:
+        content = yaml.safe_load(stream)
+    edit(content)
+    with open(path, 'w') as stream:
+        yaml.safe_dump(content, stream)
+    return path
+
+
+@pytest.mark.parametrize('edit,reason', [
+    (lambda content: content.update(z_bais=[1]), 'unknown key z_bais; did you mean z_bias'),
+    (lambda content: content['x_bias'].update(slop=1), r'unknown key x_bias\.slop; did you mean x_bias\.slope'),
+    (lambda content: content.pop('x_sigma'), 'the key x_sigma is missing'),
+    (lambda content: content['x_sigma'].pop('growth'), r'the key x_sigma\.growth is missing'),
+    (lambda content: content.update(z_bias='1 + z'), "z_bias is '1 \\+ z'; a list of numbers expected"),
+    (lambda content: content.update(z_bias=[]), r'z_bias is \[\]'),
+    (lambda content: content.update(z_bias=[1, 'two']), "z_bias is 'two'; a number expected"),
+    (lambda content: content.update(y_sigma_m=float('nan')), 'y_sigma_m is nan; a number expected'),
+    (lambda content: content.update(y_sigma_m=True), 'y_sigma_m is True'),
+    (lambda content: content['x_sigma'].update(power=0.5), 'power is 0.5; a whole number expected'),
+    (lambda content: content.update(x_sigma=3), 'x_sigma is 3; the keys constant_m, growth, power expected'),
+    (lambda content: content.update(y_sigma_m=0), 'y_sigma_m is 0 m')])
+def test_files_with_faults_are_refused(tmp_path, edit, reason):
+    path = edited(tmp_path, edit)
+    with pytest.raises(ValueError, match=reason) as error:
+        read_error_model(path)
+    assert path in str(error.value)
+
+
+@pytest.mark.parametrize('text', ['', '- 1', 'z_bias: [', '!!python/object/apply:os.system ["false"]'])
+def test_what_is_no_model_is_refused(tmp_path, text):
+    (tmp_path / 'model.yaml').write_text(text)
+    with pytest.raises(ValueError, match='not an error model'):
+        read_error_model(tmp_path / 'model.yaml')
+
+
+def test_whole_numbers_will_do(tmp_path):
+    assert read_error_model(edited(tmp_path, lambda content: content.update(z_bias=[0], growth_outside=1))).z_bias == (0,)
+
+
+@pytest.mark.parametrize('path', sorted(glob.glob(os.path.join(SHIPPED, '*.yaml'))), ids=os.path.basename)
+def test_shipped_models_can_be_read_and_are_explained(path):
+    assert read_error_model(path).provenance.source
+    with open(os.path.join(SHIPPED, 'README.md')) as stream:
+        text = stream.read()
+    assert '`%s`' % os.path.basename(path) in text and all('`%s`' % name in text for name in MODEL._fields)
+
+
+def test_the_thesis_model_is_the_published_one():
+    model = read_error_model(os.path.join(SHIPPED, 'thesis.yaml'))
+    assert model.z_bias == (-0.04, 0.06, 0.008) and model.x_bias == (-0.106, 0.0, -0.006)
+    assert np.sqrt(np.diag(model.covariance([0.5, 0, 2])))[[0, 2]] == pytest.approx([0.018, 0.0474])
+    assert model.corrected(model.biased([1.0, 0, 3.0])) == pytest.approx([1.0, 0, 3.0], abs=1e-5)
