@@ -152,7 +152,12 @@ class ErrorModel(NamedTuple):
                 + np.maximum(0, np.abs(position_m[..., 0]) - limits.x_max_m))
 
     def _z_bias_at(self, z_m):
-        return np.polyval(self.z_bias, np.clip(z_m, self.measured_range.z_min_m, self.measured_range.z_max_m))
+        # by hand, as polyval and clip take five times as long for the few boxes of an image
+        inside_m = np.minimum(np.maximum(z_m, self.measured_range.z_min_m), self.measured_range.z_max_m)
+        bias_m = 0 * inside_m
+        for coefficient in self.z_bias:
+            bias_m = bias_m * inside_m + coefficient
+        return bias_m
 
     def _x_slope_at(self, z_m):
         nearest_m, farthest_m = self.measured_range.x_z_min_m, self.measured_range.z_max_m

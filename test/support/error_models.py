@@ -8,8 +8,8 @@ MODEL = ErrorModel(
     x_sigma=Spread(0.02, 0.0, 2), y_sigma_m=0.1, measured_range=MeasuredRange(0.5, 4.0, 1.5, 1.0), growth_outside=0.2,
     provenance=Provenance('a test: of "keys", and #colours', 'median', 'none', '2026-01-01', 110, 22),
     cross_validated=None)
-PLACES_M = np.array([(x, z) for z in (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
-                     for x in (-1.5, -0.7, 0.0, 0.7, 1.5) if z >= 1.0 or x == 0.0])
+PLACES_M = np.array([(x, z) for z in (0.5, 1.0, 1.7, 2.5, 3.2, 4.0)
+                     for x in (-1.5, 0.0, 0.7, 1.5) if z >= 1.0 or x == 0.0])
 
 
 def measure(model, repetitions, seed=1, noise=1.0):

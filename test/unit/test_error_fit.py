@@ -11,13 +11,14 @@ SIMPLE = MODEL._replace(x_bias=XBias(-0.1, 0.0, 0.02))
 
 @pytest.fixture(scope='module')
 def fitted():
-    return fit_error_model(*measure(SIMPLE, 6), source='made', estimator='median', camera='none', date='2026-01-01')
+    return fit_error_model(*measure(SIMPLE, 4), source='made', estimator='median', camera='none', date='2026-01-01')
 
 
 def test_recovers_the_bias(fitted):
     true_m = np.array([[0.5, 0.0, 1.2], [-1.0, 0.2, 2.2], [1.2, 0.1, 3.8]])
-    assert np.abs(fitted.corrected(SIMPLE.biased(true_m)) - true_m)[:, [0, 2]].max() < 0.02
-    assert len(fitted.z_bias) == 3 and fitted.x_bias.per_angle_m == 0 and fitted.x_bias.slope == pytest.approx(-0.1, abs=0.01)
+    assert np.abs(fitted.corrected(SIMPLE.biased(true_m)) - true_m)[:, [0, 2]].max() < 0.03
+    assert len(fitted.z_bias) == 3 and fitted.x_bias.per_angle_m == 0
+    assert fitted.x_bias.slope == pytest.approx(-0.1, abs=0.01)
 
 
 def test_recovers_a_bias_that_goes_with_the_angle():
@@ -46,7 +47,7 @@ def test_ellipses_hold_what_they_promise(fitted):
 
 def test_scores_are_of_positions_that_the_model_never_saw():
     measured_m, truth_m = measure(SIMPLE, 3)
-    outlier = (truth_m == PLACES_M[17]).all(axis=1)
+    outlier = (truth_m == PLACES_M[10]).all(axis=1)
     measured_m[outlier, 2] += 0.3
     corrected_m, _covariances = held_out(data_of(measured_m, truth_m))
     assert (corrected_m[outlier, 2] - truth_m[outlier, 1]).mean() > 0.29
@@ -56,16 +57,17 @@ def test_a_position_counts_once_however_often_it_was_measured():
     measured_m, truth_m = measure(SIMPLE, 1)
     often = np.repeat(np.arange(len(truth_m)), np.where(np.arange(len(truth_m)) == 3, 40, 1))
     once, many = fit_error_model(measured_m, truth_m), fit_error_model(measured_m[often], truth_m[often])
-    assert many.z_bias == pytest.approx(once.z_bias) and many.z_sigma.at(2.0) == pytest.approx(once.z_sigma.at(2.0), rel=0.1)
+    assert many.z_bias == pytest.approx(once.z_bias)
+    assert many.z_sigma.at(2.0) == pytest.approx(once.z_sigma.at(2.0), rel=0.1)
 
 
 def test_keeps_where_it_comes_from_and_where_it_holds(fitted):
-    assert fitted.provenance == ('made', 'median', 'none', '2026-01-01', 6 * len(PLACES_M), len(PLACES_M))
+    assert fitted.provenance == ('made', 'median', 'none', '2026-01-01', 4 * len(PLACES_M), len(PLACES_M))
     assert fitted.measured_range == (0.5, 4.0, 1.5, 1.0)
 
 
 @pytest.mark.parametrize('select,reason', [
-    (lambda truth: truth[:, 1] == 2.0, 'at 1 different z'), (lambda truth: truth[:, 0] == 0.0, 'at 1 different x')])
+    (lambda truth: truth[:, 1] == 2.5, 'at 1 different z'), (lambda truth: truth[:, 0] == 0.0, 'at 1 different x')])
 def test_too_few_positions_are_refused(select, reason):
     measured_m, truth_m = measure(SIMPLE, 2)
     with pytest.raises(ValueError, match=reason):

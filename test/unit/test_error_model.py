@@ -138,7 +138,8 @@ def test_what_is_no_model_is_refused(tmp_path, text):
 
 
 def test_whole_numbers_will_do(tmp_path):
-    assert read_error_model(edited(tmp_path, lambda content: content.update(z_bias=[0], growth_outside=1))).z_bias == (0,)
+    path = edited(tmp_path, lambda content: content.update(z_bias=[0], growth_outside=1))
+    assert read_error_model(path).z_bias == (0,)
 
 
 @pytest.mark.parametrize('path', sorted(glob.glob(os.path.join(SHIPPED, '*.yaml'))), ids=os.path.basename)

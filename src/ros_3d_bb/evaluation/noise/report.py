@@ -106,7 +106,8 @@ def _distributions(analysis):
                       gaussian, clusters),
                   'A small cluster is hard to reject; that it is not does not make it Gaussian.'),
         paragraph('The last columns compare distributions by what they say of measurements that they were not fitted '
-                  'to: the mean log density in five-fold cross-validation, larger is better (★).', _best_text(analysis)),
+                  'to: the mean log density in five-fold cross-validation; ★ marks the largest, the best.',
+                  _best_text(analysis)),
         table(header, rows)]
 
 
@@ -176,7 +177,7 @@ def _best_text(analysis):
     gain = means[best] - means['Gaussian']
     text = 'Over all clusters: ' + ', '.join('%s %.3f' % (name, means[name]) for name, _fit in DISTRIBUTIONS) + '. '
     if gain < SIMILAR:
-        return text + 'None is better than the Gaussian by more than %.2f: one loses little by using it.' % SIMILAR
+        return text + 'None is better than the Gaussian by more than %.2f: little is lost by using it.' % SIMILAR
     return text + '%s predict%s best, by %.3f a measurement over the Gaussian.' % (
         best, '' if best.endswith('s') else 's', gain)
 

@@ -9,6 +9,7 @@ from ros_3d_bb.evaluation.noise.tables import AXES
 LEAST_SCALE_M = 0.001  # values come in whole millimetres: a density must not rise above what that can show
 FOLDS = 5
 EM_STEPS = 60
+FREEDOMS = (1, 2, 4, 8, 16, 64)  # of Student's t: from long tails to almost a Gaussian
 NARROWEST_PART = 0.25  # of a mixture, in standard deviations of the whole: a part must not settle on one value
 SIGNIFICANCE = 0.05
 
@@ -125,9 +126,18 @@ def fit_laplace(values_m):
 
 def fit_student(values_m):
     """The log density function of the likeliest Student t distribution: a Gaussian with outliers."""
-    location, scale = np.median(values_m), max(values_m.std(), LEAST_SCALE_M)
-    freedom, location, scale = stats.t.fit(values_m, 5, loc=location, scale=scale)
-    return stats.t(max(freedom, 1.0), location, max(scale, LEAST_SCALE_M)).logpdf
+    candidates = [stats.t(freedom, *_student_location_scale(values_m, freedom)).logpdf for freedom in FREEDOMS]
+    return max(candidates, key=lambda density: density(values_m).sum())
+
+
+def _student_location_scale(values_m, freedom):
+    """The likeliest location and scale for so many degrees of freedom, by expectation maximisation."""
+    location_m, scale_m = np.median(values_m), max(values_m.std(), LEAST_SCALE_M)
+    for _ in range(EM_STEPS):
+        weights = (freedom + 1) / (freedom + ((values_m - location_m) / scale_m) ** 2)
+        location_m = (weights * values_m).sum() / weights.sum()
+        scale_m = max(np.sqrt((weights * (values_m - location_m) ** 2).mean()), LEAST_SCALE_M)
+    return location_m, scale_m
 
 
 def fit_mixture(values_m):
@@ -146,8 +156,8 @@ def fit_mixture(values_m):
 
 
 def _log_parts(values_m, weights, means_m, sigmas_m):
-    return np.stack([np.log(weight) + stats.norm(mean_m, sigma_m).logpdf(values_m)
-                     for weight, mean_m, sigma_m in zip(weights, means_m, sigmas_m)])
+    deviations = (values_m - means_m[:, np.newaxis]) / sigmas_m[:, np.newaxis]
+    return np.log(weights / (np.sqrt(2 * np.pi) * sigmas_m))[:, np.newaxis] - deviations ** 2 / 2
 
 
 DISTRIBUTIONS = (('Gaussian', fit_gaussian), ('Laplace', fit_laplace), ('Student t', fit_student),

@@ -1,0 +1,83 @@
+"""Reading measurements for the noise analysis: what is in them, and what is wrong with those that cannot be used."""
+import numpy as np
+import pytest
+
+from ros_3d_bb.evaluation.noise.tables import (Measurements, TableError, clusters_of, read_session_measurements,
+                                               read_table)
+from ros_3d_bb.measurements import read_session
+from support.noise_tables import COLUMNS, RANGES_M, SIDES_M, rows_of, write_table
+
+
+def test_reads_a_table_in_metres(tmp_path):
+    table = read_table(write_table(tmp_path / 'table.csv', [[-1152, -1230, 2558, 2700, 78, 78, -142, 142]]), 'X')
+    assert table.measured_m.tolist() == [[-1.152, 0, 2.558]] and table.truth_m.tolist() == [[-1.23, 2.7]]
+
+
+def test_an_axis_that_was_not_measured_may_be_empty_or_missing(tmp_path):
+    empty = read_table(write_table(tmp_path / 'empty.csv', [['', '', 288, 300, '', '', -12, 12]]), 'Z')
+    missing = read_table(write_table(tmp_path / 'missing.csv', [[288, 300]], ['Z measured', ' Z true']), 'Z')
+    for table in (empty, missing):
+        assert np.isnan(table.truth_m[0, 0]) and table.truth_m[0, 1] == 0.3 and len(table.complete().truth_m) == 0
+
+
+def test_clusters_are_by_true_value(tmp_path):
+    table = read_table(write_table(tmp_path / 'table.csv', rows_of()), 'Z')
+    assert [cluster.truth_m for cluster in clusters_of(table, 'Z')] == pytest.approx(list(RANGES_M))
+    assert [cluster.truth_m for cluster in clusters_of(table, 'X')] == pytest.approx(list(SIDES_M))
+    assert [len(cluster.error_m) for cluster in clusters_of(table, 'Z')] == [6 * len(SIDES_M)] * len(RANGES_M)
+
+
+@pytest.mark.parametrize('row,reason', [
+    ([0, 0, 'far', 300], 'line 3: "Z measured" is \'far\'; a number of millimetres expected'),
+    ([0, 0, 'inf', 300], 'line 3: "Z measured" is \'inf\''),
+    ([0, 0, '', 300], 'line 3: "Z measured" is nan and "Z true" is 300; both or none expected'),
+    ([0, 0, 288, 300, 0, 0, 12], 'line 3: "Z error" is 12, but measured minus true is -12')])
+def test_rows_with_faults_are_named(tmp_path, row, reason):
+    with pytest.raises(TableError) as error:
+        read_table(write_table(tmp_path / 'table.csv', [[0, 0, 288, 300], row]), 'Z')
+    assert 'table.csv' in str(error.value) and reason in str(error.value)
+
+
+@pytest.mark.parametrize('columns', [['X measured', 'X true', 'Z measured'], []])
+def test_missing_columns_are_named(tmp_path, columns):
+    with pytest.raises(TableError, match='no column "Z true"; there are: X measured' if columns else 'there are: none'):
+        read_table(write_table(tmp_path / 'table.csv', [], columns), 'Z')
+
+
+def test_files_that_are_no_tables_are_named(tmp_path):
+    (tmp_path / 'image.csv').write_bytes(b'\x89PNG\xff\xfe')
+    write_table(tmp_path / 'empty.csv', [])
+    for name, reason in (('image.csv', 'cannot be read'), ('no.csv', 'No such file'), ('empty.csv', 'without rows')):
+        with pytest.raises(TableError, match=reason):
+            read_table(str(tmp_path / name), 'Z')
+
+
+@pytest.mark.parametrize('rows,reason', [
+    ([[0, 0, '', '']] * 3, 'no measurement of Z'),
+    ([[0, 0, 288, 300]] * 5, 'all measurements have Z true = 0.3 m'),
+    ([[0, 0, 288, 300]] * 5 + [[0, 0, 588, 600]] * 2, 'only 2 measurements with Z true = 0.6 m; at least 3')])
+def test_too_little_to_analyse_is_refused(tmp_path, rows, reason):
+    table = read_table(write_table(tmp_path / 'table.csv', rows, COLUMNS[:4]), 'Z')
+    with pytest.raises(TableError, match=reason):
+        clusters_of(table, 'Z')
+
+
+def test_a_session_gives_what_is_stored_in_it_or_what_an_estimator_makes_of_it(session_folder):
+    recorded, median, foreground = (read_session_measurements(session_folder, name)
+                                    for name in ('recorded', 'median', 'foreground'))
+    assert len(recorded.truth_m) == len(median.truth_m) == len(read_session(session_folder).frames)
+    assert np.abs(recorded.measured_m - median.measured_m).max() < 0.002  # median is the thesis' estimator
+    assert np.abs(foreground.measured_m - median.measured_m).max() > 0.01
+    assert np.abs(foreground.measured_m[:, 2] - foreground.truth_m[:, 1]).max() < 0.4
+
+
+def test_people_cut_by_the_edge_of_the_image_can_be_left_out(session_folder):
+    table = read_session_measurements(session_folder, 'recorded')
+    boxes = [frame.boxes_px[0] for frame in read_session(session_folder).frames]
+    assert [left <= 2 or right >= 638 for left, _top, right, _bottom in boxes] == table.cut.tolist()
+    assert len(table.whole().truth_m) == len(boxes) - np.count_nonzero(table.cut)
+
+
+def test_complete_and_whole_are_parts():
+    table = Measurements('made', np.arange(6.0).reshape(2, 3), np.array([[1, np.nan], [1, 2]]), np.array([False, True]))
+    assert table.complete().measured_m.tolist() == [[3, 4, 5]] and table.whole().measured_m.tolist() == [[0, 1, 2]]
