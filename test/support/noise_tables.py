@@ -5,7 +5,7 @@ import numpy as np
 
 COLUMNS = ['X measured', 'X true', 'Z measured', 'Z true', 'X error', 'X absolute error', 'Z error', 'Z absolute error']
 Z_POLY, X_POLY = (-0.04, 0.06, 0.008), (-0.106, -0.006)
-RANGES_M, SIDES_M = (0.6, 0.9, 1.2, 1.5, 1.8, 2.1, 2.4, 2.7, 3.0), (-1.23, -0.65, 0.0, 0.65, 1.23)
+RANGES_M, SIDES_M = (0.6, 0.9, 1.2, 1.5, 2.0, 2.5, 3.0), (-1.23, -0.65, 0.0, 0.65, 1.23)
 Z_SIGMA_M, X_SIGMA_M = 0.0474, 0.018
 
 
