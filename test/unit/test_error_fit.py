@@ -28,8 +28,8 @@ def test_recovers_a_bias_that_goes_with_the_angle():
 
 def test_recovers_the_spread(fitted):
     ranges_m = np.array([1.0, 2.5, 4.0])
-    assert fitted.z_sigma.at(ranges_m) == pytest.approx(MODEL.z_sigma.at(ranges_m), rel=0.3)
-    assert fitted.x_sigma.at(ranges_m) == pytest.approx(MODEL.x_sigma.at(ranges_m), rel=0.3)
+    assert fitted.z_sigma.at(ranges_m) == pytest.approx(MODEL.z_sigma.at(ranges_m), rel=0.4)
+    assert fitted.x_sigma.at(ranges_m) == pytest.approx(MODEL.x_sigma.at(ranges_m), rel=0.4)
 
 
 def test_without_noise_the_bias_is_exact():

@@ -47,9 +47,11 @@ def test_moments_are_those_of_the_thesis():
     assert found.variance_m2 == pytest.approx(0.0014 / 3)  # divided by n
 
 
-def test_errors_that_are_all_equal_are_not_tested():
-    found = cluster_statistics(Cluster(1.0, np.array([0.01] * 4)))
-    assert found.variance_m2 == 0 and found.shapiro_p is None and not found.looks_gaussian
+def test_errors_that_are_all_equal_or_few_are_not_tested():
+    equal, few = (cluster_statistics(Cluster(1.0, np.array(values))) for values in ([0.01] * 9, [0.01, 0.02, 0.05]))
+    assert equal.variance_m2 == 0 and few.variance_m2 > 0
+    for found in (equal, few):
+        assert found.shapiro_p is None and not found.tested and not found.looks_gaussian
 
 
 def test_each_cluster_has_the_same_weight_in_the_polynomial():

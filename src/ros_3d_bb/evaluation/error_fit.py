@@ -122,7 +122,7 @@ def _fit(data):
     residuals_m = _residuals(data, degree, terms)
     x_sigma, z_sigma = (_fit_spread(residuals_m[:, axis], data) for axis in (0, 1))
     sigmas_m = np.stack([spread.at(data.truth_m[:, 1]) for spread in (x_sigma, z_sigma)], axis=1)
-    widening = _widening(sigmas_m, residuals_m)
+    widening = _widening(sigmas_m, residuals_m, int(data.position.max()) + 1)
     return _fit_bias(data, degree, terms)._replace(x_sigma=_wider(x_sigma, widening), z_sigma=_wider(z_sigma, widening))
 
 
@@ -160,13 +160,15 @@ def _fit_bias(data, degree, terms):
                       GROWTH_OUTSIDE, NOBODY, None)
 
 
-def _widening(sigmas_m, residuals_m):
-    """By how much to stretch ellipses of sigmas (n, 2) so that 95 % of them hold their residual (n, 2); at least 1.
+def _widening(sigmas_m, residuals_m, positions):
+    """By how much to stretch ellipses of sigmas (n, 2) so that those of 95 % hold their residual (n, 2); at least 1.
 
-    Errors have longer tails than a Gaussian, and planners count on the ellipse of 95 %.
+    Errors have longer tails than a Gaussian, and planners count on the ellipse of 95 %. The quantile is the one of
+    conformal prediction: the next position is worse than 95 % of so many that were seen more often than once in twenty.
     """
     distances = ((residuals_m / sigmas_m) ** 2).sum(axis=1)
-    return max(1.0, float(np.sqrt(np.percentile(distances, 95) / CHI_SQUARE_68_95[1])))
+    quantile = np.percentile(distances, min(100, 95.0 * (positions + 1) / positions))
+    return max(1.0, float(np.sqrt(quantile / CHI_SQUARE_68_95[1])))
 
 
 def _wider(spread, factor):

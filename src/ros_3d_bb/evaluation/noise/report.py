@@ -2,7 +2,7 @@
 from ros_3d_bb.evaluation.noise import theory
 from ros_3d_bb.evaluation.noise.figures import RMS_FIT_FROM_M, polynomial_text
 from ros_3d_bb.evaluation.noise.page import figure, heading, page, paragraph, table
-from ros_3d_bb.evaluation.noise.statistics import DISTRIBUTIONS
+from ros_3d_bb.evaluation.noise.statistics import DISTRIBUTIONS, LEAST_TO_TEST
 
 SIMILAR = 0.05  # of log likelihood a measurement: less says nothing
 
@@ -34,7 +34,7 @@ def _summary(analysis):
                       far.truth_m, far.mean_m, abs(far.mean_m) / max(far.sigma_m, 1e-6))
                   if abs(far.mean_m) > far.sigma_m else 'The mean error nowhere exceeds the standard deviation.',
                   'The mean error can be taken out; the error model at the end of this page does.',
-                  '%d of %d clusters pass for a Gaussian.' % (gaussian, clusters)),
+                  '%d of %d tested clusters pass for a Gaussian.' % (gaussian, clusters)),
         paragraph('Measured by: %s. Camera: %s. Z: %s. X: %s. Variance of X: %s.' % (
             inputs.estimator, inputs.camera, inputs.z.name, inputs.x.name, inputs.x_variance.name))]
 
@@ -104,7 +104,8 @@ def _distributions(analysis):
         paragraph('Two tests: Shapiro–Wilk rejects a Gaussian where p is below 0.05, Anderson–Darling where its '
                   'statistic is above the critical value. %d of %d clusters are rejected by neither.' % (
                       gaussian, clusters),
-                  'A small cluster is hard to reject; that it is not does not make it Gaussian.'),
+                  'A small cluster is hard to reject; that it is not does not make it Gaussian. With fewer than %d '
+                  'measurements, or all equal, it is not tested.' % LEAST_TO_TEST),
         paragraph('The last columns compare distributions by what they say of measurements that they were not fitted '
                   'to: the mean log density in five-fold cross-validation; ★ marks the largest, the best.',
                   _best_text(analysis)),
@@ -155,8 +156,8 @@ def _cluster_table(axis, name):
 
 def _distribution_row(name, cluster):
     row = ('%s = %.2f m' % (name, cluster.truth_m), '%d' % cluster.count)
-    if cluster.log_likelihoods is None:
-        return row + ('all equal', '', '', '') + ('',) * len(DISTRIBUTIONS)
+    if not cluster.tested:
+        return row + ('not tested', '', '', '') + ('',) * len(DISTRIBUTIONS)
     best = max(cluster.log_likelihoods.values())
     return row + (
         '%.4f' % cluster.shapiro_p, '%.2f' % cluster.anderson, '%.2f' % cluster.anderson_critical,
@@ -167,7 +168,7 @@ def _distribution_row(name, cluster):
 
 def _best_text(analysis):
     """Which distribution predicts best, over all clusters by their numbers of measurements."""
-    clusters = [cluster for _name, cluster in _all_clusters(analysis) if cluster.log_likelihoods is not None]
+    clusters = [cluster for _name, cluster in _all_clusters(analysis) if cluster.tested]
     if not clusters:
         return ''
     count = float(sum(cluster.count for cluster in clusters))
@@ -196,9 +197,9 @@ def _all_clusters(analysis):
 
 
 def _gaussian_count(analysis):
-    """(number of clusters, how many of them neither test rejects)."""
-    clusters = _all_clusters(analysis)
-    return len(clusters), sum(cluster.looks_gaussian for _name, cluster in clusters)
+    """(number of clusters that could be tested, how many of them neither test rejects)."""
+    tested = [cluster for _name, cluster in _all_clusters(analysis) if cluster.tested]
+    return len(tested), sum(cluster.looks_gaussian for cluster in tested)
 
 
 def _spread_text(spread):

@@ -12,12 +12,13 @@ EM_STEPS = 60
 FREEDOMS = (1, 2, 4, 8, 16, 64)  # of Student's t: from long tails to almost a Gaussian
 NARROWEST_PART = 0.25  # of a mixture, in standard deviations of the whole: a part must not settle on one value
 SIGNIFICANCE = 0.05
+LEAST_TO_TEST = 8  # measurements; with fewer the critical values of Anderson-Darling are none
 
 
 class ClusterStatistics(NamedTuple):
     """Of one cluster, metres: variance as the thesis has it (divided by n); `shapiro_p` the p value of Shapiro-Wilk;
     `anderson` the statistic of Anderson-Darling and its critical value at 5 %; `log_likelihoods` of the distributions
-    in DISTRIBUTIONS, a measurement held out. The last four are None where all errors are equal."""
+    in DISTRIBUTIONS, a measurement held out. The last four are None where all errors are equal, or fewer than 8."""
 
     truth_m: float
     count: int
@@ -35,9 +36,14 @@ class ClusterStatistics(NamedTuple):
         return float(np.sqrt(self.variance_m2))
 
     @property
+    def tested(self):
+        """Whether there was enough to test."""
+        return self.shapiro_p is not None
+
+    @property
     def looks_gaussian(self):
         """Whether neither test rejects a Gaussian at 5 %."""
-        return self.shapiro_p is not None and self.shapiro_p >= SIGNIFICANCE and self.anderson < self.anderson_critical
+        return self.tested and self.shapiro_p >= SIGNIFICANCE and self.anderson < self.anderson_critical
 
 
 class AxisStatistics(NamedTuple):
@@ -98,7 +104,7 @@ def cluster_statistics(cluster):
     error_m = cluster.error_m
     moments = (cluster.truth_m, len(error_m), float(error_m.mean()), float(error_m.var()),
                float(np.sqrt((error_m ** 2).mean())))
-    if np.ptp(error_m) == 0:
+    if len(error_m) < LEAST_TO_TEST or np.ptp(error_m) == 0:
         return ClusterStatistics(*(moments + (None,) * 4))
     anderson = stats.anderson(error_m, 'norm')
     return ClusterStatistics(*moments + (
