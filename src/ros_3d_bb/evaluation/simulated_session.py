@@ -1,0 +1,73 @@
+"""A measurement session of the simulated camera, with exact truth: people of all builds at places of a grid, standing
+and walking by in all directions. For the error model of the simulated camera: `./run noise` takes it as any other.
+"""
+import argparse
+import json
+import os
+
+import cv2
+import numpy as np
+
+from ros_3d_bb.geometry import transform_points
+from ros_3d_bb.simulation.scenario import Move, Person, Robot, Room, Scenario
+from ros_3d_bb.simulation.simulator import D435I_COLOR, Simulator
+
+RANGES_M = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)
+TANGENTS = (-0.4, -0.2, 0.0, 0.2, 0.4)  # of the angle off the optical axis
+ROOM = Room(bounds=(-2.0, 9.0, -5.0, 5.0))
+ROBOT = Robot()
+WALK_S, SPEED_MPS = 1.0, 1.2  # a walker passes the place so long after the start
+REPETITIONS = 6
+
+
+def write_simulated_session(folder, ranges_m=RANGES_M, tangents=TANGENTS, repetitions=REPETITIONS):
+    """Write a session of people whom the image shows, the 2D box being exactly around them; returns the folder."""
+    for name in ('color', 'depth'):
+        os.makedirs(os.path.join(folder, name), exist_ok=True)
+    places = [(z_m, round(tangent * z_m, 3)) for z_m in ranges_m for tangent in tangents]
+    frames = [_write_frame(folder, number, places[number // repetitions])
+              for number in range(len(places) * repetitions)]
+    camera = dict(D435I_COLOR._asdict(), distortion=[0] * 5, depth_scale=0.001, frame='camera_color_optical_frame')
+    with open(os.path.join(folder, 'frames.json'), 'w') as stream:
+        json.dump({'camera': camera, 'frames': [frame for frame in frames if frame is not None]}, stream, indent=1)
+    return folder
+
+
+def _write_frame(folder, number, place):
+    """Render somebody at a place (z, x) of the camera; returns the description, None where nobody is seen."""
+    z_m, x_m = place
+    simulator = Simulator(_scenario(np.array([ROBOT.pose[0] + ROBOT.mount[0] + z_m, ROBOT.pose[1] - x_m]), number))
+    frame = simulator.frame(simulator.frame_count - 1)
+    person = frame.people[0]
+    if person.box_px is None:
+        return None
+    name = '%04d.png' % number
+    cv2.imwrite(os.path.join(folder, 'color', name), frame.color[..., ::-1])
+    cv2.imwrite(os.path.join(folder, 'depth', name), frame.depth_mm)
+    truth_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), person.position_m)
+    return {'id': '%04d' % number, 'color': 'color/' + name, 'depth': 'depth/' + name,
+            'box': [int(edge) for edge in person.box_px],
+            'truth_mm': {'x': round(1000 * truth_m[0]), 'z': round(1000 * truth_m[2])}}
+
+
+def _scenario(place_m, number):
+    """Somebody who is at the place (x, y) of the map in the last image; every other one walks there."""
+    heading_rad = float(np.random.RandomState(number).uniform(-np.pi, np.pi))
+    step_m = WALK_S * SPEED_MPS * np.array([np.cos(heading_rad), np.sin(heading_rad)])
+    if number % 2:
+        person = Person(tuple(place_m - step_m), heading_rad, moves=(Move(to=tuple(place_m + step_m), speed=SPEED_MPS),))
+    else:
+        person = Person(tuple(place_m), heading_rad)
+    # two images: one at the start, one when the walker passes
+    return Scenario(duration=2 * WALK_S, rate=1 / WALK_S, seed=number, room=ROOM, robot=ROBOT, people=(person,))
+
+
+def main():
+    """Write the session of the whole grid."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('folder', help='where to write it')
+    print(write_simulated_session(parser.parse_args().folder))
+
+
+if __name__ == '__main__':
+    main()
