@@ -55,7 +55,8 @@ def _scenario(place_m, number):
     heading_rad = float(np.random.RandomState(number).uniform(-np.pi, np.pi))
     step_m = WALK_S * SPEED_MPS * np.array([np.cos(heading_rad), np.sin(heading_rad)])
     if number % 2:
-        person = Person(tuple(place_m - step_m), heading_rad, moves=(Move(to=tuple(place_m + step_m), speed=SPEED_MPS),))
+        walk = Move(to=tuple(place_m + step_m), speed=SPEED_MPS)
+        person = Person(tuple(place_m - step_m), heading_rad, moves=(walk,))
     else:
         person = Person(tuple(place_m), heading_rad)
     # two images: one at the start, one when the walker passes
