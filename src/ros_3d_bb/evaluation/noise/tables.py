@@ -35,8 +35,10 @@ class Measurements(NamedTuple):
         return self._part(np.isfinite(self.measured_m[:, [0, 2]]).all(axis=1) & np.isfinite(self.truth_m).all(axis=1))
 
     def whole(self):
-        """Those of people who are not cut by the left or right edge."""
-        return self._part(~self.cut)
+        """Those of people who are not cut by the left or right edge, where at least 3 of them share their true x."""
+        whole = self._part(~self.cut)
+        values_m, counts = np.unique(whole.truth_m[:, 0], return_counts=True)
+        return whole._part(np.isin(whole.truth_m[:, 0], values_m[counts >= LEAST_IN_CLUSTER]))
 
     def _part(self, mask):
         return self._replace(measured_m=self.measured_m[mask], truth_m=self.truth_m[mask], cut=self.cut[mask])
