@@ -45,6 +45,16 @@ def test_ellipses_hold_what_they_promise(fitted):
     assert 0.92 < scores.coverage_95 < 0.99 and 0.62 < scores.coverage_68 < 0.8
 
 
+def test_ellipses_hold_long_tails():
+    random = np.random.RandomState(4)
+    measured_m, truth_m = measure(SIMPLE, 200, noise=0.0)
+    measured_m += 0.01 * random.standard_t(2, measured_m.shape)
+    some = np.arange(len(truth_m)) % 200 < 5
+    model = fit_error_model(measured_m[some], truth_m[some])
+    corrected_m = model.corrected(measured_m[~some])
+    assert 0.92 < scores_of(corrected_m, model.covariance(corrected_m), truth_m[~some]).coverage_95 < 0.99
+
+
 def test_scores_are_of_positions_that_the_model_never_saw():
     measured_m, truth_m = measure(SIMPLE, 3)
     outlier = (truth_m == PLACES_M[10]).all(axis=1)

@@ -163,8 +163,8 @@ def _fit_bias(data, degree, terms):
 def _widening(sigmas_m, residuals_m, positions):
     """By how much to stretch ellipses of sigmas (n, 2) so that those of 95 % hold their residual (n, 2); at least 1.
 
-    Errors have longer tails than a Gaussian, and planners count on the ellipse of 95 %. The quantile is the one of
-    conformal prediction: the next position is worse than 95 % of so many that were seen more often than once in twenty.
+    Errors have longer tails than a Gaussian, and planners count on the ellipse of 95 %. The quantile is a little
+    higher than 95 %, as in conformal prediction: the next position is one more than those that are known.
     """
     distances = ((residuals_m / sigmas_m) ** 2).sum(axis=1)
     quantile = np.percentile(distances, min(100, 95.0 * (positions + 1) / positions))
