@@ -176,6 +176,15 @@ class ErrorModel(NamedTuple):
         return np.where(np.abs(inside_m) <= limit_m, inside_m, x_m - slope * limit_m * np.sign(x_m))
 
 
+def corrected_boxes(boxes, model):
+    """3D boxes (`estimation.Box3D`) without their bias and with their covariance."""
+    if not boxes:
+        return []
+    centers_m = model.corrected([box.center_m for box in boxes])
+    return [box._replace(center_m=center_m, covariance_m2=covariance_m2)
+            for box, center_m, covariance_m2 in zip(boxes, centers_m, model.covariance(centers_m))]
+
+
 def checked(model):
     """The model itself. Raises ValueError where it cannot be used: what is wrong, and the value."""
     limits = model.measured_range

@@ -3,7 +3,7 @@
 Convention: a rectangle (x1, y1, x2, y2) holds the pixels x1 <= u < x2, y1 <= v < y2. Positions are in the camera
 optical frame, metres.
 """
-from typing import Any, NamedTuple, Tuple
+from typing import Any, NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -52,7 +52,8 @@ class Box3D(NamedTuple):
     """An upright cylinder in the camera optical frame, and how well it was seen.
 
     `center_m` (3,) and `size_m` (width, height, width), metres; `rect_px` the rectangle it came from; `support` the
-    share 0..1 of the sampled pixels that carried its depth; `truncated` whether the rectangle touches the border.
+    share 0..1 of the sampled pixels that carried its depth; `truncated` whether the rectangle touches the border;
+    `covariance_m2` (3, 3) of the centre, None where unknown.
     """
 
     center_m: np.ndarray
@@ -60,6 +61,7 @@ class Box3D(NamedTuple):
     rect_px: Tuple[int, int, int, int]
     support: float
     truncated: bool
+    covariance_m2: Optional[Any] = None
 
 
 def sample_median(depth, rect_px, stride_px=20):

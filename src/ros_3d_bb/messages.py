@@ -120,6 +120,8 @@ def _box3d_to_message(box, camera):
     _set_xyz(message.center.position, box.center_m)
     message.center.orientation.w = 1.0
     _set_xyz(message.size, box.size_m)
+    if box.covariance_m2 is not None:
+        message.position_covariance = np.ravel(box.covariance_m2).tolist()
     x1, x2 = (min(max(edge, 0), camera.width) for edge in box.rect_px[::2])
     y1, y2 = (min(max(edge, 0), camera.height) for edge in box.rect_px[1::2])
     message.roi.x_offset, message.roi.width = x1, x2 - x1

@@ -30,7 +30,7 @@ TEST_KEYS = {'pytest': 'python3-pytest'}
 CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams), 'bbox3d.yaml': (Bbox3dParams,),
            'tracker.yaml': (TrackerNodeParams, ThesisTrackerParams), 'simulator.yaml': (SimulatorParams,),
            'depth_detector.yaml': (DepthDetectorParams, DepthPeopleParams)}
-SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id'},
+SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id', 'error_model'},
                  'tracker.yaml': {'target_frame', 'camera_frame'}, 'simulator.yaml': {'scenario'},
                  'depth_detector.yaml': {'floor_frame', 'frame_id'}}
 REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag']

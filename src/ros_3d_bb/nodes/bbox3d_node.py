@@ -6,6 +6,7 @@ import rospy
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header, Int32MultiArray
 
+from ros_3d_bb.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.estimation import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.images import depth_from
 from ros_3d_bb.messages import boxes2d_from_message, boxes3d_to_message, camera_from_message, stamp_of, time_from
@@ -25,6 +26,7 @@ class Bbox3dParams(NamedTuple):
 
     estimator: str = 'foreground'
     stride: int = 20
+    error_model: str = ''
     depth_scale: float = 0.0
     frame_id: str = ''
     cache_length: float = 1.0
@@ -46,6 +48,7 @@ class Bbox3dNode(object):
         check_not_negative(self._params, 'depth_scale', 'cache_length', 'stamp_tolerance', 'assumed_delay',
                            'depth_image_range')
         self._estimator = estimator_named(self._params.estimator, self._params.stride)
+        self._error_model = _error_model(self._params)
         cache_ns, tolerance_ns, delay_ns = (int(seconds * NS) for seconds in (
             self._params.cache_length, self._params.stamp_tolerance, self._params.assumed_delay))
         self._pairing = Pairing(cache_ns, tolerance_ns, delay_ns)
@@ -94,6 +97,11 @@ class Bbox3dNode(object):
         boxes = [box for box in estimate_boxes(depth, usable, camera, self._estimator) if box is not None]
         self._diagnostics.count('boxes lifted', len(boxes))
         self._diagnostics.count('boxes without depth', len(usable) - len(boxes))
+        if self._error_model is None or not boxes:
+            return boxes
+        boxes = corrected_boxes(boxes, self._error_model)
+        outside_m = self._error_model.distance_outside([box.center_m for box in boxes])
+        self._diagnostics.count('boxes outside of the measured range', int((outside_m > 0).sum()))
         return boxes
 
     def _is_usable(self, rect_px):
@@ -126,6 +134,20 @@ class Bbox3dNode(object):
             return 'no depth image has come on %s within %.1f s' % (rospy.resolve_name(DEPTH_TOPIC), kept_s)
         return ('no depth image with their stamp %.3f came on %s; the newest has %.3f, and %.1f s are kept '
                 '(~cache_length)' % (boxes.stamp_ns / NS, rospy.resolve_name(DEPTH_TOPIC), newest_ns / NS, kept_s))
+
+
+def _error_model(params):
+    """The error model that the parameters name; None where they name none."""
+    if not params.error_model:
+        return None
+    try:
+        model = read_error_model(params.error_model)
+    except OSError as error:
+        raise ValueError('the error model cannot be read: %s; an absolute path expected' % error)
+    if model.provenance.estimator not in (params.estimator, ''):
+        raise ValueError('error model %s is for the estimator %s; ~estimator is %s'
+                         % (params.error_model, model.provenance.estimator, params.estimator))
+    return model
 
 
 def main():

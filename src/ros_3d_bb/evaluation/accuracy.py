@@ -1,0 +1,203 @@
+"""Positions of a measurement session against ground truth: our estimator, the thesis', and what was recorded.
+
+Without an error model each position is corrected by a model of all others, for both estimators; the recorded
+estimates are taken as they are.
+"""
+import argparse
+import json
+import os
+import sys
+from typing import Any, NamedTuple, Optional
+
+import numpy as np
+
+from ros_3d_bb.detection.boxes import iou
+from ros_3d_bb.error_model import read_error_model, write_error_model
+from ros_3d_bb.estimation import estimate_boxes, estimator_named, is_truncated
+from ros_3d_bb.evaluation.error_fit import CHI_SQUARE_68_95, data_of, fit_error_model, held_out
+from ros_3d_bb.measurements import read_color, read_depth, read_session
+
+LENGTHS = ('rmse_x_m', 'rmse_z_m', 'rmse_plane_m', 'p95_plane_m', 'bias_x_m', 'bias_z_m', 'repeatability_x_m',
+           'repeatability_z_m', 'rmse_x_truncated_m')
+CALIBRATIONS = ('leave-one-position-out', 'error model')
+
+
+class Estimates(NamedTuple):
+    """What one estimator makes of the frames: `raw_m` and `position_m` (corrected), (n, 3), nan where it found nobody;
+    `covariances` (n, 3, 3), None where unknown.
+    """
+
+    raw_m: np.ndarray
+    position_m: np.ndarray
+    covariances: Optional[Any]
+
+
+def boxes_of(session, weights=None):
+    """The 2D box of the person in each frame: the recorded one, or, of YOLOv5, the one most like it; None for none.
+
+    Raises
+    ------
+    ValueError
+        If a frame with ground truth has no recorded box.
+    """
+    for frame in session.frames:
+        if not frame.boxes_px:
+            raise ValueError('frame %s has no 2D box; all frames with ground truth need one' % frame.id)
+    if weights is None:
+        return [frame.boxes_px[0] for frame in session.frames]
+    from ros_3d_bb.detection.runtime import open_runtime  # torch takes seconds to import
+    from ros_3d_bb.detection.yolov5 import Yolov5
+    detector, chosen = Yolov5(open_runtime(weights, 'cpu')), []
+    for frame in session.frames:
+        boxes = detector.detect(read_color(frame, session.camera)).boxes
+        overlaps = iou(frame.boxes_px[0], boxes)
+        found = len(boxes) > 0 and overlaps.max() > 0
+        chosen.append(tuple(np.rint(boxes[overlaps.argmax()]).astype(int).tolist()) if found else None)
+    return chosen
+
+
+def estimates_of(session, boxes, estimator, model=None):
+    """The positions that an estimator finds, corrected by an error model, or else by models of the other positions.
+
+    Returns
+    -------
+    Estimates
+    """
+    raw_m, truth_m = np.full((len(boxes), 3), np.nan), truth_of(session)
+    for number, (frame, rect_px) in enumerate(zip(session.frames, boxes)):
+        if rect_px is not None:
+            box, = estimate_boxes(read_depth(frame, session), [rect_px], session.camera, estimator)
+            raw_m[number] = np.nan if box is None else box.center_m
+    seen = np.isfinite(raw_m[:, 0])
+    position_m, covariances = raw_m.copy(), np.full(raw_m.shape + (3,), np.nan)
+    if model is not None:
+        position_m[seen] = model.corrected(raw_m[seen])
+        covariances[seen] = model.covariance(position_m[seen])
+    else:
+        position_m[seen], covariances[seen] = held_out(data_of(raw_m[seen], truth_m[seen]))
+    return Estimates(raw_m, position_m, covariances)
+
+
+def truth_of(session):
+    """Ground truth (x, z) of the frames, (n, 2), metres."""
+    return np.array([frame.truth_m for frame in session.frames])
+
+
+def scores_of(estimates, truth_m, truncated):
+    """The scores of design §8 as a dictionary; a missing one is None.
+
+    Parameters
+    ----------
+    estimates : Estimates
+    truth_m : numpy.ndarray, (n, 2)
+    truncated : numpy.ndarray, (n,), bool
+        Whether the image border cuts the box.
+    """
+    seen = np.isfinite(estimates.position_m[:, 0])
+    error_m = (estimates.position_m[:, [0, 2]] - truth_m)[seen]
+    rmse_m = np.sqrt(np.mean(error_m ** 2, axis=0))
+    scores = dict(zip(LENGTHS, (rmse_m[0], rmse_m[1], np.hypot(*rmse_m),
+                                np.percentile(np.hypot(*error_m.T), 95)) + tuple(error_m.mean(axis=0))
+                      + tuple(_repeatability_m(error_m, truth_m[seen]))
+                      + (np.sqrt(np.mean(error_m[truncated[seen], 0] ** 2)) if truncated[seen].any() else np.nan,)))
+    if estimates.covariances is not None:
+        in_plane = estimates.covariances[seen][:, [0, 2]][:, :, [0, 2]]
+        distances = np.einsum('ni,nij,nj->n', error_m, np.linalg.inv(in_plane), error_m)
+        scores.update(zip(('coverage_68', 'coverage_95'), (distances[:, None] <= CHI_SQUARE_68_95).mean(axis=0)))
+    else:
+        scores.update(coverage_68=None, coverage_95=None)
+    scores['missed'] = int(np.count_nonzero(~seen))
+    return {name: None if value is None or not np.isfinite(value) else value if name == 'missed' else float(value)
+            for name, value in scores.items()}
+
+
+def _repeatability_m(error_m, truth_m):
+    """Standard deviation within a position, root mean square over the positions with three measurements or more, (2,)."""
+    variances = [error_m[same].var(axis=0) for same in (
+        (truth_m == place).all(axis=1) for place in np.unique(truth_m, axis=0)) if np.count_nonzero(same) > 2]
+    return np.sqrt(np.mean(variances, axis=0)) if variances else np.full(2, np.nan)
+
+
+def compare(session, boxes, estimator, model=None):
+    """Compare estimators on a session. Returns the scores and positions of design §8, and our raw positions (n, 3)."""
+    truth_m = truth_of(session)
+    truncated = np.array([is_truncated(rect_px or frame.boxes_px[0], session.camera)
+                          for rect_px, frame in zip(boxes, session.frames)])
+    ours = estimates_of(session, boxes, estimator, model)
+    thesis = estimates_of(session, boxes, estimator_named('median'))
+    recorded_m = np.array([np.full(3, np.nan) if frame.estimate_m is None else frame.estimate_m
+                           for frame in session.frames])
+    recorded = Estimates(recorded_m, recorded_m, None) if np.isfinite(recorded_m[:, 0]).any() else None
+    columns = zip(session.frames, ours.position_m, thesis.position_m, truth_m, ours.raw_m, thesis.raw_m)
+    return {'frames': len(session.frames), 'positions': len(np.unique(truth_m, axis=0)),
+            'calibration': CALIBRATIONS[model is not None], 'ours': scores_of(ours, truth_m, truncated),
+            'thesis': scores_of(thesis, truth_m, truncated),
+            'recorded': None if recorded is None else scores_of(recorded, truth_m, truncated),
+            'per_frame': [dict(zip(('id', 'ours', 'thesis', 'truth', 'ours_raw', 'thesis_raw'),
+                                   [column[0].id] + [_numbers(values) for values in column[1:]]))
+                          for column in columns]}, ours.raw_m
+
+
+def _numbers(values):
+    return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def table(result):
+    """The scores as lines of text."""
+    names = [name for name in ('ours', 'thesis', 'recorded') if result[name] is not None]
+    lines = ['%-20s' % '' + ''.join('%12s' % name for name in names)]
+    for key in LENGTHS + ('coverage_68', 'coverage_95', 'missed'):
+        values = [result[name][key] for name in names]
+        lines.append('%-20s' % key + ''.join('%12s' % ('-' if value is None else '%d' % value if key == 'missed'
+                                                       else '%.4f' % value) for value in values))
+    return lines
+
+
+def main():
+    """The command `./run bench accuracy`."""
+    arguments = _arguments()
+    try:
+        session = read_session(arguments.data)
+        session = session._replace(frames=tuple(frame for frame in session.frames if frame.truth_m is not None))
+        model = read_error_model(arguments.error_model) if arguments.error_model else None
+        boxes = boxes_of(session, arguments.weights if arguments.boxes == 'yolov5' else None)
+        result, raw_m = compare(session, boxes, estimator_named(arguments.estimator), model)
+        result.update(boxes=arguments.boxes, estimator=arguments.estimator)
+        if arguments.fit:
+            seen = np.isfinite(raw_m[:, 0])
+            write_error_model(arguments.fit, fit_error_model(
+                raw_m[seen], truth_of(session)[seen], source=arguments.source, estimator=arguments.estimator,
+                camera=arguments.camera, date=arguments.date))
+        if arguments.json:
+            with open(arguments.json, 'w') as stream:
+                json.dump(result, stream, indent=1)
+    except (ValueError, OSError) as error:
+        sys.exit('./run bench accuracy: %s' % error)
+    print('%d frames at %d positions, boxes: %s, estimator: %s, calibration: %s' % (
+        result['frames'], result['positions'], arguments.boxes, arguments.estimator, result['calibration']))
+    print('\n'.join(table(result)))
+
+
+def _arguments():
+    parser = argparse.ArgumentParser(prog='./run bench accuracy', description=__doc__)
+    data = os.environ.get('ROS_3D_BB_DATA')
+    parser.add_argument('--data', default=data and os.path.join(data, 'data', 'thesis'), metavar='DIR',
+                        help='a measurement session (default: $ROS_3D_BB_DATA/data/thesis)')
+    parser.add_argument('--error-model', metavar='FILE', help='correct by this instead of by the other positions')
+    parser.add_argument('--fit', metavar='FILE', help='also write the error model of all frames')
+    parser.add_argument('--boxes', choices=('recorded', 'yolov5'), default='recorded', help='default: recorded')
+    parser.add_argument('--weights', help='checkpoint or export, for --boxes yolov5')
+    parser.add_argument('--estimator', default='foreground', metavar='NAME', help='default: foreground')
+    parser.add_argument('--json', metavar='FILE', help='also write the scores there')
+    for name in ('source', 'camera', 'date'):
+        parser.add_argument('--' + name, default='', help='kept in the file of --fit')
+    arguments = parser.parse_args()
+    if not arguments.data:
+        parser.error('no --data given, and ROS_3D_BB_DATA is not set')
+    if arguments.boxes == 'yolov5' and not arguments.weights:
+        parser.error('--boxes yolov5 needs --weights')
+    return arguments
+
+
+if __name__ == '__main__':
+    main()
