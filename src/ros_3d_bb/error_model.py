@@ -29,7 +29,8 @@ class Spread(NamedTuple):
     """A standard deviation by range: sqrt(constant_m ** 2 + (growth * z ** power) ** 2), metres.
 
     With power 2 it is a constant and the law of stereo, where growth is s / (f * b): pixels of matching error by focal
-    length in pixels times baseline in metres (thesis 5.2).
+    length in pixels times baseline in metres (thesis 5.2). With power -1 it falls with range: near people fill the
+    image and are cut by its border.
     """
 
     constant_m: float

@@ -32,6 +32,11 @@ def test_recovers_the_spread(fitted):
     assert fitted.x_sigma.at(ranges_m) == pytest.approx(MODEL.x_sigma.at(ranges_m), rel=0.4)
 
 
+def test_recovers_a_spread_that_falls_with_range():
+    model = fit_error_model(*measure(SIMPLE._replace(x_sigma=Spread(0.005, 0.08, -1)), 4))
+    assert model.x_sigma.at(1.0) > 2 * model.x_sigma.at(3.0)
+
+
 def test_without_noise_the_bias_is_exact():
     model = fit_error_model(*measure(SIMPLE, 1, noise=0.0))
     assert model.z_bias == pytest.approx(SIMPLE.z_bias, abs=1e-6) and model.x_bias == pytest.approx(SIMPLE.x_bias)

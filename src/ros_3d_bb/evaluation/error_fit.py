@@ -13,8 +13,9 @@ X_TERMS = ((False, True), (True, False), (True, True))  # whether x_bias has slo
 BETTER = 0.95  # a model with more coefficients must be better by so much
 LEAST_SIGMA_M = 0.001
 Y_SIGMA_M = 0.1  # a box whose top or bottom is cut or missed by 0.2 m
-POWERS = (2, 1)  # of the range, in the law of the spread; the law of stereo first
-STEREO_SHARES = np.linspace(0, 1, 41)[:, np.newaxis]  # of the variance at the farthest range that grows with range
+POWERS = (2, 1, -1)  # of range, in the law of the spread: stereo first; the last for people who are cut when near
+LIKELIER = 2.0  # log likelihood by which another law than stereo has to win
+RANGE_SHARES = np.linspace(0, 1, 41)[:, np.newaxis]  # of the variance at the farthest range that goes with range
 GROWTH_OUTSIDE = 0.2  # about the steepest bias that the thesis' data show
 OFF_THE_MIDDLE_M = 0.1
 CHI_SQUARE_68_95 = -2 * np.log(1 - np.array([0.68, 0.95]))  # of two axes
@@ -185,16 +186,18 @@ def _fit_spread(residuals_m, data):
             held = data.position == number
             sigma_m = _spread_of(residuals_m[~held], z_m[~held], weights[~held], power).at(z_m[held])
             likelihoods[-1] -= np.mean(np.log(sigma_m) + (residuals_m[held] / sigma_m) ** 2 / 2)
-    return _spread_of(residuals_m, z_m, weights, POWERS[int(np.argmax(likelihoods))])
+    best = int(np.argmax(likelihoods))
+    power = POWERS[best if likelihoods[best] > likelihoods[0] + LIKELIER else 0]
+    return _spread_of(residuals_m, z_m, weights, power)
 
 
 def _spread_of(residuals_m, z_m, weights, power):
     """The likeliest Spread of weighted Gaussian residuals: for each share of its parts the scale is known exactly."""
     farthest_m = z_m.max()
-    shapes = 1 - STEREO_SHARES + STEREO_SHARES * (z_m / farthest_m) ** (2 * power)
+    shapes = 1 - RANGE_SHARES + RANGE_SHARES * (z_m / farthest_m) ** (2 * power)
     variances_m2 = np.maximum(LEAST_SIGMA_M ** 2, np.average(residuals_m ** 2 / shapes, axis=1, weights=weights))
     costs = np.log(variances_m2) + np.average(np.log(shapes), axis=1, weights=weights)
     best = int(np.argmin(costs))
     constant_m, farthest_sigma_m = (np.sqrt(variances_m2[best] * share)
-                                    for share in (1 - STEREO_SHARES[best, 0], STEREO_SHARES[best, 0]))
-    return Spread(float(max(constant_m, LEAST_SIGMA_M)), float(farthest_sigma_m / farthest_m ** power), power)
+                                    for share in (1 - RANGE_SHARES[best, 0], RANGE_SHARES[best, 0]))
+    return Spread(float(max(constant_m, LEAST_SIGMA_M)), float(farthest_sigma_m / farthest_m ** float(power)), power)

@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 
 SIZE_IN, DPI = (7.2, 4.2), 110
 COLUMNS = 3
+MANY_CLUSTERS = 12
 MEASURED, FITTED, THEORY, OTHER = 'tab:blue', 'tab:orange', 'tab:green', '0.55'
 
 
@@ -80,7 +81,8 @@ def variances(path, axis, name):
     axes.axhline(axis.max_variance_m2, color=FITTED, linestyle='--',
                  label='largest: %.5f m² (standard deviation %.4f m)' % (axis.max_variance_m2, axis.max_sigma_m))
     axes.set_xticks(places)
-    axes.set_xticklabels(['%.2f\nn=%d' % (cluster.truth_m, cluster.count) for cluster in axis.clusters])
+    crowded = {'fontsize': 7, 'rotation': 90} if len(places) > MANY_CLUSTERS else {}
+    axes.set_xticklabels(['%.2f\nn=%d' % (cluster.truth_m, cluster.count) for cluster in axis.clusters], **crowded)
     axes.set_ylim(0, 1.2 * axis.max_variance_m2 or 1)
     _finish(figure, axes, path, 'true %s of the cluster [m], number of measurements' % name,
             'variance of the %s error [m²]' % name)

@@ -43,8 +43,9 @@ def _theory(analysis):
     far = analysis.z.clusters[-1]
     return [
         heading('Depth error and the theory of stereo cameras'),
-        paragraph('A stereo camera that matches to s pixels has a depth error of d² · s / (f · b) at distance d. It is '
-                  'the least to be expected: it is for a flat plane; a person is round, and is found by a detector.',
+        paragraph('A stereo camera that matches to s pixels has a depth error of d² · s / (f · b) at distance d, '
+                  'for one pixel that shows a flat plane. That a person is round, and found by a detector, adds to it; '
+                  'that a position is made of many pixels takes away from it.',
                   'The measured RMS holds the mean error too; the standard deviation is what is left without it.',
                   'Where the RMS is far above the standard deviation, most of the error is bias.',
                   'Here, at %.2f m: RMS %.4f m, standard deviation %.4f m, theory %.4f m.' % (
@@ -209,7 +210,7 @@ def _spread_text(spread):
 
 
 def _power_text(variable, power):
-    return ('', ' ' + variable, ' %s²' % variable, ' %s³' % variable)[power]
+    return {-1: ' / %s', 0: '', 1: ' %s', 2: ' %s²', 3: ' %s³'}[power].replace('%s', variable)
 
 
 def _count(axis):
