@@ -245,7 +245,7 @@ def _line(name, value):
 
 def _filled(kind, content, where):
     """A value of the kind, a NamedTuple or a plain type, from what YAML gave; `where` is its key."""
-    if kind is Optional[Scores]:
+    if kind == Optional[Scores]:
         return None if content is None else _filled(Scores, content, where)
     if hasattr(kind, '_fields'):
         return _filled_fields(kind, content, where)

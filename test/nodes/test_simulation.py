@@ -54,6 +54,15 @@ def test_the_bag_holds_what_is_needed_to_play_it_again(bag):
     assert not {'/ros_3d_bb/color', '/yolo_result_out'} & set(topics)
 
 
+def test_positions_come_with_the_covariance_of_the_simulated_camera(bag):
+    with rosbag.Bag(bag) as opened:
+        boxes = [box for _topic, message, _time in opened.read_messages(['/ros_3d_bb/bb_3d']) for box in message.boxes]
+    assert len(boxes) > 30
+    for box in boxes:
+        variances = box.position_covariance[0::4]
+        assert 0.01 ** 2 < min(variances) and max(variances) < 0.5 ** 2
+
+
 def test_the_report_is_made_of_it(bag, tmp_path):
     assert len(write_report(bag, str(tmp_path / 'report.png'))) == 5
     assert os.path.getsize(str(tmp_path / 'report.png')) > 10000

@@ -8,7 +8,9 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ros_3d_bb.error_model import STEEPEST_BIAS, Scores, Spread, XBias, checked, read_error_model, write_error_model
+from ros_3d_bb.error_model import (STEEPEST_BIAS, Scores, Spread, XBias, checked, corrected_boxes, read_error_model,
+                                   write_error_model)
+from ros_3d_bb.estimation import Box3D
 from support.error_models import MODEL
 
 SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'error_models')
@@ -155,3 +157,13 @@ def test_the_thesis_model_is_the_published_one():
     assert model.z_bias == (-0.04, 0.06, 0.008) and model.x_bias == (-0.106, 0.0, -0.006)
     assert np.sqrt(np.diag(model.covariance([0.5, 0, 2])))[[0, 2]] == pytest.approx([0.018, 0.0474])
     assert model.corrected(model.biased([1.0, 0, 3.0])) == pytest.approx([1.0, 0, 3.0], abs=1e-5)
+
+
+def test_boxes_are_corrected_and_get_their_covariance():
+    box = Box3D(np.array([0.5, 0.1, 2.0]), np.array([0.5, 1.7, 0.5]), (1, 2, 3, 4), 0.5, False)
+    other = box._replace(center_m=np.array([-0.5, 0.0, 3.0]))
+    corrected = corrected_boxes([box, other], MODEL)
+    assert corrected_boxes([], MODEL) == [] and [result.size_m is box.size_m for result in corrected] == [True, True]
+    for result, given_box in zip(corrected, (box, other)):
+        np.testing.assert_allclose(result.center_m, MODEL.corrected(given_box.center_m))
+        np.testing.assert_allclose(result.covariance_m2, MODEL.covariance(result.center_m))

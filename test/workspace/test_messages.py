@@ -43,6 +43,14 @@ def test_2d_boxes_and_their_stamp_survive_to_the_nanosecond(boxes, stamp_ns, fra
     assert message.layout.dim[0].size == len(boxes) and message.layout.data_offset == 0
 
 
+@pytest.mark.parametrize('covariance_m2', [None, np.diag([0.01, 0.04, 0.09])])
+def test_the_covariance_of_a_3d_box_is_sent_and_zero_where_unknown(covariance_m2):
+    box = Box3D(np.array([1.0, 0, 3]), np.array([0.5, 1.7, 0.5]), (10, 10, 40, 40), 0.8, False, covariance_m2)
+    sent, = on_the_wire(boxes3d_to_message([box], header(1), Camera(64, 48, 60.0, 60.0, 31.5, 23.5))).boxes
+    expected = np.zeros(9) if covariance_m2 is None else np.ravel(covariance_m2)
+    assert list(sent.position_covariance) == expected.tolist()
+
+
 def test_the_label_is_as_documented():
     label = boxes2d_to_message(np.zeros((1, 4)), header(12 * NS + 34, 'camera')).layout.dim[0].label
     assert label == 'boxes;stamp=12.000000034;frame=camera'

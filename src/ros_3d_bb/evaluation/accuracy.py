@@ -112,7 +112,7 @@ def scores_of(estimates, truth_m, truncated):
 
 
 def _repeatability_m(error_m, truth_m):
-    """Standard deviation within a position, root mean square over the positions with three measurements or more, (2,)."""
+    """Standard deviation within a position, (2,): root mean square over those with three measurements or more."""
     variances = [error_m[same].var(axis=0) for same in (
         (truth_m == place).all(axis=1) for place in np.unique(truth_m, axis=0)) if np.count_nonzero(same) > 2]
     return np.sqrt(np.mean(variances, axis=0)) if variances else np.full(2, np.nan)

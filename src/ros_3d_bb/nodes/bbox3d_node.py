@@ -48,7 +48,7 @@ class Bbox3dNode(object):
         check_not_negative(self._params, 'depth_scale', 'cache_length', 'stamp_tolerance', 'assumed_delay',
                            'depth_image_range')
         self._estimator = estimator_named(self._params.estimator, self._params.stride)
-        self._error_model = _error_model(self._params)
+        self._error_model = error_model_of(self._params)
         cache_ns, tolerance_ns, delay_ns = (int(seconds * NS) for seconds in (
             self._params.cache_length, self._params.stamp_tolerance, self._params.assumed_delay))
         self._pairing = Pairing(cache_ns, tolerance_ns, delay_ns)
@@ -136,8 +136,8 @@ class Bbox3dNode(object):
                 '(~cache_length)' % (boxes.stamp_ns / NS, rospy.resolve_name(DEPTH_TOPIC), newest_ns / NS, kept_s))
 
 
-def _error_model(params):
-    """The error model that the parameters name; None where they name none."""
+def error_model_of(params):
+    """The error model that the parameters name; None where they name none. Raises ValueError where it is unusable."""
     if not params.error_model:
         return None
     try:

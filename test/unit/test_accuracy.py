@@ -1,0 +1,75 @@
+"""The accuracy benchmark: scores of known errors, and the bars on the real measurements."""
+import os
+
+import numpy as np
+import pytest
+
+from conftest import DATA
+from ros_3d_bb.estimation import estimator_named
+from ros_3d_bb.evaluation.accuracy import Estimates, boxes_of, compare, scores_of, table
+from ros_3d_bb.evaluation.simulated_session import write_simulated_session
+from ros_3d_bb.measurements import read_session
+
+PLACES = np.repeat([(0.0, 1.0), (0.5, 2.0), (-1.0, 3.0)], 4, axis=0)
+
+
+def estimates(shift_m, sigma_m=None, seed=0):
+    """Positions at PLACES, shifted, with a spread of 0.02 m in z within each place."""
+    position_m = np.c_[PLACES[:, 0], np.zeros(len(PLACES)), PLACES[:, 1]] + shift_m
+    position_m[:, 2] += np.tile([-0.02, 0.02, -0.02, 0.02], 3)
+    covariances = None if sigma_m is None else np.tile(np.eye(3) * sigma_m ** 2, (len(PLACES), 1, 1))
+    return Estimates(position_m, position_m, covariances)
+
+
+def test_scores_are_those_of_the_errors():
+    scores = scores_of(estimates((0.1, 0, 0.05)), PLACES, PLACES[:, 0] < 0)
+    assert scores['rmse_x_m'] == pytest.approx(0.1) == scores['rmse_x_truncated_m']
+    assert scores['bias_z_m'] == pytest.approx(0.05) and scores['bias_x_m'] == pytest.approx(0.1)
+    assert scores['rmse_z_m'] == pytest.approx(np.sqrt(0.05 ** 2 + 0.02 ** 2))
+    assert scores['rmse_plane_m'] == pytest.approx(np.hypot(scores['rmse_x_m'], scores['rmse_z_m']))
+    assert scores['repeatability_z_m'] == pytest.approx(0.02) and scores['repeatability_x_m'] == pytest.approx(0)
+    assert scores['p95_plane_m'] == pytest.approx(np.hypot(0.1, 0.07))
+    assert scores['missed'] == 0 and scores['coverage_95'] is None
+
+
+@pytest.mark.parametrize('sigma_m,coverage_68,coverage_95', [(0.2, 1, 1), (0.06, 0, 1), (0.01, 0, 0)])
+def test_coverage_is_the_share_within_the_ellipse(sigma_m, coverage_68, coverage_95):
+    scores = scores_of(estimates((0.1, 0, 0.0), sigma_m), PLACES, np.zeros(len(PLACES), bool))
+    assert (scores['coverage_68'], scores['coverage_95']) == (coverage_68, coverage_95)
+    assert scores['rmse_x_truncated_m'] is None
+
+
+def test_frames_without_an_estimate_are_counted():
+    found = estimates((0.1, 0, 0.0), 0.1)
+    found.position_m[3] = np.nan
+    assert scores_of(found, PLACES, np.zeros(len(PLACES), bool))['missed'] == 1
+
+
+@pytest.fixture(scope='module')
+def result(tmp_path_factory):
+    """Of the real measurements with YOLOv5n's boxes; without them of a simulated session with exact boxes."""
+    if DATA:
+        session = read_session(os.path.join(DATA, 'data', 'thesis'))
+        boxes = boxes_of(session, os.path.join(DATA, 'weights', 'yolov5n.pt'))
+    else:
+        folder = str(tmp_path_factory.mktemp('session'))
+        session = read_session(write_simulated_session(folder, (1.5, 2.5, 3.5), (-0.3, 0.0, 0.3), 4))
+        boxes = boxes_of(session)
+    return compare(session, boxes, estimator_named('foreground'))[0]
+
+
+def test_positions_are_as_good_as_a_planner_was_promised(result):
+    """Leave-one-position-out; the bars are those on the real measurements, the simulation's are wider."""
+    ours, thesis = result['ours'], result['thesis']
+    assert ours['rmse_plane_m'] <= (0.042 if DATA else 0.08) and ours['p95_plane_m'] <= (0.08 if DATA else 0.15)
+    assert ours['rmse_plane_m'] < 0.7 * thesis['rmse_plane_m']
+    assert ours['repeatability_z_m'] < 0.6 * thesis['repeatability_z_m']
+    assert 0.92 <= ours['coverage_95'] <= (0.98 if DATA else 1.0)
+    if DATA:
+        assert ours['rmse_x_truncated_m'] <= 0.045 and ours['missed'] <= 3
+
+
+def test_the_result_has_the_promised_keys_and_a_table(result):
+    assert {'frames', 'positions', 'calibration', 'ours', 'thesis', 'recorded', 'per_frame'} == set(result)
+    assert set(result['per_frame'][0]) == {'id', 'ours', 'thesis', 'truth', 'ours_raw', 'thesis_raw'}
+    assert len(table(result)) == 13 and 'rmse_plane_m' in table(result)[3]
