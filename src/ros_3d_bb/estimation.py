@@ -21,7 +21,7 @@ FIRST_LAYER_SHARE = 0.5  # the nearest layer with this share of the strongest on
 AXIS_BEHIND_SURFACE_M = 0.09  # mean over standing and walking bodies of the simulation, seen from all sides
 LEAST_SUPPORT = 0.1  # what carries less of the samples is no person that anything can be said about
 USUAL_WIDTH_M, USUAL_HEIGHT_M = 0.46, 1.7  # of a body that the image border cuts
-EDGE_PERCENT = 2  # of the pixels of the layer beyond its left and right edge: flying pixels, fingers
+EDGE_PERCENT = 5  # of the pixels of the layer are looked past on the left and on the right: arms, flying pixels
 
 
 class DepthImage(NamedTuple):
@@ -159,7 +159,7 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     if support < LEAST_SUPPORT or flat_px is None or not points.size:
         return None
     layer_m = _trimmed_mean(points[:, 2])
-    left_m, right_m = np.percentile(points[:, 0], [EDGE_PERCENT, 100 - EDGE_PERCENT])
+    left_m, right_m = _edges(points[:, 0])
     top_m, bottom_m = ((edge - camera.cy) / camera.fy * layer_m for edge in flat_px[1::2])
     cut_left, cut_top, cut_right, cut_bottom = _cut_edges(rect_px, camera)
     left_m, right_m = _whole(left_m, right_m, cut_left, cut_right, USUAL_WIDTH_M)
@@ -168,6 +168,13 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     width_m = max(right_m - left_m, BIN_M)
     return Box3D(surface_m * (1 + AXIS_BEHIND_SURFACE_M / layer_m), np.array([width_m, bottom_m - top_m, width_m]),
                  tuple(rect_px), support, is_truncated(rect_px, camera))
+
+
+def _edges(x_m):
+    """Left and right edge of a body of points at x (n,): where they would be if it were as wide everywhere."""
+    low_m, high_m = np.percentile(x_m, [EDGE_PERCENT, 100 - EDGE_PERCENT])
+    beyond_m = (high_m - low_m) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
+    return low_m - beyond_m, high_m + beyond_m
 
 
 def _trimmed_mean(values):
