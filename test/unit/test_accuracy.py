@@ -7,9 +7,13 @@ import pytest
 from conftest import DATA
 from ros_3d_bb.estimation import estimator_named
 from ros_3d_bb.evaluation.accuracy import Estimates, boxes_of, compare, scores_of, table
+from ros_3d_bb.evaluation.scenes import position_errors_m
 from ros_3d_bb.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb.measurements import read_session
+from ros_3d_bb.simulation.scenario import read_scenario
+from ros_3d_bb.simulation.simulator import Simulator
 
+SCENARIOS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
 PLACES = np.repeat([(0.0, 1.0), (0.5, 2.0), (-1.0, 3.0)], 4, axis=0)
 
 
@@ -67,6 +71,16 @@ def test_positions_are_as_good_as_a_planner_was_promised(result):
     assert 0.92 <= ours['coverage_95'] <= (0.98 if DATA else 1.0)
     if DATA:
         assert ours['rmse_x_truncated_m'] <= 0.045 and ours['missed'] <= 3
+
+
+@pytest.mark.parametrize('scene', ['behind_a_pillar', 'thesis_f_in_front'])
+def test_nobody_in_front_or_behind_throws_a_position_off(scene):
+    """Where the thesis' median is more than 0.4 m off again and again."""
+    simulator = Simulator(read_scenario(os.path.join(SCENARIOS, scene + '.yaml')))
+    ours, median = (position_errors_m(simulator, estimator_named(name), 7) for name in ('foreground', 'median'))
+    assert len(ours) > 20 and not np.isnan(ours).any() and ours.max() < 0.4
+    assert np.sqrt(np.mean(ours ** 2)) < 0.08
+    assert np.count_nonzero(median > 0.4) > 3
 
 
 def test_the_result_has_the_promised_keys_and_a_table(result):

@@ -14,6 +14,7 @@ from ros_3d_bb.tracking.association import match_greedily
 from ros_3d_bb.tracking.thesis import ThesisTracker
 from ros_3d_bb.tracking.tracked import Detection
 
+LEAST_SHOWN = 0.3  # share of the body; less of it tells nothing of where the person is
 FOUND_IOU = 0.5  # a detection is that of a person where the boxes overlap by so much, else it is false
 
 
@@ -77,6 +78,29 @@ def _detections(frame, boxes, camera, estimator):
     found = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, camera, estimator)
     return [Detection(transform_points(frame.poses.map_from_camera, box.center_m), box.size_m[[0, 2, 1]])
             for box in found if box is not None]
+
+
+def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6.0):
+    """Errors in the plane of what an estimator makes of the exact boxes around people in a range of depth, metres.
+
+    Whoever shows at least `LEAST_SHOWN` of the body counts; nan where the estimator finds nobody.
+
+    Returns
+    -------
+    numpy.ndarray, (n,)
+    """
+    errors_m = []
+    for number in range(0, simulator.frame_count, every):
+        frame = simulator.frame(number)
+        people = [person for person in frame.people if person.visible >= LEAST_SHOWN]
+        boxes = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [person.box_px for person in people],
+                               simulator.camera, estimator)
+        camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
+        for person, box in zip(people, boxes):
+            x_m, _y, z_m = transform_points(camera_from_map, person.position_m)
+            if nearest_m <= z_m <= farthest_m:
+                errors_m.append(np.nan if box is None else np.hypot(box.center_m[0] - x_m, box.center_m[2] - z_m))
+    return np.array(errors_m)
 
 
 def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):
