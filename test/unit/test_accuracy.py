@@ -6,7 +6,7 @@ import pytest
 
 from conftest import DATA
 from ros_3d_bb.estimation import estimator_named
-from ros_3d_bb.evaluation.accuracy import Estimates, boxes_of, compare, scores_of, table
+from ros_3d_bb.evaluation.accuracy import Estimates, boxes_of, compare, scenario_scores, scores_of, table
 from ros_3d_bb.evaluation.scenes import position_errors_m
 from ros_3d_bb.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb.measurements import read_session
@@ -81,6 +81,15 @@ def test_nobody_in_front_or_behind_throws_a_position_off(scene):
     assert len(ours) > 20 and not np.isnan(ours).any() and ours.max() < 0.4
     assert np.sqrt(np.mean(ours ** 2)) < 0.08
     assert np.count_nonzero(median > 0.4) > 3
+
+
+def test_scenes_have_their_scores_too():
+    path = os.path.join(SCENARIOS, 'thesis_a_start.yaml')
+    scores = scenario_scores(path, estimator_named('foreground'), every=40)
+    assert scores['scenario'] == 'thesis_a_start.yaml' and scores['ours']['boxes'] == scores['thesis']['boxes'] > 5
+    assert scores['ours']['rmse_plane_m'] < 0.08 < scores['thesis']['worst_m']
+    empty = scenario_scores(os.path.join(SCENARIOS, 'empty_room.yaml'), estimator_named('foreground'), every=90)
+    assert empty['ours'] == {'boxes': 0, 'missed': 0}
 
 
 def test_the_result_has_the_promised_keys_and_a_table(result):

@@ -15,7 +15,10 @@ from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.error_model import read_error_model, write_error_model
 from ros_3d_bb.estimation import estimate_boxes, estimator_named, is_truncated
 from ros_3d_bb.evaluation.error_fit import CHI_SQUARE_68_95, data_of, fit_error_model, held_out
+from ros_3d_bb.evaluation.scenes import position_errors_m
 from ros_3d_bb.measurements import read_color, read_depth, read_session
+from ros_3d_bb.simulation.scenario import read_scenario
+from ros_3d_bb.simulation.simulator import Simulator
 
 LENGTHS = ('rmse_x_m', 'rmse_z_m', 'rmse_plane_m', 'p95_plane_m', 'bias_x_m', 'bias_z_m', 'repeatability_x_m',
            'repeatability_z_m', 'rmse_x_truncated_m')
@@ -153,10 +156,26 @@ def table(result):
     return lines
 
 
+def scenario_scores(path, estimator, every=5):
+    """Errors on a simulated scene with exact boxes and truth, uncorrected: ours and the thesis', as a dictionary."""
+    simulator, scores = Simulator(read_scenario(path)), {'scenario': os.path.basename(path)}
+    for name, one in (('ours', estimator), ('thesis', estimator_named('median'))):
+        errors_m = position_errors_m(simulator, one, every)
+        found_m = errors_m[~np.isnan(errors_m)]
+        scores[name] = {'boxes': len(errors_m), 'missed': len(errors_m) - len(found_m)}
+        if len(found_m):
+            scores[name].update(rmse_plane_m=float(np.sqrt(np.mean(found_m ** 2))), worst_m=float(found_m.max()),
+                                p95_plane_m=float(np.percentile(found_m, 95)))
+    return scores
+
+
 def main():
     """The command `./run bench accuracy`."""
     arguments = _arguments()
     try:
+        if arguments.scenarios:
+            _bench_scenarios(arguments)
+            return
         session = read_session(arguments.data)
         session = session._replace(frames=tuple(frame for frame in session.frames if frame.truth_m is not None))
         model = read_error_model(arguments.error_model) if arguments.error_model else None
@@ -178,11 +197,25 @@ def main():
     print('\n'.join(table(result)))
 
 
+def _bench_scenarios(arguments):
+    """Print, and write, what an estimator makes of simulated scenes."""
+    results = []
+    for path in arguments.scenarios:
+        results.append(scenario_scores(path, estimator_named(arguments.estimator)))
+        print(results[-1]['scenario'])
+        for name in ('ours', 'thesis'):
+            print('  %-7s %s' % (name, '  '.join('%s %.4g' % pair for pair in sorted(results[-1][name].items()))))
+    if arguments.json:
+        with open(arguments.json, 'w') as stream:
+            json.dump({'estimator': arguments.estimator, 'scenarios': results}, stream, indent=1)
+
+
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench accuracy', description=__doc__)
     data = os.environ.get('ROS_3D_BB_DATA')
     parser.add_argument('--data', default=data and os.path.join(data, 'data', 'thesis'), metavar='DIR',
                         help='a measurement session (default: $ROS_3D_BB_DATA/data/thesis)')
+    parser.add_argument('--scenarios', nargs='+', metavar='FILE', help='simulated scenes instead of a session')
     parser.add_argument('--error-model', metavar='FILE', help='correct by this instead of by the other positions')
     parser.add_argument('--fit', metavar='FILE', help='also write the error model of all frames')
     parser.add_argument('--boxes', choices=('recorded', 'yolov5'), default='recorded', help='default: recorded')
@@ -192,7 +225,7 @@ def _arguments():
     for name in ('source', 'camera', 'date'):
         parser.add_argument('--' + name, default='', help='kept in the file of --fit')
     arguments = parser.parse_args()
-    if not arguments.data:
+    if not arguments.data and not arguments.scenarios:
         parser.error('no --data given, and ROS_3D_BB_DATA is not set')
     if arguments.boxes == 'yolov5' and not arguments.weights:
         parser.error('--boxes yolov5 needs --weights')
