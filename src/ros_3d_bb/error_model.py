@@ -14,6 +14,7 @@ import yaml
 from ros_3d_bb.params import nearest_name
 
 STEEPEST_BIAS = 0.5  # metres a metre; a steeper one has no safe inverse
+NEAREST_SHARE = 0.2  # of a measured range: no correction puts anybody nearer
 SOLVER_STEPS = 20  # each at least halves what is left of the bias: a micrometre of a metre in the end
 
 
@@ -126,6 +127,11 @@ class ErrorModel(NamedTuple):
         measured_x_m = x_m + inside_m * self._x_slope_at(z_m) + self.x_bias.offset_m
         return np.stack((measured_x_m, y_m * measured_z_m / z_m, measured_z_m), axis=-1)
 
+    def check_estimator(self, name):
+        """Raise ValueError where the model is of another estimator than the named one."""
+        if self.provenance.estimator not in (name, ''):
+            raise ValueError('the error model is for the estimator %s, not %s' % (self.provenance.estimator, name))
+
     def covariance(self, position_m):
         """Covariance of corrected positions in the camera optical frame, square metres.
 
@@ -168,7 +174,7 @@ class ErrorModel(NamedTuple):
         z_m = measured_z_m
         for _ in range(SOLVER_STEPS):
             z_m = measured_z_m - self._z_bias_at(z_m)
-        return z_m
+        return np.maximum(z_m, NEAREST_SHARE * measured_z_m)
 
     def _true_x(self, measured_x_m, z_m):
         x_m, slope = measured_x_m - self.x_bias.offset_m, self._x_slope_at(z_m)
@@ -198,6 +204,13 @@ def checked(model):
         if np.abs(slopes).max() > STEEPEST_BIAS:
             raise ValueError('%s changes by %.2g m a metre; at most %g expected, for it has to be undone'
                              % (name, np.abs(slopes).max(), STEEPEST_BIAS))
+    if not abs(model._z_bias_at(limits.z_min_m)) < limits.z_min_m:
+        raise ValueError('z_bias is %g m at %g m; less than the range expected'
+                         % (model._z_bias_at(limits.z_min_m), limits.z_min_m))
+    for name, spread in (('z_sigma', model.z_sigma), ('x_sigma', model.x_sigma)):
+        if spread.constant_m < 0 or spread.growth < 0 or not -4 <= spread.power <= 4:
+            raise ValueError('%s is %s; constant_m and growth of 0 or more and a power of -4 to 4 expected'
+                             % (name, tuple(spread)))
     sigmas_m = {'z_sigma': model.z_sigma.at(limits.z_min_m), 'x_sigma': model.x_sigma.at(limits.z_min_m),
                 'y_sigma_m': model.y_sigma_m}
     for name, sigma_m in sorted(sigmas_m.items()):
@@ -221,7 +234,7 @@ def read_error_model(path):
     with open(str(path), encoding='utf-8') as stream:
         try:
             return checked(_filled(ErrorModel, yaml.safe_load(stream), ''))
-        except (ValueError, yaml.YAMLError) as error:
+        except (ValueError, OverflowError, yaml.YAMLError) as error:
             raise ValueError('%s: not an error model: %s' % (path, error))
 
 

@@ -93,6 +93,7 @@ def test_scenes_have_their_scores_too():
 
 
 def test_the_result_has_the_promised_keys_and_a_table(result):
-    assert {'frames', 'positions', 'calibration', 'ours', 'thesis', 'recorded', 'per_frame'} == set(result)
+    assert {'frames', 'positions', 'calibration', 'thesis_calibration', 'ours', 'thesis', 'recorded',
+            'per_frame'} == set(result)
     assert set(result['per_frame'][0]) == {'id', 'ours', 'thesis', 'truth', 'ours_raw', 'thesis_raw'}
     assert len(table(result)) == 13 and 'rmse_plane_m' in table(result)[3]

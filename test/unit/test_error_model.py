@@ -159,6 +159,27 @@ def test_the_thesis_model_is_the_published_one():
     assert model.corrected(model.biased([1.0, 0, 3.0])) == pytest.approx([1.0, 0, 3.0], abs=1e-5)
 
 
+@pytest.mark.parametrize('changes,complaint', [
+    ({'z_bias': (0.0, 0.9)}, 'z_bias is 0.9 m'), ({'z_sigma': Spread(-0.5, 0.0, 2)}, 'z_sigma'),
+    ({'x_sigma': Spread(0.1, 0.0, 1000)}, 'x_sigma'), ({'z_sigma': Spread(0.1, -1.0, 2)}, 'z_sigma')])
+def test_models_that_cannot_be_are_refused(changes, complaint):
+    limits = MODEL.measured_range._replace(z_min_m=0.5, x_z_min_m=0.5)
+    with pytest.raises(ValueError, match=complaint):
+        checked(MODEL._replace(measured_range=limits, **changes))
+
+
+def test_nobody_is_put_behind_the_camera():
+    corrected_m = MODEL._replace(z_bias=(0.3,)).corrected([[0.0, 0.2, 0.1]])
+    assert corrected_m[0, 2] > 0 and corrected_m[0, 1] > 0
+
+
+def test_a_model_is_for_its_estimator():
+    named = MODEL._replace(provenance=MODEL.provenance._replace(estimator='median'))
+    named.check_estimator('median')
+    with pytest.raises(ValueError, match='for the estimator median, not foreground'):
+        named.check_estimator('foreground')
+
+
 def test_boxes_are_corrected_and_get_their_covariance():
     box = Box3D(np.array([0.5, 0.1, 2.0]), np.array([0.5, 1.7, 0.5]), (1, 2, 3, 4), 0.5, False)
     other = box._replace(center_m=np.array([-0.5, 0.0, 3.0]))

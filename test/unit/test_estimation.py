@@ -144,6 +144,15 @@ def test_foreground_says_nothing_of_a_few_pixels():
     assert foreground(depth, (20, 10, 42, 40)) is None
 
 
+@pytest.mark.parametrize('pixels', [1, 2, 3, 11])
+def test_few_pixels_have_a_position_too(pixels):
+    depth = flat(0)
+    depth.values[10, 10:10 + pixels] = 3000 + 10 * np.arange(pixels)
+    box = foreground(depth, (10, 10, 10 + pixels, 11))
+    assert box.center_m[2] == pytest.approx(3.0 + 0.005 * (pixels - 1) + AXIS_BEHIND_SURFACE_M)
+    assert np.isfinite(box.center_m).all() and (box.size_m > 0).all()
+
+
 def test_one_absurd_depth_neither_stalls_nor_counts():
     depth = flat(2.0, 1.0, np.float32)
     depth.values[10, 10], depth.values[20, 20] = 1e30, 1e7

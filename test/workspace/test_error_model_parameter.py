@@ -21,7 +21,7 @@ def test_no_model_is_none():
 def test_the_shipped_models_are_for_their_estimators(name, estimator):
     path, other = os.path.join(FOLDER, name + '.yaml'), {'foreground': 'median', 'median': 'foreground'}[estimator]
     assert error_model_of(params(path, estimator)).provenance.estimator == estimator
-    with pytest.raises(ValueError, match='is for the estimator %s; ~estimator is %s' % (estimator, other)):
+    with pytest.raises(ValueError, match='is for the estimator %s, not %s' % (estimator, other)):
         error_model_of(params(path, other))
 
 

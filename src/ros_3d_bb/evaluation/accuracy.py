@@ -1,7 +1,7 @@
 """Positions of a measurement session against ground truth: our estimator, the thesis', and what was recorded.
 
-Without an error model each position is corrected by a model of all others, for both estimators; the recorded
-estimates are taken as they are.
+Without an error model each position is corrected by a model of all others, for both estimators; the thesis' always is,
+as far as there are enough positions. The recorded estimates are taken as they are, for the frames that have a box.
 """
 import argparse
 import json
@@ -66,11 +66,7 @@ def estimates_of(session, boxes, estimator, model=None):
     -------
     Estimates
     """
-    raw_m, truth_m = np.full((len(boxes), 3), np.nan), truth_of(session)
-    for number, (frame, rect_px) in enumerate(zip(session.frames, boxes)):
-        if rect_px is not None:
-            box, = estimate_boxes(read_depth(frame, session), [rect_px], session.camera, estimator)
-            raw_m[number] = np.nan if box is None else box.center_m
+    raw_m, truth_m = raw_positions(session, boxes, estimator), truth_of(session)
     seen = np.isfinite(raw_m[:, 0])
     position_m, covariances = raw_m.copy(), np.full(raw_m.shape + (3,), np.nan)
     if model is not None:
@@ -79,6 +75,16 @@ def estimates_of(session, boxes, estimator, model=None):
     else:
         position_m[seen], covariances[seen] = held_out(data_of(raw_m[seen], truth_m[seen]))
     return Estimates(raw_m, position_m, covariances)
+
+
+def raw_positions(session, boxes, estimator):
+    """The positions that an estimator finds in each frame, (n, 3), nan for none."""
+    raw_m = np.full((len(boxes), 3), np.nan)
+    for number, (frame, rect_px) in enumerate(zip(session.frames, boxes)):
+        if rect_px is not None:
+            box, = estimate_boxes(read_depth(frame, session), [rect_px], session.camera, estimator)
+            raw_m[number] = np.nan if box is None else box.center_m
+    return raw_m
 
 
 def truth_of(session):
@@ -127,18 +133,30 @@ def compare(session, boxes, estimator, model=None):
     truncated = np.array([is_truncated(rect_px or frame.boxes_px[0], session.camera)
                           for rect_px, frame in zip(boxes, session.frames)])
     ours = estimates_of(session, boxes, estimator, model)
-    thesis = estimates_of(session, boxes, estimator_named('median'))
-    recorded_m = np.array([np.full(3, np.nan) if frame.estimate_m is None else frame.estimate_m
-                           for frame in session.frames])
+    thesis = _thesis_estimates(session, boxes)
+    nobody_m = np.full(3, np.nan)
+    recorded_m = np.array([nobody_m if frame.estimate_m is None or rect_px is None else frame.estimate_m
+                           for rect_px, frame in zip(boxes, session.frames)])
     recorded = Estimates(recorded_m, recorded_m, None) if np.isfinite(recorded_m[:, 0]).any() else None
     columns = zip(session.frames, ours.position_m, thesis.position_m, truth_m, ours.raw_m, thesis.raw_m)
     return {'frames': len(session.frames), 'positions': len(np.unique(truth_m, axis=0)),
-            'calibration': CALIBRATIONS[model is not None], 'ours': scores_of(ours, truth_m, truncated),
+            'calibration': CALIBRATIONS[model is not None],
+            'thesis_calibration': 'none' if thesis.covariances is None else CALIBRATIONS[0],
+            'ours': scores_of(ours, truth_m, truncated),
             'thesis': scores_of(thesis, truth_m, truncated),
             'recorded': None if recorded is None else scores_of(recorded, truth_m, truncated),
             'per_frame': [dict(zip(('id', 'ours', 'thesis', 'truth', 'ours_raw', 'thesis_raw'),
                                    [column[0].id] + [_numbers(values) for values in column[1:]]))
                           for column in columns]}, ours.raw_m
+
+
+def _thesis_estimates(session, boxes):
+    """The thesis' estimator, corrected by the other positions; uncorrected where there are too few of them."""
+    try:
+        return estimates_of(session, boxes, estimator_named('median'))
+    except ValueError:
+        raw_m = raw_positions(session, boxes, estimator_named('median'))
+        return Estimates(raw_m, raw_m, None)
 
 
 def _numbers(values):
@@ -178,7 +196,11 @@ def main():
             return
         session = read_session(arguments.data)
         session = session._replace(frames=tuple(frame for frame in session.frames if frame.truth_m is not None))
+        if not session.frames:
+            raise ValueError('%s has no frame with ground truth' % arguments.data)
         model = read_error_model(arguments.error_model) if arguments.error_model else None
+        if model is not None:
+            model.check_estimator(arguments.estimator)
         boxes = boxes_of(session, arguments.weights if arguments.boxes == 'yolov5' else None)
         result, raw_m = compare(session, boxes, estimator_named(arguments.estimator), model)
         result.update(boxes=arguments.boxes, estimator=arguments.estimator)

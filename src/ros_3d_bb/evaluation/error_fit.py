@@ -73,6 +73,8 @@ def data_of(measured_m, truth_m):
         raise ValueError('measured %s and truth %s; (n, 3) and (n, 2) expected' % (measured_m.shape, truth_m.shape))
     if not np.isfinite(measured_m).all() or not np.isfinite(truth_m).all():
         raise ValueError('a measurement is not finite')
+    if not (truth_m[:, 1] > 0).all():
+        raise ValueError('true z is %g m; more than 0 expected' % truth_m[:, 1].min())
     positions, position = np.unique(truth_m, axis=0, return_inverse=True)
     for axis, name in enumerate('xz'):
         if len(np.unique(positions[:, axis])) < 3:

@@ -144,9 +144,7 @@ def error_model_of(params):
         model = read_error_model(params.error_model)
     except OSError as error:
         raise ValueError('the error model cannot be read: %s; an absolute path expected' % error)
-    if model.provenance.estimator not in (params.estimator, ''):
-        raise ValueError('error model %s is for the estimator %s; ~estimator is %s'
-                         % (params.error_model, model.provenance.estimator, params.estimator))
+    model.check_estimator(params.estimator)
     return model
 
 

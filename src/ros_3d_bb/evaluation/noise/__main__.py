@@ -48,7 +48,7 @@ def _inputs(arguments):
         return Inputs(session, session, session.whole(), estimator, camera)
     z, x = read_table(arguments.z, 'Z'), read_table(arguments.x, 'X')
     x_variance = read_table(arguments.x_variance, 'X') if arguments.x_variance else x
-    return Inputs(z, x, x_variance, arguments.estimator or 'unknown', camera)
+    return Inputs(z, x, x_variance, arguments.estimator or '', camera)
 
 
 def _arguments():
@@ -60,7 +60,8 @@ def _arguments():
                         'edge of the image (default: that of --x)')
     parser.add_argument('--out', required=True, metavar='DIR', help='folder for the report; made where missing')
     parser.add_argument('--estimator', metavar='NAME', help='of a session: foreground (default), median, or recorded '
-                        'for the estimates stored in it; of tables: a name to be kept in the error model')
+                        'for the estimates stored in it; of tables: the estimator of bbox3d_node that made their '
+                        'positions (default: not said, for any)')
     parser.add_argument('--camera', default='unknown', help='a name to be kept in the error model')
     arguments = parser.parse_args()
     if bool(arguments.session) == bool(arguments.z or arguments.x or arguments.x_variance):
