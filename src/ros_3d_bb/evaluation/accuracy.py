@@ -14,7 +14,7 @@ import numpy as np
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.error_model import read_error_model, write_error_model
 from ros_3d_bb.estimation import estimate_boxes, estimator_named, is_truncated
-from ros_3d_bb.evaluation.error_fit import CHI_SQUARE_68_95, data_of, fit_error_model, held_out
+from ros_3d_bb.evaluation.error_fit import coverage, data_of, fit_error_model, held_out
 from ros_3d_bb.evaluation.scenes import position_errors_m
 from ros_3d_bb.measurements import read_color, read_depth, read_session
 from ros_3d_bb.simulation.scenario import read_scenario
@@ -110,9 +110,7 @@ def scores_of(estimates, truth_m, truncated):
                       + tuple(_repeatability_m(error_m, truth_m[seen]))
                       + (np.sqrt(np.mean(error_m[truncated[seen], 0] ** 2)) if truncated[seen].any() else np.nan,)))
     if estimates.covariances is not None:
-        in_plane = estimates.covariances[seen][:, [0, 2]][:, :, [0, 2]]
-        distances = np.einsum('ni,nij,nj->n', error_m, np.linalg.inv(in_plane), error_m)
-        scores.update(zip(('coverage_68', 'coverage_95'), (distances[:, None] <= CHI_SQUARE_68_95).mean(axis=0)))
+        scores.update(zip(('coverage_68', 'coverage_95'), coverage(error_m, estimates.covariances[seen])))
     else:
         scores.update(coverage_68=None, coverage_95=None)
     scores['missed'] = int(np.count_nonzero(~seen))

@@ -102,11 +102,16 @@ def held_out(data):
 def scores_of(corrected_m, covariances, truth_m):
     """How far corrected positions (n, 3) with covariances (n, 3, 3) are from the truth (n, 2), as Scores."""
     error_m = corrected_m[:, [0, 2]] - truth_m
-    in_plane = covariances[:, [0, 2]][:, :, [0, 2]]
-    distances = np.einsum('ni,nij,nj->n', error_m, np.linalg.inv(in_plane), error_m)
-    shares = (distances[:, np.newaxis] <= CHI_SQUARE_68_95).mean(axis=0)
+    shares = coverage(error_m, covariances)
     rmse_m = np.sqrt((error_m ** 2).mean(axis=0))
     return Scores(*(float(value) for value in (rmse_m[0], rmse_m[1], np.hypot(*rmse_m), shares[0], shares[1])))
+
+
+def coverage(error_m, covariances):
+    """Shares of errors (n, 2) in x and z in the 68 % and the 95 % ellipse of their covariances (n, 3, 3), (2,)."""
+    in_plane = covariances[:, [0, 2]][:, :, [0, 2]]
+    distances = np.einsum('ni,nij,nj->n', error_m, np.linalg.inv(in_plane), error_m)
+    return (distances[:, np.newaxis] <= CHI_SQUARE_68_95).mean(axis=0)
 
 
 def _folds(data):

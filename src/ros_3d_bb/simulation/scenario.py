@@ -1,9 +1,10 @@
 """Scenario files: a room, a robot, and people in it, as YAML. `config/scenarios/README.md` describes the form."""
-import difflib
 import os
 from typing import NamedTuple, Optional, Tuple
 
 import yaml
+
+from ros_3d_bb.params import nearest_name
 
 Color = Tuple[int, int, int]
 Point = Tuple[float, float]
@@ -181,9 +182,8 @@ def _record(kind, given, where):
         raise ScenarioError('%s is %r; keys and values expected' % (where, given))
     for name in given:
         if name not in kind._fields:
-            near = difflib.get_close_matches(str(name), kind._fields, 1, 0.0)
             raise ScenarioError('%s has the unknown key %r; did you mean %s? Known: %s'
-                                % (where, name, near[0], ', '.join(kind._fields)))
+                                % (where, name, nearest_name(str(name), kind._fields), ', '.join(kind._fields)))
     try:
         record = kind(**{name: _value(name, value, '%s.%s' % (where, name)) for name, value in given.items()})
     except TypeError:

@@ -4,7 +4,7 @@ from typing import List, NamedTuple, Tuple
 import cv2
 import numpy as np
 
-from ros_3d_bb.geometry import Camera
+from ros_3d_bb.geometry import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.simulation import mesh
 from ros_3d_bb.simulation.body import Body, Build
 from ros_3d_bb.simulation.color import ColorSensor
@@ -14,7 +14,7 @@ from ros_3d_bb.simulation.room import Room
 from ros_3d_bb.simulation.stereo import StereoCamera
 
 D435I_COLOR = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)  # the camera of the thesis' measurements
-FRONT_FROM_OPTICAL = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)  # REP 103
+FRONT_FROM_OPTICAL = transform_from((0, 0, 0), OPTICAL_ROTATION)
 SHADOW_RADIUS_M = 0.28
 SKINS = ((225, 180, 150), (215, 170, 140), (185, 140, 110), (230, 185, 155), (145, 105, 80))
 HAIRS = ((60, 45, 35), (35, 30, 25), (25, 22, 20), (130, 95, 60), (120, 120, 120))

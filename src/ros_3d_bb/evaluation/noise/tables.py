@@ -8,13 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.estimation import estimator_named, near_first
+from ros_3d_bb.estimation import BORDER_PX, estimate_boxes, estimator_named
 from ros_3d_bb.measurements import read_depth, read_session
 
 AXES = ('X', 'Z')
 LEAST_IN_CLUSTER = 3
 ROUNDING_MM = 1.01  # errors may be differences of values that were rounded afterwards
-EDGE_PX = 2
 
 
 class TableError(ValueError):
@@ -140,16 +139,13 @@ def _estimate(frame, session, name):
     """Position (3,) of the person of a frame, the first box, or None."""
     if name == 'recorded':
         return frame.estimate_m
-    estimator, depth, found = estimator_named(name), read_depth(frame, session), {}
-    for number in near_first(frame.boxes_px):
-        rect_px = frame.boxes_px[number]
-        nearer = [box for box in found.values() if box is not None]
-        found[number] = estimator.estimate(estimator.sample(depth, rect_px), rect_px, session.camera, nearer)
-    return None if found.get(0) is None else found[0].center_m
+    boxes = estimate_boxes(read_depth(frame, session), frame.boxes_px, session.camera, estimator_named(name))
+    return boxes[0].center_m if boxes and boxes[0] is not None else None
 
 
 def _is_cut(frame, camera):
-    return bool(frame.boxes_px) and (frame.boxes_px[0][0] <= EDGE_PX or frame.boxes_px[0][2] >= camera.width - EDGE_PX)
+    return bool(frame.boxes_px) and (frame.boxes_px[0][0] <= BORDER_PX
+                                     or frame.boxes_px[0][2] >= camera.width - BORDER_PX)
 
 
 def _axis_of(row, axis, where):
