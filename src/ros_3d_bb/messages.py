@@ -143,7 +143,7 @@ def detections_from_message(message, fixed_from_camera):
     Raises
     ------
     ValueError
-        If a centre is not finite or a size not positive.
+        If a centre is not finite, a size not positive or a covariance none.
     """
     detections = []
     for number, box in enumerate(message.boxes):
@@ -152,9 +152,21 @@ def detections_from_message(message, fixed_from_camera):
         if not (np.isfinite(values).all() and (values[3:] > 0).all()):
             raise ValueError('3D box %d has centre (%g, %g, %g) and size (%g, %g); finite and positive expected'
                              % ((number,) + tuple(values)))
-        detections.append(Detection(transform_points(fixed_from_camera, values[:3]),
-                                    np.array([size.x, size.x, size.y])))
+        detections.append(Detection(transform_points(fixed_from_camera, values[:3]), np.array([size.x, size.x, size.y]),
+                                    _covariance_in(fixed_from_camera, box, number), box.truncated))
     return detections
+
+
+def _covariance_in(fixed_from_camera, box, number):
+    """The covariance (3, 3) of a BoundingBox3D's centre in the fixed frame; None where it says none."""
+    covariance_m2 = np.array(box.position_covariance).reshape(3, 3)
+    if not covariance_m2.any():
+        return None
+    if not (np.isfinite(covariance_m2).all() and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T).min() > -1e-9):
+        raise ValueError('3D box %d has the position_covariance %s; a finite, positive semi-definite matrix, or zeros '
+                         'where it is not known, expected' % (number, list(box.position_covariance)))
+    rotation = fixed_from_camera[:3, :3]
+    return rotation.dot(covariance_m2).dot(rotation.T)
 
 
 def tracks_to_message(tracks, header):
@@ -166,24 +178,49 @@ def _track_to_message(track):
     message = msg.TrackedObject(id=track.id, status=track.status, moving=track.moving)
     message.pose = _pose_at(track.position_m)
     _set_xyz(message.twist.twist.linear, track.velocity_mps)
+    if track.covariance is not None:
+        message.pose.covariance = _covariance_6x6(track.covariance[:3, :3])
+        message.twist.covariance = _covariance_6x6(track.covariance[3:, 3:])
     _set_xyz(message.size, track.size_m)
     message.first_seen, message.last_seen = time_from(track.first_seen_ns), time_from(track.last_seen_ns)
     message.prediction = [_pose_at(position_m) for position_m in track.prediction_m]
+    if track.prediction_covariance_m2 is not None:
+        for pose, covariance_m2 in zip(message.prediction, track.prediction_covariance_m2):
+            pose.covariance = _covariance_6x6(covariance_m2)
     message.prediction_step = genpy.Duration.from_sec(track.prediction_step_s)
     return message
 
 
 def tracks_from_message(message):
-    """The tracks in a TrackedObjectArray; the instant velocity is not in the message and is that of the track."""
+    """The tracks in a TrackedObjectArray; the instant velocity is not in the message and is that of the track.
+
+    Nor is how position and velocity go together: that part of the covariance is zero.
+    """
     return [_track_from_message(track) for track in message.objects]
 
 
 def _track_from_message(track):
     velocity_mps = _xyz(track.twist.twist.linear)
     prediction_m = np.array([_xyz(pose.pose.position) for pose in track.prediction]).reshape(-1, 3)
+    covariance = prediction_covariance_m2 = None
+    if any(track.pose.covariance):
+        covariance = np.zeros((6, 6))
+        covariance[:3, :3], covariance[3:, 3:] = _covariance_3x3(track.pose), _covariance_3x3(track.twist)
+        prediction_covariance_m2 = np.array([_covariance_3x3(pose) for pose in track.prediction]).reshape(-1, 3, 3)
     return TrackedObject(track.id, _xyz(track.pose.pose.position), _xyz(track.size), velocity_mps, velocity_mps,
                          track.status, track.moving, track.first_seen.to_nsec(), track.last_seen.to_nsec(),
-                         prediction_m, track.prediction_step.to_sec())
+                         prediction_m, track.prediction_step.to_sec(), covariance, prediction_covariance_m2)
+
+
+def _covariance_6x6(covariance):
+    """As in geometry_msgs: the cylinder stands upright and looks the same from all sides, so its rotation is known."""
+    full = np.zeros((6, 6))
+    full[:3, :3] = covariance
+    return full.ravel().tolist()
+
+
+def _covariance_3x3(with_covariance):
+    return np.reshape(with_covariance.covariance, (6, 6))[:3, :3]
 
 
 def _pose_at(position_m):

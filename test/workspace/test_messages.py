@@ -12,12 +12,12 @@ from ros_3d_bb.camera_messages import CameraFrame, messages_of
 from ros_3d_bb.estimation import Box3D, DepthImage
 from ros_3d_bb.geometry import Camera, transform_from
 from ros_3d_bb.messages import (boxes2d_from_message, boxes2d_to_message, boxes3d_to_message, camera_from_message,
-                                detections_from_message, stamp_of, time_from, tracks_to_message,
-                                transform_from_message)
+                                detections_from_message, stamp_of, time_from, tracks_from_message,
+                                tracks_to_message, transform_from_message)
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.thesis import ThesisTracker
-from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject as Track
 
 INT32 = st.integers(-2 ** 31, 2 ** 31 - 1)
 STAMP = st.integers(1, 2 ** 32 * NS - 1)
@@ -153,6 +153,35 @@ def test_3d_boxes_that_cannot_be_are_refused(field, value):
         good = BoundingBox3D()
         good.size.x = good.size.y = 1.0
         detections_from_message(BoundingBox3DArray(boxes=[good, box]), np.eye(4))
+
+
+def test_the_covariance_of_a_detection_is_turned_into_the_fixed_frame():
+    """Camera looking along x of the map: its z, the range, is the map's x."""
+    box = BoundingBox3D(position_covariance=np.diag([0.01, 0.04, 0.09]).ravel(), truncated=True)
+    box.size.x = box.size.y = 1.0
+    detection, = detections_from_message(BoundingBox3DArray(boxes=[box]), transform_from((0, 0, 1), (-.5, .5, -.5, .5)))
+    np.testing.assert_allclose(detection.covariance_m2, np.diag([0.09, 0.01, 0.04]), atol=1e-12)
+    assert detection.truncated
+
+
+@pytest.mark.parametrize('wrong', [-np.eye(3), np.full((3, 3), np.nan), [[1, 5, 0], [5, 1, 0], [0, 0, 1]]])
+def test_a_matrix_that_is_no_covariance_is_refused(wrong):
+    box = BoundingBox3D(position_covariance=np.ravel(wrong).tolist())
+    box.size.x = box.size.y = 1.0
+    with pytest.raises(ValueError, match='3D box 0 has the position_covariance'):
+        detections_from_message(BoundingBox3DArray(boxes=[box]), np.eye(4))
+
+
+def test_the_covariance_of_tracks_and_predictions_survives():
+    covariance = np.diag([0.01, 0.02, 0.03, 0.04, 0.05, 0.06])
+    track = Track(1, np.zeros(3), np.ones(3), np.zeros(3), np.zeros(3), VISIBLE, False, 1, 2, np.ones((2, 3)), 0.5,
+                  covariance, np.array([2 * np.eye(3), 3 * np.eye(3)]))
+    back, = tracks_from_message(on_the_wire(tracks_to_message([track], header(NS))))
+    np.testing.assert_array_equal(back.covariance, covariance)
+    np.testing.assert_array_equal(back.prediction_covariance_m2, track.prediction_covariance_m2)
+    unknown = track._replace(covariance=None, prediction_covariance_m2=None)
+    back, = tracks_from_message(on_the_wire(tracks_to_message([unknown], header(NS))))
+    assert back.covariance is None and back.prediction_covariance_m2 is None
 
 
 def test_tracks_fill_every_field():

@@ -62,7 +62,7 @@ class ThesisTracker(object):
         self._last_id = 0
         self._now_ns = None
 
-    def update(self, stamp_ns, detections):
+    def update(self, stamp_ns, detections, view=None):
         """Take the detections of one image.
 
         Parameters
@@ -70,6 +70,8 @@ class ThesisTracker(object):
         stamp_ns : int
             Stamp of the image, later than that of the image before.
         detections : list of Detection
+        view : View, optional
+            Not used here: the thesis' tracker does not ask where the camera looked.
 
         Returns
         -------
