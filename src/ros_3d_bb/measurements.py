@@ -1,11 +1,12 @@
 """Read a measurement session: a folder of colour and depth images with boxes, estimates and ground truth.
 
-The folder holds `frames.json` with the camera (its lens distortion as k1, k2, p1, p2, k3 of plumb_bob) and the frames,
-colour as 8-bit PNG and depth as 16-bit PNG in units of the camera's depth_scale, never normalised. Lengths in the file
-are millimetres, here metres.
+The folder holds `frames.json` with the camera (its lens distortion as k1, k2, p1, p2, k3 of plumb_bob, unless it names
+another model) and the frames, colour as 8-bit PNG and depth as 16-bit PNG in units of the camera's depth_scale, never
+normalised. Lengths in the file are millimetres, here metres. doc/session.md describes all of it.
 """
 import json
 import os
+import re
 from typing import NamedTuple, Optional, Tuple
 
 import cv2
@@ -14,22 +15,60 @@ import numpy as np
 from ros_3d_bb.distortion import PLUMB_BOB
 from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.geometry import Camera
+from ros_3d_bb.session_file import FILE_NAME
+
+# what reading a wrong description raises, besides KeyError
+MISUSE = (TypeError, ValueError, AttributeError, OverflowError, RecursionError)
 
 
 class SessionError(ValueError):
     """A measurement session that cannot be read: says which file, what is wrong and what was expected."""
 
 
+class Detection(NamedTuple):
+    """A person that was found in an image: `box_px` (x1, y1, x2, y2), `estimate_m` (x, y, z) in the optical frame,
+    `size_m` (width, height), `support` and `truncated` as in estimation.Box3D; None where not stored. `by_hand`:
+    somebody drew the box.
+    """
+
+    box_px: Optional[Tuple[int, int, int, int]]
+    estimate_m: Optional[np.ndarray]
+    size_m: Optional[np.ndarray] = None
+    support: Optional[float] = None
+    truncated: Optional[bool] = None
+    by_hand: bool = False
+
+
 class Frame(NamedTuple):
-    """One measurement. `boxes_px` are (x1, y1, x2, y2); `estimate_m` is (x, y, z) in the optical frame, `truth_m`
-    (x, z); None where not annotated."""
+    """One measurement. `person` is the number of the detection whose truth is given; `truth_m` (x, z) and `truth_y_m`
+    are in the optical frame; None where not annotated. `rejected` says why it is not to be used, `stamp_ns` when the
+    image was taken, where stored.
+    """
 
     id: str
     color_path: str
     depth_path: str
-    boxes_px: Tuple[Tuple[int, int, int, int], ...]
-    estimate_m: Optional[np.ndarray]
-    truth_m: Optional[np.ndarray]
+    detections: Tuple[Detection, ...]
+    person: int = 0
+    truth_m: Optional[np.ndarray] = None
+    truth_y_m: Optional[float] = None
+    rejected: Optional[str] = None
+    stamp_ns: Optional[int] = None
+    label: str = ''
+
+    @property
+    def boxes_px(self):
+        """The 2D boxes of the detections, that of the person first."""
+        return tuple(detection.box_px for detection in self._person_first() if detection.box_px is not None)
+
+    @property
+    def estimate_m(self):
+        """The stored position (3,) of the person, or None."""
+        return self.detections[self.person].estimate_m if self.detections else None
+
+    def _person_first(self):
+        return (self.detections[self.person:self.person + 1] + self.detections[:self.person]
+                + self.detections[self.person + 1:])
 
 
 class Session(NamedTuple):
@@ -42,31 +81,64 @@ class Session(NamedTuple):
 
 
 def read_session(folder):
-    """Read the `frames.json` of a session; images are read by `read_color` and `read_depth`.
+    """Read the `frames.json` of a session, without the rejected frames; images are read by `read_color`, `read_depth`.
 
     Raises
     ------
     SessionError
         If the folder holds no session, or a field is missing or wrong.
     """
-    path = os.path.join(str(folder), 'frames.json')
+    content = read_description(folder)
+    path = os.path.join(str(folder), FILE_NAME)
+    try:
+        return Session(*camera_of(content), tuple(frame_of(str(folder), entry) for entry in content['frames']
+                                                  if not entry.get('rejected')))
+    except KeyError as error:
+        raise SessionError('%s: the field %s is missing' % (path, error))
+    except MISUSE as error:
+        raise SessionError('%s: not the description of a measurement session (%s)' % (path, error))
+
+
+def read_description(folder):
+    """The content of `frames.json` of a folder, a dictionary whose fields are not checked. Raises SessionError."""
+    path = os.path.join(str(folder), FILE_NAME)
     try:
         with open(path, encoding='utf-8') as stream:
             content = json.load(stream)
-        camera = content['camera']
-        if not 0 < float(camera['depth_scale']) < 1:
-            raise ValueError('depth_scale is %s; metres per unit expected, such as 0.001' % camera['depth_scale'])
-        intrinsics = (camera[name] for name in ('width', 'height', 'fx', 'fy', 'cx', 'cy'))
-        return Session(Camera(*intrinsics, distortion_model=PLUMB_BOB, distortion=camera.get('distortion', ())),
-                       float(camera['depth_scale']), str(camera['frame']),
-                       tuple(_frame_from(str(folder), entry) for entry in content['frames']))
     except OSError as error:
         raise SessionError('%s: not a measurement session (%s); expected a folder with frames.json, color/ and depth/'
                            % (folder, error.strerror))
-    except KeyError as error:
-        raise SessionError('%s: the field %s is missing' % (path, error))
-    except (TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise SessionError('%s: not the description of a measurement session (%s)' % (path, error))
+    if not isinstance(content, dict):
+        raise SessionError('%s: not the description of a measurement session; an object with frames expected' % path)
+    return content
+
+
+def camera_of(content):
+    """(Camera, metres per depth unit, camera frame) of a description. Raises KeyError or one of MISUSE."""
+    camera = content['camera']
+    if not 0 < float(camera['depth_scale']) < 1:
+        raise ValueError('depth_scale is %s; metres per unit expected, such as 0.001' % camera['depth_scale'])
+    intrinsics = (camera[name] for name in ('width', 'height', 'fx', 'fy', 'cx', 'cy'))
+    return (Camera(*intrinsics, distortion_model=camera.get('distortion_model', PLUMB_BOB),
+                   distortion=camera.get('distortion', ())), float(camera['depth_scale']), str(camera['frame']))
+
+
+def frame_of(folder, entry):
+    """The Frame of an entry of a description. Raises KeyError or one of MISUSE."""
+    # a session of one box a frame has its fields in the frame itself
+    described = entry.get('detections') or ([entry] if {'box', 'estimate_mm', 'original_mm'} & set(entry) else [])
+    person, truth_mm, stamp = int(entry.get('person', 0)), entry.get('truth_mm'), entry.get('stamp')
+    if not 0 <= person < max(1, len(described)):
+        raise ValueError('person is %d, where there are %d detections' % (person, len(described)))
+    return Frame(
+        str(entry['id']), os.path.join(folder, entry['color']), os.path.join(folder, entry['depth']),
+        tuple(_detection_from(detection) for detection in described), person,
+        None if truth_mm is None else _numbers([truth_mm['x'], truth_mm['z']], 2) / 1000,
+        None if truth_mm is None or truth_mm.get('y') is None else _numbers([truth_mm['y']], 1)[0] / 1000,
+        None if not entry.get('rejected') else str(entry['rejected']), None if stamp is None else _stamp_ns_from(stamp),
+        str(entry.get('label', '')))
 
 
 def read_color(frame, camera):
@@ -99,16 +171,22 @@ def _read_image(path, camera):
     return image
 
 
-def _frame_from(folder, entry):
-    detections = entry.get('detections') or [entry]
-    estimate_mm = detections[0].get('estimate_mm', detections[0].get('original_mm'))
-    truth_mm = entry.get('truth_mm')
-    return Frame(
-        str(entry['id']), os.path.join(folder, entry['color']), os.path.join(folder, entry['depth']),
-        tuple(tuple(int(edge) for edge in _numbers(detection['box'], 4))
-              for detection in detections if detection.get('box')),
-        None if estimate_mm is None else _numbers(estimate_mm, 3) / 1000,
-        None if truth_mm is None else _numbers([truth_mm['x'], truth_mm['z']], 2) / 1000)
+def _detection_from(entry):
+    box, size_mm, support = entry.get('box'), entry.get('size_mm'), entry.get('support')
+    estimate_mm = entry.get('estimate_mm', entry.get('original_mm'))
+    return Detection(None if not box else tuple(int(edge) for edge in _numbers(box, 4)),
+                     None if estimate_mm is None else _numbers(estimate_mm, 3) / 1000,
+                     None if size_mm is None else _numbers(size_mm, 2) / 1000,
+                     None if support is None else float(_numbers([support], 1)[0]),
+                     None if entry.get('truncated') is None else bool(entry['truncated']), entry.get('by') == 'hand')
+
+
+def _stamp_ns_from(text):
+    """Nanoseconds of '<secs>.<nsecs, 9 digits>'. Raises ValueError."""
+    match = re.match(r'(\d{1,12})\.(\d{9})$', str(text))
+    if match is None:
+        raise ValueError('stamp is %.40r; seconds, a point and nine digits of nanoseconds expected' % (text,))
+    return int(match.group(1)) * 10 ** 9 + int(match.group(2))
 
 
 def _numbers(values, count):

@@ -1,0 +1,35 @@
+"""Lengths as people type them."""
+import re
+
+from ros_3d_bb.estimation import FARTHEST_M
+
+METRES = {'m': 1.0, 'cm': 0.01, 'mm': 0.001}
+
+
+def parse_length(text, unit):
+    """Metres of a length such as '1230', '1230 mm', '1.23 m' or '1,23'.
+
+    Parameters
+    ----------
+    text : str
+        With a decimal point or comma.
+    unit : str
+        'mm', 'cm' or 'm': meant where the text names none.
+
+    Raises
+    ------
+    ValueError
+        If it is no length, could be meant in two ways, or is farther than any depth camera sees.
+    """
+    match = re.match(r'\s*([+\-\u2212]?)(\d+(?:[.,]\d*)?|[.,]\d+)\s*(mm|cm|m)?\s*$', text)
+    if match is None:
+        raise ValueError('%.40r is not a length; one such as 1230, 1230 mm or 1.23 m expected' % text)
+    sign, number, unit = match.group(1), match.group(2), match.group(3) or unit
+    if unit == 'mm' and re.match(r'[1-9]\d{0,2},\d{3}$', number):
+        raise ValueError('%.40r could be %s mm or %s mm; write it without the comma'
+                         % (text, number.replace(',', ''), number.replace(',', '.')))
+    metres = float(number.replace(',', '.')) * METRES[unit]
+    if metres > FARTHEST_M:
+        raise ValueError('%.40r is %g m; at most %g m expected. Is it meant in millimetres?'
+                         % (text, metres, FARTHEST_M))
+    return round(-metres if sign in ('-', '\u2212') else metres, 6) + 0.0  # no -0.0

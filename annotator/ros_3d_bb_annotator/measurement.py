@@ -1,0 +1,96 @@
+"""What the annotator shows of one measurement."""
+import os
+from typing import NamedTuple, Optional, Tuple
+
+from ros_3d_bb.measurements import MISUSE, Detection, frame_of
+
+NEW, ANNOTATED, REJECTED = 'new', 'annotated', 'rejected'
+# The old form's depth is stretched to the range of the image: under another name nobody takes it for distances.
+DEPTH, STRETCHED_DEPTH = 'depth', 'stretched_depth'
+
+
+class Mark(NamedTuple):
+    """A marked position on the floor, metres right of and in front of the camera (its optical X and Z)."""
+
+    name: str
+    x_m: float
+    z_m: float
+
+
+class Measurement(NamedTuple):
+    """One measurement. `person` is the number of the detection whose truth is given, None where nobody was detected;
+    `truth_m` is (x, y, z) in the optical frame, y None where not given; `rejected` the reason; `problem` says what is
+    wrong with it, None where nothing is. `stamp_text` is '<secs>.<nsecs>' or empty.
+    """
+
+    id: str
+    color_path: str
+    depth_path: str
+    stamp_text: str = ''
+    label: str = ''
+    detections: Tuple[Detection, ...] = ()
+    person: Optional[int] = None
+    truth_m: Optional[Tuple[float, Optional[float], float]] = None
+    rejected: Optional[str] = None
+    problem: Optional[str] = None
+
+    @property
+    def state(self):
+        """'new', 'annotated' or 'rejected'."""
+        if self.rejected is not None:
+            return REJECTED
+        return NEW if self.truth_m is None else ANNOTATED
+
+    @property
+    def estimate_m(self):
+        """The stored position (3,) of the person, or None."""
+        return None if self.person is None else self.detections[self.person].estimate_m
+
+
+class FileNames(object):
+    """Which files there are, by one look into each folder."""
+
+    def __init__(self):
+        self._names = {}
+
+    def __contains__(self, path):
+        folder, name = os.path.split(path)
+        if folder not in self._names:
+            try:
+                self._names[folder] = set(os.listdir(folder))
+            except OSError:
+                self._names[folder] = set()
+        return name in self._names[folder]
+
+
+def measurement_of(folder, entry, files):
+    """The Measurement of an entry of frames.json; one that cannot be understood has a `problem`.
+
+    Parameters
+    ----------
+    folder : str
+        Of the session.
+    entry : object
+        Of "frames", whatever it is.
+    files : FileNames
+    """
+    if isinstance(entry, dict) and entry.get('unreadable'):
+        return _broken(entry, str(entry['unreadable']))
+    try:
+        frame = frame_of(folder, dict(entry, depth=entry.get(DEPTH) or entry[STRETCHED_DEPTH]))
+    except KeyError as error:
+        missing = 'depth' if error.args == (STRETCHED_DEPTH,) else error.args[0]
+        return _broken(entry, 'the field %s is missing' % missing)
+    except MISUSE as error:
+        return _broken(entry, str(error))
+    lost = [os.path.relpath(path, folder) for path in (frame.color_path, frame.depth_path) if path not in files]
+    truth_m = None if frame.truth_m is None else (float(frame.truth_m[0]), frame.truth_y_m, float(frame.truth_m[1]))
+    return Measurement(frame.id, frame.color_path, frame.depth_path, str(entry.get('stamp') or ''), frame.label,
+                       frame.detections, frame.person if frame.detections else None, truth_m, frame.rejected,
+                       'there is no file %s' % ' and no file '.join(lost) if lost else None)
+
+
+def _broken(entry, problem):
+    known = entry if isinstance(entry, dict) else {}
+    return Measurement(str(known.get('id', '')), '', '', problem=problem,
+                       rejected=str(known['rejected']) if known.get('rejected') else None)
