@@ -16,6 +16,8 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)
 if importlib.util.find_spec('ros_3d_bb') is None:  # no workspace is sourced: the pure modules need none
     sys.path.insert(0, os.path.join(os.path.dirname(HERE), 'src'))
+if importlib.util.find_spec('ros_3d_bb_annotator') is None:
+    sys.path.insert(0, os.path.join(os.path.dirname(HERE), 'annotator'))
 DATA = os.environ.get('ROS_3D_BB_DATA', '')
 
 

@@ -9,7 +9,8 @@ import os
 import numpy as np
 
 from ros_3d_bb.estimation import FARTHEST_M, check_rect, estimate_boxes, estimator_named
-from ros_3d_bb.measurements import MISUSE, Session, SessionError, camera_of, read_color, read_depth, read_description
+from ros_3d_bb.measurements import (Session, SessionError, camera_of, others_than, read_color, read_depth,
+                                    read_description, refusing)
 from ros_3d_bb.session_file import FILE_NAME, changing
 from ros_3d_bb_annotator import legacy
 from ros_3d_bb_annotator.drafts import Drafts
@@ -55,13 +56,8 @@ class Document(object):
         """Open the session in a folder; no image is read. Raises SessionError where there is nothing to open."""
         folder = os.path.abspath(str(folder))
         content = legacy.read(folder) if legacy.is_old_form(folder) else read_description(folder)
-        path = os.path.join(folder, FILE_NAME)
-        try:
+        with refusing(os.path.join(folder, FILE_NAME)):
             return cls(folder, content)
-        except KeyError as error:
-            raise SessionError('%s: the field %s is missing' % (path, error))
-        except MISUSE as error:
-            raise SessionError('%s: not the description of a measurement session (%s)' % (path, error))
 
     @property
     def progress(self):
@@ -72,7 +68,9 @@ class Document(object):
         """Take in what other programs wrote. Returns whether there was anything. Raises SessionError."""
         if self._signature == _signature(self.folder):
             return False
-        self._take(read_description(self.folder))
+        content = read_description(self.folder)
+        with refusing(os.path.join(self.folder, FILE_NAME)):
+            self._take(content)
         return True
 
     def color(self, index):
@@ -90,7 +88,7 @@ class Document(object):
         return legacy.read_stretched(self._usable(index).depth_path)
 
     def estimated(self, index, box_px):
-        """The 3D box of a 2D box (x1, y1, x2, y2) in a measurement, knowing the other people in it.
+        """The 3D box of a 2D box (x1, y1, x2, y2) in a measurement, detected or drawn, knowing the other people in it.
 
         Returns
         -------
@@ -106,9 +104,12 @@ class Document(object):
         """
         box_px = tuple(int(edge) for edge in box_px)
         check_rect(box_px)
-        boxes_px = [detection.box_px for detection in self.measurements[index].detections
-                    if detection.box_px not in (None, box_px)] + [box_px]
-        return estimate_boxes(self.depth(index), boxes_px, self.camera, estimator_named(ESTIMATOR))[-1]
+        detections = self.measurements[index].detections
+        others_px = [detection.box_px for detection in detections if detection.box_px not in (None, box_px)]
+        if not any(detection.box_px == box_px and not detection.by_hand for detection in detections):
+            others_px = others_than(box_px, others_px)  # one drawn by hand replaces those of the same person
+        boxes_px = [box_px] + list(others_px)
+        return estimate_boxes(self.depth(index), boxes_px, self.camera, estimator_named(ESTIMATOR))[0]
 
     def errors(self, index):
         """(x, z, distance on the floor), metres, of estimate minus truth; None where one of both is missing."""

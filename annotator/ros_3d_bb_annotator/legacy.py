@@ -66,7 +66,8 @@ def _entry_of(line, number, names, used):
     """The entry of a line, one that says what is wrong where the line is not of the form; counts times in `used`."""
     match = LINE.match(line)
     if match is None:
-        return {'id': 'line-%d' % number, 'unreadable': '%s, line %d is %.60r; %s' % (TEXT_NAME, number, line, EXPECTED)}
+        return {'id': 'line-%d' % number,
+                'unreadable': '%s, line %d is %.60r; %s' % (TEXT_NAME, number, line, EXPECTED)}
     time = match.group(2)
     used[time] = used.get(time, 0) + 1  # two in one second share their images
     stem = 'measurements_%s' % time

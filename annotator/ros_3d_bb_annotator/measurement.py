@@ -2,11 +2,11 @@
 import os
 from typing import NamedTuple, Optional, Tuple
 
-from ros_3d_bb.measurements import MISUSE, Detection, frame_of
+from ros_3d_bb.measurements import Detection, SessionError, frame_of, refusing
 
 NEW, ANNOTATED, REJECTED = 'new', 'annotated', 'rejected'
-# The old form's depth is stretched to the range of the image: under another name nobody takes it for distances.
-DEPTH, STRETCHED_DEPTH = 'depth', 'stretched_depth'
+# The depth of the old form, which is stretched: under this name nobody takes it for distances.
+STRETCHED_DEPTH = 'stretched_depth'
 
 
 class Mark(NamedTuple):
@@ -77,17 +77,21 @@ def measurement_of(folder, entry, files):
     if isinstance(entry, dict) and entry.get('unreadable'):
         return _broken(entry, str(entry['unreadable']))
     try:
-        frame = frame_of(folder, dict(entry, depth=entry.get(DEPTH) or entry[STRETCHED_DEPTH]))
-    except KeyError as error:
-        missing = 'depth' if error.args == (STRETCHED_DEPTH,) else error.args[0]
-        return _broken(entry, 'the field %s is missing' % missing)
-    except MISUSE as error:
+        with refusing('frames.json'):
+            frame = frame_of(folder, _with_depth(entry))
+    except SessionError as error:
         return _broken(entry, str(error))
     lost = [os.path.relpath(path, folder) for path in (frame.color_path, frame.depth_path) if path not in files]
     truth_m = None if frame.truth_m is None else (float(frame.truth_m[0]), frame.truth_y_m, float(frame.truth_m[1]))
     return Measurement(frame.id, frame.color_path, frame.depth_path, str(entry.get('stamp') or ''), frame.label,
                        frame.detections, frame.person if frame.detections else None, truth_m, frame.rejected,
                        'there is no file %s' % ' and no file '.join(lost) if lost else None)
+
+
+def _with_depth(entry):
+    if isinstance(entry, dict) and STRETCHED_DEPTH in entry:
+        return dict(entry, depth=entry[STRETCHED_DEPTH])
+    return entry
 
 
 def _broken(entry, problem):

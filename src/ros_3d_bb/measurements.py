@@ -4,6 +4,7 @@ The folder holds `frames.json` with the camera (its lens distortion as k1, k2, p
 another model) and the frames, colour as 8-bit PNG and depth as 16-bit PNG in units of the camera's depth_scale, never
 normalised. Lengths in the file are millimetres, here metres. doc/session.md describes all of it.
 """
+import contextlib
 import json
 import os
 import re
@@ -12,13 +13,13 @@ from typing import NamedTuple, Optional, Tuple
 import cv2
 import numpy as np
 
+from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.distortion import PLUMB_BOB
 from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.geometry import Camera
 from ros_3d_bb.session_file import FILE_NAME
 
-# what reading a wrong description raises, besides KeyError
-MISUSE = (TypeError, ValueError, AttributeError, OverflowError, RecursionError)
+SAME_PERSON_IOU = 0.3  # half of a body is what a detector may have seen of it; two people seldom overlap so much
 
 
 class SessionError(ValueError):
@@ -58,8 +59,11 @@ class Frame(NamedTuple):
 
     @property
     def boxes_px(self):
-        """The 2D boxes of the detections, that of the person first."""
-        return tuple(detection.box_px for detection in self._person_first() if detection.box_px is not None)
+        """The 2D boxes of the people, that of the person first. One drawn by hand replaces those of the same person."""
+        boxes_px = tuple(detection.box_px for detection in self._person_first() if detection.box_px is not None)
+        if not self.detections or not self.detections[self.person].by_hand:
+            return boxes_px
+        return boxes_px[:1] + others_than(boxes_px[0], boxes_px[1:])
 
     @property
     def estimate_m(self):
@@ -88,35 +92,40 @@ def read_session(folder):
     SessionError
         If the folder holds no session, or a field is missing or wrong.
     """
-    content = read_description(folder)
-    path = os.path.join(str(folder), FILE_NAME)
-    try:
-        return Session(*camera_of(content), tuple(frame_of(str(folder), entry) for entry in content['frames']
-                                                  if not entry.get('rejected')))
-    except KeyError as error:
-        raise SessionError('%s: the field %s is missing' % (path, error))
-    except MISUSE as error:
-        raise SessionError('%s: not the description of a measurement session (%s)' % (path, error))
+    content, path = read_description(folder), os.path.join(str(folder), FILE_NAME)
+    with refusing(path):
+        return Session(*camera_of(content), tuple(_used_frames(str(folder), content['frames'], path)))
 
 
 def read_description(folder):
     """The content of `frames.json` of a folder, a dictionary whose fields are not checked. Raises SessionError."""
     path = os.path.join(str(folder), FILE_NAME)
     try:
-        with open(path, encoding='utf-8') as stream:
+        with refusing(path), open(path, encoding='utf-8') as stream:
             content = json.load(stream)
     except OSError as error:
         raise SessionError('%s: not a measurement session (%s); expected a folder with frames.json, color/ and depth/'
                            % (folder, error.strerror))
-    except (ValueError, RecursionError) as error:
-        raise SessionError('%s: not the description of a measurement session (%s)' % (path, error))
     if not isinstance(content, dict):
         raise SessionError('%s: not the description of a measurement session; an object with frames expected' % path)
     return content
 
 
+@contextlib.contextmanager
+def refusing(where):
+    """Make a SessionError, whose text begins with `where`, of what reading a wrong description raises."""
+    try:
+        yield
+    except SessionError:
+        raise
+    except KeyError as error:
+        raise SessionError('%s: the field %s is missing' % (where, error))
+    except (TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
+        raise SessionError('%s: not the description of a measurement session (%s)' % (where, error))
+
+
 def camera_of(content):
-    """(Camera, metres per depth unit, camera frame) of a description. Raises KeyError or one of MISUSE."""
+    """(Camera, metres per depth unit, camera frame) of a description. What it raises, see `refusing`."""
     camera = content['camera']
     if not 0 < float(camera['depth_scale']) < 1:
         raise ValueError('depth_scale is %s; metres per unit expected, such as 0.001' % camera['depth_scale'])
@@ -126,7 +135,9 @@ def camera_of(content):
 
 
 def frame_of(folder, entry):
-    """The Frame of an entry of a description. Raises KeyError or one of MISUSE."""
+    """The Frame of an entry of a description. What it raises, see `refusing`."""
+    if not isinstance(entry, dict):
+        raise ValueError('%.60r is no measurement' % (entry,))
     # a session of one box a frame has its fields in the frame itself
     described = entry.get('detections') or ([entry] if {'box', 'estimate_mm', 'original_mm'} & set(entry) else [])
     person, truth_mm, stamp = int(entry.get('person', 0)), entry.get('truth_mm'), entry.get('stamp')
@@ -169,6 +180,20 @@ def _read_image(path, camera):
         raise SessionError('%s: %d x %d pixels, where the camera has %d x %d'
                            % (path, image.shape[1], image.shape[0], camera.width, camera.height))
     return image
+
+
+def others_than(box_px, boxes_px):
+    """Those of some 2D boxes that overlap another one too little to be of the same person; a tuple."""
+    overlaps = iou(box_px, boxes_px)
+    return tuple(other for other, overlap in zip(boxes_px, overlaps) if overlap <= SAME_PERSON_IOU)
+
+
+def _used_frames(folder, entries, path):
+    """Yield the Frames of the entries that are not rejected. Raises SessionError, which says what number."""
+    for number, entry in enumerate(entries, 1):
+        if not (isinstance(entry, dict) and entry.get('rejected')):
+            with refusing('%s, measurement number %d' % (path, number)):
+                yield frame_of(folder, entry)
 
 
 def _detection_from(entry):

@@ -92,7 +92,7 @@ def test_several_boxes_in_a_frame(folder):
     (lambda content: content['frames'][0].update(box=[1, 2, 3, float('inf')]), 'is not 4 numbers'),
     (lambda content: content['camera'].update(depth_scale=-0.001), 'depth_scale is -0.001'),
     (lambda content: content['camera'].update(width=float('inf')), 'infinity'),
-    (lambda content: content['frames'].append(7), 'int')])
+    (lambda content: content['frames'].append(7), 'number 2: not the description of a measurement session (7 is no')])
 def test_descriptions_with_faults_are_refused(folder, edit, reason):
     change(folder, edit)
     with pytest.raises(SessionError) as error:

@@ -36,8 +36,8 @@ def test_launch_config_rviz_and_scripts_are_installed(installed):
     share = os.path.join(installed, 'share', 'ros_3d_bb')
     for folder in ('launch', 'config', 'rviz', 'msg', 'urdf', 'worlds'):
         assert sorted(os.listdir(os.path.join(share, folder))) == sorted(os.listdir(os.path.join(ROOT, folder)))
-    scripts = sorted(os.path.basename(path) for path in glob.glob(os.path.join(ROOT, 'scripts', '*')))
-    assert sorted(os.listdir(os.path.join(installed, 'lib', 'ros_3d_bb'))) == scripts
+    scripts = [os.path.basename(path) for path in glob.glob(os.path.join(ROOT, 'scripts', '*'))] + ['annotator']
+    assert sorted(os.listdir(os.path.join(installed, 'lib', 'ros_3d_bb'))) == sorted(scripts)
 
 
 def test_the_package_is_found_and_imported_from_there(installed):
@@ -48,6 +48,7 @@ def test_the_package_is_found_and_imported_from_there(installed):
 
 def test_the_tool_and_the_launch_files_run_from_there(installed):
     assert 'usage: session_to_bag' in run_in(installed, 'rosrun ros_3d_bb session_to_bag --help')
+    assert 'usage: annotator' in run_in(installed, 'rosrun ros_3d_bb annotator --help')
     nodes = run_in(installed, 'roslaunch --nodes ros_3d_bb playback.launch bag:=x weights:=y')
     assert {'/yolov5_node', '/bbox3d_node', '/tracker_node', '/player', '/rviz'} <= set(nodes.split())
     assert installed in run_in(installed, 'roslaunch --files ros_3d_bb pipeline.launch')

@@ -41,7 +41,8 @@ def inside(*parts):
 
 
 def python_files():
-    return sorted(glob.glob(inside('src', '**', '*.py'), recursive=True) + glob.glob(inside('scripts', '*')))
+    return sorted(glob.glob(inside('src', '**', '*.py'), recursive=True) + glob.glob(inside('scripts', '*'))
+                  + glob.glob(inside('annotator', '**', '*.py'), recursive=True) + [inside('annotator', 'annotator')])
 
 
 def declared(*kinds):
@@ -59,7 +60,7 @@ def imported(paths):
                     names.update(name.name.split('.')[0] for name in node.names)
                 elif isinstance(node, ast.ImportFrom):
                     names.add(node.module.split('.')[0])
-    return names - STANDARD_LIBRARY - {'ros_3d_bb'}
+    return names - STANDARD_LIBRARY - {'ros_3d_bb', 'ros_3d_bb_annotator'}
 
 
 def test_every_import_is_declared_and_every_dependency_is_used():
@@ -160,6 +161,7 @@ def test_rviz_shows_what_the_pipeline_publishes():
 def test_python_packages_are_all_named_in_setup_py():
     with open(inside('setup.py')) as stream:
         text = stream.read()
-    packages = set(os.path.relpath(os.path.dirname(path), inside('src')).replace(os.sep, '.')
-                   for path in glob.glob(inside('src', '**', '__init__.py'), recursive=True))
+    packages = set(os.path.relpath(os.path.dirname(path), inside(root)).replace(os.sep, '.')
+                   for root in ('src', 'annotator')
+                   for path in glob.glob(inside(root, '**', '__init__.py'), recursive=True))
     assert packages == set(re.findall(r"'(ros_3d_bb[\w.]*)'", text))

@@ -1,14 +1,11 @@
 """Analyse the noise of measured positions: figures, normality tests, error models and a report."""
 import argparse
-import json
 import pathlib
 import sys
 
-from ros_3d_bb.error_model import write_error_model
-from ros_3d_bb.evaluation.noise.analysis import Inputs, analyse, summary_of
-from ros_3d_bb.evaluation.noise.figures import polynomial_text, write_figures
-from ros_3d_bb.evaluation.noise.report import report_of
-from ros_3d_bb.evaluation.noise.tables import clusters_of, read_session_measurements, read_table
+from ros_3d_bb.evaluation.noise.analysis import Inputs, analyse
+from ros_3d_bb.evaluation.noise.results import text_of, write_results
+from ros_3d_bb.evaluation.noise.tables import read_session_measurements, read_table
 
 
 def main():
@@ -18,25 +15,11 @@ def main():
         inputs = _inputs(arguments)
         analysis = analyse(inputs)
         folder = pathlib.Path(arguments.out)
-        folder.mkdir(parents=True, exist_ok=True)
         write_results(folder, analysis)
     except (ValueError, OSError) as error:
         sys.exit('./run noise: %s' % error)
-    for name, axis, variances in (('z', analysis.z, analysis.z), ('x', analysis.x, analysis.x_variance)):
-        print('f(%s) = %s, largest variance %.5f m², standard deviation %.4f m'
-              % (name, polynomial_text(axis.poly, name), variances.max_variance_m2, variances.max_sigma_m))
+    print(text_of(analysis))
     print('report: %s' % (folder / 'report.html'))
-
-
-def write_results(folder, analysis):
-    """Write the report with its figures, summary.json and the error models into a folder (pathlib)."""
-    write_figures(folder, analysis, clusters_of(analysis.inputs.z, 'Z'), clusters_of(analysis.inputs.x_variance, 'X'))
-    (folder / 'report.html').write_text(report_of(analysis), encoding='utf-8')
-    (folder / 'summary.json').write_text(json.dumps(summary_of(analysis), indent=1), encoding='utf-8')
-    for name, model in (('error_model_thesis_form.yaml', analysis.thesis_form),
-                        ('error_model.yaml', analysis.model or analysis.thesis_form)):
-        if model is not None:
-            write_error_model(folder / name, model)
 
 
 def _inputs(arguments):

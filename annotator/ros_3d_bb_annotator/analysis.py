@@ -1,0 +1,77 @@
+"""The noise analysis of a session, its figures and error model in a folder beside it. Needs scipy and matplotlib."""
+import os
+import pathlib
+from typing import NamedTuple, Tuple
+
+import numpy as np
+
+from ros_3d_bb.evaluation.noise.analysis import Inputs
+from ros_3d_bb.evaluation.noise.analysis import analyse as analyse_noise
+from ros_3d_bb.evaluation.noise.results import text_of, write_results
+from ros_3d_bb.evaluation.noise.tables import Measurements, TableError, read_session_measurements
+from ros_3d_bb_annotator.document import ESTIMATOR
+from ros_3d_bb_annotator.measurement import ANNOTATED
+
+FOLDER_NAME = 'analysis'
+RECORDED = 'recorded'
+
+
+class Analysed(NamedTuple):
+    """Where the results are, and what they are: `text` has the mean error and the spread of both axes, `no_model` says
+    why there is no cross-validated error model, empty where there is one.
+    """
+
+    folder: str
+    report_path: str
+    figure_paths: Tuple[str, ...]
+    text: str
+    no_model: str
+
+
+def analyse(document, folder=None, estimator=None):
+    """Analyse the errors of a document's annotated measurements, and write report, figures and error model.
+
+    Parameters
+    ----------
+    document : Document
+    folder : str, optional
+        Where to write; `analysis` in the session where not given.
+    estimator : str, optional
+        'foreground', 'median', or 'recorded' for the stored estimates. The default is that of bbox3d_node; of the old
+        form, whose depth is lost, 'recorded'.
+
+    Returns
+    -------
+    Analysed
+
+    Raises
+    ------
+    ValueError
+        If there is too little to analyse, or an image cannot be read.
+    OSError
+        If the results cannot be written.
+    """
+    folder = pathlib.Path(folder or os.path.join(document.folder, FOLDER_NAME))
+    estimator = estimator or (RECORDED if document.is_old_form else ESTIMATOR)
+    if document.is_old_form:
+        measurements = _recorded(document, estimator)
+    else:
+        measurements = read_session_measurements(document.folder, estimator)
+    analysis = analyse_noise(Inputs(measurements, measurements, measurements.whole(), estimator, 'unknown'))
+    write_results(folder, analysis)
+    return Analysed(str(folder), str(folder / 'report.html'), tuple(sorted(map(str, folder.glob('figure_*.png')))),
+                    text_of(analysis), analysis.no_model)
+
+
+def _recorded(document, estimator):
+    """The stored estimates of a document of the old form; nobody knows who is cut by the edge of the image."""
+    if estimator != RECORDED:
+        raise TableError('%s: its depth is lost, so only the recorded estimates can be analysed, not those of %r'
+                         % (document.folder, estimator))
+    used = [measurement for measurement in document.measurements
+            if measurement.state == ANNOTATED and measurement.estimate_m is not None]
+    if not used:
+        raise TableError('%s: no annotated measurement with an estimate' % document.folder)
+    return Measurements(document.folder, np.array([measurement.estimate_m for measurement in used]),
+                        np.array([(measurement.truth_m[0], measurement.truth_m[2]) for measurement in used]),
+                        np.zeros(len(used), bool))

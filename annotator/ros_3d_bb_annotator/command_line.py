@@ -1,0 +1,79 @@
+"""Show the snapshots of a measurement session, take the ground truth, compute the errors; or do that in a script."""
+import argparse
+import sys
+
+from ros_3d_bb_annotator.document import Document
+from ros_3d_bb_annotator.export import export
+from ros_3d_bb_annotator.validation import problems_of
+
+
+def main(arguments=None):
+    """The command `annotator`. Returns the exit status: 1 where something is wrong with the session."""
+    arguments = _arguments(arguments)
+    if not (arguments.export or arguments.analyse or arguments.validate):
+        return _show(arguments.session)
+    try:
+        document = Document.open(arguments.session)
+        for note in document.notes:
+            print('annotator: note: %s' % note, file=sys.stderr)
+        if arguments.export:
+            print('%s: %d measurements' % (arguments.export, export(document, arguments.export)))
+        elif arguments.analyse:
+            _analyse(document, arguments)
+        else:
+            return _validate(document)
+    except (ValueError, OSError) as error:
+        print('annotator: %s' % error, file=sys.stderr)
+        return 1
+    return 0
+
+
+def _show(folder):
+    try:
+        from ros_3d_bb_annotator.application import run_window  # scripts need no Qt
+    except ImportError as error:
+        print('annotator: the window cannot be opened (%s); install PyQt5, or see annotator --help for what works '
+              'without it' % error, file=sys.stderr)
+        return 1
+    return run_window(folder)
+
+
+def _analyse(document, arguments):
+    from ros_3d_bb_annotator.analysis import analyse  # imports scipy and matplotlib
+    analysed = analyse(document, arguments.out, arguments.estimator)
+    print(analysed.text)
+    if analysed.no_model:
+        print('annotator: note: no cross-validated error model: %s' % analysed.no_model, file=sys.stderr)
+    print('report: %s' % analysed.report_path)
+
+
+def _validate(document):
+    count = 0
+    for problem in problems_of(document):
+        print(problem)
+        count += 1
+    done, total = document.progress
+    print('%s: %d measurements, %d annotated or rejected, %s'
+          % (document.folder, total, done, '%d problems' % count if count else 'nothing wrong'))
+    return 1 if count else 0
+
+
+def _arguments(arguments):
+    parser = argparse.ArgumentParser(prog='annotator', description=__doc__)
+    parser.add_argument('session', nargs='?', metavar='SESSION', help="folder of a measurement session, also of the "
+                        "thesis' old form")
+    actions = parser.add_mutually_exclusive_group()
+    actions.add_argument('--export', metavar='FILE.csv', help="write the annotated measurements as a table of the "
+                         "thesis' form, millimetres")
+    actions.add_argument('--analyse', action='store_true', help='noise analysis: report, figures and error model')
+    actions.add_argument('--validate', action='store_true', help='list what is wrong with the session; exit with 1 if '
+                         'anything is')
+    parser.add_argument('--out', metavar='DIR', help='where --analyse writes (default: SESSION/analysis)')
+    parser.add_argument('--estimator', choices=('foreground', 'median', 'recorded'), help='what --analyse takes: '
+                        'estimates made anew, or those stored (default: foreground; of the old form recorded)')
+    parsed = parser.parse_args(arguments)
+    if (parsed.export or parsed.analyse or parsed.validate) and not parsed.session:
+        parser.error('a SESSION expected')
+    if (parsed.out or parsed.estimator) and not parsed.analyse:
+        parser.error('--out and --estimator are for --analyse')
+    return parsed

@@ -1,0 +1,77 @@
+"""Whether a session is sound: every image readable, every box inside, every estimate and truth plausible."""
+import collections
+
+from ros_3d_bb.measurements import SessionError
+from ros_3d_bb_annotator.measurement import ANNOTATED, REJECTED
+
+FARTHEST_OFF_M = 1.0  # an estimate farther off the truth is of somebody else, or the truth of another place
+HALF_PERSON_M = 0.5  # the image border may cut the person whose axis is just outside it
+
+
+def problems_of(document):
+    """Yield what is wrong with a document, a line of text each; rejected measurements are not looked at."""
+    counts = collections.Counter(measurement.id for measurement in document.measurements)
+    for name in sorted(name for name, count in counts.items() if count > 1):
+        yield '%s: %d measurements have this id' % (name, counts[name])
+    for index, measurement in enumerate(document.measurements):
+        if measurement.state != REJECTED:
+            for problem in _problems_at(document, index):
+                yield '%s: %s' % (measurement.id or 'measurement number %d' % (index + 1), problem)
+
+
+def _problems_at(document, index):
+    measurement = document.measurements[index]
+    if measurement.problem is not None:
+        return [measurement.problem]
+    try:
+        document.color(index)
+        if document.is_old_form:
+            document.stretched_depth(index)
+            return _truth_problems(document, index)
+        document.depth(index)
+    except SessionError as error:
+        return [str(error)]
+    boxes = _box_problems(document, index)
+    return boxes or _estimate_problems(document, index) + _truth_problems(document, index)
+
+
+def _box_problems(document, index):
+    return ['box (%d, %d, %d, %d) is not inside the image of %d x %d pixels'
+            % (detection.box_px + (document.camera.width, document.camera.height))
+            for detection in document.measurements[index].detections if detection.box_px is not None
+            and not _is_inside(detection.box_px, document.camera)]
+
+
+def _is_inside(box_px, camera):
+    x1, y1, x2, y2 = box_px
+    return 0 <= x1 < x2 <= camera.width and 0 <= y1 < y2 <= camera.height
+
+
+def _estimate_problems(document, index):
+    """Whether the person's estimate can be made again from the images."""
+    measurement = document.measurements[index]
+    box_px = None if measurement.person is None else measurement.detections[measurement.person].box_px
+    if box_px is None:
+        return ['nobody is detected in it, and no box drawn'] if measurement.state == ANNOTATED else []
+    if document.estimated(index, box_px) is None:
+        return ['no estimate can be made of box (%d, %d, %d, %d): too little depth' % box_px]
+    return []
+
+
+def _truth_problems(document, index):
+    """Whether the truth is a place that the camera sees, and not far off the estimate."""
+    truth_m, errors_m, problems = document.measurements[index].truth_m, document.errors(index), []
+    if truth_m is None:
+        return problems
+    x_m, _y_m, z_m = truth_m
+    if not z_m > 0:
+        return ['truth z is %g m; more than 0 expected' % z_m]
+    if document.camera is not None:
+        left_m, right_m = document.camera.deproject([(0, document.camera.cy), (document.camera.width,
+                                                                               document.camera.cy)], z_m)[:, 0]
+        if not left_m - HALF_PERSON_M <= x_m <= right_m + HALF_PERSON_M:
+            problems.append('truth x is %g m, outside the image, which shows %.2f to %.2f m at %g m'
+                            % (x_m, left_m, right_m, z_m))
+    if errors_m is not None and errors_m[2] > FARTHEST_OFF_M:
+        problems.append('truth and estimate are %.2f m apart' % errors_m[2])
+    return problems
