@@ -68,9 +68,11 @@ class Document(object):
         """Take in what other programs wrote. Returns whether there was anything. Raises SessionError."""
         if self._signature == _signature(self.folder):
             return False
+        signature = _signature(self.folder)  # before it is read: what is written meanwhile is seen next time
         content = read_description(self.folder)
         with refusing(os.path.join(self.folder, FILE_NAME)):
             self._take(content)
+        self._signature = signature
         return True
 
     def color(self, index):
@@ -261,6 +263,7 @@ class Document(object):
         except ValueError as error:
             raise SessionError('%s: cannot be saved (%s)' % (self.folder, error))
         self._take(content)
+        self._signature = None  # another program may write before anybody looks
         return inverse
 
     def _take(self, content):
@@ -270,7 +273,7 @@ class Document(object):
         self.measurements = tuple(
             self.measurements[index] if index < len(old) and old[index] == entry
             else measurement_of(self.folder, entry, files) for index, entry in enumerate(frames))
-        self.grid, self._content, self._signature = grid_of(content), content, _signature(self.folder)
+        self.grid, self._content = grid_of(content), content
 
 
 def _signature(folder):

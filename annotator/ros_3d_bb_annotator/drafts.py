@@ -1,4 +1,5 @@
 """What was typed but not yet entered, kept in a file beside the session, so that a crash does not lose it."""
+import contextlib
 import json
 import os
 
@@ -31,7 +32,8 @@ class Drafts(object):
         if self._fields:
             write_whole(self._path, json.dumps(self._fields).encode())
         else:
-            os.remove(self._path)
+            with contextlib.suppress(FileNotFoundError):
+                os.remove(self._path)
 
 
 def _read(path):

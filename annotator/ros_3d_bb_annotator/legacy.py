@@ -22,7 +22,7 @@ NOTES = (
     'The camera (focal lengths, principal point, distortion) is not stored, and cannot be recovered.',
     'The 2D boxes are not stored; only the positions that were computed from them are.')
 EXPECTED = 'positions and a time such as [(-7, 3, 300)];30-03-2021-11-49-54 expected; nothing in the file is run'
-NUMBER = r'-?\d{1,7}'
+NUMBER = r'-?[0-9]{1,7}'
 POSITION = r'\({0}, ?{0}, ?{0}\)'.format(NUMBER)
 LINE = re.compile(r'\[((?:{0}(?:, ?{0})*)?)\][ ;] ?([\w-]{{1,60}})$'.format(POSITION))
 

@@ -21,11 +21,11 @@ def parse_length(text, unit):
     ValueError
         If it is no length, could be meant in two ways, or is farther than any depth camera sees.
     """
-    match = re.match(r'\s*([+\-\u2212]?)(\d+(?:[.,]\d*)?|[.,]\d+)\s*(mm|cm|m)?\s*$', text)
+    match = re.match(r'\s*([+\-\u2212]?)(\d+(?:[.,]\d*)?|[.,]\d+)\s*(mm|cm|m)?\s*$', text, re.ASCII)
     if match is None:
         raise ValueError('%.40r is not a length; one such as 1230, 1230 mm or 1.23 m expected' % text)
     sign, number, unit = match.group(1), match.group(2), match.group(3) or unit
-    if unit == 'mm' and re.match(r'[1-9]\d{0,2},\d{3}$', number):
+    if unit == 'mm' and re.match(r'[1-9]\d{0,2},[0-9]{3}$', number):
         raise ValueError('%.40r could be %s mm or %s mm; write it without the comma'
                          % (text, number.replace(',', ''), number.replace(',', '.')))
     metres = float(number.replace(',', '.')) * METRES[unit]

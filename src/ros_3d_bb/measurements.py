@@ -208,7 +208,7 @@ def _detection_from(entry):
 
 def _stamp_ns_from(text):
     """Nanoseconds of '<secs>.<nsecs, 9 digits>'. Raises ValueError."""
-    match = re.match(r'(\d{1,12})\.(\d{9})$', str(text))
+    match = re.match(r'([0-9]{1,12})\.([0-9]{9})$', str(text))
     if match is None:
         raise ValueError('stamp is %.40r; seconds, a point and nine digits of nanoseconds expected' % (text,))
     return int(match.group(1)) * 10 ** 9 + int(match.group(2))

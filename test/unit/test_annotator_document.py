@@ -1,0 +1,263 @@
+"""Annotating a session: every edit is saved at once, can be undone, and leaves alone what other programs write."""
+import json
+import os
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ros_3d_bb.measurements import SessionError, read_session
+from ros_3d_bb.session_file import changing
+from ros_3d_bb_annotator.document import Document
+from ros_3d_bb_annotator.measurement import Mark
+from support.small_session import (FAR_BOX, FAR_MM, NEAR_BOX, NEAR_MM, change_json, read_json, write_measurement,
+                                   write_small_session)
+from support.synthetic_session import write_synthetic_session
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return write_small_session(str(tmp_path))
+
+
+@pytest.fixture
+def document(folder):
+    return Document.open(folder)
+
+
+def states(document):
+    return [measurement.state for measurement in document.measurements]
+
+
+def test_a_new_session_is_shown_as_it_is(document):
+    first = document.measurements[0]
+    assert states(document) == ['new'] * 4 and document.progress == (0, 4) and document.notes == ()
+    assert (first.id, first.stamp_text, first.label, first.person) == ('m0', '1616161616.000000005', 'by the door', 0)
+    assert [detection.box_px for detection in first.detections] == [NEAR_BOX, FAR_BOX]
+    assert first.detections[0].size_m.tolist() == [0.533, 1.4] and first.detections[0].support == 0.9
+    assert first.detections[0].truncated is False and first.detections[1].truncated is None
+    assert document.grid == (Mark('A1', -0.5, 2.0),) and document.camera.width == 64
+    assert document.color(0)[20, 20].tolist() == [200, 30, 30]
+    assert document.depth(0).values[20, 20] == NEAR_MM and document.depth_scale_m == 0.001
+
+
+def test_errors_are_estimate_minus_truth(document):
+    assert document.errors(0) is None
+    document.set_truth(0, -0.5, 2.1)
+    assert document.errors(0) == pytest.approx((0.0335, -0.1, np.hypot(0.0335, 0.1)))
+    document.choose_person(0, 1)
+    assert document.errors(0)[:2] == pytest.approx((1.2, 0.9))
+
+
+def test_truth_is_in_the_file_at_once_and_read_by_the_benchmarks(document, folder):
+    document.set_truth(1, 0.1, 2.3)
+    document.set_truth(2, 0.1, 2.3, -0.05)
+    document.choose_person(2, 1)
+    entries = read_json(folder)['frames']
+    assert entries[1]['truth_mm'] == {'x': 100, 'z': 2300} and entries[2]['truth_mm'] == {'x': 100, 'z': 2300, 'y': -50}
+    frames = read_session(folder).frames
+    assert frames[1].truth_m.tolist() == [0.1, 2.3] and frames[1].truth_y_m is None and frames[2].truth_y_m == -0.05
+    assert frames[2].boxes_px == (FAR_BOX, NEAR_BOX) and frames[2].estimate_m.tolist() == [0.7, 0.1, 3.0]
+    assert frames[0].stamp_ns == 1616161616000000005 and frames[0].label == 'by the door'
+    assert Document.open(folder).measurements[2].truth_m == (0.1, -0.05, 2.3)
+
+
+@pytest.mark.parametrize('x_m,z_m,y_m', [(0, 0, None), (0, -1, None), (float('nan'), 1, None), (101, 1, None),
+                                         (0, float('inf'), None), (0, 1, 1e3)])
+def test_what_is_no_place_in_front_of_the_camera_is_no_truth(document, folder, x_m, z_m, y_m):
+    before = read_json(folder)
+    with pytest.raises(ValueError, match='truth'):
+        document.set_truth(0, x_m, z_m, y_m)
+    assert read_json(folder) == before and not document.can_undo
+
+
+def test_the_same_as_the_one_annotated_last(document):
+    with pytest.raises(ValueError, match='nothing is annotated yet'):
+        document.set_same_as_last(0)
+    document.set_truth(2, 0.1, 2.3, 0.4)
+    document.set_truth(1, 0.2, 2.5)
+    document.set_same_as_last(3)
+    assert document.measurements[3].truth_m == (0.2, None, 2.5)
+    reopened = Document.open(document.folder)  # knows no order: the nearest one before
+    reopened.reject(3, 'blurred')
+    reopened.set_same_as_last(3)
+    assert reopened.measurements[3].truth_m == (0.1, 0.4, 2.3) and reopened.measurements[3].state == 'annotated'
+
+
+def test_rejected_measurements_are_left_out_and_come_back(document, folder):
+    document.set_truth(0, 0.1, 2.0)
+    document.reject(0, ' arm in front ')
+    assert document.measurements[0].rejected == 'arm in front' and states(document)[0] == 'rejected'
+    assert document.progress == (1, 4) and [frame.id for frame in read_session(folder).frames] == ['m1', 'm2', 'm3']
+    document.restore(0)
+    assert states(document)[0] == 'annotated' and len(read_session(folder).frames) == 4
+    with pytest.raises(ValueError, match='reason'):
+        document.reject(0, '  ')
+
+
+def test_a_box_drawn_by_hand_is_estimated_and_chosen(document, folder):
+    change_json(folder, lambda content: content['frames'][0]['detections'].pop(0))
+    document.refresh()
+    box = document.add_box(0, NEAR_BOX)
+    drawn = document.measurements[0].detections[-1]
+    assert document.measurements[0].person == 1 and drawn.by_hand and drawn.box_px == NEAR_BOX
+    assert box.center_m[2] == pytest.approx(NEAR_MM / 1000.0 + 0.09)  # the axis is behind the surface
+    assert np.abs(drawn.estimate_m - box.center_m).max() < 1e-5
+    assert drawn.support == pytest.approx(box.support, abs=1e-3) and drawn.truncated is False
+    assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
+
+
+def test_a_box_drawn_by_hand_replaces_a_bad_one_of_the_same_person(document, folder):
+    change_json(folder, lambda content: content['frames'][0]['detections'][0].update(box=[10, 4, 26, 30]))
+    document.refresh()
+    assert document.add_box(0, (-5, 4, 26, 44)) is not None
+    assert document.measurements[0].detections[-1].box_px == (0, 4, 26, 44)
+    assert document.add_box(0, NEAR_BOX).center_m[2] == pytest.approx(2.09)
+    assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
+
+
+def test_a_box_without_depth_is_added_without_estimate(document):
+    cv2.imwrite(document.measurements[0].depth_path, np.zeros((48, 64), np.uint16))
+    assert document.add_box(0, (1, 1, 9, 9)) is None
+    assert document.measurements[0].estimate_m is None and document.measurements[0].person == 2
+
+
+@pytest.mark.parametrize('box_px', [(5, 5, 5, 9), (9, 5, 5, 9), (70, 5, 90, 9), (-9, 5, 0, 9)])
+def test_a_box_without_pixels_is_refused(document, box_px):
+    with pytest.raises(ValueError, match='empty or reversed'):
+        document.add_box(0, box_px)
+    assert not document.can_undo
+
+
+def test_a_box_in_a_session_of_one_box_a_frame(tmp_path):
+    folder = write_synthetic_session(str(tmp_path))
+    before = read_json(folder)
+    document = Document.open(folder)
+    recorded_m = document.measurements[0].estimate_m
+    document.add_box(0, (200, 100, 330, 400))
+    assert len(document.measurements[0].detections) == 2
+    assert document.measurements[0].detections[0].estimate_m.tolist() == recorded_m.tolist()
+    assert set(read_json(folder)['frames'][0]) == {'id', 'color', 'depth', 'truth_mm', 'detections', 'person'}
+    assert document.undo() == 0 and read_json(folder) == before
+
+
+def test_who_is_not_there_cannot_be_chosen(document):
+    for number in (-1, 2):
+        with pytest.raises(ValueError, match='detection %d of 2' % number):
+            document.choose_person(0, number)
+
+
+def test_undo_and_redo_go_through_all_edits(document, folder):
+    def content():
+        return json.dumps(read_json(folder), sort_keys=True)
+    edits = [lambda: document.set_truth(0, 0.1, 2.0), lambda: document.set_same_as_last(1),
+             lambda: document.reject(1, 'blurred'), lambda: document.choose_person(2, 1),
+             lambda: document.add_box(2, (1, 1, 30, 40)), lambda: document.set_grid([Mark('B2', 0.5, 2.5)]),
+             lambda: document.restore(1), lambda: document.set_truth(0, 0.2, 2.1, 0.3)]
+    contents = [content()]
+    for edit in edits:
+        edit()
+        contents.append(content())
+    assert document.grid == (Mark('B2', 0.5, 2.5),)
+    indices = []
+    for expected in contents[-2::-1]:
+        indices.append(document.undo())
+        assert content() == expected
+    assert indices == [0, 1, None, 2, 2, 1, 1, 0] and not document.can_undo and document.undo() is None
+    for expected in contents[1:]:
+        document.redo()
+        assert content() == expected
+    assert not document.can_redo and document.redo() is None
+    document.undo()
+    document.restore(0)
+    assert not document.can_redo
+
+
+@settings(max_examples=25)
+@given(st.lists(st.tuples(st.sampled_from(['truth', 'reject', 'restore', 'person', 'undo', 'redo']),
+                          st.integers(0, 3), st.integers(0, 1)), max_size=12))
+def test_after_any_edits_the_file_is_what_is_shown_and_undo_leads_back(tmp_path_factory, edits):
+    folder = write_small_session(str(tmp_path_factory.mktemp('session')))
+    start, document = read_json(folder), Document.open(folder)
+    for kind, index, number in edits:
+        if kind in ('undo', 'redo'):
+            getattr(document, kind)()
+        else:
+            {'truth': lambda: document.set_truth(index, number, 1 + number), 'reject': lambda: document.reject(
+                index, 'no'), 'restore': lambda: document.restore(index),
+             'person': lambda: document.choose_person(index, number)}[kind]()
+    shown, saved = document.measurements, Document.open(folder).measurements
+    assert [(m.truth_m, m.person, m.rejected) for m in shown] == [(m.truth_m, m.person, m.rejected) for m in saved]
+    while document.can_undo:
+        document.undo()
+    assert read_json(folder) == start
+
+
+def test_measurements_that_a_viewer_adds_meanwhile_are_kept_and_shown(document, folder):
+    with changing(folder) as content:
+        content['frames'].append(write_measurement(folder, 'new'))
+    assert len(document.measurements) == 4
+    document.set_truth(0, 0.1, 2.0)
+    assert [entry['id'] for entry in read_json(folder)['frames']] == ['m0', 'm1', 'm2', 'm3', 'new']
+    assert document.measurements[4].id == 'new' and document.progress == (1, 5)
+    with changing(folder) as content:
+        content['frames'].append(write_measurement(folder, 'newer'))
+    assert document.refresh() and document.measurements[5].id == 'newer' and not document.refresh()
+    document.undo()
+    assert len(read_json(folder)['frames']) == 6 and 'truth_mm' not in read_json(folder)['frames'][0]
+
+
+def test_two_annotators_keep_each_others_fields(document, folder):
+    other = Document.open(folder)
+    document.set_truth(0, 0.1, 2.0)
+    other.choose_person(0, 1)
+    other.set_truth(1, 0.3, 2.2)
+    assert read_json(folder)['frames'][0]['truth_mm'] == {'x': 100, 'z': 2000}
+    assert document.refresh() and document.measurements[0].person == 1 and states(document)[1] == 'annotated'
+    document.undo()
+    assert read_json(folder)['frames'][0]['person'] == 1
+
+
+def test_a_measurement_that_moved_is_found_by_its_id_and_one_that_is_gone_named(document, folder):
+    with changing(folder) as content:
+        content['frames'].reverse()
+    document.set_truth(0, 0.1, 2.0)
+    assert [entry['id'] for entry in read_json(folder)['frames'] if 'truth_mm' in entry] == ['m0']
+    document = Document.open(folder)
+    change_json(folder, lambda content: content['frames'].pop(0))
+    with pytest.raises(SessionError, match='m3 is no longer in the session'):
+        document.reject(0, 'gone')
+
+
+def test_an_edit_that_cannot_be_saved_says_so_and_changes_nothing(document, folder):
+    with open(os.path.join(folder, 'frames.json'), 'w') as stream:
+        stream.write('{"frames"')
+    for edit in (lambda: document.set_truth(0, 0.1, 2.0), document.refresh):
+        with pytest.raises(SessionError, match='frames.json|cannot be saved'):
+            edit()
+    assert states(document) == ['new'] * 4 and not document.can_undo
+    os.rename(folder, folder + '-gone')
+    with pytest.raises(SessionError, match='cannot be saved'):
+        document.set_truth(0, 0.1, 2.0)
+    with pytest.raises(SessionError, match='cannot be kept'):
+        document.set_draft(0, {'x': '1'})
+
+
+def test_what_is_typed_comes_back_until_it_is_entered(document, folder):
+    path = os.path.join(folder, '.annotator_draft.json')
+    document.set_draft(1, {'x': '12', 'z': ''})
+    document.set_draft(2, {'reason': 'blu'})
+    reopened = Document.open(folder)
+    assert reopened.draft(1) == {'x': '12'} and reopened.draft(2) == {'reason': 'blu'} and reopened.draft(0) == {}
+    reopened.set_truth(1, 0.12, 2.0)
+    assert reopened.draft(1) == {} and os.path.exists(path)
+    reopened.reject(2, 'blurred')
+    assert not os.path.exists(path)
+    reopened.set_draft(1, {'x': '3'})
+    os.remove(path)
+    reopened.set_draft(1, {})
+    with open(path, 'w') as stream:
+        stream.write('[1')
+    assert Document.open(folder).draft(1) == {}
