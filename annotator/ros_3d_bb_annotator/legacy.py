@@ -9,9 +9,7 @@ images. Nothing in the file is run: lines are matched against that form.
 import os
 import re
 
-import cv2
-
-from ros_3d_bb.measurements import SessionError
+from ros_3d_bb.measurements import SessionError, read_image
 from ros_3d_bb.session_file import FILE_NAME
 
 FORM = 'thesis'
@@ -56,9 +54,7 @@ def read(folder):
 
 def read_stretched(path):
     """A stretched depth image, (height, width), uint8 or uint16. Raises SessionError."""
-    image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise SessionError('%s: missing, or not an image' % path)
+    image = read_image(path)
     return image if image.ndim == 2 else image[..., 0]
 
 

@@ -153,8 +153,8 @@ def frame_of(folder, entry):
 
 
 def read_color(frame, camera):
-    """The colour image of a frame, (height, width, 3), uint8, RGB. Raises SessionError."""
-    image = _read_image(frame.color_path, camera)
+    """The colour image of a frame, (height, width, 3), uint8, RGB; of any size without camera. Raises SessionError."""
+    image = read_image(frame.color_path, camera)
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
         raise SessionError('%s: an 8-bit colour image was expected' % frame.color_path)
     return image[..., ::-1]
@@ -162,21 +162,22 @@ def read_color(frame, camera):
 
 def read_depth(frame, session):
     """The depth image of a frame. Raises SessionError."""
-    image = _read_image(frame.depth_path, session.camera)
+    image = read_image(frame.depth_path, session.camera)
     if image.dtype != np.uint16 or image.ndim != 2:
         raise SessionError('%s: a 16-bit depth image with one channel was expected; depth stored with 8 bits has lost '
                            'its scale' % frame.depth_path)
     return DepthImage(image, session.depth_scale_m)
 
 
-def _read_image(path, camera):
+def read_image(path, camera=None):
+    """Any image as it is stored, (height, width, ...). Raises SessionError, also where it has not the camera's size."""
     try:
         image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
     except cv2.error:  # more pixels than OpenCV reads
         image = None
     if image is None:
         raise SessionError('%s: missing, or not an image' % path)
-    if image.shape[:2] != (camera.height, camera.width):
+    if camera is not None and image.shape[:2] != (camera.height, camera.width):
         raise SessionError('%s: %d x %d pixels, where the camera has %d x %d'
                            % (path, image.shape[1], image.shape[0], camera.width, camera.height))
     return image

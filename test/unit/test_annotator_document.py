@@ -12,7 +12,7 @@ from ros_3d_bb.measurements import SessionError, read_session
 from ros_3d_bb.session_file import changing
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.measurement import Mark
-from support.small_session import (FAR_BOX, FAR_MM, NEAR_BOX, NEAR_MM, change_json, read_json, write_measurement,
+from support.small_session import (FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json, write_measurement,
                                    write_small_session)
 from support.synthetic_session import write_synthetic_session
 

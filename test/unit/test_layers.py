@@ -6,18 +6,30 @@ import pytest
 
 from support.standard_library import STANDARD_LIBRARY
 
-SOURCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'src', 'ros_3d_bb')
-MODULES = sorted(os.path.relpath(os.path.join(folder, name), SOURCE)
-                 for folder, _folders, names in os.walk(SOURCE) for name in names if name.endswith('.py'))
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+SOURCE, ANNOTATOR = os.path.join(ROOT, 'src', 'ros_3d_bb'), os.path.join(ROOT, 'annotator', 'ros_3d_bb_annotator')
+
+
+def modules_in(root):
+    return sorted(os.path.relpath(os.path.join(folder, name), root)
+                  for folder, _folders, names in os.walk(root) for name in names if name.endswith('.py'))
+
+
+MODULES = modules_in(SOURCE)
 PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime', 'yaml', 'matplotlib', 'scipy'}
 NOISE = os.path.join('evaluation', 'noise')  # a desk tool: no node may come to need its libraries
 # convert to and from ROS messages, but run in no node
 ROS_TYPES = {'bags.py', 'camera_messages.py', 'markers.py', 'messages.py', 'report.py', 'simulator_messages.py'}
 
+# what a session is, without the windows that show it
+WITHOUT_WINDOW = {'__init__.py', 'analysis.py', 'command_line.py', 'document.py', 'drafts.py', 'entries.py', 'export.py',
+                  'legacy.py', 'lengths.py', 'measurement.py', 'validation.py'}
+QT = {'PyQt5', 'python_qt_binding'}
 
-def imports_of(module):
+
+def imports_of(module, root=SOURCE):
     """Top-level names of other packages, and dotted names of ours, that a module imports."""
-    with open(os.path.join(SOURCE, module)) as stream:
+    with open(os.path.join(root, module)) as stream:
         tree = ast.parse(stream.read())
     names = [name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names]
     names += [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
@@ -50,3 +62,24 @@ def test_nodes_know_no_mathematics_and_not_each_other(module):
     others, ours = imports_of(module)
     assert not others & {'numpy', 'math', 'cv2', 'torch'}
     assert not any(name.endswith('_node') for name in ours)
+
+
+@pytest.mark.parametrize('module', modules_in(ANNOTATOR))
+def test_the_annotator_knows_no_ros_and_only_its_windows_qt(module):
+    others, ours = imports_of(module, ANNOTATOR)
+    allowed = STANDARD_LIBRARY | {'numpy', 'cv2', 'ros_3d_bb_annotator'}
+    assert others <= allowed | (set() if module in WITHOUT_WINDOW else QT)
+    assert not any(name.startswith(('ros_3d_bb.nodes', 'ros_3d_bb.msg', 'ros_3d_bb.messages')) for name in ours)
+    noise = any(name.startswith('ros_3d_bb.evaluation.noise') for name in ours)
+    assert not noise or module == 'analysis.py'  # it takes a second to import
+
+
+def test_the_modules_without_windows_are_there():
+    assert WITHOUT_WINDOW <= set(modules_in(ANNOTATOR))
+
+
+@pytest.mark.parametrize('module', sorted(WITHOUT_WINDOW - {'command_line.py'}))
+def test_modules_without_windows_import_none_with(module):
+    _others, ours = imports_of(module, ANNOTATOR)
+    own = set(name.split('.')[1] + '.py' for name in ours if name.startswith('ros_3d_bb_annotator.'))
+    assert own <= WITHOUT_WINDOW

@@ -1,0 +1,105 @@
+"""The annotator in scripts: export, analysis and validation without a window, without Qt, in a plain clone."""
+import json
+import os
+import subprocess
+import sys
+
+import cv2
+import numpy as np
+import pytest
+
+from ros_3d_bb.error_model import read_error_model
+from ros_3d_bb_annotator.command_line import main
+from support.old_session import write_old_session
+from support.small_session import change_json, write_small_session
+from support.synthetic_session import write_synthetic_session
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A session with truth, 0.1 m off the estimates."""
+    write_small_session(str(tmp_path))
+    change_json(str(tmp_path), lambda content: [entry.update(truth_mm={'x': -466.5, 'z': 2100})
+                                                for entry in content['frames']])
+    return str(tmp_path)
+
+
+def test_export(folder, capsys):
+    path = os.path.join(folder, 'table.csv')
+    assert main(['--export', path, folder]) == 0 and os.path.exists(path)
+    assert capsys.readouterr().out == '%s: 4 measurements\n' % path
+
+
+def test_analysis_beside_the_session_and_elsewhere(tmp_path, capsys):
+    session = write_synthetic_session(str(tmp_path / 'session'))
+    assert main(['--analyse', session]) == 0
+    assert main(['--analyse', session, '--out', str(tmp_path / 'out'), '--estimator', 'recorded']) == 0
+    text = capsys.readouterr().out
+    assert 'f(z) = ' in text and 'report: %s' % os.path.join(session, 'analysis', 'report.html') in text
+    for folder, estimator in ((os.path.join(session, 'analysis'), 'foreground'), (str(tmp_path / 'out'), 'recorded')):
+        names = os.listdir(folder)
+        assert {'report.html', 'summary.json', 'error_model.yaml', 'figure_5_3.png'} <= set(names)
+        with open(os.path.join(folder, 'summary.json')) as stream:
+            assert len(json.load(stream)['z']['clusters']) == 6
+        assert read_error_model(os.path.join(folder, 'error_model.yaml')).provenance.estimator == estimator
+
+
+def test_a_sound_session_is_valid(session_folder, capsys):
+    assert main(['--validate', session_folder]) == 0
+    assert 'nothing wrong' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('break_it,problem', [
+    (lambda entry: entry['detections'][0].update(box=[10, 4, 26, 49]), 'box (10, 4, 26, 49) is not inside the image'),
+    (lambda entry: entry['detections'][1].update(box=[26, 4, 10, 44]), 'is not inside the image'),
+    (lambda entry: entry.update(truth_mm={'x': -466.5, 'z': 3600}), 'apart'),
+    (lambda entry: entry.update(truth_mm={'x': 2000, 'z': 2000}), 'outside the image'),
+    (lambda entry: entry.update(truth_mm={'x': 0, 'z': -2000}), 'truth z is -2 m'),
+    (lambda entry: entry.update(detections=[]), 'nobody is detected')])
+def test_what_is_wrong_is_listed(folder, capsys, break_it, problem):
+    change_json(folder, lambda content: break_it(content['frames'][1]))
+    assert main(['--validate', folder]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith('m1: ') and problem in '\n'.join(lines) and lines[-1].endswith(' problems')
+
+
+def test_an_estimate_that_cannot_be_made_again_is_listed(folder, capsys):
+    cv2.imwrite(os.path.join(folder, 'depth', 'm1.png'), np.zeros((48, 64), np.uint16))
+    assert main(['--validate', folder]) == 1
+    assert 'no estimate can be made' in capsys.readouterr().out
+
+
+def test_notes_on_the_old_form_and_errors_go_to_the_screen(tmp_path, capsys):
+    old = write_old_session(str(tmp_path / 'old'))
+    assert main(['--validate', old]) == 0
+    assert 'cannot be recovered' in capsys.readouterr().err
+    for action in (['--validate'], ['--analyse'], ['--export', str(tmp_path / 'table.csv')]):
+        assert main(action + [str(tmp_path)]) == 1
+        assert 'not a measurement session' in capsys.readouterr().err
+    assert main(['--analyse', old]) == 1
+    assert 'no annotated measurement' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('arguments', [['--validate'], ['--export', 'a.csv'], ['--analyse', '--validate', 'x'],
+                                       ['--out', 'x', 'y'], ['--analyse', 'x', '--estimator', 'mean']])
+def test_arguments_that_do_not_fit_are_refused(arguments, capsys):
+    with pytest.raises(SystemExit) as error:
+        main(arguments)
+    assert error.value.code == 2 and 'usage: annotator' in capsys.readouterr().err
+
+
+def test_a_plain_clone_without_ros_and_qt_runs_it(folder, tmp_path):
+    # modules that cannot be imported stand for those that are not installed
+    (tmp_path / 'sitecustomize.py').write_text(
+        'import sys\nfor name in ("rospy", "PyQt5", "python_qt_binding", "catkin_pkg", "torch"):\n'
+        '    sys.modules[name] = None\n')
+    environment = {'PATH': os.environ['PATH'], 'PYTHONPATH': str(tmp_path), 'OMP_NUM_THREADS': '1'}
+    command = [sys.executable, os.path.join(ROOT, 'annotator', 'annotator')]
+    result = subprocess.run(command + ['--validate', folder], env=environment, cwd='/', stdout=subprocess.PIPE,
+                            stderr=subprocess.STDOUT, universal_newlines=True)
+    assert result.returncode == 0 and 'nothing wrong' in result.stdout, result.stdout
+    result = subprocess.run(command + [folder], env=environment, cwd='/', stdout=subprocess.PIPE,
+                            stderr=subprocess.PIPE, universal_newlines=True)
+    assert result.returncode == 1 and 'the window cannot be opened' in result.stderr and result.stdout == ''

@@ -1,0 +1,119 @@
+"""The thesis' own old form: it opens, says what is lost, takes ground truth, and nothing in it is run."""
+import os
+
+import numpy as np
+import pytest
+
+from ros_3d_bb.measurements import SessionError, read_session
+from ros_3d_bb_annotator.analysis import analyse
+from ros_3d_bb_annotator.document import Document
+from ros_3d_bb_annotator.export import rows_of
+from ros_3d_bb_annotator.validation import problems_of
+from support.old_session import FIRST_CAMPAIGN_LINES, LINES, write_old_session
+from support.small_session import read_json
+
+
+def test_positions_times_and_images_are_read(tmp_path):
+    document = Document.open(write_old_session(str(tmp_path)))
+    assert document.is_old_form and document.progress == (0, 5) and document.camera is None
+    assert [measurement.id for measurement in document.measurements] == [
+        '30-03-2021-11-49-54', '30-03-2021-11-49-56', '30-03-2021-11-53-28', '30-03-2021-11-53-28-2',
+        '30-03-2021-11-53-29']
+    second = document.measurements[1]
+    assert [detection.estimate_m.tolist() for detection in second.detections] == [[2.971, 0.535, 6.102],
+                                                                                  [-0.007, 0.002, 0.3]]
+    assert document.measurements[4].detections == () and document.measurements[4].person is None
+    assert document.color(0)[0, 0].tolist() == [100] * 3 and all(m.problem is None for m in document.measurements)
+    assert document.measurements[2].color_path == document.measurements[3].color_path
+    assert list(problems_of(document)) == []
+
+
+def test_the_first_campaign_has_no_semicolon_and_no_raw_images(tmp_path):
+    document = Document.open(write_old_session(str(tmp_path), FIRST_CAMPAIGN_LINES, ('color', 'depth')))
+    assert [len(measurement.detections) for measurement in document.measurements] == [2, 1]
+    assert document.color(0)[0, 0].tolist() == [200] * 3
+
+
+def test_it_says_what_is_lost_and_estimates_nothing(tmp_path):
+    document = Document.open(write_old_session(str(tmp_path)))
+    text = ' '.join(document.notes)
+    assert 'stretched' in text and 'distances cannot be recovered' in text and 'focal lengths' in text
+    for use in (document.depth, lambda index: document.estimated(index, (1, 1, 9, 9)),
+                lambda index: document.add_box(index, (1, 1, 9, 9))):
+        with pytest.raises(SessionError, match='cannot be recovered'):
+            use(0)
+
+
+@pytest.mark.parametrize('bits,kind', [(8, np.uint8), (16, np.uint16)])
+def test_stretched_depth_can_be_looked_at(tmp_path, bits, kind):
+    picture = Document.open(write_old_session(str(tmp_path), bits=bits)).stretched_depth(0)
+    assert picture.dtype == kind and picture.shape == (48, 64) and picture.max() == 2 ** bits - 1
+
+
+def test_truth_is_kept_beside_it_and_the_text_as_it_was(tmp_path):
+    document = Document.open(write_old_session(str(tmp_path)))
+    document.choose_person(1, 1)
+    document.set_truth(1, 0.0, 0.3)
+    document.reject(0, 'blurred')
+    assert (tmp_path / 'measurements.txt').read_text() == '\n'.join(LINES) + '\n'
+    reopened = Document.open(str(tmp_path))
+    assert reopened.is_old_form and reopened.notes and len(reopened.measurements) == 5
+    assert reopened.errors(1)[:2] == pytest.approx((-0.007, 0.0)) and reopened.progress == (2, 5)
+    assert rows_of(reopened) == [(-7, 0, 300, 300, -7, 7, 0, 0)]
+    assert document.undo() == 0 and Document.open(str(tmp_path)).measurements[0].rejected is None
+
+
+def test_its_stretched_depth_is_never_taken_for_distances(tmp_path):
+    document = Document.open(write_old_session(str(tmp_path)))
+    document.set_truth(0, 0.0, 0.3)
+    assert all('depth' not in entry for entry in read_json(tmp_path)['frames'])
+    with pytest.raises(SessionError, match="'camera' is missing"):
+        read_session(str(tmp_path))
+
+
+def test_the_recorded_positions_are_analysed(tmp_path):
+    random = np.random.RandomState(3)
+    places = [(x, z) for z in (1000, 2000, 3000) for x in (-600, 0, 600)] * 4
+    lines = ['[(%d, 0, %d)];%04d' % (x + random.randint(-9, 10), z + random.randint(-9, 10), number)
+             for number, (x, z) in enumerate(places)]
+    document = Document.open(write_old_session(str(tmp_path), lines, kinds=()))
+    for index, (x_mm, z_mm) in enumerate(places):
+        document.set_truth(index, x_mm / 1000.0, z_mm / 1000.0)
+    analysed = analyse(document)
+    assert os.path.dirname(analysed.report_path) == str(tmp_path / 'analysis')
+    assert analysed.text.startswith('f(z) = ') and len(analysed.figure_paths) == 7
+    assert os.path.exists(os.path.join(analysed.folder, 'error_model.yaml'))
+    with pytest.raises(ValueError, match='recorded'):
+        analyse(document, estimator='foreground')
+
+
+@pytest.mark.parametrize('line', [
+    '[(1, 2, __import__("os").system("touch run"))];x', '__import__("os").system("touch run")',
+    '[(1, 2, 3)];x; import os', '[(1, 2, 3), open("run", "w")] x', '[(1, 2)];x', '[(1, 2, 3.5)];x',
+    '[(1,2,3)(4,5,6)];x', '[(12345678, 2, 3)];x',
+    '[(1, 2, 3)];../../etc/passwd', '[(1, 2, 3)];', '[(1, 2, 3)]', '{}', '\u0661'])
+def test_a_line_with_anything_else_is_shown_as_it_is_and_not_run(tmp_path, monkeypatch, line):
+    monkeypatch.chdir(str(tmp_path))
+    write_old_session(str(tmp_path), LINES[:1])
+    with open('measurements.txt', 'a', encoding='utf-8') as stream:
+        stream.write(line + '\n')
+    document = Document.open(str(tmp_path))
+    assert document.measurements[0].problem is None and document.measurements[1].id == 'line-2'
+    assert line[:20] in document.measurements[1].problem.replace("\\'", "'")
+    assert 'nothing in the file is run' in document.measurements[1].problem
+    document.reject(1, 'no measurement')
+    assert Document.open(str(tmp_path)).measurements[1].rejected == 'no measurement'
+    assert not os.path.exists('run')
+
+
+def test_lines_of_any_length_take_no_time(tmp_path):
+    line = '[' + '(1, 2, 3), ' * 20000 + 'x];now'
+    document = Document.open(write_old_session(str(tmp_path), (LINES[0], line), kinds=()))
+    assert 'line 2' in document.measurements[1].problem
+
+
+@pytest.mark.parametrize('content', [b'', b'\n\n', b'import os\n', b'\xff\xfe\x00'])
+def test_a_text_without_measurements_is_refused(tmp_path, content):
+    (tmp_path / 'measurements.txt').write_bytes(content)
+    with pytest.raises(SessionError, match='measurements.txt'):
+        Document.open(str(tmp_path))
