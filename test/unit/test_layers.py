@@ -22,8 +22,8 @@ NOISE = os.path.join('evaluation', 'noise')  # a desk tool: no node may come to 
 ROS_TYPES = {'bags.py', 'camera_messages.py', 'markers.py', 'messages.py', 'report.py', 'simulator_messages.py'}
 
 # what a session is, without the windows that show it
-WITHOUT_WINDOW = {'__init__.py', 'analysis.py', 'command_line.py', 'document.py', 'drafts.py', 'entries.py', 'export.py',
-                  'legacy.py', 'lengths.py', 'measurement.py', 'validation.py'}
+WITHOUT_WINDOW = {'__init__.py', 'analysis.py', 'command_line.py', 'document.py', 'drafts.py', 'entries.py',
+                  'export.py', 'legacy.py', 'lengths.py', 'measurement.py', 'validation.py'}
 QT = {'PyQt5', 'python_qt_binding'}
 
 
