@@ -15,7 +15,6 @@ from ros_3d_bb.session_file import FILE_NAME, changing
 from ros_3d_bb_annotator import legacy
 from ros_3d_bb_annotator.drafts import Drafts
 from ros_3d_bb_annotator.entries import Edit, changed, detections_with, entry_at, grid_of, grid_entry, millimetres
-from ros_3d_bb_annotator.lengths import parse_length  # noqa: F401 (for those who fill in a document)
 from ros_3d_bb_annotator.measurement import ANNOTATED, NEW, FileNames, measurement_of
 
 ESTIMATOR = 'foreground'  # the default of bbox3d_node

@@ -59,20 +59,21 @@ class Frame(NamedTuple):
 
     @property
     def boxes_px(self):
-        """The 2D boxes of the people, that of the person first. One drawn by hand replaces those of the same person."""
-        boxes_px = tuple(detection.box_px for detection in self._person_first() if detection.box_px is not None)
-        if not self.detections or not self.detections[self.person].by_hand:
-            return boxes_px
-        return boxes_px[:1] + others_than(boxes_px[0], boxes_px[1:])
+        """The 2D boxes of the people, that of the person first; none where that is not stored.
+
+        One of the person that was drawn by hand replaces the others of the same person.
+        """
+        if not self.detections or self.detections[self.person].box_px is None:
+            return ()
+        person = self.detections[self.person]
+        others_px = tuple(detection.box_px for number, detection in enumerate(self.detections)
+                          if number != self.person and detection.box_px is not None)
+        return (person.box_px,) + (others_than(person.box_px, others_px) if person.by_hand else others_px)
 
     @property
     def estimate_m(self):
         """The stored position (3,) of the person, or None."""
         return self.detections[self.person].estimate_m if self.detections else None
-
-    def _person_first(self):
-        return (self.detections[self.person:self.person + 1] + self.detections[:self.person]
-                + self.detections[self.person + 1:])
 
 
 class Session(NamedTuple):

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ros_3d_bb_annotator.document import parse_length
+from ros_3d_bb_annotator.lengths import parse_length
 
 
 @pytest.mark.parametrize('text,unit,expected_m', [

@@ -79,6 +79,38 @@ def test_several_boxes_in_a_frame(folder):
     assert frame.boxes_px == ((1, 2, 3, 4), (5, 6, 7, 8)) and frame.estimate_m.tolist() == [0.001, 0.002, 0.003]
 
 
+def test_the_person_comes_first_and_one_drawn_by_hand_replaces_its_detection(folder):
+    boxes = [{'box': [10, 20, 60, 200]}, {'box': [100, 20, 150, 200]}, {'box': [12, 20, 64, 300], 'by': 'hand'}]
+
+    def boxes_with(person):
+        change(folder, lambda content: content['frames'][0].update(detections=boxes, person=person))
+        return [box[0] for box in read_session(folder).frames[0].boxes_px]
+    assert [boxes_with(person) for person in range(3)] == [[10, 100, 12], [100, 10, 12], [12, 100]]
+    del boxes[1]['box']
+    assert [boxes_with(person) for person in range(3)] == [[10, 12], [], [12]]
+
+
+def test_all_that_may_be_stored_of_a_measurement(folder):
+    change(folder, lambda content: content['frames'][0].update(
+        stamp='1616161616.000000007', label='far', truth_mm={'x': 1, 'y': -2, 'z': 3}, detections=[
+            {'box': [1, 2, 3, 4], 'size_mm': [400, 1700], 'support': 0.5, 'truncated': True}]))
+    frame = read_session(folder).frames[0]
+    assert (frame.stamp_ns, frame.label, frame.truth_y_m) == (1616161616000000007, 'far', -0.002)
+    detection, = frame.detections
+    assert detection.size_m.tolist() == [0.4, 1.7] and (detection.support, detection.truncated) == (0.5, True)
+    assert detection.estimate_m is None and not detection.by_hand
+
+
+def test_rejected_measurements_are_left_out_whatever_is_wrong_with_them(folder):
+    change(folder, lambda content: content['frames'].append({'id': 'b', 'rejected': 'no image'}))
+    assert len(read_session(folder).frames) == 1
+
+
+def test_another_lens_model_may_be_named(folder):
+    change(folder, lambda content: content['camera'].update(distortion_model='equidistant', distortion=[0.1, 0, 0, 0]))
+    assert read_session(folder).camera.distortion_model == 'equidistant'
+
+
 @pytest.mark.parametrize('edit,reason', [
     (lambda content: content.pop('camera'), "'camera' is missing"),
     (lambda content: content['camera'].pop('fx'), "'fx' is missing"),
