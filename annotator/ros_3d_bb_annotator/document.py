@@ -64,15 +64,17 @@ class Document(object):
         return sum(measurement.state != NEW for measurement in self.measurements), len(self.measurements)
 
     def refresh(self):
-        """Take in what other programs wrote. Returns whether there was anything. Raises SessionError."""
-        if self._signature == _signature(self.folder):
-            return False
+        """Take in what other programs wrote. Returns whether there was anything new. Raises SessionError."""
         signature = _signature(self.folder)  # before it is read: what is written meanwhile is seen next time
+        if self._signature == signature:
+            return False
+        before, grid = self.measurements, self.grid
         content = read_description(self.folder)
         with refusing(os.path.join(self.folder, FILE_NAME)):
             self._take(content)
         self._signature = signature
-        return True
+        return (len(before) != len(self.measurements) or grid != self.grid
+                or any(old is not new for old, new in zip(before, self.measurements)))
 
     def color(self, index):
         """The colour image of a measurement, (height, width, 3), uint8, RGB. Raises SessionError."""

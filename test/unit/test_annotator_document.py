@@ -202,6 +202,7 @@ def test_measurements_that_a_viewer_adds_meanwhile_are_kept_and_shown(document, 
     document.set_truth(0, 0.1, 2.0)
     assert [entry['id'] for entry in read_json(folder)['frames']] == ['m0', 'm1', 'm2', 'm3', 'new']
     assert document.measurements[4].id == 'new' and document.progress == (1, 5)
+    assert not document.refresh()  # nothing but its own edit
     with changing(folder) as content:
         content['frames'].append(write_measurement(folder, 'newer'))
     assert document.refresh() and document.measurements[5].id == 'newer' and not document.refresh()
