@@ -19,7 +19,8 @@ MODULES = modules_in(SOURCE)
 PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime', 'yaml', 'matplotlib', 'scipy'}
 NOISE = os.path.join('evaluation', 'noise')  # a desk tool: no node may come to need its libraries
 # convert to and from ROS messages, but run in no node
-ROS_TYPES = {'bags.py', 'camera_messages.py', 'markers.py', 'messages.py', 'report.py', 'simulator_messages.py'}
+ROS_TYPES = {'bags.py', 'camera_messages.py', 'markers.py', 'messages.py', 'planner_messages.py', 'report.py',
+             'simulator_messages.py'}
 
 # what a session is, without the windows that show it
 WITHOUT_WINDOW = {'__init__.py', 'analysis.py', 'command_line.py', 'document.py', 'drafts.py', 'entries.py',

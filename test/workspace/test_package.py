@@ -15,6 +15,7 @@ from ros_3d_bb.detection.bodies import DepthPeopleParams
 from ros_3d_bb.detection.yolov5 import DetectionParams
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dParams
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorParams
+from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
 from ros_3d_bb.nodes.simulator_node import SimulatorParams
 from ros_3d_bb.nodes.tracker_node import TrackerNodeParams
 from ros_3d_bb.nodes.yolov5_node import Yolov5NodeParams
@@ -29,9 +30,11 @@ KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-pyt
 TEST_KEYS = {'pytest': 'python3-pytest'}
 CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams), 'bbox3d.yaml': (Bbox3dParams,),
            'tracker.yaml': (TrackerNodeParams, ThesisTrackerParams), 'simulator.yaml': (SimulatorParams,),
+           'planner_bridge.yaml': (PlannerBridgeParams,),
            'depth_detector.yaml': (DepthDetectorParams, DepthPeopleParams)}
 SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id', 'error_model'},
                  'tracker.yaml': {'target_frame', 'camera_frame'}, 'simulator.yaml': {'scenario'},
+                 'planner_bridge.yaml': {'outputs', 'planner_frame', 'robot_frame'},
                  'depth_detector.yaml': {'floor_frame', 'frame_id'}}
 REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag']
 
@@ -139,7 +142,8 @@ def test_launch_files_load_and_document_their_arguments(name):
         assert node.package != 'ros_3d_bb' or os.path.exists(inside('scripts', node.type))
 
 
-@pytest.mark.parametrize('name', ['yolov5.launch', 'bbox3d.launch', 'tracker.launch', 'depth_detector.launch'])
+@pytest.mark.parametrize('name', ['yolov5.launch', 'bbox3d.launch', 'tracker.launch', 'depth_detector.launch',
+                                  'planner_bridge.launch'])
 def test_launch_files_set_no_parameter_that_the_node_does_not_know(name):
     loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
     loader.load(inside('launch', name), config, argv=REQUIRED_ARGUMENTS, verbose=False)

@@ -1,0 +1,172 @@
+"""The node that hands tracks on to planners, as the messages that they read."""
+import threading
+from typing import NamedTuple, Optional
+
+import rospy
+import tf2_ros
+from std_msgs.msg import Header
+
+from ros_3d_bb.messages import TRACKS_TOPIC, stamp_of, time_from, tracks_from_message
+from ros_3d_bb.msg import TrackedObjectArray
+from ros_3d_bb.nodes.diagnostics import Diagnostics
+from ros_3d_bb.nodes.planner_outputs import outputs_from
+from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.nodes.transforms import Transforms
+from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.for_planners import check_tracks, in_frame, predicted_to
+
+
+class PlannerBridgeParams(NamedTuple):
+    """See config/planner_bridge.yaml."""
+
+    outputs: list = ('costmap',)
+    planner_frame: str = ''
+    robot_frame: str = 'base_link'
+    timeout: float = 1.0
+    resend_period: float = 0.1
+    tf_timeout: float = 0.2
+    points_prediction: float = 0.5
+    point_spacing: float = 0.05
+    clearing_range: float = 10.0
+
+
+class News(NamedTuple):
+    """The latest tracks, in their own frame. `planner_from_tracks` is None where there was no transform."""
+
+    stamp_ns: int
+    arrival_ns: int
+    frame_id: str
+    tracks: list
+    planner_from_tracks: Optional[object]
+
+
+class PlannerTopic(object):
+    """A topic, and whether there are still people in what was sent last; `sent_ns` is when those tracks had come."""
+
+    def __init__(self, output):
+        self.output = output
+        self.sent_ns = None
+        self._publisher = rospy.Publisher(output.topic, output.kind, queue_size=2)
+
+    def send(self, tracks, stamp_ns, frame_id):
+        """Publish tracks, which may be none at all."""
+        self._publisher.publish(self.output.write(tracks, Header(stamp=time_from(stamp_ns), frame_id=frame_id)))
+
+
+class PlannerBridgeNode(object):
+    """Hand tracks on to planners.
+
+    Subscribes: ros_3d_bb/tracks, tf. Publishes, as ~outputs says: ~points and ~clearing_points, /people, ~obstacles,
+    ~objects, ~detections. Where no tracks come for ~timeout, each is emptied once. Parameters:
+    config/planner_bridge.yaml.
+    """
+
+    def __init__(self):
+        self._params, = read_params(PlannerBridgeParams)
+        _check(self._params)
+        self._topics = [PlannerTopic(output) for output in outputs_from(self._params)]
+        self._lock = threading.Lock()
+        self._news = None
+        self._diagnostics = Diagnostics()
+        self._transforms = Transforms(self._params.tf_timeout)
+        rospy.on_shutdown(self._empty_all)
+        rospy.Subscriber(TRACKS_TOPIC, TrackedObjectArray, self._on_tracks, queue_size=2)
+        self._timer = rospy.Timer(rospy.Duration.from_sec(self._params.resend_period), self._on_timer, reset=True)
+
+    def _on_tracks(self, message):
+        with self._diagnostics.refusing('tracks'):
+            news = self._read(message)
+            with self._lock:
+                self._news = news
+                for topic in self._topics:
+                    self._send(topic, news.arrival_ns)
+            self._diagnostics.count('tracks handed on')
+
+    def _read(self, message):
+        """The news in a message. Raises ValueError where a planner should not see them."""
+        stamp_ns, now_ns = stamp_of(message), _now_ns()
+        if abs(now_ns - stamp_ns) > self._params.timeout * NS:
+            raise ValueError('their stamp is %.3f s before the clock, more than ~timeout (%g s); a bag needs '
+                             'use_sim_time' % ((now_ns - stamp_ns) / NS, self._params.timeout))
+        if self._news is not None and stamp_ns < self._news.stamp_ns:
+            self._transforms.go_back()
+        tracks = tracks_from_message(message)
+        check_tracks(tracks)
+        return News(stamp_ns, now_ns, message.header.frame_id, tracks, self._planner_from_tracks(message.header))
+
+    def _planner_frame(self, tracks_frame):
+        return self._params.planner_frame or tracks_frame
+
+    def _planner_from_tracks(self, header):
+        """The transform at the stamp; None where there is none, or none is needed."""
+        planner_frame = self._planner_frame(header.frame_id)
+        if planner_frame == header.frame_id or not any(topic.output.in_planner_frame for topic in self._topics):
+            return None
+        try:
+            return self._transforms.lookup(planner_frame, header.frame_id, header.stamp)
+        except tf2_ros.TransformException as error:
+            self._diagnostics.warn('no transform', 'no transform from %s to %s at %.3f: %s; the planner gets nothing, '
+                                   'and an empty array after ~timeout'
+                                   % (header.frame_id, planner_frame, header.stamp.to_sec(), error))
+            return None
+
+    def _send(self, topic, now_ns):
+        """Send the news to one topic, as its planner needs them; not without the transform that it needs."""
+        news, tracks, stamp_ns, frame_id = self._news, self._news.tracks, self._news.stamp_ns, self._news.frame_id
+        if topic.output.to_now:
+            stamp_ns = max(now_ns, news.stamp_ns)
+            tracks = predicted_to(tracks, (stamp_ns - news.stamp_ns) / NS)
+        if topic.output.in_planner_frame and self._planner_frame(frame_id) != frame_id:
+            if news.planner_from_tracks is None:
+                return
+            frame_id, tracks = self._params.planner_frame, in_frame(tracks, news.planner_from_tracks)
+        topic.send(tracks, stamp_ns, frame_id)
+        topic.sent_ns = news.arrival_ns
+
+    def _on_timer(self, _event):
+        """Send again what planners take for now; empty what is out of date."""
+        with self._diagnostics.refusing('tracks'), self._lock:
+            now_ns = _now_ns()
+            for topic in self._topics:
+                if topic.sent_ns is None:
+                    continue
+                if not 0 <= now_ns - topic.sent_ns <= self._params.timeout * NS:
+                    self._diagnostics.warn('outputs emptied', 'no tracks that can be handed on for %g s: %s is '
+                                           'emptied, and goes on with the next ones'
+                                           % (self._params.timeout, topic.output.topic))
+                    self._empty(topic, now_ns)
+                elif topic.output.to_now and now_ns - self._news.arrival_ns >= self._params.resend_period * NS:
+                    self._send(topic, now_ns)
+
+    def _empty(self, topic, now_ns):
+        """Send nobody, once; the next tracks make it go on."""
+        frame_id = self._news.frame_id
+        topic.send([], now_ns, self._planner_frame(frame_id) if topic.output.in_planner_frame else frame_id)
+        topic.sent_ns = None
+
+    def _empty_all(self):
+        """The node ends: no planner must keep the people of its last array."""
+        with self._lock:
+            for topic in self._topics:
+                if topic.sent_ns is not None:
+                    self._empty(topic, _now_ns())
+
+
+def _now_ns():
+    """The time to which positions are predicted; stamps of images are on this clock."""
+    return rospy.get_rostime().to_nsec()
+
+
+def _check(params):
+    check_not_negative(params, 'tf_timeout', 'points_prediction', 'clearing_range')
+    for name in ('timeout', 'resend_period', 'point_spacing'):
+        if not 0.001 <= getattr(params, name) < 1e6:
+            raise ValueError('parameter ~%s is %g; 0.001 or more expected' % (name, getattr(params, name)))
+    if not params.robot_frame:
+        raise ValueError('parameter ~robot_frame is empty; base_link or the like expected')
+
+
+def main():
+    """Run the node."""
+    run_node('planner_bridge_node', PlannerBridgeNode)

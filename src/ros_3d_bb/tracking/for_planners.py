@@ -1,0 +1,110 @@
+"""Tracks as planners need them: where people are now, in the planner's frame, and what ground they take up.
+
+Positions and velocities as in `tracked.TrackedObject`; points are (n, 3), metres, in the frame of the tracks.
+"""
+import numpy as np
+
+SWATH_STEP_S = 0.1  # a person at 3 m/s is 0.3 m further on, less than a body is wide: the footprints overlap
+LOWEST, HIGHEST = 0.25, 0.75  # of a cylinder's height: well off the floor, and below 2 m, where costmaps stop looking
+
+
+def check_tracks(tracks):
+    """Raise ValueError where a track has a number that is not finite or a size that is not positive."""
+    for track in tracks:
+        values = np.concatenate([track.position_m, track.velocity_mps, track.size_m, track.prediction_m.ravel()])
+        if not (np.isfinite(values).all() and (track.size_m > 0).all()):
+            raise ValueError('track %d has position %s, velocity %s, size %s and prediction %s; finite numbers and a '
+                             'positive size expected' % ((track.id,) + tuple(np.asarray(value).tolist() for value in (
+                                 track.position_m, track.velocity_mps, track.size_m, track.prediction_m))))
+
+
+def position_after(track, ahead_s):
+    """Where a track will be, as its tracker predicts: straight between the predicted positions, and beyond the last.
+
+    Parameters
+    ----------
+    track : tracked.TrackedObject
+    ahead_s : array_like, (...)
+        Seconds after the stamp of the tracks, 0 or more.
+
+    Returns
+    -------
+    numpy.ndarray, (..., 3)
+    """
+    ahead_s = np.asarray(ahead_s, float)
+    times_s = track.prediction_step_s * np.arange(len(track.prediction_m) + 1)
+    known_m = np.vstack((track.position_m, track.prediction_m))
+    position_m = np.stack([np.interp(ahead_s, times_s, axis_m) for axis_m in known_m.T], axis=-1)
+    return position_m + np.maximum(ahead_s - times_s[-1], 0)[..., np.newaxis] * track.velocity_mps
+
+
+def predicted_to(tracks, ahead_s):
+    """The tracks some seconds later (see `position_after`), without their predictions.
+
+    Those who are not `moving` have no velocity: what is left of it is noise, and planners would take it for a person
+    who walks off.
+    """
+    return [track._replace(position_m=position_after(track, ahead_s), prediction_m=np.empty((0, 3)),
+                           prediction_covariance_m2=None,
+                           velocity_mps=track.velocity_mps if track.moving else np.zeros(3)) for track in tracks]
+
+
+def in_frame(tracks, b_from_a):
+    """The tracks of frame a in frame b, without their predictions.
+
+    Parameters
+    ----------
+    tracks : list of tracked.TrackedObject
+    b_from_a : numpy.ndarray, (4, 4)
+        Both frames have z up.
+    """
+    return [track._replace(position_m=b_from_a[:3, :3].dot(track.position_m) + b_from_a[:3, 3],
+                           velocity_mps=b_from_a[:3, :3].dot(track.velocity_mps),
+                           covariance=_turned(track.covariance, b_from_a[:3, :3]),
+                           prediction_m=np.empty((0, 3)), prediction_covariance_m2=None) for track in tracks]
+
+
+def _turned(covariance, rotation):
+    if covariance is None:
+        return None
+    both = np.kron(np.eye(2), rotation)
+    return both.dot(covariance).dot(both.T)
+
+
+def footprint_points(tracks, ahead_s, spacing_m):
+    """Points in people's cylinders, at three heights, and in the discs that they will cover, at half their height.
+
+    Parameters
+    ----------
+    tracks : list of tracked.TrackedObject
+    ahead_s : float
+        How far ahead; 0: where people are only.
+    spacing_m : float
+        Between points of a disc.
+
+    Returns
+    -------
+    numpy.ndarray, (n, 3)
+    """
+    later_s = np.linspace(0, ahead_s, int(np.ceil(ahead_s / SWATH_STEP_S)) + 1)[1:]
+    points = [np.empty((0, 3))]
+    for track in tracks:
+        disc = disc_points(track.size_m[0] / 2, spacing_m)
+        levels_m = np.outer((np.array([LOWEST, 0.5, HIGHEST]) - 0.5) * track.size_m[2], [0, 0, 1])
+        centers_m = np.vstack((track.position_m + levels_m, position_after(track, later_s)))
+        points.append((centers_m[:, np.newaxis] + disc).reshape(-1, 3))
+    return np.concatenate(points)
+
+
+def disc_points(radius_m, spacing_m):
+    """A flat disc around the origin, (n, 3): its outline, and a grid inside."""
+    side = np.arange(-np.floor(radius_m / spacing_m), np.floor(radius_m / spacing_m) + 1) * spacing_m
+    grid = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    inside = grid[np.hypot(grid[:, 0], grid[:, 1]) < radius_m]
+    return np.vstack((np.column_stack((inside, np.zeros(len(inside)))), ring_points(radius_m, spacing_m)))
+
+
+def ring_points(radius_m, spacing_m):
+    """A flat circle around the origin, (n, 3), with points `spacing_m` apart or a little less."""
+    angles = np.linspace(0, 2 * np.pi, int(np.ceil(2 * np.pi * radius_m / spacing_m)), endpoint=False)
+    return radius_m * np.column_stack((np.cos(angles), np.sin(angles), np.zeros_like(angles)))

@@ -1,0 +1,210 @@
+"""planner_bridge_node on made tracks. Needs a master because it predicts to ROS time and asks tf2 for a transform.
+
+Stamps are the clock's, as from a camera: a tenth of a second old. What the planners make of the messages is in
+test/workspace/test_planner_messages.py; here it is which message comes when, with which stamp and frame.
+"""
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import rospy
+from geometry_msgs.msg import PoseWithCovariance, TransformStamped
+from sensor_msgs.msg import PointCloud2
+from tf2_msgs.msg import TFMessage
+
+from ros_3d_bb.messages import time_from
+from ros_3d_bb.msg import TrackedObject, TrackedObjectArray
+from ros_3d_bb.stamped import NS
+from support.planner_definitions import message_class
+from support.ros import Recorder, diagnostics_of, header_at, publisher, wait_until
+
+LATENCY_NS, TIMEOUT_S, SPEED_MPS = NS // 10, 1.0, 1.2
+TOPICS = {'points': ('planner_bridge_node/points', PointCloud2, 'width'),
+          'people': ('/people', message_class('people_msgs/People'), 'people'),
+          'teb': ('planner_bridge_node/obstacles', message_class('costmap_converter/ObstacleArrayMsg'), 'obstacles'),
+          'mpc': ('planner_bridge_node/objects', message_class('derived_object_msgs/ObjectArray'), 'objects'),
+          'vision': ('planner_bridge_node/detections', message_class('vision_msgs/Detection3DArray'), 'detections')}
+
+
+def now_ns():
+    return rospy.get_rostime().to_nsec()
+
+
+class Rig(object):
+    """A tracker, and a localisation that knows odom_from_map: a quarter turn to the left, 10 m along x."""
+
+    def __init__(self):
+        self.tracks = publisher('ros_3d_bb/tracks', TrackedObjectArray)
+        self.tf = publisher('/tf', TFMessage)
+
+    def send_tf(self, stamp_ns):
+        transform = TransformStamped(header=header_at(stamp_ns, 'odom'), child_frame_id='map')
+        transform.transform.translation.x = 10.0
+        transform.transform.rotation.z = transform.transform.rotation.w = 0.5 ** 0.5
+        self.tf.publish(TFMessage([transform]))
+
+    def send(self, stamp_ns, *positions, **options):
+        """People at positions of the map who walk along its x; number 1 is the first."""
+        if options.get('tf', True):
+            self.send_tf(stamp_ns)
+        message = TrackedObjectArray(header=header_at(stamp_ns, 'map'))
+        for number, (x, y, z) in enumerate(positions):
+            track = TrackedObject(id=number + 1, moving=True)
+            track.pose.pose.position.x, track.pose.pose.position.y, track.pose.pose.position.z = x, y, z
+            track.size.x = track.size.y = 0.6
+            track.size.z = 1.7
+            track.twist.twist.linear.x = SPEED_MPS
+            track.prediction_step = rospy.Duration(2.0)
+            track.prediction = [PoseWithCovariance()]
+            end = track.prediction[0].pose.position
+            end.x, end.y, end.z = x + 2 * SPEED_MPS, y, z
+            message.objects.append(track)
+        self.tracks.publish(message)
+
+
+@pytest.fixture(scope='module')
+def rig():
+    rospy.init_node('test_planner_bridge_node')
+    return Rig()
+
+
+@pytest.fixture(scope='module')
+def all_recorders(rig):
+    return {name: Recorder(topic, kind) for name, (topic, kind, _field) in TOPICS.items()}
+
+
+@pytest.fixture
+def recorders(all_recorders):
+    """Of each output, once it is quiet: what the test before left has been emptied."""
+    time.sleep(TIMEOUT_S + 0.5)
+    return {name: recorder.emptied() for name, recorder in all_recorders.items()}
+
+
+def people_in(name, message):
+    """How much is in the message of an output: people, or points."""
+    content = getattr(message, TOPICS[name][2])
+    return content if isinstance(content, int) else len(content)
+
+
+def test_outputs_of_the_image_carry_its_stamp_and_frame(rig, recorders):
+    stamp_ns = now_ns() - LATENCY_NS
+    rig.send(stamp_ns, (1.0, 2.0, 0.85))
+    for name in ('points', 'vision'):
+        message, = recorders[name].wait_for(1)
+        assert message.header.frame_id == 'map' and message.header.stamp == time_from(stamp_ns)
+        assert people_in(name, message) > 0
+    place = recorders['vision'].messages[0].detections[0].bbox.center.position
+    assert (place.x, place.y, place.z) == pytest.approx((1, 2, 0.85))
+
+
+def test_outputs_for_now_carry_the_time_that_they_are_predicted_to(rig, recorders):
+    stamp_ns = now_ns() - 3 * LATENCY_NS
+    rig.send(stamp_ns, (1.0, 2.0, 0.85))
+    message = recorders['people'].wait_for(1)[0]
+    age_s = message.header.stamp.to_sec() - stamp_ns / NS
+    assert 0.3 <= age_s < TIMEOUT_S and message.header.frame_id == 'map'
+    assert message.people[0].position.x == pytest.approx(1 + SPEED_MPS * age_s, abs=1e-6)
+
+
+@pytest.mark.parametrize('name', ['teb', 'mpc'])
+def test_planners_that_do_not_transform_get_position_and_velocity_in_their_frame(rig, recorders, name):
+    """x of the map is y of odom: a person at (1, 2) is at (8, 1) and walks along y."""
+    stamp_ns = now_ns() - LATENCY_NS
+    rig.send(stamp_ns, (1.0, 2.0, 0.85))
+    message = recorders[name].wait_for(1)[0]
+    age_s = message.header.stamp.to_sec() - stamp_ns / NS
+    assert message.header.frame_id == 'odom'
+    if name == 'teb':
+        place, twist = message.obstacles[0].polygon.points[0], message.obstacles[0].velocities.twist
+    else:
+        place, twist = message.objects[0].pose.position, message.objects[0].twist
+    assert (place.x, place.y) == pytest.approx((8, 1 + SPEED_MPS * age_s), abs=1e-5)
+    assert (twist.linear.x, twist.linear.y) == pytest.approx((0, SPEED_MPS), abs=1e-9)
+
+
+def test_what_planners_keep_is_sent_again_further_on_and_then_emptied_once(rig, recorders):
+    rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85))
+    wait_until(lambda: all(people_in(name, recorder.messages[-1]) == 0 if recorder.messages else False
+                           for name, recorder in recorders.items()), 'every output emptied')
+    counts = {name: len(recorder.messages) for name, recorder in recorders.items()}
+    assert counts['points'] == counts['vision'] == 2
+    positions = [message.people[0].position.x for message in recorders['people'].messages[:-1]]
+    stamps = [message.header.stamp.to_sec() for message in recorders['people'].messages[:-1]]
+    assert len(positions) > 3 and positions == sorted(positions)
+    assert positions[-1] - positions[0] == pytest.approx(SPEED_MPS * (stamps[-1] - stamps[0]), abs=1e-6)
+    assert {name: recorder.messages[-1].header.frame_id for name, recorder in recorders.items()} == {
+        'points': 'map', 'people': 'map', 'teb': 'odom', 'mpc': 'odom', 'vision': 'map'}
+    time.sleep(0.5)
+    assert counts == {name: len(recorder.messages) for name, recorder in recorders.items()}
+    level, sentence, _counts = diagnostics_of('planner_bridge_node')
+    assert level == 1 and 'no tracks that can be handed on for 1 s' in sentence
+
+
+def test_an_empty_array_of_tracks_empties_every_output(rig, recorders):
+    rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85), (3.0, 2.0, 0.85))
+    for name in ('people', 'teb', 'mpc', 'vision'):
+        assert people_in(name, recorders[name].wait_for(1)[0]) == 2
+    rig.send(now_ns() - LATENCY_NS)
+    for name, recorder in recorders.items():
+        wait_until(lambda: people_in(name, recorder.messages[-1]) == 0, 'an empty message of ' + name)
+
+
+def test_the_costmap_is_cleared_around_the_robot_at_the_stamp_of_the_tracks(rig, recorders):
+    with Recorder('planner_bridge_node/clearing_points', PointCloud2) as clearing:
+        stamp_ns = now_ns() - LATENCY_NS
+        rig.send(stamp_ns)
+        message = clearing.wait_for(1)[0]
+    assert message.header.frame_id == 'base_link' and message.header.stamp == time_from(stamp_ns)
+    assert message.width > 2000
+
+
+def test_without_transform_the_planner_keeps_nobody_and_the_others_go_on(rig, recorders):
+    """No transform for 2 s, after one that was there: TEB's array is emptied while tracks come."""
+    rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85))
+    recorders['teb'].wait_for(1)
+    for _again in range(8):
+        rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85), tf=False)
+        time.sleep(0.25)
+    assert people_in('teb', recorders['teb'].messages[-1]) == 0
+    assert people_in('people', recorders['people'].messages[-1]) == 1
+    level, sentence, counts = diagnostics_of('planner_bridge_node')
+    assert level == 1 and counts['no transform'] >= 8
+
+
+def test_tracks_that_are_too_old_or_not_finite_are_refused_and_the_next_work(rig, recorders):
+    rig.send(now_ns() - 3 * NS, (1.0, 2.0, 0.85))
+    wait_until(lambda: 'a bag needs use_sim_time' in diagnostics_of('planner_bridge_node')[1], 'the reason')
+    rig.send(now_ns() - LATENCY_NS, (float('nan'), 2.0, 0.85))
+    wait_until(lambda: 'track 1 has position [nan' in diagnostics_of('planner_bridge_node')[1], 'the reason')
+    assert all(recorder.messages == [] for recorder in recorders.values())
+    rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85))
+    assert people_in('people', recorders['people'].wait_for(1)[0]) == 1
+
+
+def bridge(name, before, *arguments):
+    """A second node as a process of its own; `before`: Python that runs first."""
+    code = before + '; from ros_3d_bb.nodes.planner_bridge_node import main; main()'
+    return subprocess.Popen([sys.executable, '-c', code, '__name:=' + name] + list(arguments), stdout=subprocess.PIPE,
+                            stderr=subprocess.STDOUT, universal_newlines=True)
+
+
+def test_a_missing_package_is_said_at_the_start(rig):
+    process = bridge('without_vision', 'import sys; sys.modules["vision_msgs"] = None', '_outputs:=vision')
+    said = process.communicate()[0]
+    assert process.returncode == 1 and 'output vision needs the package vision_msgs' in said
+
+
+def test_a_node_that_ends_leaves_no_people_behind(rig):
+    process = bridge('second_bridge', 'pass', '_outputs:=teb')
+    try:
+        with Recorder('second_bridge/obstacles', TOPICS['teb'][1]) as recorder:
+            wait_until(lambda: rig.tracks.get_num_connections() == 2, 'the second node')
+            rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85))
+            wait_until(lambda: recorder.messages and people_in('teb', recorder.messages[-1]) == 1, 'an obstacle')
+            process.send_signal(signal.SIGINT)
+            wait_until(lambda: people_in('teb', recorder.messages[-1]) == 0, 'an empty array')
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate()

@@ -1,0 +1,161 @@
+"""What planners do with the messages of planner_bridge_node: replicas of what their public sources do, traps included.
+
+They are written from the behaviour of the sources named at each, and take over none of their text.
+"""
+import numpy as np
+from sensor_msgs import point_cloud2
+
+LETHAL, FREE = 254, 0
+CYLINDER, CYLINDER_RADIUS = 3, 1
+
+
+def yaw_of(quaternion):
+    """The rotation about z of a geometry_msgs/Quaternion, radians."""
+    x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
+    return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def moved(points, transform):
+    """Points (n, 3) by a 4x4 matrix."""
+    return np.reshape(points, (-1, 3)).dot(transform[:3, :3].T) + transform[:3, 3]
+
+
+class TebReplica(object):
+    """teb_local_planner (Noetic): teb_local_planner_ros.cpp and obstacles.h.
+
+    It keeps the last array for ever and looks at its stamp never. Positions are transformed by the latest transform
+    from the array's frame (the identity where there is none); velocities are not. An obstacle of less than 1 mm/s is
+    static; another one moves on from where it is at the moment of planning.
+    """
+
+    def __init__(self, planner_from):
+        self._planner_from, self._array = planner_from, None
+
+    def receive(self, array):
+        self._array = array
+
+    def obstacles(self):
+        """(centre (2,), radius, velocity (2,) or None) of each circle."""
+        if self._array is None:
+            return []
+        transform = self._planner_from.get(self._array.header.frame_id, np.eye(4))
+        found = []
+        for obstacle in self._array.obstacles:
+            assert len(obstacle.polygon.points) == 1 and obstacle.radius > 0  # else it is no circle to TEB
+            point = obstacle.polygon.points[0]
+            velocity = np.array([obstacle.velocities.twist.linear.x, obstacle.velocities.twist.linear.y])
+            found.append((moved([point.x, point.y, point.z], transform)[0, :2], obstacle.radius,
+                          velocity if np.linalg.norm(velocity) >= 0.001 else None))
+        return found
+
+    def predicted(self, ahead_s):
+        """Where it expects the circles' centres, seconds after it plans, (n, 2)."""
+        return np.array([centre + ahead_s * (0 if velocity is None else velocity)
+                         for centre, _radius, velocity in self.obstacles()]).reshape(-1, 2)
+
+
+class JackalMpcReplica(object):
+    """mpc_planner_jackal (tud-amr/mpc_planner): ros1_jackal.cpp, obstacleCallback.
+
+    No frame and no stamp is looked at. Number 0 is taken for the robot. A cylinder's radius is the second dimension.
+    The twist is turned by minus the yaw of the pose, and the prediction is straight on from the moment of arrival.
+    """
+
+    def __init__(self):
+        self.obstacles = {}
+
+    def receive(self, array):
+        """Obstacles as {id: (centre (2,), radius, velocity (2,))}."""
+        self.obstacles = {}
+        for item in array.objects:
+            if item.id == 0 or item.shape.type != CYLINDER:
+                continue
+            angle = -yaw_of(item.pose.orientation)
+            turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+            self.obstacles[item.id] = (np.array([item.pose.position.x, item.pose.position.y]),
+                                       item.shape.dimensions[CYLINDER_RADIUS],
+                                       turn.dot([item.twist.linear.x, item.twist.linear.y]))
+
+
+class SocialLayerReplica(object):
+    """social_navigation_layers: social_layer.cpp.
+
+    It keeps the last list and looks at its stamp never. Position, and position plus velocity, are transformed by the
+    latest transform; their difference is the velocity.
+    """
+
+    def __init__(self, costmap_from):
+        self._costmap_from, self._people = costmap_from, None
+
+    def receive(self, people):
+        self._people = people
+
+    def people(self):
+        """(position (3,), velocity (3,)) of each."""
+        if self._people is None:
+            return []
+        transform = self._costmap_from[self._people.header.frame_id]
+        found = []
+        for person in self._people.people:
+            position = np.array([person.position.x, person.position.y, person.position.z])
+            end = position + [person.velocity.x, person.velocity.y, person.velocity.z]
+            start, end = moved([position, end], transform)
+            found.append((start, end - start))
+        return found
+
+
+class ObstacleLayerReplica(object):
+    """costmap_2d's ObstacleLayer and ObservationBuffer with observation_persistence 0.
+
+    Each source keeps its last cloud for ever, less the points outside of the heights. At an update the rays from the
+    sensor's origin to all points of the clearing clouds are set free, and then the points of the marking clouds that
+    are in range are set lethal. What no ray meets stays as it was.
+
+    Parameters
+    ----------
+    costmap_from : dict
+        4x4 matrices by frame.
+    sources : dict
+        {name: {'sensor_frame', 'marking', 'clearing'}} as in the layer's parameters; no sensor_frame: the cloud's.
+    """
+
+    resolution, cells, reach_m, heights = 0.05, 200, 10.0, (0.0, 2.0)
+
+    def __init__(self, costmap_from, sources):
+        self._costmap_from, self._sources, self._clouds = costmap_from, sources, {}
+        self.grid = np.full((self.cells, self.cells), FREE, np.uint8)  # [y, x], centre at the costmap's origin
+
+    def receive(self, name, cloud):
+        points = np.array(list(point_cloud2.read_points(cloud, ('x', 'y', 'z')))).reshape(-1, 3)
+        points = moved(points, self._costmap_from[cloud.header.frame_id])
+        inside = (points[:, 2] >= self.heights[0]) & (points[:, 2] <= self.heights[1])
+        sensor = self._sources[name].get('sensor_frame') or cloud.header.frame_id
+        self._clouds[name] = self._costmap_from[sensor][:3, 3], points[inside]
+
+    def update(self):
+        for name, (origin, points) in self._clouds.items():
+            if self._sources[name]['clearing']:
+                for point in points:
+                    self._clear(origin, point)
+        for name, (origin, points) in self._clouds.items():
+            if self._sources[name]['marking']:
+                x, y = self._cell(points[np.linalg.norm(points - origin, axis=1) <= self.reach_m])
+                inside = (x >= 0) & (x < self.cells) & (y >= 0) & (y < self.cells)
+                self.grid[y[inside], x[inside]] = LETHAL
+
+    def _cell(self, points):
+        x, y = np.floor(np.asarray(points)[..., :2] / self.resolution).astype(int).T + self.cells // 2
+        return x, y
+
+    def _clear(self, origin, point):
+        """One cell a step along the longer axis, from the sensor's cell to that of the point or the map's border."""
+        start, end = np.array(self._cell(origin)), np.array(self._cell(point))
+        steps = max(np.abs(end - start).max(), 1)
+        line = np.rint(start + np.outer(np.arange(steps + 1), (end - start) / steps)).astype(int)
+        line = line[((line >= 0) & (line < self.cells)).all(axis=1)]
+        self.grid[line[:, 1], line[:, 0]] = FREE
+
+    def lethal(self):
+        """Centres of the lethal cells, (n, 2) metres."""
+        y, x = np.nonzero(self.grid == LETHAL)
+        return (np.column_stack((x, y)) - self.cells // 2 + 0.5) * self.resolution

@@ -1,0 +1,207 @@
+"""Tracks as planners read them: each message goes through its wire format into a replica of its reader."""
+import io
+import sys
+
+import numpy as np
+import pytest
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Header
+
+from ros_3d_bb.geometry import transform_from
+from ros_3d_bb.messages import time_from
+from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
+from ros_3d_bb.nodes.planner_outputs import outputs_from
+from ros_3d_bb.planner_messages import (detections3d_to_message, objects_to_message, obstacles_to_message,
+                                        people_to_message, points_to_message)
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.for_planners import footprint_points, in_frame, predicted_to, ring_points
+from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject
+from support.planner_definitions import PUBLISHED_MD5, message_class, package
+from support.planners import JackalMpcReplica, ObstacleLayerReplica, SocialLayerReplica, TebReplica
+
+QUARTER = transform_from((10, 5, 0), (0, 0, np.sqrt(0.5), np.sqrt(0.5)))  # odom_from_map: a quarter turn to the left
+STAMP_NS = 1000 * NS
+
+
+def header_in(frame_id, stamp_ns=STAMP_NS):
+    return Header(stamp=time_from(stamp_ns), frame_id=frame_id)
+
+
+def walker(number, position_m, velocity_mps, status=VISIBLE, width_m=0.6):
+    position_m, velocity_mps = np.array(position_m, float), np.array(velocity_mps, float)
+    prediction_m = position_m + np.outer(0.25 * np.arange(1, 9), velocity_mps)
+    covariance = np.diag([0.01, 0.04, 0.09, 0.1, 0.2, 0.3])
+    return TrackedObject(number, position_m, np.array([width_m, width_m, 1.7]), velocity_mps, velocity_mps, status,
+                         bool(velocity_mps.any()), 0, STAMP_NS, prediction_m, 0.25, covariance)
+
+
+def received(message):
+    """The message as it comes out at the other end."""
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    return type(message)().deserialize(buffer.getvalue())
+
+
+@pytest.mark.parametrize('kind', sorted(PUBLISHED_MD5))
+def test_the_definitions_used_here_are_the_published_ones(kind):
+    assert message_class(kind)._md5sum == PUBLISHED_MD5[kind]
+
+
+def test_teb_turns_no_velocities_so_they_come_in_its_own_frame():
+    teb = TebReplica({'map': QUARTER})
+    tracks = [walker(3, [1, 2, 0.9], [1.2, 0, 0])]
+    teb.receive(received(obstacles_to_message(in_frame(tracks, QUARTER), header_in('odom'),
+                                              package('costmap_converter'))))
+    (centre, radius, velocity), = teb.obstacles()
+    np.testing.assert_allclose(centre, [8, 6], atol=1e-6)
+    assert radius == pytest.approx(0.3)
+    np.testing.assert_allclose(velocity, [0, 1.2], atol=1e-9)
+    teb.receive(received(obstacles_to_message(tracks, header_in('map'), package('costmap_converter'))))
+    (centre, _radius, velocity), = teb.obstacles()  # what the frame of the tracks would have led to
+    np.testing.assert_allclose(centre, [8, 6], atol=1e-6)
+    np.testing.assert_allclose(velocity, [1.2, 0], atol=1e-9)
+
+
+def test_teb_plans_from_now_so_positions_are_predicted_to_now():
+    """The image is 0.3 s old; TEB plans 1 s ahead, so the person is 1.3 s further on."""
+    teb, tracks = TebReplica({}), [walker(3, [1, 2, 0.9], [1.2, 0, 0]), walker(4, [5, 5, 0.9], [0, 0, 0])]
+    teb.receive(received(obstacles_to_message(predicted_to(tracks, 0.3), header_in('odom'),
+                                              package('costmap_converter'))))
+    np.testing.assert_allclose(teb.predicted(1.0), [[1 + 1.3 * 1.2, 2], [5, 5]], atol=1e-6)
+    assert [velocity is None for _centre, _radius, velocity in teb.obstacles()] == [False, True]
+
+
+def test_teb_keeps_an_array_until_an_empty_one_comes():
+    teb = TebReplica({})
+    teb.receive(received(obstacles_to_message([walker(3, [1, 2, 0.9], [0, 0, 0])], header_in('odom'),
+                                              package('costmap_converter'))))
+    assert len(teb.obstacles()) == 1
+    teb.receive(received(obstacles_to_message([], header_in('odom'), package('costmap_converter'))))
+    assert teb.obstacles() == []
+
+
+def test_obstacles_keep_number_and_velocity_covariance():
+    obstacle, = received(obstacles_to_message(in_frame([walker(3, [1, 2, 0.9], [1, 0, 0])], QUARTER), header_in('odom'),
+                                              package('costmap_converter'))).obstacles
+    assert obstacle.id == 3 and obstacle.header.frame_id == 'odom' and obstacle.orientation.w == 1
+    np.testing.assert_allclose(np.diag(np.reshape(obstacle.velocities.covariance, (6, 6)))[:3], [0.2, 0.1, 0.3])
+
+
+def test_mpc_planner_jackal_sees_everybody_with_radius_and_velocity():
+    mpc = JackalMpcReplica()
+    tracks = [walker(1, [1, 2, 0.9], [0.3, -1.1, 0]), walker(2, [4, 2, 0.9], [0, 0, 0], width_m=0.4)]
+    mpc.receive(received(objects_to_message(tracks, header_in('map'), package('derived_object_msgs'))))
+    assert sorted(mpc.obstacles) == [1, 2]
+    centre, radius, velocity = mpc.obstacles[1]
+    np.testing.assert_allclose(centre, [1, 2])
+    np.testing.assert_allclose(velocity, [0.3, -1.1])
+    assert radius == pytest.approx(0.3) and mpc.obstacles[2][1] == pytest.approx(0.2)
+
+
+def test_objects_are_tracked_pedestrians():
+    item, = received(objects_to_message([walker(1, [1, 2, 0.9], [0, 0, 0])], header_in('map'),
+                                        package('derived_object_msgs'))).objects
+    assert (item.detection_level, item.classification, item.object_classified) == (1, 4, True)
+    assert item.shape.dimensions == pytest.approx((1.7, 0.3)) and item.header.stamp == time_from(STAMP_NS)
+
+
+def test_the_social_layer_finds_position_and_velocity_in_its_own_frame():
+    layer = SocialLayerReplica({'map': QUARTER})
+    layer.receive(received(people_to_message([walker(3, [1, 2, 0.9], [1.2, 0, 0])], header_in('map'),
+                                             package('people_msgs'))))
+    (position, velocity), = layer.people()
+    np.testing.assert_allclose(position, [8, 6, 0.9])
+    np.testing.assert_allclose(velocity, [0, 1.2, 0], atol=1e-9)
+
+
+def test_people_say_who_they_are_and_how_sure_the_tracker_is():
+    seen, hidden = received(people_to_message(
+        [walker(3, [1, 2, 0.9], [0, 0, 0]), walker(12, [1, 2, 0.9], [0, 0, 0], OCCLUDED)], header_in('map'),
+        package('people_msgs'))).people
+    assert (seen.name, seen.reliability, hidden.name, hidden.reliability) == ('3', 1.0, '12', 0.5)
+    assert dict(zip(hidden.tagnames, hidden.tags)) == {'status': 'occluded', 'width': '0.60', 'height': '1.70'}
+
+
+def test_detections_have_box_number_and_covariance():
+    message = received(detections3d_to_message([walker(3, [1, 2, 0.9], [1, 0, 0])], header_in('map'),
+                                               package('vision_msgs')))
+    detection, = message.detections
+    assert message.header.frame_id == detection.header.frame_id == 'map'
+    box, result = detection.bbox, detection.results[0]
+    assert (box.center.position.x, box.center.position.y, box.center.position.z) == (1, 2, 0.9)
+    assert (box.size.x, box.size.y, box.size.z) == (0.6, 0.6, 1.7) and box.center.orientation.w == 1
+    assert (result.id, result.score) == (3, 1.0) and result.pose.pose == box.center
+    np.testing.assert_allclose(np.diag(np.reshape(result.pose.covariance, (6, 6)))[:3], [0.01, 0.04, 0.09])
+
+
+def costmap(clearing):
+    """A local costmap around the origin of odom, with the README's people_layer; the robot is 1 m off its centre."""
+    robot = transform_from((1, 0, 0), (0, 0, 0.6, 0.8))
+    sources = {'people': {'sensor_frame': 'base_link', 'marking': True, 'clearing': False}}
+    if clearing:
+        sources['clearing'] = {'sensor_frame': 'base_link', 'marking': False, 'clearing': True}
+    return ObstacleLayerReplica({'map': QUARTER, 'odom': np.eye(4), 'base_link': robot}, sources)
+
+
+def walk_past(layer, clearing):
+    """Somebody walks from y -3 to 3 at x 3 of odom; where the layer has marks at the end."""
+    map_from_odom = np.linalg.inv(QUARTER)
+    for y in np.linspace(-3, 3, 7):
+        track, = in_frame([walker(1, [3, y, 0.85], [0, 1, 0])], map_from_odom)
+        layer.receive('people', received(points_to_message(footprint_points([track], 0.5, 0.05), header_in('map'))))
+        if clearing:
+            layer.receive('clearing', received(points_to_message(ring_points(10.0, 0.025) + [0, 0, 0.5],
+                                                                 header_in('base_link'))))
+        layer.update()
+    return layer.lethal()
+
+
+def test_the_obstacle_layer_marks_who_is_there_and_clears_where_they_were():
+    layer = costmap(clearing=True)
+    marks = walk_past(layer, clearing=True)
+    assert len(marks) > 50
+    assert (np.abs(marks - [3, 3]) <= [0.35, 0.35 + 0.5]).all() and marks[:, 1].min() > 2.6
+    layer.receive('people', received(points_to_message(footprint_points([], 0.5, 0.05), header_in('map'))))
+    layer.update()
+    assert len(layer.lethal()) == 0
+
+
+def test_without_the_clearing_points_the_obstacle_layer_keeps_a_trail():
+    marks = walk_past(costmap(clearing=False), clearing=False)
+    assert marks[:, 1].min() < -2.9
+
+
+def test_without_the_robot_as_the_sensor_ranges_count_from_the_origin_of_the_map():
+    """The map's origin is 11 m away: nobody would be marked."""
+    layer = ObstacleLayerReplica({'map': QUARTER}, {'people': {'marking': True, 'clearing': False}})
+    track, = in_frame([walker(1, [3, 0, 0.85], [0, 0, 0])], np.linalg.inv(QUARTER))
+    layer.receive('people', received(points_to_message(footprint_points([track], 0.0, 0.05), header_in('map'))))
+    layer.reach_m = 5.0
+    layer.update()
+    assert len(layer.lethal()) == 0
+    layer = costmap(clearing=False)
+    layer.reach_m = 5.0
+    layer.receive('people', received(points_to_message(footprint_points([track], 0.0, 0.05), header_in('map'))))
+    layer.update()
+    assert len(layer.lethal()) > 50
+
+
+@pytest.mark.parametrize('name, lacking', [('people', 'people_msgs'), ('teb', 'costmap_converter'),
+                                           ('mpc', 'derived_object_msgs'), ('vision', 'vision_msgs')])
+def test_a_missing_package_is_named_with_what_to_install(monkeypatch, name, lacking):
+    monkeypatch.setitem(sys.modules, lacking + '.msg', None)
+    with pytest.raises(ValueError, match='output %s needs the package %s .*rosdep key %s, .*ros-noetic-%s'
+                       % (name, lacking, lacking, lacking.replace('_', '-'))):
+        outputs_from(PlannerBridgeParams(outputs=['costmap', name]))
+
+
+@pytest.mark.parametrize('outputs, said', [(['tebb'], "'tebb'; did you mean teb"), ([], 'outputs is empty')])
+def test_unknown_outputs_are_refused_with_the_nearest_known_one(outputs, said):
+    with pytest.raises(ValueError, match=said):
+        outputs_from(PlannerBridgeParams(outputs=outputs))
+
+
+def test_the_costmap_needs_no_package_and_no_ring_where_its_range_is_zero():
+    assert [(output.topic, output.kind) for output in outputs_from(PlannerBridgeParams())] == [
+        ('~points', PointCloud2), ('~clearing_points', PointCloud2)]
+    assert [output.topic for output in outputs_from(PlannerBridgeParams(clearing_range=0.0))] == ['~points']
