@@ -57,8 +57,9 @@ class TebReplica(object):
 class JackalMpcReplica(object):
     """mpc_planner_jackal (tud-amr/mpc_planner): ros1_jackal.cpp, obstacleCallback.
 
-    No frame and no stamp is looked at. Number 0 is taken for the robot. A cylinder's radius is the second dimension.
-    The twist is turned by minus the yaw of the pose, and the prediction is straight on from the moment of arrival.
+    No frame and no stamp is looked at. Number 0 is left out (by some versions; the public one takes it). A cylinder's
+    radius is the second dimension. The twist is turned by minus the yaw of the pose, and the prediction is straight on
+    from the moment of arrival.
     """
 
     def __init__(self):
@@ -116,30 +117,36 @@ class ObstacleLayerReplica(object):
     costmap_from : dict
         4x4 matrices by frame.
     sources : dict
-        {name: {'sensor_frame', 'marking', 'clearing'}} as in the layer's parameters; no sensor_frame: the cloud's.
+        The layer's parameters of each observation source, by its name; what is not given has costmap_2d's default.
     """
 
-    resolution, cells, reach_m, heights = 0.05, 200, 10.0, (0.0, 2.0)
+    resolution, cells = 0.05, 200
+    defaults = {'sensor_frame': '', 'marking': True, 'clearing': False, 'obstacle_range': 2.5, 'raytrace_range': 3.0,
+                'min_obstacle_height': 0.0, 'max_obstacle_height': 2.0, 'observation_persistence': 0.0}
 
     def __init__(self, costmap_from, sources):
-        self._costmap_from, self._sources, self._clouds = costmap_from, sources, {}
+        self._costmap_from, self._clouds = costmap_from, {}
+        self._sources = {name: dict(self.defaults, **given) for name, given in sources.items()}
+        assert all(source['observation_persistence'] == 0 for source in self._sources.values())
         self.grid = np.full((self.cells, self.cells), FREE, np.uint8)  # [y, x], centre at the costmap's origin
 
     def receive(self, name, cloud):
         points = np.array(list(point_cloud2.read_points(cloud, ('x', 'y', 'z')))).reshape(-1, 3)
         points = moved(points, self._costmap_from[cloud.header.frame_id])
-        inside = (points[:, 2] >= self.heights[0]) & (points[:, 2] <= self.heights[1])
-        sensor = self._sources[name].get('sensor_frame') or cloud.header.frame_id
+        source = self._sources[name]
+        inside = (points[:, 2] >= source['min_obstacle_height']) & (points[:, 2] <= source['max_obstacle_height'])
+        sensor = source['sensor_frame'] or cloud.header.frame_id
         self._clouds[name] = self._costmap_from[sensor][:3, 3], points[inside]
 
     def update(self):
         for name, (origin, points) in self._clouds.items():
             if self._sources[name]['clearing']:
                 for point in points:
-                    self._clear(origin, point)
+                    self._clear(origin, point, self._sources[name]['raytrace_range'])
         for name, (origin, points) in self._clouds.items():
             if self._sources[name]['marking']:
-                x, y = self._cell(points[np.linalg.norm(points - origin, axis=1) <= self.reach_m])
+                reach_m = self._sources[name]['obstacle_range']
+                x, y = self._cell(points[np.linalg.norm(points - origin, axis=1) <= reach_m])
                 inside = (x >= 0) & (x < self.cells) & (y >= 0) & (y < self.cells)
                 self.grid[y[inside], x[inside]] = LETHAL
 
@@ -147,11 +154,12 @@ class ObstacleLayerReplica(object):
         x, y = np.floor(np.asarray(points)[..., :2] / self.resolution).astype(int).T + self.cells // 2
         return x, y
 
-    def _clear(self, origin, point):
-        """One cell a step along the longer axis, from the sensor's cell to that of the point or the map's border."""
+    def _clear(self, origin, point, range_m):
+        """One cell a step along the longer axis, from the sensor's cell to that of the point, as far as it reaches."""
         start, end = np.array(self._cell(origin)), np.array(self._cell(point))
         steps = max(np.abs(end - start).max(), 1)
-        line = np.rint(start + np.outer(np.arange(steps + 1), (end - start) / steps)).astype(int)
+        share = min(1.0, range_m / max(self.resolution * np.linalg.norm(end - start), 1e-9))
+        line = np.rint(start + np.outer(np.arange(int(share * steps) + 1), (end - start) / steps)).astype(int)
         line = line[((line >= 0) & (line < self.cells)).all(axis=1)]
         self.grid[line[:, 1], line[:, 0]] = FREE
 

@@ -1,9 +1,12 @@
 """Tracks as planners read them: each message goes through its wire format into a replica of its reader."""
 import io
+import os
+import re
 import sys
 
 import numpy as np
 import pytest
+import yaml
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
@@ -12,13 +15,14 @@ from ros_3d_bb.messages import time_from
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
 from ros_3d_bb.nodes.planner_outputs import outputs_from
 from ros_3d_bb.planner_messages import (detections3d_to_message, objects_to_message, obstacles_to_message,
-                                        people_to_message, points_to_message)
+                                        people_to_message)
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tracking.for_planners import footprint_points, in_frame, predicted_to, ring_points
+from ros_3d_bb.tracking.for_planners import in_frame, predicted_to
 from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject
 from support.planner_definitions import PUBLISHED_MD5, message_class, package
 from support.planners import JackalMpcReplica, ObstacleLayerReplica, SocialLayerReplica, TebReplica
 
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 QUARTER = transform_from((10, 5, 0), (0, 0, np.sqrt(0.5), np.sqrt(0.5)))  # odom_from_map: a quarter turn to the left
 STAMP_NS = 1000 * NS
 
@@ -134,56 +138,66 @@ def test_detections_have_box_number_and_covariance():
     np.testing.assert_allclose(np.diag(np.reshape(result.pose.covariance, (6, 6)))[:3], [0.01, 0.04, 0.09])
 
 
-def costmap(clearing):
-    """A local costmap around the origin of odom, with the README's people_layer; the robot is 1 m off its centre."""
+def people_layer():
+    """The sources of the layer that the README recommends."""
+    with open(os.path.join(ROOT, 'README.md')) as stream:
+        snippets = [yaml.safe_load(snippet) for snippet in re.findall(r'```yaml\n(.*?)```', stream.read(), re.DOTALL)]
+    layer, = [snippet['local_costmap']['people_layer'] for snippet in snippets if 'local_costmap' in snippet]
+    return {name: layer[name] for name in layer['observation_sources'].split()}
+
+
+def costmap(sources):
+    """A local costmap around the origin of odom; the robot is 1 m off its centre."""
     robot = transform_from((1, 0, 0), (0, 0, 0.6, 0.8))
-    sources = {'people': {'sensor_frame': 'base_link', 'marking': True, 'clearing': False}}
-    if clearing:
-        sources['clearing'] = {'sensor_frame': 'base_link', 'marking': False, 'clearing': True}
     return ObstacleLayerReplica({'map': QUARTER, 'odom': np.eye(4), 'base_link': robot}, sources)
 
 
-def walk_past(layer, clearing):
-    """Somebody walks from y -3 to 3 at x 3 of odom; where the layer has marks at the end."""
-    map_from_odom = np.linalg.inv(QUARTER)
+def show(layer, sources, tracks):
+    """What the bridge publishes for tracks of odom, once; the layer is updated."""
+    topics = {output.topic: output for output in outputs_from(PlannerBridgeParams())}
+    for name, source in sources.items():
+        output = topics[source['topic'].replace('/planner_bridge_node/', '~')]
+        layer.receive(name, received(output.write(in_frame(tracks, np.linalg.inv(QUARTER)), header_in('map'))))
+    layer.update()
+
+
+def walk_past(layer, sources):
+    """Somebody walks from y -3 to 3 at x 3 of odom."""
     for y in np.linspace(-3, 3, 7):
-        track, = in_frame([walker(1, [3, y, 0.85], [0, 1, 0])], map_from_odom)
-        layer.receive('people', received(points_to_message(footprint_points([track], 0.5, 0.05), header_in('map'))))
-        if clearing:
-            layer.receive('clearing', received(points_to_message(ring_points(10.0, 0.025) + [0, 0, 0.5],
-                                                                 header_in('base_link'))))
-        layer.update()
-    return layer.lethal()
+        show(layer, sources, [walker(1, [3, y, 0.85], [0, 1, 0])])
 
 
 def test_the_obstacle_layer_marks_who_is_there_and_clears_where_they_were():
-    layer = costmap(clearing=True)
-    marks = walk_past(layer, clearing=True)
+    sources = people_layer()
+    layer = costmap(sources)
+    walk_past(layer, sources)
+    marks = layer.lethal()
     assert len(marks) > 50
     assert (np.abs(marks - [3, 3]) <= [0.35, 0.35 + 0.5]).all() and marks[:, 1].min() > 2.6
-    layer.receive('people', received(points_to_message(footprint_points([], 0.5, 0.05), header_in('map'))))
-    layer.update()
+    show(layer, sources, [])
     assert len(layer.lethal()) == 0
 
 
 def test_without_the_clearing_points_the_obstacle_layer_keeps_a_trail():
-    marks = walk_past(costmap(clearing=False), clearing=False)
-    assert marks[:, 1].min() < -2.9
+    sources = {'people': people_layer()['people']}
+    layer = costmap(sources)
+    walk_past(layer, sources)
+    assert layer.lethal()[:, 1].min() < -2.9
 
 
-def test_without_the_robot_as_the_sensor_ranges_count_from_the_origin_of_the_map():
-    """The map's origin is 11 m away: nobody would be marked."""
-    layer = ObstacleLayerReplica({'map': QUARTER}, {'people': {'marking': True, 'clearing': False}})
-    track, = in_frame([walker(1, [3, 0, 0.85], [0, 0, 0])], np.linalg.inv(QUARTER))
-    layer.receive('people', received(points_to_message(footprint_points([track], 0.0, 0.05), header_in('map'))))
-    layer.reach_m = 5.0
-    layer.update()
-    assert len(layer.lethal()) == 0
-    layer = costmap(clearing=False)
-    layer.reach_m = 5.0
-    layer.receive('people', received(points_to_message(footprint_points([track], 0.0, 0.05), header_in('map'))))
-    layer.update()
-    assert len(layer.lethal()) > 50
+@pytest.mark.parametrize('sensor_frame, marked', [('base_link', True), ('', False)])
+def test_without_the_robot_as_the_sensor_ranges_count_from_the_origin_of_the_map(sensor_frame, marked):
+    """The map's origin is 11 m from the costmap's, the person 2 m from the robot."""
+    sources = {'people': dict(people_layer()['people'], sensor_frame=sensor_frame, obstacle_range=5.0)}
+    layer = costmap(sources)
+    show(layer, sources, [walker(1, [3, 0, 0.85], [0, 0, 0])])
+    assert bool(len(layer.lethal())) == marked
+
+
+def test_the_ring_reaches_as_far_as_the_costmap_clears_and_further_than_it_marks():
+    sources = people_layer()
+    assert sources['people']['obstacle_range'] < sources['clearing']['raytrace_range'] <= (
+        PlannerBridgeParams().clearing_range)
 
 
 @pytest.mark.parametrize('name, lacking', [('people', 'people_msgs'), ('teb', 'costmap_converter'),
