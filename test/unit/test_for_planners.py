@@ -79,8 +79,9 @@ def test_a_disc_has_its_outline_and_nothing_outside(radius_m, spacing_m):
 
 
 @pytest.mark.parametrize('changed', [{'position_m': np.array([np.nan, 0, 1])}, {'velocity_mps': np.full(3, np.inf)},
-                                     {'size_m': np.array([0, 0, 1.7])}, {'prediction_m': np.full((1, 3), np.nan)}])
+                                     {'size_m': np.array([0, 0, 1.7])}, {'prediction_m': np.full((1, 3), np.nan)},
+                                     {'prediction_step_s': 0.0}])
 def test_tracks_that_no_planner_should_see_are_named(changed):
     check_tracks([track_at([0, 0, 1], [1, 0, 0])])
-    with pytest.raises(ValueError, match='track 7 has position'):
+    with pytest.raises(ValueError, match='track 7 has p'):
         check_tracks([track_at([0, 0, 1], [1, 0, 0], number=7)._replace(**changed)])

@@ -151,6 +151,16 @@ def test_launch_files_set_no_parameter_that_the_node_does_not_know(name):
     params_from(given, *CONFIGS[name.replace('.launch', '.yaml')])
 
 
+@pytest.mark.parametrize('arguments, outputs', [([], None), (['planner:=teb, people', 'planner_frame:=odom'],
+                                                             'teb, people')])
+def test_the_pipeline_starts_the_planner_bridge_where_it_is_asked_to(arguments, outputs):
+    loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
+    loader.load(inside('launch', 'pipeline.launch'), config, argv=['weights:=yolov5n.pt'] + arguments, verbose=False)
+    given = {key: parameter.value for key, parameter in config.params.items()}
+    assert given.get('/planner_bridge_node/outputs') == outputs
+    assert given.get('/planner_bridge_node/planner_frame') == (outputs and 'odom')
+
+
 def test_rviz_shows_what_the_pipeline_publishes():
     with open(inside('rviz', 'pipeline.rviz')) as stream:
         content = yaml.safe_load(stream)

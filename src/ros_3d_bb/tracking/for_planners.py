@@ -9,13 +9,16 @@ LOWEST, HIGHEST = 0.25, 0.75  # of a cylinder's height: well off the floor, and 
 
 
 def check_tracks(tracks):
-    """Raise ValueError where a track has a number that is not finite or a size that is not positive."""
+    """Raise ValueError where a track has a number that is not finite, or a size or step that is not positive."""
     for track in tracks:
         values = np.concatenate([track.position_m, track.velocity_mps, track.size_m, track.prediction_m.ravel()])
         if not (np.isfinite(values).all() and (track.size_m > 0).all()):
             raise ValueError('track %d has position %s, velocity %s, size %s and prediction %s; finite numbers and a '
                              'positive size expected' % ((track.id,) + tuple(np.asarray(value).tolist() for value in (
                                  track.position_m, track.velocity_mps, track.size_m, track.prediction_m))))
+        if len(track.prediction_m) and not track.prediction_step_s > 0:
+            raise ValueError('track %d has predictions in steps of %g s; a positive step expected'
+                             % (track.id, track.prediction_step_s))
 
 
 def position_after(track, ahead_s):
