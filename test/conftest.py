@@ -25,6 +25,12 @@ def pytest_report_header(config):
     return 'ROS_3D_BB_DATA: %s' % (DATA or 'not set; the tests use data that they make themselves')
 
 
+@pytest.fixture(scope='session', autouse=True)
+def own_cache(tmp_path_factory):
+    """Exported networks of the tests, and of the nodes that they start, do not go into the user's cache."""
+    os.environ['ROS_3D_BB_CACHE'] = str(tmp_path_factory.mktemp('cache'))
+
+
 @pytest.fixture(scope='session')
 def session_folder(tmp_path_factory):
     """A measurement session: the real one, or a synthetic one."""

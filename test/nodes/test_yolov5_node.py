@@ -5,6 +5,7 @@ import subprocess
 import numpy as np
 import pytest
 import rospy
+import yaml
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool
@@ -17,6 +18,7 @@ from ros_3d_bb.stamped import NS
 from support.ros import Recorder, diagnostics_of, header_at, launched, publisher, wait_until
 
 START = 1000 * NS
+CONFIG = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'yolov5.yaml')
 
 
 @pytest.fixture(scope='module')
@@ -27,10 +29,16 @@ def images(session_folder):
     return [(read_color(frame, session.camera), frame.boxes_px[0]) for frame in frames]
 
 
-@pytest.fixture(scope='module')
-def camera(weights):
+@pytest.fixture(scope='module', params=['auto', 'torch'])
+def camera(request, weights, tmp_path_factory):
+    """Where to send images, with the node on each runtime."""
+    with open(CONFIG) as stream:
+        given = dict(yaml.safe_load(stream), runtime=request.param, threads=1)
+    params = str(tmp_path_factory.mktemp('params') / 'yolov5.yaml')
+    with open(params, 'w') as stream:
+        yaml.safe_dump(given, stream)
     rospy.init_node('test_yolov5_node')
-    with launched('yolov5.launch', 'weights:=' + weights):
+    with launched('yolov5.launch', 'weights:=' + weights, 'params:=' + params):
         yield publisher('camera/color/image_raw', Image)
 
 

@@ -12,7 +12,7 @@ import torch
 
 from ros_3d_bb.detection.checkpoint import WeightsError, class_names, read_checkpoint
 from ros_3d_bb.detection import checkpoint
-from ros_3d_bb.detection.runtime import open_runtime
+from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime
 from support.checkpoints import official_classes, write_checkpoint
 from support.layouts import layout
 from support.red_detector import write_red_detector
@@ -227,7 +227,7 @@ def test_any_byte_of_the_directory_may_be_wrong(path):
         with open(path, 'wb') as stream:
             stream.write(damaged)
         try:
-            open_runtime(path, 'cpu')
+            open_runtime(path, RuntimeParams('torch', 'cpu', 1))
         except WeightsError as error:
             refused += path in str(error)
     assert refused > 20

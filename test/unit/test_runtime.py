@@ -1,18 +1,40 @@
 """Whatever runs the network: the same predictions, and one clear error for what cannot be run."""
 import json
 import sys
+import types
 
 import numpy as np
 import pytest
 import torch
 
 from ros_3d_bb.detection.checkpoint import WeightsError
-from ros_3d_bb.detection.runtime import open_runtime, torch_device
-from ros_3d_bb.detection.yolov5 import letterboxed
+from ros_3d_bb.detection import runtime as seam
+from ros_3d_bb.detection import torch_runtime
+from ros_3d_bb.detection.exports import export
+from ros_3d_bb.detection.onnx_runtime import session_of
+from ros_3d_bb.detection.predictions import batch_of
+from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime, physical_cores
+from ros_3d_bb.detection.torch_runtime import TorchRuntime, torch_device
+from ros_3d_bb.detection.yolov5 import DetectionParams, Yolov5
+from ros_3d_bb.measurements import read_color, read_session
 from support.checkpoints import random_network, write_checkpoint
 from support.layouts import layout
 from support.official_reference import made
 from support.red_detector import write_red_detector
+
+
+RUNTIMES = ['torch', 'onnxruntime']
+ON_TORCH, ON_ONNX = RuntimeParams('torch', 'cpu', 1), RuntimeParams('onnxruntime', 'cpu', 1)
+
+
+def image_of(height=96, width=128):
+    return np.random.RandomState(0).randint(0, 256, (height, width, 3)).astype(np.uint8)
+
+
+def predicted(network, image):
+    """All predictions of a network of ours."""
+    with torch.no_grad():
+        return network(torch.from_numpy(batch_of(image)))[0].numpy()
 
 
 def exported_onnx(path, network, hw, metadata, dynamic=False):
@@ -29,43 +51,94 @@ def exported_onnx(path, network, hw, metadata, dynamic=False):
     return path
 
 
-def test_raw_output_agrees_with_the_official_code(official_output):
-    """Within 0.01 px and 1e-4 in every score, without letterbox (the images are multiples of the stride)."""
+@pytest.mark.parametrize('runtime', RUNTIMES)
+def test_raw_output_agrees_with_the_official_code(official_output, runtime):
+    """Within 0.01 px and 1e-4 in every score."""
     path, cases = official_output
-    runtime = open_runtime(path, 'cpu')
+    run = open_runtime(path, RuntimeParams(runtime, 'cpu', 1))
     for image, rows, values in cases:
-        batch, letterbox = letterboxed(image, (max(image.shape[:2]),) * 2, runtime.stride)
-        assert batch.shape[2:] == image.shape[:2] and letterbox == (1.0, 0, 0)
-        difference = np.abs(runtime(batch)[rows] - values)
+        difference = np.abs(run(image, -1)[rows] - values)
         assert difference[:, :4].max() <= 0.01
         assert difference[:, 4:].max() <= 1e-4
 
 
+@pytest.mark.parametrize('runtime', RUNTIMES)
 @pytest.mark.parametrize('release,model', [('6.0', 'n'), ('5.0', 's')])
-def test_raw_output_agrees_with_plain_numpy(tmp_path, release, model):
+def test_raw_output_agrees_with_plain_numpy(tmp_path, release, model, runtime):
     """Focus and SPP of release 5.0 too, of which there is no recorded output."""
     path, cases = made(str(tmp_path / 'random.pt'), layout(release, model))
-    runtime = open_runtime(path, 'cpu')
+    run = open_runtime(path, RuntimeParams(runtime, 'cpu', 1))
     for image, rows, values in cases:
-        batch, _letterbox = letterboxed(image, (96, 96), runtime.stride)
-        difference = np.abs(runtime(batch)[rows] - values)
+        difference = np.abs(run(image, -1)[rows] - values)
         assert difference[:, :4].max() <= 0.01 and difference[:, 4:].max() <= 1e-4
 
 
-def test_anchors_kept_twice_as_in_release_5_are_read_once(tmp_path):
+def test_every_runtime_finds_the_same_in_a_measurement_session(session_folder, official_output):
+    """Boxes within 1 px and scores within 0.01, at both of the sizes that are measured."""
+    session = read_session(session_folder)
+    for size in (640, 512):
+        detectors = [Yolov5(open_runtime(official_output[0], params), DetectionParams(image_size=size, confidence=0.2))
+                     for params in (ON_TORCH, ON_ONNX)]
+        for frame in session.frames[::12]:
+            one, other = (detector.detect(read_color(frame, session.camera)) for detector in detectors)
+            assert one.classes.tolist() == other.classes.tolist()
+            np.testing.assert_allclose(one.boxes, other.boxes, atol=1, rtol=0)
+            np.testing.assert_allclose(one.scores, other.scores, atol=0.01, rtol=0)
+
+
+@pytest.mark.parametrize('params', [ON_TORCH, ON_ONNX])
+def test_only_predictions_above_the_least_objectness_come_back(tmp_path, params):
+    path = str(tmp_path / 'random.pt')
+    write_checkpoint(path, layout('6.0', 'n'))
+    run = open_runtime(path, params)
+    everything = run(image_of(), -1)
+    levels = np.sort(everything[:, 4])
+    least = levels[np.diff(levels).argmax()] + np.diff(levels).max() / 2  # where rounding decides nothing
+    np.testing.assert_array_equal(run(image_of(), least), everything[everything[:, 4] > least])
+    assert run(image_of(), 1.0).shape == (0, 85)
+
+
+@pytest.mark.parametrize('params', [ON_TORCH, ON_ONNX])
+def test_anchors_kept_twice_as_in_release_5_are_read_once(tmp_path, params):
     path = str(tmp_path / 'five.pt')
     network = write_checkpoint(path, layout('5.0', 's'), anchor_grid=True)
-    batch = np.random.RandomState(0).random_sample((1, 3, 64, 64)).astype(np.float32)
-    with torch.no_grad():
-        expected = network(torch.from_numpy(batch))[0].numpy()
-    np.testing.assert_allclose(open_runtime(path, 'cpu')(batch), expected, atol=1e-3, rtol=1e-4)
+    found = open_runtime(path, params)(image_of(64, 64), -1)
+    np.testing.assert_allclose(found, predicted(network, image_of(64, 64)), atol=1e-3, rtol=1e-4)
+
+
+@pytest.mark.parametrize('activation', ['nn.ReLU()', 'nn.LeakyReLU(0.1)', 'nn.Hardswish()'])
+def test_every_activation_is_exported(tmp_path, activation):
+    path = str(tmp_path / 'other.pt')
+    network = write_checkpoint(path, dict(layout('6.0', 'n', 3), activation=activation))
+    found = open_runtime(path, ON_ONNX)(image_of(), -1)
+    np.testing.assert_allclose(found, predicted(network, image_of()), atol=1e-3, rtol=1e-4)
+
+
+def test_four_scales_are_exported(tmp_path):
+    path = str(tmp_path / 'six.pt')
+    network = write_checkpoint(path, layout('6.0', 'n6', 3))
+    run = open_runtime(path, ON_ONNX)
+    assert run.stride == 64
+    np.testing.assert_allclose(run(image_of(128, 64), -1), predicted(network, image_of(128, 64)), atol=1e-3, rtol=1e-4)
+
+
+def test_views_need_no_copy_by_the_caller(tmp_path):
+    """Images that came as bgr8, with rows longer than the image, or that cannot be written to."""
+    path = str(tmp_path / 'random.pt')
+    write_checkpoint(path, layout('6.0', 'n', 3))
+    whole = np.ascontiguousarray(np.pad(image_of(), ((0, 0), (0, 7), (0, 0)), 'edge')[..., ::-1])
+    whole.setflags(write=False)
+    view = whole[:, :128, ::-1]
+    for params in (ON_TORCH, ON_ONNX):
+        run = open_runtime(path, params)
+        np.testing.assert_array_equal(run(view, -1), run(image_of(), -1))
 
 
 def test_weights_that_do_not_fit_their_layout_are_refused(tmp_path):
     path = str(tmp_path / 'wrong.pt')
     write_checkpoint(path, layout('6.0', 'n'), yaml=layout('6.0', 's'))
     with pytest.raises(WeightsError, match='wrong.pt: the network cannot be rebuilt .* expected the checkpoint'):
-        open_runtime(path, 'cpu')
+        open_runtime(path)
 
 
 @pytest.mark.parametrize('dynamic', [False, True])
@@ -76,10 +149,7 @@ def test_onnx_exports_give_the_same_predictions(tmp_path, dynamic):
     runtime = open_runtime(path)
     assert runtime.names == ['person', 'cat', 'dog'] and runtime.stride == 32
     assert runtime.input_hw == (None if dynamic else (96, 128))
-    batch = np.random.RandomState(0).random_sample((1, 3, 96, 128)).astype(np.float32)
-    with torch.no_grad():
-        expected = network(torch.from_numpy(batch))[0].numpy()
-    np.testing.assert_allclose(runtime(batch), expected, atol=1e-3, rtol=1e-4)
+    np.testing.assert_allclose(runtime(image_of(), -1), predicted(network, image_of()), atol=1e-3, rtol=1e-4)
 
 
 def test_torchscript_exports_give_the_same_predictions(tmp_path):
@@ -87,19 +157,16 @@ def test_torchscript_exports_give_the_same_predictions(tmp_path):
     path = str(tmp_path / 'model.torchscript')
     config = {'shape': [1, 3, 96, 128], 'stride': 32, 'names': {'0': 'person'}}
     torch.jit.trace(network, torch.zeros(1, 3, 96, 128)).save(path, _extra_files={'config.txt': json.dumps(config)})
-    runtime = open_runtime(path, 'cpu')
+    runtime = open_runtime(path)
     assert runtime.input_hw == (96, 128) and runtime.stride == 32 and runtime.names[0] == 'person'
-    batch = np.random.RandomState(0).random_sample((1, 3, 96, 128)).astype(np.float32)
-    with torch.no_grad():
-        expected = network(torch.from_numpy(batch))[0].numpy()
-    np.testing.assert_allclose(runtime(batch), expected, atol=1e-3, rtol=1e-4)
+    np.testing.assert_allclose(runtime(image_of(), -1), predicted(network, image_of()), atol=1e-3, rtol=1e-4)
 
 
 def test_torchscript_runs_only_by_its_name(tmp_path):
     """It is a program, and a checkpoint must never be one."""
-    assert open_runtime(write_red_detector(str(tmp_path / 'red.torchscript.pt')), 'cpu').names[0] == 'person'
+    assert open_runtime(write_red_detector(str(tmp_path / 'red.torchscript.pt'))).names[0] == 'person'
     with pytest.raises(WeightsError, match='must end in .torchscript'):
-        open_runtime(write_red_detector(str(tmp_path / 'red.pt')), 'cpu')
+        open_runtime(write_red_detector(str(tmp_path / 'red.pt')))
 
 
 @pytest.mark.parametrize('edit', [
@@ -112,7 +179,7 @@ def test_layouts_that_cannot_run_are_refused_when_the_file_is_opened(tmp_path, e
     edit(given)
     write_checkpoint(path, layout('6.0', 'n'), yaml=given)
     with pytest.raises(WeightsError, match='cannot be rebuilt'):
-        open_runtime(path, 'cpu')
+        open_runtime(path)
 
 
 class NotADetector(torch.nn.Module):
@@ -134,7 +201,7 @@ def test_exports_that_cannot_be_run_are_refused(tmp_path, suffix, kind):
     elif kind == 'other':
         exported_onnx(path, NotADetector(), (64, 64), {})
     with pytest.raises(WeightsError, match='weights %s: not a YOLOv5 .* export .*expected' % path):
-        open_runtime(path, 'cpu')
+        open_runtime(path)
 
 
 def test_onnx_without_onnx_runtime_says_what_to_install(tmp_path, monkeypatch):
@@ -152,9 +219,86 @@ def test_names_in_an_export_are_never_run(tmp_path):
     assert not victim.exists()
 
 
-def test_a_device_that_does_not_exist_is_named():
+def test_a_device_that_does_not_exist_is_named(tmp_path):
+    path = str(tmp_path / 'random.pt')
+    write_checkpoint(path, layout('6.0', 'n', 3))
     assert torch_device('cpu').type == 'cpu'
     assert torch_device('auto').type in ('cpu', 'cuda')
     for name in ('cuda:99', 'toaster'):
         with pytest.raises(ValueError, match=name):
-            torch_device(name)
+            open_runtime(path, RuntimeParams(device=name))
+
+
+@pytest.mark.parametrize('params,reason', [
+    (RuntimeParams(runtime='tensorflow'), "'tensorflow'; one of auto, onnxruntime, torch"),
+    (RuntimeParams(threads=-1), 'threads is -1'),
+    (RuntimeParams(runtime='onnxruntime', device='cuda'), "works on the CPU, and device is 'cuda'")])
+def test_parameters_that_make_no_sense_are_named(params, reason):
+    with pytest.raises(ValueError, match=reason):
+        open_runtime('any.pt', params)
+
+
+@pytest.mark.parametrize('name,runtime', [('model.onnx', 'torch'), ('model.torchscript', 'onnxruntime')])
+def test_a_runtime_that_cannot_run_a_file_says_which_can(name, runtime):
+    with pytest.raises(ValueError, match='runtime %s cannot run %s; use auto' % (runtime, name)):
+        open_runtime(name, RuntimeParams(runtime=runtime))
+
+
+def test_on_a_cpu_a_checkpoint_runs_on_onnx_runtime_with_the_threads_asked_for(official_output):
+    assert open_runtime(official_output[0], RuntimeParams(threads=3)).description == 'ONNX Runtime, 3 threads'
+    assert open_runtime(official_output[0], ON_TORCH).description == 'torch on the CPU, 1 thread'
+    assert torch.get_num_threads() == 1
+
+
+def test_threads_are_those_of_the_machine_but_not_many(monkeypatch, official_output):
+    assert physical_cores() >= 1
+    monkeypatch.setattr(seam, 'physical_cores', lambda: 64)
+    assert open_runtime(official_output[0], RuntimeParams(device='cpu')).description == 'ONNX Runtime, 4 threads'
+
+
+def test_waiting_threads_leave_the_cores_to_others(official_output):
+    """ONNX Runtime's threads spin by default."""
+    options = session_of(export(official_output[0], 'any'), 2).get_session_options()
+    assert options.get_session_config_entry('session.intra_op.allow_spinning') == '0'
+    assert options.intra_op_num_threads == 2
+
+
+class Gpu(object):
+    """Stands in for torch.device('cuda')."""
+
+    type = 'cuda'
+
+
+def test_a_gpu_is_used_by_torch_in_half_precision(monkeypatch, official_output):
+    calls = []
+    monkeypatch.setattr(seam, 'gpu_count', lambda: 1)
+    monkeypatch.setattr(torch_runtime, 'torch_device', lambda name: Gpu())
+    monkeypatch.setattr(torch_runtime.Network, 'to', lambda network, device: calls.append(device.type) or network)
+    runtime = open_runtime(official_output[0])
+    assert isinstance(runtime, TorchRuntime) and calls == ['cuda']
+    assert next(runtime._network.parameters()).dtype == torch.float16
+
+
+def test_a_gpu_that_torch_cannot_use_changes_nothing(monkeypatch, official_output):
+    monkeypatch.setattr(seam, 'gpu_count', lambda: 1)
+    monkeypatch.setattr(torch.cuda, 'is_available', lambda: False)
+    assert open_runtime(official_output[0]).description.startswith('ONNX Runtime')
+
+
+def test_half_precision_finds_the_same_boxes(official_output):
+    """Half the numbers' length on the CPU, as on a GPU: within 1 px and 0.01 of the recorded predictions."""
+    path, cases = official_output
+    network = torch_runtime.network_of(path)[0].half()
+    for image, rows, values in cases:
+        found = torch_runtime.run(network, image).numpy()[rows]
+        likely = values[:, 4] > 0.2
+        assert found.dtype == np.float32 and likely.any()
+        assert np.abs(found - values)[likely, :4].max() <= 1
+        assert np.abs(found - values)[likely, 4:].max() <= 0.01
+
+
+def test_drivers_without_a_gpu_count_none(monkeypatch):
+    monkeypatch.setattr(seam.ctypes, 'CDLL', lambda name: types.SimpleNamespace(cuInit=lambda flags: 100))
+    assert seam.gpu_count() == 0
+    monkeypatch.setattr(seam.ctypes, 'CDLL', lambda name: types.SimpleNamespace())
+    assert seam.gpu_count() == 0

@@ -7,7 +7,6 @@ import glob
 import os
 
 import pytest
-import torch
 
 from conftest import DATA
 from ros_3d_bb.evaluation.identities import score
@@ -28,7 +27,6 @@ OTHERS_EVERY = {'depth': 6, 'yolov5': 12}  # in the scenes where only detections
 def yolov5():
     if not DATA:
         return lambda frame: [person.box_px for person in frame.people if person.visible > 0.3]
-    torch.set_num_threads(1)  # more wait for each other where other tests or programs are at work
     return yolov5_detector(os.path.join(DATA, 'weights', 'yolov5n.pt'))
 
 

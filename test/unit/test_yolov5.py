@@ -5,6 +5,7 @@ from hypothesis import given, settings, strategies as st
 from hypothesis.extra import numpy as hnp
 
 from ros_3d_bb.detection.boxes import Detections, iou, suppressed
+from ros_3d_bb.detection.predictions import batch_of
 from ros_3d_bb.detection.runtime import open_runtime
 from ros_3d_bb.detection.yolov5 import DetectionParams, Yolov5, class_number, decoded, letterboxed
 from ros_3d_bb.measurements import read_color, read_session
@@ -17,17 +18,18 @@ class FixedRuntime(object):
 
     def __init__(self, rows=()):
         self.rows = np.array(rows, np.float32).reshape(-1, 7)
-        self.batches = []
+        self.inputs = []
 
-    def __call__(self, batch):
-        self.batches.append(batch.shape)
+    def __call__(self, image, _least):
+        assert image.dtype == np.uint8
+        self.inputs.append(image.shape)
         return self.rows
 
 
 def test_finds_the_person_in_a_measurement_session(session_folder, weights):
     """In at least 107 of 110 frames at confidence 0.25, with a median IoU of at least 0.93 with the recorded boxes."""
     session = read_session(session_folder)
-    detector = Yolov5(open_runtime(weights, 'cpu'), DetectionParams(confidence=0.25))
+    detector = Yolov5(open_runtime(weights), DetectionParams(confidence=0.25))
     overlaps = []
     for frame in session.frames:
         found = detector.detect(read_color(frame, session.camera))
@@ -41,33 +43,39 @@ def test_finds_the_person_in_a_measurement_session(session_folder, weights):
 @given(st.integers(1, 900), st.integers(1, 900), st.sampled_from([None, 32, 64]))
 @settings(max_examples=60)
 def test_letterbox_and_back(height, width, stride):
-    batch, letterbox = letterboxed(np.zeros((height, width, 3), np.uint8), (640, 640), stride)
-    assert batch.shape[2] <= 640 and batch.shape[3] <= 640 and max(batch.shape[2:]) == 640
-    assert batch.shape[2:] == (640, 640) if stride is None else all(n % stride == 0 for n in batch.shape[2:])
+    scaled, letterbox = letterboxed(np.zeros((height, width, 3), np.uint8), (640, 640), stride)
+    assert max(scaled.shape[:2]) == 640
+    assert scaled.shape[:2] == (640, 640) if stride is None else all(n % stride == 0 for n in scaled.shape[:2])
     corner = np.array([[letterbox.left, letterbox.top, letterbox.left + width * letterbox.scale,
                         letterbox.top + height * letterbox.scale]])
     np.testing.assert_allclose(letterbox.undo(corner, (height, width)), [[0, 0, width, height]], atol=1e-6)
 
 
-def test_letterbox_keeps_channels_and_scales_to_one():
+def test_an_image_of_the_right_size_is_neither_padded_nor_copied():
     image = np.zeros((480, 640, 3), np.uint8)
+    scaled, letterbox = letterboxed(image, (640, 640), 32)
+    assert scaled is image and letterbox == (1.0, 0, 0)
+
+
+def test_a_batch_has_the_channels_first_and_ends_at_one():
+    image = np.zeros((4, 6, 3), np.uint8)
     image[..., 0] = 255
-    batch, letterbox = letterboxed(image, (640, 640), 32)
-    assert batch.shape == (1, 3, 480, 640) and letterbox == (1.0, 0, 0)
-    assert batch.dtype == np.float32 and batch[0, 0].min() == 1 and batch[0, 1:].max() == 0
+    batch = batch_of(image)
+    assert batch.shape == (1, 3, 4, 6) and batch.dtype == np.float32
+    assert batch[0, 0].min() == 1 and batch[0, 1:].max() == 0
 
 
 def test_views_with_reversed_channels_can_be_letterboxed():
     image = np.arange(300 * 500 * 3, dtype=np.uint8).reshape(300, 500, 3)
-    batch, _letterbox = letterboxed(image[..., ::-1], (640, 640), 32)
+    scaled, _letterbox = letterboxed(image[..., ::-1], (640, 640), 32)
     other, _letterbox = letterboxed(image, (640, 640), 32)
-    np.testing.assert_array_equal(batch[:, ::-1], other)
+    np.testing.assert_array_equal(scaled[..., ::-1], other)
 
 
 def test_boxes_come_back_in_pixels_of_the_image_and_cut_at_its_border():
     runtime = FixedRuntime([(320, 320, 320, 160, 0.9, 1, 0), (0, 320, 100, 100, 0.8, 1, 0)])
     found = Yolov5(runtime).detect(np.zeros((360, 1280, 3), np.uint8))  # input 640x192, scale 0.5, 6 rows padded
-    assert runtime.batches == [(1, 3, 192, 640)]
+    assert runtime.inputs == [(192, 640, 3)]
     np.testing.assert_allclose(found.boxes[0], [320, 360, 960, 360])
     np.testing.assert_allclose(found.boxes[1, 0], 0)
 
@@ -130,9 +138,9 @@ def test_exports_of_a_fixed_size_get_that_size_with_grey_on_both_sides():
     class Fixed(FixedRuntime):
         input_hw = (64, 128)
 
-        def __call__(self, batch):
-            assert batch.shape == (1, 3, 64, 128)
-            edges = np.nonzero(np.abs(batch[0, 0, 32] - 114 / 255) > 1e-6)[0]
+        def __call__(self, image, _least):
+            assert image.shape == (64, 128, 3)
+            edges = np.nonzero(image[32, :, 0] != 114)[0]
             assert (edges[0], edges[-1]) == (21, 105)  # 85 of 128 columns, 43 of them padded
             return np.array([(64, 32, 85, 64, 0.9, 1, 0)], np.float32)
     found = Yolov5(Fixed()).detect(np.zeros((300, 400, 3), np.uint8))
@@ -142,4 +150,4 @@ def test_exports_of_a_fixed_size_get_that_size_with_grey_on_both_sides():
 def test_the_input_is_rounded_up_to_the_stride():
     runtime = FixedRuntime()
     Yolov5(runtime, DetectionParams(image_size=500)).detect(np.zeros((480, 640, 3), np.uint8))
-    assert runtime.batches == [(1, 3, 384, 512)]
+    assert runtime.inputs == [(384, 512, 3)]

@@ -12,6 +12,7 @@ import roslaunch
 import yaml
 
 from ros_3d_bb.detection.bodies import DepthPeopleParams
+from ros_3d_bb.detection.runtime import RuntimeParams
 from ros_3d_bb.detection.yolov5 import DetectionParams
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dParams
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorParams
@@ -28,7 +29,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-pytorch-pip', 'onnxruntime': None,
         'yaml': 'python3-yaml', 'matplotlib': 'python3-matplotlib', 'scipy': 'python3-scipy'}
 TEST_KEYS = {'pytest': 'python3-pytest'}
-CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams), 'bbox3d.yaml': (Bbox3dParams,),
+CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams, RuntimeParams), 'bbox3d.yaml': (Bbox3dParams,),
            'tracker.yaml': (TrackerNodeParams, ThesisTrackerParams), 'simulator.yaml': (SimulatorParams,),
            'planner_bridge.yaml': (PlannerBridgeParams,),
            'depth_detector.yaml': (DepthDetectorParams, DepthPeopleParams)}
@@ -159,6 +160,13 @@ def test_the_pipeline_starts_the_planner_bridge_where_it_is_asked_to(arguments, 
     given = {key: parameter.value for key, parameter in config.params.items()}
     assert given.get('/planner_bridge_node/outputs') == outputs
     assert given.get('/planner_bridge_node/planner_frame') == (outputs and 'odom')
+
+
+def test_waiting_threads_of_torch_leave_the_cores_to_other_nodes():
+    """A library that OpenCV loads too reads it at its start, so only the environment can say it."""
+    loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
+    loader.load(inside('launch', 'yolov5.launch'), config, argv=REQUIRED_ARGUMENTS, verbose=False)
+    assert [node.env_args for node in config.nodes] == [[('OMP_WAIT_POLICY', 'PASSIVE')]]
 
 
 def test_rviz_shows_what_the_pipeline_publishes():

@@ -7,6 +7,7 @@ numbers, names and the layout of the network. (What is left: a file can be made 
 very long, by hashing nested tuples.)
 """
 import collections
+import hashlib
 import pickle
 import zipfile
 from typing import Dict, List, NamedTuple
@@ -49,12 +50,27 @@ def read_checkpoint(path):
             root = _Unpickler(archive).load()
         return _checkpoint_from(root)
     except FileNotFoundError:
-        raise WeightsError('weights %s: no such file; %s' % (path, EXPECTED))
+        raise _missing(path)
     except zipfile.BadZipFile as error:
         raise WeightsError('weights %s: truncated, or not a checkpoint at all, or one of torch before 1.6 (%s); %s'
                            % (path, cause(error), EXPECTED))
     except Exception as error:  # a damaged or hostile pickle can raise anything; it all means the same
         raise WeightsError('weights %s: refused (%s); %s' % (path, cause(error), EXPECTED))
+
+
+def checkpoint_digest(path):
+    """SHA-256 of a file, in hexadecimal. Raises WeightsError where it cannot be read."""
+    try:
+        with open(path, 'rb') as stream:
+            return hashlib.sha256(stream.read()).hexdigest()
+    except FileNotFoundError:
+        raise _missing(path)
+    except OSError as error:
+        raise WeightsError('weights %s: %s; %s' % (path, cause(error), EXPECTED))
+
+
+def _missing(path):
+    return WeightsError('weights %s: no such file; %s' % (path, EXPECTED))
 
 
 def cause(error):

@@ -132,7 +132,7 @@ class Detect(nn.Module):
 
     def _decode(self, scale, x):
         stride, anchors = self.strides[scale], self.anchors[scale]
-        y = self.m[scale](x)
+        y = self.m[scale](x).float()  # in half precision, x and y of boxes would be whole numbers
         batch, _, height, width = y.shape
         y = y.view(batch, anchors.shape[0], self.columns, height, width).permute(0, 1, 3, 4, 2).sigmoid()
         column = torch.arange(width, device=y.device, dtype=y.dtype).view(1, 1, 1, width)

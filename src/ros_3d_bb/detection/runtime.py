@@ -1,21 +1,32 @@
 """What runs a network: one seam, so that the detector does not know whether torch or ONNX Runtime does.
 
-A runtime is called with a batch (1, 3, height, width), float32, RGB, 0..1, and returns its predictions
-(rows, 5 + classes), float32: x, y, width, height in pixels of the batch, objectness, class scores. It has
-`names`, the class names; `stride`, of which height and width must be multiples; and `input_hw`, the one
-(height, width) that it takes, or None where it takes any.
+A runtime is called with an image (height, width, 3), uint8, RGB, and a least objectness, and returns the predictions
+above it (rows, 5 + classes), float32: x, y, width, height in pixels of the image, objectness, class scores. It has
+`names`, the class names; `stride`, of which height and width must be multiples; `input_hw`, the one (height, width)
+that it takes, or None where it takes any; and `description`, itself in words.
 """
-import ast
-import json
+import ctypes
+import os
+import warnings
+from typing import NamedTuple
 
-import numpy as np
-import torch
+from ros_3d_bb.detection.exports import export_folder, exported_runtime
+from ros_3d_bb.detection.onnx_runtime import OnnxRuntime, OnnxUnusable
 
-from ros_3d_bb.detection.checkpoint import EXPECTED, WeightsError, cause, class_names, read_checkpoint
-from ros_3d_bb.detection.network import Network
+RUNTIMES = ('auto', 'onnxruntime', 'torch')
+MAX_THREADS = 4  # taken by itself; the networks that a robot's CPU can run gain little from more
 
 
-def open_runtime(path, device='auto'):
+class RuntimeParams(NamedTuple):
+    """What runs the network, and where; see config/yolov5.yaml."""
+
+    runtime: str = 'auto'
+    device: str = 'auto'
+    threads: int = 0
+    export_folder: str = ''
+
+
+def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
     """The runtime for a file of weights.
 
     Parameters
@@ -23,129 +34,92 @@ def open_runtime(path, device='auto'):
     path : str
         An official checkpoint (.pt), or a model exported by YOLOv5 to TorchScript (.torchscript) or ONNX (.onnx).
         A TorchScript file is a program: run only those that you trust.
-    device : str
-        'auto' (CUDA where there is a GPU, else the CPU), or a torch device: 'cpu', 'cuda', 'cuda:1'.
+    params : RuntimeParams
+    warn : callable
+        Told, as a line of text, what is not as it was meant to be but does no harm.
 
     Raises
     ------
     WeightsError
         If the file cannot be used; names the file and what was expected.
     ValueError
-        If the device does not exist.
+        If a parameter makes no sense, the device does not exist, or the runtime asked for cannot run this file.
     """
-    path = str(path)
+    path, threads = str(path), checked_threads(params)
     if path.endswith('.onnx'):
-        return OnnxRuntime(path)
+        if params.runtime == 'torch':
+            raise ValueError('runtime torch cannot run %s; use auto or onnxruntime, or the .pt checkpoint' % path)
+        return OnnxRuntime(path, threads)
     if path.endswith(('.torchscript', '.torchscript.pt')):
-        return TorchScriptRuntime(path, torch_device(device))
-    return TorchRuntime(path, torch_device(device))
+        if params.runtime == 'onnxruntime':
+            raise ValueError('runtime onnxruntime cannot run %s; use auto or torch, or the .pt checkpoint' % path)
+        from ros_3d_bb.detection.torch_runtime import TorchScriptRuntime, torch_device
+        return TorchScriptRuntime(path, torch_device(params.device), threads)
+    return _of_checkpoint(path, params, threads, warn)
 
 
-def torch_device(name):
-    """The torch.device of that name, checked; 'auto' takes CUDA where it works."""
-    if name == 'auto':
-        return torch.device('cuda' if torch.cuda.is_available() else 'cpu')
+def _of_checkpoint(path, params, threads, warn):
+    """ONNX Runtime on a CPU, where it is there and works: it takes half of torch's time. Torch on a GPU."""
+    if params.runtime == 'onnxruntime' or params.runtime == 'auto' and not on_gpu(params.device):
+        try:
+            return exported_runtime(path, export_folder(params.export_folder), threads, warn)
+        except OnnxUnusable as error:
+            if params.runtime == 'onnxruntime':
+                raise
+            warn('%s; torch runs the network instead, which takes twice the time' % error)
+    from ros_3d_bb.detection.torch_runtime import TorchRuntime, torch_device
+    return TorchRuntime(path, torch_device(params.device), threads)
+
+
+def on_gpu(device):
+    """Whether a network for this device, 'auto' included, runs on a GPU.
+
+    Torch, which takes a second and 200 MB to import, is asked only where NVIDIA's driver reports a GPU.
+    """
+    if device != 'auto':
+        return not device.startswith('cpu')
+    if gpu_count() == 0:
+        return False
+    from ros_3d_bb.detection.torch_runtime import torch_device
+    return torch_device('auto').type == 'cuda'
+
+
+def gpu_count():
+    """How many GPUs NVIDIA's driver reports; 0 where there is no driver."""
+    count = ctypes.c_int(0)
     try:
-        device = torch.device(name)
-        torch.zeros(1, device=device)
-    except (RuntimeError, AssertionError) as error:
-        raise ValueError('device %r cannot be used (%s); use auto, cpu or, with an NVIDIA GPU, cuda'
-                         % (name, cause(error)))
-    return device
+        driver = ctypes.CDLL('libcuda.so.1')
+        if driver.cuInit(0) == 0:
+            driver.cuDeviceGetCount(ctypes.byref(count))
+    except (OSError, AttributeError):  # no driver, or none worth the name
+        pass
+    return count.value
 
 
-class TorchRuntime(object):
-    """A network of ours with the weights of an official checkpoint."""
-
-    input_hw = None
-
-    def __init__(self, path, device):
-        checkpoint = read_checkpoint(path)
-        self.names, self._device = checkpoint.names, device
-        try:
-            network = Network(checkpoint.layout)
-            network.load_state_dict({name: torch.from_numpy(array.astype(np.float32))
-                                     for name, array in checkpoint.weights.items()
-                                     if not name.endswith('.anchor_grid')})  # release 5.0 keeps the anchors twice
-            self.stride = checked_stride(network.stride)
-            self._network = network.fuse().to(device)
-            self(np.zeros((1, 3, self.stride, self.stride), np.float32))
-        except Exception as error:  # a layout is data from outside: whatever is wrong with it, say so once
-            raise WeightsError('weights %s: the network cannot be rebuilt from the yaml inside (%s); %s'
-                               % (path, cause(error), EXPECTED))
-
-    def __call__(self, batch):
-        with torch.no_grad():
-            return self._network(torch.from_numpy(batch).to(self._device))[0].cpu().numpy()
-
-
-class TorchScriptRuntime(object):
-    """A model that YOLOv5 exported to TorchScript; it takes the one image size that it was exported for."""
-
-    def __init__(self, path, device):
-        extra = {'config.txt': ''}
-        try:
-            self._module = torch.jit.load(path, map_location=device, _extra_files=extra).eval()
-            config = json.loads(extra['config.txt'] or '{}')
-            self.input_hw = tuple(config.get('shape', (1, 3, 640, 640))[2:])
-            self.stride = checked_stride(config.get('stride', 32))
-            self._device = device
-            columns = self(np.zeros((1, 3) + self.input_hw, np.float32)).shape[1]
-        except Exception as error:  # a damaged file can raise anything; it all means the same
-            raise WeightsError('weights %s: not a YOLOv5 TorchScript export (%s); expected the file that its export.py '
-                               'writes (release 5.0: with --grid; without --half)' % (path, cause(error)))
-        self.names = class_names(config.get('names'), columns - 5)
-
-    def __call__(self, batch):
-        with torch.no_grad():
-            output = self._module(torch.from_numpy(batch).to(self._device))
-        return predictions(output[0] if isinstance(output, (tuple, list)) else output).cpu().numpy()
-
-
-class OnnxRuntime(object):
-    """A model that YOLOv5 exported to ONNX, run on the CPU."""
-
-    def __init__(self, path):
-        try:
-            import onnxruntime
-        except ImportError:
-            raise WeightsError('weights %s: running .onnx needs ONNX Runtime; install it with '
-                               '"pip3 install onnxruntime", or use the .pt checkpoint' % path)
-        try:
-            self._session = onnxruntime.InferenceSession(path, providers=['CPUExecutionProvider'])
-            entry = self._session.get_inputs()[0]
-            self._input, self._dtype = entry.name, {'tensor(float16)': np.float16}.get(entry.type, np.float32)
-            size = entry.shape[2:]
-            self.input_hw = tuple(size) if all(isinstance(n, int) for n in size) else None
-            metadata = self._session.get_modelmeta().custom_metadata_map
-            self.stride = checked_stride(metadata.get('stride', 32))
-            columns = self(np.zeros((1, 3) + (self.input_hw or (self.stride, self.stride)), np.float32)).shape[1]
-            names = ast.literal_eval(metadata.get('names', 'None'))  # literals only: runs nothing
-        except Exception as error:  # a damaged file can raise anything; it all means the same
-            raise WeightsError('weights %s: not a YOLOv5 ONNX export (%s); expected the file that its export.py writes'
-                               % (path, cause(error)))
-        self.names = class_names(names, columns - 5)
-
-    def __call__(self, batch):
-        output = self._session.run(None, {self._input: batch.astype(self._dtype, copy=False)})[0]
-        return predictions(output).astype(np.float32, copy=False)
-
-
-def checked_stride(stride):
-    """A stride as a positive int. Raises ValueError."""
-    if not 1 <= int(stride) <= 1024:
-        raise ValueError('its stride is %s' % stride)
-    return int(stride)
-
-
-def predictions(output):
-    """The predictions (rows, 5 + classes) of the one image in an output (1, rows, 5 + classes).
+def checked_threads(params):
+    """How many threads a runtime uses: as many as asked for, or as this machine has cores, up to MAX_THREADS.
 
     Raises
     ------
     ValueError
-        If the output has another shape: the model is no YOLOv5 detector.
+        If a parameter makes no sense.
     """
-    if len(output.shape) != 3 or output.shape[0] != 1 or output.shape[2] < 6:
-        raise ValueError('its output has shape %s; (1, rows, 5 + classes) expected' % (tuple(output.shape),))
-    return output[0]
+    if params.runtime not in RUNTIMES:
+        raise ValueError('runtime is %r; one of %s expected' % (params.runtime, ', '.join(RUNTIMES)))
+    if params.runtime == 'onnxruntime' and params.device not in ('auto', 'cpu'):
+        raise ValueError('runtime onnxruntime works on the CPU, and device is %r; use runtime torch' % params.device)
+    if not 0 <= params.threads <= 1024:
+        raise ValueError('threads is %d; 1 or more expected, or 0 for as many as there are cores' % params.threads)
+    return params.threads or min(physical_cores(), MAX_THREADS)
+
+
+def physical_cores():
+    """Cores that this process may use; the two hardware threads of one core are one."""
+    cores = set()
+    for number in os.sched_getaffinity(0):
+        try:
+            with open('/sys/devices/system/cpu/cpu%d/topology/thread_siblings_list' % number) as stream:
+                cores.add(stream.read())
+        except OSError:
+            cores.add(number)
+    return len(cores)

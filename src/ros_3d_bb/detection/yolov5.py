@@ -66,8 +66,8 @@ class Yolov5(object):
         return self._runtime.names
 
     def warm_up(self):
-        """Run the network once on nothing: the first run takes several times as long as those after it."""
-        self._runtime(np.zeros((1, 3) + self._input_hw, np.float32))
+        """Search once in nothing: the first run of a network takes several times as long as those after it."""
+        self.detect(np.zeros((480, 640, 3), np.uint8))
 
     def detect(self, image):
         """Find objects in an RGB image (height, width, 3), uint8.
@@ -76,8 +76,8 @@ class Yolov5(object):
         -------
         Detections
         """
-        batch, letterbox = letterboxed(image, self._input_hw, self._stride)
-        rows = self._runtime(batch)
+        scaled, letterbox = letterboxed(image, self._input_hw, self._stride)
+        rows = self._runtime(scaled, self._params.confidence)
         found = suppressed(decoded(rows, self._params.confidence, self._classes), self._params.iou,
                            self._params.max_det)
         return found._replace(boxes=letterbox.undo(found.boxes, image.shape[:2]))
@@ -117,7 +117,8 @@ def letterboxed(image, input_hw, stride=None):
 
     Returns
     -------
-    batch : numpy.ndarray, (1, 3, height, width), float32, 0..1
+    scaled : numpy.ndarray, (height, width, 3), uint8, RGB
+        The image itself where it has the size already.
     letterbox : Letterbox
     """
     height, width = image.shape[:2]
@@ -131,9 +132,7 @@ def letterboxed(image, input_hw, stride=None):
     top, left = pad_y // 2, pad_x // 2
     if pad_x or pad_y:
         image = cv2.copyMakeBorder(image, top, pad_y - top, left, pad_x - left, cv2.BORDER_CONSTANT, value=GREY)
-    batch = np.ascontiguousarray(image.transpose(2, 0, 1)[None], np.float32)
-    batch /= 255
-    return batch, Letterbox(scale, left, top)
+    return image, Letterbox(scale, left, top)
 
 
 def decoded(rows, confidence, classes):

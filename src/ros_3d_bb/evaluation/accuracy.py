@@ -50,7 +50,7 @@ def boxes_of(session, weights=None):
         return [frame.boxes_px[0] for frame in session.frames]
     from ros_3d_bb.detection.runtime import open_runtime  # torch takes seconds to import
     from ros_3d_bb.detection.yolov5 import Yolov5
-    detector, chosen = Yolov5(open_runtime(weights, 'cpu')), []
+    detector, chosen = Yolov5(open_runtime(weights)), []
     for frame in session.frames:
         boxes = detector.detect(read_color(frame, session.camera)).boxes
         overlaps = iou(frame.boxes_px[0], boxes)

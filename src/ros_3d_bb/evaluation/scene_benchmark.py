@@ -29,7 +29,7 @@ def yolov5_detector(weights):
     """YOLOv5 for `run_scene`, of a checkpoint. Raises ValueError where it cannot be used."""
     from ros_3d_bb.detection.runtime import open_runtime  # torch takes seconds to import
     from ros_3d_bb.detection.yolov5 import Yolov5
-    detector = Yolov5(open_runtime(weights, 'cpu'))
+    detector = Yolov5(open_runtime(weights))
     return lambda frame: detector.detect(frame.color).boxes
 
 

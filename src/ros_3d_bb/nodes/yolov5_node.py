@@ -5,7 +5,7 @@ from typing import NamedTuple
 import rospy
 from sensor_msgs.msg import Image
 
-from ros_3d_bb.detection.runtime import open_runtime
+from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime
 from ros_3d_bb.detection.yolov5 import DetectionParams, Yolov5
 from ros_3d_bb.images import rgb_from
 from ros_3d_bb.messages import stamp_of
@@ -19,7 +19,6 @@ class Yolov5NodeParams(NamedTuple):
     """See config/yolov5.yaml."""
 
     weights: str = ''
-    device: str = 'auto'
     enabled: bool = True
     publish_empty: bool = True
 
@@ -32,11 +31,11 @@ class Yolov5Node(object):
     """
 
     def __init__(self):
-        self._params, detection = read_params(Yolov5NodeParams, DetectionParams)
+        self._params, detection, running = read_params(Yolov5NodeParams, DetectionParams, RuntimeParams)
         if not self._params.weights:
             raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
                              'checkpoint such as yolov5n.pt')
-        runtime = open_runtime(os.path.abspath(os.path.expanduser(self._params.weights)), self._params.device)
+        runtime = open_runtime(os.path.abspath(os.path.expanduser(self._params.weights)), running, rospy.logwarn)
         self._detector = Yolov5(runtime, detection)
         self._detector.warm_up()
         self._diagnostics = Diagnostics()
@@ -45,7 +44,8 @@ class Yolov5Node(object):
         rospy.on_shutdown(self._worker.stop)
         self._switch = Switch(self._params.enabled)
         rospy.Subscriber('camera/color/image_raw', Image, self._on_image, queue_size=1, buff_size=2 ** 24)
-        rospy.loginfo('looking for %s with %s', ', '.join(map(str, detection.classes)), self._params.weights)
+        rospy.loginfo('looking for %s with %s on %s', ', '.join(map(str, detection.classes)), self._params.weights,
+                      runtime.description)
 
     def _on_image(self, message):
         if self._switch.on and self._worker.offer(message):

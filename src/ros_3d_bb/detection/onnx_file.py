@@ -1,0 +1,101 @@
+"""Write ONNX files: the few messages of the format that a network needs, in protobuf's encoding.
+
+Written here because neither the `onnx` package nor torch's exporters can be counted on: the one is missing on most
+robots, the others differ from release to release. Field numbers: https://github.com/onnx/onnx/blob/main/onnx/onnx.proto
+"""
+import struct
+
+import numpy as np
+
+IR_VERSION, OPSET = 7, 13  # of ONNX 1.8; ONNX Runtime reads them since 1.6
+FLOAT, UINT8 = 1, 2
+ELEMENTS = {'float32': FLOAT, 'uint8': UINT8, 'int64': 7}
+
+
+class Graph(object):
+    """A graph that grows node by node, and becomes a file.
+
+    Values are known by names; `node` returns the name of what it makes.
+    """
+
+    def __init__(self):
+        self._nodes, self._constants, self._count = [], [], 0
+
+    def node(self, kind, inputs, **attributes):
+        """Add an operator of one output; attributes are int, float, str or lists of int. Returns the output's name."""
+        self._count += 1
+        name = 'v%d' % self._count
+        self._nodes.append(_fields((1, list(inputs)), (2, name), (4, kind),
+                                   (5, [_attribute(key, attributes[key]) for key in sorted(attributes)])))
+        return name
+
+    def constant(self, values):
+        """Add an array of float32 or int64 numbers. Returns its name."""
+        values = np.asarray(values)
+        name = 'c%d' % len(self._constants)
+        self._constants.append(_fields((1, list(values.shape)), (2, ELEMENTS[values.dtype.name]), (8, name),
+                                       (9, values.astype(values.dtype.newbyteorder('<')).tobytes())))
+        return name
+
+    def model(self, inputs, outputs, metadata):
+        """The file as bytes.
+
+        Parameters
+        ----------
+        inputs, outputs : list of (name, element, shape)
+            Element: FLOAT or UINT8. Shape: numbers, or names where any size goes.
+        metadata : dict
+            Strings by strings.
+        """
+        graph = _fields((1, self._nodes), (2, 'network'), (5, self._constants),
+                        (11, [_value(*entry) for entry in inputs]), (12, [_value(*entry) for entry in outputs]))
+        return (_fields((1, IR_VERSION), (2, 'ros_3d_bb'), (7, graph), (8, _fields((2, OPSET))))
+                + b''.join(metadata_entry(key, metadata[key]) for key in sorted(metadata)))
+
+
+def metadata_entry(key, value):
+    """One entry of a file's metadata; put after the bytes of a file, it belongs to it."""
+    return _fields((14, _fields((1, key), (2, value))))
+
+
+def _attribute(name, value):
+    """AttributeProto; the last field says which of the others holds the value."""
+    if isinstance(value, float):
+        return _fields((1, name), (2, value), (20, 1))
+    if isinstance(value, int):
+        return _fields((1, name), (3, value), (20, 2))
+    if isinstance(value, str):
+        return _fields((1, name), (4, value), (20, 3))
+    return _fields((1, name), (8, list(value)), (20, 7))
+
+
+def _value(name, element, shape):
+    """ValueInfoProto of a tensor."""
+    dimensions = [_fields((2, size)) if isinstance(size, str) else _fields((1, size)) for size in shape]
+    return _fields((1, name), (2, _fields((1, _fields((1, element), (2, _fields((1, dimensions))))))))
+
+
+def _fields(*fields):
+    """Numbered fields one after the other; a list is a field that repeats."""
+    written = []
+    for number, values in fields:
+        for value in values if isinstance(values, list) else [values]:
+            if isinstance(value, int):
+                written.append(_varint(number << 3) + _varint(value))
+            elif isinstance(value, float):
+                written.append(_varint(number << 3 | 5) + struct.pack('<f', value))
+            else:
+                value = value.encode('utf-8') if isinstance(value, str) else value
+                written.append(_varint(number << 3 | 2) + _varint(len(value)) + value)
+    return b''.join(written)
+
+
+def _varint(number):
+    """Seven bits a byte, the lowest first; the eighth says that more follow. Negative numbers as of 64 bits."""
+    number &= 2 ** 64 - 1
+    written = bytearray()
+    while number > 127:
+        written.append(number & 127 | 128)
+        number >>= 7
+    written.append(number)
+    return bytes(written)
