@@ -27,9 +27,9 @@ def depth_detector(simulator):
 
 def yolov5_detector(weights):
     """YOLOv5 for `run_scene`, of a checkpoint. Raises ValueError where it cannot be used."""
-    from ros_3d_bb.detection.runtime import open_runtime  # torch takes seconds to import
+    from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime  # may import torch, which takes seconds
     from ros_3d_bb.detection.yolov5 import Yolov5
-    detector = Yolov5(open_runtime(weights))
+    detector = Yolov5(open_runtime(weights, RuntimeParams(device='cpu')))
     return lambda frame: detector.detect(frame.color).boxes
 
 
