@@ -12,7 +12,6 @@ from ros_3d_bb.detection import runtime as seam
 from ros_3d_bb.detection import torch_runtime
 from ros_3d_bb.detection.exports import export
 from ros_3d_bb.detection.onnx_runtime import session_of
-from ros_3d_bb.detection.predictions import batch_of
 from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime, physical_cores
 from ros_3d_bb.detection.torch_runtime import TorchRuntime, torch_device
 from ros_3d_bb.detection.yolov5 import DetectionParams, Yolov5
@@ -33,8 +32,7 @@ def image_of(height=96, width=128):
 
 def predicted(network, image):
     """All predictions of a network of ours."""
-    with torch.no_grad():
-        return network(torch.from_numpy(batch_of(image)))[0].numpy()
+    return torch_runtime.run(network, image).numpy()
 
 
 def exported_onnx(path, network, hw, metadata, dynamic=False):
@@ -58,8 +56,7 @@ def test_raw_output_agrees_with_the_official_code(official_output, runtime):
     run = open_runtime(path, RuntimeParams(runtime, 'cpu', 1))
     for image, rows, values in cases:
         difference = np.abs(run(image, -1)[rows] - values)
-        assert difference[:, :4].max() <= 0.01
-        assert difference[:, 4:].max() <= 1e-4
+        assert difference[:, :4].max() <= 0.01 and difference[:, 4:].max() <= 1e-4
 
 
 @pytest.mark.parametrize('runtime', RUNTIMES)
@@ -238,7 +235,7 @@ def test_parameters_that_make_no_sense_are_named(params, reason):
         open_runtime('any.pt', params)
 
 
-@pytest.mark.parametrize('name,runtime', [('model.onnx', 'torch'), ('model.torchscript', 'onnxruntime')])
+@pytest.mark.parametrize('name,runtime', [('a.onnx', 'torch'), ('a.torchscript', 'onnxruntime')])
 def test_a_runtime_that_cannot_run_a_file_says_which_can(name, runtime):
     with pytest.raises(ValueError, match='runtime %s cannot run %s; use auto' % (runtime, name)):
         open_runtime(name, RuntimeParams(runtime=runtime))
@@ -298,7 +295,6 @@ def test_half_precision_finds_the_same_boxes(official_output):
 
 
 def test_drivers_without_a_gpu_count_none(monkeypatch):
-    monkeypatch.setattr(seam.ctypes, 'CDLL', lambda name: types.SimpleNamespace(cuInit=lambda flags: 100))
-    assert seam.gpu_count() == 0
-    monkeypatch.setattr(seam.ctypes, 'CDLL', lambda name: types.SimpleNamespace())
-    assert seam.gpu_count() == 0
+    for driver in (types.SimpleNamespace(cuInit=lambda flags: 100), types.SimpleNamespace()):
+        monkeypatch.setattr(seam.ctypes, 'CDLL', lambda name: driver)
+        assert seam.gpu_count() == 0
