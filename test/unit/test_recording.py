@@ -1,0 +1,200 @@
+"""Measurements are appended whole or not at all, and read back as they were."""
+import json
+import multiprocessing
+import os
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+
+from ros_3d_bb import recording, session_file
+from ros_3d_bb.estimation import Box3D, DepthImage
+from ros_3d_bb.geometry import Camera
+from ros_3d_bb.measurements import read_color, read_depth, read_session
+from ros_3d_bb.recording import Measurement, append, stored_depth
+from ros_3d_bb.stamped import NS
+
+CAMERA = Camera(64, 48, 60.0, 61.0, 31.5, 23.25, 'plumb_bob', (0.1, -0.2, 0.001, 0.002, 0.03))
+STAMP_NS = 1616161616 * NS + 123456789
+BOX = Box3D(np.array([0.1234, -0.25, 2.5]), np.array([0.5, 1.75, 0.5]), (10, 0, 30, 48), 0.75, True)
+
+
+def measurement(number=0, **changes):
+    random = np.random.RandomState(number)
+    values = dict(color=random.randint(0, 256, (48, 64, 3)).astype(np.uint8),
+                  depth=DepthImage(random.randint(0, 65536, (48, 64)).astype(np.uint16), 0.001), camera=CAMERA,
+                  frame_id='optical', stamp_ns=STAMP_NS + number * NS, rects_px=((10, 0, 30, 48),), boxes=(BOX,))
+    values.update(changes)
+    return Measurement(**values)
+
+
+def description(folder):
+    with open(os.path.join(folder, 'frames.json')) as stream:
+        return json.load(stream)
+
+
+def content_of(folder):
+    """Every file in a folder but the lock, {path: bytes}."""
+    found = {}
+    for place, _folders, names in os.walk(folder):
+        for name in set(names) - {'.lock'}:
+            with open(os.path.join(place, name), 'rb') as stream:
+                found[os.path.relpath(os.path.join(place, name), folder)] = stream.read()
+    return found
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Of a session that is not there yet."""
+    return str(tmp_path / 'a campaign' / 'session')
+
+
+def test_what_is_appended_is_read_back(folder):
+    sent = [measurement(0), measurement(1, label='A1, arms up')]
+    done = [append(folder, one) for one in sent]
+    session = read_session(folder)
+    assert (session.camera, session.depth_scale_m, session.frame_id) == (CAMERA, 0.001, 'optical')
+    assert [frame.id for frame in session.frames] == [one.id for one in done]
+    assert [one.count for one in done] == [1, 2]
+    for frame, one in zip(session.frames, sent):
+        np.testing.assert_array_equal(read_color(frame, session.camera), one.color)
+        depth = read_depth(frame, session)
+        np.testing.assert_array_equal(depth.values, one.depth.values)
+        assert depth.scale_m == one.depth.scale_m
+        assert frame.boxes_px == ((10, 0, 30, 48),)
+        np.testing.assert_allclose(frame.estimate_m, BOX.center_m, atol=1e-6)
+
+
+def test_the_description_says_what_is_known(folder):
+    append(folder, measurement(label='A1'))
+    entry, = description(folder)['frames']
+    assert entry == {
+        'id': '00001_1616161616_123456789', 'color': 'color/00001_1616161616_123456789.png',
+        'depth': 'depth/00001_1616161616_123456789.png', 'stamp': '1616161616.123456789', 'label': 'A1',
+        'detections': [{'box': [10, 0, 30, 48], 'estimate_mm': [123.4, -250.0, 2500.0], 'size_mm': [500.0, 1750.0],
+                        'support': 0.75, 'truncated': True}]}
+
+
+def test_each_2d_box_gets_the_3d_box_that_was_made_of_it(folder):
+    """The second person has no depth; the first box leaves the image, and its 3D box says so only inside of it."""
+    rects_px = ((-5, 3, 12, 60), (20, 3, 30, 40), (40, 3, 60, 40))
+    boxes = tuple(BOX._replace(rect_px=rect_px, center_m=np.array([0.0, 0.0, z]))
+                  for rect_px, z in (((40, 3, 60, 40), 3.0), ((0, 3, 12, 48), 1.0), ((1, 1, 9, 9), 4.0)))
+    append(folder, measurement(rects_px=rects_px, boxes=boxes))
+    entry, = description(folder)['frames']
+    assert [(detection['box'], detection.get('estimate_mm', [None] * 3)[2]) for detection in entry['detections']] == [
+        ([-5, 3, 12, 60], 1000.0), ([20, 3, 30, 40], None), ([40, 3, 60, 40], 3000.0), ([1, 1, 9, 9], 4000.0)]
+
+
+def test_without_boxes_the_images_are_stored(folder):
+    append(folder, measurement(rects_px=(), boxes=()))
+    frame, = read_session(folder).frames
+    assert frame.boxes_px == () and description(folder)['frames'][0]['detections'] == []
+
+
+def test_ids_sort_in_the_order_of_the_measurements_whatever_was_taken_out(folder):
+    first = append(folder, measurement(0)).id
+    second = append(folder, measurement(1)).id
+    with session_file.changing(folder) as content:
+        del content['frames'][0]
+    third = append(folder, measurement(2, stamp_ns=NS)).id  # an earlier stamp, as of a bag
+    assert first < second < third and len({first, second, third}) == 3
+
+
+def test_the_same_image_twice_overwrites_nothing(folder):
+    first, second = (append(folder, measurement(0)) for _time in range(2))
+    assert first.id != second.id and len(read_session(folder).frames) == 2
+
+
+def _append_many(folder, first):
+    for number in range(first, first + 10):
+        append(folder, measurement(number))
+
+
+def test_two_programs_lose_nothing_of_each_other(folder):
+    others = [multiprocessing.Process(target=_append_many, args=(folder, first)) for first in (0, 100)]
+    for other in others:
+        other.start()
+    for other in others:
+        other.join()
+    session = read_session(folder)
+    assert len(set(frame.id for frame in session.frames)) == 20
+    for frame in session.frames:
+        read_color(frame, session.camera)
+
+
+@pytest.mark.parametrize('changes, said', [
+    ({'camera': CAMERA._replace(fx=60.5)}, 'intrinsics'), ({'frame_id': 'another'}, "frame is optical, here it is ano"),
+    ({'depth': DepthImage(np.zeros((48, 64), np.uint16), 0.0001)}, 'depth scale is 0.001, here it is 0.0001')])
+def test_another_camera_is_refused(folder, changes, said):
+    append(folder, measurement(0))
+    before = content_of(folder)
+    with pytest.raises(ValueError, match=said):
+        append(folder, measurement(1, **changes))
+    assert content_of(folder) == before
+
+
+@pytest.mark.parametrize('changes, said', [
+    ({'color': np.zeros((50, 64, 3), np.uint8)}, 'colour image has 64 x 50 pixels'),
+    ({'depth': DepthImage(np.zeros((24, 32), np.uint16), 0.001)}, 'depth must be aligned to colour'),
+    ({'boxes': (BOX._replace(center_m=np.full(3, np.nan)),)}, 'finite expected')])
+def test_what_cannot_be_stored_is_refused(folder, changes, said):
+    append(folder, measurement(0))
+    before = content_of(folder)
+    with pytest.raises(ValueError, match=said):
+        append(folder, measurement(1, **changes))
+    assert content_of(folder) == before
+
+
+@pytest.mark.parametrize('text', ['[]', '{"frames": []', '{"frames": [{"id": 1}], "camera": {}}'])
+def test_what_is_no_session_is_refused_and_kept(tmp_path, text):
+    (tmp_path / 'frames.json').write_text(text)
+    with pytest.raises(ValueError):
+        append(str(tmp_path), measurement())
+    assert content_of(str(tmp_path)) == {'frames.json': text.encode()}
+
+
+@pytest.mark.parametrize('full_at', ['color', 'depth', 'frames.json'])
+def test_a_full_disk_leaves_the_session_as_it_was(folder, monkeypatch, full_at):
+    append(folder, measurement(0))
+    before, write_whole = content_of(folder), session_file.write_whole
+
+    def failing(path, data):
+        if full_at in os.path.relpath(path, folder):
+            raise OSError(28, 'No space left on device')
+        write_whole(path, data)
+
+    monkeypatch.setattr(recording, 'write_whole', failing)
+    monkeypatch.setattr(session_file, 'write_whole', failing)
+    with pytest.raises(OSError):
+        append(folder, measurement(1))
+    assert content_of(folder) == before
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
+    (tmp_path / 'file').write_text('')
+    with pytest.raises(OSError):
+        append(str(tmp_path / 'file' / 'session'), measurement())
+
+
+def test_depth_in_metres_is_stored_in_millimetres(folder):
+    metres = np.full((48, 64), 2.3456, np.float32)
+    metres[0, :6] = np.nan, np.inf, -np.inf, -1.0, 65.6, 65.535
+    append(folder, measurement(depth=DepthImage(metres, 1.0)))
+    session = read_session(folder)
+    depth = read_depth(session.frames[0], session)
+    assert session.depth_scale_m == 0.001 and depth.values[1, 1] == 2346
+    assert depth.values[0, :6].tolist() == [0, 0, 0, 0, 0, 65535]
+
+
+@given(st.lists(st.integers(0, 65535), min_size=1), st.sampled_from(['<u2', '>u2']), st.sampled_from([0.001, 0.00025]))
+def test_depth_in_units_of_the_camera_is_kept_as_it_is(values, kind, scale_m):
+    depth = stored_depth(DepthImage(np.array([values], kind), scale_m))
+    assert depth.values.dtype == np.uint16 and depth.values[0].tolist() == values and depth.scale_m == scale_m
+
+
+def test_the_images_can_be_read_by_other_programs(folder):
+    done = append(folder, measurement(0))
+    image = cv2.imread(os.path.join(folder, 'color', done.id + '.png'))
+    np.testing.assert_array_equal(image[..., ::-1], measurement(0).color)
