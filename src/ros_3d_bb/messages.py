@@ -7,6 +7,7 @@ from geometry_msgs.msg import PoseWithCovariance
 from std_msgs.msg import Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb import msg
+from ros_3d_bb.estimation import Box3D
 from ros_3d_bb.geometry import Camera, transform_from, transform_points
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.stamped import NS
@@ -127,6 +128,18 @@ def _box3d_to_message(box, camera):
     message.roi.x_offset, message.roi.width = x1, x2 - x1
     message.roi.y_offset, message.roi.height = y1, y2 - y1
     return message
+
+
+def boxes3d_from_message(message):
+    """The 3D boxes in a BoundingBox3DArray, as (`estimation.Box3D`, ...). Inverse of `boxes3d_to_message`."""
+    return tuple(_box3d_from_message(box) for box in message.boxes)
+
+
+def _box3d_from_message(box):
+    roi, covariance_m2 = box.roi, np.reshape(box.position_covariance, (3, 3))
+    rect_px = (roi.x_offset, roi.y_offset, roi.x_offset + roi.width, roi.y_offset + roi.height)
+    return Box3D(_xyz(box.center.position), _xyz(box.size), rect_px, box.support, box.truncated,
+                 covariance_m2 if covariance_m2.any() else None)
 
 
 def detections_from_message(message, fixed_from_camera):

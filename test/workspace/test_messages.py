@@ -11,9 +11,9 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from ros_3d_bb.camera_messages import CameraFrame, messages_of
 from ros_3d_bb.estimation import Box3D, DepthImage
 from ros_3d_bb.geometry import Camera, transform_from
-from ros_3d_bb.messages import (boxes2d_from_message, boxes2d_to_message, boxes3d_to_message, camera_from_message,
-                                detections_from_message, stamp_of, time_from, tracks_from_message,
-                                tracks_to_message, transform_from_message)
+from ros_3d_bb.messages import (boxes2d_from_message, boxes2d_to_message, boxes3d_from_message, boxes3d_to_message,
+                                camera_from_message, detections_from_message, stamp_of, time_from,
+                                tracks_from_message, tracks_to_message, transform_from_message)
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.thesis import ThesisTracker
@@ -130,6 +130,16 @@ def test_3d_boxes_fill_every_field():
     roi = box.roi
     assert (roi.x_offset, roi.y_offset, roi.width, roi.height, roi.do_rectify) == (0, 20, 640, 280, False)
     assert box.support == 0.75 and box.truncated
+
+
+@pytest.mark.parametrize('covariance_m2', [None, np.diag([0.01, 0.04, 0.09])])
+def test_3d_boxes_survive(covariance_m2):
+    sent = Box3D(np.array([0.1, 0.2, 3.0]), np.array([0.5, 1.7, 0.5]), (10, 20, 64, 48), 0.75, True, covariance_m2)
+    camera = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+    back, other = boxes3d_from_message(on_the_wire(boxes3d_to_message([sent] * 2, header(1), camera)))
+    for field, value in sent._asdict().items():
+        np.testing.assert_array_equal(getattr(back, field), value)
+    assert back.rect_px == other.rect_px == sent.rect_px
 
 
 def test_detections_are_upright_in_the_fixed_frame():
