@@ -30,6 +30,10 @@ class StampedCache(object):
     def __len__(self):
         return len(self._entries)
 
+    def __reversed__(self):
+        """The entries, the newest first."""
+        return reversed(self._entries)
+
     @property
     def newest_ns(self):
         """The newest stamp, None where the cache is empty."""
