@@ -1,0 +1,125 @@
+"""The picture that viewer_node shows: colour, depth and boxes of one image side by side, and lines of text below.
+
+Images are (height, width, 3), uint8, RGB.
+"""
+import collections
+from typing import NamedTuple, Optional, Tuple
+
+import cv2
+import numpy as np
+
+from ros_3d_bb.estimation import Box3D, DepthImage
+from ros_3d_bb.overlay import draw_boxes, visible_depth
+from ros_3d_bb.stamped import NS
+
+PAPER, INK, WARNING_INK = (32, 32, 32), (235, 235, 235), (255, 190, 60)
+FONT, FONT_SCALE, LINE_PX, MARGIN_PX = cv2.FONT_HERSHEY_SIMPLEX, 0.45, 20, 8
+BAR_WIDTH_PX, BAR_TOP_PX = 14, 16
+LEAST_TEXT_LINES = 8  # so that the window does not change its size with each person
+MEASURED_NS = 2 * NS  # the frame rate is that of the last so many nanoseconds
+TITLES = ('colour', 'depth', 'boxes')
+
+
+class View(NamedTuple):
+    """What is to be seen: an image with its boxes, and what is said about it.
+
+    `rects_px` are the 2D boxes, `boxes` the 3D boxes; None where they have not come. `lines` are said as they are,
+    `warnings` so that they are noticed.
+    """
+
+    color: np.ndarray
+    depth: DepthImage
+    rects_px: Optional[Tuple[Tuple[int, int, int, int], ...]]
+    boxes: Optional[Tuple[Box3D, ...]]
+    lines: Tuple[str, ...] = ()
+    warnings: Tuple[str, ...] = ()
+
+
+class FrameRate(object):
+    """How many images come in a second, by the clock that the caller gives."""
+
+    def __init__(self):
+        self._arrivals_ns = collections.deque()
+
+    def add(self, arrival_ns):
+        """An image came."""
+        self._arrivals_ns.append(arrival_ns)
+
+    def at(self, now_ns):
+        """Images a second of late; 0 where fewer than two came."""
+        while self._arrivals_ns and self._arrivals_ns[0] < now_ns - MEASURED_NS:
+            self._arrivals_ns.popleft()
+        if len(self._arrivals_ns) < 2:
+            return 0.0
+        return (len(self._arrivals_ns) - 1) * NS / max(1, self._arrivals_ns[-1] - self._arrivals_ns[0])
+
+
+def compose(view, panel_width_px, farthest_m):
+    """Draw a view: three panels, each `panel_width_px` wide, depth in colours up to `farthest_m`."""
+    height, width = view.color.shape[:2]
+    size_px = (panel_width_px, max(1, int(round(height * panel_width_px / width))))
+    color = cv2.resize(np.ascontiguousarray(view.color), size_px, interpolation=cv2.INTER_LINEAR)
+    # between the pixels of a depth image there is nothing
+    grey = cv2.resize(visible_depth(view.depth, farthest_m), size_px, interpolation=cv2.INTER_NEAREST)
+    panels = [color, draw_range_bar(colors_of(grey), farthest_m), _annotated(color.copy(), view)]
+    for panel, title in zip(panels, TITLES):
+        _write(panel, title, (MARGIN_PX, LINE_PX))
+    row = np.concatenate(panels, axis=1)
+    lines = view.lines + box_lines(view.boxes or ())
+    return np.concatenate((row, text_picture(lines, view.warnings, row.shape[1])))
+
+
+def colors_of(grey):
+    """Colours of a depth image as `visible_depth` makes it: near is red, far blue, not measured black."""
+    colors = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_JET)[..., ::-1])
+    colors[grey == 0] = 0
+    return colors
+
+
+def draw_range_bar(image, farthest_m):
+    """Draw the colours of the depths along the right border, with metres. Returns the image."""
+    height, width = image.shape[:2]
+    left, right, bottom = width - MARGIN_PX - BAR_WIDTH_PX, width - MARGIN_PX, height - BAR_TOP_PX
+    grey = np.rint(np.linspace(255, 1, bottom - BAR_TOP_PX)).astype(np.uint8)
+    image[BAR_TOP_PX:bottom, left:right] = colors_of(np.repeat(grey[:, None], BAR_WIDTH_PX, axis=1))
+    for metres in range(0, int(farthest_m) + 1, max(1, int(farthest_m) // 6)):
+        row = BAR_TOP_PX + int(round(metres / farthest_m * (bottom - BAR_TOP_PX)))
+        cv2.line(image, (left - 4, row), (left, row), INK, 1)
+        text = '%d m' % metres
+        text_width = cv2.getTextSize(text, FONT, FONT_SCALE, 1)[0][0]
+        _write(image, text, (left - 6 - text_width, row + 5))
+    return image
+
+
+def box_lines(boxes):
+    """One line for each 3D box: number as in the picture, position in the camera's optical frame, width and height."""
+    return tuple('%d: x %+.2f  y %+.2f  z %.2f m,  %.2f m wide, %.2f m high%s'
+                 % ((number,) + tuple(box.center_m) + tuple(box.size_m[:2]) + (', cut' if box.truncated else '',))
+                 for number, box in enumerate(boxes, 1))
+
+
+def _annotated(panel, view):
+    """Draw the 3D boxes by number and distance, and the 2D boxes for which there is none. Returns the panel."""
+    boxes = view.boxes or ()
+    lifted = set(tuple(box.rect_px) for box in boxes)
+    height, width = view.color.shape[:2]
+    inside_px = np.clip(np.reshape(view.rects_px or (), (-1, 4)).astype(int), 0, [width, height] * 2).tolist()
+    others = [rect_px for rect_px in inside_px if tuple(rect_px) not in lifted]
+    rects_px = np.array([box.rect_px for box in boxes] + others, float).reshape(-1, 4)
+    labels = ['%d: %.2f m' % (number, box.center_m[2]) for number, box in enumerate(boxes, 1)]
+    return draw_boxes(panel, rects_px * (panel.shape[1] / width), labels + ['no position'] * len(others))
+
+
+def text_picture(lines, warnings, width_px):
+    """Lines of text, then warnings, as an image of a width."""
+    rows = [(line, INK) for line in lines] + [(line, WARNING_INK) for line in warnings]
+    image = np.full((LINE_PX * max(LEAST_TEXT_LINES, len(rows)) + 2 * MARGIN_PX, width_px, 3), PAPER, np.uint8)
+    for number, (line, color) in enumerate(rows, 1):
+        cv2.putText(image, line, (MARGIN_PX, LINE_PX * number), FONT, FONT_SCALE, color, 1, cv2.LINE_AA)
+    return image
+
+
+def _write(image, text, place_px):
+    """Write with a dark rim, to be read on any ground."""
+    for ink, thickness in (((0, 0, 0), 3), (INK, 1)):
+        cv2.putText(image, text, place_px, FONT, FONT_SCALE, ink, thickness, cv2.LINE_AA)

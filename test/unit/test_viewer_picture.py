@@ -1,0 +1,89 @@
+"""The picture of the viewer: what is where, whatever is missing."""
+import numpy as np
+import pytest
+
+from ros_3d_bb.estimation import Box3D, DepthImage
+from ros_3d_bb.overlay import BOX_COLOR
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.viewer_picture import WARNING_INK, FrameRate, View, box_lines, colors_of, compose, text_picture
+
+BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75, True)
+
+
+def view(**changes):
+    values = dict(color=np.full((240, 320, 3), (10, 20, 30), np.uint8),
+                  depth=DepthImage(np.full((240, 320), 1500, np.uint16), 0.001), rects_px=((100, 40, 200, 160),),
+                  boxes=(BOX,))
+    values.update(changes)
+    return View(**values)
+
+
+@pytest.mark.parametrize('width_px', [160, 320, 640])
+def test_three_panels_stand_side_by_side(width_px):
+    picture = compose(view(), width_px, 6.0)
+    height_px = width_px * 3 // 4
+    assert picture.dtype == np.uint8 and picture.shape[1] == 3 * width_px and picture.shape[0] > height_px
+    row, column = int(height_px * 0.95), int(width_px * 0.5)
+    assert picture[row, column].tolist() == picture[row, column + 2 * width_px].tolist() == [10, 20, 30]
+    depth = colors_of(np.full((1, 1), 255 - int(254 * 1.5 / 6.0), np.uint8))[0, 0].astype(int)
+    assert np.abs(picture[row, column + width_px] - depth).max() <= 8
+
+
+def test_boxes_are_drawn_in_the_third_panel_only():
+    picture = compose(view(), 320, 6.0)
+    assert picture[100, 640 + 100].tolist() == list(BOX_COLOR)
+    for panel in range(2):
+        assert not (picture[:240, 320 * panel:320 * (panel + 1)] == BOX_COLOR).all(axis=2).any()
+
+
+def test_2d_boxes_without_a_position_are_drawn_too_and_lifted_ones_once():
+    lifted = compose(view(), 320, 6.0)
+    np.testing.assert_array_equal(lifted, compose(view(rects_px=None), 320, 6.0))
+    with_other = compose(view(rects_px=((100, 40, 200, 160), (-20, 30, 60, 400))), 320, 6.0)
+    assert with_other[100, 640 + 60].tolist() == list(BOX_COLOR) != lifted[100, 640 + 60].tolist()
+
+
+def test_near_is_red_far_is_blue_and_nothing_is_black():
+    near, far, nothing = colors_of(np.array([[250, 5, 0]], np.uint8))[0].astype(int)
+    assert near[0] > near[2] + 50 and far[2] > far[0] + 50 and nothing.tolist() == [0, 0, 0]
+
+
+def test_the_range_bar_has_the_colours_of_the_depths():
+    picture = compose(view(depth=DepthImage(np.zeros((240, 320), np.uint16), 0.001)), 320, 6.0)
+    bar = picture[:240, 640 - 15].astype(int)
+    assert bar[20, 0] > bar[20, 2] and bar[-20, 2] > bar[-20, 0]
+
+
+@pytest.mark.parametrize('depth', [np.full((240, 320), np.nan, np.float32), np.full((240, 320), 2.0, np.float32),
+                                   np.full((240, 320), 700, '>u2')])
+def test_depth_of_any_kind_is_shown(depth):
+    assert compose(view(depth=DepthImage(depth, 1.0 if depth.dtype.kind == 'f' else 0.001)), 320, 6.0).any()
+
+
+@pytest.mark.parametrize('changes', [{'boxes': None}, {'boxes': None, 'rects_px': None}, {'boxes': (), 'rects_px': ()}])
+def test_boxes_may_be_missing(changes):
+    assert compose(view(**changes), 320, 6.0).shape == compose(view(), 320, 6.0).shape
+
+
+def test_positions_are_said():
+    line, = box_lines((BOX,))
+    assert line == '1: x +0.50  y -0.25  z 2.00 m,  0.50 m wide, 1.75 m high, cut'
+
+
+def test_warnings_are_in_another_colour():
+    plain, warned = (text_picture(('line',), warnings, 400).astype(int) for warnings in ((), ('nothing comes',)))
+    has_ink = [(np.abs(picture - WARNING_INK).max(axis=2) < 60).any() for picture in (plain, warned)]
+    assert has_ink == [False, True]
+
+
+def test_many_people_make_the_picture_higher():
+    assert compose(view(boxes=(BOX,) * 30), 320, 6.0).shape[0] > compose(view(), 320, 6.0).shape[0]
+
+
+def test_the_frame_rate_is_that_of_the_last_images():
+    rate = FrameRate()
+    assert rate.at(NS) == 0
+    for number in range(31):
+        rate.add(10 * NS + number * NS // 30)
+    assert rate.at(11 * NS) == pytest.approx(30.0, rel=1e-6)
+    assert rate.at(20 * NS) == 0
