@@ -19,6 +19,7 @@ from ros_3d_bb.nodes.depth_detector_node import DepthDetectorParams
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
 from ros_3d_bb.nodes.simulator_node import SimulatorParams
 from ros_3d_bb.nodes.tracker_node import TrackerNodeParams
+from ros_3d_bb.nodes.viewer_node import ViewerParams
 from ros_3d_bb.nodes.yolov5_node import Yolov5NodeParams
 from ros_3d_bb.params import params_from
 from ros_3d_bb.tracking.thesis import ThesisTrackerParams
@@ -32,12 +33,13 @@ TEST_KEYS = {'pytest': 'python3-pytest'}
 CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams, RuntimeParams), 'bbox3d.yaml': (Bbox3dParams,),
            'tracker.yaml': (TrackerNodeParams, ThesisTrackerParams), 'simulator.yaml': (SimulatorParams,),
            'planner_bridge.yaml': (PlannerBridgeParams,),
-           'depth_detector.yaml': (DepthDetectorParams, DepthPeopleParams)}
+           'depth_detector.yaml': (DepthDetectorParams, DepthPeopleParams), 'viewer.yaml': (ViewerParams,)}
 SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id', 'error_model'},
                  'tracker.yaml': {'target_frame', 'camera_frame'}, 'simulator.yaml': {'scenario'},
                  'planner_bridge.yaml': {'outputs', 'planner_frame', 'robot_frame'},
-                 'depth_detector.yaml': {'floor_frame', 'frame_id'}}
-REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag']
+                 'depth_detector.yaml': {'floor_frame', 'frame_id'},
+                 'viewer.yaml': {'session', 'label', 'window', 'frame_id'}}
+REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag', 'session:=/some/session']
 
 
 def inside(*parts):
@@ -85,7 +87,7 @@ def test_what_the_tests_import_is_declared_or_in_their_requirements():
     known = declared('depend', 'exec_depend', 'test_depend')
     assert [name for name in names
             if TEST_KEYS.get(name, KEYS.get(name) or name) not in known and name not in required] == []
-    assert declared('test_depend') - set(TEST_KEYS.values()) - names == {'rostest'}
+    assert declared('test_depend') - set(TEST_KEYS.values()) - names == {'rostest', 'xdotool', 'xvfb'}
 
 
 def test_the_robot_needs_no_more_than_python_3_6():
@@ -144,7 +146,7 @@ def test_launch_files_load_and_document_their_arguments(name):
 
 
 @pytest.mark.parametrize('name', ['yolov5.launch', 'bbox3d.launch', 'tracker.launch', 'depth_detector.launch',
-                                  'planner_bridge.launch'])
+                                  'planner_bridge.launch', 'viewer.launch'])
 def test_launch_files_set_no_parameter_that_the_node_does_not_know(name):
     loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
     loader.load(inside('launch', name), config, argv=REQUIRED_ARGUMENTS, verbose=False)

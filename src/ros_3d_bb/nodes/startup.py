@@ -11,8 +11,8 @@ def read_params(*kinds):
     return params_from(rospy.get_param('~', {}), *kinds)
 
 
-def run_node(name, node_class):
-    """Run a node until ROS shuts down, and return it.
+def run_node(name, node_class, run=lambda _node: rospy.spin()):
+    """Make a node and `run` it, by default until ROS shuts down; return it.
 
     A ValueError at its start is a fault of the set-up: it is said, and the exit status is 1.
     """
@@ -22,5 +22,5 @@ def run_node(name, node_class):
     except ValueError as error:
         rospy.logfatal('%s cannot start: %s', rospy.get_name(), error)
         sys.exit(1)
-    rospy.spin()
+    run(node)
     return node

@@ -1,0 +1,260 @@
+"""The node that shows what the camera and the pipeline see, and takes measurements."""
+import os
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import rospy
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Int32MultiArray
+from std_srvs.srv import SetBool, Trigger, TriggerResponse
+
+from ros_3d_bb.images import depth_from, rgb_from
+from ros_3d_bb.messages import boxes2d_from_message, boxes3d_from_message, camera_from_message, stamp_of
+from ros_3d_bb.msg import BoundingBox3DArray
+from ros_3d_bb.nodes.diagnostics import Diagnostics
+from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.recording import Measurement, append
+from ros_3d_bb.snapshots import Snapshots
+from ros_3d_bb.stamped import NS, arrival_clock_ns
+from ros_3d_bb.viewer_picture import FrameRate, View, compose, text_picture
+from ros_3d_bb.window import Window, WindowError
+
+COLOR_TOPIC, DEPTH_TOPIC = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
+CAMERA_INFO_TOPIC, BOXES3D_TOPIC = 'camera/color/camera_info', 'ros_3d_bb/bb_3d'
+ENABLE_SERVICE = 'detector/enable'
+KEYS = 'keys: s saves, p pauses the detector, q quits'
+
+
+class ViewerParams(NamedTuple):
+    """See config/viewer.yaml."""
+
+    session: str = ''
+    label: str = ''
+    window: bool = True
+    frame_id: str = ''
+    depth_scale: float = 0.0
+    cache_length: float = 1.0
+    stamp_tolerance: float = 0.005
+    window_rate: float = 15.0
+    panel_width: int = 480
+    depth_image_range: float = 6.0
+
+
+class Color(NamedTuple):
+    """A colour image, RGB, and the frame of its camera."""
+
+    pixels: Any
+    frame_id: str
+
+
+class ViewerNode(object):
+    """Show colour, depth and boxes of one image, and append it to a measurement session.
+
+    Subscribes: camera/color/image_raw, camera/aligned_depth_to_color/image_raw, camera/color/camera_info,
+    yolo_bounding_box, ros_3d_bb/bb_3d. Services: ~capture (std_srvs/Trigger); calls detector/enable
+    (std_srvs/SetBool). Parameters: config/viewer.yaml; ~label is read at each measurement.
+    """
+
+    def __init__(self):
+        self._params, = read_params(ViewerParams)
+        _check(self._params)
+        self._window = _window() if self._params.window else None
+        self._snapshots = Snapshots(int(self._params.cache_length * NS), int(self._params.stamp_tolerance * NS))
+        self._lock, self._capture_lock = threading.Lock(), threading.Lock()
+        self._rate, self._came, self._answer = FrameRate(), set(), ''
+        self._captured_ns, self._is_said, self._is_paused = None, False, False
+        self._diagnostics = Diagnostics()
+        rospy.Service('~capture', Trigger, lambda _request: TriggerResponse(*self.capture()))
+        rospy.Subscriber(BOXES3D_TOPIC, BoundingBox3DArray, self._on_boxes3d, queue_size=10)
+        rospy.Subscriber('yolo_bounding_box', Int32MultiArray, self._on_boxes2d, queue_size=10)
+        rospy.Subscriber(CAMERA_INFO_TOPIC, CameraInfo, self._on_camera_info, queue_size=10)
+        rospy.Subscriber(DEPTH_TOPIC, Image, self._on_depth, queue_size=10, buff_size=2 ** 24)
+        rospy.Subscriber(COLOR_TOPIC, Image, self._on_color, queue_size=10, buff_size=2 ** 24)
+
+    def _on_color(self, message):
+        with self._diagnostics.refusing('colour images'), self._lock:
+            color, now_ns = Color(rgb_from(message), message.header.frame_id), arrival_clock_ns()
+            self._rate.add(now_ns)
+            self._note(COLOR_TOPIC, self._snapshots.add_color(stamp_of(message), now_ns, color))
+
+    def _on_depth(self, message):
+        with self._diagnostics.refusing('depth images'), self._lock:
+            depth = depth_from(message, self._params.depth_scale)
+            self._note(DEPTH_TOPIC, self._snapshots.add_depth(stamp_of(message), arrival_clock_ns(), depth))
+
+    def _on_camera_info(self, message):
+        with self._diagnostics.refusing('camera_info'), self._lock:
+            camera = camera_from_message(message)
+            self._note(CAMERA_INFO_TOPIC, self._snapshots.add_camera(stamp_of(message), arrival_clock_ns(), camera))
+
+    def _on_boxes2d(self, message):
+        with self._diagnostics.refusing('2D boxes'), self._lock:
+            boxes = boxes2d_from_message(message)
+            if boxes.stamp_ns is None:
+                rospy.loginfo_once('the 2D boxes carry no stamp: only those of which 3D boxes are made are stored')
+                return
+            self._snapshots.add_boxes2d(boxes.stamp_ns, arrival_clock_ns(),
+                                        tuple(tuple(rect_px) for rect_px in boxes.boxes.tolist()))
+
+    def _on_boxes3d(self, message):
+        with self._diagnostics.refusing('3D boxes'), self._lock:
+            self._snapshots.add_boxes3d(stamp_of(message), arrival_clock_ns(), boxes3d_from_message(message))
+            self._is_said = False
+
+    def _note(self, topic, lost):
+        """Something came on a topic, after which some colour images are known to stay without depth."""
+        self._came.add(topic)
+        self._diagnostics.count('messages of the camera')
+        for stamp_ns in lost:
+            self._diagnostics.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f '
+                                   'of the colour image came; waiting for the next' % (stamp_ns / NS))
+
+    def capture(self):
+        """Append what is newest to the session.
+
+        Returns
+        -------
+        bool, str
+            Whether it is stored, and a sentence: as what, or why not.
+        """
+        with self._capture_lock:
+            try:
+                done, self._answer = True, self._stored()
+                rospy.loginfo('%s', self._answer)
+                self._diagnostics.count('measurements stored')
+            except (ValueError, OSError) as error:
+                done, self._answer = False, 'not saved: %s' % error
+                self._diagnostics.warn('measurements not stored', self._answer)
+            return done, self._answer
+
+    def _stored(self):
+        """Store the newest snapshot. Returns a sentence about it; raises ValueError or OSError where it is not."""
+        if not self._params.session:
+            raise ValueError('no session is given; start the viewer with session:=FOLDER')
+        snapshot = self._snapshot_to_store()
+        label = str(rospy.get_param('~label', self._params.label))
+        appended = append(self._params.session, Measurement(
+            snapshot.color.pixels, snapshot.depth, snapshot.camera, self._params.frame_id or snapshot.color.frame_id,
+            snapshot.stamp_ns, snapshot.boxes2d or (), snapshot.boxes3d or (), label))
+        self._captured_ns = snapshot.stamp_ns
+        found = ('without 3D boxes' if snapshot.boxes3d is None else
+                 'with %d 3D box%s' % (len(snapshot.boxes3d), '' if len(snapshot.boxes3d) == 1 else 'es'))
+        return 'saved %s %s%s: number %d in %s' % (appended.id, found, label and ', label %s' % label, appended.count,
+                                                   self._params.session)
+
+    def _snapshot_to_store(self):
+        """The newest snapshot. Raises ValueError where there is none to store, or it lacks boxes and nobody knows."""
+        with self._lock:
+            snapshot, is_early = self._snapshots.newest, self._snapshots.is_early
+        if snapshot is None:
+            raise ValueError(self._why_nothing())
+        if snapshot.stamp_ns == self._captured_ns:
+            raise ValueError('nothing new has come since the last measurement')
+        if snapshot.boxes3d is None and is_early:
+            raise ValueError('the 3D boxes of the first images may still be on their way; try again')
+        if snapshot.boxes3d is None and not self._is_said:
+            self._is_said = True
+            raise ValueError('no 3D boxes have come on %s for the images of the last %.1f s; once more saves the '
+                             'images without' % (rospy.resolve_name(BOXES3D_TOPIC), self._params.cache_length))
+        return snapshot
+
+    def _why_nothing(self):
+        missing = [rospy.resolve_name(topic) for topic in (COLOR_TOPIC, DEPTH_TOPIC, CAMERA_INFO_TOPIC)
+                   if topic not in self._came]
+        if missing:
+            return 'nothing has come on %s' % ', '.join(missing)
+        return 'no depth image with the stamp of a colour image has come on %s' % rospy.resolve_name(DEPTH_TOPIC)
+
+    def pause_or_resume(self):
+        """Pause the detector, or let it go on; what became of it is said in the window."""
+        try:
+            answer = rospy.ServiceProxy(ENABLE_SERVICE, SetBool)(self._is_paused)
+        except rospy.ServiceException as error:
+            self._answer = 'the detector cannot be paused: nobody answers on the service %s (%s)' % (
+                rospy.resolve_name(ENABLE_SERVICE), error)
+            rospy.logwarn('%s', self._answer)
+            return
+        self._answer = answer.message
+        if answer.success:
+            self._is_paused = not self._is_paused
+            self._is_said = self._is_paused  # who paused it knows that there are no boxes
+
+    def run(self):
+        """Show the window until it is closed or ROS shuts down. In the main thread, which must publish nothing."""
+        if self._window is None:
+            rospy.spin()
+            return
+        with ThreadPoolExecutor(1) as others:  # at the end it waits for what is being stored
+            actions = {'s': self.capture, 'p': self.pause_or_resume}
+            shown, key = None, ''
+            while not (rospy.is_shutdown() or key == 'q' or self._window.is_closed):
+                due_s = time.monotonic() + 1 / self._params.window_rate
+                shown = self._show(shown)
+                key = self._window.key(max(1, int(1000 * (due_s - time.monotonic()))))
+                if key in actions:
+                    others.submit(actions[key]).add_done_callback(_complain)
+            if self._is_paused and not rospy.is_shutdown():
+                others.submit(self.pause_or_resume)
+        self._window.close()
+        if not rospy.is_shutdown():
+            rospy.signal_shutdown('the window was closed')
+
+    def _show(self, shown):
+        """Draw what is new since `shown`, the last return value."""
+        with self._lock:
+            snapshot, is_early = self._snapshots.newest, self._snapshots.is_early
+            rate_hz = self._rate.at(arrival_clock_ns())
+        if snapshot is None:
+            self._window.show(text_picture((KEYS,), (self._why_nothing(),), 3 * self._params.panel_width))
+            return None
+        label = rospy.get_param_cached('~label', '')
+        news = (snapshot.stamp_ns, snapshot.boxes2d, snapshot.boxes3d is None, rate_hz == 0, self._answer,
+                self._is_paused, label)
+        if news == shown:
+            return shown
+        lines = ('%.1f images/s    stamp %d.%09d    %s' % ((rate_hz,) + divmod(snapshot.stamp_ns, NS) + (
+                     'no 3D boxes' if snapshot.boxes3d is None else '3D boxes: %d' % len(snapshot.boxes3d),)),
+                 'session: %s    label: %s' % (self._params.session or 'none', label or 'none'), KEYS, self._answer)
+        view = View(snapshot.color.pixels, snapshot.depth, snapshot.boxes2d, snapshot.boxes3d, lines,
+                    tuple(self._warnings(snapshot, is_early, rate_hz)))
+        self._window.show(compose(view, self._params.panel_width, self._params.depth_image_range))
+        return news
+
+    def _warnings(self, snapshot, is_early, rate_hz):
+        if self._is_paused:
+            yield 'the detector is paused'
+        elif snapshot.boxes3d is None and not is_early:
+            yield 'no 3D boxes come on %s' % rospy.resolve_name(BOXES3D_TOPIC)
+        if rate_hz == 0:
+            yield 'no new images come on %s' % rospy.resolve_name(COLOR_TOPIC)
+
+
+def _check(params):
+    """Raise ValueError where a parameter cannot be meant."""
+    check_not_negative(params, 'depth_scale', 'cache_length', 'stamp_tolerance')
+    if params.session and not os.path.isabs(params.session):
+        raise ValueError('parameter ~session is %r; an absolute path expected' % params.session)
+    for name, least in (('window_rate', 0.1), ('panel_width', 80), ('depth_image_range', 0.1)):
+        if not least <= getattr(params, name) <= 10000:
+            raise ValueError('parameter ~%s is %g; %g or more expected' % (name, getattr(params, name), least))
+
+
+def _window():
+    try:
+        return Window('ros_3d_bb viewer')
+    except WindowError as error:
+        raise ValueError('%s; ~window:=false (launch argument window:=false) does without' % error)
+
+
+def _complain(future):
+    """Say what went wrong on a key that nobody foresaw."""
+    if future.exception() is not None:
+        rospy.logerr('the key did nothing: %r', future.exception())
+
+
+def main():
+    """Run the node."""
+    run_node('viewer_node', ViewerNode, ViewerNode.run)

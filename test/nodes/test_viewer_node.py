@@ -1,0 +1,282 @@
+"""viewer_node on simulated images. Needs a master: five topics have to meet, and services and keys to be answered."""
+import contextlib
+import os
+import signal
+import subprocess
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import rospy
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header, Int32MultiArray
+from std_srvs.srv import SetBool, SetBoolResponse, Trigger
+
+from ros_3d_bb.estimation import DepthImage, estimate_boxes, estimator_named
+from ros_3d_bb.measurements import read_color, read_depth, read_session
+from ros_3d_bb.messages import boxes2d_to_message, boxes3d_to_message, time_from
+from ros_3d_bb.msg import BoundingBox3DArray
+from ros_3d_bb.session_file import changing
+from ros_3d_bb.simulation.scenario import scenario_from
+from ros_3d_bb.simulation.simulator import Simulator
+from ros_3d_bb.simulator_messages import CAMERA_FRAME, simulated_messages
+from ros_3d_bb.stamped import NS
+from support.ros import Recorder, launched, publisher, wait_until
+
+START_NS = 1000 * NS
+PERIOD = NS // 10
+PEOPLE = [{'start': [4.0, 0.8], 'facing': 3.1}, {'start': [5.0, -0.9], 'facing': 1.6}]
+COLOR, DEPTH, INFO = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw', 'camera/color/camera_info'
+BOXES2D, BOXES3D = 'yolo_bounding_box', 'ros_3d_bb/bb_3d'
+TYPES = {COLOR: Image, DEPTH: Image, INFO: CameraInfo, BOXES2D: Int32MultiArray, BOXES3D: BoundingBox3DArray}
+TITLE = 'ros_3d_bb viewer'
+
+
+class Sent(NamedTuple):
+    """An image that was sent, with what was found in it."""
+
+    frame: Any
+    camera: Any
+    stamp_ns: int
+    rects_px: Any
+    boxes: Any
+
+
+class Rig(object):
+    """A simulated camera and a detector that knows where the people are."""
+
+    def __init__(self):
+        self.simulator = Simulator(scenario_from({'rate': 10.0, 'duration': 30.0, 'people': PEOPLE}))
+        self.pubs = {topic: publisher(topic, kind) for topic, kind in TYPES.items()}
+        self._sent = 0
+
+    def send(self, with_boxes=True, focal_factor=1.0):
+        """Send the next image; returns what was sent."""
+        frame, stamp_ns = self.simulator.frame(self._sent), START_NS + self._sent * PERIOD
+        self._sent += 1
+        for topic, message in simulated_messages(self.simulator, frame, stamp_ns):
+            if topic == INFO:
+                message.K = tuple(value * focal_factor for value in message.K)
+            if topic in self.pubs:
+                self.pubs[topic].publish(message)
+        rects_px = [tuple(int(edge) for edge in person.box_px) for person in frame.people]
+        boxes = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, self.simulator.camera,
+                               estimator_named('foreground'))
+        if with_boxes:
+            header = Header(stamp=time_from(stamp_ns), frame_id=CAMERA_FRAME)
+            self.pubs[BOXES2D].publish(boxes2d_to_message(np.array(rects_px), header))
+            self.pubs[BOXES3D].publish(boxes3d_to_message(boxes, header, self.simulator.camera))
+        return Sent(frame, self.simulator.camera, stamp_ns, tuple(rects_px), boxes)
+
+
+@contextlib.contextmanager
+def viewer(*arguments):
+    """The node as a process of its own."""
+    process = subprocess.Popen(['rosrun', 'ros_3d_bb', 'viewer_node'] + list(arguments))
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+        process.wait(timeout=20)
+
+
+def capture(name='viewer_node'):
+    rospy.wait_for_service(name + '/capture', timeout=20)
+    return rospy.ServiceProxy(name + '/capture', Trigger)()
+
+
+def captured(count_before, folder):
+    """Capture until everything that was sent has arrived: nothing says so but the session."""
+    answers = []
+
+    def done():
+        answers.append(capture())
+        return answers[-1].success
+    wait_until(done, 'a measurement')
+    assert len(entries(folder)) == count_before + 1
+    return answers[-1].message
+
+
+def entries(folder):
+    """The frames in the description of a session; none where there is no session."""
+    if not os.path.exists(os.path.join(folder, 'frames.json')):
+        return []
+    with changing(folder) as content:
+        return content['frames']
+
+
+def check_stored(folder, sent, number):
+    """That a measurement holds what was sent, to the bit."""
+    session = read_session(folder)
+    frame, entry = session.frames[number], entries(folder)[number]
+    assert (session.camera, session.depth_scale_m, session.frame_id) == (sent.camera, 0.001, CAMERA_FRAME)
+    np.testing.assert_array_equal(read_color(frame, session.camera), sent.frame.color)
+    np.testing.assert_array_equal(read_depth(frame, session).values, sent.frame.depth_mm)
+    assert entry['stamp'] == '%d.%09d' % divmod(sent.stamp_ns, NS)
+    assert frame.boxes_px == sent.rects_px
+    for detection, box in zip(entry['detections'], sent.boxes):
+        np.testing.assert_allclose(np.array(detection['estimate_mm']) / 1000, box.center_m, atol=1e-5)
+        np.testing.assert_allclose(np.array(detection['size_mm']) / 1000, box.size_m[:2], atol=1e-5)
+        assert detection['support'] == pytest.approx(box.support, abs=1e-5)
+        assert detection['truncated'] == box.truncated
+
+
+@pytest.fixture(scope='module', autouse=True)
+def node():
+    rospy.init_node('test_viewer_node')
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    return str(tmp_path_factory.mktemp('measurements') / 'a session')
+
+
+@pytest.fixture(scope='module')
+def headless(folder):
+    with launched('viewer.launch', 'session:=' + folder, 'window:=false', 'label:=A1', 'enable_service:=d/enable'):
+        yield
+
+
+@pytest.fixture(scope='module')
+def rig(headless):
+    answer = capture()
+    assert not answer.success and 'nothing has come on /camera/color/image_raw, /camera/aligned' in answer.message
+    return Rig()
+
+
+def test_before_anything_came_it_is_said(rig, folder):
+    assert entries(folder) == []
+    rig.pubs[COLOR].publish(Image())  # refused
+    assert not capture().success and entries(folder) == []
+
+
+def test_two_captures_are_appended_and_read_back(rig, folder):
+    first = rig.send()
+    assert 'with 2 3D boxes, label A1: number 1 in ' + folder in captured(0, folder)
+    rospy.set_param('viewer_node/label', 'B2')
+    second = rig.send()
+    captured(1, folder)
+    for number, sent in enumerate((first, second)):
+        check_stored(folder, sent, number)
+    assert [entry['label'] for entry in entries(folder)] == ['A1', 'B2']
+
+
+def test_the_same_image_is_not_stored_twice(rig, folder):
+    count = len(entries(folder))
+    rig.send()
+    captured(count, folder)
+    answer = capture()
+    assert not answer.success and 'nothing new' in answer.message and len(entries(folder)) == count + 1
+
+
+def test_a_slow_detector_is_waited_for(rig, folder):
+    """The newest image whose boxes are there is stored, not the newest image."""
+    count = len(entries(folder))
+    sent = rig.send()
+    for _image in range(3):
+        rig.send(with_boxes=False)
+    captured(count, folder)
+    check_stored(folder, sent, -1)
+
+
+def test_without_boxes_it_is_said_before_images_are_stored_alone(rig, folder):
+    count = len(entries(folder))
+    for _image in range(12):
+        rig.send(with_boxes=False)
+    wait_until(lambda: 'no 3D boxes have come on /ros_3d_bb/bb_3d' in capture().message, 'a refusal')
+    assert len(entries(folder)) == count
+    last = rig.send(with_boxes=False)
+    wait_until(lambda: capture().success and entries(folder)[-1]['stamp'] == '%d.%09d' % divmod(last.stamp_ns, NS),
+               'images alone')
+    assert entries(folder)[-1]['detections'] == []
+
+
+def test_another_camera_is_refused(rig, folder):
+    rig.send()
+    captured(len(entries(folder)), folder)
+    before = entries(folder)
+    rig.send(focal_factor=1.1)
+    wait_until(lambda: 'another camera' in capture().message, 'a refusal')
+    assert entries(folder) == before
+
+
+def test_without_a_session_nothing_is_stored():
+    with viewer('__name:=looking', '_window:=false'):
+        answer = capture('looking')
+    assert not answer.success and 'session:=FOLDER' in answer.message
+
+
+@pytest.mark.parametrize('display', [None, ':9876'])
+def test_without_a_display_it_says_what_to_do(display):
+    environment = {name: value for name, value in os.environ.items() if name not in ('DISPLAY', 'WAYLAND_DISPLAY')}
+    environment.update({'DISPLAY': display} if display else {})
+    process = subprocess.Popen(['rosrun', 'ros_3d_bb', 'viewer_node', '__name:=blind'], env=environment,
+                               stderr=subprocess.PIPE)
+    said = process.communicate()[1].decode()
+    assert process.returncode == 1 and '~window:=false' in said and 'Traceback' not in said
+
+
+@pytest.fixture
+def screen(monkeypatch):
+    """A virtual display, with nobody else on it."""
+    process = subprocess.Popen(['Xvfb', '-displayfd', '1', '-screen', '0', '1600x900x24'], stdout=subprocess.PIPE)
+    monkeypatch.setenv('DISPLAY', ':' + process.stdout.readline().decode().strip())
+    yield
+    process.terminate()
+    process.wait()
+
+
+def xdotool(*arguments):
+    return subprocess.check_output(('xdotool',) + arguments).decode()
+
+
+def press(key):
+    """Press a key in the window, which no window manager has given the focus."""
+    window = xdotool('search', '--sync', '--onlyvisible', '--name', TITLE).split()[-1]
+    xdotool('windowfocus', '--sync', window)
+    xdotool('key', key)
+
+
+@pytest.fixture
+def window(screen, tmp_path):
+    """The node with its window: its process and session."""
+    folder = str(tmp_path / 'session')
+    with viewer('__name:=window', '_session:=' + folder, '_label:=by hand') as process:
+        rospy.wait_for_service('window/capture', timeout=20)
+        yield process, folder
+
+
+def test_keys_store_pause_and_quit(rig, window):
+    process, folder = window
+    wait_until(lambda: all(pub.get_num_connections() >= 2 for pub in rig.pubs.values()), 'the connections')
+    sent = rig.send()
+
+    def stored():
+        press('s')
+        rospy.sleep(0.3)
+        return entries(folder)
+    wait_until(stored, 'a measurement')
+    check_stored(folder, sent, 0)
+    assert entries(folder)[0]['label'] == 'by hand' and len(entries(folder)) == 1
+    with Recorder('/rosout', Log, False) as log:
+        press('p')
+        wait_until(lambda: any('nobody answers on the service /detector/enable' in message.msg
+                               for message in log.messages), 'a word about the missing detector')
+    asked = []
+    service = rospy.Service('detector/enable', SetBool,
+                            lambda request: SetBoolResponse(asked.append(request.data) is None, 'done'))
+    for presses in (1, 2, 3):
+        press('p')
+        wait_until(lambda: len(asked) == presses, 'the call of the detector')
+    press('q')
+    assert process.wait(timeout=20) == 0
+    assert asked == [False, True, False, True]  # who goes leaves no detector paused
+    service.shutdown()
+
+
+def test_ctrl_c_ends_the_window(window):
+    process, _folder = window
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=20) == 0
