@@ -228,15 +228,10 @@ def screen(monkeypatch):
     process.wait()
 
 
-def xdotool(*arguments):
-    return subprocess.check_output(('xdotool',) + arguments).decode()
-
-
 def press(key):
-    """Press a key in the window, which no window manager has given the focus."""
-    window = xdotool('search', '--sync', '--onlyvisible', '--name', TITLE).split()[-1]
-    xdotool('windowfocus', '--sync', window)
-    xdotool('key', key)
+    """Press a key in the window, which no window manager gives the focus."""
+    command = ['xdotool', 'search', '--onlyvisible', '--name', TITLE, 'windowfocus', '--sync', 'key', key]
+    wait_until(lambda: subprocess.call(command) == 0, 'the window')
 
 
 @pytest.fixture
