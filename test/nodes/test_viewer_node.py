@@ -17,7 +17,6 @@ from ros_3d_bb.estimation import DepthImage, estimate_boxes, estimator_named
 from ros_3d_bb.measurements import read_color, read_depth, read_session
 from ros_3d_bb.messages import boxes2d_to_message, boxes3d_to_message, time_from
 from ros_3d_bb.msg import BoundingBox3DArray
-from ros_3d_bb.session_file import changing
 from ros_3d_bb.simulation.scenario import scenario_from
 from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulator_messages import CAMERA_FRAME, simulated_messages
@@ -100,27 +99,23 @@ def captured(count_before, folder):
 
 
 def entries(folder):
-    """The frames in the description of a session; none where there is no session."""
-    if not os.path.exists(os.path.join(folder, 'frames.json')):
-        return []
-    with changing(folder) as content:
-        return content['frames']
+    """The measurements in a session; none where there is no session."""
+    return read_session(folder).frames if os.path.exists(os.path.join(folder, 'frames.json')) else ()
 
 
 def check_stored(folder, sent, number):
     """That a measurement holds what was sent, to the bit."""
     session = read_session(folder)
-    frame, entry = session.frames[number], entries(folder)[number]
+    frame = session.frames[number]
     assert (session.camera, session.depth_scale_m, session.frame_id) == (sent.camera, 0.001, CAMERA_FRAME)
     np.testing.assert_array_equal(read_color(frame, session.camera), sent.frame.color)
     np.testing.assert_array_equal(read_depth(frame, session).values, sent.frame.depth_mm)
-    assert entry['stamp'] == '%d.%09d' % divmod(sent.stamp_ns, NS)
-    assert frame.boxes_px == sent.rects_px
-    for detection, box in zip(entry['detections'], sent.boxes):
-        np.testing.assert_allclose(np.array(detection['estimate_mm']) / 1000, box.center_m, atol=1e-5)
-        np.testing.assert_allclose(np.array(detection['size_mm']) / 1000, box.size_m[:2], atol=1e-5)
-        assert detection['support'] == pytest.approx(box.support, abs=1e-5)
-        assert detection['truncated'] == box.truncated
+    assert (frame.stamp_ns, frame.boxes_px) == (sent.stamp_ns, sent.rects_px)
+    for detection, box in zip(frame.detections, sent.boxes):
+        np.testing.assert_allclose(detection.estimate_m, box.center_m, atol=1e-5)
+        np.testing.assert_allclose(detection.size_m, box.size_m[:2], atol=1e-5)
+        assert detection.support == pytest.approx(box.support, abs=1e-5)
+        assert detection.truncated == box.truncated
 
 
 @pytest.fixture(scope='module', autouse=True)
@@ -147,9 +142,9 @@ def rig(headless):
 
 
 def test_before_anything_came_it_is_said(rig, folder):
-    assert entries(folder) == []
+    assert entries(folder) == ()
     rig.pubs[COLOR].publish(Image())  # refused
-    assert not capture().success and entries(folder) == []
+    assert not capture().success and entries(folder) == ()
 
 
 def test_two_captures_are_appended_and_read_back(rig, folder):
@@ -160,7 +155,7 @@ def test_two_captures_are_appended_and_read_back(rig, folder):
     captured(1, folder)
     for number, sent in enumerate((first, second)):
         check_stored(folder, sent, number)
-    assert [entry['label'] for entry in entries(folder)] == ['A1', 'B2']
+    assert [frame.label for frame in read_session(folder).frames] == ['A1', 'B2']
 
 
 def test_the_same_image_is_not_stored_twice(rig, folder):
@@ -188,18 +183,17 @@ def test_without_boxes_it_is_said_before_images_are_stored_alone(rig, folder):
     wait_until(lambda: 'no 3D boxes have come on /ros_3d_bb/bb_3d' in capture().message, 'a refusal')
     assert len(entries(folder)) == count
     last = rig.send(with_boxes=False)
-    wait_until(lambda: capture().success and entries(folder)[-1]['stamp'] == '%d.%09d' % divmod(last.stamp_ns, NS),
-               'images alone')
-    assert entries(folder)[-1]['detections'] == []
+    wait_until(lambda: capture().success and entries(folder)[-1].stamp_ns == last.stamp_ns, 'images alone')
+    assert entries(folder)[-1].detections == ()
 
 
 def test_another_camera_is_refused(rig, folder):
     rig.send()
     captured(len(entries(folder)), folder)
-    before = entries(folder)
+    count = len(entries(folder))
     rig.send(focal_factor=1.1)
     wait_until(lambda: 'another camera' in capture().message, 'a refusal')
-    assert entries(folder) == before
+    assert len(entries(folder)) == count
 
 
 def test_without_a_session_nothing_is_stored():
@@ -254,7 +248,7 @@ def test_keys_store_pause_and_quit(rig, window):
         return entries(folder)
     wait_until(stored, 'a measurement')
     check_stored(folder, sent, 0)
-    assert entries(folder)[0]['label'] == 'by hand' and len(entries(folder)) == 1
+    assert entries(folder)[0].label == 'by hand' and len(entries(folder)) == 1
     with Recorder('/rosout', Log, False) as log:
         press('p')
         wait_until(lambda: any('nobody answers on the service /detector/enable' in message.msg

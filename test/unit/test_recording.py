@@ -62,8 +62,21 @@ def test_what_is_appended_is_read_back(folder):
         depth = read_depth(frame, session)
         np.testing.assert_array_equal(depth.values, one.depth.values)
         assert depth.scale_m == one.depth.scale_m
-        assert frame.boxes_px == ((10, 0, 30, 48),)
-        np.testing.assert_allclose(frame.estimate_m, BOX.center_m, atol=1e-6)
+        assert (frame.stamp_ns, frame.label, frame.boxes_px) == (one.stamp_ns, one.label, ((10, 0, 30, 48),))
+        detection, = frame.detections
+        np.testing.assert_allclose(detection.estimate_m, BOX.center_m, atol=1e-6)
+        np.testing.assert_allclose(detection.size_m, BOX.size_m[:2], atol=1e-6)
+        assert (detection.support, detection.truncated, detection.by_hand) == (BOX.support, BOX.truncated, False)
+
+
+@pytest.mark.parametrize('model, distortion', [
+    ('', ()), ('plumb_bob', (0.1, 0, 0, 0, 0)), ('equidistant', (0.0,) * 4), ('inverse_brown_conrady', (0.1,) * 5),
+    ('rational_polynomial', (0.1, -0.2, 0.001, 0.002, 0.03, 0.1, 0.2, 0.3))])
+def test_the_lens_is_read_back(folder, model, distortion):
+    camera = CAMERA._replace(distortion_model=model, distortion=distortion)
+    for number in range(2):  # the second one finds it to be the same
+        append(folder, measurement(number, camera=camera))
+    assert read_session(folder).camera == camera
 
 
 def test_the_description_says_what_is_known(folder):
