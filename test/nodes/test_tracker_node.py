@@ -2,9 +2,11 @@
 import itertools
 import time
 
+import numpy as np
 import pytest
 import rospy
 from geometry_msgs.msg import Point, TransformStamped
+from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -35,6 +37,13 @@ class Rig(object):
         """Boxes at camera coordinates (right, down, forward), and the transform at their stamp."""
         self.send_tf(stamp_ns, **robot)
         self.send_boxes(stamp_ns, *centers)
+
+    def stand(self, tracks, stamp_ns, frames=10):
+        """Images of somebody who stands 3 m ahead; returns their number."""
+        for frame in range(frames):
+            self.send(stamp_ns + frame * PERIOD, (0.0, 0.0, 3.0))
+            messages = tracks.wait_for(frame + 1)
+        return messages[-1].objects[0].id
 
     def send_boxes(self, stamp_ns, *centers):
         message = BoundingBox3DArray(header=header_at(stamp_ns))
@@ -78,53 +87,54 @@ def now():
 
 def test_tracks_are_in_the_map_at_the_stamp_of_the_image(rig, tracks, now):
     """1 m right, 0.2 m down and 3 m in front of a camera 1 m above the map: x 3, y -1, z 0.8."""
-    for frame in range(3):
+    for frame in range(5):
         rig.send(now + frame * PERIOD, (1.0, 0.2, 3.0))
-    message = tracks.wait_for(3)[-1]
-    assert message.header.frame_id == 'map' and message.header.stamp == time_from(now + 2 * PERIOD)
+    message = tracks.wait_for(5)[-1]
+    assert message.header.frame_id == 'map' and message.header.stamp == time_from(now + 4 * PERIOD)
     track, = message.objects
     place = track.pose.pose.position
-    assert (place.x, place.y, place.z) == pytest.approx((3, -1, 0.8))
+    assert (place.x, place.y, place.z) == pytest.approx((3, -1, 0.8), abs=0.01)
     assert (track.size.x, track.size.y, track.size.z) == pytest.approx((0.5, 0.5, 1.7))
     assert track.id >= 1 and track.status == TrackedObject.VISIBLE and not track.moving
-    assert track.first_seen == time_from(now) and track.last_seen == time_from(now + 2 * PERIOD)
+    assert track.first_seen == time_from(now) and track.last_seen == time_from(now + 4 * PERIOD)
     assert len(track.prediction) == 8 and track.prediction_step.to_sec() == pytest.approx(0.25)
     assert track.pose.pose.orientation.w == 1.0
+    assert 0 < track.pose.covariance[0] < 0.1 and 0 < track.twist.covariance[0]
+    assert track.pose.covariance[0] < track.prediction[0].covariance[0] < track.prediction[-1].covariance[0]
 
 
 def test_a_person_who_stands_still_has_no_speed_though_the_robot_drives(rig, tracks, now):
     for frame in range(20):
         rig.send(now + frame * PERIOD, (0.0, 0.0, 5.0 - 0.1 * frame), x=0.1 * frame)
-        track, = tracks.wait_for(frame + 1)[-1].objects
-    assert track.pose.pose.position.x == pytest.approx(5.0)
+        tracks.wait_for(frame + 1)
+    track, = tracks.wait_for(20)[-1].objects
+    assert track.pose.pose.position.x == pytest.approx(5.0, abs=0.01)
     assert abs(track.twist.twist.linear.x) < 0.01 and not track.moving
 
 
 def test_velocity_and_prediction_are_in_metres_and_seconds(rig, tracks, now):
     """1 m/s to the right of the camera is -y in the map."""
     for frame in range(40):
-        rig.send(now + frame * PERIOD, (0.1 * frame, 0.0, 4.0))
-        track, = tracks.wait_for(frame + 1)[-1].objects
-    assert track.twist.twist.linear.y == pytest.approx(-1, abs=0.01) and track.moving
+        rig.send(now + frame * PERIOD, (0.1 * frame - 2, 0.0, 4.0))
+        tracks.wait_for(frame + 1)
+    track, = tracks.wait_for(40)[-1].objects
+    assert track.twist.twist.linear.y == pytest.approx(-1, abs=0.02) and track.moving
     last = track.prediction[-1].pose.position
-    assert last.y - track.pose.pose.position.y == pytest.approx(-2, abs=0.02)
+    assert last.y - track.pose.pose.position.y == pytest.approx(-2, abs=0.08)
 
 
 def test_without_transform_nothing_is_published_and_nobody_ages(rig, tracks, now):
-    """Nothing for 4 s by the stamps, four times the limit; the track lives on."""
-    rig.send(now, (0.0, 0.0, 3.0))
-    first, = tracks.wait_for(1)
+    """Nothing for 1 s by the stamps, three times as long as somebody unseen is published; the track lives on."""
+    number = rig.stand(tracks, now, frames=30)
     before = diagnostics_of('tracker_node')[2].get('no transform', 0)
-    for second in range(1, 5):
-        rig.send_boxes(now + second * NS, (0.0, 0.0, 3.0))
+    for quarter in range(4):
+        rig.send_boxes(now + 3 * NS + quarter * NS // 4, (0.0, 0.0, 3.0))
     wait_until(lambda: diagnostics_of('tracker_node')[2].get('no transform', 0) == before + 4, 'four warnings')
     level, sentence, _counts = diagnostics_of('tracker_node')
     assert level == 1 and 'no transform from camera_color_optical_frame to map' in sentence
-    assert len(tracks.messages) == 1
-    rig.send(now + 4 * NS + PERIOD)
-    again = tracks.wait_for(2)[-1]
-    assert [track.id for track in again.objects] == [track.id for track in first.objects]
-    assert again.objects[0].status == TrackedObject.OCCLUDED
+    assert len(tracks.messages) == 30
+    rig.send(now + 4 * NS)
+    assert [(track.id, track.status) for track in tracks.wait_for(31)[-1].objects] == [(number, TrackedObject.OCCLUDED)]
 
 
 def test_a_transform_that_comes_a_little_late_is_waited_for(rig, tracks, now):
@@ -135,14 +145,14 @@ def test_a_transform_that_comes_a_little_late_is_waited_for(rig, tracks, now):
 
 
 def test_tracks_end_after_the_limit_and_their_markers_are_deleted(rig, tracks, markers, now):
-    rig.send(now, (0.0, 0.0, 3.0))
-    number = tracks.wait_for(1)[0].objects[0].id
-    for frame in range(1, 12):
+    """0.35 s after an image in which the camera should have seen the person, and did not."""
+    number = rig.stand(tracks, now)
+    for frame in range(10, 14):
         rig.send(now + frame * PERIOD)
         messages = tracks.wait_for(frame + 1)
-    assert [len(message.objects) for message in messages] == [1] * 11 + [0]
-    assert messages[5].objects[0].status == TrackedObject.OCCLUDED
-    deleted = [marker for marker in markers.wait_for(12)[-1].markers if marker.action == Marker.DELETE]
+    assert [len(message.objects) for message in messages[10:]] == [1, 1, 1, 0]
+    assert messages[10].objects[0].status == TrackedObject.OCCLUDED
+    deleted = [marker for marker in markers.wait_for(14)[-1].markers if marker.action == Marker.DELETE]
     assert sorted((marker.ns, marker.id) for marker in deleted) == [
         (namespace, number) for namespace in ('cylinder', 'id', 'prediction', 'velocity')]
 
@@ -165,28 +175,56 @@ def test_markers_are_those_of_the_thesis(rig, markers, tracks, now):
     assert text.pose.position.z > cylinder.pose.position.z + cylinder.scale.z / 2
     red, green = drawn['velocity'], drawn['prediction']
     assert red.type == green.type == Marker.ARROW and red.color.r > 0.8 and green.color.g > 0.8
-    assert red.points[1].x - red.points[0].x == pytest.approx(1.0, abs=0.01)
-    assert green.points[1].x - green.points[0].x == pytest.approx(2.0, abs=0.05)
+    assert red.points[1].x - red.points[0].x == pytest.approx(1.0, abs=0.05)
+    assert green.points[1].x - green.points[0].x == pytest.approx(2.0, abs=0.1)
 
 
 def test_time_that_goes_back_ends_all_tracks_and_goes_on(rig, tracks, now):
     """The transforms of the time before are forgotten too, so they are sent until the boxes have met one."""
-    for second in range(3):
-        rig.send(now + second * NS // 2, (0.0, 0.0, 3.0))
-        old = tracks.wait_for(second + 1)[-1].objects[0].id
+    number = rig.stand(tracks, now)
     rig.send_boxes(now - 5 * NS, (0.0, 0.0, 3.0))
-    wait_until(lambda: rig.send_tf(now - 5 * NS) or len(tracks.messages) > 3, 'a track after the jump')
-    again = tracks.messages[3]
-    assert again.header.stamp == time_from(now - 5 * NS) and [track.id for track in again.objects] == [old + 1]
+    wait_until(lambda: rig.send_tf(now - 5 * NS) or len(tracks.messages) > 10, 'tracks after the jump')
+    assert tracks.messages[10].header.stamp == time_from(now - 5 * NS) and not tracks.messages[10].objects
+    assert rig.stand(tracks.emptied(), now - 4 * NS) > number
 
 
 def test_boxes_that_cannot_be_used_are_refused_and_the_next_work(rig, tracks, now):
     rig.send(now, (0.0, 0.0, float('nan')))
     rig.send(now + PERIOD, (0.0, 0.0, 3.0))
     assert tracks.wait_for(1)[0].header.stamp == time_from(now + PERIOD)
-    rig.send(now + PERIOD // 2, (0.0, 0.0, 3.0))  # late
+    rig.send(now + PERIOD, (0.0, 0.0, 3.0))  # a second time
     rig.boxes.publish(BoundingBox3DArray())  # no stamp
     rig.send(now + 2 * PERIOD, (0.0, 0.0, 3.0))
     assert tracks.wait_for(2)[1].header.stamp == time_from(now + 2 * PERIOD)
     level, sentence, _counts = diagnostics_of('tracker_node')
     assert level == 1 and '3D boxes refused' in sentence
+
+
+def test_boxes_that_come_late_are_taken_in_and_nothing_is_stamped_older(rig, tracks, now):
+    """Two images swapped on the way: the track has seen both."""
+    rig.stand(tracks, now)
+    rig.send(now + 11 * PERIOD, (0.0, 0.0, 3.0))
+    tracks.wait_for(11)
+    rig.send(now + 10 * PERIOD, (0.0, 0.0, 3.0))
+    late = tracks.wait_for(12)[-1]
+    assert late.header.stamp == time_from(now + 11 * PERIOD) and len(late.objects) == 1
+
+
+def test_somebody_behind_a_pillar_is_occluded_and_keeps_the_number(rig, tracks, now):
+    """The depth image shows the pillar 1.5 m ahead while nobody is found for 1.5 s."""
+    info = publisher('camera/color/camera_info', CameraInfo)
+    depth = publisher('camera/aligned_depth_to_color/image_raw', Image)
+    number = rig.stand(tracks, now)
+    for frame in range(10, 25):
+        stamp_ns = now + frame * PERIOD
+        info.publish(CameraInfo(header=header_at(stamp_ns), width=64, height=48, K=[60, 0, 32, 0, 60, 24, 0, 0, 1]))
+        pillar = np.full((48, 64), 1500, np.uint16)
+        depth.publish(Image(header=header_at(stamp_ns), width=64, height=48, encoding='16UC1', step=128,
+                            data=pillar.tobytes()))
+        time.sleep(0.02)  # another topic: nothing says that it comes first
+        rig.send(stamp_ns)
+        message = tracks.wait_for(frame + 1)[-1]
+    track, = message.objects
+    assert track.id == number and track.status == TrackedObject.OCCLUDED
+    rig.send(now + 25 * PERIOD, (0.0, 0.0, 3.0))
+    assert [track.id for track in tracks.wait_for(26)[-1].objects] == [number]

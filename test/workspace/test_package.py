@@ -18,11 +18,10 @@ from ros_3d_bb.nodes.bbox3d_node import Bbox3dParams
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorParams
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
 from ros_3d_bb.nodes.simulator_node import SimulatorParams
-from ros_3d_bb.nodes.tracker_node import TrackerNodeParams
+from ros_3d_bb.nodes.tracker_node import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.nodes.viewer_node import ViewerParams
 from ros_3d_bb.nodes.yolov5_node import Yolov5NodeParams
 from ros_3d_bb.params import params_from
-from ros_3d_bb.tracking.thesis import ThesisTrackerParams
 from support.standard_library import STANDARD_LIBRARY, TEST_STANDARD_LIBRARY
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -31,7 +30,7 @@ KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-pyt
         'yaml': 'python3-yaml', 'matplotlib': 'python3-matplotlib', 'scipy': 'python3-scipy'}
 TEST_KEYS = {'pytest': 'python3-pytest'}
 CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams, RuntimeParams), 'bbox3d.yaml': (Bbox3dParams,),
-           'tracker.yaml': (TrackerNodeParams, ThesisTrackerParams), 'simulator.yaml': (SimulatorParams,),
+           'tracker.yaml': (TrackerNodeParams,) + TRACKING_PARAMS, 'simulator.yaml': (SimulatorParams,),
            'planner_bridge.yaml': (PlannerBridgeParams,),
            'depth_detector.yaml': (DepthDetectorParams, DepthPeopleParams), 'viewer.yaml': (ViewerParams,)}
 SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id', 'error_model'},

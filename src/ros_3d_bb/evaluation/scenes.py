@@ -1,4 +1,5 @@
 """The pipeline without ROS on a simulated scene: detector, 3D boxes, tracks, image by image."""
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +12,9 @@ from ros_3d_bb.simulation.simulator import Frame
 from ros_3d_bb.simulation.truth import truth_at
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.association import match_greedily
-from ros_3d_bb.tracking.thesis import ThesisTracker
-from ros_3d_bb.tracking.tracked import Detection
+from ros_3d_bb.tracking.tracked import Detection, View
+from ros_3d_bb.tracking.tracker import Tracker
+from ros_3d_bb.tracking.visibility import depths_towards, edges_of
 
 LEAST_SHOWN = 0.3  # share of the body; less of it tells nothing of where the person is
 FOUND_IOU = 0.5  # a detection is that of a person where the boxes overlap by so much, else it is false
@@ -61,12 +63,13 @@ def run_scene(simulator, detect, every=1, estimator=estimator_named('foreground'
     -------
     list of Step
     """
-    tracker, steps = ThesisTracker(), []
+    tracker, steps = Tracker(), []
     for number in range(0, simulator.frame_count, every):
         frame = simulator.frame(number)
         boxes = np.asarray(detect(frame), float).reshape(-1, 4)
         stamp_ns = int(round(frame.time_s * NS))
-        tracks = tracker.update(stamp_ns, _detections(frame, boxes, simulator.camera, estimator))
+        tracks = tracker.update(stamp_ns, _detections(frame, boxes, simulator.camera, estimator),
+                                _view(frame, simulator.camera))
         moment = Moment(stamp_ns, truth_at(simulator, frame, stamp_ns), tracks)
         steps.append(Step(frame._replace(color=None, depth_mm=None), boxes, moment))
     return steps
@@ -78,6 +81,13 @@ def _detections(frame, boxes, camera, estimator):
     found = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, camera, estimator)
     return [Detection(transform_points(frame.poses.map_from_camera, box.center_m), box.size_m[[0, 2, 1]])
             for box in found if box is not None]
+
+
+def _view(frame, camera):
+    """What the tracker is told of the camera, as tracker_node does it."""
+    depth = DepthImage(frame.depth_mm, 0.001)
+    depth_at = functools.partial(depths_towards, camera, depth)
+    return View(frame.poses.map_from_camera, edges_of(camera), depth_at=depth_at)
 
 
 def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6.0):

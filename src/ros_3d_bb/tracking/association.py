@@ -1,5 +1,6 @@
 """Which detection belongs to which track."""
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 
 def match_greedily(distances):
@@ -28,3 +29,25 @@ def plane_distances(positions, others):
     """Distances (n, m) between points (n, 3) and (m, 3) seen from above, in the x-y plane, metres."""
     difference = np.asarray(positions, float)[:, None, :2] - np.asarray(others, float)[None, :, :2]
     return np.linalg.norm(difference, axis=2)
+
+
+def assign(costs):
+    """Pair rows with columns so that as many pairs as can be are made and the sum of their costs is least.
+
+    Parameters
+    ----------
+    costs : array_like, (n, m)
+        inf where a pair is not allowed.
+
+    Returns
+    -------
+    list of (int, int)
+        Pairs (row, column).
+    """
+    costs = np.asarray(costs, float)
+    allowed = np.isfinite(costs)
+    if not allowed.any():
+        return []
+    forbidden = 1e6 + np.abs(costs[allowed]).sum()
+    pairs = zip(*linear_sum_assignment(np.where(allowed, costs, forbidden)))
+    return [(int(row), int(column)) for row, column in pairs if allowed[row, column]]

@@ -1,5 +1,5 @@
 """What goes into a tracker and what comes out. Positions and sizes in the fixed frame (z up), metres."""
-from typing import NamedTuple, Optional, Tuple
+from typing import Callable, NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -19,15 +19,26 @@ class Detection(NamedTuple):
 
 
 class View(NamedTuple):
-    """Where the camera of an image was, (4, 4) from its optical frame, and how far to the left and right it sees.
+    """Where the camera of an image was, (4, 4) from its optical frame, and what it sees.
 
     `edges` are x / z of what the left and the right image border show, None where they are not known. `camera` tells
-    the images of one camera from those of another.
+    the images of one camera from those of another. `depth_at`, where there is a depth image: a function that takes
+    points (k, 3) of the optical frame and returns the depths (k,) that were measured in their direction, metres, nan
+    where none was.
     """
 
     fixed_from_camera: np.ndarray
     edges: Optional[Tuple[float, float]] = None
     camera: str = ''
+    depth_at: Optional[Callable[[np.ndarray], np.ndarray]] = None
+
+    def bearings(self, positions_m):
+        """Distances (n,) of positions (n, 2 or 3) from the camera seen from above, and their bearings (n,): 0 straight
+        ahead, positive to the left, radians."""
+        ahead = self.fixed_from_camera[:2, 2]
+        offsets = np.asarray(positions_m)[:, :2] - self.fixed_from_camera[:2, 3]
+        bearings = np.arctan2(ahead[0] * offsets[:, 1] - ahead[1] * offsets[:, 0], offsets.dot(ahead))
+        return np.hypot(offsets[:, 0], offsets[:, 1]), bearings
 
 
 class TrackedObject(NamedTuple):

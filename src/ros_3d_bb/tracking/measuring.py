@@ -1,0 +1,111 @@
+"""What the detections of one image tell a tracker: where, how sure, from which direction, and how large."""
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_3d_bb.tracking.kalman import Measurements
+
+FLOOR_M = 0.02  # nobody's centre is known better than that: people sway as they walk
+USUAL_PERIOD_S = 1 / 30.0  # of images, for the first one
+PERSON_WIDTH_M = 0.5
+MAX_SHIFT_M = 0.2
+CUT_SIGMA_M = 0.08  # what is not seen of a cut person leaves the side open by so much
+NEARER_M = 0.25  # a box hides another one behind it from this difference in depth on
+TOUCHING_RAD = 0.03  # and if there is not more between them
+
+
+class NoiseParams(NamedTuple):
+    """How boxes err: see config/tracker.yaml."""
+
+    noise_unknown: float = 0.1
+    noise_correlated: float = 0.035
+    noise_correlation_time: float = 0.15
+
+
+class Sightings(NamedTuple):
+    """The detections of one image as arrays: where they are on the ground, extents (n, 3), height of the centre and
+    its variance, (n,), and whether the image border cuts them."""
+
+    ground: Measurements
+    sizes_m: np.ndarray
+    z_m: np.ndarray
+    z_m2: np.ndarray
+    truncated: np.ndarray
+
+
+class _Seen(NamedTuple):
+    """Detections as the camera saw them: on the ground, (n, 2); distances, bearings, half widths in radians, (n,)."""
+
+    positions_m: np.ndarray
+    rays: np.ndarray
+    distances_m: np.ndarray
+    bearings: np.ndarray
+    half_widths: np.ndarray
+
+    @property
+    def sides(self):
+        """Directions (n, 2) to the left of the rays."""
+        return np.stack((-self.rays[:, 1], self.rays[:, 0]), axis=1)
+
+
+def sightings_of(detections, view, elapsed_s, params):
+    """The detections of one image, with the noise that a filter may believe.
+
+    An error that lasts for several images would be taken for certainty if each image counted as a new opinion. The part
+    of the covariance that lasts is therefore widened by how many images it lasts for, which makes the filter the same
+    at any frame rate. The centre of a person whom the image border or somebody nearer cuts is put half a width behind
+    the edge that is seen, and its side is less sure.
+
+    Parameters
+    ----------
+    detections : sequence of Detection, n
+    view : View
+    elapsed_s : float
+        Since the image before; 0 for the first.
+    params : NoiseParams
+
+    Returns
+    -------
+    Sightings
+    """
+    positions_m = np.array([detection.position_m for detection in detections]).reshape(-1, 3)
+    sizes_m = np.array([detection.size_m for detection in detections]).reshape(-1, 3)
+    truncated = np.array([detection.truncated for detection in detections], bool)
+    unknown = np.eye(3) * params.noise_unknown ** 2
+    covariances = np.array([unknown if detection.covariance_m2 is None else detection.covariance_m2
+                            for detection in detections]).reshape(-1, 3, 3)
+    seen = _seen(positions_m[:, :2], sizes_m[:, 0], view)
+    hidden = _hidden_side(seen)
+    side = np.where(truncated, np.sign(seen.bearings), hidden)
+    shift_m = np.clip((PERSON_WIDTH_M - sizes_m[:, 0]) / 2, 0, MAX_SHIFT_M)
+    noise_m2 = _noise(covariances[:, :2, :2], seen, truncated | (hidden != 0), elapsed_s, params)
+    ground = Measurements(seen.positions_m + (side * shift_m)[:, None] * seen.sides, noise_m2, seen.rays)
+    return Sightings(ground, sizes_m, positions_m[:, 2], covariances[:, 2, 2], truncated)
+
+
+def _seen(positions_m, widths_m, view):
+    distances_m, bearings = view.bearings(positions_m)
+    distances_m = np.maximum(distances_m, 0.01)
+    rays = (positions_m - view.fixed_from_camera[:2, 3]) / distances_m[:, None]
+    return _Seen(positions_m, rays, distances_m, bearings, np.arctan2(widths_m / 2, distances_m))
+
+
+def _hidden_side(seen):
+    """On which side somebody nearer hides each in part: 1 left, -1 right, 0 on none, or on both."""
+    depths_m = seen.distances_m * np.cos(seen.bearings)
+    to_left = seen.bearings[None, :] - seen.bearings[:, None]
+    gaps = np.abs(to_left) - seen.half_widths[None, :] - seen.half_widths[:, None]
+    hides = (depths_m[None, :] < depths_m[:, None] - NEARER_M) & (gaps < TOUCHING_RAD)
+    left, right = (hides & (to_left > 0)).any(axis=1), (hides & (to_left <= 0)).any(axis=1)
+    return left.astype(int) - right
+
+
+def _noise(covariances, seen, cut, elapsed_s, params):
+    """Covariances (n, 2, 2) for the filter, from those of single images."""
+    images = max(1.0, 2 * params.noise_correlation_time / (elapsed_s or USUAL_PERIOD_S))
+    noise = np.zeros(covariances.shape)
+    for axes, extra_m2 in ((seen.rays, 0), (seen.sides, cut * CUT_SIGMA_M ** 2)):
+        variance = ((covariances @ axes[..., None])[..., 0] * axes).sum(axis=1)
+        variance += (images - 1) * np.minimum(variance, params.noise_correlated ** 2) + FLOOR_M ** 2 + extra_m2
+        noise += variance[:, None, None] * axes[:, :, None] * axes[:, None, :]
+    return noise

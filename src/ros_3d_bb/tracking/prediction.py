@@ -1,0 +1,66 @@
+"""Where tracked people are and will be, and how sure that is: what is published of a track."""
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_3d_bb.tracking.tracked import TrackedObject
+
+
+class PredictionParams(NamedTuple):
+    """See config/tracker.yaml."""
+
+    prediction_time: float = 2.0
+    prediction_step: float = 0.25
+    prediction_acceleration: float = 0.03
+    standing_speed: float = 0.15
+    position_bias: float = 0.05
+
+    def times_s(self):
+        """The times (steps,) ahead of the image at which positions are predicted."""
+        return self.prediction_step * np.arange(1, int(round(self.prediction_time / self.prediction_step)) + 1)
+
+
+def objects_of(tracks, params):
+    """What is published of tracks.
+
+    People are predicted to walk on as they do. What looks like a slow walk is mostly noise of somebody who stands: the
+    slower, the less of it is carried on. The filter's covariance does not know of errors that stay the same for
+    seconds, such as that of a wrong calibration: `position_bias` is added for them, and `prediction_acceleration` for
+    the turns that people make.
+
+    Parameters
+    ----------
+    tracks : numpy.ndarray of tracker.TRACK, (n,)
+    params : PredictionParams
+
+    Returns
+    -------
+    list of TrackedObject, n
+    """
+    times_s = params.times_s()
+    velocity_mps, level = tracks['mean'][:, 2:], np.eye(3)[:, :2]
+    speed2 = (velocity_mps ** 2).sum(axis=1, keepdims=True)
+    carried_mps = velocity_mps * speed2 / (speed2 + params.standing_speed ** 2 + 1e-12)
+    positions_m = np.column_stack((tracks['mean'][:, :2], tracks['z_m']))
+    predictions_m = positions_m[:, None] + times_s[:, None] * carried_mps.dot(level.T)[:, None]
+    predicted_m2 = level @ _ahead(tracks['covariance'], times_s, params) @ level.T
+    predicted_m2[..., 2, 2] = tracks['z_m2'][:, None]
+    covariances = np.zeros((len(tracks), 6, 6))
+    for rows, kept in ((0, np.s_[:2]), (3, np.s_[2:])):
+        for columns, others in ((0, np.s_[:2]), (3, np.s_[2:])):
+            covariances[:, rows:rows + 2, columns:columns + 2] = tracks['covariance'][:, kept, others]
+    covariances[:, [0, 1], [0, 1]] += params.position_bias ** 2
+    covariances[:, 2, 2] = tracks['z_m2']
+    velocities_mps = velocity_mps.dot(level.T)
+    return [TrackedObject(int(track['id']), positions_m[row], track['size_m'].copy(), velocities_mps[row],
+                          velocities_mps[row], int(track['status']), bool(track['moving']), int(track['first_ns']),
+                          int(track['last_ns']), predictions_m[row], params.prediction_step, covariances[row],
+                          predicted_m2[row]) for row, track in enumerate(tracks)]
+
+
+def _ahead(covariance, times_s, params):
+    """Covariances (n, steps, 2, 2) of the positions at times ahead."""
+    position, velocity, both = covariance[:, None, :2, :2], covariance[:, None, 2:, 2:], covariance[:, None, :2, 2:]
+    times = times_s[:, None, None]
+    wandered = params.prediction_acceleration * times ** 3 / 3 + params.position_bias ** 2
+    return (position + times * (both + both.transpose(0, 1, 3, 2)) + times ** 2 * velocity + wandered * np.eye(2))

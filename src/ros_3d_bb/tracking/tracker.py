@@ -1,0 +1,270 @@
+"""The tracker: who is where, how fast, and where in two seconds, from the boxes of image after image.
+
+Each person is a constant-velocity Kalman filter in the plane (`kalman`). Boxes are given to people by the sum of their
+likelihoods, those seen a moment ago first; a box that a newcomer explains better than any of them starts a new track,
+which is published once it was seen often enough. Who is not seen is carried on: published for a moment where the
+camera should have found them, for longer where somebody or something hides them (`visibility`), and remembered for
+longer still, so that they get their number back.
+"""
+import collections
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking import kalman
+from ros_3d_bb.tracking.association import assign
+from ros_3d_bb.tracking.measuring import NoiseParams, sightings_of
+from ros_3d_bb.tracking.prediction import PredictionParams, objects_of
+from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, View
+from ros_3d_bb.tracking.visibility import places_in
+
+TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
+                  ('size_m', float, 3), ('sightings', int), ('first_ns', np.int64), ('last_ns', np.int64),
+                  ('missed_s', float), ('unseen_s', float), ('status', int), ('confirmed', bool), ('moving', bool)])
+LATEST_NS = NS // 2  # images that come later than others by more are refused
+RECENT_S = 0.7  # who was seen so recently comes before those who were away
+LOST_M = 2.4  # who may be anywhere within this (standard deviation) is forgotten
+FIRST_TRY_S, TRIES_S = 0.15, 0.4  # how long a track that was seen once, or a few times, waits to be seen again
+TAKEN_NS = NS // 5  # nobody new begins near somebody seen so recently
+HIDING_S = 0.3  # who was missed for longer hides nobody
+SMOOTHING = 0.1  # share of the newest sighting in size and height
+CUT_SMOOTHING = 0.02  # a box that the image border cuts tells little of them
+STILL_MOVING = 0.5  # of the speed at which somebody begins to move
+
+
+class TrackerParams(NamedTuple):
+    """See config/tracker.yaml."""
+
+    acceleration: float = 0.08
+    initial_speed: float = 0.8
+    outlier_share: float = 0.1
+    outlier_offset: float = 0.45
+    outlier_spread: float = 0.3
+    gate: float = 0.99
+    max_speed: float = 2.5
+    reach: float = 1.0
+    newcomer_density: float = 0.15
+    duplicate_distance: float = 0.35
+    height_sigma: float = 0.06
+    min_sightings: int = 4
+    min_age: float = 0.1
+    missed_limit: float = 0.35
+    unsure_limit: float = 0.5
+    memory: float = 2.5
+    max_range: float = 6.0
+    moving_speed: float = 0.2
+
+
+class _Image(NamedTuple):
+    stamp_ns: int
+    detections: tuple
+    view: View
+
+
+class _State(NamedTuple):
+    """What images change: the tracks, and the stamps of the latest image and of the latest one without an answer."""
+
+    tracks: np.ndarray
+    now_ns: int
+    skipped_ns: int
+
+
+class Tracker(object):
+    """Tracks people from image to image.
+
+    Call `update` with the detections of each image, `skip` for an image whose detections could not be used, `reset`
+    where time jumped. Images may come late and out of order: what happened since is done again with them.
+
+    Raises
+    ------
+    ValueError
+        If a parameter makes no sense; names it.
+    """
+
+    def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams()):
+        _check(params)
+        self._params, self._noise, self._prediction = params, noise, prediction
+        self._outliers = kalman.Outliers(params.outlier_share, params.outlier_offset, params.outlier_spread)
+        self._last_id = 0
+        self.reset()
+
+    def reset(self):
+        """Forget all tracks, as after a jump in time. Numbers are not used again."""
+        self._state = _State(np.zeros(0, TRACK), None, 0)
+        self._history = collections.deque()  # (state before, image) of the latest images
+        self._ids = {}  # of the tracks begun in them, by stamp, camera and number of the detection
+
+    def skip(self, stamp_ns):
+        """Let an image pass whose detections could not be used: nobody ages. Never an error: it may be late."""
+        self._state = self._state._replace(skipped_ns=max(stamp_ns, self._state.skipped_ns))
+
+    def update(self, stamp_ns, detections, view):
+        """Take the detections of one image.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Stamp of the image.
+        detections : list of Detection
+        view : View
+
+        Returns
+        -------
+        list of TrackedObject
+            By id, at the stamp of the newest image.
+
+        Raises
+        ------
+        ValueError
+            If the image comes too late, or a second time; nothing changes then.
+        """
+        images = [_Image(stamp_ns, tuple(detections), view)] + self._taken_back(stamp_ns, view.camera)
+        for image in images:
+            self._history.append((self._state, image))
+            self._state = self._after(image)
+        self._forget_history()
+        return self.objects()
+
+    def objects(self):
+        """The people who are published now, by id, at the stamp of the newest image."""
+        tracks = self._state.tracks
+        known = (tracks['missed_s'] <= self._params.missed_limit) & (_sigma(tracks) < self._params.unsure_limit)
+        return objects_of(tracks[tracks['confirmed'] & known], self._prediction)
+
+    def _taken_back(self, stamp_ns, camera):
+        """Undo the images after a stamp; returns them, oldest first."""
+        if any(image.stamp_ns == stamp_ns and image.view.camera == camera for _state, image in self._history):
+            raise ValueError('stamp %.9f of camera %r comes a second time' % (stamp_ns / NS, camera))
+        if self._state.now_ns is not None and stamp_ns < self._state.now_ns - LATEST_NS:
+            raise ValueError('stamp %.9f is %.3f s before the latest, more than %.1f s late'
+                             % (stamp_ns / NS, (self._state.now_ns - stamp_ns) / NS, LATEST_NS / NS))
+        images = []
+        while self._history and self._history[-1][1].stamp_ns > stamp_ns:
+            before, image = self._history.pop()
+            self._state = before._replace(skipped_ns=self._state.skipped_ns)
+            images.insert(0, image)
+        return images
+
+    def _forget_history(self):
+        oldest_ns = self._state.now_ns - LATEST_NS
+        while self._history[0][1].stamp_ns < oldest_ns:
+            self._history.popleft()
+        self._ids = {key: number for key, number in self._ids.items() if key[0] >= oldest_ns}
+
+    def _after(self, image):
+        """The state after an image."""
+        tracks, now_ns, skipped_ns = self._state
+        tracks = tracks.copy()
+        elapsed_s = 0.0 if now_ns is None else (image.stamp_ns - now_ns) / NS
+        looked_s = 0.0 if now_ns is None else max(image.stamp_ns - max(now_ns, skipped_ns), 0) / NS
+        tracks['mean'], tracks['covariance'] = kalman.predict(tracks['mean'], tracks['covariance'], elapsed_s,
+                                                              self._params.acceleration)
+        sightings = sightings_of(image.detections, image.view, elapsed_s, self._noise)
+        rows, columns = self._associate(tracks, sightings, image.stamp_ns)
+        self._see(tracks, rows, _taken(sightings, columns), image.stamp_ns)
+        self._miss(tracks, np.setdiff1d(np.arange(len(tracks)), rows), image.view, looked_s)
+        tracks = tracks[self._is_remembered(tracks)]
+        others = np.setdiff1d(np.arange(len(image.detections)), columns)
+        tracks = np.concatenate((tracks, self._newcomers(tracks, _taken(sightings, others), others, image)))
+        return _State(tracks, image.stamp_ns, skipped_ns)
+
+    def _associate(self, tracks, sightings, stamp_ns):
+        """Rows of tracks and columns of sightings that belong together."""
+        params = self._params
+        cost, distance = kalman.likelihoods(tracks['mean'], tracks['covariance'], sightings.ground, self._outliers)
+        cost += ((tracks['size_m'][:, 2:] - sightings.sizes_m[:, 2]) / params.height_sigma) ** 2 / 2
+        unseen_s = (stamp_ns - tracks['last_ns']) / NS
+        reach_m = params.reach + params.max_speed * np.minimum(unseen_s, 1)
+        away_m = np.linalg.norm(tracks['mean'][:, None, :2] - sightings.ground.positions_m, axis=2)
+        allowed = distance < -2 * np.log(1 - params.gate)  # the quantile of chi squared with 2 degrees of freedom
+        allowed &= (cost < -2 * np.log(2 * np.pi * params.newcomer_density)) & (away_m < reach_m[:, None])
+        cost[~allowed] = np.inf
+        rank = np.where(tracks['confirmed'], (unseen_s >= RECENT_S).astype(int), 2)
+        pairs = []
+        for turn in range(3):
+            rows = np.flatnonzero(rank == turn)
+            columns = np.setdiff1d(np.arange(len(sightings.z_m)), [column for _row, column in pairs])
+            pairs += [(rows[row], columns[column]) for row, column in assign(cost[np.ix_(rows, columns)])]
+        return np.array(pairs, int).reshape(-1, 2).T
+
+    def _see(self, tracks, rows, sightings, stamp_ns):
+        """Update the tracks in `rows` with one sighting each."""
+        seen = tracks[rows]
+        seen['mean'], seen['covariance'] = kalman.update(seen['mean'], seen['covariance'], sightings.ground,
+                                                         self._outliers)
+        seen['sightings'] += 1
+        seen['last_ns'], seen['unseen_s'], seen['missed_s'], seen['status'] = stamp_ns, 0, 0, VISIBLE
+        seen['confirmed'] |= ((seen['sightings'] >= self._params.min_sightings) &
+                              (stamp_ns - seen['first_ns'] >= self._params.min_age * NS))
+        speed = np.linalg.norm(seen['mean'][:, 2:], axis=1)
+        seen['moving'] = speed >= self._params.moving_speed * np.where(seen['moving'], STILL_MOVING, 1)
+        share = np.where(sightings.truncated, CUT_SMOOTHING, np.maximum(SMOOTHING, 1 / seen['sightings']))
+        seen['size_m'] += share[:, None] * (sightings.sizes_m - seen['size_m'])
+        seen['z_m'] += share * (sightings.z_m - seen['z_m'])
+        seen['z_m2'] += share * (sightings.z_m2 - seen['z_m2'])
+        tracks[rows] = seen
+
+    def _miss(self, tracks, rows, view, looked_s):
+        """Say why the tracks in `rows` were not seen, and count for how long, and how long of that they should have."""
+        positions_m = np.column_stack((tracks['mean'][:, :2], tracks['z_m']))
+        hiding = tracks['confirmed'] & (tracks['missed_s'] < HIDING_S)
+        places = places_in(view, positions_m, tracks['size_m'], hiding, self._params.max_range)[rows]
+        tracks['unseen_s'][rows] += looked_s
+        tracks['missed_s'][rows] += np.where(places == VISIBLE, looked_s, 0)
+        tracks['status'][rows] = np.where(places == VISIBLE, OCCLUDED, places)
+
+    def _is_remembered(self, tracks):
+        """Which tracks are kept; those that are not confirmed yet only for a few more tries."""
+        unseen_s = tracks['unseen_s']
+        known = (unseen_s < self._params.memory) & (_sigma(tracks) < LOST_M)
+        tried_s = np.where(tracks['sightings'] > 1, TRIES_S, FIRST_TRY_S)
+        return np.where(tracks['confirmed'], known, unseen_s < tried_s)
+
+    def _newcomers(self, tracks, sightings, columns, image):
+        """Tracks of sightings that belong to nobody and do not double anybody."""
+        new = np.zeros(len(columns), TRACK)
+        new['mean'][:, :2] = sightings.ground.positions_m
+        new['covariance'][:, :2, :2] = sightings.ground.noise_m2
+        new['covariance'][:, [2, 3], [2, 3]] = self._params.initial_speed ** 2
+        new['size_m'], new['z_m'], new['z_m2'] = sightings.sizes_m, sightings.z_m, sightings.z_m2
+        new['sightings'], new['first_ns'], new['last_ns'] = 1, image.stamp_ns, image.stamp_ns
+        taken_m = tracks['mean'][image.stamp_ns - tracks['last_ns'] < TAKEN_NS, :2]
+        kept = []
+        for row, column in enumerate(columns):
+            others_m = np.concatenate((taken_m, new['mean'][kept, :2]))
+            if (np.linalg.norm(others_m - new['mean'][row, :2], axis=1) >= self._params.duplicate_distance).all():
+                kept.append(row)
+                new['id'][row] = self._id_of((image.stamp_ns, image.view.camera, column))
+        return new[kept]
+
+    def _id_of(self, key):
+        """The number of a track by its first detection, so that done again it gets the same one."""
+        if key not in self._ids:
+            self._last_id += 1
+            self._ids[key] = self._last_id
+        return self._ids[key]
+
+
+def _taken(sightings, columns):
+    """The sightings in `columns`."""
+    ground, *others = sightings
+    return type(sightings)(kalman.Measurements(*(values[columns] for values in ground)),
+                           *(values[columns] for values in others))
+
+
+def _sigma(tracks):
+    """Standard deviations (n,) of the positions, along the axis of the frame where they are less sure."""
+    return np.sqrt(np.maximum(tracks['covariance'][:, 0, 0], tracks['covariance'][:, 1, 1]))
+
+
+def _check(params):
+    for name in ('gate', 'outlier_share'):
+        if not 0 <= getattr(params, name) < 1:
+            raise ValueError('%s is %g; 0 or more and less than 1 expected' % (name, getattr(params, name)))
+    for name in set(params._fields) - {'gate', 'outlier_share'}:
+        if not getattr(params, name) >= 0:
+            raise ValueError('%s is %g; 0 or more expected' % (name, getattr(params, name)))
+    for name in ('newcomer_density', 'height_sigma'):
+        if not getattr(params, name) > 0:
+            raise ValueError('%s is %g; more than 0 expected' % (name, getattr(params, name)))

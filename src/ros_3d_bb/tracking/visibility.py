@@ -1,0 +1,100 @@
+"""Why a person is not seen: hidden by somebody or something, outside the camera's view, or gone."""
+import numpy as np
+
+from ros_3d_bb.geometry import transform_points
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
+
+EDGE_RAD = 0.03  # so near to the image border a person is not found for sure
+NEAREST_M = 0.45  # nor so near to the camera
+BODY_RADIUS_M = 0.27
+NEARER_M = 0.25  # who hides another person is nearer by so much
+SEEN_BESIDE = 0.2  # and leaves so much of a half width to be seen, which is too narrow for a detector
+HIDDEN_BEHIND_M = 0.5  # nearer by so much than the person, measured depth is that of something else
+HIDDEN_SHARE = 0.5
+ACROSS, ALONG = np.meshgrid((-0.6, 0, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))  # where depth is asked for, in half extents
+
+
+def places_in(view, positions_m, sizes_m, hiding, farthest_m):
+    """What the camera could see of the places where people are thought to be.
+
+    Parameters
+    ----------
+    view : View
+    positions_m, sizes_m : numpy.ndarray, (n, 3)
+    hiding : numpy.ndarray of bool, (n,)
+        Whose place is sure enough to hide others.
+    farthest_m : float
+        People farther away are not found.
+
+    Returns
+    -------
+    numpy.ndarray of int, (n,)
+        VISIBLE: should have been found there; OCCLUDED: hidden by somebody, or by something nearer in the depth image;
+        OUT_OF_VIEW.
+    """
+    distances_m, bearings = view.bearings(positions_m)
+    places = np.full(len(positions_m), VISIBLE)
+    places[_behind_others(distances_m, bearings, hiding)] = OCCLUDED
+    if view.depth_at is not None:
+        places[_behind_something(view, positions_m, sizes_m)] = OCCLUDED
+    places[_outside(view, distances_m, bearings, farthest_m)] = OUT_OF_VIEW
+    return places
+
+
+def edges_of(camera):
+    """x / z of what the left and the right border of a camera's image show, for `View`."""
+    borders = camera.deproject([[-0.5, camera.cy], [camera.width - 0.5, camera.cy]], 1.0)
+    return float(borders[0, 0]), float(borders[1, 0])
+
+
+def depths_towards(camera, depth, points):
+    """The depth measured in the direction of points, for `View`.
+
+    Parameters
+    ----------
+    camera : geometry.Camera
+    depth : estimation.DepthImage
+    points : numpy.ndarray, (k, 3)
+        In the optical frame, metres.
+
+    Returns
+    -------
+    numpy.ndarray, (k,)
+        Metres along z; nan where none was measured, and outside the image.
+    """
+    in_front = points[:, 2] > 0
+    pixels = camera.project(np.where(in_front[:, None], points, (0, 0, 1)))
+    size = np.array([camera.width, camera.height])
+    inside = in_front & np.isfinite(pixels).all(axis=1)
+    pixels = np.rint(np.where(inside[:, None], pixels, 0)).clip(-1, size).astype(int)
+    inside &= ((pixels >= 0) & (pixels < size)).all(axis=1)
+    depths_m, measured = depth.at(*np.where(inside[:, None], pixels, 0).T)
+    return np.where(inside & measured, depths_m, np.nan)
+
+
+def _outside(view, distances_m, bearings, farthest_m):
+    outside = (distances_m < NEAREST_M) | (distances_m > farthest_m)
+    if view.edges is None:
+        return outside | (np.abs(bearings) > np.pi / 2)
+    left, right = np.arctan(view.edges)  # x is to the right, a bearing to the left
+    return outside | (-bearings < left + EDGE_RAD) | (-bearings > right - EDGE_RAD)
+
+
+def _behind_others(distances_m, bearings, hiding):
+    half_widths = np.arcsin(np.clip(BODY_RADIUS_M / np.maximum(distances_m, 0.01), 0, 1))
+    apart = np.abs(bearings[None, :] - bearings[:, None])
+    covered = apart < half_widths[None, :] + SEEN_BESIDE * half_widths[:, None]
+    nearer = distances_m[None, :] < distances_m[:, None] - NEARER_M
+    return (covered & nearer & hiding[None, :]).any(axis=1)
+
+
+def _behind_something(view, positions_m, sizes_m):
+    """Where most of the depth measured towards a person ends well before the person."""
+    centers = transform_points(np.linalg.inv(view.fixed_from_camera), positions_m)
+    offsets = np.zeros((len(centers), ACROSS.size, 3))
+    offsets[..., 0] = ACROSS.ravel() * sizes_m[:, :1] / 2
+    offsets[..., 1] = ALONG.ravel() * sizes_m[:, 2:] / 2
+    depths_m = view.depth_at((centers[:, None] + offsets).reshape(-1, 3)).reshape(len(centers), -1)
+    known = np.isfinite(depths_m)
+    nearer = known & (np.where(known, depths_m, 0) < centers[:, 2:] - HIDDEN_BEHIND_M)
+    return nearer.sum(axis=1) > HIDDEN_SHARE * np.maximum(known.sum(axis=1), ACROSS.size / 3.0)
