@@ -59,3 +59,17 @@ def official_output(tmp_path_factory):
     if DATA:
         return official_reference.recorded(DATA)
     return official_reference.made(str(tmp_path_factory.mktemp('reference') / 'random.pt'))
+
+
+@pytest.fixture
+def window_on():
+    """Opens the annotator's window on the session in a folder; the windows are closed at the end."""
+    from support.window import Driver  # Qt, which few tests need
+    drivers = []
+
+    def window_on_session(folder):
+        drivers.append(Driver(folder))
+        return drivers[-1]
+    yield window_on_session
+    for driver in drivers:
+        driver.close()

@@ -1,6 +1,6 @@
 """The modules of Python's standard library that are in use here (sys.stdlib_module_names is Python 3.10's)."""
 STANDARD_LIBRARY = {'argparse', 'ast', 'base64', 'bisect', 'collections', 'concurrent', 'contextlib', 'copy', 'csv',
                     'ctypes', 'datetime', 'difflib', 'fcntl', 'functools', 'hashlib', 'html', 'importlib', 'io', 'json',
-                    'math', 'os', 'pathlib', 'pickle', 're', 'struct', 'subprocess', 'sys', 'tempfile', 'threading',
-                    'time', 'typing', 'warnings', 'zipfile'}
-TEST_STANDARD_LIBRARY = {'glob', 'itertools', 'multiprocessing', 'random', 'shutil', 'signal', 'stat', 'types', 'xml'}
+                    'math', 'os', 'pathlib', 'pickle', 're', 'signal', 'struct', 'subprocess', 'sys', 'tempfile',
+                    'threading', 'time', 'typing', 'warnings', 'zipfile'}
+TEST_STANDARD_LIBRARY = {'glob', 'itertools', 'multiprocessing', 'random', 'shutil', 'stat', 'types', 'xml'}

@@ -1,0 +1,124 @@
+"""All that the window can do, with its keys: the menus, and the overview of them."""
+from typing import NamedTuple, Tuple
+
+from ros_3d_bb_annotator.qt import QtGui, QtWidgets
+
+
+class Action(NamedTuple):
+    """`name` is the method of the window that does it, `keys` its shortcuts, `checked` what it starts as, None where
+    it is nothing to be switched on and off."""
+
+    name: str
+    text: str
+    keys: Tuple[str, ...] = ()
+    checked: object = None
+
+
+LINE = Action('', '')
+MENUS = (
+    ('&File', (
+        Action('ask_session', '&Open a session…', ('Ctrl+O',)),
+        Action('reload', 'Look for &new measurements', ('F5',)),
+        LINE,
+        Action('ask_export', '&Export CSV…', ('Ctrl+E',)),
+        Action('analyse', '&Analyse the noise…', ('Ctrl+Shift+A',)),
+        LINE,
+        Action('close', '&Quit', ('Ctrl+Q',)))),
+    ('&Edit', (
+        Action('undo', '&Undo', ('Ctrl+Z',)),
+        Action('redo', '&Redo', ('Ctrl+Shift+Z', 'Ctrl+Y')),
+        LINE,
+        Action('same_as_last', '&Same as the last one', ('Ctrl+L',)),
+        Action('ask_reject', 'Re&ject…', ('Ctrl+R',)),
+        Action('restore', 'Res&tore', ('Ctrl+Shift+R',)),
+        LINE,
+        Action('start_drawing', '&Draw a box', ('D', 'Ctrl+D')),
+        Action('switch_unit', 'Millimetres or &metres', ('Ctrl+U',)),
+        Action('edit_marks', 'Marks on the &floor…', ('Ctrl+G',)))),
+    ('&Go', (
+        Action('next', '&Next measurement', ('PgDown',)),
+        Action('previous', '&Previous measurement', ('PgUp',)),
+        Action('next_new', 'Next ne&w measurement', ('Ctrl+N',)),
+        Action('first', '&First measurement', ('Alt+Home',)),
+        Action('last', '&Last measurement', ('Alt+End',)),
+        LINE,
+        Action('go_to_list', 'To the l&ist', ('F2',)),
+        Action('go_to_image', 'To the i&mage', ('F3',)),
+        Action('go_to_truth', 'To the &truth', ('F4',)),
+        Action('go_to_floor', 'To the fl&oor', ('F6',)),
+        LINE,
+        Action('go_on', '&Go on to the next new one after an entry', ('Ctrl+T',), True))),
+    ('&Person', tuple(
+        Action('choose_%d' % number, 'Box &%d' % number, ('%d' % number, 'Alt+%d' % number))
+        for number in range(1, 10))),
+    ('&View', (
+        Action('zoom_in', 'Zoom &in', ('+', '=', 'Ctrl++', 'Ctrl+=')),
+        Action('zoom_out', 'Zoom &out', ('-', 'Ctrl+-')),
+        Action('fit', '&Whole image', ('0', 'Ctrl+0')),
+        Action('show_samples', '&Samples', ('P', 'Ctrl+P'), True))),
+    ('&Help', (
+        Action('show_keys', '&Keys', ('F1',)),)))
+OTHER_KEYS = (
+    ('The image has the keyboard (F3, or a click)', (
+        ('arrows', 'move the cursor by 10 pixels; with Ctrl by one'),
+        ('Shift + arrows', 'move the part of the image that is shown'),
+        ('Space', 'the first corner of a box at the cursor, then the second one'),
+        ('Esc', 'drop the box that is being drawn'),
+        ('wheel, drag', 'zoom, move; a click chooses a box'),
+        ('Shift + drag', 'draw a box'))),
+    ('The floor has the keyboard (F6)', (
+        ('arrows', 'go from mark to mark'),
+        ('Enter, Space', 'the person stood on this mark'))),
+    ('A field of the truth has the keyboard (F4)', (
+        ('Enter', 'enter the truth and go on to the next new measurement'),
+        ('Tab', 'next field'))))
+
+
+def build_menus(window):
+    """Fill the menu bar of a window; returns {name: QAction}."""
+    actions = {}
+    for title, entries in MENUS:
+        menu = window.menuBar().addMenu(title)
+        for entry in entries:
+            if entry == LINE:
+                menu.addSeparator()
+                continue
+            action = menu.addAction(entry.text)
+            action.setShortcuts([QtGui.QKeySequence(key) for key in entry.keys])
+            if entry.checked is not None:
+                action.setCheckable(True)
+                action.setChecked(entry.checked)
+            else:
+                action.triggered.connect(_without_argument(window.handler(entry.name)))
+            actions[entry.name] = action
+    return actions
+
+
+def keys_dialog(parent):
+    """The overview of all keys, a dialog."""
+    dialog = QtWidgets.QDialog(parent)
+    dialog.setWindowTitle('Keys')
+    dialog.resize(620, 640)
+    text = QtWidgets.QTextBrowser()
+    text.setHtml(overview())
+    buttons = QtWidgets.QDialogButtonBox(QtWidgets.QDialogButtonBox.Close)
+    buttons.rejected.connect(dialog.reject)
+    layout = QtWidgets.QVBoxLayout(dialog)
+    layout.addWidget(text)
+    layout.addWidget(buttons)
+    return dialog
+
+
+def overview():
+    """The overview of all keys as HTML, made of what the menus hold."""
+    sections = [(title.replace('&', ''), [(', '.join(entry.keys), entry.text.replace('&', '').rstrip('…'))
+                                          for entry in entries if entry != LINE])
+                for title, entries in MENUS] + list(OTHER_KEYS)
+    rows = ''.join('<tr><td colspan="2"><br><b>%s</b></td></tr>' % title
+                   + ''.join('<tr><td>%s&nbsp;&nbsp;&nbsp;</td><td>%s</td></tr>' % row for row in lines)
+                   for title, lines in sections)
+    return '<p>In a field, digits are text: there, Alt and a digit chooses a box.</p><table>%s</table>' % rows
+
+
+def _without_argument(call):
+    return lambda _checked=False: call()

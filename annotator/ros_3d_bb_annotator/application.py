@@ -1,0 +1,38 @@
+"""The annotator as a program with a window."""
+import signal
+import sys
+
+from ros_3d_bb_annotator.main_window import AnnotatorWindow
+from ros_3d_bb_annotator.qt import QtCore, QtWidgets
+
+WAKE_MS = 250
+
+
+def make_application():
+    """The QApplication of this process, made where there is none."""
+    application = QtWidgets.QApplication.instance()
+    if application is None:
+        application = QtWidgets.QApplication(sys.argv[:1])
+        application.setApplicationName('ros_3d_bb annotator')
+        application.setStyle('Fusion')  # the same everywhere
+    return application
+
+
+def run_window(folder=None):
+    """Show the window, with the session in `folder` where one is given, until it is closed.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
+    application = make_application()
+    signal.signal(signal.SIGINT, lambda _number, _frame: application.closeAllWindows())
+    wake = QtCore.QTimer(interval=WAKE_MS)  # Python sees signals only between its own instructions
+    wake.timeout.connect(lambda: None)
+    wake.start()
+    window = AnnotatorWindow()
+    window.show()
+    if folder is not None:
+        QtCore.QTimer.singleShot(0, lambda: window.open_session(folder))
+    return application.exec_()

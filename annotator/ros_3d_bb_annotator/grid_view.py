@@ -1,0 +1,204 @@
+"""The floor in front of the camera from above, with its marks (thesis Fig. 5.1): click one to set the truth."""
+import math
+from typing import Any, NamedTuple, Optional, Tuple
+
+import numpy as np
+
+from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
+
+GROUND, LINES, CAMERA, TEXT = (QtGui.QColor(*color) for color in (
+    (250, 250, 248), (222, 222, 218), (120, 124, 130), (70, 70, 70)))
+SIGHT, MARK, POINTED = QtGui.QColor(60, 120, 200, 22), QtGui.QColor(245, 150, 40), QtGui.QColor(70, 170, 240)
+TRUTH, ESTIMATE = QtGui.QColor(30, 140, 60), QtGui.QColor(200, 30, 60)
+MARGIN_PX, REACH_PX = 22, 16
+MARK_PX, NAME_PX = (4, 8), (9, 13)  # least and most: radius of a mark, height of its name
+STEPS_M = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+ARROWS = {Qt.Key_Left: (-1, 0), Qt.Key_Right: (1, 0), Qt.Key_Up: (0, 1), Qt.Key_Down: (0, -1)}
+
+
+class FloorScene(NamedTuple):
+    """What is on the floor: `marks` (see `document.Mark`), the (x, z) in metres of truth and estimate, None where
+    there is none, and the tangents of the camera's field of view to the left and to the right."""
+
+    marks: Tuple[Any, ...]
+    truth_m: Optional[Tuple[float, float]]
+    estimate_m: Optional[Tuple[float, float]]
+    sight: Tuple[float, float]
+
+
+EMPTY = FloorScene((), None, None, (0.0, 0.0))
+
+
+class GridView(QtWidgets.QWidget):
+    """The floor. `mark_chosen` gives the Mark that was clicked, or that the keyboard took.
+
+    Arrows go from mark to mark, Enter or Space takes it.
+    """
+
+    mark_chosen = Signal(object)
+
+    def __init__(self, parent=None):
+        super(GridView, self).__init__(parent)
+        self._scene, self._pointed = EMPTY, None
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.StrongFocus)
+        self.setMinimumSize(220, 220)
+        self.setAccessibleName('floor from above')
+
+    def sizeHint(self):  # noqa: N802 (Qt's name)
+        return QtCore.QSize(340, 340)
+
+    def show_scene(self, scene):
+        """Show a FloorScene."""
+        if scene.marks != self._scene.marks:
+            self._pointed = None
+        self._scene = scene
+        self.update()
+
+    def place_of(self, x_m, z_m):
+        """Where a point of the floor is in this widget, QPointF."""
+        left_m, right_m, far_m = self._extent()
+        scale = min((self.width() - 2 * MARGIN_PX) / (right_m - left_m), (self.height() - 2 * MARGIN_PX) / far_m)
+        return QtCore.QPointF(self.width() / 2 + (x_m - (left_m + right_m) / 2) * scale,
+                              self.height() - MARGIN_PX - z_m * scale)
+
+    def _apart_px(self):
+        """How far apart the nearest two marks are on the screen; many pixels where there are not two."""
+        places = np.array([(place.x(), place.y()) for place in (
+            self.place_of(mark.x_m, mark.z_m) for mark in self._scene.marks)]).reshape(-1, 2)
+        apart = np.hypot(*np.moveaxis(places[:, None] - places[None], -1, 0))
+        return float(apart[apart > 0].min()) if (apart > 0).any() else 1000.0
+
+    def _extent(self):
+        """Left, right and far end of the floor to be shown, metres: whole steps around all that is on it."""
+        points = [(mark.x_m, mark.z_m) for mark in self._scene.marks]
+        points += [point for point in (self._scene.truth_m, self._scene.estimate_m) if point is not None]
+        side_m = max([0.75] + [abs(x_m) + 0.25 for x_m, _z_m in points])
+        return -side_m, side_m, max([1.5] + [z_m + 0.4 for _x_m, z_m in points])
+
+    def paintEvent(self, _event):  # noqa: N802
+        painter = QtGui.QPainter(self)
+        painter.setRenderHint(QtGui.QPainter.Antialiasing)
+        painter.fillRect(self.rect(), GROUND)
+        self._paint_floor(painter)
+        apart_px = self._apart_px()
+        for mark in self._scene.marks:
+            self._paint_mark(painter, mark, apart_px)
+        self._paint_error(painter)
+        self._paint_legend(painter)
+        if not self._scene.marks:
+            painter.setPen(TEXT)
+            painter.drawText(self.rect().adjusted(70, 6, -12, -6), Qt.AlignLeft | Qt.AlignTop | Qt.TextWordWrap,
+                             'No marks on the floor yet: Edit, Marks (Ctrl+G).')
+        if self.hasFocus():
+            painter.setPen(QtGui.QPen(POINTED, 2))
+            painter.setBrush(Qt.NoBrush)
+            painter.drawRect(self.rect().adjusted(1, 1, -1, -1))
+
+    def _paint_floor(self, painter):
+        left_m, right_m, far_m = self._extent()
+        _set_height(painter, NAME_PX[1])
+        far_m *= 1.5  # the lines go on behind the farthest mark
+        step_m = next((step for step in STEPS_M if max(right_m - left_m, far_m) / step <= 9), STEPS_M[-1])
+        for number in range(math.ceil(4 * left_m / step_m), math.floor(4 * right_m / step_m) + 1):
+            self._paint_line(painter, (number * step_m, 0), (number * step_m, far_m))
+        for number in range(int(far_m / step_m) + 1):
+            z_m = number * step_m
+            self._paint_line(painter, (4 * left_m, z_m), (4 * right_m, z_m))
+            if number:
+                painter.setPen(TEXT)
+                painter.drawText(QtCore.QPointF(4, self.place_of(0, z_m).y() - 2), '%g m' % z_m)
+        camera = self.place_of(0, 0)
+        sides = [self.place_of(tangent * 10 * far_m, 10 * far_m) for tangent in self._scene.sight]
+        painter.setPen(Qt.NoPen)
+        painter.setBrush(SIGHT)
+        painter.drawPolygon(QtGui.QPolygonF([camera] + sides))
+        painter.setBrush(CAMERA)
+        painter.drawRoundedRect(QtCore.QRectF(camera.x() - 20, camera.y() - 4, 40, 11), 5, 5)
+
+    def _paint_line(self, painter, start, end):
+        painter.setPen(QtGui.QPen(LINES, 1))
+        painter.drawLine(self.place_of(*start), self.place_of(*end))
+
+    def _paint_mark(self, painter, mark, apart_px):
+        place, pointed = self.place_of(mark.x_m, mark.z_m), mark == self._pointed
+        radius = min(max(0.2 * apart_px, MARK_PX[0]), MARK_PX[1])
+        height = int(min(max(0.4 * apart_px, NAME_PX[0]), NAME_PX[1]))
+        painter.setPen(QtGui.QPen(POINTED, 3) if pointed else QtGui.QPen(MARK.darker(130), 1))
+        painter.setBrush(MARK)
+        painter.drawEllipse(place, radius + 3 * pointed, radius + 3 * pointed)
+        _set_height(painter, height)
+        painter.setPen(TEXT)
+        painter.drawText(QtCore.QRectF(place.x() - 60, place.y() + radius, 120, height + 3), Qt.AlignHCenter, mark.name)
+
+    def _paint_error(self, painter):
+        """The truth as a green cross, the estimate as a red circle, a line between them."""
+        truth, estimate = (None if point is None else self.place_of(*point)
+                           for point in (self._scene.truth_m, self._scene.estimate_m))
+        painter.setBrush(Qt.NoBrush)
+        if truth is not None and estimate is not None:
+            painter.setPen(QtGui.QPen(ESTIMATE, 1.5, Qt.DashLine))
+            painter.drawLine(truth, estimate)
+        if truth is not None:
+            painter.setPen(QtGui.QPen(TRUTH, 3))
+            painter.drawLine(truth - QtCore.QPointF(7, 7), truth + QtCore.QPointF(7, 7))
+            painter.drawLine(truth - QtCore.QPointF(7, -7), truth + QtCore.QPointF(7, -7))
+        if estimate is not None:
+            painter.setPen(QtGui.QPen(ESTIMATE, 2.5))
+            painter.drawEllipse(estimate, 6, 6)
+
+    def _paint_legend(self, painter):
+        _set_height(painter, NAME_PX[1])
+        for row, (color, text) in enumerate(((TRUTH, '✕ truth'), (ESTIMATE, '○ estimate'))):
+            painter.setPen(color)
+            painter.drawText(QtCore.QPointF(self.width() - 80, self.height() - 24 + 16 * row), text)
+
+    def mouseMoveEvent(self, event):  # noqa: N802
+        self._point_at(self._mark_at(event.localPos()))
+
+    def leaveEvent(self, _event):  # noqa: N802
+        if not self.hasFocus():
+            self._point_at(None)
+
+    def mousePressEvent(self, event):  # noqa: N802
+        mark = self._mark_at(event.localPos())
+        if event.button() == Qt.LeftButton and mark is not None:
+            self.mark_chosen.emit(mark)
+
+    def keyPressEvent(self, event):  # noqa: N802
+        if event.key() in ARROWS and self._scene.marks:
+            self._point_at(self._next_mark(ARROWS[event.key()]))
+        elif event.key() in (Qt.Key_Return, Qt.Key_Enter, Qt.Key_Space) and self._pointed is not None:
+            self.mark_chosen.emit(self._pointed)
+        else:
+            event.ignore()
+
+    def _point_at(self, mark):
+        self._pointed = mark
+        self.setToolTip('' if mark is None else '%s: X %+.3f m, Z %.3f m' % mark)
+        self.update()
+
+    def _mark_at(self, position):
+        """The mark nearest to a place in this widget, None where none is near."""
+        ways = [((self.place_of(mark.x_m, mark.z_m) - position).manhattanLength(), number)
+                for number, mark in enumerate(self._scene.marks)]
+        distance, number = min(ways) if ways else (REACH_PX + 1, 0)
+        return self._scene.marks[number] if distance <= REACH_PX else None
+
+    def _next_mark(self, way):
+        """The mark to go to from the one pointed at, by an arrow (right, ahead): near, and not far to the side."""
+        if self._pointed is None:
+            return min(self._scene.marks, key=lambda mark: (mark.z_m, abs(mark.x_m)))
+        best, here = (float('inf'), self._pointed), self._pointed
+        for mark in self._scene.marks:
+            x_m, z_m = mark.x_m - here.x_m, mark.z_m - here.z_m
+            ahead_m, aside_m = x_m * way[0] + z_m * way[1], abs(x_m * way[1]) + abs(z_m * way[0])
+            if ahead_m > 1e-6 and ahead_m + 3 * aside_m < best[0]:
+                best = (ahead_m + 3 * aside_m, mark)
+        return best[1]
+
+
+def _set_height(painter, height_px):
+    font = painter.font()
+    font.setPixelSize(height_px)
+    painter.setFont(font)

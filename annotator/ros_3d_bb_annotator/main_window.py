@@ -1,0 +1,270 @@
+"""The window: the list of measurements, what is shown of one, and all that can be done with it."""
+import functools
+
+from ros_3d_bb_annotator import dialogs
+from ros_3d_bb_annotator.actions import build_menus, keys_dialog
+from ros_3d_bb_annotator.document import Document
+from ros_3d_bb_annotator.edits import Edits
+from ros_3d_bb_annotator.measurement import NEW
+from ros_3d_bb_annotator.measurement_list import MeasurementList
+from ros_3d_bb_annotator.measurement_pane import MeasurementPane
+from ros_3d_bb_annotator.qt import Qt, QtCore, QtWidgets
+from ros_3d_bb_annotator.results import Results
+
+TITLE = 'ros_3d_bb annotator'
+REFRESH_MS = 2000
+NEIGHBOURS = (1, -1)
+
+
+class AnnotatorWindow(QtWidgets.QMainWindow):
+    """The annotator's main window; `actions` are its QActions by the name of the method that they call."""
+
+    def __init__(self, parent=None):
+        super(AnnotatorWindow, self).__init__(parent)
+        self.document, self.current = None, None
+        self.list, self.pane = MeasurementList(), MeasurementPane()
+        self.progress, self.last_entry = QtWidgets.QProgressBar(), QtWidgets.QLabel()
+        self.edits, self.results = Edits(self), Results(self)
+        self.actions = build_menus(self)
+        self._lay_out()
+        self._connect()
+        self._ahead = QtCore.QTimer(self, singleShot=True, interval=0)
+        self._ahead.timeout.connect(self._read_ahead)
+        self._refresh = QtCore.QTimer(self, interval=REFRESH_MS)
+        self._refresh.timeout.connect(self._take_in)
+        self._show_state()
+
+    def handler(self, name):
+        """What the action of a name does: a method of the window, of its edits or of its view."""
+        if name.startswith('choose_'):
+            return functools.partial(self.edits.choose_person, int(name.split('_')[1]) - 1)
+        return next(getattr(owner, name) for owner in (self, self.edits, self.pane.shared) if hasattr(owner, name))
+
+    # --- sessions
+
+    def ask_session(self):
+        """Ask for a folder and open it."""
+        folder = QtWidgets.QFileDialog.getExistingDirectory(self, 'Open a measurement session')
+        if folder:
+            self.open_session(folder)
+
+    def open_session(self, folder):
+        """Open the session in a folder, or say in a message why not. Returns whether it is open."""
+        self.keep_typed()
+        try:
+            document = Document.open(folder)
+        except (ValueError, OSError) as error:
+            dialogs.show_error(self, 'The session cannot be opened', error)
+            return False
+        self.document, self.current = document, None
+        self.pane.show_document(document)
+        self.list.show_document(document)
+        self.setWindowTitle('%s – %s' % (document.folder, TITLE))
+        self._show_state()
+        if document.measurements:
+            self.show_measurement(self._new_after(-1) or 0)
+            self.pane.truth.begin()
+        self._refresh.start()
+        return True
+
+    def reload(self):
+        """Take in what other programs did to the session, and read images again."""
+        if self.document is not None:
+            self.pane.read_again()
+            self._refresh.start()
+            self._take_in()
+            if self.current is not None:
+                self.keep_typed()
+                self.show_measurement(self.current)
+
+    def _take_in(self):
+        """Show what other programs did to the session."""
+        before = self.document.measurements
+        try:
+            if not self.document.refresh():
+                return
+        except (ValueError, OSError) as error:
+            self._refresh.stop()  # one message, not one every two seconds; reload looks again
+            dialogs.show_error(self, 'The session has changed and cannot be read', error)
+            return
+        count = len(self.document.measurements)
+        changed = self.current is None or self.current >= count or (
+            self.document.measurements[self.current] is not before[self.current])
+        if self.current is not None and self.current >= count:
+            self.current = None  # somebody took it out of the session
+        self.after_edit()
+        if changed and count:
+            self.show_measurement(self._new_after(-1) or 0 if self.current is None else self.current)
+
+    def ask_export(self):
+        """Ask for a file and write the table of errors to it."""
+        if self.document is not None:
+            self.results.ask_export(self.document)
+
+    def analyse(self):
+        """Analyse the noise and show the figures."""
+        if self.document is not None:
+            self.keep_typed()
+            self.results.analyse(self.document)
+
+    # --- going from one measurement to another
+
+    def show_measurement(self, number):
+        """Show a measurement; what was typed for the one before is kept."""
+        changed = number != self.current
+        if changed:
+            self.keep_typed()
+        self.current = number
+        self.pane.show_measurement(number)
+        if changed and self.pane.truth.has_keyboard():
+            self.pane.truth.begin()
+        self.list.mark_current(number)
+        self._show_state()
+        self._ahead.start()
+
+    def next(self):
+        """Show the next measurement."""
+        if self.current is not None:
+            self._go_to(self.current + 1)
+
+    def previous(self):
+        """Show the measurement before."""
+        if self.current is not None:
+            self._go_to(self.current - 1)
+
+    def first(self):
+        """Show the first measurement."""
+        self._go_to(0)
+
+    def last(self):
+        """Show the last measurement."""
+        self._go_to(len(self.document.measurements) - 1 if self.document else 0)
+
+    def next_new(self):
+        """Show the next measurement that is neither annotated nor rejected."""
+        if self.document is None:
+            return
+        number = self._new_after(-1 if self.current is None else self.current)
+        if number is None:
+            self.statusBar().showMessage('Nothing is new any more: %d of %d are done' % self.document.progress)
+        else:
+            self._go_to(number)
+
+    def go_to_list(self):
+        """Give the keyboard to the list."""
+        self.list.table.setFocus()
+
+    def go_to_image(self):
+        """Give the keyboard to the colour image."""
+        self.pane.color_view.setFocus()
+
+    def go_to_truth(self):
+        """Give the keyboard to the fields of the truth."""
+        self.pane.truth.begin()
+
+    def go_to_floor(self):
+        """Give the keyboard to the floor."""
+        self.pane.floor.setFocus()
+
+    def start_drawing(self):
+        """Let a box be drawn, by dragging or by cursor and Space; once more: do not."""
+        if self.current is not None:
+            self.pane.shared.start_drawing(not self.pane.shared.drawing)
+            self.pane.color_view.setFocus()
+
+    def switch_unit(self):
+        """Millimetres instead of metres, or metres instead of millimetres."""
+        self.pane.truth.switch_unit()
+
+    def show_keys(self):
+        """Show the overview of all keys."""
+        keys_dialog(self).exec_()
+
+    # --- what the parts do
+
+    def keep_typed(self):
+        """Keep what is typed for the measurement that is shown, now."""
+        if self.current is not None:
+            self.pane.truth.flush()
+
+    def after_edit(self):
+        """Show what the document holds now."""
+        self.list.update_rows()
+        self._show_state()
+
+    def closeEvent(self, event):  # noqa: N802 (Qt's name)
+        self.keep_typed()
+        self._refresh.stop()
+        self.results.wait()
+        super(AnnotatorWindow, self).closeEvent(event)
+
+    def _go_to(self, number):
+        if self.document is not None and 0 <= number < len(self.document.measurements):
+            self.show_measurement(number)
+
+    def _new_after(self, number):
+        """The next measurement that is new, from the start again after the last one; None where none is."""
+        measurements = self.document.measurements
+        order = list(range(number + 1, len(measurements))) + list(range(number + 1))
+        return next((place for place in order if measurements[place].state == NEW), None)
+
+    def _read_ahead(self):
+        """Read the images beside those that are shown, one measurement each time that nothing else is to be done."""
+        for step in NEIGHBOURS:
+            number = self.current + step
+            if 0 <= number < len(self.document.measurements) and self.pane.read_ahead(number):
+                self._ahead.start()
+                return
+
+    def _on_drawing(self, drawing):
+        self.statusBar().showMessage('Drag a box around the person, or move the cursor with the arrows and set two '
+                                     'corners with Space; Esc drops it' if drawing else '')
+
+    def _keep_draft(self, texts):
+        try:
+            self.document.set_draft(self.current, texts)
+        except (ValueError, OSError) as error:
+            self.pane.truth.show_problem(str(error))
+
+    def _show_state(self):
+        done, count = self.document.progress if self.document is not None else (0, 0)
+        self.progress.setRange(0, max(count, 1))
+        self.progress.setValue(done)
+        self.progress.setFormat('%d of %d done' % (done, count))
+        measurement = None if self.current is None else self.document.measurements[self.current]
+        self.actions['undo'].setEnabled(bool(self.document and self.document.can_undo))
+        self.actions['redo'].setEnabled(bool(self.document and self.document.can_redo))
+        self.actions['restore'].setEnabled(measurement is not None and measurement.rejected is not None)
+        for name in ('same_as_last', 'ask_reject', 'start_drawing'):
+            self.actions[name].setEnabled(measurement is not None)
+        for name in ('ask_export', 'analyse', 'edit_marks', 'reload'):
+            self.actions[name].setEnabled(self.document is not None)
+        self.pane.set_usable(measurement is not None)
+
+    def _lay_out(self):
+        self.setWindowTitle(TITLE)
+        self.resize(1400, 860)
+        split = QtWidgets.QSplitter(Qt.Horizontal)
+        split.addWidget(self.list)
+        split.addWidget(self.pane)
+        split.setStretchFactor(1, 1)
+        split.setSizes([330, 1070])
+        self.setCentralWidget(split)
+        for place, name in enumerate(('same_as_last', 'ask_reject', 'start_drawing', 'restore')):
+            button = QtWidgets.QToolButton()
+            button.setDefaultAction(self.actions[name])
+            button.setSizePolicy(QtWidgets.QSizePolicy.Expanding, QtWidgets.QSizePolicy.Fixed)
+            self.pane.buttons.addWidget(button, place // 2, place % 2)
+        self.progress.setFixedWidth(220)
+        self.statusBar().addPermanentWidget(self.last_entry)
+        self.statusBar().addPermanentWidget(self.progress)
+
+    def _connect(self):
+        self.list.chosen.connect(self.show_measurement)
+        self.pane.person_chosen.connect(self.edits.choose_person)
+        self.pane.shared.box_drawn.connect(self.edits.add_box)
+        self.pane.shared.drawing_changed.connect(self._on_drawing)
+        self.pane.truth.entered.connect(self.edits.enter_truth)
+        self.pane.truth.typed.connect(self._keep_draft)
+        self.pane.floor.mark_chosen.connect(lambda mark: self.edits.enter_truth(mark.x_m, mark.z_m))
+        self.actions['show_samples'].toggled.connect(self.pane.show_samples)

@@ -1,0 +1,138 @@
+"""Paint what is marked in an image: boxes, samples, cursor, caption. Boxes and pixels are in image coordinates."""
+from typing import Any, NamedTuple, Optional, Tuple
+
+import numpy as np
+
+from ros_3d_bb.overlay import BOX_COLOR, INVALID_COLOR, VALID_COLOR
+
+from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui
+
+CHOSEN, OTHER, DRAWN = QtGui.QColor(*BOX_COLOR), QtGui.QColor(255, 205, 60), QtGui.QColor(70, 200, 255)
+CAPTION = QtGui.QColor(0, 0, 0, 150)
+SAMPLE_PX, SAMPLES_APART_PX = 3, 9  # on the screen
+
+
+class MarkedBox(NamedTuple):
+    """The box (x1, y1, x2, y2) of detection `number`, with its label; `by_hand` where somebody drew it."""
+
+    number: int
+    rect_px: Tuple[int, int, int, int]
+    label: str
+    by_hand: bool
+
+
+class Scene(NamedTuple):
+    """What is marked in an image: boxes, the number of the one that is the person's or None, and the samples of each
+    box whose samples are shown, estimation.Samples.
+    """
+
+    boxes: Tuple[MarkedBox, ...]
+    person: Optional[int]
+    samples: Tuple[Any, ...]
+
+    def box_at(self, x, y):
+        """The number of the smallest box that holds a point of the image; None where there is none."""
+        inside = [((x2 - x1) * (y2 - y1), number) for number, (x1, y1, x2, y2), _label, _by_hand in self.boxes
+                  if x1 <= x < x2 and y1 <= y < y2]
+        return min(inside)[1] if inside else None
+
+
+NOTHING = Scene((), None, ())
+
+
+def paint_scene(painter, transform, scene):
+    """Paint samples and boxes."""
+    for samples in scene.samples:
+        _paint_samples(painter, transform, samples)
+    boxes = sorted(scene.boxes, key=lambda box: box.number == scene.person)  # the person's on top
+    for box in boxes:
+        color, width = (CHOSEN, 3) if box.number == scene.person else (OTHER, 1.5)
+        _paint_box(painter, transform, box.rect_px, color, (width, Qt.DashLine if box.by_hand else Qt.SolidLine))
+    for box in boxes:
+        _paint_label(painter, transform.map(QtCore.QPointF(*box.rect_px[:2])), box.label,
+                     CHOSEN if box.number == scene.person else OTHER)
+
+
+def paint_cursor(painter, transform, shared):
+    """Paint the cross-hair of a SharedView, and the box being drawn."""
+    band = shared.rubber_band()
+    if band is not None:
+        _paint_box(painter, transform, band, DRAWN, (2, Qt.SolidLine))
+    if shared.cursor is None:
+        return
+    point = transform.map(QtCore.QPointF(shared.cursor[0] + 0.5, shared.cursor[1] + 0.5))
+    arm = 3000 if shared.drawing or band is not None else 12
+    for color, width in ((QtGui.QColor(0, 0, 0, 160), 3), (DRAWN if arm > 12 else Qt.white, 1)):
+        painter.setPen(QtGui.QPen(color, width))
+        painter.drawLine(point - QtCore.QPointF(arm, 0), point + QtCore.QPointF(arm, 0))
+        painter.drawLine(point - QtCore.QPointF(0, arm), point + QtCore.QPointF(0, arm))
+
+
+def paint_frame(painter, rect, name, legend, focused):
+    """Paint the name of the view, its scale of colours, and a frame where it has the keyboard."""
+    _paint_label(painter, QtCore.QPointF(rect.left(), rect.top()), name, CAPTION, inside=True)
+    if legend is not None:
+        scale, top, bottom = legend
+        bar = QtCore.QRect(rect.right() - 22, rect.top() + 28, 14, max(60, rect.height() - 64))
+        painter.drawImage(bar, scale)
+        painter.setPen(QtGui.QPen(Qt.white, 1))
+        painter.drawRect(bar)
+        for text, y in ((top, bar.top() - 22), (bottom, bar.bottom() + 2)):
+            _paint_label(painter, QtCore.QPointF(rect.right() - 8, y), text, CAPTION, inside=True, ends=True)
+    if focused:
+        painter.setPen(QtGui.QPen(DRAWN, 2))
+        painter.setBrush(Qt.NoBrush)
+        painter.drawRect(rect.adjusted(1, 1, -1, -1))
+
+
+def paint_message(painter, rect, message):
+    """Paint why there is no image."""
+    painter.setPen(Qt.white)
+    option = QtGui.QTextOption(Qt.AlignCenter)
+    option.setWrapMode(QtGui.QTextOption.WrapAtWordBoundaryOrAnywhere)  # paths have no spaces
+    painter.drawText(QtCore.QRectF(rect.adjusted(24, 24, -24, -24)), message, option)
+
+
+def _paint_samples(painter, transform, samples):
+    """Paint the samples of a box: all of them where they are far enough apart on the screen, else each n-th."""
+    shown = _thinned(samples.u, transform.m11()) & _thinned(samples.v, transform.m11())
+    for kind, color in ((samples.valid, VALID_COLOR), (~samples.valid, INVALID_COLOR)):
+        painter.setPen(QtGui.QPen(QtGui.QColor(*color), SAMPLE_PX, Qt.SolidLine, Qt.RoundCap))
+        painter.drawPoints(transform.map(QtGui.QPolygonF([
+            QtCore.QPointF(u + 0.5, v + 0.5)
+            for u, v in zip(samples.u[shown & kind].tolist(), samples.v[shown & kind].tolist())])))
+
+
+def _thinned(places, scale):
+    """Which places (n,) on an axis of a grid to show so that they are `SAMPLES_APART_PX` apart on the screen."""
+    ticks = np.unique(places)
+    if ticks.size < 2:
+        return np.ones(places.shape, bool)
+    every = int(np.ceil(SAMPLES_APART_PX / ((ticks[1] - ticks[0]) * scale)))
+    return np.isin(places, ticks[every // 2::every])
+
+
+def _paint_box(painter, transform, box_px, color, stroke):
+    x1, y1, x2, y2 = box_px
+    rect = transform.mapRect(QtCore.QRectF(x1, y1, x2 - x1, y2 - y1))
+    painter.setBrush(Qt.NoBrush)
+    painter.setPen(QtGui.QPen(QtGui.QColor(0, 0, 0, 130), stroke[0] + 2))  # so that it shows on any ground
+    painter.drawRect(rect)
+    painter.setPen(QtGui.QPen(color, *stroke))
+    painter.drawRect(rect)
+
+
+def _paint_label(painter, corner, text, color, inside=False, ends=False):
+    """A text on a filled ground: above its lower left corner, or `inside` a view below its upper left corner.
+
+    With `ends` the corner is the right one.
+    """
+    if not text:
+        return
+    metrics = painter.fontMetrics()
+    width, height = metrics.boundingRect(text).width() + 10, metrics.height() + 2
+    top = corner.y() if inside else max(corner.y() - height, 0)
+    rect = QtCore.QRectF(corner.x() - (width if ends else 0), top, width, height)
+    painter.fillRect(rect, color)
+    painter.setPen(Qt.white if color is CAPTION else Qt.black)
+    painter.drawText(rect, Qt.AlignCenter, text)

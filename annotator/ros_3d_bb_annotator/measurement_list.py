@@ -1,0 +1,157 @@
+"""The list of measurements with their states, as Qt's model and a view that filters it."""
+from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
+
+COLUMNS = ('measurement', 'state', 'error')
+COLORS = {'new': QtGui.QColor(60, 120, 200), 'annotated': QtGui.QColor(30, 140, 60),
+          'rejected': QtGui.QColor(150, 150, 150)}
+PROBLEM = QtGui.QColor(190, 0, 40)
+STATES = ('new', 'annotated', 'rejected')
+
+
+class MeasurementModel(QtCore.QAbstractTableModel):
+    """The measurements of a document, a row each; nothing is computed before it is shown."""
+
+    def __init__(self, parent=None):
+        super(MeasurementModel, self).__init__(parent)
+        self._document, self._count = None, 0
+
+    def show_document(self, document):
+        """Show another document, or None."""
+        self.beginResetModel()
+        self._document, self._count = document, len(document.measurements) if document else 0
+        self.endResetModel()
+
+    def update_rows(self):
+        """Show what the document holds now."""
+        if len(self._document.measurements) != self._count:
+            self.show_document(self._document)
+        elif self._count:
+            self.dataChanged.emit(self.index(0, 0), self.index(self._count - 1, len(COLUMNS) - 1))
+
+    def rowCount(self, parent=QtCore.QModelIndex()):  # noqa: N802 (Qt's name)
+        return 0 if parent.isValid() else self._count
+
+    def columnCount(self, parent=QtCore.QModelIndex()):  # noqa: N802
+        return 0 if parent.isValid() else len(COLUMNS)
+
+    def headerData(self, section, orientation, role=Qt.DisplayRole):  # noqa: N802
+        if role == Qt.DisplayRole and orientation == Qt.Horizontal:
+            return COLUMNS[section]
+        return None
+
+    def data(self, index, role=Qt.DisplayRole):
+        measurement = self._document.measurements[index.row()]
+        if role == Qt.DisplayRole:
+            return self._text(index.row(), measurement, COLUMNS[index.column()])
+        if role == Qt.ForegroundRole:
+            return QtGui.QBrush(PROBLEM if measurement.problem else COLORS[measurement.state])
+        if role == Qt.ToolTipRole:
+            return measurement.problem or measurement.rejected or measurement.label or None
+        if role == Qt.TextAlignmentRole and index.column() == 2:
+            return int(Qt.AlignRight | Qt.AlignVCenter)
+        return None
+
+    def _text(self, row, measurement, column):
+        if column == 'measurement':
+            return measurement.id
+        if column == 'state':
+            return measurement.state
+        errors = self._document.errors(row)
+        return '' if errors is None else '%.0f mm' % (1000 * errors[2])
+
+
+class StateFilter(QtCore.QSortFilterProxyModel):
+    """Of the measurements those in one state, or all."""
+
+    def __init__(self, parent=None):
+        super(StateFilter, self).__init__(parent)
+        self._state, self._states = None, ()
+
+    def show_states(self, states):
+        """Say the states of all measurements, before the model tells of a change."""
+        self._states = states
+
+    def show_only(self, state):
+        """Show one state only; None: all."""
+        self._state = state
+        self.invalidateFilter()
+
+    def filterAcceptsRow(self, row, _parent):  # noqa: N802
+        return self._state is None or self._states[row] == self._state
+
+
+class MeasurementList(QtWidgets.QWidget):
+    """The list and its filter. `chosen` gives the number of the measurement that somebody goes to."""
+
+    chosen = Signal(int)
+
+    def __init__(self, parent=None):
+        super(MeasurementList, self).__init__(parent)
+        self._model, self._filter = MeasurementModel(self), StateFilter(self)
+        self._document, self._marking = None, False
+        self._filter.setSourceModel(self._model)
+        self.filter_box = QtWidgets.QComboBox()
+        self.filter_box.addItem('all measurements', None)
+        for state in STATES:
+            self.filter_box.addItem('%s only' % state, state)
+        self.filter_box.currentIndexChanged.connect(self._change_filter)
+        self.table = self._make_table()
+        layout = QtWidgets.QVBoxLayout(self)
+        layout.setContentsMargins(6, 6, 0, 6)
+        layout.addWidget(self.filter_box)
+        layout.addWidget(self.table)
+
+    def show_document(self, document):
+        """Show the measurements of a document."""
+        self._document = document
+        self._filter.show_states([measurement.state for measurement in document.measurements])
+        self._model.show_document(document)
+        self._name_counts()
+
+    def update_rows(self):
+        """Show what became of the measurements."""
+        self._filter.show_states([measurement.state for measurement in self._document.measurements])
+        self._model.update_rows()
+        self._name_counts()
+
+    def mark_current(self, number):
+        """Show which measurement is looked at; does not emit `chosen`."""
+        index = self._filter.mapFromSource(self._model.index(number, 0))
+        self._marking = True
+        if index.isValid():
+            self.table.setCurrentIndex(index)
+        else:
+            self.table.clearSelection()
+        self._marking = False
+
+    def _make_table(self):
+        table = QtWidgets.QTableView()
+        table.setModel(self._filter)
+        table.setSelectionBehavior(QtWidgets.QTableView.SelectRows)
+        table.setSelectionMode(QtWidgets.QTableView.SingleSelection)
+        table.setTabKeyNavigation(False)
+        table.setShowGrid(False)
+        table.setWordWrap(False)
+        table.setTextElideMode(Qt.ElideMiddle)  # names made of times differ at their end
+        table.verticalHeader().hide()
+        table.verticalHeader().setSectionResizeMode(QtWidgets.QHeaderView.Fixed)  # sizes no row before it is seen
+        table.verticalHeader().setDefaultSectionSize(table.fontMetrics().height() + 6)
+        table.horizontalHeader().setSectionResizeMode(0, QtWidgets.QHeaderView.Stretch)
+        for column, text in ((1, 'annotated'), (2, '00000 mm')):
+            table.horizontalHeader().setSectionResizeMode(column, QtWidgets.QHeaderView.Fixed)
+            table.horizontalHeader().resizeSection(column, table.fontMetrics().boundingRect(text).width() + 14)
+        table.selectionModel().currentChanged.connect(self._on_current)
+        return table
+
+    def _on_current(self, index, _previous):
+        if index.isValid() and not self._marking:
+            self.chosen.emit(self._filter.mapToSource(index).row())
+
+    def _change_filter(self):
+        self._filter.show_only(self.filter_box.currentData())
+
+    def _name_counts(self):
+        states = [measurement.state for measurement in self._document.measurements]
+        self.filter_box.setItemText(0, 'all measurements (%d)' % len(states))
+        for row, state in enumerate(STATES, 1):
+            self.filter_box.setItemText(row, '%s only (%d)' % (state, states.count(state)))

@@ -1,0 +1,159 @@
+"""All that is shown of one measurement: its images, the people in it, its truth and its place on the floor."""
+from ros_3d_bb_annotator.grid_view import FloorScene, GridView
+from ros_3d_bb_annotator.image_view import ImageView
+from ros_3d_bb_annotator.pictures import PictureCache, depth_scale
+from ros_3d_bb_annotator.qt import Qt, QtWidgets, Signal
+from ros_3d_bb_annotator.scenes import detection_text, floor_of, readout_text, scene_of
+from ros_3d_bb_annotator.shared_view import SharedView
+from ros_3d_bb_annotator.truth_panel import TruthPanel
+
+STATE_COLORS = {'new': '#3c78c8', 'annotated': '#1e8c3c', 'rejected': '#787878'}
+HEADER = '<span style="font-size: large"><b>%s</b></span> &nbsp; <b style="color: %s">%s</b> &nbsp; %s'
+
+
+class MeasurementPane(QtWidgets.QWidget):
+    """Shows one measurement of a document. `person_chosen` gives the number of a detection; `truth` (a TruthPanel),
+    `floor` (a GridView) and `shared` (a SharedView) have the signals of what else somebody does.
+    """
+
+    person_chosen = Signal(int)
+
+    def __init__(self, parent=None):
+        super(MeasurementPane, self).__init__(parent)
+        self.shared, self.truth, self.floor = SharedView(self), TruthPanel(), GridView()
+        self.color_view, self.depth_view = ImageView('colour', self.shared), ImageView('depth', self.shared)
+        self.header, self.banner = _label(), _label()
+        self.readout = QtWidgets.QLabel()
+        self.people, self.buttons = QtWidgets.QListWidget(), QtWidgets.QGridLayout()
+        self._document, self._pictures, self._measurement, self._shown = None, None, None, None
+        self._scale, self._samples_shown = depth_scale(), True
+        self._lay_out()
+        self.header.setText('No session is open: File, Open a session (Ctrl+O).')
+        for view in (self.color_view, self.depth_view):
+            view.box_chosen.connect(self.person_chosen)
+        self.people.setAlternatingRowColors(True)
+        self.people.itemActivated.connect(lambda item: self.person_chosen.emit(self.people.row(item)))
+        self.people.itemClicked.connect(lambda item: self.person_chosen.emit(self.people.row(item)))
+        self.shared.pointed.connect(self._show_readout)
+        self.truth.previewed.connect(self._show_floor)
+
+    def set_usable(self, usable):
+        """Say whether there is a measurement to be worked on."""
+        for widget in (self.color_view, self.depth_view, self.people, self.truth, self.floor):
+            widget.setEnabled(usable)
+
+    def show_document(self, document):
+        """Take the measurements of a document; none is shown yet."""
+        self._document, self._pictures, self._shown = document, PictureCache(document), None
+        self.header.setText('This session holds no measurements yet.')
+        self.banner.setText('<br>'.join(_escaped(note) for note in document.notes))
+        self.banner.setVisible(bool(document.notes))
+
+    def show_measurement(self, number):
+        """Show a measurement, or what became of it."""
+        self._measurement = measurement = self._document.measurements[number]
+        self._shown = pictures = self._pictures.of(number)
+        self._show_header(measurement)
+        image = pictures.color_image or pictures.depth_image
+        if image is not None:
+            self.shared.show_size(image.width(), image.height())
+        self.shared.cancel()
+        scene = self._scene()
+        self.color_view.show_image(pictures.color_image, scene, pictures.color_problem)
+        self.depth_view.show_image(pictures.depth_image, scene, pictures.depth_problem,
+                                   (self._scale, '%g m' % pictures.farthest_m, '0 m') if pictures.depth else None)
+        self._show_people(measurement)
+        self.truth.show_truth(measurement.truth_m, measurement.estimate_m, self._document.draft(number))
+        self._show_readout()
+
+    def read_ahead(self, number):
+        """Read the images of a measurement that may be looked at next. Returns whether that was still to be done."""
+        return self._pictures.read_ahead(number)
+
+    def read_again(self):
+        """Forget images that were read; their files may have changed."""
+        self._pictures.forget()
+
+    def show_samples(self, shown):
+        """Say whether the samples are shown."""
+        self._samples_shown = shown
+        if self._measurement is not None:
+            scene = self._scene()
+            self.color_view.show_scene(scene)
+            self.depth_view.show_scene(scene)
+
+    def _scene(self):
+        return scene_of(self._measurement, self._shown.depth if self._samples_shown else None)
+
+    def _show_header(self, measurement):
+        details = [text for text in (measurement.label, measurement.stamp_text and 'at %s s' % measurement.stamp_text,
+                                     measurement.rejected and 'because: %s' % measurement.rejected,
+                                     measurement.problem) if text]
+        self.header.setText(HEADER % (_escaped(measurement.id), STATE_COLORS[measurement.state], measurement.state,
+                                      _escaped(' · '.join(details))))
+
+    def _show_people(self, measurement):
+        self.people.clear()
+        for number, detection in enumerate(measurement.detections):
+            item = QtWidgets.QListWidgetItem(detection_text(number, detection))
+            font = item.font()
+            font.setBold(number == measurement.person)
+            item.setFont(font)
+            self.people.addItem(item)
+        if measurement.person is not None:
+            self.people.setCurrentRow(measurement.person)
+
+    def _show_readout(self):
+        depth, camera = (self._shown.depth, self._document.camera) if self._shown is not None else (None, None)
+        self.readout.setText(readout_text(self.shared.cursor, depth, camera))
+
+    def _show_floor(self, truth_m):
+        """The floor with the truth (x, z) as it is typed, None where it is not."""
+        self.floor.show_scene(FloorScene(self._document.grid, truth_m, floor_of(self._measurement.estimate_m),
+                                         sight_of(self._document.camera)))
+
+    def _lay_out(self):
+        views = QtWidgets.QSplitter(Qt.Horizontal)
+        views.addWidget(self.color_view)
+        views.addWidget(self.depth_view)
+        self.banner.setStyleSheet('background: #fff3c4; color: #5c4400; padding: 6px')
+        self.banner.hide()
+        self.readout.setTextInteractionFlags(Qt.TextSelectableByMouse)
+        layout = QtWidgets.QVBoxLayout(self)
+        layout.setContentsMargins(6, 6, 6, 0)
+        for widget, stretch in ((self.banner, 0), (self.header, 0), (views, 1), (self.readout, 0)):
+            layout.addWidget(widget, stretch)
+        layout.addLayout(self._lower_part())
+
+    def _lower_part(self):
+        people_box, floor_box = QtWidgets.QGroupBox('Boxes: which is the person?'), QtWidgets.QGroupBox('Floor')
+        QtWidgets.QVBoxLayout(people_box).addWidget(self.people)
+        middle = QtWidgets.QVBoxLayout()
+        middle.addWidget(self.truth, 1)
+        middle.addLayout(self.buttons)
+        floor_layout = QtWidgets.QVBoxLayout(floor_box)
+        floor_layout.setContentsMargins(4, 4, 4, 4)
+        floor_layout.addWidget(self.floor)
+        layout = QtWidgets.QHBoxLayout()
+        layout.addWidget(people_box, 3)
+        layout.addLayout(middle, 4)
+        layout.addWidget(floor_box, 4)
+        return layout
+
+
+def sight_of(camera):
+    """Tangents of a camera's field of view to the left and to the right; of an unknown one, none."""
+    if camera is None:
+        return 0.0, 0.0
+    return -camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx
+
+
+def _label():
+    label = QtWidgets.QLabel()
+    label.setTextFormat(Qt.RichText)
+    label.setWordWrap(True)
+    return label
+
+
+def _escaped(text):
+    return text.replace('&', '&amp;').replace('<', '&lt;')

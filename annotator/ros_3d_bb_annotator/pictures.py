@@ -1,0 +1,109 @@
+"""The images of measurements as Qt paints them, read when they are looked at."""
+import collections
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+
+from ros_3d_bb.overlay import visible_depth
+
+from ros_3d_bb_annotator.qt import QtGui
+
+KEPT = 7  # measurements: the one looked at and its neighbours
+FARTHEST_PERCENT = 90  # beyond is the end of the room; it may all be blue
+RANGES_M = (1, 2, 3, 4, 6, 8, 10, 15, 20, 40)
+
+
+class Pictures(NamedTuple):
+    """Of one measurement: QImages of colour and depth, None where a problem says why there is none; `depth` is the
+    DepthImage or None, `farthest_m` the end of the scale of colours."""
+
+    color_image: Any
+    color_problem: str
+    depth_image: Any
+    depth_problem: str
+    depth: Any
+    farthest_m: float
+
+
+class PictureCache(object):
+    """The pictures of the measurements of a document, the last few kept."""
+
+    def __init__(self, document):
+        self._document, self._kept = document, collections.OrderedDict()
+
+    def of(self, number):
+        """The Pictures of a measurement."""
+        if number in self._kept:
+            self._kept.move_to_end(number)
+        else:
+            self._kept[number] = self._read(number)
+        while len(self._kept) > KEPT:
+            self._kept.popitem(last=False)
+        return self._kept[number]
+
+    def read_ahead(self, number):
+        """Read the pictures of a measurement, where they are not there. Returns whether they were not."""
+        if number in self._kept:
+            return False
+        self.of(number)
+        return True
+
+    def forget(self):
+        """Read everything again; the files may have changed."""
+        self._kept.clear()
+
+    def _read(self, number):
+        color, color_problem = _tried(self._document.color, number)
+        if self._document.is_old_form:
+            depth, (picture, depth_problem) = None, _tried(self._document.stretched_depth, number)
+            shown = None if picture is None else grey_picture(picture)
+        else:
+            depth, depth_problem = _tried(self._document.depth, number)
+            shown = None if depth is None else colored_depth(depth, farthest_of(depth))
+        return Pictures(None if color is None else image_of(color), color_problem,
+                        None if shown is None else image_of(shown), depth_problem,
+                        depth, 0.0 if depth is None else farthest_of(depth))
+
+
+def farthest_of(depth):
+    """The end of a scale of colours that suits a DepthImage, metres: a round number."""
+    measured = depth.values[::4, ::4].astype(float) * depth.scale_m
+    measured = measured[np.isfinite(measured) & (measured > 0)]
+    if not measured.size:
+        return RANGES_M[-1]
+    far_m = np.percentile(measured, FARTHEST_PERCENT)
+    return next((range_m for range_m in RANGES_M if range_m >= far_m), RANGES_M[-1])
+
+
+def colored_depth(depth, farthest_m):
+    """A DepthImage in colours, (height, width, 3), uint8, RGB: near is red, far is blue, no depth is black."""
+    grey = visible_depth(depth, farthest_m)
+    colored = cv2.applyColorMap(grey, cv2.COLORMAP_JET)[..., ::-1]
+    return np.where(grey[..., None] > 0, colored, 0).astype(np.uint8)
+
+
+def grey_picture(values):
+    """A picture (height, width), uint8 or uint16, in no unit, as (height, width, 3), uint8, RGB."""
+    grey = values if values.dtype == np.uint8 else (values // 256).astype(np.uint8)
+    return np.repeat(grey[..., None], 3, axis=2)
+
+
+def depth_scale():
+    """The colours of `colored_depth` from far (top) to near (bottom), a QImage."""
+    grey = np.linspace(1, 255, 255).astype(np.uint8)[:, None]
+    return image_of(cv2.applyColorMap(grey, cv2.COLORMAP_JET)[..., ::-1])
+
+
+def image_of(rgb):
+    """A QImage of (height, width, 3), uint8, RGB."""
+    rgb = np.ascontiguousarray(rgb)
+    height, width = rgb.shape[:2]
+    return QtGui.QImage(rgb.data, width, height, 3 * width, QtGui.QImage.Format_RGB888).copy()
+
+
+def _tried(read, number):
+    try:
+        return read(number), ''
+    except (ValueError, OSError) as error:
+        return None, str(error)

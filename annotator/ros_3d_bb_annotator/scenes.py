@@ -1,0 +1,57 @@
+"""What is to be seen of a measurement, in words and as marks."""
+from ros_3d_bb.estimation import estimator_named
+from ros_3d_bb_annotator.document import ESTIMATOR
+from ros_3d_bb_annotator.marking import MarkedBox, Scene
+
+
+def scene_of(measurement, depth):
+    """The Scene of a measurement; with a DepthImage also what the estimator looks at in each box."""
+    boxes = tuple(MarkedBox(number, detection.box_px, _label_of(number, detection), detection.by_hand)
+                  for number, detection in enumerate(measurement.detections) if detection.box_px is not None)
+    sample = estimator_named(ESTIMATOR).sample
+    samples = () if depth is None else tuple(
+        sample(depth, box.rect_px) for box in boxes
+        if box.rect_px[0] < box.rect_px[2] and box.rect_px[1] < box.rect_px[3])
+    return Scene(boxes, measurement.person, samples)
+
+
+def detection_text(number, detection):
+    """A detection in two lines."""
+    position = 'no estimate' if detection.estimate_m is None else (
+        'X %s  Z %.3f m' % (signed(detection.estimate_m[0]), detection.estimate_m[2]))
+    details = (detection.support is not None and 'support %.0f %%' % (100 * detection.support),
+               detection.truncated and 'truncated', detection.by_hand and 'drawn by hand')
+    return '%d: %s\n     %s' % (number + 1, position, ', '.join(filter(None, details)))
+
+
+def readout_text(cursor, depth, camera):
+    """Pixel, depth and position that the cursor (u, v) points at; `depth` a DepthImage or None, `camera` or None."""
+    if cursor is None:
+        return 'Point at the image: pixel, depth, X Y Z'
+    text = 'pixel (%d, %d)' % cursor
+    if depth is None:
+        return text
+    height, width = depth.values.shape
+    if not (0 <= cursor[0] < width and 0 <= cursor[1] < height):
+        return text
+    depth_m, measured = depth.at(*cursor)
+    if not measured:
+        return text + '    no depth there'
+    x_m, y_m, z_m = camera.deproject(cursor, depth_m).tolist()
+    return text + '    depth %.3f m    X %s  Y %s  Z %.3f m' % (depth_m, signed(x_m), signed(y_m), z_m)
+
+
+def floor_of(position_m):
+    """The (x, z) of a position (3,) or None."""
+    return None if position_m is None else (float(position_m[0]), float(position_m[2]))
+
+
+def signed(value_m):
+    """Metres with their sign, and a minus as wide as the plus."""
+    return ('%+.3f' % value_m).replace('-', '−')
+
+
+def _label_of(number, detection):
+    if detection.estimate_m is None:
+        return '%d' % (number + 1)
+    return '%d: %.2f m' % (number + 1, detection.estimate_m[2])

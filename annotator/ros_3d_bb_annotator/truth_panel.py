@@ -1,0 +1,182 @@
+"""The fields for the truth of one measurement, with the error that follows from what is typed."""
+import math
+
+from ros_3d_bb_annotator.lengths import METRES, parse_length
+from ros_3d_bb_annotator.qt import QtCore, QtGui, QtWidgets, Signal
+
+FIELDS = (('x', '&X, right of the camera'), ('z', '&Z, ahead of it'), ('y', '&Y, below it (optional)'))
+UNITS = ('mm', 'm')
+TYPING_MS = 300  # what is typed is kept when nothing more comes for so long
+WRONG, PLAIN = 'color: #b00020', ''
+
+
+class LengthEdit(QtWidgets.QLineEdit):
+    """A line to type into, which leaves undo and redo to the program where it has nothing to undo itself."""
+
+    def event(self, event):
+        if event.type() == QtCore.QEvent.ShortcutOverride and (
+                (event.matches(QtGui.QKeySequence.Undo) and not self.isUndoAvailable())
+                or (event.matches(QtGui.QKeySequence.Redo) and not self.isRedoAvailable())):
+            event.ignore()
+            return False
+        return super(LengthEdit, self).event(event)
+
+
+class TruthPanel(QtWidgets.QGroupBox):
+    """Signals: `entered` with (x_m, z_m, y_m or None) when Enter is pressed on a complete position; `typed` with the
+    text of the fields, to be kept; `previewed` with the (x_m, z_m) that the fields hold now, None where they hold
+    none.
+    """
+
+    entered = Signal(float, float, object)
+    typed = Signal(dict)
+    previewed = Signal(object)
+
+    def __init__(self, parent=None):
+        super(TruthPanel, self).__init__('Truth', parent)
+        self.fields = {name: LengthEdit() for name, _label in FIELDS}
+        self.unit_box = QtWidgets.QComboBox()
+        self.unit_box.addItems(UNITS)
+        self.error_label, self.hint_label = QtWidgets.QLabel(), QtWidgets.QLabel()
+        self._estimate_m, self._stored = None, self.texts()
+        self._timer = QtCore.QTimer(self, singleShot=True, interval=TYPING_MS)
+        self._timer.timeout.connect(self.flush)
+        self._lay_out()
+        for field in self.fields.values():
+            field.textEdited.connect(self._on_typed)
+            field.returnPressed.connect(self._on_enter)
+        self.unit_box.activated.connect(self._on_unit)
+
+    def show_truth(self, truth_m, estimate_m, draft):
+        """Show the (x, y, z) of a measurement or None, or what was typed for it; `estimate_m` (3,) or None."""
+        self._timer.stop()
+        self._estimate_m = estimate_m
+        unit = draft.get('unit', self.unit_box.currentText())
+        self.unit_box.setCurrentText(unit if unit in UNITS else UNITS[0])
+        self._stored = dict(_texts_of(truth_m, self.unit_box.currentText()), unit=self.unit_box.currentText())
+        shown = dict(self._stored, **draft)
+        for name, field in self.fields.items():
+            field.setText(shown[name])
+        self._say('typed before, not entered yet: Enter enters it' if draft else '')
+        self._show_error()
+
+    def texts(self):
+        """What the fields hold: {name: text}."""
+        return dict({name: field.text() for name, field in self.fields.items()}, unit=self.unit_box.currentText())
+
+    def begin(self):
+        """Give the keyboard to the first field."""
+        self.fields['x'].setFocus()
+        self.fields['x'].selectAll()
+
+    def has_keyboard(self):
+        """Whether a field has the keyboard."""
+        return any(field.hasFocus() for field in self.fields.values())
+
+    def flush(self):
+        """Tell now what is typed, where that was being waited for."""
+        if self._timer.isActive():
+            self._timer.stop()
+        texts = self.texts()
+        edited = any(texts[name] != self._stored[name] for name in self.fields)
+        self.typed.emit(texts if edited and any(texts[name] for name in self.fields) else {})
+
+    def switch_unit(self):
+        """Go from millimetres to metres or back; complete lengths are written anew."""
+        self.unit_box.setCurrentIndex(1 - self.unit_box.currentIndex())
+        self._on_unit()
+
+    def show_problem(self, text):
+        """Say what is wrong with what was typed."""
+        self._say(text, WRONG)
+
+    def read(self):
+        """(x_m, z_m, y_m or None) of the fields. Raises ValueError that names the field."""
+        values_m = {}
+        for name, field in self.fields.items():
+            if name == 'y' and not field.text().strip():
+                continue
+            try:
+                values_m[name] = parse_length(field.text(), self.unit_box.currentText())
+            except ValueError as error:
+                raise ValueError('%s: %s' % (name.upper(), error if field.text().strip() else 'a length is missing'))
+        return values_m['x'], values_m['z'], values_m.get('y')
+
+    def _lay_out(self):
+        form = QtWidgets.QFormLayout(self)
+        for name, label in FIELDS:
+            form.addRow(label, self.fields[name])
+            self.fields[name].setAccessibleName(label.replace('&', ''))
+        form.addRow('&unit', self.unit_box)
+        self.error_label.setWordWrap(True)
+        self.error_label.setTextFormat(QtCore.Qt.RichText)
+        self.hint_label.setWordWrap(True)
+        form.addRow(self.error_label)
+        form.addRow(self.hint_label)
+
+    def _on_typed(self):
+        self._say('')
+        self._show_error()
+        self._timer.start()
+
+    def _on_unit(self, _index=None):
+        """Write what was typed in the unit that was meant in the one that is meant now."""
+        unit = self.unit_box.currentText()
+        other = UNITS[1 - UNITS.index(unit)]
+        for name, field in self.fields.items():
+            try:
+                length_m = parse_length(field.text(), other)
+            except ValueError:
+                continue  # half typed: left as it is
+            field.setText(_text_of(length_m, unit))
+        self._show_error()
+        self._timer.start()
+
+    def _on_enter(self):
+        try:
+            position = self.read()
+        except ValueError as error:
+            self.show_problem(str(error))
+            self.fields[str(error)[0].lower()].setFocus()
+            return
+        self._timer.stop()
+        self.entered.emit(*position)
+
+    def _show_error(self):
+        try:
+            x_m, z_m, _y_m = self.read()
+        except ValueError:
+            self.error_label.setText(error_text(None))
+            self.previewed.emit(None)
+            return
+        self.error_label.setText(error_text(None if self._estimate_m is None else (
+            float(self._estimate_m[0]) - x_m, float(self._estimate_m[2]) - z_m)))
+        self.previewed.emit((x_m, z_m))
+
+    def _say(self, text, style=PLAIN):
+        self.hint_label.setStyleSheet(style)
+        self.hint_label.setText(text)
+
+
+def error_text(error_m):
+    """Errors (x, z) in metres as people read them; None where there is none."""
+    if error_m is None:
+        return 'Error: –'
+    return 'Error: <b>X %s mm, Z %s mm</b>, %.0f mm on the floor' % (
+        signed_mm(error_m[0]), signed_mm(error_m[1]), 1000 * math.hypot(*error_m[:2]))
+
+
+def signed_mm(value_m):
+    """Metres as millimetres with their sign: +12, −3."""
+    return ('%+.0f' % (1000 * value_m)).replace('-', '−')
+
+
+def _texts_of(truth_m, unit):
+    if truth_m is None:
+        return {name: '' for name, _label in FIELDS}
+    x_m, y_m, z_m = truth_m
+    return {'x': _text_of(x_m, unit), 'z': _text_of(z_m, unit), 'y': '' if y_m is None else _text_of(y_m, unit)}
+
+
+def _text_of(length_m, unit):
+    return '%.10g' % round(length_m / METRES[unit], 6)

@@ -1,0 +1,100 @@
+"""Drive the annotator's window as a person does: keys go to what has the keyboard, clicks to places in a widget."""
+import importlib
+import os
+
+os.environ.setdefault('QT_QPA_PLATFORM', 'offscreen')  # before Qt is imported; a virtual display does as well
+
+from ros_3d_bb_annotator.application import make_application  # noqa: E402
+from ros_3d_bb_annotator.main_window import AnnotatorWindow  # noqa: E402
+from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets  # noqa: E402
+
+QtTest = importlib.import_module(QtCore.__name__.replace('QtCore', 'QtTest'))  # of the binding that is in use
+TRIES, WAIT_MS = 1000, 20
+APPLICATION = make_application()  # Qt goes with the last reference to it
+
+
+class Driver(object):
+    """An AnnotatorWindow that is shown, with a session."""
+
+    def __init__(self, folder):
+        self.window = AnnotatorWindow()
+        self.window.show()
+        self.window.activateWindow()
+        QtTest.QTest.qWaitForWindowActive(self.window)
+        self.opened = self.window.open_session(folder)
+        self.settle()
+
+    @property
+    def document(self):
+        return self.window.document
+
+    def measurement(self, number):
+        return self.document.measurements[number]
+
+    def press(self, *keys):
+        """Press keys: Qt's numbers, (key, modifiers), or text to be typed."""
+        for key in keys:
+            widget = QtWidgets.QApplication.focusWidget() or self.window
+            if isinstance(key, str):
+                QtTest.QTest.keyClicks(widget, key)
+            else:
+                QtTest.QTest.keyClick(widget, *(key if isinstance(key, tuple) else (key,)))
+        self.settle()
+
+    def click(self, widget, place, modifiers=Qt.NoModifier):
+        """Click at a place (QPointF) in a widget."""
+        QtTest.QTest.mouseClick(widget, Qt.LeftButton, modifiers, place.toPoint())
+        self.settle()
+
+    def drag(self, widget, start, end, modifiers=Qt.NoModifier):
+        """Press at a place in a widget, move, release at another one."""
+        QtTest.QTest.mousePress(widget, Qt.LeftButton, modifiers, start.toPoint())
+        for place in ((start + end) / 2, end):  # QTest.mouseMove holds no button
+            event = _mouse_move(place, modifiers)
+            QtWidgets.QApplication.sendEvent(widget, event)
+        QtTest.QTest.mouseRelease(widget, Qt.LeftButton, modifiers, end.toPoint())
+        self.settle()
+
+    def answer(self, reply, act):
+        """Do what opens a dialog, `act()`, and let `reply(dialog)` answer it; returns what it returned."""
+        replies = []
+
+        def reply_when_it_is_there():
+            dialog = QtWidgets.QApplication.activeModalWidget()
+            if dialog is None or not dialog.isVisible() or isinstance(dialog, QtWidgets.QProgressDialog):
+                QtCore.QTimer.singleShot(10, reply_when_it_is_there)
+                return
+            try:
+                replies.append(reply(dialog))
+            finally:
+                dialog.close()  # a reply that fails must not leave the test waiting
+
+        QtCore.QTimer.singleShot(0, reply_when_it_is_there)
+        act()
+        self.window.activateWindow()  # a window manager would
+        QtTest.QTest.qWaitForWindowActive(self.window)
+        self.settle()
+        assert replies, 'no dialog was opened'
+        return replies[0]
+
+    def wait_for(self, condition):
+        """Let the program run until `condition()`."""
+        for _ in range(TRIES):
+            if condition():
+                return
+            QtTest.QTest.qWait(WAIT_MS)
+        raise AssertionError('waited in vain')
+
+    def settle(self):
+        """Let the program do what is due."""
+        for _ in range(5):
+            QtWidgets.QApplication.processEvents()
+
+    def close(self):
+        self.window.close()
+        self.window.deleteLater()
+        self.settle()
+
+
+def _mouse_move(place, modifiers):
+    return QtGui.QMouseEvent(QtCore.QEvent.MouseMove, place, Qt.NoButton, Qt.LeftButton, modifiers)

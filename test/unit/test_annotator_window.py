@@ -1,0 +1,245 @@
+"""Annotating in the window, by key presses and clicks: what a person does is in the session afterwards."""
+import os
+
+import cv2
+import numpy as np
+import pytest
+
+from ros_3d_bb_annotator.document import Document
+from ros_3d_bb_annotator.measurement import Mark
+from support.small_session import FAR_BOX, NEAR_BOX, write_small_session
+from support.window import Qt, QtCore, QtWidgets
+
+CONTROL, SHIFT, ALT = Qt.ControlModifier, Qt.ShiftModifier, Qt.AltModifier
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return write_small_session(str(tmp_path))
+
+
+@pytest.fixture
+def drive(window_on, folder):
+    return window_on(folder)
+
+
+def opened(folder):
+    """What another program finds in the session."""
+    return Document.open(folder).measurements
+
+
+def place_in(view, x, y):
+    return view.transform().map(QtCore.QPointF(x, y))
+
+
+def test_typing_a_truth_and_enter_saves_it_and_goes_on(drive, folder):
+    drive.press('-476.5', Qt.Key_Tab, '2050', Qt.Key_Return)
+    assert opened(folder)[0].truth_m == (-0.4765, None, 2.05)
+    assert drive.window.current == 1 and drive.window.progress.text() == '1 of 4 done'
+    assert 'X +10 mm, Z −50 mm' in drive.window.last_entry.text()
+    drive.press('0,1 m', Qt.Key_Tab, '2.1m', Qt.Key_Tab, '-30', Qt.Key_Return)
+    assert opened(folder)[1].truth_m == (0.1, -0.03, 2.1) and drive.window.current == 2
+
+
+def test_the_error_is_shown_while_the_truth_is_typed(drive):
+    drive.press('-400', Qt.Key_Tab, '1900')
+    assert 'X −66 mm, Z +100 mm' in drive.window.pane.truth.error_label.text()
+    assert drive.measurement(0).truth_m is None
+
+
+@pytest.mark.parametrize('x, z, problem, field', [
+    ('12e', '2000', "X: '12e' is not a length", 'x'), ('100', '', 'Z: a length is missing', 'z'),
+    ('100', '-5', 'truth z is -0.005 m', None), ('100', '2000000', 'at most 100 m expected', 'z')])
+def test_what_is_no_truth_is_refused_beside_the_fields(drive, x, z, problem, field):
+    drive.press(x, Qt.Key_Tab, z, Qt.Key_Return)
+    truth = drive.window.pane.truth
+    assert problem in truth.hint_label.text() and drive.window.current == 0
+    assert drive.measurement(0).state == 'new' and truth.fields['z'].text() == z
+    assert field is None or truth.fields[field].hasFocus()
+
+
+def test_metres_and_millimetres(drive, folder):
+    drive.press('1500', (Qt.Key_U, CONTROL))
+    assert drive.window.pane.truth.fields['x'].text() == '1.5'
+    drive.press(Qt.Key_Tab, '2', Qt.Key_Return)
+    assert opened(folder)[0].truth_m == (1.5, None, 2.0)
+    drive.press('0.25', Qt.Key_Tab, '3', Qt.Key_Return)  # the unit stays
+    assert opened(folder)[1].truth_m == (0.25, None, 3.0)
+
+
+def test_a_digit_chooses_the_person_where_no_text_is_typed(drive, folder):
+    drive.press((Qt.Key_2, ALT))
+    assert opened(folder)[0].person == 1
+    drive.press(Qt.Key_F3, '1')
+    assert opened(folder)[0].person == 0
+    drive.press(Qt.Key_F4, '2')
+    assert opened(folder)[0].person == 0 and drive.window.pane.truth.fields['x'].text() == '2'
+    drive.press(Qt.Key_F3, '7')
+    assert opened(folder)[0].person == 0 and 'no box 7' in drive.window.statusBar().currentMessage()
+
+
+def test_what_is_typed_survives_choosing_a_box(drive):
+    drive.press('-77', (Qt.Key_2, ALT))
+    assert drive.measurement(0).person == 1 and drive.window.pane.truth.fields['x'].text() == '-77'
+
+
+@pytest.mark.parametrize('name', ['color_view', 'depth_view'])
+def test_a_click_on_a_box_chooses_it_at_any_zoom(drive, folder, name):
+    view = getattr(drive.window.pane, name)
+    drive.click(view, place_in(view, *np.mean([FAR_BOX[:2], FAR_BOX[2:]], axis=0)))
+    assert opened(folder)[0].person == 1
+    drive.press(Qt.Key_F3, '+', '+')
+    drive.click(view, place_in(view, NEAR_BOX[2] - 1, 24))
+    assert opened(folder)[0].person == 0
+    drive.click(view, place_in(view, 33, 24))  # between the people
+    assert opened(folder)[0].person == 0
+
+
+def test_the_person_is_chosen_in_the_list_of_boxes(drive, folder):
+    people = drive.window.pane.people
+    drive.click(people.viewport(), QtCore.QPointF(people.visualItemRect(people.item(1)).center()))
+    assert opened(folder)[0].person == 1
+
+
+def test_a_box_is_drawn_with_shift_and_drag(drive, folder):
+    view = drive.window.pane.color_view
+    drive.drag(view, place_in(view, 11.5, 5.5), place_in(view, 25.5, 43.5), SHIFT)
+    drawn = opened(folder)[0].detections[2]
+    assert drawn.box_px == (11, 5, 26, 44) and drawn.by_hand and opened(folder)[0].person == 2
+    assert 1.9 < drawn.estimate_m[2] < 2.2
+
+
+def test_a_box_is_drawn_by_the_keyboard(drive, folder):
+    drive.press((Qt.Key_D, CONTROL), Qt.Key_Left, Qt.Key_Left, Qt.Key_Up, Qt.Key_Up, (Qt.Key_Left, CONTROL))
+    drive.press(Qt.Key_Space)
+    drive.press(Qt.Key_Right, Qt.Key_Down, Qt.Key_Down, Qt.Key_Down, Qt.Key_Down, (Qt.Key_Down, CONTROL), Qt.Key_Return)
+    assert opened(folder)[0].detections[2].box_px == (11, 4, 22, 46)
+    assert not drive.window.pane.shared.drawing
+
+
+def test_escape_drops_a_box_and_a_slip_is_no_box(drive):
+    view = drive.window.pane.color_view
+    drive.press(Qt.Key_F3, Qt.Key_Space, Qt.Key_Right, Qt.Key_Escape, Qt.Key_Down)
+    drive.drag(view, place_in(view, 20.5, 20.5), place_in(view, 22.5, 22.5), SHIFT)
+    assert len(drive.measurement(0).detections) == 2 and not drive.document.can_undo
+
+
+def test_a_drag_moves_what_both_views_show(drive):
+    pane = drive.window.pane
+    drive.press(Qt.Key_F3, '+', '+', '+')
+    before = place_in(pane.depth_view, 30, 20)
+    start = QtCore.QPointF(100, 80)
+    drive.drag(pane.color_view, start, start + QtCore.QPointF(30, 20))
+    moved = place_in(pane.depth_view, 30, 20) - before
+    assert (moved - QtCore.QPointF(30, 20)).manhattanLength() < 1 and len(drive.measurement(0).detections) == 2
+    drive.press('0')
+    assert pane.shared.zoom == 1 and pane.shared.center == (0.5, 0.5)
+
+
+def test_the_cursor_reads_pixel_depth_and_position(drive):
+    drive.press(Qt.Key_F3, *[Qt.Key_Left, (Qt.Key_Right, CONTROL)])
+    u, v = drive.window.pane.shared.cursor
+    assert (u, v) == (23, 24)
+    assert drive.window.pane.readout.text() == ('pixel (23, 24)    depth 2.000 m    X −0.300  Y +0.000  Z 2.000 m')
+
+
+def test_the_cursor_reads_holes_as_holes(drive, folder):
+    cv2.imwrite(os.path.join(folder, 'depth', 'm0.png'), np.zeros((48, 64), np.uint16))
+    drive.press(Qt.Key_F5, Qt.Key_F3, Qt.Key_Left)
+    assert drive.window.pane.readout.text().endswith('no depth there')
+
+
+def test_a_click_on_a_mark_sets_the_truth(drive, folder):
+    floor = drive.window.pane.floor
+    drive.click(floor, floor.place_of(-0.5, 2.0) + QtCore.QPointF(3, -3))
+    assert opened(folder)[0].truth_m == (-0.5, None, 2.0) and drive.window.current == 1
+    drive.click(floor, floor.place_of(0.3, 1.0))  # nothing there
+    assert opened(folder)[1].truth_m is None
+
+
+def test_marks_are_taken_and_edited_by_the_keyboard(drive, folder):
+    def add_marks(dialog):
+        for name, x_mm, z_mm in (('B1', '0', '2000'), ('B2', '0', '3000')):
+            dialog.add_empty()
+            for column, text in enumerate((name, x_mm, z_mm)):
+                dialog.table.item(dialog.table.rowCount() - 1, column).setText(text)
+        dialog.accept()
+    drive.answer(add_marks, lambda: drive.press((Qt.Key_G, CONTROL)))
+    assert Document.open(folder).grid == (Mark('A1', -0.5, 2.0), Mark('B1', 0, 2), Mark('B2', 0, 3))
+    drive.press(Qt.Key_F6, Qt.Key_Up, Qt.Key_Up, Qt.Key_Left, Qt.Key_Right, Qt.Key_Return)  # B1 is nearest; then B2
+    assert opened(folder)[0].truth_m in ((0, None, 2), (0, None, 3))
+    drive.press((Qt.Key_Z, CONTROL), (Qt.Key_Z, CONTROL))
+    assert Document.open(folder).grid == (Mark('A1', -0.5, 2.0),)
+
+
+def test_marks_that_are_none_are_refused(drive, folder):
+    def enter_nonsense(dialog):
+        dialog.add_empty()
+        for column, text in enumerate(('B1', '__import__("os")', '2000')):
+            dialog.table.item(1, column).setText(text)
+        dialog.accept()
+        return dialog._problem.text(), dialog.isVisible()
+    problem, still_there = drive.answer(enter_nonsense, lambda: drive.press((Qt.Key_G, CONTROL)))
+    assert 'Row 2' in problem and still_there and len(Document.open(folder).grid) == 1
+
+
+def test_same_as_the_last_one(drive, folder):
+    drive.press('100', Qt.Key_Tab, '2000', Qt.Key_Return, (Qt.Key_L, CONTROL), (Qt.Key_L, CONTROL))
+    assert [measurement.truth_m for measurement in opened(folder)] == [(0.1, None, 2.0)] * 3 + [None]
+
+
+def test_same_as_the_last_one_without_one_says_so(drive):
+    drive.press((Qt.Key_L, CONTROL))
+    assert 'nothing is annotated yet' in drive.window.pane.truth.hint_label.text()
+
+
+def test_reject_asks_for_a_reason_and_restore_takes_it_back(drive, folder):
+    def give_reason(dialog):
+        box = dialog.findChild(QtWidgets.QComboBox)
+        box.setEditText('moved')
+        dialog.accept()
+    drive.answer(give_reason, lambda: drive.press((Qt.Key_R, CONTROL)))
+    assert opened(folder)[0].rejected == 'moved' and drive.window.current == 1
+    drive.press(Qt.Key_PageUp)
+    assert 'because: moved' in drive.window.pane.header.text()
+    drive.press((Qt.Key_R, CONTROL | SHIFT))
+    assert opened(folder)[0].state == 'new'
+
+
+def test_a_rejection_that_is_called_off_changes_nothing(drive):
+    drive.answer(lambda dialog: dialog.reject(), lambda: drive.press((Qt.Key_R, CONTROL)))
+    assert drive.measurement(0).state == 'new' and drive.window.current == 0
+
+
+def test_undo_and_redo_show_where_they_were(drive, folder):
+    drive.press('100', Qt.Key_Tab, '2000', Qt.Key_Return, '200', Qt.Key_Tab, '2000', Qt.Key_Return)
+    drive.press((Qt.Key_Z, CONTROL), (Qt.Key_Z, CONTROL))
+    assert drive.window.current == 0 and [measurement.state for measurement in opened(folder)] == ['new'] * 4
+    drive.press((Qt.Key_Y, CONTROL))
+    assert opened(folder)[0].truth_m == (0.1, None, 2.0) and drive.window.pane.truth.fields['x'].text() == '100'
+    drive.press((Qt.Key_Z, CONTROL | SHIFT))
+    assert opened(folder)[1].truth_m == (0.2, None, 2.0) and drive.window.current == 1
+    assert not drive.window.actions['redo'].isEnabled()
+
+
+def test_undo_in_a_field_takes_back_typing_first(drive, folder):
+    drive.press('100', Qt.Key_Tab, '2000', Qt.Key_Return, '7', (Qt.Key_Z, CONTROL))
+    assert drive.window.pane.truth.fields['x'].text() == '' and opened(folder)[0].state == 'annotated'
+    drive.press((Qt.Key_Z, CONTROL))
+    assert opened(folder)[0].state == 'new'
+
+
+def test_the_list_goes_to_a_measurement_and_filters_by_state(drive):
+    drive.press('1', Qt.Key_Tab, '2000', Qt.Key_Return, Qt.Key_F2, Qt.Key_Down)
+    assert drive.window.current == 2
+    drive.window.list.filter_box.setCurrentIndex(2)
+    shown = drive.window.list.table.model()
+    assert shown.rowCount() == 1 and shown.index(0, 0).data() == 'm0'
+    assert shown.index(0, 2).data() == '468 mm'
+    drive.window.list.filter_box.setCurrentIndex(1)
+    assert shown.rowCount() == 3 and drive.window.list.filter_box.itemText(1) == 'new only (3)'
+
+
+def test_going_on_can_be_switched_off(drive):
+    drive.press((Qt.Key_T, CONTROL), '1', Qt.Key_Tab, '2000', Qt.Key_Return)
+    assert drive.window.current == 0 and drive.measurement(0).state == 'annotated'
