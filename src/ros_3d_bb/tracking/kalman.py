@@ -48,20 +48,16 @@ def _white(elapsed_s):
     return np.kron(block, np.eye(2))
 
 
-def likelihoods(mean, covariance, measurements, outliers):
+def unlikeliness(mean, covariance, measurements, outliers):
     """How well each measurement fits each object.
 
     Returns
     -------
-    cost : numpy.ndarray, (n, m)
-        -2 log of the likelihood.
-    distance : numpy.ndarray, (n, m)
-        Squared Mahalanobis distance to the nearer component of the mixture.
+    numpy.ndarray, (n, m)
+        -2 log (2 pi times the density, per m², of the measurement if it is of that object).
     """
-    terms = [_fit(mean[:, None], covariance[:, None], _of(measurements, None), component)[:2]
-             for component in outliers.components()]
-    log_likelihood = np.logaddexp(*(log for log, _distance in terms))
-    return -2 * log_likelihood, np.minimum(terms[0][1], terms[1][1] / 0.6)
+    return -2 * np.logaddexp(*(_fit(mean[:, None], covariance[:, None], measurements, component)[0]
+                               for component in outliers.components()))
 
 
 def update(mean, covariance, measurements, outliers):
@@ -73,7 +69,7 @@ def update(mean, covariance, measurements, outliers):
     """
     means, covariances, logs = [], [], []
     for component in outliers.components():
-        log, _distance, innovation, inverse = _fit(mean, covariance, measurements, component)
+        log, innovation, inverse = _fit(mean, covariance, measurements, component)
         gain = covariance[:, :, :2] @ inverse
         means.append(mean + (gain @ innovation[..., None])[..., 0])
         covariances.append(covariance - gain @ covariance[:, :2])
@@ -85,12 +81,8 @@ def update(mean, covariance, measurements, outliers):
     return means[0] + share[:, None] * shift, (mixed + mixed.transpose(0, 2, 1)) / 2
 
 
-def _of(measurements, *index):
-    return Measurements(*(values[index] for values in measurements))
-
-
 def _fit(mean, covariance, measurements, component):
-    """log likelihood, squared Mahalanobis distance, innovation and its inverse covariance, of one component."""
+    """Log likelihood, innovation, and its inverse covariance, of one component."""
     weight, offset_m, spread_m = component
     rays = measurements.rays
     innovation = measurements.positions_m - offset_m * rays - mean[..., :2]
@@ -99,7 +91,7 @@ def _fit(mean, covariance, measurements, component):
         spread = spread + spread_m ** 2 * rays[..., :, None] * rays[..., None, :]
     inverse, determinant = _inverse(spread)
     distance = ((inverse @ innovation[..., None])[..., 0] * innovation).sum(axis=-1)
-    return np.log(max(weight, 1e-12)) - (distance + np.log(determinant)) / 2, distance, innovation, inverse
+    return np.log(max(weight, 1e-12)) - (distance + np.log(determinant)) / 2, innovation, inverse
 
 
 def _inverse(matrices):

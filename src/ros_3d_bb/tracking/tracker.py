@@ -16,16 +16,17 @@ from ros_3d_bb.tracking import kalman
 from ros_3d_bb.tracking.association import assign
 from ros_3d_bb.tracking.measuring import NoiseParams, sightings_of
 from ros_3d_bb.tracking.prediction import PredictionParams, objects_of
-from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, View
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, View
 from ros_3d_bb.tracking.visibility import places_in
 
 TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
                   ('size_m', float, 3), ('sightings', int), ('first_ns', np.int64), ('last_ns', np.int64),
                   ('missed_s', float), ('unseen_s', float), ('status', int), ('confirmed', bool), ('moving', bool)])
 LATEST_NS = NS // 2  # images that come later than others by more are refused
-RECENT_S = 0.7  # who was seen so recently comes before those who were away
+RECENT_NS = 7 * NS // 10  # who was seen so recently comes before those who were away
 LOST_M = 2.4  # who may be anywhere within this (standard deviation) is forgotten
 FIRST_TRY_S, TRIES_S = 0.15, 0.4  # how long a track that was seen once, or a few times, waits to be seen again
+TRIES = 4  # for so many images at least
 TAKEN_NS = NS // 5  # nobody new begins near somebody seen so recently
 HIDING_S = 0.3  # who was missed for longer hides nobody
 SMOOTHING = 0.1  # share of the newest sighting in size and height
@@ -41,15 +42,13 @@ class TrackerParams(NamedTuple):
     outlier_share: float = 0.1
     outlier_offset: float = 0.45
     outlier_spread: float = 0.3
-    gate: float = 0.99
-    max_speed: float = 2.5
-    reach: float = 1.0
-    newcomer_density: float = 0.15
+    newcomer_density: float = 0.12
     duplicate_distance: float = 0.35
     height_sigma: float = 0.06
     min_sightings: int = 4
     min_age: float = 0.1
     missed_limit: float = 0.35
+    out_of_view_limit: float = 1.0
     unsure_limit: float = 0.5
     memory: float = 2.5
     max_range: float = 6.0
@@ -128,8 +127,9 @@ class Tracker(object):
 
     def objects(self):
         """The people who are published now, by id, at the stamp of the newest image."""
-        tracks = self._state.tracks
-        known = (tracks['missed_s'] <= self._params.missed_limit) & (_sigma(tracks) < self._params.unsure_limit)
+        tracks, params = self._state.tracks, self._params
+        known = (tracks['missed_s'] <= params.missed_limit) & (_sigma(tracks) < params.unsure_limit)
+        known &= (tracks['status'] != OUT_OF_VIEW) | (tracks['unseen_s'] <= params.out_of_view_limit)
         return objects_of(tracks[tracks['confirmed'] & known], self._prediction)
 
     def _taken_back(self, stamp_ns, camera):
@@ -164,7 +164,7 @@ class Tracker(object):
         rows, columns = self._associate(tracks, sightings, image.stamp_ns)
         self._see(tracks, rows, _taken(sightings, columns), image.stamp_ns)
         self._miss(tracks, np.setdiff1d(np.arange(len(tracks)), rows), image.view, looked_s)
-        tracks = tracks[self._is_remembered(tracks)]
+        tracks = tracks[self._is_remembered(tracks, looked_s)]
         others = np.setdiff1d(np.arange(len(image.detections)), columns)
         tracks = np.concatenate((tracks, self._newcomers(tracks, _taken(sightings, others), others, image)))
         return _State(tracks, image.stamp_ns, skipped_ns)
@@ -172,15 +172,11 @@ class Tracker(object):
     def _associate(self, tracks, sightings, stamp_ns):
         """Rows of tracks and columns of sightings that belong together."""
         params = self._params
-        cost, distance = kalman.likelihoods(tracks['mean'], tracks['covariance'], sightings.ground, self._outliers)
+        cost = kalman.unlikeliness(tracks['mean'], tracks['covariance'], sightings.ground, self._outliers)
         cost += ((tracks['size_m'][:, 2:] - sightings.sizes_m[:, 2]) / params.height_sigma) ** 2 / 2
-        unseen_s = (stamp_ns - tracks['last_ns']) / NS
-        reach_m = params.reach + params.max_speed * np.minimum(unseen_s, 1)
-        away_m = np.linalg.norm(tracks['mean'][:, None, :2] - sightings.ground.positions_m, axis=2)
-        allowed = distance < -2 * np.log(1 - params.gate)  # the quantile of chi squared with 2 degrees of freedom
-        allowed &= (cost < -2 * np.log(2 * np.pi * params.newcomer_density)) & (away_m < reach_m[:, None])
-        cost[~allowed] = np.inf
-        rank = np.where(tracks['confirmed'], (unseen_s >= RECENT_S).astype(int), 2)
+        cost[cost >= -2 * np.log(2 * np.pi * params.newcomer_density)] = np.inf
+        away = stamp_ns - tracks['last_ns'] >= RECENT_NS
+        rank = np.where(tracks['confirmed'], away.astype(int), 2)
         pairs = []
         for turn in range(3):
             rows = np.flatnonzero(rank == turn)
@@ -207,19 +203,21 @@ class Tracker(object):
 
     def _miss(self, tracks, rows, view, looked_s):
         """Say why the tracks in `rows` were not seen, and count for how long, and how long of that they should have."""
+        if not len(rows):
+            return
         positions_m = np.column_stack((tracks['mean'][:, :2], tracks['z_m']))
         hiding = tracks['confirmed'] & (tracks['missed_s'] < HIDING_S)
-        places = places_in(view, positions_m, tracks['size_m'], hiding, self._params.max_range)[rows]
+        places = places_in(view, positions_m[rows], tracks['size_m'][rows], positions_m[hiding], self._params.max_range)
         tracks['unseen_s'][rows] += looked_s
         tracks['missed_s'][rows] += np.where(places == VISIBLE, looked_s, 0)
         tracks['status'][rows] = np.where(places == VISIBLE, OCCLUDED, places)
 
-    def _is_remembered(self, tracks):
+    def _is_remembered(self, tracks, looked_s):
         """Which tracks are kept; those that are not confirmed yet only for a few more tries."""
         unseen_s = tracks['unseen_s']
         known = (unseen_s < self._params.memory) & (_sigma(tracks) < LOST_M)
         tried_s = np.where(tracks['sightings'] > 1, TRIES_S, FIRST_TRY_S)
-        return np.where(tracks['confirmed'], known, unseen_s < tried_s)
+        return np.where(tracks['confirmed'], known, unseen_s < np.maximum(tried_s, (TRIES + 0.5) * looked_s))
 
     def _newcomers(self, tracks, sightings, columns, image):
         """Tracks of sightings that belong to nobody and do not double anybody."""
@@ -259,12 +257,11 @@ def _sigma(tracks):
 
 
 def _check(params):
-    for name in ('gate', 'outlier_share'):
-        if not 0 <= getattr(params, name) < 1:
-            raise ValueError('%s is %g; 0 or more and less than 1 expected' % (name, getattr(params, name)))
-    for name in set(params._fields) - {'gate', 'outlier_share'}:
-        if not getattr(params, name) >= 0:
-            raise ValueError('%s is %g; 0 or more expected' % (name, getattr(params, name)))
+    if not params.outlier_share < 1:
+        raise ValueError('outlier_share is %g; less than 1 expected' % params.outlier_share)
+    for name, value in params._asdict().items():
+        if not value >= 0:
+            raise ValueError('%s is %g; 0 or more expected' % (name, value))
     for name in ('newcomer_density', 'height_sigma'):
         if not getattr(params, name) > 0:
             raise ValueError('%s is %g; more than 0 expected' % (name, getattr(params, name)))

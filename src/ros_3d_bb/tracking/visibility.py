@@ -14,15 +14,15 @@ HIDDEN_SHARE = 0.5
 ACROSS, ALONG = np.meshgrid((-0.6, 0, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))  # where depth is asked for, in half extents
 
 
-def places_in(view, positions_m, sizes_m, hiding, farthest_m):
+def places_in(view, positions_m, sizes_m, others_m, farthest_m):
     """What the camera could see of the places where people are thought to be.
 
     Parameters
     ----------
     view : View
     positions_m, sizes_m : numpy.ndarray, (n, 3)
-    hiding : numpy.ndarray of bool, (n,)
-        Whose place is sure enough to hide others.
+    others_m : numpy.ndarray, (m, 3)
+        Where people are who may hide them; they themselves may be among those.
     farthest_m : float
         People farther away are not found.
 
@@ -34,7 +34,7 @@ def places_in(view, positions_m, sizes_m, hiding, farthest_m):
     """
     distances_m, bearings = view.bearings(positions_m)
     places = np.full(len(positions_m), VISIBLE)
-    places[_behind_others(distances_m, bearings, hiding)] = OCCLUDED
+    places[_behind_others(distances_m, bearings, *view.bearings(others_m))] = OCCLUDED
     if view.depth_at is not None:
         places[_behind_something(view, positions_m, sizes_m)] = OCCLUDED
     places[_outside(view, distances_m, bearings, farthest_m)] = OUT_OF_VIEW
@@ -80,12 +80,15 @@ def _outside(view, distances_m, bearings, farthest_m):
     return outside | (-bearings < left + EDGE_RAD) | (-bearings > right - EDGE_RAD)
 
 
-def _behind_others(distances_m, bearings, hiding):
-    half_widths = np.arcsin(np.clip(BODY_RADIUS_M / np.maximum(distances_m, 0.01), 0, 1))
-    apart = np.abs(bearings[None, :] - bearings[:, None])
-    covered = apart < half_widths[None, :] + SEEN_BESIDE * half_widths[:, None]
-    nearer = distances_m[None, :] < distances_m[:, None] - NEARER_M
-    return (covered & nearer & hiding[None, :]).any(axis=1)
+def _behind_others(distances_m, bearings, others_m, others_bearings):
+    apart = np.abs(others_bearings - bearings[:, None])
+    covered = apart < _half_widths(others_m) + SEEN_BESIDE * _half_widths(distances_m)[:, None]
+    return (covered & (others_m < distances_m[:, None] - NEARER_M)).any(axis=1)
+
+
+def _half_widths(distances_m):
+    """Of bodies, in radians."""
+    return np.arcsin(np.clip(BODY_RADIUS_M / np.maximum(distances_m, 0.01), 0, 1))
 
 
 def _behind_something(view, positions_m, sizes_m):
@@ -94,7 +97,7 @@ def _behind_something(view, positions_m, sizes_m):
     offsets = np.zeros((len(centers), ACROSS.size, 3))
     offsets[..., 0] = ACROSS.ravel() * sizes_m[:, :1] / 2
     offsets[..., 1] = ALONG.ravel() * sizes_m[:, 2:] / 2
-    depths_m = view.depth_at((centers[:, None] + offsets).reshape(-1, 3)).reshape(len(centers), -1)
+    depths_m = view.depth_at((centers[:, None] + offsets).reshape(-1, 3)).reshape(len(centers), ACROSS.size)
     known = np.isfinite(depths_m)
     nearer = known & (np.where(known, depths_m, 0) < centers[:, 2:] - HIDDEN_BEHIND_M)
     return nearer.sum(axis=1) > HIDDEN_SHARE * np.maximum(known.sum(axis=1), ACROSS.size / 3.0)

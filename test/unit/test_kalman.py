@@ -1,0 +1,78 @@
+"""The filter's laws: it is a Kalman filter where nothing is an outlier, the same at any frame rate, and not fooled."""
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+
+from ros_3d_bb.tracking.kalman import Measurements, Outliers, predict, unlikeliness, update
+
+NONE = Outliers(probability=0.0)
+AHEAD = np.array([[1.0, 0.0]])
+SECONDS = st.floats(0.01, 2)
+
+
+def state(position=(0, 0), velocity=(0, 0), spread=0.3, speed_spread=0.8):
+    return (np.array([tuple(position) + tuple(velocity)], float),
+            np.diag([spread ** 2, spread ** 2, speed_spread ** 2, speed_spread ** 2])[None])
+
+
+def seen(x, y, sigma=0.1):
+    return Measurements(np.array([[x, y]], float), np.eye(2)[None] * sigma ** 2, AHEAD)
+
+
+@given(SECONDS, SECONDS)
+def test_two_steps_are_one(first_s, second_s):
+    mean, covariance = state((1, 2), (0.5, -1))
+    once = predict(mean, covariance, first_s + second_s, 0.08)
+    twice = predict(*predict(mean, covariance, first_s, 0.08), elapsed_s=second_s, density=0.08)
+    for one, other in zip(once, twice):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
+
+
+@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.02, 0.5))
+def test_without_outliers_it_is_the_textbook_filter(x, y, sigma):
+    mean, covariance = state()
+    covariance[0, 0, 2] = covariance[0, 2, 0] = 0.1
+    matrix = np.eye(2, 4)
+    innovation = matrix.dot(covariance[0]).dot(matrix.T) + sigma ** 2 * np.eye(2)
+    gain = covariance[0].dot(matrix.T).dot(np.linalg.inv(innovation))
+    got_mean, got_covariance = update(mean, covariance, seen(x, y, sigma), NONE)
+    np.testing.assert_allclose(got_mean[0], gain.dot([x, y]), atol=1e-9)
+    np.testing.assert_allclose(got_covariance[0], (np.eye(4) - gain.dot(matrix)).dot(covariance[0]), atol=1e-9)
+
+
+def test_a_measurement_behind_the_person_is_not_believed_and_one_beside_is():
+    """0.8 m behind is what a background pixel looks like; 0.8 m beside no background explains."""
+    sure = state(spread=0.1)
+    behind, _covariance = update(*sure, measurements=seen(0.8, 0.0), outliers=Outliers())
+    beside, _covariance = update(*sure, measurements=seen(0.0, 0.8), outliers=Outliers())
+    plain, _covariance = update(*sure, measurements=seen(0.8, 0.0), outliers=NONE)
+    assert abs(behind[0, 0]) < 0.1 and plain[0, 0] == pytest.approx(0.4, abs=1e-4)
+    assert beside[0, 1] == pytest.approx(0.4, abs=1e-4)
+
+
+@given(st.floats(-2, 2), st.floats(-2, 2))
+def test_a_mixture_stays_a_covariance(x, y):
+    _mean, covariance = update(*state(), measurements=seen(x, y), outliers=Outliers())
+    np.testing.assert_allclose(covariance, covariance.transpose(0, 2, 1))
+    assert np.linalg.eigvalsh(covariance[0]).min() > 0
+
+
+def test_likelihood_is_a_density():
+    """-2 log p, summed over a fine grid of places, is a probability of 1."""
+    mean, covariance = state(spread=0.2)
+    step_m = 0.05
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(-3, 4, step_m), np.arange(-3, 3, step_m)))
+    places = Measurements(np.column_stack((x, y)), np.tile(np.eye(2) * 0.01, (x.size, 1, 1)),
+                          np.tile(AHEAD, (x.size, 1)))
+    cost = unlikeliness(mean, covariance, places, Outliers())
+    assert np.exp(-cost / 2).sum() * step_m ** 2 / (2 * np.pi) == pytest.approx(1, abs=0.01)
+
+
+def test_all_pairs_are_as_likely_as_each_alone():
+    random = np.random.RandomState(3)
+    mean, covariance = random.normal(0, 1, (3, 4)), np.tile(np.eye(4) * 0.1, (3, 1, 1))
+    places = Measurements(random.normal(0, 1, (5, 2)), np.tile(np.eye(2) * 0.01, (5, 1, 1)), np.tile(AHEAD, (5, 1)))
+    cost = unlikeliness(mean, covariance, places, Outliers())
+    assert cost.shape == (3, 5)
+    one = Measurements(*(values[2:3] for values in places))
+    assert cost[1, 2] == pytest.approx(unlikeliness(mean[1:2], covariance[1:2], one, Outliers())[0, 0])

@@ -1,0 +1,273 @@
+"""The tracker: numbers, velocities and predictions of people who walk, hide, leave and come back.
+
+The camera stands at the origin of the map, 1 m up, and looks along x.
+"""
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.prediction import PredictionParams
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
+from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
+
+VIEW = View(transform_from((0, 0, 1), OPTICAL_ROTATION), (-0.6, 0.6))
+START_NS = 1000 * NS
+SIZE = np.array([0.5, 0.5, 1.7])
+
+
+def at(x, y, height=1.7, truncated=False, width=0.5, sigma=0.04):
+    return Detection(np.array([x, y, height / 2]), np.array([width, width, height]), np.eye(3) * sigma ** 2, truncated)
+
+
+def play(tracker, seconds, detections_at, rate_hz=30, start_s=0.0, view=VIEW):
+    """Show the tracker what `detections_at(seconds)` gives; returns what it publishes, image by image."""
+    times_s = [start_s + frame / rate_hz for frame in range(int(seconds * rate_hz))]
+    return [tracker.update(START_NS + int(round(time_s * NS)), detections_at(time_s), view) for time_s in times_s]
+
+
+def standing(*places):
+    return lambda _time_s: [at(*place) for place in places]
+
+
+def ids(objects):
+    return [track.id for track in objects]
+
+
+def test_numbers_start_at_1_and_are_not_used_again():
+    tracker = Tracker()
+    assert ids(play(tracker, 1, standing((3, 0), (3, 1)))[-1]) == [1, 2]
+    tracker.reset()
+    assert ids(play(tracker, 1, standing((3, 0)))[-1]) == [3]
+
+
+def test_somebody_is_published_once_seen_often_enough():
+    published = play(Tracker(TrackerParams(min_sightings=4, min_age=0.0)), 0.3, standing((3, 0)))
+    assert [len(objects) for objects in published] == [0, 0, 0, 1, 1, 1, 1, 1, 1]
+
+
+def test_a_false_box_is_never_published():
+    published = play(Tracker(), 2, lambda time_s: [at(3, 0)] if abs(time_s - 1) < 0.05 else [])
+    assert not any(published)
+
+
+@pytest.mark.parametrize('rate_hz', [5, 10, 30, 60])
+def test_velocity_and_prediction_are_right_at_any_rate(rate_hz):
+    walk = play(Tracker(), 4, lambda time_s: [at(4 - 0.4 * time_s, -1 + 0.6 * time_s)], rate_hz)
+    track, = walk[-1]
+    np.testing.assert_allclose(track.velocity_mps, (-0.4, 0.6, 0), atol=0.03)
+    assert track.moving and track.status == VISIBLE
+    np.testing.assert_allclose(track.prediction_m[-1] - track.position_m, (-0.8, 1.2, 0), atol=0.12)
+    assert len(track.prediction_m) == 8 and track.prediction_step_s == 0.25
+
+
+def test_irregular_and_dropped_images_do_not_touch_the_velocity():
+    random, tracker, time_s = np.random.RandomState(1), Tracker(), 0.0
+    for _image in range(100):
+        time_s += random.uniform(0.02, 0.2)
+        tracks = tracker.update(START_NS + int(time_s * NS), [at(5 - 0.3 * time_s, 0.2 * time_s)], VIEW)
+    np.testing.assert_allclose(tracks[0].velocity_mps, (-0.3, 0.2, 0), atol=0.03)
+
+
+def test_uncertainty_grows_where_nobody_is_seen_and_with_the_time_ahead():
+    tracker = Tracker()
+    seen = play(tracker, 1, standing((3, 0)))[-1][0]
+    unseen = play(tracker, 0.3, standing(), start_s=1)[-1][0]
+    for covariances in (seen.covariance, unseen.covariance):
+        assert np.linalg.eigvalsh(covariances).min() >= 0 and covariances[0, 0] > 0
+    assert unseen.covariance[0, 0] > seen.covariance[0, 0]
+    assert (np.diff(seen.prediction_covariance_m2[:, 0, 0]) > 0).all()
+    assert seen.prediction_covariance_m2[0, 0, 0] > seen.covariance[0, 0]
+
+
+def test_a_sure_box_counts_for_more_than_an_unsure_one():
+    moves = []
+    for sigma in (0.02, 0.5):
+        tracker = Tracker()
+        play(tracker, 1, standing((3, 0)))
+        track, = tracker.update(START_NS + NS, [at(3, 0.15, sigma=sigma)], VIEW)
+        moves.append(track.position_m[1])
+    assert moves[0] > 3 * moves[1] > 0
+
+
+def test_people_who_pass_each_other_keep_their_numbers():
+    """One hides the other while they pass, and is not found for 0.4 s."""
+    def passing(time_s):
+        left, right = at(4, 1.2 - 0.8 * time_s), at(3, -1.2 + 0.8 * time_s)
+        return [right] if abs(time_s - 1.5) < 0.2 else [left, right][::(-1) ** int(30 * time_s)]
+    walk = play(Tracker(), 3, passing)
+    first = {track.id: track.position_m[0] for track in walk[20]}
+    last = {track.id: track.position_m[0] for track in walk[-1]}
+    assert len(first) == 2 and set(first) == set(last)
+    assert all(abs(first[number] - last[number]) < 0.3 for number in first)
+
+
+def test_somebody_hidden_is_published_as_occluded_for_long_and_keeps_the_number():
+    """Somebody stands in front for 1.5 s."""
+    def hidden(time_s):
+        return [at(2, 0)] + ([] if 1 < time_s < 2.5 else [at(4, 0)])
+    walk = play(Tracker(), 4, hidden)
+    assert all(ids(objects) == [1, 2] for objects in walk[20:])
+    assert [track.status for track in walk[60]] == [VISIBLE, OCCLUDED]
+    assert [track.status for track in walk[-1]] == [VISIBLE, VISIBLE]
+
+
+def test_somebody_who_is_gone_is_not_published_for_longer_than_the_limit():
+    walk = play(Tracker(TrackerParams(missed_limit=0.35)), 2, lambda time_s: [at(3, 0)] if time_s < 1 else [])
+    assert [bool(objects) for objects in walk[30:]] == [frame < 10 for frame in range(30)]
+    assert walk[35][0].status == OCCLUDED
+
+
+def test_somebody_who_leaves_the_view_is_said_to_be_out_of_it_and_then_gone():
+    """Walks out to the left at 1 m/s."""
+    walk = play(Tracker(), 5, lambda time_s: [at(3, time_s)] if time_s < 1.75 else [])
+    states = [objects[0].status if objects else None for objects in walk[52:]]
+    assert states[8] == OUT_OF_VIEW and states[-1] is None
+    assert len([state for state in states if state is not None]) == 31  # until 1 s after the last sight, and no longer
+
+
+def test_who_comes_back_in_time_gets_the_number_back_and_later_is_somebody_else():
+    for away_s, expected in ((1.5, [1]), (4.0, [2])):
+        tracker = Tracker()
+        play(tracker, 2, standing((3, 0)))
+        play(tracker, away_s, standing(), start_s=2)
+        assert ids(play(tracker, 1, standing((3, 0)), start_s=2 + away_s)[-1]) == expected
+
+
+def test_double_boxes_make_no_second_person():
+    walk = play(Tracker(), 2, standing((3, 0), (3.1, 0.15)))
+    assert all(len(objects) <= 1 for objects in walk)
+
+
+def test_a_box_with_the_depth_of_the_background_throws_nobody_off():
+    """One box in ten is 0.8 m too far."""
+    walk = play(Tracker(), 3, lambda time_s: [at(3 + 0.8 * (int(30 * time_s + 0.5) % 10 == 9), 0)])
+    errors_m = [abs(track.position_m[0] - 3) for objects in walk[15:] for track in objects]
+    assert len(errors_m) == 75 and max(errors_m) < 0.15
+
+
+def test_a_box_cut_by_the_border_shows_only_one_side_of_a_person():
+    """The half of a body that is seen has its centre 0.125 m inside of the person's."""
+    track, = play(Tracker(), 1, lambda _time_s: [at(3, 1.5, truncated=True, width=0.25)])[-1]
+    assert track.position_m[1] == pytest.approx(1.5 + 0.125, abs=0.03)
+
+
+def test_a_person_who_stands_is_not_said_to_move_and_one_who_slows_down_moves_on_for_a_while():
+    """0.2 m/s begins it, 0.1 m/s ends it."""
+    def speed(mps):
+        return play(Tracker(), 4, lambda time_s: [at(3, mps * time_s - 0.5)])[-1][0].moving
+    assert [speed(mps) for mps in (0.0, 0.15, 0.3)] == [False, False, True]
+    slowing = play(Tracker(), 6, lambda time_s: [at(3, 0.4 * min(time_s, 3) + 0.14 * max(time_s - 3, 0) - 1)])
+    assert slowing[-1][0].moving
+
+
+def test_size_is_smoothed():
+    random = np.random.RandomState(2)
+    walk = play(Tracker(), 3, lambda _time_s: [at(3, 0, height=1.7 + random.normal(0, 0.05))])
+    heights_m = [objects[0].size_m[2] for objects in walk[45:]]
+    assert np.std(heights_m) < 0.025 and np.mean(heights_m) == pytest.approx(1.7, abs=0.03)
+
+
+@settings(max_examples=20)
+@given(st.permutations(range(6)))
+def test_images_in_another_order_give_the_same_tracks(order):
+    def image(number):
+        time_s = 1 + number / 15
+        return START_NS + int(time_s * NS), [at(3, 0.8 * time_s - 1), at(4, 1 - 0.8 * time_s)], VIEW
+    expected, shuffled = Tracker(), Tracker()
+    for tracker, numbers in ((expected, range(6)), (shuffled, order)):
+        play(tracker, 1, lambda time_s: [at(3, 0.8 * time_s - 1), at(4, 1 - 0.8 * time_s)])
+        for number in numbers:
+            objects = tracker.update(*image(number))
+    wanted = expected.objects()
+    assert ids(objects) == ids(wanted)
+    for got, want in zip(objects, wanted):
+        np.testing.assert_allclose(got.covariance, want.covariance, rtol=1e-9)
+        np.testing.assert_allclose(got.position_m, want.position_m, rtol=1e-9)
+
+
+def test_what_was_published_keeps_its_number_when_a_late_image_shows_somebody_more():
+    tracker = Tracker()
+    play(tracker, 1, standing((3, 0)))
+    play(tracker, 0.3, standing((3, 0), (4, 1.2)), start_s=1.1)
+    objects = tracker.update(START_NS + int(1.05 * NS), [at(3, 0), at(2, -1)], VIEW)
+    assert ids(objects) == [1, 2] and objects[1].position_m[0] == pytest.approx(4, abs=0.1)
+
+
+@pytest.mark.parametrize('late_s', [0.0, 0.6, 5.0])
+def test_an_image_that_comes_again_or_too_late_is_refused_and_changes_nothing(late_s):
+    tracker = Tracker()
+    before = play(tracker, 1, standing((3, 0)))[-1]
+    with pytest.raises(ValueError, match='stamp'):
+        tracker.update(START_NS + int(round((29 / 30 - late_s) * NS)), [at(3, 1)], VIEW)
+    np.testing.assert_array_equal(tracker.objects()[0].covariance, before[0].covariance)
+    assert ids(tracker.update(START_NS + NS, [at(3, 0)], VIEW)) == [1]
+
+
+def test_two_cameras_with_the_same_stamp_are_both_taken():
+    tracker = Tracker()
+    for frame in range(30):
+        stamp_ns = START_NS + frame * NS // 30
+        tracker.update(stamp_ns, [at(3, 0)], VIEW._replace(camera='front'))
+        objects = tracker.update(stamp_ns, [at(3.02, 0)], VIEW._replace(camera='side'))
+    assert ids(objects) == [1] and objects[0].position_m[0] == pytest.approx(3.01, abs=0.02)
+
+
+def test_time_without_an_answer_ages_nobody():
+    tracker = Tracker()
+    play(tracker, 1, standing((3, 0)))
+    for frame in range(24):
+        tracker.skip(START_NS + NS + frame * NS // 30)
+    skipped = tracker.update(START_NS + int(1.8 * NS), [], VIEW)
+    assert [(track.id, track.status) for track in skipped] == [(1, OCCLUDED)]
+
+
+def test_a_camera_that_paused_for_long_forgets_everybody():
+    tracker = Tracker()
+    play(tracker, 1, standing((3, 0)))
+    assert tracker.update(START_NS + 11 * NS, [], VIEW) == []
+    assert ids(play(tracker, 1, standing((3, 0)), start_s=11.1)[-1]) == [2]
+
+
+def test_a_hundred_people_are_told_apart():
+    places = [(1.5 + 0.45 * row, (column - 4.5) * 0.5) for row in range(10) for column in range(10)]
+    view = VIEW._replace(edges=(-5, 5))
+    walk = play(Tracker(TrackerParams(max_range=9)), 1, standing(*places), view=view)
+    assert len(walk[-1]) == 100
+    for track in walk[-1]:
+        assert np.hypot(*(track.position_m[:2] - np.array(places[track.id - 1]))) < 0.25
+
+
+@given(st.lists(st.lists(st.tuples(st.floats(0.5, 6), st.floats(-3, 3)), max_size=4), min_size=1, max_size=12))
+def test_whatever_comes_tracks_are_sane(images):
+    tracker, known = Tracker(), set()
+    for number, image in enumerate(images):
+        objects = tracker.update(START_NS + number * NS // 10, [at(*place) for place in image], VIEW)
+        assert ids(objects) == sorted(set(ids(objects)))
+        for track in objects:
+            known.add(track.id)
+            assert np.isfinite(track.prediction_m).all() and np.linalg.eigvalsh(track.covariance).min() > -1e-9
+            assert track.first_seen_ns <= track.last_seen_ns <= START_NS + number * NS // 10
+    assert len(known) <= sum(len(image) for image in images)
+
+
+def test_the_same_images_give_the_same_tracks_to_the_bit():
+    def run():
+        random = np.random.RandomState(5)
+        return play(Tracker(), 2, lambda time_s: [at(3 + random.normal(0, 0.05), time_s - 1 + random.normal(0, 0.05))])
+    for one, other in zip(run(), run()):
+        assert [track.position_m.tobytes() for track in one] == [track.position_m.tobytes() for track in other]
+
+
+def test_prediction_goes_as_far_and_in_such_steps_as_asked_for():
+    tracker = Tracker(prediction=PredictionParams(prediction_time=3.0, prediction_step=0.5))
+    track, = play(tracker, 1, standing((3, 0)))[-1]
+    assert track.prediction_m.shape == (6, 3) and track.prediction_covariance_m2.shape == (6, 3, 3)
+
+
+@pytest.mark.parametrize('name,value', [('outlier_share', 1.0), ('memory', -1), ('newcomer_density', 0.0),
+                                        ('height_sigma', float('nan'))])
+def test_parameters_that_make_no_sense_are_named(name, value):
+    with pytest.raises(ValueError, match=name):
+        Tracker(TrackerParams(**{name: value}))
