@@ -2,5 +2,5 @@
 STANDARD_LIBRARY = {'argparse', 'ast', 'base64', 'bisect', 'collections', 'concurrent', 'contextlib', 'copy', 'csv',
                     'ctypes', 'datetime', 'difflib', 'fcntl', 'functools', 'hashlib', 'html', 'importlib', 'io', 'json',
                     'math', 'os', 'pathlib', 'pickle', 're', 'signal', 'struct', 'subprocess', 'sys', 'tempfile',
-                    'threading', 'time', 'typing', 'warnings', 'zipfile'}
+                    'threading', 'time', 'typing', 'warnings', 'zipfile', 'zlib'}
 TEST_STANDARD_LIBRARY = {'glob', 'itertools', 'multiprocessing', 'random', 'shutil', 'stat', 'types', 'xml'}

@@ -16,8 +16,9 @@ def modules_in(root):
 
 
 MODULES = modules_in(SOURCE)
-PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime', 'yaml', 'matplotlib', 'scipy'}
-NOISE = os.path.join('evaluation', 'noise')  # a desk tool: no node may come to need its libraries
+PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime', 'yaml', 'matplotlib', 'scipy', 'norfair', 'trackeval'}
+# desk tools: no node may come to need their libraries
+NOISE, TRACKING_BENCHMARK = os.path.join('evaluation', 'noise'), os.path.join('evaluation', 'tracking')
 ASSIGNMENT = os.path.join('tracking', 'association.py')  # SciPy's solver has no equal
 # convert to and from ROS messages, but run in no node
 ROS_TYPES = {'bags.py', 'camera_messages.py', 'markers.py', 'messages.py', 'planner_messages.py', 'report.py',
@@ -51,12 +52,16 @@ def test_pure_modules_know_no_ros(module):
 
 
 @pytest.mark.parametrize('module', MODULES)
-def test_rospy_is_for_nodes_torch_for_detection_and_scipy_for_the_noise_analysis(module):
+def test_rospy_is_for_nodes_torch_for_detection_and_scipy_for_desk_tools(module):
     others, ours = imports_of(module)
     assert 'rospy' not in others or module.startswith('nodes/')
     assert 'torch' not in others or module.startswith('detection/')
-    assert not others & {'matplotlib', 'scipy'} or module.startswith(NOISE) or module == ASSIGNMENT
-    assert not any(name.startswith('ros_3d_bb.evaluation.noise') for name in ours) or module.startswith(NOISE)
+    assert 'matplotlib' not in others or module.startswith(NOISE)
+    assert 'scipy' not in others or module.startswith((NOISE, TRACKING_BENCHMARK)) or module == ASSIGNMENT
+    assert not others & {'norfair', 'trackeval'} or module.startswith(TRACKING_BENCHMARK)
+    for tool in (NOISE, TRACKING_BENCHMARK):
+        name = 'ros_3d_bb.' + tool.replace(os.sep, '.')
+        assert not any(our.startswith(name) for our in ours) or module.startswith(tool)
 
 
 @pytest.mark.parametrize('module', [m for m in MODULES if m.startswith('nodes/')])

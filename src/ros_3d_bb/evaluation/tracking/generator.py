@@ -1,0 +1,251 @@
+"""Runs of a robot among recorded pedestrians: what its camera's detections are, image by image, and the truth.
+
+Figures as the thesis measured them and as a D435 has them. The same sequence, motion and seed give the same run.
+"""
+import zlib
+from typing import List, NamedTuple, Tuple
+
+import numpy as np
+
+from ros_3d_bb.evaluation.tracking.camera_model import CameraModel, half_width, shown
+from ros_3d_bb.evaluation.tracking.detector import HARD_TO_SEE, Detector, Seen
+from ros_3d_bb.evaluation.tracking.robot import (
+    PERIOD_S, STANDING, OdometryModel, bearing_of, driving, from_frame, jittered, standing, to_frame, turned,
+    with_odometry)
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
+
+HORIZONS_S = np.array([0.5, 1.0, 1.5, 2.0])  # at which predictions are compared with where people went
+CAMERA_HEIGHT_M = 0.5
+START_S = 100.0  # stamp of the first image
+SECONDS = 60.0
+AROUND_M = (0.05, 9.0)  # people in this range of the robot count for occlusion and for what is truth
+STAYS_S = 1.5  # a person whose recording ends does not vanish: a track of them is no error so long
+TRIES, LOOKED_AT_S = 25, 3.0  # the busiest of so many places and times is taken, by a look every so often
+OPTICAL_FROM_BODY = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], float)
+
+
+class Timing(NamedTuple):
+    """When images are taken and their detections arrive; seconds, and shares of the images.
+
+    A stall, with a chance of `stalls_hz`, loses all images for `stall_s`.
+    """
+
+    rate_hz: float = 30.0
+    stamp_sigma_s: float = 0.0007
+    latency_s: float = 0.05
+    latency_sigma_s: float = 0.005
+    least_latency_s: float = 0.02
+    least_gap_s: float = 0.008
+    lost_share: float = 0.03
+    stalls_hz: float = 0.05
+    stall_s: float = 0.3
+
+
+class Models(NamedTuple):
+    """All figures of a run."""
+
+    camera: CameraModel = CameraModel()
+    odometry: OdometryModel = OdometryModel()
+    timing: Timing = Timing()
+
+
+class Truth(NamedTuple):
+    """The people around the robot when an image was taken, n of them, in the fixed frame as the odometry has it then.
+
+    `status` is VISIBLE (to be found: enough of the body in view), OCCLUDED (less than that) or OUT_OF_VIEW (or its
+    recording has just ended); `future_m` (n, horizons, 2) is nan where the recording ends before; `pose` (3,) is that
+    of the robot in the fixed frame.
+    """
+
+    ids: np.ndarray
+    position_m: np.ndarray
+    velocity_mps: np.ndarray
+    future_m: np.ndarray
+    status: np.ndarray
+    pose: np.ndarray
+
+
+class Image(NamedTuple):
+    """One image that got through: what a tracker is given, and the truth.
+
+    `detections` with their `sources`: person's number, or FALSE or DOUBLE. `arrival_ns` is when they arrive, and
+    `arrival_view` where tf says that the camera is then.
+    """
+
+    stamp_ns: int
+    detections: List[Detection]
+    view: View
+    truth: Truth
+    sources: List[int]
+    arrival_ns: int
+    arrival_view: View
+
+
+class Run(NamedTuple):
+    """The images of one robot; `name` says of what, `camera` is the model of its camera."""
+
+    name: str
+    camera: CameraModel
+    images: Tuple[Image, ...]
+
+
+class _Walks(NamedTuple):
+    """The people of a run at the time of each image: (images, people, 2), nan where they are not.
+
+    `ended` (images, people): the recording is over; `future_m` is (images, people, horizons, 2).
+    """
+
+    position_m: np.ndarray
+    velocity_mps: np.ndarray
+    ended: np.ndarray
+    future_m: np.ndarray
+
+
+def simulate(sequence, motion, seed, models=Models(), seconds=SECONDS):
+    """A run of a robot among the people of a sequence.
+
+    Parameters
+    ----------
+    sequence : trajectories.Sequence
+    motion : str
+        robot.STANDING or robot.DRIVING.
+    seed : int or sequence of int
+    models : Models
+    seconds : float
+        How long; less where the recording is shorter.
+
+    Returns
+    -------
+    Run
+    """
+    names = [zlib.crc32(name.encode('utf-8')) & 0xffffffff for name in (sequence.name, motion)]
+    random = np.random.RandomState(np.append(np.atleast_1d(seed), names).astype(np.uint32))
+    first_s, last_s = sequence.span_s
+    seconds = min(seconds, last_s - first_s)
+    start_s, true = _busiest(sequence, motion, seconds, models.camera, random)
+    path = with_odometry(true, models.odometry, random)
+    times_s = np.arange(0, seconds, 1 / models.timing.rate_hz)
+    walks = _walks(sequence.pedestrians, start_s + times_s)
+    images = _images(path, times_s, walks, models, random)
+    return Run('%s_%s' % (sequence.name, motion), models.camera, tuple(images))
+
+
+def _busiest(sequence, motion, seconds, camera, random):
+    """When to begin, and the true poses of a robot who sees many people."""
+    first_s, last_s = sequence.span_s
+    low_m, high_m = np.percentile(sequence.points_m, [8, 92], axis=0)
+    best = None
+    for _ in range(TRIES):
+        start_s = random.uniform(first_s, max(first_s, last_s - seconds))
+        if motion == STANDING:
+            place_m = random.uniform(low_m, high_m)
+            towards_m = sequence.points_m[random.randint(len(sequence.points_m))]
+            poses = standing(place_m, bearing_of(towards_m - place_m), seconds + 1)
+        else:
+            place_m = (low_m + high_m) / 2 + random.normal(0, 0.8, 2)
+            poses = driving(place_m, random.uniform(0, 2 * np.pi), random.uniform(), seconds + 1)
+        count = sum(_in_view(sequence.pedestrians, start_s + time_s, poses[int(time_s / PERIOD_S)], camera)
+                    for time_s in np.arange(0, seconds, LOOKED_AT_S))
+        if best is None or count > best[0]:
+            best = count, start_s, poses
+    return best[1:]
+
+
+def _in_view(pedestrians, time_s, pose, camera):
+    """How many people are in view, seen or not."""
+    places_m = [person.position_m(time_s) for person in pedestrians if person.start_s <= time_s <= person.end_s]
+    local_m = to_frame(pose, np.reshape(places_m, (-1, 2)))
+    range_m = np.linalg.norm(local_m, axis=1)
+    return np.count_nonzero((range_m > 0.5) & (range_m < camera.farthest_m)
+                            & (np.abs(bearing_of(local_m)) < camera.field_of_view / 2))
+
+
+def _walks(pedestrians, times_s):
+    """The _Walks of those who are there at some of the times."""
+    there = [person for person in pedestrians
+             if person.start_s <= times_s[-1] and person.end_s + STAYS_S >= times_s[0]]
+    shape = (len(times_s), len(there))
+    walks = _Walks(np.full(shape + (2,), np.nan), np.full(shape + (2,), np.nan), np.zeros(shape, bool),
+                   np.full(shape + (len(HORIZONS_S), 2), np.nan))
+    for column, person in enumerate(there):
+        rows = np.flatnonzero((times_s >= person.start_s) & (times_s <= person.end_s + STAYS_S))
+        known_s = np.minimum(times_s[rows], person.end_s)
+        over_s = times_s[rows] - known_s
+        velocity_mps = person.velocity_mps(known_s)
+        walks.velocity_mps[rows, column] = velocity_mps
+        walks.position_m[rows, column] = person.position_m(known_s) + over_s[:, None] * velocity_mps
+        walks.ended[rows, column] = over_s > 0
+        for number, horizon_s in enumerate(HORIZONS_S):
+            known = rows[times_s[rows] + horizon_s <= person.end_s]
+            walks.future_m[known, column, number] = person.position_m(times_s[known] + horizon_s)
+    return walks
+
+
+def _images(path, times_s, walks, models, random):
+    """The images that get through, one after the other."""
+    timing, detector = models.timing, Detector(models.camera, walks.ended.shape[1], 1 / models.timing.rate_hz, random)
+    arrived_s, stalled_until_s = -np.inf, -np.inf
+    for row, time_s in enumerate(times_s):
+        pose = path.true_at(time_s)
+        detector.advance(pose)
+        if random.uniform() < timing.stalls_hz / timing.rate_hz:
+            stalled_until_s = time_s + timing.stall_s
+        if random.uniform() < timing.lost_share or time_s < stalled_until_s:
+            continue
+        latency_s = max(timing.least_latency_s, random.normal(timing.latency_s, timing.latency_sigma_s))
+        arrived_s = max(time_s + latency_s, arrived_s + timing.least_gap_s)
+        truth, seen = _looked_at(walks, row, pose, path.odometry_at(time_s), models.camera)
+        found = detector.find(seen, pose, time_s)
+        measured, later = (jittered(path.odometry_at(when_s), models.odometry, random)
+                           for when_s in (time_s, arrived_s))
+        view = view_of(measured, models.camera)
+        stamp_s = START_S + time_s + random.normal(0, timing.stamp_sigma_s)
+        yield Image(_nanoseconds(stamp_s), [detection_of(box, view, models.camera) for box in found], view, truth,
+                    [box.source for box in found], _nanoseconds(START_S + arrived_s), view_of(later, models.camera))
+
+
+def _looked_at(walks, row, pose, odometry, camera):
+    """The Truth of an image, and the list of Seen."""
+    local_m = to_frame(pose, walks.position_m[row])
+    range_m = np.linalg.norm(np.where(np.isfinite(local_m), local_m, np.inf), axis=1)
+    ids = np.flatnonzero((range_m > AROUND_M[0]) & (range_m < AROUND_M[1]))
+    local_m, range_m, bearing = local_m[ids], range_m[ids], bearing_of(local_m[ids])
+    there = ~walks.ended[row, ids] & (np.abs(bearing) < np.pi / 2)
+    half_view = camera.field_of_view / 2
+    what = shown(bearing, np.where(there, half_width(range_m), 1e-3), range_m, half_view)
+    share = np.where(there, what.share, 0)
+    inside = (there & (np.abs(bearing) < half_view) & (local_m[:, 0] > camera.nearest_m)
+              & (range_m < camera.farthest_m))
+    velocity_mps, turn = walks.velocity_mps[row, ids], odometry[2] - pose[2]
+    truth = Truth(ids, from_frame(odometry, local_m), turned(turn, velocity_mps),
+                  from_frame(odometry, to_frame(pose, walks.future_m[row, ids])),
+                  np.where(inside, np.where(share >= HARD_TO_SEE, VISIBLE, OCCLUDED), OUT_OF_VIEW), odometry)
+    heading = bearing_of(velocity_mps) - pose[2]
+    seen = [Seen(ids[i], local_m[i, 0], range_m[i], what.middle[i], share[i], what.cut[i],
+                 np.linalg.norm(velocity_mps[i]), heading[i]) for i in np.flatnonzero(share > 0)]
+    return truth, seen
+
+
+def view_of(pose, camera):
+    """The View of the camera on a robot at a pose (3,)."""
+    fixed_from_camera = np.eye(4)
+    body = np.eye(3)
+    body[:2, :2] = turned(pose[2], np.eye(2)).T
+    fixed_from_camera[:3, :3] = body.dot(OPTICAL_FROM_BODY.T)
+    fixed_from_camera[:3, 3] = pose[0], pose[1], CAMERA_HEIGHT_M
+    edge = np.tan(camera.field_of_view / 2)
+    return View(fixed_from_camera, (-edge, edge), 'camera')
+
+
+def detection_of(box, view, camera):
+    """The Detection of a box that a camera with this view found."""
+    rotation = view.fixed_from_camera[:3, :3]
+    point_m = (-box.depth_m * np.tan(box.bearing), CAMERA_HEIGHT_M - box.height_m / 2, box.depth_m)
+    covariance_m2 = rotation.dot(camera.covariance_m2(box.bearing, box.depth_m)).dot(rotation.T)
+    return Detection(rotation.dot(point_m) + view.fixed_from_camera[:3, 3],
+                     np.array([box.width_m, box.width_m, box.height_m]), covariance_m2, bool(box.cut))
+
+
+def _nanoseconds(seconds):
+    return int(round(seconds * NS))

@@ -1,0 +1,108 @@
+"""How the robot goes among the people, and where its odometry thinks that it is.
+
+Poses are (x, y, heading), metres and radians.
+"""
+from typing import NamedTuple
+
+import numpy as np
+
+PERIOD_S = 0.01  # of the odometry
+SPEED_MPS = 0.7
+EIGHT_M = (4.0, 2.5)  # half the length and half the width of the figure of eight that the robot drives
+STANDING, DRIVING = 'standing', 'driving'
+
+
+class OdometryModel(NamedTuple):
+    """Shares by which distance and turning are off the whole time, and what each pose is off by: metres, radians.
+
+    `step_m` and `turn` are by the square root of the metres driven.
+    """
+
+    distance_scale: float = 0.02
+    turn_scale: float = 0.01
+    step_m: float = 0.002
+    turn: float = np.radians(0.5)
+    position_m: float = 0.004
+    heading: float = np.radians(0.15)
+
+
+class Path(NamedTuple):
+    """A robot's poses (n, 3) every `PERIOD_S`: the true ones, and those of its odometry, which start there."""
+
+    true: np.ndarray
+    odometry: np.ndarray
+
+    def true_at(self, time_s):
+        """The true pose (3,)."""
+        return _at(self.true, time_s)
+
+    def odometry_at(self, time_s):
+        """The pose (3,) of the odometry."""
+        return _at(self.odometry, time_s)
+
+
+def _at(poses, time_s):
+    row = time_s / PERIOD_S
+    before = int(np.clip(np.floor(row), 0, len(poses) - 2))
+    return poses[before] + (row - before) * (poses[before + 1] - poses[before])
+
+
+def standing(place_m, heading, seconds):
+    """Poses (n, 3) of a robot that stands."""
+    return np.tile(np.append(place_m, heading), (int(round(seconds / PERIOD_S)) + 1, 1))
+
+
+def driving(place_m, heading, phase, seconds):
+    """Poses (n, 3) of a robot that drives a figure of eight around a place; `phase` 0..1 is where on it, to begin."""
+    angles = np.linspace(0, 2 * np.pi, 4001)
+    eight_m = np.stack((EIGHT_M[0] * np.cos(angles), EIGHT_M[1] * np.sin(2 * angles)), axis=1)
+    way_m = np.append(0, np.cumsum(np.linalg.norm(np.diff(eight_m, axis=0), axis=1)))
+    driven_m = SPEED_MPS * PERIOD_S * np.arange(int(round(seconds / PERIOD_S)) + 1)
+    angle = np.interp((phase * way_m[-1] + driven_m) % way_m[-1], way_m, angles)
+    x_m, y_m = EIGHT_M[0] * np.cos(angle), EIGHT_M[1] * np.sin(2 * angle)
+    towards = np.unwrap(np.arctan2(2 * EIGHT_M[1] * np.cos(2 * angle), -EIGHT_M[0] * np.sin(angle)))
+    cos, sin = np.cos(heading), np.sin(heading)
+    return np.stack((place_m[0] + cos * x_m - sin * y_m, place_m[1] + sin * x_m + cos * y_m, towards + heading), axis=1)
+
+
+def with_odometry(true, model, random):
+    """A Path of true poses (n, 3): the odometry adds up steps that are each a little off."""
+    steps = np.diff(true, axis=0)
+    cos, sin = np.cos(true[:-1, 2]), np.sin(true[:-1, 2])
+    forward_m, left_m = cos * steps[:, 0] + sin * steps[:, 1], cos * steps[:, 1] - sin * steps[:, 0]
+    scale, turn_scale = 1 + random.normal(0, (model.distance_scale, model.turn_scale))
+    root_m = np.sqrt(np.abs(forward_m))
+    turns = steps[:, 2] * turn_scale + random.normal(size=len(steps)) * model.turn * root_m
+    forward_m = forward_m * scale + random.normal(size=len(steps)) * model.step_m * root_m
+    heading = true[0, 2] + np.append(0, np.cumsum(turns))
+    cos, sin = np.cos(heading[:-1]), np.sin(heading[:-1])
+    moves_m = np.stack((cos * forward_m - sin * left_m, sin * forward_m + cos * left_m), axis=1)
+    places_m = true[0, :2] + np.concatenate((np.zeros((1, 2)), np.cumsum(moves_m, axis=0)))
+    return Path(true, np.column_stack((places_m, heading)))
+
+
+def jittered(pose, model, random):
+    """What tf says of a pose (3,) of the odometry."""
+    return pose + random.normal(0, (model.position_m, model.position_m, model.heading))
+
+
+def to_frame(pose, points_m):
+    """Points (..., 2) of the plane, seen from a pose: forward and left, metres. Inverse of `from_frame`."""
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    return (np.asarray(points_m) - pose[:2]).dot(np.array([[cos, -sin], [sin, cos]]))
+
+
+def from_frame(pose, points_m):
+    """Points (..., 2), forward and left of a pose, in the plane. Inverse of `to_frame`."""
+    return turned(pose[2], points_m) + pose[:2]
+
+
+def turned(angle, vectors):
+    """Vectors (..., 2) of the plane, turned to the left by an angle."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.asarray(vectors).dot(np.array([[cos, sin], [-sin, cos]]))
+
+
+def bearing_of(points_m):
+    """Bearings of points (..., 2), forward and left."""
+    return np.arctan2(points_m[..., 1], points_m[..., 0])

@@ -1,0 +1,161 @@
+"""Pedestrians on a plane: recorded ones, smoothed, or made ones where there is no recording."""
+import csv
+import os
+from typing import Any, NamedTuple, Tuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.sparse import csc_matrix, diags
+from scipy.sparse.linalg import spsolve
+
+COLUMNS = ('t_s', 'id', 'x_m', 'y_m')
+SMOOTHING = 0.004  # s^3; leaves what a head moves by in a step, takes what a mouse click on a video is off by
+LONGEST_GAP_S = 1.3  # nobody knows where a person was meanwhile: those before and after are two people
+FEWEST_POINTS = 6  # of a person; fewer make no curve
+PERIOD_S = 0.4  # of the made recordings, as of the usual ones
+
+
+class Pedestrian(NamedTuple):
+    """One person, who is there from `start_s` to `end_s`.
+
+    `position_m` and `velocity_mps` are functions of times (n,) in seconds that give (n, 2).
+    """
+
+    start_s: float
+    end_s: float
+    position_m: Any
+    velocity_mps: Any
+
+
+class Sequence(NamedTuple):
+    """A recording: its name, the people in it, and their recorded points (n, 2), all together."""
+
+    name: str
+    pedestrians: Tuple[Pedestrian, ...]
+    points_m: np.ndarray
+
+    @property
+    def span_s(self):
+        """When the first comes and the last goes, (2,)."""
+        return (min(person.start_s for person in self.pedestrians), max(person.end_s for person in self.pedestrians))
+
+
+def read_sequences(folder):
+    """The recordings of a folder: each `.csv` file, by name.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or one cannot be used; names it.
+    OSError
+        If there is no such folder.
+    """
+    names = sorted(name for name in os.listdir(folder) if name.endswith('.csv'))
+    if not names:
+        raise ValueError('%s has no .csv file; files with the columns %s expected' % (folder, ','.join(COLUMNS)))
+    return [read_sequence(os.path.join(folder, name)) for name in names]
+
+
+def read_sequence(path):
+    """One recording: CSV with the columns t_s, id, x_m, y_m.
+
+    A point with a position that is no number is one that was not seen. Of two points of a person at one time the first
+    counts. People with fewer than `FEWEST_POINTS` points without a gap are left out.
+
+    Raises
+    ------
+    ValueError
+        If the file has other columns, a line that cannot be read, or nobody with enough points.
+    OSError
+        If there is no such file.
+    """
+    with open(path, newline='', encoding='utf-8') as stream:
+        reader = csv.DictReader(stream)
+        if not set(COLUMNS) <= set(reader.fieldnames or ()):
+            raise ValueError('%s has the columns %s; %s expected'
+                             % (path, ','.join(reader.fieldnames or ()), ','.join(COLUMNS)))
+        rows = [_row(path, reader.line_num, line) for line in reader]
+    return _sequence(path, os.path.splitext(os.path.basename(path))[0], rows)
+
+
+def _row(path, number, line):
+    try:
+        time_s, x_m, y_m = (float(line[name]) for name in ('t_s', 'x_m', 'y_m'))
+        if not np.isfinite(time_s):
+            raise ValueError
+    except (TypeError, ValueError):
+        raise ValueError('%s, line %d: %s is no point' % (path, number, ','.join(str(line[name]) for name in COLUMNS)))
+    return line['id'], time_s, x_m, y_m
+
+
+def _sequence(source, name, rows):
+    """A Sequence of rows (id, time_s, x_m, y_m). Raises ValueError where nobody is in it."""
+    points = {}
+    for identity, time_s, x_m, y_m in rows:
+        if np.isfinite(x_m) and np.isfinite(y_m):
+            points.setdefault(identity, {}).setdefault(time_s, (x_m, y_m))
+    people, all_points = [], []
+    for identity in sorted(points):
+        times_s = np.array(sorted(points[identity]))
+        points_m = np.array([points[identity][time_s] for time_s in times_s])
+        cuts = np.flatnonzero(np.diff(times_s) > LONGEST_GAP_S) + 1
+        for part_s, part_m in zip(np.split(times_s, cuts), np.split(points_m, cuts)):
+            if len(part_s) >= FEWEST_POINTS:
+                people.append(pedestrian_of(part_s, part_m))
+                all_points.append(part_m)
+    if not people:
+        raise ValueError('%s: nobody has %d points without a gap of more than %g s'
+                         % (source, FEWEST_POINTS, LONGEST_GAP_S))
+    return Sequence(name, tuple(people), np.concatenate(all_points))
+
+
+def pedestrian_of(times_s, points_m):
+    """A Pedestrian on a smooth curve along points (n, 2) at rising times (n,), n > 1."""
+    curve = CubicSpline(times_s, _smoothed(times_s, points_m), bc_type='natural')
+    return Pedestrian(float(times_s[0]), float(times_s[-1]), curve, curve.derivative())
+
+
+def _smoothed(times_s, points_m):
+    """Where the cubic smoothing spline passes: least sum of squares + SMOOTHING * integral of acceleration squared.
+
+    Reinsch's algorithm; Green and Silverman, Nonparametric Regression and Generalized Linear Models (1994), 2.3.
+    """
+    if len(times_s) < 3:
+        return points_m
+    steps = np.diff(times_s)
+    inner = len(steps) - 1
+    differences = csc_matrix(diags([1 / steps[:-1], -1 / steps[:-1] - 1 / steps[1:], 1 / steps[1:]], [0, -1, -2],
+                                   shape=(inner + 2, inner)))
+    bending = diags([steps[1:-1] / 6, (steps[:-1] + steps[1:]) / 3, steps[1:-1] / 6], [-1, 0, 1])
+    accelerations = spsolve(csc_matrix(bending + SMOOTHING * differences.T.dot(differences)),
+                            differences.T.dot(points_m))
+    return points_m - SMOOTHING * differences.dot(accelerations.reshape(inner, -1))
+
+
+def made_sequences(seed, seconds=90):
+    """Recordings that the package makes: a square with few people and one with many, some in pairs, some standing.
+
+    They walk through each other where their ways cross at the same time.
+    """
+    return [_made('made_%s' % name, np.random.RandomState([seed, people]), people, seconds)
+            for name, people in (('sparse', 30), ('dense', 90))]
+
+
+def _made(name, random, people, seconds):
+    rows = []
+    for number in range(people):
+        start_s = random.uniform(-10, seconds)
+        times_s = start_s + np.arange(0, random.uniform(10, 25), PERIOD_S)
+        if random.uniform() < 0.15:
+            points_m = np.tile(random.uniform((-5, -4), (5, 4)), (len(times_s), 1))
+        else:
+            heading = random.uniform(-np.pi, np.pi) + random.normal(0, 0.03) * (times_s - start_s)
+            steps_m = random.normal(1.2, 0.2) * PERIOD_S * np.c_[np.cos(heading), np.sin(heading)]
+            middle_m = random.uniform((-5, -4), (5, 4))
+            points_m = middle_m + np.cumsum(steps_m, axis=0) - steps_m.sum(axis=0) / 2
+        companions = 2 if random.uniform() < 0.3 else 1
+        for companion in range(companions):
+            shifted_m = points_m + companion * random.uniform(0.5, 0.9, 2) + random.normal(0, 0.02, points_m.shape)
+            rows += [('%d.%d' % (number, companion), time_s) + tuple(point_m)
+                     for time_s, point_m in zip(times_s, shifted_m) if 0 <= time_s <= seconds]
+    return _sequence(name, name, rows)
