@@ -1,6 +1,7 @@
 """Who may import what: pure modules know no ROS, nodes no mathematics and not each other."""
 import ast
 import os
+import re
 
 import pytest
 
@@ -62,6 +63,12 @@ def test_rospy_is_for_nodes_torch_for_detection_and_scipy_for_desk_tools(module)
     for tool in (NOISE, TRACKING_BENCHMARK):
         name = 'ros_3d_bb.' + tool.replace(os.sep, '.')
         assert not any(our.startswith(name) for our in ours) or module.startswith(tool)
+
+
+@pytest.mark.parametrize('module', [m for m in MODULES if m.startswith(TRACKING_BENCHMARK)])
+def test_libraries_of_the_tracking_benchmark_are_imported_where_they_are_used(module):
+    with open(os.path.join(SOURCE, module)) as stream:
+        assert not re.search(r'^(import|from) (norfair|trackeval)', stream.read(), re.MULTILINE)
 
 
 @pytest.mark.parametrize('module', [m for m in MODULES if m.startswith('nodes/')])

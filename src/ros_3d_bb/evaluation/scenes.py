@@ -1,6 +1,6 @@
 """The pipeline without ROS on a simulated scene: detector, 3D boxes, tracks, image by image."""
 import functools
-from typing import NamedTuple
+from typing import List, NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ros_3d_bb.simulation.simulator import Frame
 from ros_3d_bb.simulation.truth import truth_at
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.association import match_greedily
-from ros_3d_bb.tracking.tracked import Detection, View
+from ros_3d_bb.tracking.tracked import Detection, TrackedObject, View
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.visibility import depths_towards, edges_of
 
@@ -26,6 +26,17 @@ class Step(NamedTuple):
     frame: Frame
     boxes: np.ndarray
     moment: Moment
+
+
+class SceneImage(NamedTuple):
+    """One image: the frame without its pixels, the 2D boxes (n, 4) found in it, what a tracker gets, and the truth."""
+
+    stamp_ns: int
+    frame: Frame
+    boxes: np.ndarray
+    detections: List[Detection]
+    view: View
+    truth: List[TrackedObject]
 
 
 class DetectionScore(NamedTuple):
@@ -47,8 +58,8 @@ class DetectionScore(NamedTuple):
         return self.false / float(max(1, self.images))
 
 
-def run_scene(simulator, detect, every=1, estimator=estimator_named('foreground')):
-    """Run the pipeline on a scene.
+def look_at_scene(simulator, detect, every=1, estimator=estimator_named('foreground')):
+    """Render a scene and find the people in it, image by image.
 
     Parameters
     ----------
@@ -59,19 +70,32 @@ def run_scene(simulator, detect, every=1, estimator=estimator_named('foreground'
         Use one image of so many.
     estimator : Estimator
 
-    Returns
-    -------
-    list of Step
+    Yields
+    ------
+    SceneImage
     """
-    tracker, steps = Tracker(), []
     for number in range(0, simulator.frame_count, every):
         frame = simulator.frame(number)
         boxes = np.asarray(detect(frame), float).reshape(-1, 4)
         stamp_ns = int(round(frame.time_s * NS))
-        tracks = tracker.update(stamp_ns, _detections(frame, boxes, simulator.camera, estimator),
-                                _view(frame, simulator.camera))
-        moment = Moment(stamp_ns, truth_at(simulator, frame, stamp_ns), tracks)
-        steps.append(Step(frame._replace(color=None, depth_mm=None), boxes, moment))
+        yield SceneImage(stamp_ns, frame._replace(color=None, depth_mm=None), boxes,
+                         _detections(frame, boxes, simulator.camera, estimator), _view(frame, simulator.camera),
+                         truth_at(simulator, frame, stamp_ns))
+
+
+def track_scene(images, trackers):
+    """Let trackers follow the people in the images (SceneImage) of a scene. Returns a list of Step for each tracker."""
+    steps = [[] for _tracker in trackers]
+    for image in images:
+        for tracker, own_steps in zip(trackers, steps):
+            tracks = tracker.update(image.stamp_ns, image.detections, image.view)
+            own_steps.append(Step(image.frame, image.boxes, Moment(image.stamp_ns, image.truth, tracks)))
+    return steps
+
+
+def run_scene(simulator, detect, every=1, estimator=estimator_named('foreground')):
+    """Run the pipeline on a scene: `look_at_scene`, and `track_scene` with our tracker. Returns a list of Step."""
+    steps, = track_scene(look_at_scene(simulator, detect, every, estimator), [Tracker()])
     return steps
 
 
@@ -79,7 +103,8 @@ def _detections(frame, boxes, camera, estimator):
     """The 2D boxes as bbox3d_node and tracker_node take them: 3D boxes, in the map."""
     rects_px = [tuple(rect) for rect in np.rint(boxes).astype(int).tolist() if rect[0] < rect[2] and rect[1] < rect[3]]
     found = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, camera, estimator)
-    return [Detection(transform_points(frame.poses.map_from_camera, box.center_m), box.size_m[[0, 2, 1]])
+    return [Detection(transform_points(frame.poses.map_from_camera, box.center_m), box.size_m[[0, 2, 1]],
+                      truncated=box.truncated)
             for box in found if box is not None]
 
 

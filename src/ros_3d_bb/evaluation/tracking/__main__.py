@@ -1,0 +1,75 @@
+"""Trackers on detections of a camera on a robot, which stands or drives among recorded pedestrians, against the truth.
+
+Detections have the errors that the thesis measured. Without recordings the package makes some.
+"""
+import argparse
+import json
+import os
+import sys
+
+from ros_3d_bb.evaluation.tracking.benchmark import compare, cpu_times, runs_of, table
+from ros_3d_bb.evaluation.tracking.generator import SECONDS
+from ros_3d_bb.evaluation.tracking.scenes import compare_scenes
+from ros_3d_bb.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
+from ros_3d_bb.simulation.scenario import ScenarioError
+
+
+def main():
+    """The command `./run bench tracking`."""
+    arguments = _arguments()
+    try:
+        if arguments.scenarios:
+            result = {'scenes': compare_scenes(arguments.scenarios, arguments.weights)}
+        else:
+            result = bench(arguments)
+        if arguments.json:
+            with open(arguments.json, 'w') as stream:
+                json.dump(result, stream, indent=1)
+    except (ScenarioError, ValueError, OSError) as error:
+        sys.exit('./run bench tracking: %s' % error)
+
+
+def bench(arguments):
+    """Run and print the comparison. Returns the results of design §8."""
+    sequences = read_sequences(arguments.data) if arguments.data else made_sequences(arguments.seed)
+    names = [sequence.name for sequence in sequences]
+    print('sequences: %s (%s), seed %d' % (', '.join(names), arguments.data or 'made; no recordings are at hand',
+                                           arguments.seed), flush=True)
+    trackers = compare(runs_of(sequences, arguments.seed, arguments.repetitions, arguments.seconds), on_run=_say)
+    for name, times_ms in cpu_times().items():
+        trackers[name]['cpu_ms'] = times_ms
+    print('\n'.join(table(trackers)))
+    return {'sequences': names, 'recorded': bool(arguments.data), 'seed': arguments.seed,
+            'repetitions': arguments.repetitions, 'seconds': arguments.seconds, 'trackers': trackers}
+
+
+def _say(run, scores):
+    """One line for a run."""
+    print('  %-24s %4d images, HOTA %s' % (run.name, len(run.images), ', '.join(
+        '%s %.1f' % (name, tracker['hota']) for name, tracker in scores.items())), flush=True)
+
+
+def _arguments():
+    parser = argparse.ArgumentParser(prog='./run bench tracking', description=__doc__)
+    data = os.environ.get('ROS_3D_BB_DATA')
+    parser.add_argument('--data', default=data and os.path.join(data, 'data', 'trajectories'), metavar='DIR',
+                        help='folder of CSV files with the columns %s (default: $ROS_3D_BB_DATA/data/trajectories, '
+                        'and without it recordings that are made)' % ','.join(COLUMNS))
+    parser.add_argument('--seed', type=int, default=0, metavar='N', help='of all that is random (default: 0)')
+    parser.add_argument('--repetitions', type=int, default=2, metavar='N',
+                        help='runs of each sequence, standing and driving each (default: 2)')
+    parser.add_argument('--seconds', type=float, default=SECONDS, help='length of a run (default: %g)' % SECONDS)
+    parser.add_argument('--scenarios', nargs='+', metavar='FILE', help='instead: the whole pipeline on rendered scenes')
+    parser.add_argument('--weights', help='of YOLOv5, for --scenarios; without, the weight-free detector')
+    parser.add_argument('--json', metavar='FILE', help='also write the scores there')
+    arguments = parser.parse_args()
+    for name in ('repetitions', 'seconds'):
+        if not getattr(arguments, name) > 0:
+            parser.error('--%s is %g; more than 0 expected' % (name, getattr(arguments, name)))
+    if not 0 <= arguments.seed < 2 ** 32:
+        parser.error('--seed is %d; 0 to %d expected' % (arguments.seed, 2 ** 32 - 1))
+    return arguments
+
+
+if __name__ == '__main__':
+    main()

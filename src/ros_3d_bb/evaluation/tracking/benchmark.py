@@ -1,0 +1,85 @@
+"""Our tracker, the thesis' and a library's on the same detections of robots among pedestrians."""
+from typing import Any, NamedTuple
+
+from ros_3d_bb.evaluation.tracking.generator import SECONDS, simulate
+from ros_3d_bb.evaluation.tracking.library import Norfair
+from ros_3d_bb.evaluation.tracking.metrics import score_run, scores_of
+from ros_3d_bb.evaluation.tracking.original import OriginalTracker, as_it_arrived
+from ros_3d_bb.evaluation.tracking.robot import DRIVING, STANDING
+from ros_3d_bb.evaluation.tracking.timing import PEOPLE, cpu_ms
+from ros_3d_bb.tracking.thesis import ThesisTracker
+from ros_3d_bb.tracking.tracker import Tracker
+
+ROWS = (('hota', '%.1f'), ('assa', '%.1f'), ('deta', '%.1f'), ('mota', '%.1f'), ('idf1', '%.1f'),
+        ('id_switches', '%d'), ('fragmentations', '%d'), ('recall', '%.1f'), ('precision', '%.1f'),
+        ('position_rmse_m', '%.3f'), ('velocity_rmse_mps', '%.3f'), ('ade_1s_m', '%.3f'), ('fde_1s_m', '%.3f'),
+        ('ade_2s_m', '%.3f'), ('fde_2s_m', '%.3f'), ('coverage_95_position', '%.3f'),
+        ('coverage_95_velocity', '%.3f'), ('coverage_95_1s', '%.3f'), ('coverage_95_2s', '%.3f'))
+
+
+class Contestant(NamedTuple):
+    """A tracker to be compared: its name in the results, what makes one, and what it sees of a run."""
+
+    name: str
+    make: Any
+    view_of_run: Any = staticmethod(lambda run: run)
+
+
+# `thesis` is the tracker that ships with the package, `thesis_original` the one that the thesis' own package ran.
+CONTESTANTS = (Contestant('ours', Tracker), Contestant('thesis', ThesisTracker),
+               Contestant('thesis_original', OriginalTracker, as_it_arrived), Contestant('library', Norfair))
+
+
+def runs_of(sequences, seed, repetitions, seconds=SECONDS):
+    """The runs of a benchmark, one after the other: each sequence with a robot that stands and one that drives."""
+    for sequence in sequences:
+        for motion in (STANDING, DRIVING):
+            for repetition in range(repetitions):
+                yield simulate(sequence, motion, (seed, repetition), seconds=seconds)
+
+
+def outputs_of(contestant, run):
+    """What a tracker publishes after each image of a run."""
+    tracker = contestant.make()
+    return [tracker.update(image.stamp_ns, image.detections, image.view)
+            for image in contestant.view_of_run(run).images]
+
+
+def compare(runs, contestants=CONTESTANTS, on_run=None):
+    """The scores of design §8 of each tracker, but for `cpu_ms`; {name: scores}.
+
+    Parameters
+    ----------
+    runs : iterable of generator.Run
+    contestants : sequence of Contestant
+    on_run : callable, optional
+        Called with each run and {name: scores} of it, once it is done.
+
+    Raises
+    ------
+    ValueError
+        If there is no run, or a library is missing.
+    """
+    scores = {contestant.name: [] for contestant in contestants}
+    for run in runs:
+        for contestant in contestants:
+            scores[contestant.name].append(score_run(run, outputs_of(contestant, run)))
+        if on_run is not None:
+            on_run(run, {name: scores_of(run_scores[-1:]) for name, run_scores in scores.items()})
+    return {name: scores_of(run_scores) for name, run_scores in scores.items()}
+
+
+def cpu_times(contestants=CONTESTANTS):
+    """Median CPU time of an update in milliseconds, {name: {number of people as text: time}}."""
+    return {contestant.name: {'%d' % people: cpu_ms(contestant.make, people) for people in PEOPLE}
+            for contestant in contestants}
+
+
+def table(trackers):
+    """The scores {name: scores} as lines of text."""
+    lines = ['%-22s' % '' + ''.join('%17s' % name for name in trackers)]
+    rows = [(key, [form % scores[key] if scores[key] is not None else '-' for scores in trackers.values()])
+            for key, form in ROWS]
+    rows += [('cpu_ms, %s people' % people, ['%.2f' % scores['cpu_ms'][people] for scores in trackers.values()])
+             for people in list(trackers.values())[0]['cpu_ms']]
+    return lines + ['%-22s' % key + ''.join('%17s' % value for value in values) for key, values in rows]

@@ -1,0 +1,251 @@
+"""Runs of a robot among pedestrians: what the detections and the truth of the tracking benchmark obey."""
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ros_3d_bb.evaluation.tracking import robot
+from ros_3d_bb.evaluation.tracking.camera_model import CameraModel, half_width, shown, thesis_bias_m
+from ros_3d_bb.evaluation.tracking.detector import DOUBLE, FALSE, Detector, Seen
+from ros_3d_bb.evaluation.tracking.generator import HORIZONS_S, Models, Timing, simulate, view_of
+from ros_3d_bb.evaluation.tracking.robot import DRIVING, STANDING, OdometryModel
+from ros_3d_bb.evaluation.tracking.timing import crowd
+from ros_3d_bb.evaluation.tracking.trajectories import made_sequences
+from ros_3d_bb.geometry import transform_points
+from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE
+
+SECONDS = 4
+HALF_VIEW = CameraModel().field_of_view / 2
+EXACT_CAMERA = CameraModel(matching_px=0, depth_floor_m=0, side_floor_m=0, slow_depth_m=0, slow_side_m=0, sway_m=0,
+                           bias_left=0, outlier_share=0, miss_share=0, false_rate=0, double_share=0)
+EXACT = Models(EXACT_CAMERA, OdometryModel(*[0.0] * 6), Timing(stamp_sigma_s=0, lost_share=0, stalls_hz=0))
+
+
+@pytest.fixture(scope='module')
+def dense():
+    return made_sequences(0, 30)[1]
+
+
+@pytest.fixture(scope='module', params=[STANDING, DRIVING])
+def run(request, dense):
+    return simulate(dense, request.param, 0, seconds=SECONDS)
+
+
+@pytest.fixture(scope='module', params=[STANDING, DRIVING])
+def exact(request, dense):
+    return simulate(dense, request.param, 0, EXACT, SECONDS)
+
+
+def seen_from(view, points_m):
+    """Points (n, 2) of the fixed frame as (right, forward) of the camera."""
+    points_m = np.c_[points_m, np.zeros(len(points_m))]
+    return transform_points(np.linalg.inv(view.fixed_from_camera), points_m)[:, [0, 2]]
+
+
+def test_the_same_seed_gives_the_same_images_and_another_one_others(dense):
+    first, again, other = (simulate(dense, DRIVING, seed, seconds=1) for seed in ((3, 0), (3, 0), (3, 1)))
+    assert len(first.images) == len(again.images)
+    for image, same in zip(first.images, again.images):
+        assert image.stamp_ns == same.stamp_ns and image.sources == same.sources
+        assert all(np.array_equal(a.position_m, b.position_m) for a, b in zip(image.detections, same.detections))
+    assert first.images[0].stamp_ns != other.images[0].stamp_ns
+
+
+def test_stamps_rise_images_get_lost_and_detections_arrive_later_in_order(run):
+    stamps_ns = np.array([image.stamp_ns for image in run.images])
+    arrivals_ns = np.array([image.arrival_ns for image in run.images])
+    assert (np.diff(stamps_ns) > 0).all() and (np.diff(arrivals_ns) > 0).all()
+    assert 0.7 * 30 * SECONDS < len(stamps_ns) < 30 * SECONDS
+    assert 0.04 < np.median(arrivals_ns - stamps_ns) / 1e9 < 0.06
+
+
+def shown_in(image):
+    """What an image of a robot with exact odometry shows of the people in its truth."""
+    local_m = seen_from(image.view, image.truth.position_m)[:, ::-1] * (1, -1)
+    range_m = np.linalg.norm(local_m, axis=1)
+    return shown(robot.bearing_of(local_m), half_width(range_m), range_m, HALF_VIEW)
+
+
+def test_without_errors_detections_of_whole_people_are_the_truth(exact):
+    whole = 0
+    for image in exact.images:
+        share = shown_in(image).share
+        for detection, source in zip(image.detections, image.sources):
+            row, = np.flatnonzero(image.truth.ids == source)
+            if share[row] > 1 - 1e-9:
+                whole += 1
+                assert np.allclose(detection.position_m[:2], image.truth.position_m[row])
+                assert not detection.truncated
+    assert whole > 100
+
+
+def test_who_is_cut_is_found_off_the_middle_and_truncated_at_the_border(exact):
+    truncated = 0
+    for image in exact.images:
+        what = shown_in(image)
+        for detection, source in zip(image.detections, image.sources):
+            row, = np.flatnonzero(image.truth.ids == source)
+            if detection.truncated:
+                truncated += 1
+                of_body, of_box = (np.abs(np.arctan2(*seen_from(image.view, place_m)[0])) for place_m in (
+                    image.truth.position_m[row:row + 1], detection.position_m[None, :2]))
+                range_m = np.linalg.norm(image.truth.position_m[row] - image.view.fixed_from_camera[:2, 3])
+                assert of_body + half_width(range_m) > HALF_VIEW > of_box and what.share[row] < 1
+    assert truncated > 5
+
+
+def test_who_is_occluded_has_somebody_nearer_in_front(exact):
+    occluded = 0
+    for image in exact.images:
+        right_m, forward_m = seen_from(image.view, image.truth.position_m).T
+        bearing, range_m = np.arctan2(-right_m, forward_m), np.hypot(right_m, forward_m)
+        for row in np.flatnonzero(image.truth.status == OCCLUDED):
+            reach = half_width(range_m) + half_width(range_m[row])
+            nearer = (range_m < range_m[row]) & (np.abs(bearing - bearing[row]) < reach)
+            occluded += 1
+            assert nearer.any() or np.abs(bearing[row]) + half_width(range_m[row]) > HALF_VIEW
+    assert occluded > 5
+
+
+def test_only_who_is_in_view_is_found(exact):
+    for image in exact.images:
+        right_m, forward_m = seen_from(image.view, image.truth.position_m).T
+        bearing, range_m = np.arctan2(-right_m, forward_m), np.hypot(right_m, forward_m)
+        visible = image.truth.status == VISIBLE
+        assert (np.abs(bearing[visible]) < HALF_VIEW).all()
+        assert (range_m[visible] < 6).all() and (forward_m[visible] > 0.3).all()
+        found = np.isin(image.truth.ids, image.sources)
+        assert (np.abs(bearing[found]) < HALF_VIEW + half_width(range_m[found])).all() and (range_m[found] < 6.2).all()
+        assert not found[image.truth.status == OCCLUDED].any()
+
+
+def test_the_view_shows_what_its_edges_say():
+    pose = np.array([1.0, -2.0, 0.7])
+    view = view_of(pose, CameraModel())
+    for edge, side in zip(view.edges, (1, -1)):  # left, right
+        point_m = robot.from_frame(pose, 3 * np.array([np.cos(HALF_VIEW), side * np.sin(HALF_VIEW)]))
+        (right_m, forward_m), = seen_from(view, point_m[None])
+        assert right_m / forward_m == pytest.approx(edge)
+
+
+def test_velocities_and_futures_of_the_truth_are_those_of_the_walks(exact):
+    """With exact odometry the fixed frame is that of the recording."""
+    for early, late in zip(exact.images, exact.images[1:]):
+        known = dict(zip(late.truth.ids, late.truth.position_m))
+        for person, place_m, velocity_mps in zip(early.truth.ids, early.truth.position_m, early.truth.velocity_mps):
+            if person in known:
+                assert np.allclose(known[person] - place_m, velocity_mps / 30, atol=0.005)
+    later = int(30 * HORIZONS_S[-1])
+    early, late = exact.images[0], exact.images[later]
+    future = dict(zip(early.truth.ids, early.truth.future_m[:, -1]))
+    both = [person for person in late.truth.ids if np.isfinite(future.get(person, np.nan)).all()]
+    assert both
+    for person in both:
+        assert np.allclose(late.truth.position_m[late.truth.ids == person], future[person], atol=1e-6)
+
+
+def test_who_stands_behind_another_is_hidden_and_who_is_half_behind_is_seen_at_the_side():
+    local_m = np.array([(2, 0), (4, 0), (4, 1.2), (4, -0.5)])
+    range_m = np.linalg.norm(local_m, axis=1)
+    what = shown(robot.bearing_of(local_m), half_width(range_m), range_m, HALF_VIEW)
+    assert what.share[:3].tolist() == [1, 0, 1] and 0.3 < what.share[3] < 0.95
+    assert what.middle[3] < robot.bearing_of(local_m[3]) and not what.cut.any()
+
+
+bearings = st.lists(st.tuples(st.floats(-1.2, 1.2), st.floats(0.5, 8)), min_size=1, max_size=8)
+
+
+@given(bearings)
+def test_shares_are_shares_the_nearest_is_whole_and_the_farther_hides_nobody(people):
+    bearing, range_m = np.array(people).T
+    range_m = range_m + 0.001 * np.arange(len(range_m))  # no ties
+    half = half_width(range_m)
+    what = shown(bearing, half, range_m, HALF_VIEW)
+    assert (what.share >= 0).all() and (what.share <= 1 + 1e-9).all()
+    nearest, farthest = np.argmin(range_m), np.argmax(range_m)
+    inside = min(bearing[nearest] + half[nearest], HALF_VIEW) - max(bearing[nearest] - half[nearest], -HALF_VIEW)
+    assert what.share[nearest] == pytest.approx(max(0, inside) / (2 * half[nearest]), abs=1e-9)
+    others = np.arange(len(people)) != farthest
+    without = shown(bearing[others], half[others], range_m[others], HALF_VIEW)
+    assert np.array_equal(without.share, what.share[others]) and np.array_equal(without.middle, what.middle[others])
+
+
+@given(st.floats(-3, 3), st.floats(-5, 5), st.floats(-5, 5), st.floats(-5, 5), st.floats(-5, 5))
+def test_to_frame_undoes_from_frame(heading, x_m, y_m, forward_m, left_m):
+    pose = np.array([x_m, y_m, heading])
+    assert np.allclose(robot.to_frame(pose, robot.from_frame(pose, [forward_m, left_m])), (forward_m, left_m))
+
+
+def test_odometry_drifts_from_the_truth_only_while_the_robot_drives():
+    random = np.random.RandomState(0)
+    still = robot.with_odometry(robot.standing((1, 2), 0.5, 10), OdometryModel(), random)
+    assert np.allclose(still.odometry, still.true)
+    true = robot.driving((1, 2), 0.5, 0.3, 30)
+    moving = robot.with_odometry(true, OdometryModel(), random)
+    exact_path = robot.with_odometry(true, OdometryModel(*[0.0] * 6), random)
+    assert np.allclose(exact_path.odometry, true, atol=1e-6)
+    off_m = np.linalg.norm(moving.odometry[:, :2] - true[:, :2], axis=1)
+    assert off_m[0] == 0 and 0.02 < off_m.max() < 3
+    assert np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1).mean() == pytest.approx(0.007, rel=0.05)
+
+
+@pytest.fixture(scope='module')
+def boxes():
+    """What is found of somebody who stands 3 m straight ahead, for 20000 images; None where nothing is."""
+    detector, boxes = Detector(CameraModel(), 1, 1 / 30.0, np.random.RandomState(0)), []
+    seen, pose = [Seen(0, 3.0, 3.0, 0.0, 1.0, False, 0.0, 0.0)], np.zeros(3)
+    for number in range(20000):
+        detector.advance(pose)
+        boxes.append(detector.find(seen, pose, number / 30.0))
+    return boxes
+
+
+def test_depth_errors_are_those_of_the_model_with_outliers_behind(boxes):
+    camera = CameraModel()
+    errors_m = np.array([box.depth_m - 3 - 0.2 * thesis_bias_m(3) for found in boxes for box in found
+                         if box.source == 0])
+    usual_m = errors_m[errors_m < 0.15]
+    assert np.mean(errors_m > 0.2) == pytest.approx(0.05, abs=0.015) and errors_m.min() > -0.25
+    assert usual_m.std() == pytest.approx(np.sqrt(camera.covariance_m2(0.0, 3.0)[2, 2]), rel=0.08)
+    assert abs(usual_m.mean()) < 0.01
+    sides_m = np.array([3 * box.bearing for found in boxes for box in found if box.source == 0])
+    assert sides_m.std() == pytest.approx(np.sqrt(camera.covariance_m2(0.0, 3.0)[0, 0]), rel=0.1)
+
+
+def test_errors_last_from_image_to_image(boxes):
+    errors_m = np.array([box.depth_m for found in boxes for box in found if box.source == 0 and box.depth_m < 3.1])
+    together = np.corrcoef(errors_m[:-1], errors_m[1:])[0, 1]
+    assert 0.4 < together < 0.8  # half a second for one part, none for the other
+
+
+def test_misses_doubles_and_false_boxes_have_their_shares(boxes):
+    sources = [[box.source for box in found] for found in boxes]
+    assert np.mean([0 not in found for found in sources]) == pytest.approx(0.1, abs=0.02)
+    doubles = sum(found.count(DOUBLE) for found in sources) / float(sum(0 in found for found in sources))
+    assert doubles == pytest.approx(0.02, abs=0.005)
+    # 1 % new ones an image, each for about a tenth of a second, most of them in view
+    assert np.mean([found.count(FALSE) for found in sources]) == pytest.approx(0.035, abs=0.012)
+
+
+def test_the_thesis_bias_goes_on_smoothly_beyond_what_was_measured():
+    assert thesis_bias_m([1.0, 3.0]) == pytest.approx([0.028, -0.172])
+    assert thesis_bias_m(6.0) == pytest.approx(2 * thesis_bias_m(3.0))
+
+
+@given(st.floats(-0.6, 0.6), st.floats(0.5, 6))
+def test_covariances_are_along_the_ray_and_across(bearing, depth_m):
+    camera = CameraModel()
+    covariance_m2 = camera.covariance_m2(bearing, depth_m)[np.ix_([0, 2], [0, 2])]
+    ray = np.array([-np.sin(bearing), np.cos(bearing)])
+    assert ray.dot(covariance_m2).dot(ray) == pytest.approx(camera.depth_sigma_m(depth_m) ** 2 + 0.035 ** 2)
+    across = np.array([ray[1], -ray[0]])
+    assert across.dot(covariance_m2).dot(across) == pytest.approx(0.009 ** 2 + 0.015 ** 2)
+
+
+def test_a_crowd_is_all_in_view_in_every_image():
+    for people in (5, 100):
+        images = list(crowd(people, 3))
+        assert [len(detections) for _stamp_ns, detections, _view in images] == [people] * 3
+        for _stamp_ns, detections, view in images:
+            local_m = seen_from(view, np.array([detection.position_m[:2] for detection in detections]))
+            assert (local_m[:, 1] > 0).all()

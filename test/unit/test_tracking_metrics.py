@@ -1,0 +1,164 @@
+"""Scores of the tracking benchmark on cases with known answers."""
+import sys
+
+import numpy as np
+import pytest
+
+from ros_3d_bb.evaluation.tracking.camera_model import CameraModel
+from ros_3d_bb.evaluation.tracking.generator import HORIZONS_S, Image, Run, Truth
+from ros_3d_bb.evaluation.tracking.metrics import score_run, scores_of
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject
+
+IMAGES = 40
+PLACES_M = np.array([(3.0, 0.0), (4.0, 1.5)])
+VELOCITY_MPS = np.array([0.5, 0.0])
+STEP_S = 0.25
+
+
+def run_of(status=(VISIBLE, VISIBLE), images=IMAGES, future=True):
+    """Two people who walk; the robot stands at the origin and looks along x."""
+    found = []
+    for number in range(images):
+        places_m = PLACES_M + number / 30.0 * VELOCITY_MPS
+        future_m = places_m[:, None] + HORIZONS_S[:, None] * VELOCITY_MPS
+        truth = Truth(np.array([10, 20]), places_m, np.tile(VELOCITY_MPS, (2, 1)),
+                      future_m if future else np.full_like(future_m, np.nan), np.array(status), np.zeros(3))
+        found.append(Image(number, [], None, truth, [], number, None))
+    return Run('made', CameraModel(), tuple(found))
+
+
+def track(track_id, place_m, velocity_mps=VELOCITY_MPS, covariances=None, steps=8, step_s=STEP_S):
+    times_s = step_s * np.arange(1, steps + 1)
+    prediction_m = np.c_[place_m + times_s[:, None] * velocity_mps, np.zeros(steps)]
+    covariance, prediction_covariance_m2 = covariances if covariances is not None else (None, None)
+    return TrackedObject(track_id, np.append(place_m, 1.0), np.ones(3), np.append(velocity_mps, 0), np.zeros(3),
+                         VISIBLE, True, 0, 0, prediction_m, step_s, covariance, prediction_covariance_m2)
+
+
+def scores(run, outputs):
+    return scores_of([score_run(run, outputs)])
+
+
+def outputs_of(run, make):
+    """What `make(number of the image, truth)` gives for each image."""
+    return [make(number, image.truth) for number, image in enumerate(run.images)]
+
+
+def right(_number, truth):
+    return [track(1, truth.position_m[0]), track(2, truth.position_m[1])]
+
+
+def test_a_tracker_that_is_always_right_gets_everything():
+    run = run_of()
+    result = scores(run, outputs_of(run, right))
+    assert [result[key] for key in ('hota', 'mota', 'idf1', 'recall', 'precision')] == pytest.approx([100] * 5)
+    assert (result['id_switches'], result['fragmentations']) == (0, 0)
+    for key in ('position_rmse_m', 'velocity_rmse_mps', 'ade_1s_m', 'fde_1s_m', 'ade_2s_m', 'fde_2s_m'):
+        assert result[key] == pytest.approx(0, abs=1e-9)
+    assert result['coverage_95_position'] is None and result['coverage_95_2s'] is None
+
+
+def test_numbers_that_two_people_swap_half_way_are_two_switches():
+    run = run_of()
+    late = IMAGES // 2
+    result = scores(run, outputs_of(run, lambda number, truth: [
+        track(1 + (number >= late), truth.position_m[0]), track(2 - (number >= late), truth.position_m[1])]))
+    assert result['id_switches'] == 2
+    assert result['mota'] == pytest.approx(100 * (1 - 2 / (2.0 * IMAGES)))
+    assert result['idf1'] == pytest.approx(50)
+    assert result['deta'] == pytest.approx(100) and result['assa'] == pytest.approx(100 / 3.0)  # 20 of 20 + 20 + 20
+    assert result['hota'] == pytest.approx(100 * np.sqrt(1 / 3.0))
+
+
+def test_somebody_who_is_missed_for_a_while_is_a_fragmentation():
+    run = run_of()
+    result = scores(run, outputs_of(run, lambda number, truth: right(number, truth)[10 <= number < 20:]))
+    assert result['fragmentations'] == 1 and result['id_switches'] == 0
+    assert result['recall'] == pytest.approx(100 * (1 - 10 / (2.0 * IMAGES))) == result['mota']
+
+
+@pytest.mark.parametrize('place_m,counts', [
+    ((2.0, -0.8), True), ((5.8, 0.0), True),
+    ((5.9, 0.0), False), ((0.4, 0.0), False), ((-2.0, 0.0), False),  # too far, too near, behind the robot
+    ((2.0, 1.4), False)])  # outside of the left border
+def test_a_track_of_nobody_counts_only_where_the_camera_sees(place_m, counts):
+    run = run_of()
+    result = scores(run, outputs_of(run, lambda number, truth: right(number, truth) + [track(3, np.array(place_m))]))
+    assert result['mota'] == pytest.approx(50 if counts else 100)
+    assert result['precision'] == pytest.approx(200 / 3.0 if counts else 100)
+
+
+@pytest.mark.parametrize('status', [OCCLUDED, OUT_OF_VIEW])
+@pytest.mark.parametrize('off_m,mota', [(0.0, 100), (0.7, 100), (0.8, 0)])
+def test_a_track_of_somebody_who_is_not_visible_is_neither_right_nor_wrong(status, off_m, mota):
+    run = run_of((VISIBLE, status))
+    result = scores(run, outputs_of(run, lambda number, truth: [
+        track(1, truth.position_m[0]), track(2, truth.position_m[1] + (0, off_m))]))
+    assert result['mota'] == pytest.approx(mota) and result['recall'] == pytest.approx(100)
+
+
+@pytest.mark.parametrize('off_m,mota,rmse_m', [(0.3, 100, 0.3), (0.7, -100, 0.7), (1.1, -100, None)])
+def test_a_track_far_off_is_no_match_but_its_error_counts_up_to_a_metre(off_m, mota, rmse_m):
+    run = run_of()
+    result = scores(run, outputs_of(run, lambda number, truth: [
+        track(person + 1, truth.position_m[person] - (off_m, 0)) for person in (0, 1)]))
+    assert result['mota'] == pytest.approx(mota)
+    assert result['position_rmse_m'] == (None if rmse_m is None else pytest.approx(rmse_m))
+
+
+def test_errors_of_velocity_and_prediction_are_lengths_in_the_plane():
+    run = run_of()
+    result = scores(run, outputs_of(run, lambda _number, truth: [
+        track(person + 1, truth.position_m[person], VELOCITY_MPS + (0.3, 0.4)) for person in (0, 1)]))
+    assert result['velocity_rmse_mps'] == pytest.approx(0.5)
+    assert result['fde_1s_m'] == pytest.approx(0.5) and result['fde_2s_m'] == pytest.approx(1.0)
+    assert result['ade_1s_m'] == pytest.approx(0.375) and result['ade_2s_m'] == pytest.approx(0.625)
+
+
+def test_predictions_of_people_of_whom_nobody_knows_where_they_went_do_not_count():
+    run = run_of(future=False)
+    result = scores(run, outputs_of(run, right))
+    assert result['fde_2s_m'] is None and result['position_rmse_m'] == pytest.approx(0)
+
+
+@pytest.mark.parametrize('factor,coverage', [(1.0, 0.95), (0.25, 1 - np.exp(-5.991 * 0.25 / 2)), (100.0, 1.0)])
+def test_coverage_is_the_share_of_errors_within_the_ellipse(factor, coverage):
+    """`factor`: of the covariance that the track claims to that of its errors."""
+    random, run = np.random.RandomState(0), run_of(images=1500)
+    position_m2, velocity_m2 = np.array([[0.02, 0.01], [0.01, 0.03]]), np.array([[0.1, -0.02], [-0.02, 0.05]])
+    covariance = np.eye(6)
+    covariance[:2, :2], covariance[3:5, 3:5] = factor * position_m2, factor * velocity_m2
+    times_s = STEP_S * np.arange(1, 9)
+    prediction_m2 = np.tile(np.eye(3), (8, 1, 1))
+    prediction_m2[:, :2, :2] = factor * (position_m2 + times_s[:, None, None] ** 2 * velocity_m2)
+
+    def noisy(_number, truth):
+        return [track(person + 1, truth.position_m[person] + random.multivariate_normal((0, 0), position_m2),
+                      VELOCITY_MPS + random.multivariate_normal((0, 0), velocity_m2), (covariance, prediction_m2))
+                for person in (0, 1)]
+    result = scores(run, outputs_of(run, noisy))
+    for key in ('coverage_95_position', 'coverage_95_velocity', 'coverage_95_1s', 'coverage_95_2s'):
+        assert result[key] == pytest.approx(coverage, abs=0.025), key
+
+
+def test_runs_together_are_weighed_by_their_images():
+    one, three = run_of(), run_of(images=3 * IMAGES)
+    nothing = outputs_of(one, lambda _number, _truth: [])
+    result = scores_of([score_run(one, nothing), score_run(three, outputs_of(three, right))])
+    assert result['recall'] == pytest.approx(75) == result['mota']
+    assert score_run(one, nothing).errors.position_m.shape == (0, 2)
+
+
+def test_predictions_that_do_not_reach_two_seconds_are_refused():
+    run = run_of()
+    for steps, step_s in ((4, 0.25), (8, 0.3)):
+        with pytest.raises(ValueError, match='%d predictions %g s apart do not hold' % (steps, step_s)):
+            score_run(run, outputs_of(run, lambda _number, truth: [
+                track(1, truth.position_m[0], steps=steps, step_s=step_s)]))
+
+
+def test_without_trackeval_the_error_says_how_to_install_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, 'trackeval.metrics', None)
+    run = run_of()
+    with pytest.raises(ValueError, match='pip install --no-deps trackeval'):
+        score_run(run, outputs_of(run, right))
