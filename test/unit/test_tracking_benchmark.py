@@ -7,13 +7,17 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.evaluation.tracking import __main__ as command
-from ros_3d_bb.evaluation.tracking.benchmark import CONTESTANTS, compare, runs_of, table
+from ros_3d_bb.evaluation.tracking.benchmark import CONTESTANTS, compare, outputs_of, runs_of, table
+from ros_3d_bb.evaluation.tracking.detector import DOUBLE, FALSE
 from ros_3d_bb.evaluation.tracking.generator import simulate
 from ros_3d_bb.evaluation.tracking.library import Norfair
+from ros_3d_bb.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb.evaluation.tracking.original import OriginalTracker, as_it_arrived
+from ros_3d_bb.evaluation.tracking.perfect import outputs_with_perfect_association
 from ros_3d_bb.evaluation.tracking.robot import DRIVING
 from ros_3d_bb.evaluation.tracking.trajectories import made_sequences
 from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.thesis import ThesisTracker
 from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, Detection
 
 SCENARIOS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
@@ -95,9 +99,20 @@ def test_the_original_sees_detections_from_where_the_camera_is_when_they_arrive(
             assert np.allclose(np.linalg.inv(late.view.fixed_from_camera).dot(np.append(other.position_m, 1)), seen)
 
 
+def test_with_perfect_association_everybody_keeps_one_number_and_nobody_is_invented():
+    run = simulate(made_sequences(0, 20)[1], DRIVING, 0, seconds=2)
+    outputs = outputs_with_perfect_association(ThesisTracker, run)
+    bound = scores_of([score_run(run, outputs)])
+    plain = scores_of([score_run(run, outputs_of(ThesisTracker, run))])
+    assert bound['id_switches'] <= plain['id_switches'] and bound['idf1'] > plain['idf1']
+    assert bound['precision'] > 95
+    for image, things in zip(run.images, outputs):
+        assert len(set(thing.id for thing in things)) == len(things) >= len(set(image.sources) - {FALSE, DOUBLE})
+
+
 def test_all_trackers_get_the_same_runs_and_all_scores():
     runs, said = list(runs_of(made_sequences(0, 20)[:1], 0, 1, 2)), []
-    trackers = compare(runs, on_run=lambda run, scores: said.append((run.name, sorted(scores))))
+    trackers = compare(runs, CONTESTANTS, on_run=lambda run, scores: said.append((run.name, sorted(scores))))
     names = [contestant.name for contestant in CONTESTANTS]
     assert said == [(name, sorted(names)) for name in ('made_sparse_standing', 'made_sparse_driving')]
     for name in names:

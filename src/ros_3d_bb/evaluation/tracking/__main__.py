@@ -7,7 +7,7 @@ import json
 import os
 import sys
 
-from ros_3d_bb.evaluation.tracking.benchmark import compare, cpu_times, runs_of, table
+from ros_3d_bb.evaluation.tracking.benchmark import BOUND, CONTESTANTS, compare, cpu_times, runs_of, table
 from ros_3d_bb.evaluation.tracking.generator import SECONDS
 from ros_3d_bb.evaluation.tracking.scenes import compare_scenes
 from ros_3d_bb.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
@@ -35,8 +35,10 @@ def bench(arguments):
     names = [sequence.name for sequence in sequences]
     print('sequences: %s (%s), seed %d' % (', '.join(names), arguments.data or 'made; no recordings are at hand',
                                            arguments.seed), flush=True)
-    trackers = compare(runs_of(sequences, arguments.seed, arguments.repetitions, arguments.seconds), on_run=_say)
-    for name, times_ms in cpu_times().items():
+    contestants = CONTESTANTS + ((BOUND,) if arguments.bound else ())
+    runs = runs_of(sequences, arguments.seed, arguments.repetitions, arguments.seconds)
+    trackers = compare(runs, contestants, on_run=_say)
+    for name, times_ms in cpu_times(contestants).items():
         trackers[name]['cpu_ms'] = times_ms
     print('\n'.join(table(trackers)))
     return {'sequences': names, 'recorded': bool(arguments.data), 'seed': arguments.seed,
@@ -59,6 +61,8 @@ def _arguments():
     parser.add_argument('--repetitions', type=int, default=2, metavar='N',
                         help='runs of each sequence, standing and driving each (default: 2)')
     parser.add_argument('--seconds', type=float, default=SECONDS, help='length of a run (default: %g)' % SECONDS)
+    parser.add_argument('--bound', action='store_true',
+                        help='also our tracker when it is told whose each detection is: no association is better')
     parser.add_argument('--scenarios', nargs='+', metavar='FILE', help='instead: the whole pipeline on rendered scenes')
     parser.add_argument('--weights', help='of YOLOv5, for --scenarios; without, the weight-free detector')
     parser.add_argument('--json', metavar='FILE', help='also write the scores there')

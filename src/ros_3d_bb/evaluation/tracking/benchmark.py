@@ -5,6 +5,7 @@ from ros_3d_bb.evaluation.tracking.generator import SECONDS, simulate
 from ros_3d_bb.evaluation.tracking.library import Norfair
 from ros_3d_bb.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb.evaluation.tracking.original import OriginalTracker, as_it_arrived
+from ros_3d_bb.evaluation.tracking.perfect import outputs_with_perfect_association
 from ros_3d_bb.evaluation.tracking.robot import DRIVING, STANDING
 from ros_3d_bb.evaluation.tracking.timing import PEOPLE, cpu_ms
 from ros_3d_bb.tracking.thesis import ThesisTracker
@@ -18,16 +19,24 @@ ROWS = (('hota', '%.1f'), ('assa', '%.1f'), ('deta', '%.1f'), ('mota', '%.1f'), 
 
 
 class Contestant(NamedTuple):
-    """A tracker to be compared: its name in the results, what makes one, and what it sees of a run."""
+    """A tracker to be compared: its name in the results, what makes one, and `outputs`, which lets one follow a run."""
 
     name: str
     make: Any
-    view_of_run: Any = staticmethod(lambda run: run)
+    outputs: Any
+
+
+def outputs_of(make_tracker, run):
+    """What a tracker publishes after each image of a run."""
+    tracker = make_tracker()
+    return [tracker.update(image.stamp_ns, image.detections, image.view) for image in run.images]
 
 
 # `thesis` is the tracker that ships with the package, `thesis_original` the one that the thesis' own package ran.
-CONTESTANTS = (Contestant('ours', Tracker), Contestant('thesis', ThesisTracker),
-               Contestant('thesis_original', OriginalTracker, as_it_arrived), Contestant('library', Norfair))
+CONTESTANTS = (Contestant('ours', Tracker, outputs_of), Contestant('thesis', ThesisTracker, outputs_of),
+               Contestant('thesis_original', OriginalTracker, lambda make, run: outputs_of(make, as_it_arrived(run))),
+               Contestant('library', Norfair, outputs_of))
+BOUND = Contestant('perfect_association', Tracker, outputs_with_perfect_association)
 
 
 def runs_of(sequences, seed, repetitions, seconds=SECONDS):
@@ -38,14 +47,7 @@ def runs_of(sequences, seed, repetitions, seconds=SECONDS):
                 yield simulate(sequence, motion, (seed, repetition), seconds=seconds)
 
 
-def outputs_of(contestant, run):
-    """What a tracker publishes after each image of a run."""
-    tracker = contestant.make()
-    return [tracker.update(image.stamp_ns, image.detections, image.view)
-            for image in contestant.view_of_run(run).images]
-
-
-def compare(runs, contestants=CONTESTANTS, on_run=None):
+def compare(runs, contestants, on_run=None):
     """The scores of design §8 of each tracker, but for `cpu_ms`; {name: scores}.
 
     Parameters
@@ -63,13 +65,13 @@ def compare(runs, contestants=CONTESTANTS, on_run=None):
     scores = {contestant.name: [] for contestant in contestants}
     for run in runs:
         for contestant in contestants:
-            scores[contestant.name].append(score_run(run, outputs_of(contestant, run)))
+            scores[contestant.name].append(score_run(run, contestant.outputs(contestant.make, run)))
         if on_run is not None:
             on_run(run, {name: scores_of(run_scores[-1:]) for name, run_scores in scores.items()})
     return {name: scores_of(run_scores) for name, run_scores in scores.items()}
 
 
-def cpu_times(contestants=CONTESTANTS):
+def cpu_times(contestants):
     """Median CPU time of an update in milliseconds, {name: {number of people as text: time}}."""
     return {contestant.name: {'%d' % people: cpu_ms(contestant.make, people) for people in PEOPLE}
             for contestant in contestants}
@@ -77,9 +79,9 @@ def cpu_times(contestants=CONTESTANTS):
 
 def table(trackers):
     """The scores {name: scores} as lines of text."""
-    lines = ['%-22s' % '' + ''.join('%17s' % name for name in trackers)]
+    lines = ['%-22s' % '' + ''.join('%20s' % name for name in trackers)]
     rows = [(key, [form % scores[key] if scores[key] is not None else '-' for scores in trackers.values()])
             for key, form in ROWS]
     rows += [('cpu_ms, %s people' % people, ['%.2f' % scores['cpu_ms'][people] for scores in trackers.values()])
              for people in list(trackers.values())[0]['cpu_ms']]
-    return lines + ['%-22s' % key + ''.join('%17s' % value for value in values) for key, values in rows]
+    return lines + ['%-22s' % key + ''.join('%20s' % value for value in values) for key, values in rows]
