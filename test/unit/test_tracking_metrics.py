@@ -149,6 +149,12 @@ def test_runs_together_are_weighed_by_their_images():
     assert score_run(one, nothing).errors.position_m.shape == (0, 2)
 
 
+def test_where_nobody_is_visible_and_nothing_is_tracked_there_is_no_score_but_no_failure_either():
+    run = run_of((OUT_OF_VIEW, OCCLUDED))
+    result = scores(run, outputs_of(run, lambda _number, _truth: []))
+    assert (result['id_switches'], result['position_rmse_m']) == (0, None)
+
+
 def test_predictions_that_do_not_reach_two_seconds_are_refused():
     run = run_of()
     for steps, step_s in ((4, 0.25), (8, 0.3)):

@@ -55,6 +55,11 @@ def test_a_long_gap_makes_two_people_and_a_short_one_does_not(tmp_path):
         assert len(read_sequence(csv_file(tmp_path, walk(times_s))).pedestrians) == people
 
 
+def test_the_mark_that_spreadsheets_put_in_front_is_read_over(tmp_path):
+    path = csv_file(tmp_path, walk(), header='\ufefft_s,id,x_m,y_m')
+    assert len(read_sequence(path).pedestrians) == 1
+
+
 def test_points_without_a_position_and_second_points_of_a_time_do_not_count(tmp_path):
     rows = walk() + [(0.2, 1, 'nan', 3), (0.4, 1, 99, 99)]
     person, = read_sequence(csv_file(tmp_path, rows)).pedestrians

@@ -69,7 +69,7 @@ def read_sequence(path):
     OSError
         If there is no such file.
     """
-    with open(path, newline='', encoding='utf-8') as stream:
+    with open(path, newline='', encoding='utf-8-sig') as stream:
         reader = csv.DictReader(stream)
         if not set(COLUMNS) <= set(reader.fieldnames or ()):
             raise ValueError('%s has the columns %s; %s expected'
