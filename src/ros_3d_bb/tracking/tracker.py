@@ -25,8 +25,7 @@ TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4))
 LATEST_NS = NS // 2  # images that come later than others by more are refused
 RECENT_NS = 7 * NS // 10  # who was seen so recently comes before those who were away
 LOST_M = 2.4  # who may be anywhere within this (standard deviation) is forgotten
-FIRST_TRY_S, TRIES_S = 0.15, 0.4  # how long a track that was seen once, or a few times, waits to be seen again
-TRIES = 4  # for so many images at least
+TRIES_S = 0.6  # how long a track that is not confirmed yet waits to be seen again
 TAKEN_NS = NS // 5  # nobody new begins near somebody seen so recently
 HIDING_S = 0.3  # who was missed for longer hides nobody
 SMOOTHING = 0.1  # share of the newest sighting in size and height
@@ -164,7 +163,7 @@ class Tracker(object):
         rows, columns = self._associate(tracks, sightings, image.stamp_ns)
         self._see(tracks, rows, _taken(sightings, columns), image.stamp_ns)
         self._miss(tracks, np.setdiff1d(np.arange(len(tracks)), rows), image.view, looked_s)
-        tracks = tracks[self._is_remembered(tracks, looked_s)]
+        tracks = tracks[self._is_remembered(tracks)]
         others = np.setdiff1d(np.arange(len(image.detections)), columns)
         tracks = np.concatenate((tracks, self._newcomers(tracks, _taken(sightings, others), others, image)))
         return _State(tracks, image.stamp_ns, skipped_ns)
@@ -212,12 +211,10 @@ class Tracker(object):
         tracks['missed_s'][rows] += np.where(places == VISIBLE, looked_s, 0)
         tracks['status'][rows] = np.where(places == VISIBLE, OCCLUDED, places)
 
-    def _is_remembered(self, tracks, looked_s):
+    def _is_remembered(self, tracks):
         """Which tracks are kept; those that are not confirmed yet only for a few more tries."""
-        unseen_s = tracks['unseen_s']
-        known = (unseen_s < self._params.memory) & (_sigma(tracks) < LOST_M)
-        tried_s = np.where(tracks['sightings'] > 1, TRIES_S, FIRST_TRY_S)
-        return np.where(tracks['confirmed'], known, unseen_s < np.maximum(tried_s, (TRIES + 0.5) * looked_s))
+        limit_s = np.where(tracks['confirmed'], self._params.memory, TRIES_S)
+        return (tracks['unseen_s'] < limit_s) & (_sigma(tracks) < LOST_M)
 
     def _newcomers(self, tracks, sightings, columns, image):
         """Tracks of sightings that belong to nobody and do not double anybody."""
