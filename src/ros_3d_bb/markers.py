@@ -1,31 +1,74 @@
-"""Tracks as RViz markers, drawn as in the thesis (Fig. 4.1)."""
+"""Tracks as RViz markers: the thesis' cylinders and arrows (Fig. 4.1), and what is known beyond them."""
+import functools
+from typing import NamedTuple
+
 import genpy
 import numpy as np
 from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-CYLINDER, ID, VELOCITY, PREDICTION = NAMESPACES = ('cylinder', 'id', 'velocity', 'prediction')
-BLUE = ColorRGBA(0.1, 0.3, 1.0, 0.5)
-GREEN = ColorRGBA(0.1, 0.9, 0.2, 1.0)
-RED = ColorRGBA(0.95, 0.1, 0.1, 1.0)
+from ros_3d_bb.params import check_not_negative, nearest_name
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
+
+CYLINDER, ID, VELOCITY, PREDICTION, HISTORY, ELLIPSE, PREDICTION_ELLIPSE = NAMESPACES = (
+    'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse', 'prediction_ellipse')
+BLUE, GREEN, RED = (0.1, 0.3, 1.0), (0.1, 0.9, 0.2), (0.95, 0.1, 0.1)
+AMBER, GREY, WHITE = (1.0, 0.65, 0.1), (0.65, 0.65, 0.65), (0.95, 0.95, 0.95)
+# Neighbours differ most. None is red, green or grey: those are the arrows', and of what is not seen.
+PALETTE = ((0.15, 0.4, 1.0), (1.0, 0.6, 0.1), (0.9, 0.35, 0.9), (0.1, 0.8, 0.85), (0.95, 0.9, 0.25),
+           (0.55, 0.3, 0.95), (1.0, 0.6, 0.65), (0.6, 0.8, 1.0), (0.7, 0.45, 0.2), (0.75, 0.65, 1.0))
+STATUS_COLORS = {VISIBLE: BLUE, OCCLUDED: AMBER, OUT_OF_VIEW: GREY}
+COLORS = {'id': lambda track: PALETTE[(track.id - 1) % len(PALETTE)],
+          'status': lambda track: STATUS_COLORS[track.status],
+          'thesis': lambda _track: BLUE}
+TEXT_COLORS = {'id': WHITE, 'status': WHITE, 'thesis': GREEN}
 VELOCITY_SHOWN_S = 1.0  # the velocity arrow ends where the object would be after so long
 SHORTEST_ARROW_M = 0.05  # RViz cannot orient an arrow without length
+# Shaft and head. Where both point the same way, the thin one looks out of the tip of the thick one.
+VELOCITY_WIDTHS_M, PREDICTION_WIDTHS_M = (0.07, 0.14), (0.04, 0.11)
+CHI2_95 = 5.991  # squared axes of the ellipse in standard deviations: 95 % of chi squared with 2 degrees of freedom
+CIRCLE = np.array([(np.cos(angle), np.sin(angle)) for angle in np.linspace(0, 2 * np.pi, 25)])
+ELLIPSES_EVERY_S = 0.5  # of the prediction
+ABOVE_FLOOR_M = 0.02  # lines on the floor would flicker in its grid
+HISTORY_POINTS, HISTORY_SPACING_S = 100, 0.1  # at most so many, and not closer than that
+
+
+class MarkerParams(NamedTuple):
+    """See config/tracker.yaml."""
+
+    marker_namespaces: list = NAMESPACES[:-1]
+    marker_color: str = 'id'
+    marker_history: float = 4.0
+    marker_lifetime: float = 2.0
 
 
 class MarkerWriter(object):
     """Draws tracks, one namespace for each kind of marker and the track's id as the marker's.
 
     A marker is replaced in place while its track lives and deleted when it ends; where no news comes at all, RViz
-    removes it after `lifetime_s` (0: never).
+    removes it after the lifetime (0: never).
+
+    Raises
+    ------
+    ValueError
+        If a parameter makes no sense; names it.
     """
 
-    def __init__(self, lifetime_s):
-        self._lifetime = genpy.Duration.from_sec(lifetime_s)
-        self._drawn = set()
+    def __init__(self, params=MarkerParams()):
+        _check(params)
+        self._params = params
+        self._lifetime = genpy.Duration.from_sec(params.marker_lifetime)
+        shapes = {CYLINDER: self._cylinder, ID: self._number, VELOCITY: self._velocity, PREDICTION: self._prediction,
+                  HISTORY: self._history, ELLIPSE: self._ellipse, PREDICTION_ELLIPSE: self._prediction_ellipses}
+        self._shapes = [(namespace, shapes[namespace]) for namespace in NAMESPACES
+                        if namespace in params.marker_namespaces]
+        self._drawn = set()  # (namespace, id)
+        self._histories = {}  # id: [(stamp_ns, Point)], oldest first
 
     def write(self, tracks, header):
-        """The markers for one image: a blue cylinder, the id above it, a red velocity and a green prediction arrow.
+        """The markers for one image.
 
         Parameters
         ----------
@@ -37,36 +80,128 @@ class MarkerWriter(object):
         -------
         visualization_msgs.msg.MarkerArray
         """
-        self._header = header
-        markers = [marker for track in tracks for marker in self._track(track)]
-        alive = set(track.id for track in tracks)
-        for track_id in sorted(self._drawn - alive):
-            markers += [self._marker(namespace, track_id, action=Marker.DELETE) for namespace in NAMESPACES]
-        self._drawn = alive
+        now_ns = header.stamp.to_nsec()
+        self._histories = {track.id: self._walked(track, now_ns) for track in tracks}
+        markers = []
+        for track in tracks:
+            for namespace, shape in self._shapes:
+                marker = Marker(header=header, ns=namespace, id=track.id, lifetime=self._lifetime)
+                marker.pose.orientation.w = 1.0
+                if shape(marker, track):
+                    markers.append(marker)
+        drawn = set((marker.ns, marker.id) for marker in markers)
+        markers += [Marker(header=header, ns=namespace, id=number, action=Marker.DELETE)
+                    for namespace, number in sorted(self._drawn - drawn)]
+        self._drawn = drawn
         return MarkerArray(markers=markers)
 
-    def _track(self, track):
-        cylinder = self._marker(CYLINDER, track.id, type=Marker.CYLINDER, color=BLUE)
-        cylinder.pose.position = Point(*track.position_m)
-        cylinder.scale.x, cylinder.scale.y, cylinder.scale.z = track.size_m
-        text = self._marker(ID, track.id, type=Marker.TEXT_VIEW_FACING, color=GREEN, text=str(track.id))
-        text.pose.position = Point(*(track.position_m + [0, 0, track.size_m[2] / 2 + 0.2]))
-        text.scale.z = 0.35
-        velocity_end = track.position_m + VELOCITY_SHOWN_S * track.instant_velocity_mps
-        prediction_end = track.prediction_m[-1] if len(track.prediction_m) else track.position_m
-        return [cylinder, text, self._arrow(VELOCITY, track, velocity_end, RED),
-                self._arrow(PREDICTION, track, prediction_end, GREEN)]
+    def _walked(self, track, now_ns):
+        """Where a track was on the floor, and is; what is later than now is from before a jump in time."""
+        oldest_ns = now_ns - int(self._params.marker_history * NS)
+        walked = [entry for entry in self._histories.get(track.id, ()) if oldest_ns <= entry[0] < now_ns]
+        spacing_s = max(HISTORY_SPACING_S, self._params.marker_history / HISTORY_POINTS)
+        if len(walked) > 1 and walked[-1][0] - walked[-2][0] < spacing_s * NS:
+            walked.pop()
+        return walked + [(now_ns, Point(*_foot(track)))]
 
-    def _arrow(self, namespace, track, end, color):
-        """From the centre of the object to `end`; removed where it has no length."""
-        if np.linalg.norm(end - track.position_m) < SHORTEST_ARROW_M:
-            return self._marker(namespace, track.id, action=Marker.DELETE)
-        arrow = self._marker(namespace, track.id, type=Marker.ARROW, color=color)
-        arrow.points = [Point(*track.position_m), Point(*end)]
-        arrow.scale.x, arrow.scale.y = 0.06, 0.14
-        return arrow
+    # Each shape fills in a marker and says whether there is anything to draw.
 
-    def _marker(self, namespace, track_id, **fields):
-        marker = Marker(header=self._header, ns=namespace, id=track_id, lifetime=self._lifetime, **fields)
-        marker.pose.orientation.w = 1.0
-        return marker
+    def _cylinder(self, marker, track):
+        marker.type, marker.color = Marker.CYLINDER, _color(self._rgb(track), 0.65 if _seen(track) else 0.2)
+        marker.pose.position = Point(*track.position_m)
+        marker.scale.x, marker.scale.y, marker.scale.z = track.size_m
+        return True
+
+    def _number(self, marker, track):
+        marker.type, marker.scale.z = Marker.TEXT_VIEW_FACING, 0.35
+        marker.pose.position = Point(*(track.position_m + [0, 0, track.size_m[2] / 2 + 0.2]))
+        marker.text = '%d' % track.id if _seen(track) else '%d?' % track.id
+        marker.color = _color(TEXT_COLORS[self._params.marker_color] if _seen(track) else GREY, 1.0)
+        return True
+
+    def _velocity(self, marker, track):
+        end_m = track.position_m + VELOCITY_SHOWN_S * track.instant_velocity_mps
+        return _fill_arrow(marker, track, end_m, RED, VELOCITY_WIDTHS_M)
+
+    def _prediction(self, marker, track):
+        end_m = track.prediction_m[-1] if len(track.prediction_m) else track.position_m
+        return _fill_arrow(marker, track, end_m, GREEN, PREDICTION_WIDTHS_M)
+
+    def _history(self, marker, track):
+        walked = self._histories[track.id]
+        if len(walked) < 2:
+            return False
+        marker.type, marker.scale.x = Marker.LINE_STRIP, 0.05
+        rgb, now_ns, fading = self._rgb(track), walked[-1][0], 0.85 / (self._params.marker_history * NS)
+        marker.color = _color(rgb, 0.9)  # not 1: RViz would draw the whole line opaque
+        marker.points = [point for _stamp_ns, point in walked]
+        marker.colors = [_color(rgb, round(0.9 - fading * (now_ns - stamp_ns), 2)) for stamp_ns, _point in walked]
+        return True
+
+    def _ellipse(self, marker, track):
+        if track.covariance is None:
+            return False
+        marker.type, marker.scale.x, marker.color = Marker.LINE_STRIP, 0.03, _color(self._rgb(track), 0.9)
+        marker.points, = _ellipses(track.covariance[np.newaxis, :2, :2], _foot(track)[np.newaxis])
+        return True
+
+    def _prediction_ellipses(self, marker, track):
+        if track.prediction_covariance_m2 is None or not len(track.prediction_m):
+            return False
+        stride = max(int(round(ELLIPSES_EVERY_S / track.prediction_step_s)), 1)
+        shown = np.s_[stride - 1::stride]
+        feet_m = track.prediction_m[shown] - track.position_m + _foot(track)
+        marker.type, marker.scale.x, marker.color = Marker.LINE_LIST, 0.015, _color(GREEN, 0.6)
+        for outline in _ellipses(track.prediction_covariance_m2[shown, :2, :2], feet_m):
+            marker.points += [point for ends in zip(outline, outline[1:]) for point in ends]
+        return bool(marker.points)
+
+    def _rgb(self, track):
+        return COLORS[self._params.marker_color](track)
+
+
+def _check(params):
+    check_not_negative(params, 'marker_lifetime', 'marker_history')
+    if params.marker_color not in COLORS:
+        raise ValueError('parameter ~marker_color is %r; %s expected' % (params.marker_color, ', '.join(COLORS)))
+    for name in params.marker_namespaces:
+        if name not in NAMESPACES:
+            raise ValueError('parameter ~marker_namespaces has %r; did you mean %s? Known: %s'
+                             % (name, nearest_name(str(name), NAMESPACES), ', '.join(NAMESPACES)))
+
+
+def _seen(track):
+    return track.status == VISIBLE
+
+
+def _foot(track):
+    """Where a track stands, just above the floor."""
+    return track.position_m - [0, 0, track.size_m[2] / 2 - ABOVE_FLOOR_M]
+
+
+def _fill_arrow(marker, track, end_m, rgb, widths_m):
+    """From the centre of the object to `end_m`."""
+    marker.type, marker.color = Marker.ARROW, _color(rgb, 1.0 if _seen(track) else 0.4)
+    marker.points = [Point(*track.position_m), Point(*end_m)]
+    marker.scale.x, marker.scale.y = widths_m
+    return np.linalg.norm(end_m - track.position_m) >= SHORTEST_ARROW_M
+
+
+def _ellipses(covariances_m2, centers_m):
+    """Outlines, closed, of the ellipses that hold 95 % of planar covariances (n, 2, 2), around centres (n, 3).
+
+    Returns
+    -------
+    list of list of geometry_msgs.msg.Point
+    """
+    variances_m2, axes = np.linalg.eigh(covariances_m2)
+    semi_axes_m = np.sqrt(CHI2_95 * np.maximum(variances_m2, 0))
+    around_m = np.matmul(CIRCLE * semi_axes_m[:, np.newaxis], axes.transpose(0, 2, 1))
+    outlines_m = (around_m + centers_m[:, np.newaxis, :2]).tolist()
+    return [[Point(x, y, z) for x, y in outline_m] for outline_m, z in zip(outlines_m, centers_m[:, 2].tolist())]
+
+
+@functools.lru_cache(maxsize=None)
+def _color(rgb, alpha):
+    """Markers share their colours: there are few, and nobody changes them."""
+    return ColorRGBA(*(rgb + (alpha,)))

@@ -63,20 +63,20 @@ def rig():
 
 
 @pytest.fixture(scope='module')
-def recorders(rig):
-    with Recorder('ros_3d_bb/tracks', TrackedObjectArray) as tracks, \
-            Recorder('visualization_marker_array', MarkerArray) as markers:
-        yield tracks, markers
+def tracks_recorder(rig):
+    with Recorder('ros_3d_bb/tracks', TrackedObjectArray) as tracks:
+        yield tracks
 
 
 @pytest.fixture
-def tracks(recorders):
-    return recorders[0].emptied()
+def tracks(tracks_recorder):
+    return tracks_recorder.emptied()
 
 
 @pytest.fixture
-def markers(recorders):
-    return recorders[1].emptied()
+def markers(rig):
+    with Recorder('visualization_marker_array', MarkerArray) as markers:
+        yield markers
 
 
 @pytest.fixture
@@ -154,25 +154,39 @@ def test_tracks_end_after_the_limit_and_their_markers_are_deleted(rig, tracks, m
     assert messages[10].objects[0].status == TrackedObject.OCCLUDED
     deleted = [marker for marker in markers.wait_for(14)[-1].markers if marker.action == Marker.DELETE]
     assert sorted((marker.ns, marker.id) for marker in deleted) == [
-        (namespace, number) for namespace in ('cylinder', 'id', 'prediction', 'velocity')]
+        (namespace, number) for namespace in ('cylinder', 'ellipse', 'history', 'id')]
 
 
-def test_markers_are_those_of_the_thesis(rig, markers, tracks, now):
-    """A translucent blue cylinder, its green number above, a red velocity and a green prediction arrow."""
+def test_markers_are_made_only_while_somebody_subscribes(rig, tracks, now):
+    """The writer keeps the histories: none is there when it is asked for the first time in 5 s."""
+    for frame in range(50):
+        rig.send(now + frame * PERIOD, (0.0, 0.0, 3.0))
+        tracks.wait_for(frame + 1)
+    with Recorder('visualization_marker_array', MarkerArray) as markers:
+        for frame in range(50, 52):
+            rig.send(now + frame * PERIOD, (0.0, 0.0, 3.0))
+            message = markers.wait_for(frame - 49)[-1]
+            assert ('history' in [marker.ns for marker in message.markers]) == (frame > 50)
+
+
+def test_markers_are_those_of_the_thesis_and_more(rig, markers, tracks, now):
+    """A translucent cylinder, its number above, a red velocity and a green prediction arrow; history and ellipse."""
     for frame in range(20):
         rig.send(now + frame * PERIOD, (0.0, 0.1, 2.0 + 0.1 * frame))
         tracks.wait_for(frame + 1)
     number = tracks.wait_for(20)[-1].objects[0].id
     drawn = {marker.ns: marker for marker in markers.wait_for(20)[-1].markers}
-    assert set(drawn) == {'cylinder', 'id', 'velocity', 'prediction'}
+    assert set(drawn) == {'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse'}
     for marker in drawn.values():
         assert marker.id == number and marker.action == Marker.ADD and marker.header.frame_id == 'map'
         assert marker.header.stamp == time_from(now + 19 * PERIOD) and marker.pose.orientation.w == 1.0
     cylinder, text = drawn['cylinder'], drawn['id']
-    assert cylinder.type == Marker.CYLINDER and cylinder.color.b == 1.0 and 0.2 < cylinder.color.a < 0.8
+    assert cylinder.type == Marker.CYLINDER and 0.2 < cylinder.color.a < 0.8
     assert (cylinder.scale.x, cylinder.scale.y, cylinder.scale.z) == pytest.approx((0.5, 0.5, 1.7))
     assert text.type == Marker.TEXT_VIEW_FACING and text.text == str(number) and text.color.g > 0.8
     assert text.pose.position.z > cylinder.pose.position.z + cylinder.scale.z / 2
+    assert drawn['history'].points[0].x == pytest.approx(2.3, abs=0.1)  # the fourth image, when the track began
+    assert drawn['history'].points[-1].x == pytest.approx(cylinder.pose.position.x)
     red, green = drawn['velocity'], drawn['prediction']
     assert red.type == green.type == Marker.ARROW and red.color.r > 0.8 and green.color.g > 0.8
     assert red.points[1].x - red.points[0].x == pytest.approx(1.0, abs=0.05)

@@ -1,59 +1,240 @@
-"""Markers: the same ones in place while a track lives, gone when it ends."""
+"""Markers: what each kind shows; the same ones in place while a track lives, gone when it ends."""
 import numpy as np
 import pytest
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
-from ros_3d_bb.markers import NAMESPACES, MarkerWriter
+from ros_3d_bb.markers import HISTORY_POINTS, NAMESPACES, PALETTE, MarkerParams, MarkerWriter
 from ros_3d_bb.messages import time_from
-from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject
 
-HEADER = Header(stamp=time_from(7), frame_id='map')
+ALL = MarkerParams(marker_namespaces=list(NAMESPACES))
+SECOND_NS = 1000 * NS
 
 
-def track(number, velocity=(1.0, 0.0, 0.0), steps=8):
-    position, velocity = np.array([2.0, 1.0, 0.9]), np.array(velocity)
+def header(stamp_ns=SECOND_NS):
+    return Header(stamp=time_from(stamp_ns), frame_id='map')
+
+
+def track(number, velocity=(1.0, 0.0, 0.0), steps=8, variances=(0.04, 0.01), turn=0.0, status=VISIBLE,
+          position=(2.0, 1.0, 0.9)):
+    """A track at (2, 1), 1.7 m high, whose covariance has these variances along axes turned by so many radians."""
+    position, velocity = np.array(position), np.array(velocity)
     prediction = position + np.arange(1, steps + 1)[:, None] * 0.25 * velocity
-    return TrackedObject(number, position, np.array([0.5, 0.5, 1.7]), velocity, velocity, VISIBLE, True, 0, 7,
-                         prediction, 0.25)
+    covariance = predicted = None
+    if variances:
+        axes = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+        covariance = np.zeros((6, 6))
+        covariance[:3, :3] = axes.dot(np.diag(variances + (0.01,))).dot(axes.T)
+        predicted = np.array([step * covariance[:3, :3] for step in range(1, steps + 1)]).reshape(-1, 3, 3)
+    return TrackedObject(number, position, np.array([0.5, 0.5, 1.7]), velocity, velocity, status, True, 0, 7,
+                         prediction, 0.25, covariance, predicted)
 
 
 def keys(markers, action=Marker.ADD):
     return [(marker.ns, marker.id) for marker in markers.markers if marker.action == action]
 
 
+def drawn(tracks, params=ALL, times=2):
+    """The last markers of a writer, by namespace and id, after so many images of the same tracks."""
+    writer = MarkerWriter(params)
+    for image in range(times):
+        message = writer.write(tracks, header(SECOND_NS + image * NS // 10))
+    return {(marker.ns, marker.id): marker for marker in message.markers if marker.action == Marker.ADD}
+
+
+def xyz(points):
+    return np.array([(point.x, point.y, point.z) for point in points])
+
+
+def rgb(color):
+    return color.r, color.g, color.b
+
+
 def test_each_track_has_one_marker_in_each_namespace():
-    markers = MarkerWriter(2.0).write([track(3), track(5)], HEADER)
+    writer = MarkerWriter(ALL)
+    writer.write([track(3), track(5)], header())
+    markers = writer.write([track(3), track(5)], header(SECOND_NS + NS))
     assert sorted(keys(markers)) == sorted((namespace, number) for namespace in NAMESPACES for number in (3, 5))
-    assert all(marker.header == HEADER and marker.lifetime.to_sec() == 2.0 for marker in markers.markers)
+    assert all(marker.header == header(SECOND_NS + NS) and marker.lifetime.to_sec() == 2.0
+               for marker in markers.markers)
+
+
+def test_only_the_namespaces_asked_for_are_made():
+    assert set(drawn([track(1)], ALL._replace(marker_namespaces=['id', 'ellipse']))) == {('id', 1), ('ellipse', 1)}
+    assert drawn([track(1)], ALL._replace(marker_namespaces=[])) == {}
+    assert set(name for name, _id in drawn([track(1)], MarkerParams())) == set(NAMESPACES) - {'prediction_ellipse'}
 
 
 def test_markers_of_a_living_track_are_replaced_and_never_deleted():
-    writer = MarkerWriter(0.0)
-    first, second = writer.write([track(1)], HEADER), writer.write([track(1)], HEADER)
-    assert keys(first) == keys(second) and keys(second, Marker.DELETE) == []
+    writer = MarkerWriter(MarkerParams(marker_lifetime=0.0))
+    writer.write([track(1)], header())
+    second, third = (writer.write([track(1)], header(SECOND_NS + image * NS)) for image in (1, 2))
+    assert keys(second) == keys(third) and keys(third, Marker.DELETE) == []
 
 
 def test_markers_of_an_ended_track_are_deleted_once():
-    writer = MarkerWriter(2.0)
-    writer.write([track(1), track(2)], HEADER)
-    assert sorted(keys(writer.write([track(2)], HEADER), Marker.DELETE)) == [(name, 1) for name in sorted(NAMESPACES)]
-    assert keys(writer.write([track(2)], HEADER), Marker.DELETE) == []
+    writer = MarkerWriter(ALL)
+    for image in range(2):
+        writer.write([track(1), track(2)], header(SECOND_NS + image * NS))
+    gone = writer.write([track(2)], header(SECOND_NS + 2 * NS))
+    assert sorted(keys(gone, Marker.DELETE)) == [(name, 1) for name in sorted(NAMESPACES)]
+    assert keys(writer.write([track(2)], header(SECOND_NS + 3 * NS)), Marker.DELETE) == []
 
 
-def test_an_object_that_stands_has_no_arrows():
-    markers = MarkerWriter(2.0).write([track(1, (0.0, 0.0, 0.0))], HEADER)
-    assert keys(markers) == [('cylinder', 1), ('id', 1)]
-    assert sorted(keys(markers, Marker.DELETE)) == [('prediction', 1), ('velocity', 1)]
+def test_an_object_that_stops_loses_its_arrows():
+    writer = MarkerWriter(ALL)
+    writer.write([track(1)], header())
+    markers = writer.write([track(1, (0.0, 0.0, 0.0))], header(SECOND_NS + NS))
+    assert keys(markers, Marker.DELETE) == [('prediction', 1), ('velocity', 1)]
+    assert not {'prediction', 'velocity'} & set(name for name, _id in keys(markers))
 
 
 def test_a_track_without_prediction_is_drawn():
-    markers = MarkerWriter(2.0).write([track(1, steps=0)], HEADER)
-    assert ('prediction', 1) not in keys(markers) and ('velocity', 1) in keys(markers)
+    names = set(name for name, _id in drawn([track(1, steps=0)]))
+    assert names == set(NAMESPACES) - {'prediction', 'prediction_ellipse'}
 
 
 def test_arrows_end_where_the_object_is_after_one_and_two_seconds():
-    drawn = {marker.ns: marker for marker in MarkerWriter(2.0).write([track(1, (0.5, -1.0, 0.0))], HEADER).markers}
+    markers = drawn([track(1, (0.5, -1.0, 0.0))])
     for namespace, end in (('velocity', (2.5, 0.0)), ('prediction', (3.0, -1.0))):
-        start, tip = drawn[namespace].points
+        start, tip = markers[namespace, 1].points
         assert (start.x, start.y, start.z) == (2.0, 1.0, 0.9) and (tip.x, tip.y) == pytest.approx(end)
+
+
+def test_a_tracker_without_covariance_has_no_ellipses():
+    names = set(name for name, _id in drawn([track(1, variances=None)]))
+    assert names == set(NAMESPACES) - {'ellipse', 'prediction_ellipse'}
+
+
+@pytest.mark.parametrize('turn', [0.0, 0.4, 2.0, -1.2])
+def test_the_ellipse_has_the_axes_and_the_direction_of_the_covariance(turn):
+    """The 95 % quantile of chi squared with 2 degrees of freedom is 5.991: axes of 2.448 standard deviations."""
+    ellipse = drawn([track(1, variances=(0.04, 0.01), turn=turn)])['ellipse', 1]
+    around = xyz(ellipse.points) - (2.0, 1.0, 0.05)
+    assert ellipse.type == Marker.LINE_STRIP and ellipse.pose.orientation.w == 1.0
+    assert around[0] == pytest.approx(around[-1]) and np.ptp(around[:, 2]) == 0  # closed, on the floor
+    assert 0 < around[0, 2] < 0.05
+    distances = np.linalg.norm(around[:, :2], axis=1)
+    assert (distances.max(), distances.min()) == pytest.approx((0.2 * 2.448, 0.1 * 2.448), rel=1e-3)
+    far = around[distances.argmax(), :2] / distances.max()
+    assert abs(far.dot([np.cos(turn), np.sin(turn)])) == pytest.approx(1, abs=1e-6)
+
+
+def test_the_prediction_has_an_ellipse_at_each_half_second():
+    """The covariance grows with each step of 0.25 s; the outlines are closed, one after the other."""
+    marker = drawn([track(1, (1.0, 0.0, 0.0), variances=(0.01, 0.01))])['prediction_ellipse', 1]
+    outlines = xyz(marker.points).reshape(4, -1, 3)
+    assert marker.type == Marker.LINE_LIST
+    for second, steps, outline in zip((0.5, 1.0, 1.5, 2.0), (2, 4, 6, 8), outlines):
+        radii = np.linalg.norm(outline[:, :2] - (2.0 + second, 1.0), axis=1)
+        assert radii == pytest.approx(np.full(len(radii), 0.1 * 2.448 * np.sqrt(steps)), rel=1e-3)
+        assert outline[0] == pytest.approx(outline[-1])
+        assert (outline[1:-1:2] == outline[2::2]).all()
+
+
+def test_an_ellipse_without_width_is_drawn_as_a_line():
+    around = xyz(drawn([track(1, variances=(0.04, 0.0))])['ellipse', 1].points)
+    assert np.isfinite(around).all() and around[:, 1] == pytest.approx(np.ones(len(around)))
+
+
+def walked(writer, images, period_s=0.1, start_ns=SECOND_NS, number=1):
+    """The history after a walk along x at 1 m/s, one image each period."""
+    for image in range(images):
+        moment = image * period_s
+        message = writer.write([track(number, position=(moment, 0.0, 0.85))], header(start_ns + int(moment * NS)))
+    return {marker.ns: marker for marker in message.markers if marker.action == Marker.ADD}.get('history')
+
+
+def test_the_history_is_the_way_walked_and_fades_with_age():
+    history = walked(MarkerWriter(MarkerParams(marker_history=4.0)), 101)
+    points, alphas = xyz(history.points), np.array([color.a for color in history.colors])
+    assert history.type == Marker.LINE_STRIP and history.color.a < 1  # else RViz draws it opaque
+    assert (points[0, 0], points[-1, 0]) == pytest.approx((6.0, 10.0)) and points[:, 1:] == pytest.approx(
+        np.tile([0.0, 0.02], (len(points), 1)))
+    assert len(alphas) == len(points) and (np.diff(alphas) > 0).all()
+    assert alphas[0] < 0.1 and alphas[-1] > 0.8
+    assert set(rgb(color) for color in history.colors) == {PALETTE[0]}
+
+
+@pytest.mark.parametrize('rate, length_s', [(10, 4.0), (30, 4.0), (100, 1.0), (30, 600.0)])
+def test_the_history_is_bounded_and_always_reaches_to_the_person(rate, length_s):
+    history = walked(MarkerWriter(MarkerParams(marker_history=length_s)), 30 * rate, 1.0 / rate)
+    assert len(history.points) <= HISTORY_POINTS + 2
+    assert history.points[-1].x == pytest.approx(30 - 1.0 / rate)
+    assert history.points[0].x == pytest.approx(max(30 - length_s, 0), abs=0.15)
+
+
+def test_a_history_begins_with_the_second_image_and_none_has_no_length():
+    assert walked(MarkerWriter(), 1) is None and walked(MarkerWriter(), 2) is not None
+    assert walked(MarkerWriter(MarkerParams(marker_history=0.0)), 50) is None
+
+
+def test_the_history_ends_with_its_track():
+    writer = MarkerWriter()
+    walked(writer, 20)
+    walked(writer, 5, start_ns=SECOND_NS + 2 * NS, number=2)
+    assert len(walked(writer, 3, start_ns=SECOND_NS + 3 * NS).points) == 3
+
+
+def test_the_history_starts_again_where_time_jumps_back():
+    writer = MarkerWriter()
+    walked(writer, 20)
+    assert len(walked(writer, 3, start_ns=SECOND_NS - 100 * NS).points) == 3
+
+
+def test_colors_by_id_are_always_the_same_and_those_of_neighbours_differ():
+    first, again = (drawn([track(number) for number in range(1, 12)]) for _writer in range(2))
+    colors = [rgb(first['cylinder', number].color) for number in range(1, 12)]
+    assert colors == [rgb(again['cylinder', number].color) for number in range(1, 12)]
+    assert len(set(colors)) == 10 and colors[0] == colors[10]
+    assert all(rgb(first[namespace, 4].color) == colors[3] for namespace in ('history', 'ellipse'))
+
+
+def test_colors_of_the_palette_are_told_apart_from_each_other_and_from_the_arrows():
+    markers = drawn([track(1)])
+    colors = np.array(PALETTE + (rgb(markers['velocity', 1].color), rgb(markers['prediction', 1].color),
+                                 rgb(drawn([track(1, status=OCCLUDED)])['id', 1].color)))
+    distances = np.linalg.norm(colors[:, None] - colors[None], axis=2)
+    assert distances[~np.eye(len(colors), dtype=bool)].min() > 0.2
+
+
+def test_colors_by_status_tell_who_is_seen_hidden_and_out_of_view():
+    tracks = [track(number, status=status) for number, status in enumerate((VISIBLE, OCCLUDED, OUT_OF_VIEW), 1)]
+    markers = drawn(tracks + [track(4)], ALL._replace(marker_color='status'))
+    colors = [rgb(markers['cylinder', number].color) for number in (1, 2, 3, 4)]
+    assert len(set(colors)) == 3 and colors[0] == colors[3]
+
+
+def test_the_thesis_has_blue_cylinders_and_green_numbers():
+    markers = drawn([track(number) for number in (1, 2, 3)], ALL._replace(marker_color='thesis'))
+    for number in (1, 2, 3):
+        assert markers['cylinder', number].color.b == 1.0 and markers['cylinder', number].color.r < 0.2
+        assert markers['id', number].color.g > 0.8 and markers['id', number].color.r < 0.2
+
+
+@pytest.mark.parametrize('status', [OCCLUDED, OUT_OF_VIEW])
+@pytest.mark.parametrize('coloring', ['id', 'status', 'thesis'])
+def test_who_is_not_seen_is_paler_and_has_a_question_mark(status, coloring):
+    params = ALL._replace(marker_color=coloring)
+    seen, unseen = drawn([track(3)], params), drawn([track(3, status=status)], params)
+    assert (seen['id', 3].text, unseen['id', 3].text) == ('3', '3?')
+    assert rgb(seen['id', 3].color) != rgb(unseen['id', 3].color)
+    for namespace in ('cylinder', 'velocity', 'prediction'):
+        assert 0.1 < unseen[namespace, 3].color.a < seen[namespace, 3].color.a / 2
+
+
+@pytest.mark.parametrize('params, said', [
+    (MarkerParams(marker_color='ID'), "~marker_color is 'ID'; id, status, thesis"),
+    (MarkerParams(marker_namespaces=['cylinder', 'elipse']), "'elipse'; did you mean ellipse"),
+    (MarkerParams(marker_history=-1.0), '~marker_history is -1'),
+    (MarkerParams(marker_lifetime=float('nan')), '~marker_lifetime is nan')])
+def test_parameters_that_make_no_sense_are_refused(params, said):
+    with pytest.raises(ValueError) as error:
+        MarkerWriter(params)
+    assert said in str(error.value)
+
+
+def test_nobody_has_no_markers():
+    assert MarkerWriter().write([], header()).markers == []

@@ -14,6 +14,7 @@ import yaml
 from ros_3d_bb.detection.bodies import DepthPeopleParams
 from ros_3d_bb.detection.runtime import RuntimeParams
 from ros_3d_bb.detection.yolov5 import DetectionParams
+from ros_3d_bb.markers import NAMESPACES, MarkerParams
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dParams
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorParams
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
@@ -32,7 +33,7 @@ KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-pyt
         'PyQt5': None}  # comes with python_qt_binding, and serves where that is not
 TEST_KEYS = {'pytest': 'python3-pytest'}
 CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams, RuntimeParams), 'bbox3d.yaml': (Bbox3dParams,),
-           'tracker.yaml': (TrackerNodeParams,) + TRACKING_PARAMS, 'simulator.yaml': (SimulatorParams,),
+           'tracker.yaml': (TrackerNodeParams, MarkerParams) + TRACKING_PARAMS, 'simulator.yaml': (SimulatorParams,),
            'planner_bridge.yaml': (PlannerBridgeParams,),
            'depth_detector.yaml': (DepthDetectorParams, DepthPeopleParams), 'viewer.yaml': (ViewerParams,)}
 SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id', 'error_model'},
@@ -179,6 +180,8 @@ def test_rviz_shows_what_the_pipeline_publishes():
               for display in content['Visualization Manager']['Displays']]
     published = {'visualization_marker_array', 'camera/color/image_raw', 'yolo_result_out', 'ros_3d_bb/color'}
     assert set(filter(None, topics)) == published
+    tracks, = (display for display in content['Visualization Manager']['Displays'] if display['Name'] == 'Tracks')
+    assert tracks['Namespaces'] == {namespace: True for namespace in NAMESPACES}
     assert content['Window Geometry']['QMainWindow State']
     assert (content['Window Geometry']['Width'], content['Window Geometry']['Height']) == (1280, 800)
 

@@ -10,7 +10,7 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from ros_3d_bb.images import depth_from
-from ros_3d_bb.markers import MarkerWriter
+from ros_3d_bb.markers import MarkerParams, MarkerWriter
 from ros_3d_bb.messages import camera_from_message, detections_from_message, stamp_of, time_from, tracks_to_message
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
@@ -42,7 +42,6 @@ class TrackerNodeParams(NamedTuple):
     depth_cache_length: float = 1.0
     stamp_tolerance: float = 0.005
     tf_timeout: float = 0.2
-    marker_lifetime: float = 2.0
 
 
 class TrackerNode(object):
@@ -54,10 +53,10 @@ class TrackerNode(object):
     """
 
     def __init__(self):
-        self._params, *tracking = read_params(TrackerNodeParams, *TRACKING_PARAMS)
+        self._params, marker_params, *tracking = read_params(TrackerNodeParams, MarkerParams, *TRACKING_PARAMS)
         _check(self._params)
         self._tracker = _tracker_of(self._params.tracker, *tracking)
-        self._markers = MarkerWriter(self._params.marker_lifetime)
+        self._markers = MarkerWriter(marker_params)
         self._lock, self._camera_lock = threading.Lock(), threading.Lock()
         self._last_stamp_ns = 0
         self._camera, self._depths = None, StampedCache(int(self._params.depth_cache_length * NS))
@@ -91,7 +90,8 @@ class TrackerNode(object):
                 return
             header = Header(stamp=time_from(self._last_stamp_ns), frame_id=self._params.target_frame)
             self._tracks_pub.publish(tracks_to_message(tracks, header))
-            self._markers_pub.publish(self._markers.write(tracks, header))
+            if self._markers_pub.get_num_connections():
+                self._markers_pub.publish(self._markers.write(tracks, header))
             self._diagnostics.count('images tracked')
 
     def _track(self, stamp_ns, message):
@@ -144,7 +144,7 @@ def _tracker_of(name, thesis, *kalman):
 def _check(params):
     if not params.target_frame:
         raise ValueError('parameter ~target_frame is empty; map or odom expected')
-    check_not_negative(params, 'tf_timeout', 'marker_lifetime', 'depth_scale', 'depth_cache_length', 'stamp_tolerance')
+    check_not_negative(params, 'tf_timeout', 'depth_scale', 'depth_cache_length', 'stamp_tolerance')
 
 
 def main():
