@@ -120,4 +120,4 @@ def test_playback_shows_the_person_tracked_in_the_map(session, weights, tmp_path
     assert len(off_m) > len(tracks.messages) * 0.9 and np.percentile(off_m, 95) < 0.3
     assert all(message.objects[0].id >= 1 for message in tracks.messages if message.objects)
     drawn = set(marker.ns for message in markers.messages for marker in message.markers if marker.action == Marker.ADD)
-    assert drawn == {'cylinder', 'id', 'velocity', 'prediction'}
+    assert drawn == {'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse'}
