@@ -98,7 +98,10 @@ def test_at_30_hz_every_array_gets_its_own_depth_image(session, bag, bbox3d, del
 
 
 def test_playback_shows_the_person_tracked_in_the_map(session, weights, tmp_path):
-    """From the images of the bag alone, with the detector running: boxes, tracks and markers where the person is."""
+    """From the images of the bag alone, with the detector running: boxes, tracks and markers where the person is.
+
+    Every five images the person is somewhere else, at once: a newcomer, who is published from the fourth image on.
+    """
     path, frames = make_bag(session, tmp_path, 10.0)
     with Recorder('ros_3d_bb/bb_3d', BoundingBox3DArray, False) as boxes, \
             Recorder('ros_3d_bb/tracks', TrackedObjectArray, False) as tracks, \
@@ -117,7 +120,7 @@ def test_playback_shows_the_person_tracked_in_the_map(session, weights, tmp_path
             if person.last_seen == message.header.stamp:
                 place = person.pose.pose.position
                 off_m.append(np.hypot(place.x - (ahead + MOUNT_M[0]), place.y + right))
-    assert len(off_m) > len(tracks.messages) * 0.9 and np.percentile(off_m, 95) < 0.3
+    assert len(off_m) > len(tracks.messages) * 0.25 and np.percentile(off_m, 95) < 0.3
     assert all(message.objects[0].id >= 1 for message in tracks.messages if message.objects)
     drawn = set(marker.ns for message in markers.messages for marker in message.markers if marker.action == Marker.ADD)
     assert drawn == {'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse'}

@@ -51,12 +51,13 @@ def test_there_are_the_scenes_that_the_package_promises():
 @pytest.mark.parametrize('detector', ['yolov5', 'depth'])
 @pytest.mark.parametrize('name', THESIS_SCENES)
 def test_everybody_in_the_thesis_scenes_gets_one_number_and_keeps_it(runs, name, detector):
-    """Everybody who is visible for a second."""
+    """Everybody who is visible for a second. Nobody is published before the fourth sighting, which at 5 to 7.5 images a
+    second, and at the end of the weight-free detector's range, takes a while."""
     result = score([step.moment for step in runs[detector, name]])
     assert len(result.people) == 4
     for person in result.people:
         assert person.longest_s >= 1 and len(person.ids) == 1, person
-        assert person.followed > 0.9 and person.rmse_m < 0.25, person
+        assert person.followed > 0.8 and person.rmse_m < 0.25, person
     assert len(set(person.ids[0] for person in result.people)) == 4
 
 

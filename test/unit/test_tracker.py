@@ -128,7 +128,7 @@ def test_somebody_who_leaves_the_view_is_said_to_be_out_of_it_and_then_gone():
 
 
 def test_who_comes_back_in_time_gets_the_number_back_and_later_is_somebody_else():
-    for away_s, expected in ((1.5, [1]), (4.0, [2])):
+    for away_s, expected in ((1.5, [1]), (5.0, [2])):
         tracker = Tracker()
         play(tracker, 2, standing((3, 0)))
         play(tracker, away_s, standing(), start_s=2)

@@ -49,8 +49,8 @@ class TrackerParams(NamedTuple):
     missed_limit: float = 0.35
     out_of_view_limit: float = 1.0
     unsure_limit: float = 0.5
-    memory: float = 2.5
-    max_range: float = 6.0
+    memory: float = 4.0
+    max_range: float = 8.0
     moving_speed: float = 0.2
 
 
