@@ -151,7 +151,7 @@ def test_the_command_runs_the_whole_pipeline_on_a_scene(monkeypatch, tmp_path, c
     run_command(monkeypatch, '--scenarios', str(scenario), '--json', str(path))
     scenes = json.loads(path.read_text())['scenes']
     assert [(scene['tracker'], scene['id_switches']) for scene in scenes] == [
-        ('ours', 0), ('thesis', 0), ('library', 0)]
+        ('ours', 0), ('thesis_mended', 0), ('library', 0)]
     assert all(scene['rmse_m'] < 0.1 for scene in scenes) and 'short' in capsys.readouterr().out
 
 

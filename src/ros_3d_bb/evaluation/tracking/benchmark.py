@@ -32,10 +32,10 @@ def outputs_of(make_tracker, run):
     return [tracker.update(image.stamp_ns, image.detections, image.view) for image in run.images]
 
 
-# `thesis` is the tracker that ships with the package, `thesis_original` the one that the thesis' own package ran.
-CONTESTANTS = (Contestant('ours', Tracker, outputs_of), Contestant('thesis', ThesisTracker, outputs_of),
-               Contestant('thesis_original', OriginalTracker, lambda make, run: outputs_of(make, as_it_arrived(run))),
-               Contestant('library', Norfair, outputs_of))
+# `thesis` is the tracker that the thesis' own package ran, `thesis_mended` the one of `~tracker: thesis`.
+CONTESTANTS = (Contestant('ours', Tracker, outputs_of),
+               Contestant('thesis', OriginalTracker, lambda make, run: outputs_of(make, as_it_arrived(run))),
+               Contestant('thesis_mended', ThesisTracker, outputs_of), Contestant('library', Norfair, outputs_of))
 BOUND = Contestant('perfect_association', Tracker, outputs_with_perfect_association)
 
 

@@ -7,7 +7,7 @@ from ros_3d_bb.evaluation.tracking.benchmark import CONTESTANTS
 from ros_3d_bb.simulation.scenario import read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
 
-TRACKERS = [contestant for contestant in CONTESTANTS if contestant.name != 'thesis_original']
+TRACKERS = [contestant for contestant in CONTESTANTS if contestant.name != 'thesis']
 COLUMNS = '%-22s %-8s %7s %9s %9s %9s'
 
 
