@@ -113,6 +113,21 @@ def test_somebody_hidden_is_published_as_occluded_for_long_and_keeps_the_number(
     assert [track.status for track in walk[-1]] == [VISIBLE, VISIBLE]
 
 
+def test_somebody_who_does_not_come_out_from_behind_something_is_still_there():
+    """Walks at 1 m/s behind a screen that hides y = 0 to 1 m, stops there for 1.5 s, and goes on."""
+    def depth_at(points):
+        behind_screen = (points[:, 0] / points[:, 2] < 0) & (points[:, 0] / points[:, 2] > -1 / 4.0)
+        return np.where(behind_screen, 1.5, 6.0)
+
+    def walk(time_s):
+        y_m = min(time_s - 1.5, max(0.5, time_s - 3))
+        return [] if -0.2 < y_m < 1.2 else [at(4, y_m)]
+    published = play(Tracker(), 5, walk, view=VIEW._replace(depth_at=depth_at))
+    assert all(objects[0].status == OCCLUDED for objects in published[42:125])
+    assert all(0 < objects[0].position_m[1] < 1.1 for objects in published[60:125])
+    assert ids(published[-1]) == [1] and published[-1][0].status == VISIBLE
+
+
 def test_somebody_who_is_gone_is_not_published_for_longer_than_the_limit():
     walk = play(Tracker(TrackerParams(missed_limit=0.35)), 2, lambda time_s: [at(3, 0)] if time_s < 1 else [])
     assert [bool(objects) for objects in walk[30:]] == [frame < 10 for frame in range(30)]
@@ -192,6 +207,8 @@ def test_what_was_published_keeps_its_number_when_a_late_image_shows_somebody_mo
     play(tracker, 1, standing((3, 0)))
     play(tracker, 0.3, standing((3, 0), (4, 1.2)), start_s=1.1)
     objects = tracker.update(START_NS + int(1.05 * NS), [at(3, 0), at(2, -1)], VIEW)
+    play(tracker, 0.3, standing((3, 0), (4, 1.2), (2, -1)), start_s=1.5)
+    assert ids(tracker.objects()) == [1, 2, 3]
     assert ids(objects) == [1, 2] and objects[1].position_m[0] == pytest.approx(4, abs=0.1)
 
 

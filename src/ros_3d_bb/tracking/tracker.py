@@ -24,6 +24,7 @@ TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4))
                   ('missed_s', float), ('unseen_s', float), ('status', int), ('confirmed', bool), ('moving', bool)])
 LATEST_NS = NS // 2  # images that come later than others by more are refused
 RECENT_NS = 7 * NS // 10  # who was seen so recently comes before those who were away
+BEHIND_M = 0.45  # no less sure is where somebody is who does not come out from behind something
 LOST_M = 2.4  # who may be anywhere within this (standard deviation) is forgotten
 TRIES_S = 0.6  # how long a track that is not confirmed yet waits to be seen again
 TAKEN_NS = NS // 5  # nobody new begins near somebody seen so recently
@@ -126,7 +127,7 @@ class Tracker(object):
 
     def objects(self):
         """The people who are published now, by id, at the stamp of the newest image."""
-        tracks, params = self._state.tracks, self._params
+        tracks, params = np.sort(self._state.tracks, order='id'), self._params
         known = (tracks['missed_s'] <= params.missed_limit) & (_sigma(tracks) < params.unsure_limit)
         known &= (tracks['status'] != OUT_OF_VIEW) | (tracks['unseen_s'] <= params.out_of_view_limit)
         return objects_of(tracks[tracks['confirmed'] & known], self._prediction)
@@ -154,7 +155,7 @@ class Tracker(object):
     def _after(self, image):
         """The state after an image."""
         tracks, now_ns, skipped_ns = self._state
-        tracks = tracks.copy()
+        before, tracks = tracks, tracks.copy()
         elapsed_s = 0.0 if now_ns is None else (image.stamp_ns - now_ns) / NS
         looked_s = 0.0 if now_ns is None else max(image.stamp_ns - max(now_ns, skipped_ns), 0) / NS
         tracks['mean'], tracks['covariance'] = kalman.predict(tracks['mean'], tracks['covariance'], elapsed_s,
@@ -162,7 +163,7 @@ class Tracker(object):
         sightings = sightings_of(image.detections, image.view, elapsed_s, self._noise)
         rows, columns = self._associate(tracks, sightings, image.stamp_ns)
         self._see(tracks, rows, _taken(sightings, columns), image.stamp_ns)
-        self._miss(tracks, np.setdiff1d(np.arange(len(tracks)), rows), image.view, looked_s)
+        self._miss(tracks, np.setdiff1d(np.arange(len(tracks)), rows), before, image.view, looked_s)
         tracks = tracks[self._is_remembered(tracks)]
         others = np.setdiff1d(np.arange(len(image.detections)), columns)
         tracks = np.concatenate((tracks, self._newcomers(tracks, _taken(sightings, others), others, image)))
@@ -200,16 +201,29 @@ class Tracker(object):
         seen['z_m2'] += share * (sightings.z_m2 - seen['z_m2'])
         tracks[rows] = seen
 
-    def _miss(self, tracks, rows, view, looked_s):
-        """Say why the tracks in `rows` were not seen, and count for how long, and how long of that they should have."""
+    def _miss(self, tracks, rows, before, view, looked_s):
+        """Say why the tracks in `rows` were not seen, and count for how long, and how long of that they should have.
+
+        Who was hidden, should have come out by now and did not, is still behind what hid them.
+        """
         if not len(rows):
             return
-        positions_m = np.column_stack((tracks['mean'][:, :2], tracks['z_m']))
-        hiding = tracks['confirmed'] & (tracks['missed_s'] < HIDING_S)
-        places = places_in(view, positions_m[rows], tracks['size_m'][rows], positions_m[hiding], self._params.max_range)
-        tracks['unseen_s'][rows] += looked_s
-        tracks['missed_s'][rows] += np.where(places == VISIBLE, looked_s, 0)
-        tracks['status'][rows] = np.where(places == VISIBLE, OCCLUDED, places)
+        missed = tracks[rows]
+        places = self._places(missed, tracks, view)
+        held = (places == VISIBLE) & (missed['status'] == OCCLUDED)
+        held[held] = self._places(before[rows][held], tracks, view) == OCCLUDED
+        missed['mean'][held], places[held] = before['mean'][rows][held], OCCLUDED
+        held &= _sigma(missed) > BEHIND_M
+        missed['covariance'][held] = before['covariance'][rows][held]
+        missed['unseen_s'] += looked_s
+        missed['missed_s'] += np.where(places == VISIBLE, looked_s, 0)
+        missed['status'] = np.where(places == VISIBLE, OCCLUDED, places)
+        tracks[rows] = missed
+
+    def _places(self, missed, tracks, view):
+        """What the camera could see of the places of missed people."""
+        hiding = tracks[tracks['confirmed'] & (tracks['missed_s'] < HIDING_S)]
+        return places_in(view, _positions(missed), missed['size_m'], _positions(hiding), self._params.max_range)
 
     def _is_remembered(self, tracks):
         """Which tracks are kept; those that are not confirmed yet only for a few more tries."""
@@ -246,6 +260,11 @@ def _taken(sightings, columns):
     ground, *others = sightings
     return type(sightings)(kalman.Measurements(*(values[columns] for values in ground)),
                            *(values[columns] for values in others))
+
+
+def _positions(tracks):
+    """Centres (n, 3), metres."""
+    return np.column_stack((tracks['mean'][:, :2], tracks['z_m']))
 
 
 def _sigma(tracks):
