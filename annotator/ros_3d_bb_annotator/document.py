@@ -14,7 +14,8 @@ from ros_3d_bb.measurements import (Session, SessionError, camera_of, others_tha
 from ros_3d_bb.session_file import FILE_NAME, changing
 from ros_3d_bb_annotator import legacy
 from ros_3d_bb_annotator.drafts import Drafts
-from ros_3d_bb_annotator.entries import Edit, changed, detections_with, entry_at, grid_of, grid_entry, millimetres
+from ros_3d_bb_annotator.entries import (Edit, changed, changes_with_estimate, detections_with, entry_at, grid_of,
+                                         grid_entry, millimetres)
 from ros_3d_bb_annotator.measurement import ANNOTATED, NEW, FileNames, measurement_of
 
 ESTIMATOR = 'foreground'  # the default of bbox3d_node
@@ -123,7 +124,8 @@ class Document(object):
         return dx_m, dz_m, float(np.hypot(dx_m, dz_m))
 
     def set_truth(self, index, x_m, z_m, y_m=None):
-        """Enter where the person really was; a rejected measurement is taken back.
+        """Enter where the person really was; a rejected measurement is taken back. The person's box is estimated where
+        no estimate is stored.
 
         Raises
         ------
@@ -140,9 +142,10 @@ class Document(object):
         truth_mm = {'x': millimetres(x_m), 'z': millimetres(z_m)}
         if y_m is not None:
             truth_mm['y'] = millimetres(y_m)
-        self._edit(index, {'truth_mm': truth_mm, 'rejected': None})
+        estimate = self._missing_estimate(index, self.measurements[index].person)
+        self._edit(index, dict(estimate, truth_mm=truth_mm, rejected=None))
         self._annotated.append(index)
-        self._commit_draft(index)
+        self.set_draft(index, {})
 
     def set_same_as_last(self, index):
         """Enter the truth of the measurement annotated last, or else of the nearest one before. Raises as set_truth."""
@@ -155,11 +158,13 @@ class Document(object):
                          % self.measurements[index].id)
 
     def choose_person(self, index, detection):
-        """Say which detection, by its number, is the person whose truth is given. Raises ValueError, SessionError."""
+        """Say which detection, by its number, is the person whose truth is given; it is estimated where no estimate is
+        stored. Raises ValueError, SessionError.
+        """
         count = len(self.measurements[index].detections)
         if not 0 <= detection < count:
             raise ValueError('detection %d of %d' % (detection, count))
-        self._edit(index, {'person': int(detection)})
+        self._edit(index, dict(self._missing_estimate(index, detection), person=int(detection)))
 
     def add_box(self, index, box_px):
         """Add a box (x1, y1, x2, y2) drawn by hand, estimate it and choose it as the person.
@@ -191,7 +196,7 @@ class Document(object):
         if not reason.strip():
             raise ValueError('a reason is needed to reject a measurement')
         self._edit(index, {'rejected': reason.strip()})
-        self._commit_draft(index)
+        self.set_draft(index, {})
 
     def restore(self, index):
         """Take back that a measurement is rejected; its truth is as before. Raises SessionError."""
@@ -230,8 +235,16 @@ class Document(object):
         except OSError as error:
             raise SessionError('%s: what is typed cannot be kept (%s)' % (self.folder, error.strerror))
 
-    def _commit_draft(self, index):
-        self.set_draft(index, {})
+    def _missing_estimate(self, index, person):
+        """The changes that give a detection its estimate; none where it has one, or none can be made."""
+        detection = None if person is None else self.measurements[index].detections[person]
+        if detection is None or detection.estimate_m is not None or detection.box_px is None:
+            return {}
+        try:
+            box = self.estimated(index, detection.box_px)
+        except ValueError:  # no depth, or a reversed box: the truth is good nevertheless, and validation says it
+            return {}
+        return {} if box is None else changes_with_estimate(self._content['frames'][index], person, box)
 
     def _usable(self, index):
         measurement = self.measurements[index]

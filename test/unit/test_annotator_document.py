@@ -143,6 +143,46 @@ def test_a_box_in_a_session_of_one_box_a_frame(tmp_path):
     assert document.undo() == 0 and read_json(folder) == before
 
 
+@pytest.mark.parametrize('edit', [lambda document: document.set_truth(0, 0.1, 2.0),
+                                  lambda document: document.choose_person(0, 0)])
+def test_a_box_without_estimate_is_estimated_when_it_is_needed(document, folder, edit):
+    change_json(folder, lambda content: [content['frames'][0]['detections'][0].pop(name) for name in (
+        'estimate_mm', 'size_mm', 'support', 'truncated')])
+    document.refresh()
+    before = read_json(folder)
+    edit(document)
+    expected = document.estimated(0, NEAR_BOX)
+    detection = Document.open(folder).measurements[0].detections[0]
+    assert np.abs(detection.estimate_m - expected.center_m).max() < 1e-5 and detection.support > 0.5
+    os.remove(document.measurements[0].depth_path)
+    edit(document)  # what is stored is not estimated again
+    assert document.measurements[0].estimate_m == pytest.approx(detection.estimate_m)
+    document.undo()
+    document.undo()
+    assert read_json(folder) == before
+
+
+def test_the_only_box_of_a_measurement_is_estimated_when_truth_is_entered(tmp_path):
+    folder = write_synthetic_session(str(tmp_path))
+    change_json(folder, lambda content: content['frames'][0].pop('estimate_mm'))
+    document = Document.open(folder)
+    assert document.errors(0) is None
+    document.set_truth(0, *(document.measurements[0].truth_m[axis] for axis in (0, 2)))
+    assert document.errors(0)[2] < 0.1 and len(read_json(folder)['frames'][0]['estimate_mm']) == 3
+    assert 'detections' not in read_json(folder)['frames'][0]
+
+
+@pytest.mark.parametrize('break_it', [
+    lambda document: os.remove(document.measurements[0].depth_path),
+    lambda document: cv2.imwrite(document.measurements[0].depth_path, np.zeros((48, 64), np.uint16))])
+def test_a_box_that_cannot_be_estimated_takes_the_truth(document, folder, break_it):
+    change_json(folder, lambda content: content['frames'][0]['detections'][0].pop('estimate_mm'))
+    document.refresh()
+    break_it(document)
+    document.set_truth(0, 0.1, 2.0)
+    assert document.measurements[0].truth_m == (0.1, None, 2.0) and document.errors(0) is None
+
+
 def test_who_is_not_there_cannot_be_chosen(document):
     for number in (-1, 2):
         with pytest.raises(ValueError, match='detection %d of 2' % number):
