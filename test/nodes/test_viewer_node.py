@@ -22,6 +22,7 @@ from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulator_messages import CAMERA_FRAME, simulated_messages
 from ros_3d_bb.stamped import NS
 from support.ros import Recorder, launched, publisher, wait_until
+from support.screen import press, start_screen
 
 START_NS = 1000 * NS
 PERIOD = NS // 10
@@ -214,18 +215,15 @@ def test_without_a_display_it_says_what_to_do(display):
 
 @pytest.fixture
 def screen(monkeypatch):
-    """A virtual display, with nobody else on it."""
-    process = subprocess.Popen(['Xvfb', '-displayfd', '1', '-screen', '0', '1600x900x24'], stdout=subprocess.PIPE)
-    monkeypatch.setenv('DISPLAY', ':' + process.stdout.readline().decode().strip())
+    monkeypatch.setenv('DISPLAY', '')  # given back afterwards
+    process = start_screen()
     yield
     process.terminate()
     process.wait()
 
 
-def press(key):
-    """Press a key in the window, which no window manager gives the focus."""
-    command = ['xdotool', 'search', '--onlyvisible', '--name', TITLE, 'windowfocus', '--sync', 'key', key]
-    wait_until(lambda: subprocess.call(command) == 0, 'the window')
+def press_key(key):
+    wait_until(lambda: press(TITLE, key), 'the window')
 
 
 @pytest.fixture
@@ -243,23 +241,23 @@ def test_keys_store_pause_and_quit(rig, window):
     sent = rig.send()
 
     def stored():
-        press('s')
+        press_key('s')
         rospy.sleep(0.3)
         return entries(folder)
     wait_until(stored, 'a measurement')
     check_stored(folder, sent, 0)
     assert entries(folder)[0].label == 'by hand' and len(entries(folder)) == 1
     with Recorder('/rosout', Log, False) as log:
-        press('p')
+        press_key('p')
         wait_until(lambda: any('nobody answers on the service /detector/enable' in message.msg
                                for message in log.messages), 'a word about the missing detector')
     asked = []
     service = rospy.Service('detector/enable', SetBool,
                             lambda request: SetBoolResponse(asked.append(request.data) is None, 'done'))
     for presses in (1, 2, 3):
-        press('p')
+        press_key('p')
         wait_until(lambda: len(asked) == presses, 'the call of the detector')
-    press('q')
+    press_key('q')
     assert process.wait(timeout=20) == 0
     assert asked == [False, True, False, True]  # who goes leaves no detector paused
     service.shutdown()

@@ -2,19 +2,37 @@
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 import time
 
 import numpy as np
 
 from ros_3d_bb_annotator.document import Document
 from support.small_session import change_json, write_small_session
+from support.typist import truth_mm_of
 
 COUNT = 100
 LONGEST_S = 0.006  # of a random wait before the kill: about one annotation
+WINDOW_KILLS = 4
+TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
-def truth_of(index):
-    return 0.001 * index, 1.0 + 0.01 * index
+def write_session(folder):
+    """A session of measurements that share their images: here only the description matters."""
+    write_small_session(folder, count=1)
+    change_json(folder, lambda content: content.update(
+        frames=[dict(content['frames'][0], id='m%d' % number) for number in range(COUNT)]))
+    return folder
+
+
+def saved_in(document):
+    """The numbers of the annotated measurements, after it is checked that they hold what was typed for them."""
+    saved = set(index for index in range(COUNT) if document.measurements[index].state == 'annotated')
+    for index in saved:
+        x_m, _y_m, z_m = document.measurements[index].truth_m
+        assert (round(1000 * x_m, 3), round(1000 * z_m, 3)) == truth_mm_of(index)
+    return saved
 
 
 def _annotate(folder, reports):
@@ -24,7 +42,7 @@ def _annotate(folder, reports):
         if measurement.state == 'new':
             document.set_draft(index, {'z': str(index)})
             reports.send(('typed', index))
-            document.set_truth(index, *truth_of(index))
+            document.set_truth(index, *(value_mm / 1000.0 for value_mm in truth_mm_of(index)))
             reports.send(('entered', index))
 
 
@@ -50,21 +68,47 @@ def _run_and_kill(folder, random):
 
 
 def test_kill_at_any_moment_loses_at_most_what_is_being_typed(tmp_path):
-    folder = write_small_session(str(tmp_path), count=1)
-    # all measurements share their images: here only the description matters
-    change_json(folder, lambda content: content.update(
-        frames=[dict(content['frames'][0], id='m%d' % number) for number in range(COUNT)]))
+    folder = write_session(str(tmp_path))
     random, entered, kills = np.random.RandomState(5), set(), 0
     while len(entered) < COUNT:
         reports, kills = _run_and_kill(folder, random), kills + 1
         entered |= reports['entered']
         document = Document.open(folder)
-        saved = set(index for index in range(COUNT) if document.measurements[index].state == 'annotated')
+        saved = saved_in(document)
         assert entered <= saved and len(saved - entered) <= 1
         assert reports['typed'] <= saved | set(index for index in range(COUNT) if document.draft(index))
         assert all(document.draft(index).get('z', str(index)) == str(index) for index in range(COUNT))
         entered = saved
     assert kills > 2
-    for index, measurement in enumerate(document.measurements):
-        x_m, _y_m, z_m = measurement.truth_m
-        assert (round(x_m, 6), round(z_m, 6)) == tuple(round(value, 6) for value in truth_of(index))
+
+
+def _type_and_kill(folder, to_wait_for, wait_s):
+    """The numbers that a window of its own process reported as entered, until it was killed a time after so many
+    reports; with fewer reports it ends by itself.
+    """
+    environment = dict(os.environ, PYTHONPATH=os.pathsep.join([TESTS] + sys.path), QT_QPA_PLATFORM='offscreen')
+    process = subprocess.Popen([sys.executable, '-m', 'support.typist', folder], env=environment,
+                               stdout=subprocess.PIPE, universal_newlines=True)
+    entered = set()
+    for number, line in enumerate(process.stdout):
+        kind, index = line.split()
+        if kind == 'entered':
+            entered.add(int(index))
+        if number == to_wait_for:
+            time.sleep(wait_s)
+            process.kill()
+    return entered, process.wait()
+
+
+def test_kill_of_the_window_at_any_moment_loses_at_most_what_is_being_typed(tmp_path):
+    folder = write_session(str(tmp_path))
+    random, entered = np.random.RandomState(6), set()
+    for kill in range(WINDOW_KILLS + 1):
+        to_wait_for = random.randint(COUNT // WINDOW_KILLS) if kill < WINDOW_KILLS else 2 * COUNT
+        reported, status = _type_and_kill(folder, to_wait_for, random.uniform(0, 0.05))
+        assert status == (-signal.SIGKILL if kill < WINDOW_KILLS else 0)
+        entered |= reported
+        saved = saved_in(Document.open(folder))
+        assert entered <= saved and len(saved - entered) <= 1
+        entered = saved
+    assert entered == set(range(COUNT))
