@@ -4,7 +4,7 @@ import sys
 
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.export import export
-from ros_3d_bb_annotator.validation import problems_of
+from ros_3d_bb_annotator.validation import leftovers_of, problems_of
 
 
 def main(arguments=None):
@@ -52,6 +52,10 @@ def _validate(document):
     for problem in problems_of(document):
         print(problem)
         count += 1
+    leftovers = leftovers_of(document)
+    if leftovers:
+        print('annotator: note: no measurement names %s; a program that was killed may have left that, and where none '
+              'runs it can be deleted' % ', '.join(leftovers), file=sys.stderr)
     done, total = document.progress
     print('%s: %d measurements, %d annotated or rejected, %s'
           % (document.folder, total, done, '%d problems' % count if count else 'nothing wrong'))

@@ -1,7 +1,8 @@
 """Whether a session is sound: every image readable, every box inside, every estimate and truth plausible."""
 import collections
+import os
 
-from ros_3d_bb.measurements import SessionError
+from ros_3d_bb.measurements import SessionError, read_description
 from ros_3d_bb_annotator.measurement import ANNOTATED, REJECTED
 
 FARTHEST_OFF_M = 1.0  # an estimate farther off the truth is of somebody else, or the truth of another place
@@ -17,6 +18,21 @@ def problems_of(document):
         if measurement.state != REJECTED:
             for problem in _problems_at(document, index):
                 yield '%s: %s' % (measurement.id or 'measurement number %d' % (index + 1), problem)
+
+
+def leftovers_of(document):
+    """Files in a document's folders that no measurement names, as a killed program leaves: paths there, sorted."""
+    if document.is_old_form:
+        return []
+    folder = document.folder
+    found = [name for name in os.listdir(folder) if name.startswith('.') and name.endswith('.tmp')]
+    for kind in ('color', 'depth'):
+        if os.path.isdir(os.path.join(folder, kind)):
+            found += [os.path.join(kind, name) for name in os.listdir(os.path.join(folder, kind))]
+    # read after the files were listed: a viewer may have added some to the session meanwhile
+    entries = [entry for entry in read_description(folder)['frames'] if isinstance(entry, dict)]
+    return sorted(set(found) - set(os.path.normpath(str(entry.get(kind, ''))) for entry in entries
+                                   for kind in ('color', 'depth')))
 
 
 def _problems_at(document, index):

@@ -45,7 +45,10 @@ class Window(object):
         cv2.imshow(self._title, np.ascontiguousarray(picture[..., ::-1]))
 
     def key(self, wait_ms):
-        """The key that is pressed within a time, as a character; '' where none is."""
+        """The key that is pressed within a time, as a character; '' where none is.
+
+        Of several that came since the last call, OpenCV's Qt windows give the last one and drop the others.
+        """
         code = cv2.waitKey(wait_ms) & 0xff
         return '' if code == NO_KEY else chr(code)
 

@@ -71,6 +71,16 @@ def test_an_estimate_that_cannot_be_made_again_is_listed(folder, capsys):
     assert 'no estimate can be made' in capsys.readouterr().out
 
 
+def test_what_a_killed_program_left_is_named(folder, capsys):
+    assert main(['--validate', folder]) == 0 and capsys.readouterr().err == ''
+    for name in ('color/m9.png', 'depth/.a1.tmp', '.b2.tmp', 'notes.txt'):
+        with open(os.path.join(folder, name), 'w'):
+            pass
+    change_json(folder, lambda content: content['frames'][0].update(color='./color/m0.png'))
+    assert main(['--validate', folder]) == 0
+    assert 'no measurement names .b2.tmp, color/m9.png, depth/.a1.tmp;' in capsys.readouterr().err
+
+
 def test_notes_on_the_old_form_and_errors_go_to_the_screen(tmp_path, capsys):
     old = write_old_session(str(tmp_path / 'old'))
     assert main(['--validate', old]) == 0
