@@ -76,7 +76,6 @@ class Edits(object):
         measurement = window.document.measurements[number]
         window.last_entry.setText('<b>%s</b>: %s' % (measurement.id, error_text(window.document.errors(number))
                                                      if measurement.rejected is None else 'rejected'))
-        window.statusBar().clearMessage()
         if window.actions['go_on'].isChecked():
             window.next_new()
 
@@ -95,6 +94,9 @@ class Edits(object):
             self._show(window.current if numbers[0] is None else numbers[0])
 
     def _show(self, number):
+        """Show what an edit made, and nothing more of the one before."""
+        self._window.statusBar().clearMessage()
+        self._window.last_entry.clear()
         self._window.after_edit()
         if number is not None:
             self._window.show_measurement(number)

@@ -57,6 +57,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
             dialogs.show_error(self, 'The session cannot be opened', error)
             return False
         self.document, self.current = document, None
+        self.last_entry.clear()
         self.pane.show_document(document)
         self.list.show_document(document)
         self.setWindowTitle('%s – %s' % (document.folder, TITLE))

@@ -7,7 +7,7 @@ import pytest
 
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.measurement import Mark
-from support.small_session import FAR_BOX, NEAR_BOX, write_small_session
+from support.small_session import FAR_BOX, NEAR_BOX, change_json, write_small_session
 from support.window import Qt, QtCore, QtWidgets
 
 CONTROL, SHIFT, ALT = Qt.ControlModifier, Qt.ShiftModifier, Qt.AltModifier
@@ -39,6 +39,17 @@ def test_typing_a_truth_and_enter_saves_it_and_goes_on(drive, folder):
     assert 'X +10 mm, Z −50 mm' in drive.window.last_entry.text()
     drive.press('0,1 m', Qt.Key_Tab, '2.1m', Qt.Key_Tab, '-30', Qt.Key_Return)
     assert opened(folder)[1].truth_m == (0.1, -0.03, 2.1) and drive.window.current == 2
+
+
+def test_the_error_of_a_box_without_estimate_is_shown_when_its_truth_is_entered(folder, window_on):
+    change_json(folder, lambda content: content['frames'][0]['detections'][0].pop('estimate_mm'))
+    drive = window_on(folder)
+    drive.press('-400', Qt.Key_Tab, '2000')
+    assert 'Error: –' in drive.window.pane.truth.error_label.text()
+    drive.press(Qt.Key_Return, Qt.Key_PageUp)
+    expected = drive.document.errors(0)
+    assert expected is not None and 'Z %+.0f mm' % (1000 * expected[1]) in drive.window.last_entry.text()
+    assert drive.window.last_entry.text().split('Error: ')[1] in drive.window.pane.truth.error_label.text()
 
 
 def test_the_error_is_shown_while_the_truth_is_typed(drive):
@@ -201,9 +212,9 @@ def test_reject_asks_for_a_reason_and_restore_takes_it_back(drive, folder):
     drive.answer(give_reason, lambda: drive.press((Qt.Key_R, CONTROL)))
     assert opened(folder)[0].rejected == 'moved' and drive.window.current == 1
     drive.press(Qt.Key_PageUp)
-    assert 'because: moved' in drive.window.pane.header.text()
+    assert 'because: moved' in drive.window.pane.header.text() and 'rejected' in drive.window.last_entry.text()
     drive.press((Qt.Key_R, CONTROL | SHIFT))
-    assert opened(folder)[0].state == 'new'
+    assert opened(folder)[0].state == 'new' and drive.window.last_entry.text() == ''
 
 
 def test_a_rejection_that_is_called_off_changes_nothing(drive):
