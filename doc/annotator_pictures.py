@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.estimation import DepthImage, estimate_boxes, estimator_named
+from ros_3d_bb.recording import box_entry
 from ros_3d_bb.simulation.scenario import Person, Robot, Room, Scenario
 from ros_3d_bb.simulation.simulator import D435I_COLOR, Simulator
 from ros_3d_bb_annotator.application import make_application
@@ -43,7 +44,7 @@ def _write_frame(folder, number, place):
     cv2.imwrite(os.path.join(folder, 'depth', name), frame.depth_mm)
     boxes_px = [tuple(int(edge) for edge in person.box_px) for person in frame.people if person.box_px is not None]
     estimates = estimate_boxes(DepthImage(frame.depth_mm, 0.001), boxes_px, D435I_COLOR, estimator_named('foreground'))
-    detections = [dict({'box': box_px}, **_fields_of(box)) for box_px, box in zip(boxes_px, estimates)]
+    detections = [dict({} if box is None else box_entry(box), box=box_px) for box_px, box in zip(boxes_px, estimates)]
     return {'id': '%03d' % number, 'color': 'color/' + name, 'depth': 'depth/' + name, 'label': 'first campaign',
             'stamp': '%d.%09d' % (1616161616 + 7 * number, 123456789), 'detections': detections}
 
@@ -51,13 +52,6 @@ def _write_frame(folder, number, place):
 def _map_from(x_m, z_m):
     """The place (x, y) of the map that is at (x, z) of the camera."""
     return ROBOT.pose[0] + ROBOT.mount[0] + z_m, ROBOT.pose[1] - x_m
-
-
-def _fields_of(box):
-    if box is None:
-        return {}
-    return {'estimate_mm': np.rint(1000 * box.center_m).tolist(), 'size_mm': np.rint(1000 * box.size_m[:2]).tolist(),
-            'support': round(float(box.support), 3), 'truncated': bool(box.truncated)}
 
 
 def take_pictures(session, folder):

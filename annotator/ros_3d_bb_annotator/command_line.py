@@ -57,8 +57,8 @@ def _validate(document):
         print('annotator: note: no measurement names %s; a program that was killed may have left that, and where none '
               'runs it can be deleted' % ', '.join(leftovers), file=sys.stderr)
     done, total = document.progress
-    print('%s: %d measurements, %d annotated or rejected, %s'
-          % (document.folder, total, done, '%d problems' % count if count else 'nothing wrong'))
+    found = '%d problem%s' % (count, '' if count == 1 else 's') if count else 'nothing wrong'
+    print('%s: %d measurements, %d annotated or rejected, %s' % (document.folder, total, done, found))
     return 1 if count else 0
 
 

@@ -132,7 +132,7 @@ class Document(object):
         ValueError
             If that is no place in front of the camera.
         SessionError
-            If it cannot be saved.
+            If the measurement cannot be understood, or the truth not be saved.
         """
         given_m = [value for value in (x_m, y_m, z_m) if value is not None]
         if not np.isfinite(given_m).all() or max(np.abs(given_m)) > FARTHEST_M:
@@ -142,7 +142,7 @@ class Document(object):
         truth_mm = {'x': millimetres(x_m), 'z': millimetres(z_m)}
         if y_m is not None:
             truth_mm['y'] = millimetres(y_m)
-        estimate = self._missing_estimate(index, self.measurements[index].person)
+        estimate = self._missing_estimate(index, self._usable(index).person)
         self._edit(index, dict(estimate, truth_mm=truth_mm, rejected=None))
         self._annotated.append(index)
         self.set_draft(index, {})

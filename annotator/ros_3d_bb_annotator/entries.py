@@ -5,6 +5,7 @@ from typing import Any, Dict, NamedTuple, Optional
 import numpy as np
 
 from ros_3d_bb.measurements import SessionError
+from ros_3d_bb.recording import box_entry
 from ros_3d_bb_annotator.measurement import Mark
 
 DIGITS = 3  # micrometres: no rounding that anybody sees, and no 1229.9999999999998
@@ -46,23 +47,16 @@ def detections_with(entry, box_px, box):
         recorded = {'box': entry.get('box'), 'estimate_mm': entry.get('estimate_mm', entry.get('original_mm'))}
         detections = [{key: value for key, value in recorded.items() if value}] if any(recorded.values()) else []
     drawn = {'box': [int(edge) for edge in box_px], 'by': 'hand'}
-    return detections + [dict(drawn, **({} if box is None else _estimate_of(box)))]
+    return detections + [dict(drawn, **({} if box is None else box_entry(box)))]
 
 
 def changes_with_estimate(entry, number, box):
     """The changes that give the detection of a number in an entry its estimate, a Box3D."""
-    estimate = _estimate_of(box)
     if not entry.get('detections'):  # its only box is in the entry itself
-        return {'estimate_mm': estimate['estimate_mm']}
+        return {'estimate_mm': box_entry(box)['estimate_mm']}
     detections = [dict(detection) for detection in entry['detections']]
-    detections[number].update(estimate)
+    detections[number].update(box_entry(box))
     return {'detections': detections}
-
-
-def _estimate_of(box):
-    return {'estimate_mm': [millimetres(value) for value in box.center_m],
-            'size_mm': [millimetres(value) for value in box.size_m[:2]],
-            'support': round(float(box.support), DIGITS), 'truncated': bool(box.truncated)}
 
 
 def grid_of(content):

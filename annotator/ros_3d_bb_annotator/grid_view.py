@@ -17,7 +17,7 @@ ARROWS = {Qt.Key_Left: (-1, 0), Qt.Key_Right: (1, 0), Qt.Key_Up: (0, 1), Qt.Key_
 
 
 class FloorScene(NamedTuple):
-    """What is on the floor: `marks` (see `document.Mark`), the (x, z) in metres of truth and estimate, None where
+    """What is on the floor: `marks` (see `measurement.Mark`), the (x, z) in metres of truth and estimate, None where
     there is none, and the tangents of the camera's field of view to the left and to the right."""
 
     marks: Tuple[Any, ...]

@@ -3,7 +3,7 @@ from ros_3d_bb_annotator import marking
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
 BACKGROUND = QtGui.QColor(38, 40, 44)
-WHEEL_STEP, KEY_STEP = 1.2, 1.4
+WHEEL_STEP = 1.2
 CURSOR_STEP_PX, PAN_STEP_PX = 10, 40
 CLICK_PX = 4  # on the screen: a press that moves less is a click
 ARROWS = {Qt.Key_Left: (-1, 0), Qt.Key_Right: (1, 0), Qt.Key_Up: (0, -1), Qt.Key_Down: (0, 1)}

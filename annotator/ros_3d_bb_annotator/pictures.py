@@ -2,11 +2,9 @@
 import collections
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 
-from ros_3d_bb.overlay import visible_depth
-
+from ros_3d_bb.overlay import colors_of, visible_depth
 from ros_3d_bb_annotator.qt import QtGui
 
 KEPT = 7  # measurements: the one looked at and its neighbours
@@ -60,7 +58,7 @@ class PictureCache(object):
             shown = None if picture is None else grey_picture(picture)
         else:
             depth, depth_problem = _tried(self._document.depth, number)
-            shown = None if depth is None else colored_depth(depth, farthest_of(depth))
+            shown = None if depth is None else colors_of(visible_depth(depth, farthest_of(depth)))
         return Pictures(None if color is None else image_of(color), color_problem,
                         None if shown is None else image_of(shown), depth_problem,
                         depth, 0.0 if depth is None else farthest_of(depth))
@@ -76,13 +74,6 @@ def farthest_of(depth):
     return next((range_m for range_m in RANGES_M if range_m >= far_m), RANGES_M[-1])
 
 
-def colored_depth(depth, farthest_m):
-    """A DepthImage in colours, (height, width, 3), uint8, RGB: near is red, far is blue, no depth is black."""
-    grey = visible_depth(depth, farthest_m)
-    colored = cv2.applyColorMap(grey, cv2.COLORMAP_JET)[..., ::-1]
-    return np.where(grey[..., None] > 0, colored, 0).astype(np.uint8)
-
-
 def grey_picture(values):
     """A picture (height, width), uint8 or uint16, in no unit, as (height, width, 3), uint8, RGB."""
     grey = values if values.dtype == np.uint8 else (values // 256).astype(np.uint8)
@@ -90,9 +81,9 @@ def grey_picture(values):
 
 
 def depth_scale():
-    """The colours of `colored_depth` from far (top) to near (bottom), a QImage."""
+    """The colours of depth from far (top) to near (bottom), a QImage."""
     grey = np.linspace(1, 255, 255).astype(np.uint8)[:, None]
-    return image_of(cv2.applyColorMap(grey, cv2.COLORMAP_JET)[..., ::-1])
+    return image_of(colors_of(grey))
 
 
 def image_of(rgb):

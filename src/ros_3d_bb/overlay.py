@@ -45,3 +45,10 @@ def visible_depth(depth, farthest_m):
     measured = np.isfinite(depth_m) & (depth_m > 0)
     grey = 255 - 254 * np.clip(np.where(measured, depth_m, 0) / farthest_m, 0, 1)
     return np.where(measured, grey, 0).astype(np.uint8)
+
+
+def colors_of(grey):
+    """Colours of a depth image as `visible_depth` makes it: near is red, far blue, not measured black."""
+    colors = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_JET)[..., ::-1])
+    colors[grey == 0] = 0
+    return colors

@@ -152,12 +152,13 @@ def _detections(measurement):
         entry = {'box': [int(edge) for edge in rect_px]}
         if found is not None:
             boxes = [box for box in boxes if box is not found]
-            entry.update(_box_entry(found))
+            entry.update(box_entry(found))
         entries.append(entry)
-    return entries + [dict(_box_entry(box), box=[int(edge) for edge in box.rect_px]) for box in boxes]
+    return entries + [dict(box_entry(box), box=[int(edge) for edge in box.rect_px]) for box in boxes]
 
 
-def _box_entry(box):
+def box_entry(box):
+    """What a detection has of a Box3D, its 2D box aside. Raises ValueError where that is not finite."""
     values_m = np.append(box.center_m, box.size_m[:2])
     if not np.isfinite(values_m).all():
         raise ValueError('a 3D box has centre %s and size %s; finite expected' % (box.center_m, box.size_m))

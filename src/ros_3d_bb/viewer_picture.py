@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.estimation import Box3D, DepthImage
-from ros_3d_bb.overlay import draw_boxes, visible_depth
+from ros_3d_bb.overlay import colors_of, draw_boxes, visible_depth
 from ros_3d_bb.stamped import NS
 
 PAPER, INK, WARNING_INK = (32, 32, 32), (235, 235, 235), (255, 190, 60)
@@ -67,13 +67,6 @@ def compose(view, panel_width_px, farthest_m):
     row = np.concatenate(panels, axis=1)
     lines = view.lines + box_lines(view.boxes or ())
     return np.concatenate((row, text_picture(lines, view.warnings, row.shape[1])))
-
-
-def colors_of(grey):
-    """Colours of a depth image as `visible_depth` makes it: near is red, far blue, not measured black."""
-    colors = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_JET)[..., ::-1])
-    colors[grey == 0] = 0
-    return colors
 
 
 def draw_range_bar(image, farthest_m):

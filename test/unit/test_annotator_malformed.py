@@ -63,8 +63,9 @@ def test_an_entry_with_a_fault_is_shown_with_it_and_the_others_stay_usable(folde
     assert problem in list(problems_of(document))[0]
     with pytest.raises(SessionError, match='number 2'):
         read_session(folder)
-    with pytest.raises(SessionError):
-        document.color(1)
+    for edit in (lambda: document.color(1), lambda: document.set_truth(1, 0.1, 2.0)):
+        with pytest.raises(SessionError):
+            edit()
     document.set_truth(2, 0.1, 2.0)
     assert read_json(folder)['frames'][2]['truth_mm'] == {'x': 100, 'z': 2000}
 

@@ -5,7 +5,8 @@ import pytest
 from ros_3d_bb.estimation import Box3D, DepthImage
 from ros_3d_bb.overlay import BOX_COLOR
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.viewer_picture import WARNING_INK, FrameRate, View, box_lines, colors_of, compose, text_picture
+from ros_3d_bb.overlay import colors_of
+from ros_3d_bb.viewer_picture import WARNING_INK, FrameRate, View, box_lines, compose, text_picture
 
 BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75, True)
 

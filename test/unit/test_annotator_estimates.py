@@ -1,0 +1,107 @@
+"""Estimates that the annotator makes: of boxes drawn by hand, and of those for which none is stored."""
+import os
+
+import cv2
+import numpy as np
+import pytest
+
+from ros_3d_bb.measurements import read_session
+from ros_3d_bb_annotator.document import Document
+from support.small_session import FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json, write_small_session
+from support.synthetic_session import write_synthetic_session
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return write_small_session(str(tmp_path))
+
+
+@pytest.fixture
+def document(folder):
+    return Document.open(folder)
+
+
+def test_a_box_drawn_by_hand_is_estimated_and_chosen(document, folder):
+    change_json(folder, lambda content: content['frames'][0]['detections'].pop(0))
+    document.refresh()
+    box = document.add_box(0, NEAR_BOX)
+    drawn = document.measurements[0].detections[-1]
+    assert document.measurements[0].person == 1 and drawn.by_hand and drawn.box_px == NEAR_BOX
+    assert box.center_m[2] == pytest.approx(NEAR_MM / 1000.0 + 0.09)  # the axis is behind the surface
+    assert np.abs(drawn.estimate_m - box.center_m).max() < 1e-5
+    assert drawn.support == pytest.approx(box.support, abs=1e-3) and drawn.truncated is False
+    assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
+
+
+def test_a_box_drawn_by_hand_replaces_a_bad_one_of_the_same_person(document, folder):
+    change_json(folder, lambda content: content['frames'][0]['detections'][0].update(box=[10, 4, 26, 30]))
+    document.refresh()
+    assert document.add_box(0, (-5, 4, 26, 44)) is not None
+    assert document.measurements[0].detections[-1].box_px == (0, 4, 26, 44)
+    assert document.add_box(0, NEAR_BOX).center_m[2] == pytest.approx(2.09)
+    assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
+
+
+def test_a_box_without_depth_is_added_without_estimate(document):
+    cv2.imwrite(document.measurements[0].depth_path, np.zeros((48, 64), np.uint16))
+    assert document.add_box(0, (1, 1, 9, 9)) is None
+    assert document.measurements[0].estimate_m is None and document.measurements[0].person == 2
+
+
+@pytest.mark.parametrize('box_px', [(5, 5, 5, 9), (9, 5, 5, 9), (70, 5, 90, 9), (-9, 5, 0, 9)])
+def test_a_box_without_pixels_is_refused(document, box_px):
+    with pytest.raises(ValueError, match='empty or reversed'):
+        document.add_box(0, box_px)
+    assert not document.can_undo
+
+
+def test_a_box_in_a_session_of_one_box_a_frame(tmp_path):
+    folder = write_synthetic_session(str(tmp_path))
+    before = read_json(folder)
+    document = Document.open(folder)
+    recorded_m = document.measurements[0].estimate_m
+    document.add_box(0, (200, 100, 330, 400))
+    assert len(document.measurements[0].detections) == 2
+    assert document.measurements[0].detections[0].estimate_m.tolist() == recorded_m.tolist()
+    assert set(read_json(folder)['frames'][0]) == {'id', 'color', 'depth', 'truth_mm', 'detections', 'person'}
+    assert document.undo() == 0 and read_json(folder) == before
+
+
+@pytest.mark.parametrize('edit', [lambda document: document.set_truth(0, 0.1, 2.0),
+                                  lambda document: document.choose_person(0, 0)])
+def test_a_box_without_estimate_is_estimated_when_it_is_needed(document, folder, edit):
+    change_json(folder, lambda content: [content['frames'][0]['detections'][0].pop(name) for name in (
+        'estimate_mm', 'size_mm', 'support', 'truncated')])
+    document.refresh()
+    before = read_json(folder)
+    edit(document)
+    expected = document.estimated(0, NEAR_BOX)
+    detection = Document.open(folder).measurements[0].detections[0]
+    assert np.abs(detection.estimate_m - expected.center_m).max() < 1e-5 and detection.support > 0.5
+    os.remove(document.measurements[0].depth_path)
+    edit(document)  # what is stored is not estimated again
+    assert document.measurements[0].estimate_m == pytest.approx(detection.estimate_m)
+    document.undo()
+    document.undo()
+    assert read_json(folder) == before
+
+
+def test_the_only_box_of_a_measurement_is_estimated_when_truth_is_entered(tmp_path):
+    folder = write_synthetic_session(str(tmp_path))
+    change_json(folder, lambda content: content['frames'][0].pop('estimate_mm'))
+    document = Document.open(folder)
+    assert document.errors(0) is None
+    document.set_truth(0, *(document.measurements[0].truth_m[axis] for axis in (0, 2)))
+    assert document.errors(0)[2] < 0.1 and len(read_json(folder)['frames'][0]['estimate_mm']) == 3
+    assert 'detections' not in read_json(folder)['frames'][0]
+
+
+@pytest.mark.parametrize('break_it', [
+    lambda document: os.remove(document.measurements[0].depth_path),
+    lambda document: cv2.imwrite(document.measurements[0].depth_path, np.zeros((48, 64), np.uint16))])
+def test_a_box_that_cannot_be_estimated_takes_the_truth(document, folder, break_it):
+    change_json(folder, lambda content: content['frames'][0]['detections'][0].pop('estimate_mm'))
+    document.refresh()
+    break_it(document)
+    document.set_truth(0, 0.1, 2.0)
+    assert document.measurements[0].truth_m == (0.1, None, 2.0) and document.errors(0) is None
