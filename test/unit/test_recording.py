@@ -2,6 +2,8 @@
 import json
 import multiprocessing
 import os
+import signal
+import time
 
 import cv2
 import numpy as np
@@ -135,6 +137,37 @@ def test_two_programs_lose_nothing_of_each_other(folder):
     assert len(set(frame.id for frame in session.frames)) == 20
     for frame in session.frames:
         read_color(frame, session.camera)
+
+
+def _append_on_and_on(folder, first, reports):
+    for number in range(first, 1000):
+        append(folder, measurement(number))
+        reports.send(number)
+
+
+def test_kill_at_any_moment_leaves_whole_measurements(folder):
+    random, count, kills = np.random.RandomState(4), 0, 6
+    for _kill in range(kills):
+        receiver, sender = multiprocessing.Pipe(duplex=False)
+        process = multiprocessing.get_context('fork').Process(target=_append_on_and_on, args=(folder, count, sender))
+        process.start()
+        sender.close()
+        for _report in range(1 + random.randint(3)):
+            reported = receiver.recv()
+        time.sleep(random.uniform(0, 0.01))  # about one measurement
+        os.kill(process.pid, signal.SIGKILL)
+        process.join()
+        while receiver.poll():
+            try:
+                reported = receiver.recv()
+            except EOFError:
+                break
+        session = read_session(folder)
+        assert reported + 1 <= len(session.frames) <= reported + 2
+        count = len(session.frames)
+    for number, frame in enumerate(session.frames):
+        np.testing.assert_array_equal(read_color(frame, session.camera), measurement(number).color)
+        np.testing.assert_array_equal(read_depth(frame, session).values, measurement(number).depth.values)
 
 
 @pytest.mark.parametrize('changes, said', [
