@@ -3,4 +3,4 @@ STANDARD_LIBRARY = {'argparse', 'ast', 'base64', 'bisect', 'collections', 'concu
                     'ctypes', 'datetime', 'difflib', 'fcntl', 'functools', 'hashlib', 'html', 'importlib', 'io', 'json',
                     'math', 'os', 'pathlib', 'pickle', 're', 'signal', 'struct', 'subprocess', 'sys', 'tempfile',
                     'threading', 'time', 'typing', 'warnings', 'zipfile', 'zlib'}
-TEST_STANDARD_LIBRARY = {'glob', 'itertools', 'multiprocessing', 'random', 'shutil', 'stat', 'types', 'xml'}
+TEST_STANDARD_LIBRARY = {'atexit', 'glob', 'itertools', 'multiprocessing', 'random', 'shutil', 'stat', 'types', 'xml'}
