@@ -70,7 +70,7 @@ def paint_cursor(painter, transform, shared):
 
 def paint_frame(painter, rect, name, legend, focused):
     """Paint the name of the view, its scale of colours, and a frame where it has the keyboard."""
-    _paint_label(painter, QtCore.QPointF(rect.left(), rect.top()), name, CAPTION, inside=True)
+    _paint_label(painter, QtCore.QPointF(rect.left(), rect.bottom() + 1), name, CAPTION)  # labels of boxes are on top
     if legend is not None:
         scale, top, bottom = legend
         bar = QtCore.QRect(rect.right() - 22, rect.top() + 28, 14, max(60, rect.height() - 64))

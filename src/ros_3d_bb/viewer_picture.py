@@ -63,7 +63,7 @@ def compose(view, panel_width_px, farthest_m):
     grey = cv2.resize(visible_depth(view.depth, farthest_m), size_px, interpolation=cv2.INTER_NEAREST)
     panels = [color, draw_range_bar(colors_of(grey), farthest_m), _annotated(color.copy(), view)]
     for panel, title in zip(panels, TITLES):
-        _write(panel, title, (MARGIN_PX, LINE_PX))
+        _write(panel, title, (MARGIN_PX, panel.shape[0] - MARGIN_PX))  # labels of boxes are on top
     row = np.concatenate(panels, axis=1)
     lines = view.lines + box_lines(view.boxes or ())
     return np.concatenate((row, text_picture(lines, view.warnings, row.shape[1])))
