@@ -95,21 +95,20 @@ def paint_message(painter, rect, message):
 
 def _paint_samples(painter, transform, samples):
     """Paint the samples of a box: all of them where they are far enough apart on the screen, else each n-th."""
-    shown = _thinned(samples.u, transform.m11()) & _thinned(samples.v, transform.m11())
-    for kind, color in ((samples.valid, VALID_COLOR), (~samples.valid, INVALID_COLOR)):
+    shown = _thinned(samples.rows, transform.m11()), _thinned(samples.columns, transform.m11())
+    pixels, valid = samples.pixels[shown], samples.valid[shown]
+    for kind, color in ((valid, VALID_COLOR), (~valid, INVALID_COLOR)):
         painter.setPen(QtGui.QPen(QtGui.QColor(*color), SAMPLE_PX, Qt.SolidLine, Qt.RoundCap))
         painter.drawPoints(transform.map(QtGui.QPolygonF([
-            QtCore.QPointF(u + 0.5, v + 0.5)
-            for u, v in zip(samples.u[shown & kind].tolist(), samples.v[shown & kind].tolist())])))
+            QtCore.QPointF(u + 0.5, v + 0.5) for u, v in pixels[kind].tolist()])))
 
 
-def _thinned(places, scale):
-    """Which places (n,) on an axis of a grid to show so that they are `SAMPLES_APART_PX` apart on the screen."""
-    ticks = np.unique(places)
+def _thinned(ticks, scale):
+    """Which ticks (n,) of a grid to show, a slice, so that they are `SAMPLES_APART_PX` apart on the screen."""
     if ticks.size < 2:
-        return np.ones(places.shape, bool)
+        return slice(None)
     every = int(np.ceil(SAMPLES_APART_PX / ((ticks[1] - ticks[0]) * scale)))
-    return np.isin(places, ticks[every // 2::every])
+    return slice(every // 2, None, every)
 
 
 def _paint_box(painter, transform, box_px, color, stroke):

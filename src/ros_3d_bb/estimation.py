@@ -7,21 +7,17 @@ from typing import Any, NamedTuple, Optional, Tuple
 
 import numpy as np
 
+from ros_3d_bb.body_layer import BODY_HALF_DEPTH_M, edges, first_layer, trimmed_mean, whole, within
+
 FARTHEST_M = 100.0  # farther away no depth camera measures anything
 # A box whose edge is this close to the image border is taken to be cut by it: detectors round to whole pixels and
 # regress the edge of a cut person a pixel or two inside the image.
 BORDER_PX = 2
-# Depth of a person with stretched arms around its median depth; what lies further off is something else.
-BODY_HALF_DEPTH_M = 0.35
-TRUNK_HALF_DEPTH_M = 0.25  # without arms and legs: a wall close behind must not draw the median
-# The foreground estimator: how many pixels it looks at, and how it finds the person's layer among them.
-SAMPLES_WANTED = 2000
-BIN_M, LAYER_BINS = 0.05, 5  # a layer is the depth in so many bins of a histogram
-FIRST_LAYER_SHARE = 0.5  # the nearest layer with this share of the strongest one's weight is the person
+SAMPLES_WANTED = 2000  # pixels that the foreground estimator looks at
 AXIS_BEHIND_SURFACE_M = 0.09  # mean over standing and walking bodies of the simulation, seen from all sides
 LEAST_SUPPORT = 0.1  # what carries less of the samples is no person that anything can be said about
 USUAL_WIDTH_M, USUAL_HEIGHT_M = 0.46, 1.7  # of a body that the image border cuts
-EDGE_PERCENT = 5  # of the pixels of the layer are looked past on the left and on the right: arms, flying pixels
+LEAST_WIDTH_M = 0.05
 
 
 class DepthImage(NamedTuple):
@@ -34,18 +30,32 @@ class DepthImage(NamedTuple):
     scale_m: float
 
     def at(self, u, v):
-        """Depth in metres at integer pixels (columns u, rows v), and whether it was measured; arrays of u's shape."""
+        """Depth in metres at integer pixels (columns u, rows v: arrays, or slices for a grid), and whether it was
+        measured; arrays of one shape."""
         depth_m = self.values[v, u].astype(float) * self.scale_m
         return depth_m, (depth_m > 0) & (depth_m <= FARTHEST_M)
 
 
 class Samples(NamedTuple):
-    """Depth pixels looked at in one rectangle: columns u (n,), rows v (n,), depth_m (n,), valid (n,)."""
+    """Depth pixels looked at in one rectangle, a grid: columns (w,), rows (h,), values (h, w), which times
+    `scale_m` is depth_m (h, w), valid (h, w).
+    """
 
-    u: np.ndarray
-    v: np.ndarray
+    columns: np.ndarray
+    rows: np.ndarray
+    values: np.ndarray
+    scale_m: float
     depth_m: np.ndarray
     valid: np.ndarray
+
+    def in_order(self, chosen):
+        """The depths in metres of chosen samples (h, w), nearest first: numpy sorts 16-bit integers in linear time."""
+        return np.sort(self.values[chosen], kind='mergesort').astype(float) * self.scale_m
+
+    @property
+    def pixels(self):
+        """(u, v) of the grid, (h, w, 2)."""
+        return np.stack(np.meshgrid(self.columns, self.rows), axis=-1)
 
 
 class Box3D(NamedTuple):
@@ -79,8 +89,10 @@ def sample_median(depth, rect_px, stride_px=20):
     x1, y1, x2, y2 = (int(edge) for edge in rect_px)
     check_rect((x1, y1, x2, y2))
     height, width = depth.values.shape
-    u, v = (grid.ravel() for grid in np.meshgrid(_ticks(x1, x2, width, stride_px), _ticks(y1, y2, height, stride_px)))
-    return Samples(u, v, *depth.at(u, v))
+    ticks = _ticks(x1, x2, width, stride_px), _ticks(y1, y2, height, stride_px)
+    columns, rows = (slice(those.start, those.stop, those.step) for those in ticks)
+    return Samples(*(np.arange(those.start, those.stop, those.step) for those in ticks), depth.values[rows, columns],
+                   depth.scale_m, *depth.at(columns, rows))
 
 
 def estimate_median(samples, rect_px, camera, _nearer=()):
@@ -92,7 +104,8 @@ def estimate_median(samples, rect_px, camera, _nearer=()):
         None where no sample carries a depth, or the camera sees nothing there.
     """
     depth_m = samples.depth_m[samples.valid]
-    points = _points(samples.u[samples.valid], samples.v[samples.valid], depth_m, camera)
+    points = camera.deproject(samples.pixels[samples.valid], depth_m)
+    points = points[~np.isnan(points[:, 0])]  # pixels that see nothing
     flat_px = _without_distortion(rect_px, camera)
     if flat_px is None or not points.size:
         return None
@@ -101,7 +114,7 @@ def estimate_median(samples, rect_px, camera, _nearer=()):
     width_m, height_m = (x2 - x1) / camera.fx * center_m[2], (y2 - y1) / camera.fy * center_m[2]
     on_body = np.abs(depth_m - center_m[2]) <= BODY_HALF_DEPTH_M
     return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px),
-                 np.count_nonzero(on_body) / float(samples.u.size), is_truncated(rect_px, camera))
+                 np.count_nonzero(on_body) / float(samples.valid.size), is_truncated(rect_px, camera))
 
 
 def sample_foreground(depth, rect_px):
@@ -144,57 +157,31 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
         None where no sample carries a depth, or less than `LEAST_SUPPORT` of them are in a layer of their own, or the
         camera sees nothing there.
     """
-    own = samples.valid & ~_explained(samples, rect_px, nearer)
-    if not own.any():
-        return None
-    u, v, depth_m = (part[own] for part in (samples.u, samples.v, samples.depth_m))
-    x1, y1, x2, y2 = rect_px
-    layer_m = _first_layer(depth_m, np.exp(-0.5 * ((u - (x1 + x2) / 2.0) / ((x2 - x1) / 4.0)) ** 2))
-    for _ in range(3):
-        layer_m = np.median(depth_m[np.abs(depth_m - layer_m) <= TRUNK_HALF_DEPTH_M])
-    on_body = np.abs(depth_m - layer_m) <= BODY_HALF_DEPTH_M
-    support = np.count_nonzero(on_body) / float(samples.u.size)
-    points = _points(u[on_body], v[on_body], depth_m[on_body], camera)
+    across, _down = camera.rays(samples.columns, samples.rows[:, np.newaxis])
+    own = samples.valid & ~np.isnan(across)  # a pixel that sees nothing has no ray
+    _leave_out(own, samples, rect_px, nearer)
     flat_px = _without_distortion(rect_px, camera)
-    if support < LEAST_SUPPORT or flat_px is None or not points.size:
+    if flat_px is None or not own.any():
         return None
-    layer_m = _trimmed_mean(points[:, 2])
-    left_m, right_m = _edges(points[:, 0])
+    x1, y1, x2, y2 = rect_px
+    in_middle = np.exp(-0.5 * ((samples.columns - (x1 + x2) / 2.0) / ((x2 - x1) / 4.0)) ** 2)
+    depths_m = samples.in_order(own)
+    layer_m = first_layer(samples.depth_m[own], np.broadcast_to(in_middle, own.shape)[own], depths_m)
+    body_m = within(depths_m, layer_m, BODY_HALF_DEPTH_M)
+    support = len(body_m) / float(own.size)
+    if support < LEAST_SUPPORT:
+        return None
+    on_body = own & (np.abs(samples.depth_m - layer_m) <= BODY_HALF_DEPTH_M)
+    left_m, right_m = edges((across * samples.depth_m)[on_body])
+    layer_m = trimmed_mean(body_m)
     top_m, bottom_m = ((edge - camera.cy) / camera.fy * layer_m for edge in flat_px[1::2])
     cut_left, cut_top, cut_right, cut_bottom = _cut_edges(rect_px, camera)
-    left_m, right_m = _whole(left_m, right_m, cut_left, cut_right, USUAL_WIDTH_M)
-    top_m, bottom_m = _whole(top_m, bottom_m, cut_top, cut_bottom, USUAL_HEIGHT_M)
+    left_m, right_m = whole(left_m, right_m, cut_left, cut_right, USUAL_WIDTH_M)
+    top_m, bottom_m = whole(top_m, bottom_m, cut_top, cut_bottom, USUAL_HEIGHT_M)
     surface_m = np.array([(left_m + right_m) / 2, (top_m + bottom_m) / 2, layer_m])
-    width_m = max(right_m - left_m, BIN_M)
+    width_m = max(right_m - left_m, LEAST_WIDTH_M)
     return Box3D(surface_m * (1 + AXIS_BEHIND_SURFACE_M / layer_m), np.array([width_m, bottom_m - top_m, width_m]),
                  tuple(rect_px), support, is_truncated(rect_px, camera))
-
-
-def _edges(x_m):
-    """Left and right edge of a body of points at x (n,): where they would be if it were as wide everywhere."""
-    low_m, high_m = np.percentile(x_m, [EDGE_PERCENT, 100 - EDGE_PERCENT])
-    beyond_m = (high_m - low_m) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
-    return low_m - beyond_m, high_m + beyond_m
-
-
-def _trimmed_mean(values):
-    """The mean without the lowest and the highest tenth: finer than the median, which is one of the camera's steps."""
-    tenth = len(values) // 10
-    return np.sort(values)[tenth:len(values) - tenth].mean()
-
-
-def _whole(low, high, cut_low, cut_high, usual):
-    """The extent low..high of a body that the image border cuts on one side, where it is at least the usual one."""
-    missing = max(0.0, usual - (high - low))
-    if cut_low and not cut_high:
-        return low - missing, high
-    return low, high + (missing if cut_high and not cut_low else 0.0)
-
-
-def _points(u, v, depth_m, camera):
-    """What pixels show, (n, 3), without those that see nothing (see `Camera.deproject`)."""
-    points = camera.deproject(np.stack((u, v), axis=-1), depth_m)
-    return points[~np.isnan(points[:, 0])]
 
 
 def _without_distortion(rect_px, camera):
@@ -212,24 +199,14 @@ def _without_distortion(rect_px, camera):
     return None if np.isnan(flat_px).any() else flat_px
 
 
-def _explained(samples, rect_px, boxes):
-    """Which samples of a rectangle lie in the rectangle and in the layer of depth of one of the boxes, (n,)."""
-    explained = np.zeros(samples.u.shape, bool)
+def _leave_out(own, samples, rect_px, boxes):
+    """Take out of `own` (h, w) the samples that lie in the rectangle and in the layer of depth of one of the boxes."""
+    left, top, right, bottom = rect_px
     for box in boxes:
         x1, y1, x2, y2 = box.rect_px
-        if x1 < rect_px[2] and x2 > rect_px[0] and y1 < rect_px[3] and y2 > rect_px[1]:
-            explained |= ((samples.u >= x1) & (samples.u < x2) & (samples.v >= y1) & (samples.v < y2)
-                          & (np.abs(samples.depth_m - box.center_m[2]) <= BODY_HALF_DEPTH_M))
-    return explained
-
-
-def _first_layer(depth_m, weights):
-    """Depth of the nearest strong layer of weighted depths."""
-    bins = ((depth_m - depth_m.min()) / BIN_M).astype(int)
-    histogram = np.convolve(np.bincount(bins, weights), np.ones(LAYER_BINS), 'same')
-    first = np.flatnonzero(histogram >= FIRST_LAYER_SHARE * histogram.max())[0]
-    best = first + np.argmax(histogram[first:first + LAYER_BINS])
-    return np.median(depth_m[np.abs(bins - best) <= LAYER_BINS // 2])
+        if x1 < right and x2 > left and y1 < bottom and y2 > top:
+            part = (slice(*samples.rows.searchsorted((y1, y2))), slice(*samples.columns.searchsorted((x1, x2))))
+            own[part] &= np.abs(samples.depth_m[part] - box.center_m[2]) > BODY_HALF_DEPTH_M
 
 
 class Estimator(NamedTuple):
@@ -308,8 +285,8 @@ def _cut_edges(rect_px, camera):
 
 
 def _ticks(low, high, limit, stride):
-    """Multiples of stride centred in low..high, those in 0..limit; exact for ints of any size, in O(limit)."""
+    """Range of multiples of stride centred in low..high, those in 0..limit; exact for ints of any size."""
     count = -(-(high - low) // stride)
     first = low + (high - low - (count - 1) * stride - 1) // 2
     first += max(0, -(first // stride)) * stride
-    return np.arange(first, max(first, min(high, limit)), stride) if first < limit else np.arange(0)
+    return range(first, max(first, min(high, limit)), stride) if first < limit else range(0)

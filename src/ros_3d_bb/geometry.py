@@ -55,11 +55,27 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
             nan for x and y where the distortion gives the pixel no ray.
         """
         pixels, depth_m = np.asarray(pixels, float), np.asarray(depth_m, float)
-        x, y = (pixels[..., 0] - self.cx) / self.fx, (pixels[..., 1] - self.cy) / self.fy
-        if self.distortion_model:
-            x, y = np.moveaxis(undistort(self.distortion_model, self.distortion, np.stack((x, y), axis=-1)), -1, 0)
-        x, y = x * depth_m, y * depth_m
+        x, y = (along * depth_m for along in self.rays(pixels[..., 0], pixels[..., 1]))
         return np.stack((x, y, np.broadcast_to(depth_m, x.shape)), axis=-1)
+
+    def rays(self, u, v):
+        """x / z and y / z of what the pixels in columns u and rows v show.
+
+        Parameters
+        ----------
+        u, v : numpy.ndarray
+            Arrays that broadcast to one shape: a row of columns and a column of rows are a grid.
+
+        Returns
+        -------
+        x, y : numpy.ndarray
+            Arrays that broadcast to the same shape; nan where the distortion gives the pixel no ray.
+        """
+        x, y = (u - self.cx) / self.fx, (v - self.cy) / self.fy
+        if not self.distortion_model:
+            return x, y
+        pixels = np.stack(np.broadcast_arrays(x, y), axis=-1)
+        return tuple(np.moveaxis(undistort(self.distortion_model, self.distortion, pixels), -1, 0))
 
     def project(self, points):
         """Pixels that show points of the optical frame. Inverse of `deproject`.

@@ -34,7 +34,7 @@ def draw_samples(image, rect_px, samples):
     x1, y1, x2, y2 = np.clip(rect_px, 0, [width, height] * 2).tolist()
     for corner in ((x1, y1), (x2, y2)):
         cv2.circle(image, corner, 5, CORNER_COLOR, 2)
-    for u, v, valid in zip(samples.u.tolist(), samples.v.tolist(), samples.valid.tolist()):
+    for (u, v), valid in zip(samples.pixels.reshape(-1, 2).tolist(), samples.valid.ravel().tolist()):
         cv2.circle(image, (u, v), 2, VALID_COLOR if valid else INVALID_COLOR, cv2.FILLED)
     return image
 

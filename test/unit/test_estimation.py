@@ -38,14 +38,14 @@ def test_grid_is_the_centred_one_cut_at_the_border(x1, y1, width, height, stride
         for u in range(x1 + (width - (columns - 1) * stride - 1) // 2, x1 + width, stride):
             if 0 <= u < 64 and 0 <= v < 48:
                 expected.append((u, v))
-    assert list(zip(samples.u.tolist(), samples.v.tolist())) == expected
+    assert [tuple(pixel) for pixel in samples.pixels.reshape(-1, 2).tolist()] == expected
 
 
 def test_boxes_of_any_size_cost_no_more_than_the_image():
     big = 2 ** 31 - 1
     samples = sample_median(flat(1000), (-big - 1, -big - 1, big, big))
-    assert 0 < samples.u.size <= 12
-    assert sample_median(flat(1000), (big - 50, big - 50, big, big)).u.size == 0
+    assert 0 < samples.valid.size <= 12
+    assert sample_median(flat(1000), (big - 50, big - 50, big, big)).valid.size == 0
 
 
 @pytest.mark.parametrize('rect', [(10, 10, 10, 20), (20, 10, 10, 20), (10, 20, 20, 10)])
@@ -126,9 +126,9 @@ def test_foreground_ignores_flying_pixels():
 def test_foreground_looks_at_about_as_many_pixels_in_every_box():
     depth = DepthImage(np.full((480, 640), 1000, np.uint16), 0.001)
     rects = ((0, 0, 640, 480), (100, 100, 260, 400), (-5000, -5000, 5000, 5000), (300, 200, 350, 240))
-    counts = [sample_foreground(depth, rect).u.size for rect in rects]
+    counts = [sample_foreground(depth, rect).valid.size for rect in rects]
     assert all(1500 <= count <= 4500 for count in counts)
-    assert sample_foreground(depth, (300, 200, 310, 220)).u.size == 200
+    assert sample_foreground(depth, (300, 200, 310, 220)).valid.size == 200
 
 
 @pytest.mark.parametrize('depth,scale_m,dtype', [(0, 0.001, np.uint16), (np.nan, 1.0, np.float32)])

@@ -21,7 +21,7 @@ def test_samples_show_where_depth_was_measured():
     rect = (5, 5, 55, 55)
     samples = sample_median(DepthImage(values, 0.001), rect, 10)
     image = draw_samples(np.zeros((60, 60, 3), np.uint8), rect, samples)
-    for u, v, valid in zip(samples.u, samples.v, samples.valid):
+    for (u, v), valid in zip(samples.pixels.reshape(-1, 2), samples.valid.ravel()):
         assert image[v, u].tolist() == list(VALID_COLOR if valid else INVALID_COLOR)
 
 

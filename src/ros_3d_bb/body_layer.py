@@ -1,0 +1,74 @@
+"""The layer of a person among the depths in a box, and its edges.
+
+Depths in metres; where they are `in_order`, from near to far, a layer is a slice of them, and a median an element.
+"""
+import numpy as np
+
+# Depth of a person with stretched arms around its median depth; what lies further off is something else.
+BODY_HALF_DEPTH_M = 0.35
+TRUNK_HALF_DEPTH_M = 0.25  # without arms and legs: a wall close behind must not draw the median
+BIN_M, LAYER_BINS = 0.05, 5  # a layer is the depth in so many bins of a histogram
+FIRST_LAYER_SHARE = 0.5  # the nearest layer with this share of the strongest one's weight is the person
+EDGE_PERCENT = 5  # of the pixels of the layer are looked past on the left and on the right: arms, flying pixels
+
+
+def first_layer(depths_m, weights, in_order_m):
+    """Depth of the trunk of the person: the median of the nearest strong layer of weighted depths.
+
+    Parameters
+    ----------
+    depths_m, weights : numpy.ndarray, (n,)
+    in_order_m : numpy.ndarray, (n,)
+        The same depths, nearest first.
+
+    Returns
+    -------
+    float
+    """
+    bins = ((depths_m - in_order_m[0]) / BIN_M).astype(int)
+    histogram = np.convolve(np.bincount(bins, weights), np.ones(LAYER_BINS), 'same')
+    first = np.argmax(histogram >= FIRST_LAYER_SHARE * histogram.max())
+    best = first + np.argmax(histogram[first:first + LAYER_BINS])
+    nearest, farthest = ((in_order_m - in_order_m[0]) / BIN_M).searchsorted(
+        (best - LAYER_BINS // 2, best + LAYER_BINS // 2 + 1))
+    layer_m = _median(in_order_m[nearest:farthest])
+    for _ in range(3):
+        layer_m = _median(within(in_order_m, layer_m, TRUNK_HALF_DEPTH_M))
+    return layer_m
+
+
+def within(in_order_m, middle_m, half_m):
+    """Those of the depths in order that are at most so far from the middle, a slice."""
+    offsets_m = in_order_m - middle_m
+    return in_order_m[offsets_m.searchsorted(-half_m):offsets_m.searchsorted(half_m, 'right')]
+
+
+def edges(x_m):
+    """Left and right edge of a body of points at x (n,): where they would be if it were as wide everywhere."""
+    last = len(x_m) - 1
+    rank, part = divmod(last * EDGE_PERCENT, 100)
+    after = min(rank + 1, last)
+    in_place_m = np.partition(x_m, (rank, after, last - after, last - rank))
+    low_m = in_place_m[rank] + (in_place_m[after] - in_place_m[rank]) * part / 100.0
+    high_m = in_place_m[last - rank] - (in_place_m[last - rank] - in_place_m[last - after]) * part / 100.0
+    beyond_m = (high_m - low_m) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
+    return low_m - beyond_m, high_m + beyond_m
+
+
+def trimmed_mean(in_order_m):
+    """The mean without the lowest and the highest tenth: finer than the median, which is one of the camera's steps."""
+    tenth = len(in_order_m) // 10
+    return in_order_m[tenth:len(in_order_m) - tenth].mean()
+
+
+def whole(low, high, cut_low, cut_high, usual):
+    """The extent low..high of a body that the image border cuts on one side, where it is at least the usual one."""
+    missing = max(0.0, usual - (high - low))
+    if cut_low and not cut_high:
+        return low - missing, high
+    return low, high + (missing if cut_high and not cut_low else 0.0)
+
+
+def _median(in_order_m):
+    last = len(in_order_m) - 1
+    return (in_order_m[last // 2] + in_order_m[last - last // 2]) / 2
