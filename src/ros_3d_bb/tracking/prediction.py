@@ -43,8 +43,8 @@ def objects_of(tracks, params):
     carried_mps = velocity_mps * speed2 / (speed2 + params.standing_speed ** 2 + 1e-12)
     positions_m = np.column_stack((tracks['mean'][:, :2], tracks['z_m']))
     predictions_m = positions_m[:, None] + times_s[:, None] * carried_mps.dot(level.T)[:, None]
-    predicted_m2 = level @ _ahead(tracks['covariance'], times_s, params) @ level.T
-    predicted_m2[..., 2, 2] = tracks['z_m2'][:, None]
+    predictions_m2 = level @ _ahead(tracks['covariance'], times_s, params) @ level.T
+    predictions_m2[..., 2, 2] = tracks['z_m2'][:, None]
     covariances = np.zeros((len(tracks), 6, 6))
     for rows, kept in ((0, np.s_[:2]), (3, np.s_[2:])):
         for columns, others in ((0, np.s_[:2]), (3, np.s_[2:])):
@@ -52,10 +52,12 @@ def objects_of(tracks, params):
     covariances[:, [0, 1], [0, 1]] += params.position_bias ** 2
     covariances[:, 2, 2] = tracks['z_m2']
     velocities_mps = velocity_mps.dot(level.T)
-    return [TrackedObject(int(track['id']), positions_m[row], track['size_m'].copy(), velocities_mps[row],
-                          velocities_mps[row], int(track['status']), bool(track['moving']), int(track['first_ns']),
-                          int(track['last_ns']), predictions_m[row], params.prediction_step, covariances[row],
-                          predicted_m2[row]) for row, track in enumerate(tracks)]
+    known = (tracks[name].tolist() for name in ('id', 'status', 'moving', 'first_ns', 'last_ns'))
+    return [TrackedObject(number, position_m, size_m, velocity_mps, velocity_mps, status, moving, first_ns, last_ns,
+                          prediction_m, params.prediction_step, covariance, predicted_m2)
+            for number, status, moving, first_ns, last_ns, position_m, size_m, velocity_mps, prediction_m, covariance,
+            predicted_m2 in zip(*known, positions_m, tracks['size_m'].copy(), velocities_mps, predictions_m,
+                                covariances, predictions_m2)]
 
 
 def _ahead(covariance, times_s, params):

@@ -163,10 +163,11 @@ class Tracker(object):
         sightings = sightings_of(image.detections, image.view, elapsed_s, self._noise)
         rows, columns = self._associate(tracks, sightings, image.stamp_ns)
         self._see(tracks, rows, _taken(sightings, columns), image.stamp_ns)
-        self._miss(tracks, np.setdiff1d(np.arange(len(tracks)), rows), before, image.view, looked_s)
+        self._miss(tracks, _others(len(tracks), rows), before, image.view, looked_s)
         tracks = tracks[self._is_remembered(tracks)]
-        others = np.setdiff1d(np.arange(len(image.detections)), columns)
-        tracks = np.concatenate((tracks, self._newcomers(tracks, _taken(sightings, others), others, image)))
+        others = _others(len(image.detections), columns)
+        if len(others):
+            tracks = np.concatenate((tracks, self._newcomers(tracks, _taken(sightings, others), others, image)))
         return _State(tracks, image.stamp_ns, skipped_ns)
 
     def _associate(self, tracks, sightings, stamp_ns):
@@ -180,8 +181,9 @@ class Tracker(object):
         pairs = []
         for turn in range(3):
             rows = np.flatnonzero(rank == turn)
-            columns = np.setdiff1d(np.arange(len(sightings.z_m)), [column for _row, column in pairs])
-            pairs += [(rows[row], columns[column]) for row, column in assign(cost[np.ix_(rows, columns)])]
+            if len(rows):
+                columns = _others(cost.shape[1], [column for _row, column in pairs])
+                pairs += [(rows[row], columns[column]) for row, column in assign(cost[rows[:, None], columns])]
         return np.array(pairs, int).reshape(-1, 2).T
 
     def _see(self, tracks, rows, sightings, stamp_ns):
@@ -253,6 +255,13 @@ class Tracker(object):
             self._last_id += 1
             self._ids[key] = self._last_id
         return self._ids[key]
+
+
+def _others(count, numbers):
+    """Those of 0..count that are not among the numbers."""
+    others = np.ones(count, bool)
+    others[numbers] = False
+    return np.flatnonzero(others)
 
 
 def _taken(sightings, columns):

@@ -1,7 +1,6 @@
 """Why a person is not seen: hidden by somebody or something, outside the camera's view, or gone."""
 import numpy as np
 
-from ros_3d_bb.geometry import transform_points
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
 
 EDGE_RAD = 0.03  # so near to the image border a person is not found for sure
@@ -93,7 +92,8 @@ def _half_widths(distances_m):
 
 def _behind_something(view, positions_m, sizes_m):
     """Where most of the depth measured towards a person ends well before the person."""
-    centers = transform_points(np.linalg.inv(view.fixed_from_camera), positions_m)
+    rotation = view.fixed_from_camera[:3, :3]  # its inverse is its transpose
+    centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
     offsets = np.zeros((len(centers), ACROSS.size, 3))
     offsets[..., 0] = ACROSS.ravel() * sizes_m[:, :1] / 2
     offsets[..., 1] = ALONG.ravel() * sizes_m[:, 2:] / 2
