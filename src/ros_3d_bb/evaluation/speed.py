@@ -1,0 +1,203 @@
+"""What 3D boxes and tracks cost, by the number of people: Fig. 4.2 of the thesis, for this package and the thesis'.
+
+CPU time of the algorithms, from the depth image and the 2D boxes to the tracks with their predictions, without messages
+and without waiting. Estimation: 3D boxes in the camera's frame. Tracking: taking them to the fixed frame, tracking and
+prediction. The people are those of a measurement session, side by side in one wide depth image, in boxes that a jitter
+moves from image to image. Both algorithms take the same image and boxes in turns, so that whatever else the machine
+does weighs on both alike, and the ratio between them holds.
+"""
+import argparse
+import functools
+import json
+import os
+import sys
+import tempfile
+import time
+
+import numpy as np
+
+from ros_3d_bb.estimation import estimate_boxes, estimator_named
+from ros_3d_bb.evaluation.crowd import crowd_of, people_of
+from ros_3d_bb.evaluation.detector_speed import detector_speed
+from ros_3d_bb.evaluation.machine import describe_machine
+from ros_3d_bb.evaluation.simulated_session import write_simulated_session
+from ros_3d_bb.evaluation.thesis_speed import ThesisTracks, thesis_boxes
+from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from, transform_points
+from ros_3d_bb.measurements import read_color, read_session
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.tracked import Detection, View
+from ros_3d_bb.tracking.tracker import Tracker
+from ros_3d_bb.tracking.visibility import depths_towards, edges_of
+
+OBJECTS = (1, 2, 5, 10, 20, 50, 100)
+WARM_UPS = 10  # images before the times count: until tracks are confirmed, and caches warm
+PERIOD_NS = NS // 30
+FIXED_FROM_CAMERA = transform_from((0.0, 0.0, 1.0), OPTICAL_ROTATION)
+ALGORITHMS, STAGES = ('ours', 'thesis'), ('estimation', 'tracking', 'both')
+DETECTOR_IMAGES = 40
+SIMULATED = (2.0, 4.0), (-0.2, 0.2), 2  # people of the session that is made where none is given
+
+
+class Ours(object):
+    """This package's algorithms, as its nodes call them by default."""
+
+    def __init__(self, crowd):
+        self._camera, self._tracker, self._estimator = crowd.camera, Tracker(), estimator_named('foreground')
+        depth_at = functools.partial(depths_towards, crowd.camera, crowd.depth)
+        self._view = View(FIXED_FROM_CAMERA, edges_of(crowd.camera), depth_at=depth_at)
+
+    def estimate(self, depth, rects_px):
+        """3D boxes in the frame of the camera."""
+        return [box for box in estimate_boxes(depth, rects_px, self._camera, self._estimator) if box is not None]
+
+    def track(self, stamp_ns, boxes):
+        """The tracks after one image."""
+        detections = [Detection(transform_points(FIXED_FROM_CAMERA, box.center_m), box.size_m[[0, 2, 1]],
+                                truncated=box.truncated) for box in boxes]
+        return self._tracker.update(stamp_ns, detections, self._view)
+
+
+class Theirs(object):
+    """The thesis' algorithms."""
+
+    def __init__(self, crowd):
+        self._camera, self._tracks = crowd.camera, ThesisTracks()
+
+    def estimate(self, depth, rects_px):
+        """3D boxes in the frame of the camera."""
+        return thesis_boxes(depth, rects_px, self._camera)
+
+    def track(self, stamp_ns, boxes):
+        """The predicted positions after one image."""
+        return self._tracks.update(stamp_ns, boxes, FIXED_FROM_CAMERA)
+
+
+def speed(session, counts=OBJECTS, images=60, seed=0):
+    """Time both algorithms.
+
+    Parameters
+    ----------
+    session : measurements.Session
+    counts : sequence of int
+        Numbers of people.
+    images : int
+        So many images of each number are timed.
+    seed : int
+        Of the order of the people, and of the jitter.
+
+    Returns
+    -------
+    dict
+        As in design §8, without the detector; `ratio`: medians of our time over theirs, of both stages, by number;
+        `growth`: our time by number over that for 5, or for the smallest number where there is no 5.
+
+    Raises
+    ------
+    ValueError
+        If no frame of the session has a box.
+    """
+    people, random = people_of(session), np.random.RandomState(seed)
+    if not people:
+        raise ValueError('no frame of the session has a 2D box')
+    random.shuffle(people)  # sessions go from near to far
+    times_ms = _times_ms([crowd_of(people, count, session) for count in counts], images, random)
+    result = {'machine': describe_machine(), 'people': len(people), 'images': images, 'objects': list(counts)}
+    for number, name in enumerate(ALGORITHMS):
+        result[name] = _statistics(times_ms[:, :, number])
+    both_ms = times_ms[..., STAGES.index('both')]
+    few = list(counts).index(5) if 5 in counts else int(np.argmin(counts))
+    result['ratio'] = np.median(both_ms[:, :, 0] / both_ms[:, :, 1], axis=0).tolist()
+    result['growth'] = np.median(both_ms[:, :, 0] / both_ms[:, few:few + 1, 0], axis=0).tolist()
+    return result
+
+
+def _times_ms(crowds, images, random):
+    """CPU time of images, (images, crowds, algorithms, stages)."""
+    algorithms = [(Ours(crowd), Theirs(crowd)) for crowd in crowds]
+    times_ms = np.empty((images + WARM_UPS, len(crowds), len(ALGORITHMS), len(STAGES)))
+    for image in range(len(times_ms)):
+        for number, crowd in enumerate(crowds):
+            rects_px = crowd.jittered(random)
+            for which, algorithm in enumerate(algorithms[number]):
+                times_ms[image, number, which] = _time_ms(algorithm, crowd.depth, rects_px, image * PERIOD_NS)
+    return times_ms[WARM_UPS:]
+
+
+def _time_ms(algorithm, depth, rects_px, stamp_ns):
+    start_s = time.process_time()
+    boxes = algorithm.estimate(depth, rects_px)
+    between_s = time.process_time()
+    algorithm.track(stamp_ns, boxes)
+    end_s = time.process_time()
+    return 1e3 * (between_s - start_s), 1e3 * (end_s - between_s), 1e3 * (end_s - start_s)
+
+
+def _statistics(times_ms):
+    """Median, mean and standard deviation of times (images, counts, stages), by stage."""
+    result = {}
+    for number, stage in enumerate(STAGES):
+        for suffix, statistic in (('_ms', np.median), ('_mean_ms', np.mean), ('_sd_ms', np.std)):
+            result[stage + suffix] = statistic(times_ms[..., number], axis=0).tolist()
+    return result
+
+
+def table(result):
+    """The times as lines of text."""
+    lines = ['CPU time of an image, ms: median (mean ± standard deviation)',
+             '%-20s' % 'people' + ''.join('%22d' % count for count in result['objects'])]
+    for name in ALGORITHMS:
+        for stage in STAGES:
+            columns = zip(*(result[name][stage + suffix] for suffix in ('_ms', '_mean_ms', '_sd_ms')))
+            lines.append('%-20s' % ('%s, %s' % (name, stage)) + ''.join(
+                '%22s' % ('%.2f (%.2f ± %.2f)' % column) for column in columns))
+    for key, title in (('ratio', 'ours / thesis'), ('growth', 'ours / ours for few')):
+        lines.append('%-20s' % title + ''.join('%22.2f' % value for value in result[key]))
+    lines += ['detector, %s at %d, %d thread%s: %.1f ms of CPU, %.1f ms of time'
+              % (row['runtime'], row['size'], row['threads'], 's' * (row['threads'] > 1), row['cpu_ms'],
+                 row['wall_ms']) for row in result['detector']]
+    return lines
+
+
+def main():
+    """The command `./run bench speed`."""
+    arguments = _arguments()
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
+            result = speed(session, OBJECTS, arguments.images, arguments.seed)
+            colors = [read_color(frame, session.camera) for frame in session.frames[:DETECTOR_IMAGES]]
+        result['data'] = arguments.data or 'simulated'
+        result['detector'] = detector_speed(colors, arguments.weights) if arguments.weights else []
+        if arguments.json:
+            with open(arguments.json, 'w') as stream:
+                json.dump(result, stream, indent=1)
+        if arguments.picture:
+            from ros_3d_bb.evaluation.speed_picture import draw_speed  # takes seconds to import
+            draw_speed(result, arguments.picture)
+    except (ValueError, OSError) as error:
+        sys.exit('./run bench speed: %s' % error)
+    print('%s\n%d people of %s, %d images each' % (
+        result['machine'], result['people'], 'the session %s' % arguments.data if arguments.data else
+        'the simulated camera, as no --data was given and ROS_3D_BB_DATA is not set', result['images']))
+    print('\n'.join(table(result)))
+
+
+def _arguments():
+    parser = argparse.ArgumentParser(prog='./run bench speed', description=__doc__)
+    data = os.environ.get('ROS_3D_BB_DATA')
+    parser.add_argument('--data', default=data and os.path.join(data, 'data', 'thesis'), metavar='DIR',
+                        help='a measurement session (default: $ROS_3D_BB_DATA/data/thesis, or else a simulated one)')
+    parser.add_argument('--weights', metavar='FILE', help='a YOLOv5 checkpoint: the detector is timed as well')
+    parser.add_argument('--images', type=int, default=60, help='of each number of people (default: 60)')
+    parser.add_argument('--seed', type=int, default=0,
+                        help='of the order of the people, and of the jitter of their boxes (default: 0)')
+    parser.add_argument('--json', metavar='FILE', help='also write the times there')
+    parser.add_argument('--picture', metavar='FILE', help='also draw them there (png, svg, pdf)')
+    arguments = parser.parse_args()
+    if arguments.images < 1:
+        parser.error('--images is %d; at least 1 expected' % arguments.images)
+    return arguments
+
+
+if __name__ == '__main__':
+    main()

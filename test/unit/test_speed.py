@@ -1,0 +1,155 @@
+"""The speed benchmark: what it times, what it says, and that the thesis' algorithms in it are the thesis'."""
+import json
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+
+from ros_3d_bb.estimation import DepthImage, estimate_median, sample_median
+from ros_3d_bb.evaluation import speed as benchmark
+from ros_3d_bb.evaluation.crowd import JITTER_PX, crowd_of, people_of
+from ros_3d_bb.evaluation.machine import describe_machine
+from ros_3d_bb.evaluation.speed_picture import draw_speed
+from ros_3d_bb.evaluation.thesis_speed import AHEAD_S, ThesisBox, ThesisTracks, thesis_boxes
+from ros_3d_bb.geometry import Camera
+from ros_3d_bb.measurements import read_depth, read_session
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.thesis import ThesisTracker
+from ros_3d_bb.tracking.tracked import Detection
+
+SIZE = np.array([0.5, 0.5, 1.7])
+
+
+@pytest.fixture(scope='module')
+def session(session_folder):
+    whole = read_session(session_folder)
+    return whole._replace(frames=whole.frames[::8])
+
+
+def test_the_thesis_boxes_are_those_of_the_median_estimator(session):
+    for frame in session.frames:
+        depth, rect = read_depth(frame, session), frame.boxes_px[0]
+        expected, (box,) = (estimate_median(sample_median(depth, rect), rect, session.camera),
+                            thesis_boxes(depth, [rect], session.camera))
+        np.testing.assert_allclose(box.center_m, expected.center_m, atol=1e-9)
+        np.testing.assert_allclose(box.size_m, expected.size_m, atol=1e-9)
+
+
+def test_the_thesis_has_no_box_where_no_depth_is():
+    depth = DepthImage(np.zeros((48, 64), np.uint16), 0.001)
+    assert thesis_boxes(depth, [(5, 5, 60, 40)], Camera(64, 48, 60.0, 60.0, 31.5, 23.5)) == []
+
+
+def walks(steps, random):
+    """Three people who keep apart, image by image: positions (3, 3)."""
+    places_m = np.array([[2.0, -2, 1], [4, 0, 1], [3, 3, 1]])
+    for _image in range(steps):
+        places_m = places_m + random.uniform(-0.05, 0.05, (3, 3)) * (1, 1, 0)
+        yield places_m
+
+
+@given(st.integers(0, 1000), st.lists(st.lists(st.booleans(), min_size=3, max_size=3), min_size=2, max_size=12))
+def test_the_thesis_tracks_are_those_of_its_tracker(seed, seen):
+    """While nobody is nearest to the box of somebody else; how the two differ there, the module says."""
+    ours, theirs = ThesisTracker(), ThesisTracks()
+    everybody = (True, True, True)
+    for image, (places_m, shown) in enumerate(zip(walks(len(seen) + 1, np.random.RandomState(seed)),
+                                                  [everybody] + seen)):
+        shown_m, stamp_ns = places_m[np.array(shown)], image * NS // 30
+        tracks = ours.update(stamp_ns, [Detection(place_m, SIZE) for place_m in shown_m])
+        expected = {track.id: track for track in tracks}
+        ahead = theirs.update(stamp_ns, [ThesisBox(place_m, tuple(SIZE)) for place_m in shown_m], np.eye(4))
+        assert sorted(ahead) == sorted(expected)
+        for known in theirs.objects:
+            track = expected[known.number]
+            np.testing.assert_allclose(known.position_m, track.position_m)
+            np.testing.assert_allclose(known.velocity_mps, track.velocity_mps[:2], atol=1e-9)
+            ahead_m = track.position_m + AHEAD_S * track.velocity_mps
+            np.testing.assert_allclose(ahead[known.number], ahead_m[:2], atol=1e-9)
+
+
+def test_the_thesis_forgets_who_was_not_seen_for_a_second():
+    tracks = ThesisTracks()
+    tracks.update(0, [ThesisBox(np.array([1.0, 0, 2]), SIZE)], np.eye(4))
+    assert list(tracks.update(NS, [], np.eye(4))) == [1]
+    assert tracks.update(NS + 1, [], np.eye(4)) == {}
+    assert list(tracks.update(2 * NS, [ThesisBox(np.array([1.0, 0, 2]), SIZE)], np.eye(4))) == [2]
+
+
+def test_people_of_a_crowd_have_the_depth_they_had(session):
+    people = people_of(session)
+    crowd = crowd_of(people, len(people) + 2, session)
+    assert len(crowd.rects_px) == len(people) + 2
+    for (x1, y1, x2, y2), after, person in zip(crowd.rects_px, crowd.rects_px[1:], people):
+        assert (x2 - x1, y2 - y1) == person.values.shape[::-1] and x1 < after[0] < x2
+        np.testing.assert_array_equal(crowd.depth.values[y1:y2, x1:after[0]], person.values[:, :after[0] - x1])
+    for rect, jittered in zip(crowd.rects_px, crowd.jittered(np.random.RandomState(0))):
+        assert np.abs(np.subtract(rect, jittered)).max() <= JITTER_PX
+        assert jittered[0] >= 0 and jittered[3] <= crowd.camera.height
+
+
+def test_every_number_of_people_is_timed_and_said(session, tmp_path):
+    result = dict(benchmark.speed(session, counts=(1, 5), images=3), detector=[])
+    assert result['objects'] == [1, 5] and result['machine'] == describe_machine()
+    for name in ('ours', 'thesis'):
+        assert set(result[name]) == {stage + suffix for stage in ('estimation', 'tracking', 'both')
+                                     for suffix in ('_ms', '_mean_ms', '_sd_ms')}
+        assert all(len(times) == 2 and min(times) >= 0 for times in result[name].values())
+        assert result[name]['estimation_ms'][1] > 0
+    assert len(result['ratio']) == 2 and result['growth'][1] == 1
+    text = '\n'.join(benchmark.table(result))
+    assert '%.2f' % result['thesis']['both_ms'][1] in text and '%.2f' % result['ratio'][0] in text
+    draw_speed(result, str(tmp_path / 'speed.png'))
+    assert (tmp_path / 'speed.png').stat().st_size > 5000
+
+
+def test_everybody_is_found_and_tracked(session):
+    """What is timed is the work that is meant, not an early end of it."""
+    crowd, random = crowd_of(people_of(session), 6, session), np.random.RandomState(0)
+    for algorithm in (benchmark.Ours(crowd), benchmark.Theirs(crowd)):
+        for image in range(8):
+            boxes = algorithm.estimate(crowd.depth, crowd.jittered(random))
+            tracks = algorithm.track(image * benchmark.PERIOD_NS, boxes)
+        assert len(boxes) >= 5 and len(tracks) >= 4  # two people may stand where one is
+
+
+def test_both_take_turns_and_medians_count(session, monkeypatch):
+    turns = []
+
+    def timed(algorithm, _depth, rects_px, stamp_ns):
+        turns.append((type(algorithm).__name__, len(rects_px)))
+        cost = len(rects_px) * (1.0 if isinstance(algorithm, benchmark.Ours) else 4.0) * (1 + stamp_ns % 2)
+        return cost, cost, 2 * cost
+    monkeypatch.setattr(benchmark, '_time_ms', timed)
+    result = benchmark.speed(session, counts=(2, 3), images=3)
+    assert turns[:4] == [('Ours', 2), ('Theirs', 2), ('Ours', 3), ('Theirs', 3)]
+    assert len(turns) == 4 * (3 + benchmark.WARM_UPS)
+    assert result['ratio'] == [0.25, 0.25] and result['growth'] == [1, 1.5]
+
+
+def test_the_command_writes_what_it_measured(tmp_path, session_folder, monkeypatch, capsys):
+    path = str(tmp_path / 'speed.json')
+    monkeypatch.setattr(benchmark, 'OBJECTS', (1, 2))
+    monkeypatch.setattr(sys, 'argv', ['speed', '--data', session_folder, '--images', '1', '--json', path])
+    benchmark.main()
+    with open(path) as stream:
+        result = json.load(stream)
+    assert result['detector'] == [] and result['data'] == session_folder
+    assert describe_machine() in capsys.readouterr().out
+
+
+def test_without_data_people_are_simulated(tmp_path, monkeypatch, capsys):
+    monkeypatch.delenv('ROS_3D_BB_DATA', raising=False)
+    monkeypatch.setattr(benchmark, 'OBJECTS', (1,))
+    monkeypatch.setattr(sys, 'argv', ['speed', '--images', '1'])
+    benchmark.main()
+    assert 'simulated' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('options,complaint', [(['--images', '0'], 'images is 0'), (['--data', '/nowhere'], 'nowhere')])
+def test_what_cannot_be_done_is_said(options, complaint, monkeypatch, capsys):
+    monkeypatch.setattr(sys, 'argv', ['speed'] + options)
+    with pytest.raises(SystemExit) as raised:
+        benchmark.main()
+    assert complaint in str(raised.value) + capsys.readouterr().err
