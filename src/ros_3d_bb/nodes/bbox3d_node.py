@@ -14,6 +14,7 @@ from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.sample_images import SampleImages
 from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.stamped import NS, Pairing, arrival_clock_ns
 
@@ -57,9 +58,9 @@ class Bbox3dNode(object):
         self._boxes_pub = rospy.Publisher('ros_3d_bb/bb_3d', BoundingBox3DArray, queue_size=10)
         self._images = SampleImages(cache_ns, self._estimator.sample, self._params.depth_image_range)
         # Each depth image is kept for boxes that may come for it later, so none may be dropped on the way.
-        rospy.Subscriber(DEPTH_TOPIC, Image, self._on_depth, queue_size=10, buff_size=2 ** 24)
-        rospy.Subscriber(CAMERA_INFO_TOPIC, CameraInfo, self._on_camera_info, queue_size=10)
-        rospy.Subscriber('yolo_bounding_box', Int32MultiArray, self._on_boxes, queue_size=10)
+        subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
+        subscribe(CAMERA_INFO_TOPIC, CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
+        subscribe('yolo_bounding_box', Int32MultiArray, self._on_boxes)
 
     def _on_camera_info(self, message):
         with self._diagnostics.refusing('camera_info'), self._lock:

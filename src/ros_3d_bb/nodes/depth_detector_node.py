@@ -16,6 +16,7 @@ from ros_3d_bb.nodes.boxes_output import BoxesOutput, Switch
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
+from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.stamped import NS, Pairing, arrival_clock_ns
 from ros_3d_bb.worker import NewestWorker
@@ -55,10 +56,9 @@ class DepthDetectorNode(object):
         self._worker = NewestWorker(self._search, self._on_error)
         rospy.on_shutdown(self._worker.stop)
         self._switch = Switch(self._params.enabled)
-        rospy.Subscriber('camera/color/camera_info', CameraInfo, self._on_camera_info, queue_size=10)
-        rospy.Subscriber('camera/aligned_depth_to_color/image_raw', Image, self._on_depth, queue_size=10,
-                         buff_size=2 ** 24)
-        rospy.Subscriber('camera/color/image_raw', Image, self._on_color, queue_size=10, buff_size=2 ** 24)
+        subscribe('camera/color/camera_info', CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
+        subscribe('camera/aligned_depth_to_color/image_raw', Image, self._on_depth, KEPT_AT_ONCE)
+        subscribe('camera/color/image_raw', Image, self._on_color)
 
     def _on_camera_info(self, message):
         with self._diagnostics.refusing('camera_info'), self._lock:

@@ -12,6 +12,7 @@ from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.planner_outputs import outputs_from
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
+from ros_3d_bb.nodes.transport import subscribe
 from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.for_planners import check_tracks, in_frame, predicted_to
@@ -71,7 +72,7 @@ class PlannerBridgeNode(object):
         self._diagnostics = Diagnostics()
         self._transforms = Transforms(self._params.tf_timeout)
         rospy.on_shutdown(self._empty_all)
-        rospy.Subscriber(TRACKS_TOPIC, TrackedObjectArray, self._on_tracks, queue_size=2)
+        subscribe(TRACKS_TOPIC, TrackedObjectArray, self._on_tracks, 2)
         self._timer = rospy.Timer(rospy.Duration.from_sec(self._params.resend_period), self._on_timer, reset=True)
 
     def _on_tracks(self, message):

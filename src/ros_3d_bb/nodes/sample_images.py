@@ -4,6 +4,7 @@ from sensor_msgs.msg import Image
 
 from ros_3d_bb.images import fill_image, rgb_from
 from ros_3d_bb.messages import stamp_of
+from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.overlay import draw_boxes, draw_samples, visible_depth
 from ros_3d_bb.stamped import StampedCache
 
@@ -44,8 +45,7 @@ class SampleImages(object):
         wanted = self._raw_pub.get_num_connections() or self._color_pub.get_num_connections()
         if wanted and self._subscriber is None:
             self._colors = StampedCache(self._cache_ns)
-            self._subscriber = rospy.Subscriber('camera/color/image_raw', Image, self._on_color, queue_size=10,
-                                                buff_size=2 ** 24)
+            self._subscriber = subscribe('camera/color/image_raw', Image, self._on_color, KEPT_AT_ONCE)
         elif not wanted and self._subscriber is not None:
             self._subscriber.unregister()
             self._subscriber, self._colors = None, None

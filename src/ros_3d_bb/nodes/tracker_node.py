@@ -16,6 +16,7 @@ from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
+from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.params import check_not_negative, nearest_name
 from ros_3d_bb.stamped import NS, StampedCache, arrival_clock_ns
 from ros_3d_bb.tracking.measuring import NoiseParams
@@ -67,11 +68,11 @@ class TrackerNode(object):
         self._subscribe()
 
     def _subscribe(self):
-        rospy.Subscriber('ros_3d_bb/bb_3d', BoundingBox3DArray, self._on_boxes, queue_size=10)
+        subscribe('ros_3d_bb/bb_3d', BoundingBox3DArray, self._on_boxes)
         if self._params.tracker != 'thesis':  # which does not ask where the camera looks
-            rospy.Subscriber(CAMERA_INFO_TOPIC, CameraInfo, self._on_camera_info, queue_size=1)
+            subscribe(CAMERA_INFO_TOPIC, CameraInfo, self._on_camera_info, 1)
             if self._params.use_depth:
-                rospy.Subscriber(DEPTH_TOPIC, Image, self._on_depth, queue_size=10, buff_size=2 ** 24)
+                subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
 
     def _on_camera_info(self, message):
         with self._diagnostics.refusing('camera_info'):

@@ -15,6 +15,7 @@ from ros_3d_bb.messages import boxes2d_from_message, boxes3d_from_message, camer
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.recording import Measurement, append
 from ros_3d_bb.snapshots import Snapshots
@@ -68,11 +69,11 @@ class ViewerNode(object):
         self._captured_ns, self._is_said, self._is_paused = None, False, False
         self._diagnostics = Diagnostics()
         rospy.Service('~capture', Trigger, lambda _request: TriggerResponse(*self.capture()))
-        rospy.Subscriber(BOXES3D_TOPIC, BoundingBox3DArray, self._on_boxes3d, queue_size=10)
-        rospy.Subscriber('yolo_bounding_box', Int32MultiArray, self._on_boxes2d, queue_size=10)
-        rospy.Subscriber(CAMERA_INFO_TOPIC, CameraInfo, self._on_camera_info, queue_size=10)
-        rospy.Subscriber(DEPTH_TOPIC, Image, self._on_depth, queue_size=10, buff_size=2 ** 24)
-        rospy.Subscriber(COLOR_TOPIC, Image, self._on_color, queue_size=10, buff_size=2 ** 24)
+        for topic, kind, callback in ((BOXES3D_TOPIC, BoundingBox3DArray, self._on_boxes3d),
+                                      ('yolo_bounding_box', Int32MultiArray, self._on_boxes2d),
+                                      (CAMERA_INFO_TOPIC, CameraInfo, self._on_camera_info),
+                                      (DEPTH_TOPIC, Image, self._on_depth), (COLOR_TOPIC, Image, self._on_color)):
+            subscribe(topic, kind, callback, KEPT_AT_ONCE)
 
     def _on_color(self, message):
         with self._diagnostics.refusing('colour images'), self._lock:

@@ -12,6 +12,7 @@ from ros_3d_bb.messages import stamp_of
 from ros_3d_bb.nodes.boxes_output import BoxesOutput, Switch
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.nodes.transport import subscribe
 from ros_3d_bb.worker import NewestWorker
 
 
@@ -43,7 +44,7 @@ class Yolov5Node(object):
         self._worker = NewestWorker(self._search, self._on_error)
         rospy.on_shutdown(self._worker.stop)
         self._switch = Switch(self._params.enabled)
-        rospy.Subscriber('camera/color/image_raw', Image, self._on_image, queue_size=1, buff_size=2 ** 24)
+        subscribe('camera/color/image_raw', Image, self._on_image, 1)
         rospy.loginfo('looking for %s with %s on %s', ', '.join(map(str, detection.classes)), self._params.weights,
                       runtime.description)
 
