@@ -3,6 +3,7 @@ import sys
 
 import rospy
 
+from ros_3d_bb.memory import reuse_freed_memory
 from ros_3d_bb.params import params_from
 
 
@@ -16,6 +17,7 @@ def run_node(name, node_class, run=lambda _node: rospy.spin()):
 
     A ValueError at its start is a fault of the set-up: it is said, and the exit status is 1.
     """
+    reuse_freed_memory()
     rospy.init_node(name)
     try:
         node = node_class()
