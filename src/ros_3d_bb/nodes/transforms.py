@@ -1,4 +1,5 @@
 """Transforms at the stamp of an image, waited for, but not for long."""
+import threading
 import time
 
 import rospy
@@ -6,7 +7,29 @@ import tf2_ros
 
 from ros_3d_bb.messages import transform_from_message
 
-POLL_S = 0.005
+LONGEST_WAIT_S = 0.05  # without news; shutting down takes no longer
+
+
+class _Listener(tf2_ros.TransformListener):
+    """Takes transforms, and tells who waits for them."""
+
+    def __init__(self, buffer):
+        self.news = threading.Condition()
+        tf2_ros.TransformListener.__init__(self, buffer, tcp_nodelay=True)
+
+    def callback(self, data):
+        """Of /tf."""
+        tf2_ros.TransformListener.callback(self, data)
+        self._tell()
+
+    def static_callback(self, data):
+        """Of /tf_static."""
+        tf2_ros.TransformListener.static_callback(self, data)
+        self._tell()
+
+    def _tell(self):
+        with self.news:
+            self.news.notify_all()
 
 
 class Transforms(object):
@@ -15,7 +38,7 @@ class Transforms(object):
     def __init__(self, wait_s):
         self._wait_s = wait_s
         self._buffer = tf2_ros.Buffer(debug=False)
-        self._listener = tf2_ros.TransformListener(self._buffer)
+        self._listener = _Listener(self._buffer)
         self._from_before = False
 
     def lookup(self, target_frame, source_frame, stamp):
@@ -27,16 +50,18 @@ class Transforms(object):
             If tf does not know it within the wait; says which frames and what tf knows.
         """
         deadline_s = time.monotonic() + self._wait_s
-        while True:
-            try:
-                found = self._buffer.lookup_transform(target_frame.lstrip('/'), source_frame.lstrip('/'), stamp)
-                self._from_before = False
-                return transform_from_message(found)
-            except tf2_ros.TransformException:
-                if time.monotonic() >= deadline_s or rospy.is_shutdown():
-                    self._forget_time_before()
-                    raise
-            time.sleep(POLL_S)
+        with self._listener.news:
+            while True:
+                try:
+                    found = self._buffer.lookup_transform(target_frame.lstrip('/'), source_frame.lstrip('/'), stamp)
+                    self._from_before = False
+                    return transform_from_message(found)
+                except tf2_ros.TransformException:
+                    left_s = deadline_s - time.monotonic()
+                    if left_s <= 0 or rospy.is_shutdown():
+                        self._forget_time_before()
+                        raise
+                self._listener.news.wait(min(left_s, LONGEST_WAIT_S))
 
     def go_back(self):
         """Time went back: transforms of the time before may keep new ones out of the buffer.
