@@ -1,5 +1,7 @@
 """Bags of what a camera on a robot sends, made of measurement sessions and of scenarios."""
 import argparse
+import collections
+import itertools
 import os
 import sys
 from typing import NamedTuple, Tuple
@@ -14,7 +16,7 @@ from ros_3d_bb.measurements import SessionError, read_color, read_depth, read_se
 from ros_3d_bb.messages import BOXES_TOPIC, boxes2d_to_message, time_from
 from ros_3d_bb.simulation.scenario import ScenarioError, overridden, read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulator_messages import START_NS, simulated_messages
+from ros_3d_bb.simulator_messages import CAMERA_FRAME, START_NS, simulated_messages
 from ros_3d_bb.stamped import NS
 
 MOUNT_M = (0.17, 0.0, 0.20)  # camera on a Jackal, metres forward, left and up of base_link (thesis 3.5.1)
@@ -59,6 +61,31 @@ def write_bag(images, path, compression='lz4'):
     return count
 
 
+def images_in(path, topics):
+    """The messages of a bag on some topics, image by image: [[(topic, message), ...], ...], topics without a slash.
+
+    Raises
+    ------
+    ValueError
+        If the bag cannot be read, or an image lacks one of the topics.
+    """
+    images = collections.OrderedDict()
+    try:
+        with rosbag.Bag(path) as bag:
+            for topic, message, stamp in bag.read_messages(['/' + topic for topic in topics]):
+                images.setdefault(stamp.to_nsec(), []).append((topic[1:], message))
+    except (OSError, rosbag.ROSBagException) as error:
+        raise ValueError('the bag %s cannot be read: %s' % (path, error))
+    for stamp_ns, messages in images.items():
+        missing = set(topics) - set(topic for topic, _message in messages)
+        if missing:
+            raise ValueError('the image at %.3f in the bag %s has no %s; a bag of scenario_to_bag or session_to_bag '
+                             'expected' % (stamp_ns / NS, path, ', '.join(sorted(missing))))
+    if not images:
+        raise ValueError('the bag %s holds none of %s' % (path, ', '.join(sorted(topics))))
+    return list(images.values())
+
+
 def session_images(session, options=SessionBagOptions()):
     """Yield the images of a measurement session for `write_bag`. Raises SessionError where one cannot be read."""
     chain = [('map', 'odom', np.eye(4)), ('odom', 'base_link', np.eye(4)),
@@ -73,13 +100,18 @@ def session_images(session, options=SessionBagOptions()):
         yield stamp_ns, messages
 
 
-def scenario_images(scenario):
-    """Yield the images of a scenario for `write_bag`, with the ground truth."""
+def scenario_images(scenario, with_boxes=False):
+    """Yield the images of a scenario for `write_bag`, with the ground truth; `with_boxes` with its 2D boxes, too."""
     simulator = Simulator(scenario)
     for number in range(simulator.frame_count):
         frame = simulator.frame(number)
         stamp_ns = START_NS + int(round(frame.time_s * NS))
-        yield stamp_ns, simulated_messages(simulator, frame, stamp_ns)
+        messages = simulated_messages(simulator, frame, stamp_ns)
+        if with_boxes:
+            boxes = [person.box_px for person in frame.people if person.box_px is not None]
+            header = Header(stamp=time_from(stamp_ns), frame_id=CAMERA_FRAME)
+            messages.append((BOXES_TOPIC, boxes2d_to_message(np.array(boxes, int).reshape(-1, 4), header)))
+        yield stamp_ns, messages
 
 
 def session_to_bag():
@@ -105,10 +137,17 @@ def scenario_to_bag():
     parser.add_argument('bag', help='the bag to write')
     parser.add_argument('--rate', type=float, metavar='HZ', help="images per second (default: the scenario's)")
     parser.add_argument('--seed', type=int, help="of the noise and the people's looks (default: the scenario's)")
+    parser.add_argument('--images', type=int, metavar='N', help='only so many from the start (default: all)')
+    parser.add_argument('--boxes', action='store_true', help='also write the true 2D boxes to yolo_bounding_box')
     arguments = parser.parse_args()
 
-    _write(parser, arguments, lambda: scenario_images(overridden(read_scenario(arguments.scenario), arguments.rate,
-                                                                 arguments.seed)))
+    if arguments.images is not None and arguments.images < 1:
+        parser.error('--images %d: 1 or more expected' % arguments.images)
+
+    def images():
+        scenario = overridden(read_scenario(arguments.scenario), arguments.rate, arguments.seed)
+        return itertools.islice(scenario_images(scenario, arguments.boxes), arguments.images)
+    _write(parser, arguments, images)
 
 
 def _parser(name, doc):

@@ -4,7 +4,7 @@ from typing import NamedTuple, Optional
 import genpy
 import numpy as np
 from geometry_msgs.msg import PoseWithCovariance
-from std_msgs.msg import Int32MultiArray, MultiArrayDimension
+from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb import msg
 from ros_3d_bb.estimation import Box3D
@@ -87,6 +87,19 @@ def boxes2d_from_message(message):
         raise ValueError('2D boxes carry the label %r; boxes;stamp=<secs>.<nsecs, 9 digits>;frame=<frame_id> expected'
                          % label)
     return Boxes2D(boxes, int(secs) * NS + int(nsecs), fields.get('frame', ''))
+
+
+def restamped(message, stamp):
+    """The message with another stamp: in its header, its transforms' headers, or the label of its 2D boxes.
+
+    Its frames are kept. Messages with a header are changed in place, as images are large.
+    """
+    if hasattr(message, 'layout'):
+        boxes = boxes2d_from_message(message)
+        return boxes2d_to_message(boxes.boxes, Header(stamp=stamp, frame_id=boxes.frame_id))
+    for part in getattr(message, 'transforms', [message]):
+        part.header.stamp = stamp
+    return message
 
 
 def camera_from_message(message):

@@ -8,7 +8,7 @@ import pytest
 import rosbag
 import tf2_ros
 
-from ros_3d_bb.bags import START_NS, SessionBagOptions, scenario_images, session_images, write_bag
+from ros_3d_bb.bags import START_NS, SessionBagOptions, images_in, scenario_images, session_images, write_bag
 from ros_3d_bb.images import depth_from, rgb_from
 from ros_3d_bb.measurements import read_color, read_depth, read_session
 from ros_3d_bb.messages import (boxes2d_from_message, camera_from_message, time_from, tracks_from_message,
@@ -174,6 +174,38 @@ def test_the_same_scenario_gives_the_same_bytes_and_another_seed_others(tmp_path
         assert result.returncode == 0 and ': 4 images' in result.stdout
     one, two, other = (raw_messages(tmp_path / name) for name in ('one', 'two', 'other'))
     assert one == two and one != other
+
+
+def test_a_scene_may_bring_its_first_images_only_and_the_true_boxes(tmp_path):
+    scenario, path = tmp_path / 'scene.yaml', str(tmp_path / 'scene.bag')
+    scenario.write_text(json.dumps(SCENE))
+    result = run_tool('scenario_to_bag', str(scenario), path, '--images', '2', '--boxes')
+    assert result.returncode == 0 and ': 2 images' in result.stdout
+    simulator, messages = Simulator(scenario_from(SCENE)), messages_in(path)
+    for number, message in enumerate(messages['/yolo_bounding_box']):
+        boxes, (person,) = boxes2d_from_message(message), simulator.frame(number).people
+        assert boxes.stamp_ns == START_NS + number * NS // 10 and boxes.frame_id == 'camera_color_optical_frame'
+        assert boxes.boxes.tolist() == [list(person.box_px)]
+    assert len(messages['/yolo_bounding_box']) == 2
+    assert run_tool('scenario_to_bag', str(scenario), path, '--images', '0').returncode == 2
+
+
+def test_a_bag_comes_back_image_by_image(session, tmp_path):
+    path = str(tmp_path / 'session.bag')
+    write_bag(session_images(session, SessionBagOptions(with_boxes=True)), path)
+    topics = {'tf', 'camera/color/image_raw', 'yolo_bounding_box'}
+    images = images_in(path, topics)
+    assert len(images) == len(session.frames)
+    for messages, frame in zip(images, session.frames):
+        assert set(topic for topic, _message in messages) == topics
+        np.testing.assert_array_equal(rgb_from(dict(messages)['camera/color/image_raw']),
+                                      read_color(frame, session.camera))
+    with pytest.raises(ValueError, match='has no ground_truth'):
+        images_in(path, {'tf', 'ground_truth'})
+    with pytest.raises(ValueError, match='holds none of ground_truth'):
+        images_in(path, {'ground_truth'})
+    with pytest.raises(ValueError, match='cannot be read'):
+        images_in(str(tmp_path / 'missing.bag'), topics)
 
 
 @pytest.mark.parametrize('option,complaint', [(('--rate', '0'), 'rate is 0'), (('--rate', 'nan'), 'rate is nan'),

@@ -12,7 +12,7 @@ from ros_3d_bb.camera_messages import CameraFrame, messages_of
 from ros_3d_bb.estimation import Box3D, DepthImage
 from ros_3d_bb.geometry import Camera, transform_from
 from ros_3d_bb.messages import (boxes2d_from_message, boxes2d_to_message, boxes3d_from_message, boxes3d_to_message,
-                                camera_from_message, detections_from_message, stamp_of, time_from,
+                                camera_from_message, detections_from_message, restamped, stamp_of, time_from,
                                 tracks_from_message, tracks_to_message, transform_from_message)
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 from ros_3d_bb.stamped import NS
@@ -217,3 +217,17 @@ def test_tracks_fill_every_field():
 def test_states_have_the_numbers_of_the_message():
     numbers = TrackedObject.VISIBLE, TrackedObject.OCCLUDED, TrackedObject.OUT_OF_VIEW
     assert numbers == (VISIBLE, OCCLUDED, OUT_OF_VIEW)
+
+
+def test_another_stamp_leaves_the_rest_of_a_message():
+    stamp = time_from(7 * NS + 5)
+    boxes = boxes2d_from_message(restamped(boxes2d_to_message(np.array([[1, 2, 3, 4]]), header(1, 'camera')), stamp))
+    assert (boxes.boxes.tolist(), boxes.stamp_ns, boxes.frame_id) == ([[1, 2, 3, 4]], 7 * NS + 5, 'camera')
+    depth = DepthImage(np.ones((2, 2), np.uint16), 0.001)
+    chain = [('map', 'odom', np.eye(4)), ('odom', 'camera', np.eye(4))]
+    camera, color = Camera(2, 2, 1.0, 1.0, 0.5, 0.5), np.zeros((2, 2, 3), np.uint8)
+    camera_frame = CameraFrame(header(1, 'camera'), camera, color, depth, chain)
+    for topic, message in messages_of(camera_frame):
+        parts = restamped(message, stamp).transforms if topic == 'tf' else [restamped(message, stamp)]
+        assert [part.header.stamp for part in parts] == [stamp] * len(parts)
+        assert parts[-1].header.frame_id == ('odom' if topic == 'tf' else 'camera')
