@@ -41,7 +41,7 @@ SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id
                  'planner_bridge.yaml': {'outputs', 'planner_frame', 'robot_frame'},
                  'depth_detector.yaml': {'floor_frame', 'frame_id'},
                  'viewer.yaml': {'session', 'label', 'window', 'frame_id'}}
-REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag', 'session:=/some/session']
+REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag', 'session:=/some/session', 'record:=/some/record.json']
 
 
 def inside(*parts):
@@ -171,6 +171,14 @@ def test_waiting_threads_of_torch_leave_the_cores_to_other_nodes():
     loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
     loader.load(inside('launch', 'yolov5.launch'), config, argv=REQUIRED_ARGUMENTS, verbose=False)
     assert [node.env_args for node in config.nodes] == [[('OMP_WAIT_POLICY', 'PASSIVE')]]
+
+
+@pytest.mark.parametrize('name', ['bbox3d', 'tracker', 'depth_detector', 'planner_bridge', 'viewer'])
+def test_small_matrices_take_no_second_core(name):
+    """OpenBLAS reads it at its start."""
+    loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
+    loader.load(inside('launch', name + '.launch'), config, argv=REQUIRED_ARGUMENTS, verbose=False)
+    assert [node.env_args for node in config.nodes] == [[('OPENBLAS_NUM_THREADS', '1')]]
 
 
 def test_rviz_shows_what_the_pipeline_publishes():

@@ -1,0 +1,199 @@
+"""How long images take through the whole pipeline, from their stamp to the markers, with detectors and loads."""
+import argparse
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from typing import NamedTuple
+
+from ros_3d_bb.evaluation.latency_result import result_of
+from ros_3d_bb.evaluation.machine import describe_machine
+
+IMAGES = 60  # of the scene, played forwards and backwards: two seconds, 90 MB
+ENDING_S = 40.0  # roslaunch gives its nodes 17 s to end
+EATS_A_CORE = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    pass'
+HARNESS = ('replay_node', 'latency_probe_node', 'rosout')  # run for the benchmark, not on a robot
+COLUMNS = '%-16s %6s %6s %8s %8s %8s %8s %9s %9s %9s %7s'
+TITLES = ('case', 'in Hz', 'out Hz', 'p50 ms', 'p95 ms', 'p99 ms', 'dropped', 'CPU %', 'camera %', 'memory MB', 'load')
+
+
+class Case(NamedTuple):
+    """`name`; `detector` of pipeline.launch; `image_size` of YOLOv5; whether another process eats a core."""
+
+    name: str
+    detector: str
+    image_size: int
+    loaded: bool
+
+
+class CaseFailed(Exception):
+    """A case could not be measured: says why."""
+
+
+DETECTORS = (('free', 'none', 0), ('depth', 'depth', 0), ('yolov5-512', 'yolov5', 512), ('yolov5-640', 'yolov5', 640))
+CASES = [Case(name + ('+load' if loaded else ''), detector, size, loaded)
+         for loaded in (False, True) for name, detector, size in DETECTORS]
+
+
+def measured(case, arguments, bag, folder):
+    """Run one case under a ROS master of its own; its figures as in design §8.
+
+    Raises
+    ------
+    CaseFailed
+    """
+    record, log = os.path.join(folder, 'record.json'), os.path.join(folder, 'launch.log')
+    if os.path.exists(record):
+        os.remove(record)
+    options = {'bag': bag, 'record': record, 'detector': case.detector, 'weights': arguments.weights or '',
+               'image_size': case.image_size, 'seconds': arguments.seconds, 'rate': arguments.rate}
+    with eating_a_core(case.loaded), open(log, 'w') as stream:
+        launch(['%s:=%s' % option for option in options.items()], arguments.seconds + 200, stream)
+    try:
+        with open(record) as stream:
+            recorded = json.load(stream)
+    except OSError:
+        with open(log) as stream:
+            raise CaseFailed('%s: nothing was measured. The log:\n%s' % (case.name, stream.read()))
+    result = dict(name=case.name, detector=case.name.split('+')[0], load='one core' if case.loaded else 'none')
+    return dict(result, load_average=recorded['load_average'], **result_of(recorded))
+
+
+@contextlib.contextmanager
+def eating_a_core(really):
+    """Another process that computes all the time, and ends with this one whatever becomes of it; or nothing."""
+    if not really:
+        yield
+        return
+    process = subprocess.Popen([sys.executable, '-c', EATS_A_CORE])
+    try:
+        yield
+    finally:
+        process.kill()
+        process.wait()
+
+
+def launch(arguments, timeout_s, log):
+    """roslaunch latency.launch on a free port until it ends by itself; ended with its nodes in any case.
+
+    In a session of its own: a Ctrl-C in the terminal reaches it through here, once.
+    """
+    port = free_port()
+    process = subprocess.Popen(['roslaunch', '-p', str(port), 'ros_3d_bb', 'latency.launch'] + arguments, stdout=log,
+                               stderr=subprocess.STDOUT, start_new_session=True,
+                               env=dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % port))
+    try:
+        process.wait(timeout_s)
+    except subprocess.TimeoutExpired:
+        pass  # there is no record then, which is said
+    finally:
+        if process.poll() is None:
+            end(process)
+
+
+def end(roslaunch):
+    """End roslaunch with its nodes."""
+    roslaunch.send_signal(signal.SIGINT)
+    try:
+        roslaunch.wait(ENDING_S)
+    except subprocess.TimeoutExpired:
+        roslaunch.kill()
+        roslaunch.wait()
+
+
+def free_port():
+    """A TCP port that nobody listens on."""
+    with contextlib.closing(socket.socket()) as probe:
+        probe.bind(('localhost', 0))
+        return probe.getsockname()[1]
+
+
+def make_bag(path, scenario):
+    """The first images of a scene with their true 2D boxes, rendered once."""
+    subprocess.check_call(['rosrun', 'ros_3d_bb', 'scenario_to_bag', scenario, path, '--boxes', '--images', str(IMAGES),
+                           '--compression', 'none'], stdout=subprocess.DEVNULL)
+
+
+def row(result):
+    """A result as a line of the table."""
+    nodes = [node for node in result['cpu_percent'] if node not in HARNESS]
+    times = ['-' if result[key] is None else '%.1f' % result[key] for key in ('p50_ms', 'p95_ms', 'p99_ms')]
+    return COLUMNS % ((result['name'], '%.1f' % result['input_hz'], '%.1f' % result['output_hz']) + tuple(times) + (
+        result['dropped'], '%.1f' % sum(result['cpu_percent'][node] for node in nodes),
+        '%.1f' % result['cpu_percent'].get('replay_node', 0), '%.0f' % sum(result['rss_mb'][node] for node in nodes),
+        '%.1f' % result['load_average']))
+
+
+def details(result):
+    """By node and by stage, and whether anything grew, as lines of text."""
+    trend, grew = result['trend'], result['trend']['rss_mb_per_minute']
+    lines = ['  %-22s %5.1f %% of a core, %4.0f MB, %+.2f MB a minute'
+             % (node, result['cpu_percent'][node], result['rss_mb'][node], grew[node])
+             for node in sorted(result['cpu_percent'])]
+    stages = ['%s %s' % (stage, '-' if value is None else '%.1f' % value)
+              for stage, value in result['stages_ms'].items()]
+    lines.append('  median ms from stamp: ' + ', '.join(stages))
+    if None not in (trend['first']['p50_ms'], trend['last']['p50_ms']):
+        lines.append('  first %.0f s: p50 %.1f, p99 %.1f ms; last: %.1f, %.1f ms' % (
+            trend['edge_s'], trend['first']['p50_ms'], trend['first']['p99_ms'], trend['last']['p50_ms'],
+            trend['last']['p99_ms']))
+    return '\n'.join(lines)
+
+
+def main():
+    """The command `./run bench latency`."""
+    arguments, cases = _arguments()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that everything is ended on the way out
+    print(describe_machine())
+    results = []
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            bag = arguments.bag and os.path.abspath(arguments.bag)
+            if not bag:
+                bag = os.path.join(folder, 'images.bag')
+                make_bag(bag, arguments.scenario)
+            print(COLUMNS % TITLES, flush=True)
+            for case in cases:
+                results.append(measured(case, arguments, bag, folder))
+                print(row(results[-1]), details(results[-1]), sep='\n', flush=True)
+                if arguments.json:
+                    with open(arguments.json, 'w') as stream:
+                        json.dump({'machine': describe_machine(), 'cases': results}, stream, indent=1)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except (CaseFailed, OSError, subprocess.SubprocessError) as error:
+        sys.exit('./run bench latency: %s' % error)
+
+
+def _arguments():
+    parser = argparse.ArgumentParser(prog='./run bench latency', description=__doc__)
+    parser.add_argument('--cases', help='some of %s, separated by commas (default: all that the weights allow)'
+                        % ', '.join(case.name for case in CASES))
+    parser.add_argument('--seconds', type=float, default=20.0, help='to measure in each case (default: 20)')
+    parser.add_argument('--rate', type=float, default=30.0, metavar='HZ', help='images a second (default: 30)')
+    parser.add_argument('--weights', help='checkpoint or export of YOLOv5')
+    images = parser.add_mutually_exclusive_group(required=True)
+    images.add_argument('--scenario', help='scenario file, of which the first %d images are played' % IMAGES)
+    images.add_argument('--bag', help='a bag of scenario_to_bag or session_to_bag, with --boxes')
+    parser.add_argument('--json', metavar='FILE', help='also write the figures there')
+    arguments = parser.parse_args()
+    if not (arguments.seconds > 0 and arguments.rate > 0):
+        parser.error('--seconds %g, --rate %g: more than 0 expected' % (arguments.seconds, arguments.rate))
+    arguments.weights = arguments.weights and os.path.abspath(arguments.weights)
+    known = {case.name: case for case in CASES}
+    names = arguments.cases.split(',') if arguments.cases else [
+        case.name for case in CASES if arguments.weights or case.detector != 'yolov5']
+    for name in names:
+        if name not in known:
+            parser.error('case %r is unknown; known: %s' % (name, ', '.join(known)))
+        if known[name].detector == 'yolov5' and not arguments.weights:
+            parser.error('case %s needs --weights' % name)
+    return arguments, [known[name] for name in names]
+
+
+if __name__ == '__main__':
+    main()

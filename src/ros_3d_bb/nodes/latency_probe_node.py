@@ -1,0 +1,109 @@
+"""The node that records, for the latency benchmark, when images were sent and answered, and what that took."""
+import functools
+import json
+import os
+import time
+from typing import NamedTuple
+from xmlrpc.client import ServerProxy
+
+import rospy
+from sensor_msgs.msg import CameraInfo
+from std_msgs.msg import Int32MultiArray
+from visualization_msgs.msg import MarkerArray
+
+from ros_3d_bb.evaluation.processes import usage_of
+from ros_3d_bb.messages import BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message
+from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
+from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
+
+START_TIMEOUT_S = 120.0  # a detector may have to export its network first
+SAMPLE_S = 1.0
+GRACE_S = 1.0  # answers to the last images are waited for so long
+STAGES = (('boxes_2d', BOXES_TOPIC, Int32MultiArray), ('boxes_3d', 'ros_3d_bb/bb_3d', BoundingBox3DArray),
+          ('tracks', TRACKS_TOPIC, TrackedObjectArray), ('markers', 'visualization_marker_array', MarkerArray))
+
+
+class LatencyProbeParams(NamedTuple):
+    """`record`: the file to write; `seconds` to measure, after the first markers and `warm_up` seconds more."""
+
+    record: str = ''
+    seconds: float = 20.0
+    warm_up: float = 3.0
+
+
+class LatencyProbeNode(object):
+    """Record stamps and arrivals for a while, and what each node uses meanwhile; then write them down and end.
+
+    Subscribes: camera/color/camera_info, which stands for the images; yolo_bounding_box, ros_3d_bb/bb_3d,
+    ros_3d_bb/tracks, visualization_marker_array. Parameters: see `LatencyProbeParams`; launch/latency.launch. The
+    record: see `ros_3d_bb.evaluation.latency_result.result_of`.
+    """
+
+    def __init__(self):
+        self._params, = read_params(LatencyProbeParams)
+        self._sent_ns, self._arrivals = [], {stage: [] for stage, _topic, _kind in STAGES}
+        for stage, topic, kind in STAGES:
+            subscribe(topic, kind, functools.partial(self._on_answer, self._arrivals[stage]), KEPT_AT_ONCE)
+        subscribe('camera/color/camera_info', CameraInfo, self._on_image, KEPT_AT_ONCE)
+
+    def _on_image(self, message):
+        self._sent_ns.append(message.header.stamp.to_nsec())
+
+    def _on_answer(self, arrivals, message):
+        arrival_s, stamp_ns = time.time(), stamp_in(message)
+        if stamp_ns is not None:
+            arrivals.append((stamp_ns, arrival_s))
+
+    def measure(self):
+        """Wait for markers, measure, write the record."""
+        self._wait_for_markers()
+        time.sleep(self._params.warm_up)
+        pids, began_s = pids_of_nodes(), time.time()
+        usage = {node: [] for node in pids}
+        while not rospy.is_shutdown():
+            now_s = time.time()
+            for node, pid in pids.items():
+                used = usage_of(pid)
+                if used is not None:
+                    usage[node].append((now_s,) + used)
+            if now_s >= began_s + self._params.seconds:
+                break
+            time.sleep(min(SAMPLE_S, began_s + self._params.seconds - now_s))
+        load = os.getloadavg()[0]
+        time.sleep(GRACE_S)
+        record = {'began_s': began_s, 'ended_s': now_s, 'sent_ns': self._sent_ns, 'arrivals': self._arrivals,
+                  'usage': usage, 'load_average': load}
+        with open(self._params.record, 'w') as stream:
+            json.dump(record, stream)
+
+    def _wait_for_markers(self):
+        deadline_s = time.monotonic() + START_TIMEOUT_S
+        while not self._arrivals['markers'] and not rospy.is_shutdown():
+            if time.monotonic() > deadline_s:
+                raise ValueError('no markers came within %.0f s' % START_TIMEOUT_S)
+            time.sleep(0.1)
+
+
+def stamp_in(message):
+    """The stamp of the image that a message answers, integer nanoseconds; None of markers that there are none of."""
+    if isinstance(message, MarkerArray):
+        return message.markers[0].header.stamp.to_nsec() if message.markers else None
+    if isinstance(message, Int32MultiArray):
+        return boxes2d_from_message(message).stamp_ns
+    return message.header.stamp.to_nsec()
+
+
+def pids_of_nodes():
+    """{name of a node without its slash: its process id} of all nodes of this master."""
+    master, pids = rospy.get_master(), {}
+    _code, _text, state = master.getSystemState()
+    for node in sorted(set(node for kind in state for _name, nodes in kind for node in nodes)):
+        _code, _text, uri = master.lookupNode(node)
+        pids[node.lstrip('/')] = ServerProxy(uri).getPid(rospy.get_name())[2]
+    return pids
+
+
+def main():
+    """Run the node until it has measured."""
+    run_node('latency_probe_node', LatencyProbeNode, LatencyProbeNode.measure)

@@ -1,0 +1,69 @@
+"""The node that plays the images of a bag from memory, as a camera that costs as little as possible."""
+import itertools
+import threading
+import time
+from typing import NamedTuple
+
+import rospy
+from std_msgs.msg import Int32MultiArray
+
+from ros_3d_bb.bags import images_in
+from ros_3d_bb.camera_messages import TYPES
+from ros_3d_bb.messages import BOXES_TOPIC, restamped
+from ros_3d_bb.nodes.diagnostics import Diagnostics
+from ros_3d_bb.nodes.startup import read_params, run_node
+
+
+class ReplayParams(NamedTuple):
+    """`bag`: path; `rate`: images a second; `boxes`: whether to send the 2D boxes in the bag, too."""
+
+    bag: str = ''
+    rate: float = 30.0
+    boxes: bool = False
+
+
+class ReplayNode(object):
+    """Play the images of a bag forwards and backwards, so that nobody jumps, each stamped with the time it is sent.
+
+    Publishes: what bags of `scenario_to_bag` and `session_to_bag` hold of a camera: images, camera_info, /tf; where it
+    is asked to, yolo_bounding_box. Parameters: see `ReplayParams`; launch/latency.launch.
+    """
+
+    def __init__(self):
+        self._params, = read_params(ReplayParams)
+        if not 0 < self._params.rate <= 1000:
+            raise ValueError('parameter ~rate is %g; more than 0 expected' % self._params.rate)
+        types = dict(TYPES, **({BOXES_TOPIC: Int32MultiArray} if self._params.boxes else {}))
+        self._images = images_in(self._params.bag, types)
+        self._diagnostics = Diagnostics()
+        self._pubs = {topic: rospy.Publisher('/tf' if topic == 'tf' else topic, kind, queue_size=10)
+                      for topic, kind in types.items()}
+        thread = threading.Thread(target=self._run)
+        thread.daemon = True
+        thread.start()
+
+    def _run(self):
+        """Publish at the rate; an image that is late by a whole period is left out."""
+        period_s, due_s = 1.0 / self._params.rate, time.monotonic()
+        for messages in itertools.cycle(self._images + self._images[-2:0:-1]):
+            due_s += period_s
+            late_s = time.monotonic() - due_s
+            if late_s > period_s:
+                self._diagnostics.count('images left out')
+                continue
+            time.sleep(max(0.0, -late_s))
+            if rospy.is_shutdown():
+                return
+            self._publish(messages)
+
+    def _publish(self, messages):
+        stamp = rospy.get_rostime()
+        with self._diagnostics.refusing('images'):
+            for topic, message in messages:
+                self._pubs[topic].publish(restamped(message, stamp))
+            self._diagnostics.count('images')
+
+
+def main():
+    """Run the node."""
+    run_node('replay_node', ReplayNode)
