@@ -27,20 +27,21 @@ class XBias(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """A standard deviation by range: sqrt(constant_m ** 2 + (growth * z ** power) ** 2), metres.
+    """A standard deviation by range: sqrt(constant_m ** 2 + (growth * z ** 2) ** 2 + (near_m2 / z) ** 2), metres.
 
-    With power 2 it is a constant and the law of stereo, where growth is s / (f * b): pixels of matching error by focal
-    length in pixels times baseline in metres (thesis 5.2). With power -1 it falls with range: near people fill the
-    image and are cut by its border.
+    The second part is the law of stereo, where growth is s / (f * b): pixels of matching error by focal length in
+    pixels times baseline in metres (thesis 5.2). The third falls with range: near people fill the image and are cut by
+    its border.
     """
 
     constant_m: float
     growth: float
-    power: int
+    near_m2: float
 
     def at(self, z_m):
         """The standard deviation at range z_m, metres, of its shape."""
-        return np.hypot(self.constant_m, self.growth * np.asarray(z_m, float) ** self.power)
+        z_m = np.asarray(z_m, float)
+        return np.sqrt(self.constant_m ** 2 + (self.growth * z_m ** 2) ** 2 + (self.near_m2 / z_m) ** 2)
 
 
 class MeasuredRange(NamedTuple):
@@ -208,9 +209,8 @@ def checked(model):
         raise ValueError('z_bias is %g m at %g m; less than the range expected'
                          % (model._z_bias_at(limits.z_min_m), limits.z_min_m))
     for name, spread in (('z_sigma', model.z_sigma), ('x_sigma', model.x_sigma)):
-        if spread.constant_m < 0 or spread.growth < 0 or not -4 <= spread.power <= 4:
-            raise ValueError('%s is %s; constant_m and growth of 0 or more and a power of -4 to 4 expected'
-                             % (name, tuple(spread)))
+        if min(spread) < 0:
+            raise ValueError('%s is %s; constant_m, growth and near_m2 of 0 or more expected' % (name, tuple(spread)))
     sigmas_m = {'z_sigma': model.z_sigma.at(limits.z_min_m), 'x_sigma': model.x_sigma.at(limits.z_min_m),
                 'y_sigma_m': model.y_sigma_m}
     for name, sigma_m in sorted(sigmas_m.items()):

@@ -4,8 +4,8 @@ import numpy as np
 from ros_3d_bb.error_model import ErrorModel, MeasuredRange, Provenance, Spread, XBias
 
 MODEL = ErrorModel(
-    z_bias=(-0.04, 0.06, 0.008), x_bias=XBias(-0.05, -0.1, 0.02), z_sigma=Spread(0.01, 0.004, 2),
-    x_sigma=Spread(0.02, 0.0, 2), y_sigma_m=0.1, measured_range=MeasuredRange(0.5, 4.0, 1.5, 1.0), growth_outside=0.2,
+    z_bias=(-0.04, 0.06, 0.008), x_bias=XBias(-0.05, -0.1, 0.02), z_sigma=Spread(0.01, 0.004, 0.0),
+    x_sigma=Spread(0.02, 0.0, 0.0), y_sigma_m=0.1, measured_range=MeasuredRange(0.5, 4.0, 1.5, 1.0), growth_outside=0.2,
     provenance=Provenance('a test: of "keys", and #colours', 'median', 'none', '2026-01-01', 110, 22),
     cross_validated=None)
 PLACES_M = np.array([(x, z) for z in (0.5, 1.0, 1.7, 2.5, 3.2, 4.0)

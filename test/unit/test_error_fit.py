@@ -33,7 +33,7 @@ def test_recovers_the_spread(fitted):
 
 
 def test_recovers_a_spread_that_falls_with_range():
-    model = fit_error_model(*measure(SIMPLE._replace(x_sigma=Spread(0.005, 0.08, -1)), 4))
+    model = fit_error_model(*measure(SIMPLE._replace(x_sigma=Spread(0.005, 0.0, 0.08)), 4))
     assert model.x_sigma.at(1.0) > 2 * model.x_sigma.at(3.0)
 
 
@@ -99,7 +99,7 @@ def test_measurements_that_are_none_are_refused():
 
 
 def test_a_bias_too_steep_to_be_undone_is_refused():
-    measured_m, truth_m = measure(SIMPLE._replace(x_sigma=Spread(0.001, 0.0, 2)), 1, noise=0.0)
+    measured_m, truth_m = measure(SIMPLE._replace(x_sigma=Spread(0.001, 0.0, 0.0)), 1, noise=0.0)
     measured_m[:, 2] = 0.3 * truth_m[:, 1]
     with pytest.raises(ValueError, match='z_bias changes by 0.7 m a metre'):
         fit_error_model(measured_m, truth_m)

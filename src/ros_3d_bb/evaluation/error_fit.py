@@ -13,9 +13,9 @@ X_TERMS = ((False, True), (True, False), (True, True))  # whether x_bias has slo
 BETTER = 0.95  # a model with more coefficients must be better by so much
 LEAST_SIGMA_M = 0.001
 Y_SIGMA_M = 0.1  # a box whose top or bottom is cut or missed by 0.2 m
-POWERS = (2, 1, -1)  # of range, in the law of the spread: stereo first; the last for people who are cut when near
-LIKELIER = 2.0  # log likelihood by which another law than stereo has to win
-RANGE_SHARES = np.linspace(0, 1, 41)[:, np.newaxis]  # of the variance at the farthest range that goes with range
+LIKELIER = 2.0  # log likelihood by which a spread that also falls with range has to win
+RATIOS = np.concatenate(([0], 2.0 ** np.arange(-7, 8)))  # of a part of the variance to the constant part
+SHARES = np.array([(far / (1 + far + near), near / (1 + far + near)) for far in RATIOS for near in RATIOS])
 GROWTH_OUTSIDE = 0.2  # about the steepest bias that the thesis' data show
 OFF_THE_MIDDLE_M = 0.1
 CHI_SQUARE_68_95 = -2 * np.log(1 - np.array([0.68, 0.95]))  # of two axes
@@ -163,7 +163,7 @@ def _fit_bias(data, degree, terms):
     aside = np.abs(x_m) > OFF_THE_MIDDLE_M
     limits = MeasuredRange(*(float(value) for value in (
         z_m.min(), z_m.max(), np.abs(x_m).max(), z_m[aside].min() if aside.any() else z_m.min())))
-    spread = Spread(LEAST_SIGMA_M, 0.0, 2)
+    spread = Spread(LEAST_SIGMA_M, 0.0, 0.0)
     return ErrorModel(tuple(z_bias.tolist()), XBias(*x_bias.tolist()), spread, spread, Y_SIGMA_M, limits,
                       GROWTH_OUTSIDE, NOBODY, None)
 
@@ -180,31 +180,29 @@ def _widening(sigmas_m, residuals_m, positions):
 
 
 def _wider(spread, factor):
-    return spread._replace(constant_m=spread.constant_m * factor, growth=spread.growth * factor)
+    return Spread(*(factor * part for part in spread))
 
 
 def _fit_spread(residuals_m, data):
     """The law of the spread of residuals (n,) that is likeliest at positions it never saw."""
     z_m, weights = data.truth_m[:, 1], data.weights()
-    likelihoods = []
-    for power in POWERS:
-        likelihoods.append(0)
+    likelihoods = [0.0, 0.0]
+    for with_near in (False, True):
         for number in range(data.position.max() + 1):
             held = data.position == number
-            sigma_m = _spread_of(residuals_m[~held], z_m[~held], weights[~held], power).at(z_m[held])
-            likelihoods[-1] -= np.mean(np.log(sigma_m) + (residuals_m[held] / sigma_m) ** 2 / 2)
-    best = int(np.argmax(likelihoods))
-    power = POWERS[best if likelihoods[best] > likelihoods[0] + LIKELIER else 0]
-    return _spread_of(residuals_m, z_m, weights, power)
+            sigma_m = _spread_of(residuals_m[~held], z_m[~held], weights[~held], with_near).at(z_m[held])
+            likelihoods[with_near] -= np.mean(np.log(sigma_m) + (residuals_m[held] / sigma_m) ** 2 / 2)
+    return _spread_of(residuals_m, z_m, weights, likelihoods[True] > likelihoods[False] + LIKELIER)
 
 
-def _spread_of(residuals_m, z_m, weights, power):
+def _spread_of(residuals_m, z_m, weights, with_near):
     """The likeliest Spread of weighted Gaussian residuals: for each share of its parts the scale is known exactly."""
-    farthest_m = z_m.max()
-    shapes = 1 - RANGE_SHARES + RANGE_SHARES * (z_m / farthest_m) ** (2 * power)
+    shares = SHARES if with_near else SHARES[SHARES[:, 1] == 0]
+    far, near = shares.T[..., np.newaxis]
+    nearest_m, farthest_m = z_m.min(), z_m.max()
+    shapes = 1 - far - near + far * (z_m / farthest_m) ** 4 + near * (nearest_m / z_m) ** 2
     variances_m2 = np.maximum(LEAST_SIGMA_M ** 2, np.average(residuals_m ** 2 / shapes, axis=1, weights=weights))
     costs = np.log(variances_m2) + np.average(np.log(shapes), axis=1, weights=weights)
     best = int(np.argmin(costs))
-    constant_m, farthest_sigma_m = (np.sqrt(variances_m2[best] * share)
-                                    for share in (1 - RANGE_SHARES[best, 0], RANGE_SHARES[best, 0]))
-    return Spread(float(max(constant_m, LEAST_SIGMA_M)), float(farthest_sigma_m / farthest_m ** float(power)), power)
+    constant_m, far_m, near_m = np.sqrt(variances_m2[best] * np.array([1 - shares[best].sum(), *shares[best]]))
+    return Spread(float(max(constant_m, LEAST_SIGMA_M)), float(far_m / farthest_m ** 2), float(near_m * nearest_m))

@@ -12,12 +12,12 @@ from ros_3d_bb.geometry import transform_points
 from ros_3d_bb.simulation.scenario import Move, Person, Robot, Room, Scenario
 from ros_3d_bb.simulation.simulator import D435I_COLOR, Simulator
 
-RANGES_M = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)
-TANGENTS = (-0.4, -0.2, 0.0, 0.2, 0.4)  # of the angle off the optical axis
+RANGES_M = (1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0)
+TANGENTS = (-0.4, -0.25, -0.1, 0.0, 0.1, 0.25, 0.4)  # of the angle off the optical axis
 ROOM = Room(bounds=(-2.0, 9.0, -5.0, 5.0))
 ROBOT = Robot()
 WALK_S, SPEED_MPS = 1.0, 1.2  # a walker passes the place so long after the start
-REPETITIONS = 6
+REPETITIONS = 3
 
 
 def write_simulated_session(folder, ranges_m=RANGES_M, tangents=TANGENTS, repetitions=REPETITIONS):

@@ -95,8 +95,8 @@ def _thesis_form(inputs, z, x, x_variance):
     z_m, x_m = ([cluster.truth_m for cluster in axis.clusters] for axis in (z, x))
     count = sum(cluster.count for cluster in z.clusters)
     return checked(ErrorModel(
-        z.poly, XBias(x.poly[0], 0.0, x.poly[1]), Spread(max(z.max_sigma_m, LEAST_SIGMA_M), 0.0, 2),
-        Spread(max(x_variance.max_sigma_m, LEAST_SIGMA_M), 0.0, 2), Y_SIGMA_M,
+        z.poly, XBias(x.poly[0], 0.0, x.poly[1]), Spread(max(z.max_sigma_m, LEAST_SIGMA_M), 0.0, 0.0),
+        Spread(max(x_variance.max_sigma_m, LEAST_SIGMA_M), 0.0, 0.0), Y_SIGMA_M,
         MeasuredRange(min(z_m), max(z_m), max(abs(value) for value in x_m), min(z_m)), GROWTH_OUTSIDE,
         Provenance(source, inputs.estimator, camera, date, count, len(z_m)), None))
 

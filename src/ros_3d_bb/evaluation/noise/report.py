@@ -206,7 +206,7 @@ def _gaussian_count(analysis):
 def _spread_text(spread):
     if spread.growth == 0:
         return '%.4f' % spread.constant_m
-    return '√(%.4f² + (%.4f%s)²)' % (spread.constant_m, spread.growth, _power_text('z', spread.power))
+    return '√(%.4f² + (%.4f z²)² + (%.4f / z)²)' % spread
 
 
 def _power_text(variable, power):
