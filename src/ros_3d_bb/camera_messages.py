@@ -33,11 +33,22 @@ class CameraFrame(NamedTuple):
 
 def messages_of(frame):
     """Yield (topic, message) of one image, in the order in which a robot would send them."""
-    yield TF_TOPIC, TFMessage([_transform(frame.header.stamp, *link) for link in frame.transforms])
+    yield TF_TOPIC, TFMessage(transform_messages(frame.header.stamp, frame.transforms))
+    for message in image_messages_of(frame):
+        yield message
+
+
+def image_messages_of(frame):
+    """Yield (topic, message) of one image without its transforms."""
     for topic in INFO_TOPICS:
         yield topic, _camera_info(frame.camera, frame.header)
     yield DEPTH_TOPIC, _depth_image(frame.depth, frame.header)
     yield COLOR_TOPIC, fill_image(Image(header=frame.header), frame.color, 'rgb8')
+
+
+def transform_messages(stamp, links):
+    """TransformStamped messages of (parent, child, parent_from_child (4, 4)) links."""
+    return [_transform(stamp, *link) for link in links]
 
 
 def _depth_image(depth, header):

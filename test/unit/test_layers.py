@@ -17,7 +17,8 @@ def modules_in(root):
 
 
 MODULES = modules_in(SOURCE)
-PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime', 'yaml', 'matplotlib', 'scipy', 'norfair', 'trackeval'}
+PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime', 'yaml', 'matplotlib', 'scipy', 'norfair', 'trackeval',
+                  'pyrealsense2'}
 # desk tools: no node may come to need their libraries
 NOISE, TRACKING_BENCHMARK = os.path.join('evaluation', 'noise'), os.path.join('evaluation', 'tracking')
 SPEED_PICTURE = os.path.join('evaluation', 'speed_picture.py')  # of a benchmark, which imports it last
@@ -60,6 +61,7 @@ def test_rospy_is_for_nodes_torch_for_detection_and_scipy_for_desk_tools(module)
     assert 'torch' not in others or module.startswith('detection/')
     assert 'matplotlib' not in others or module.startswith(NOISE) or module == SPEED_PICTURE
     assert 'scipy' not in others or module.startswith((NOISE, TRACKING_BENCHMARK)) or module == ASSIGNMENT
+    assert 'pyrealsense2' not in others or module == 'realsense.py'
     assert not others & {'norfair', 'trackeval'} or module.startswith(TRACKING_BENCHMARK)
     for tool in (NOISE, TRACKING_BENCHMARK):
         name = 'ros_3d_bb.' + tool.replace(os.sep, '.')

@@ -1,6 +1,5 @@
 """What can be tested of the simulation without Gazebo: the camera, the people, and what the launch file hands on."""
 import os
-import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from itertools import combinations
@@ -8,9 +7,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 import xacro
-import yaml
 
 from ros_3d_bb.geometry import transform_from, transform_points
+from support.launching import dumped, given_to_stand_ins, stand_in_launch_file, write
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 CAMERA, LAUNCH = os.path.join(ROOT, 'urdf', 'd435i.urdf.xacro'), os.path.join(ROOT, 'launch', 'gazebo.launch')
@@ -26,11 +25,6 @@ ROBOT = """<robot name="jackal" xmlns:xacro="http://www.ros.org/wiki/xacro">
 STUBS = {'gazebo_ros/launch/empty_world.launch': ('paused', 'use_sim_time', 'extra_gazebo_args', 'gui', 'headless',
                                                   'debug', 'physics', 'verbose', 'world_name', 'enable_ros_network'),
          'jackal_gazebo/launch/spawn_jackal.launch': ('x', 'y', 'z', 'yaw', 'joystick', 'config')}
-
-
-def write(path, text):
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text)
 
 
 def default_of(launch_file):
@@ -232,29 +226,20 @@ def test_the_launch_file_documents_its_arguments_and_hands_on_only_what_the_pipe
 
 @pytest.fixture
 def simulators(tmp_path):
-    """Packages in place of Gazebo's and Jackal's: their launch files put what they are given into parameters."""
+    """Packages in place of Gazebo's and Jackal's."""
     for name, arguments in STUBS.items():
-        lines = ['<arg name="%s" default=""/><param name="stub/%s" type="str" value="$(arg %s)"/>' % (arg, arg, arg)
-                 for arg in arguments]
-        write(tmp_path / name, '<launch><param name="robot_description" value="bare"/>%s</launch>' % ''.join(lines))
+        stand_in_launch_file(tmp_path, name, arguments, '<param name="robot_description" value="bare"/>')
     write(tmp_path / 'jackal_description' / 'urdf' / 'jackal.urdf.xacro', ROBOT)
     write(tmp_path / 'xacro' / 'xacro', '#!%s\nimport xacro\nxacro.main()\n' % sys.executable)
     (tmp_path / 'xacro' / 'xacro').chmod(0o755)
-    for folder in tmp_path.iterdir():
-        write(folder / 'package.xml', '<package format="2"><name>%s</name></package>' % folder.name)
+    for name in ('jackal_description', 'xacro'):
+        write(tmp_path / name / 'package.xml', '<package format="2"><name>%s</name></package>' % name)
     return tmp_path
 
 
-def loaded(simulators, *arguments):
-    """The parameters that roslaunch would set."""
-    path = '%s:%s:%s' % (simulators, ROOT, os.environ.get('ROS_PACKAGE_PATH', ''))
-    command = [sys.executable, '-c', 'import roslaunch; roslaunch.main()', '--dump-params', LAUNCH] + list(arguments)
-    return yaml.safe_load(subprocess.check_output(command, env=dict(os.environ, ROS_PACKAGE_PATH=path)))
-
-
 def test_the_launch_file_starts_gazebo_the_robot_with_the_camera_and_the_pipeline(simulators):
-    parameters = loaded(simulators, 'weights:=/some/yolov5n.pt', 'gui:=false', 'y:=-1.5', 'yaw:=0.3')
-    given = {key.split('/')[-1]: value for key, value in parameters.items() if key.startswith('/stub/') and value}
+    parameters = dumped('gazebo.launch', simulators, 'weights:=/some/yolov5n.pt', 'gui:=false', 'y:=-1.5', 'yaw:=0.3')
+    given = given_to_stand_ins(parameters)
     assert os.path.samefile(given.pop('world_name'), os.path.join(ROOT, 'worlds', 'people.world'))
     assert given == {'gui': 'false', 'x': '0.0', 'y': '-1.5', 'yaw': '0.3', 'z': '0.1'}
     assert 'camera_color_optical_frame' in parameters['/robot_description']

@@ -1,39 +1,14 @@
 """What measure.launch starts, with a stand-in for realsense2_camera, which is not on every machine."""
-import os
-import subprocess
-import sys
-
 import pytest
-import roslaunch
-import yaml
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-# of the arguments that rs_camera.launch of realsense2_camera 2.3 declares, those that are asked for
-RS_CAMERA = """<launch>
-  <arg name="align_depth" default="false"/>
-  <param name="align_depth" value="$(arg align_depth)"/>
-</launch>"""
+from support import launching
+from support.launching import RS_CAMERA_ARGUMENTS, dumped, given_to_stand_ins, stand_in_launch_file
 
-
-@pytest.fixture
-def with_realsense(tmp_path):
-    """An environment in which there is a package of that name."""
-    package = tmp_path / 'realsense2_camera'
-    (package / 'launch').mkdir(parents=True)
-    (package / 'package.xml').write_text('<package format="2"><name>realsense2_camera</name></package>')
-    (package / 'launch' / 'rs_camera.launch').write_text(RS_CAMERA)
-    return dict(os.environ, ROS_PACKAGE_PATH='%s:%s' % (tmp_path, os.environ['ROS_PACKAGE_PATH']))
-
-
-LAUNCH, REQUIRED = os.path.join(ROOT, 'launch', 'measure.launch'), ['session:=/a session', 'weights:=/some.pt']
+LAUNCH, REQUIRED = 'measure.launch', ['session:=/a session', 'weights:=/some.pt']
 
 
 def loaded(*arguments):
-    """Parameters {name: value} and nodes {name: node} that roslaunch would set and start."""
-    loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
-    loader.load(LAUNCH, config, argv=REQUIRED + list(arguments), verbose=False)
-    return ({name: parameter.value for name, parameter in config.params.items()},
-            {node.name: node for node in config.nodes})
+    return launching.loaded(LAUNCH, *REQUIRED + list(arguments))
 
 
 def test_without_a_camera_of_its_own_it_needs_no_realsense():
@@ -44,13 +19,17 @@ def test_without_a_camera_of_its_own_it_needs_no_realsense():
     assert nodes['viewer_node'].required
 
 
-def test_the_camera_aligns_depth_and_needs_no_robot(with_realsense):
-    command = [sys.executable, '-c', 'import roslaunch; roslaunch.main()', '--dump-params', LAUNCH]
-    parameters = yaml.safe_load(subprocess.check_output(command + REQUIRED + ['camera:=true', 'detector:=depth'],
-                                                        env=with_realsense))
-    assert parameters['/align_depth'] is True
+def test_the_camera_aligns_depth_and_needs_no_robot(tmp_path):
+    stand_in_launch_file(tmp_path, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS)
+    parameters = dumped(LAUNCH, tmp_path, 'camera:=true', 'detector:=depth', *REQUIRED)
+    assert given_to_stand_ins(parameters)['align_depth'] == 'true'
     assert parameters['/tracker_node/target_frame'] == 'camera_link'
     assert parameters['/depth_detector_node/floor_frame'] == ''
+
+
+def test_the_camera_needs_no_driver_where_our_node_reads_it():
+    _parameters, nodes = loaded('camera:=true', 'driver:=pyrealsense2')
+    assert 'realsense_node' in nodes
 
 
 @pytest.mark.parametrize('detector', ['yolov5', 'depth'])

@@ -18,27 +18,31 @@ from ros_3d_bb.markers import NAMESPACES, MarkerParams
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dParams
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorParams
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
+from ros_3d_bb.nodes.realsense_node import RealSenseNodeParams
 from ros_3d_bb.nodes.simulator_node import SimulatorParams
 from ros_3d_bb.nodes.tracker_node import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.nodes.viewer_node import ViewerParams
 from ros_3d_bb.nodes.yolov5_node import Yolov5NodeParams
 from ros_3d_bb.params import params_from
+from ros_3d_bb.realsense import RealSenseParams
 from support.standard_library import STANDARD_LIBRARY, TEST_STANDARD_LIBRARY
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 # rosdep keys of what is no ROS package; None: optional, imported where it is used, with an error that says so.
 KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-pytorch-pip', 'onnxruntime': None,
         'yaml': 'python3-yaml', 'matplotlib': 'python3-matplotlib', 'scipy': 'python3-scipy',
-        'norfair': None, 'trackeval': None,
+        'norfair': None, 'trackeval': None, 'pyrealsense2': None,
         'PyQt5': None}  # comes with python_qt_binding, and serves where that is not
 TEST_KEYS = {'pytest': 'python3-pytest'}
 CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams, RuntimeParams), 'bbox3d.yaml': (Bbox3dParams,),
            'tracker.yaml': (TrackerNodeParams, MarkerParams) + TRACKING_PARAMS, 'simulator.yaml': (SimulatorParams,),
-           'planner_bridge.yaml': (PlannerBridgeParams,),
+           'planner_bridge.yaml': (PlannerBridgeParams,), 'realsense.yaml': (RealSenseNodeParams, RealSenseParams),
            'depth_detector.yaml': (DepthDetectorParams, DepthPeopleParams), 'viewer.yaml': (ViewerParams,)}
 SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id', 'error_model'},
                  'tracker.yaml': {'target_frame', 'camera_frame'}, 'simulator.yaml': {'scenario'},
                  'planner_bridge.yaml': {'outputs', 'planner_frame', 'robot_frame'},
+                 'realsense.yaml': {'frame_prefix', 'publish_clock', 'serial', 'width', 'height', 'fps', 'filters',
+                                    'exposure', 'file', 'repeat'},
                  'depth_detector.yaml': {'floor_frame', 'frame_id'},
                  'viewer.yaml': {'session', 'label', 'window', 'frame_id'}}
 REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag', 'session:=/some/session', 'record:=/some/record.json']
@@ -132,9 +136,9 @@ def test_parameters_have_a_comment_with_the_default(name):
         comment = ''
 
 
-# gazebo.launch needs packages that are not on every machine: test_gazebo.py loads it with stand-ins for them.
+# These need packages that are not on every machine; tests of their own load them with stand-ins.
 @pytest.mark.parametrize('name', sorted(set(os.path.basename(path) for path in glob.glob(inside('launch', '*')))
-                                        - {'gazebo.launch'}))
+                                        - {'gazebo.launch', 'realsense.launch'}))
 def test_launch_files_load_and_document_their_arguments(name):
     path = inside('launch', name)
     for argument in ElementTree.parse(path).getroot().findall('arg'):
@@ -148,12 +152,12 @@ def test_launch_files_load_and_document_their_arguments(name):
 
 
 @pytest.mark.parametrize('name', ['yolov5.launch', 'bbox3d.launch', 'tracker.launch', 'depth_detector.launch',
-                                  'planner_bridge.launch', 'viewer.launch'])
+                                  'planner_bridge.launch', 'realsense_node.launch', 'viewer.launch'])
 def test_launch_files_set_no_parameter_that_the_node_does_not_know(name):
     loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
     loader.load(inside('launch', name), config, argv=REQUIRED_ARGUMENTS, verbose=False)
     given = {key.split('/', 2)[2]: parameter.value for key, parameter in config.params.items()}
-    params_from(given, *CONFIGS[name.replace('.launch', '.yaml')])
+    params_from(given, *CONFIGS[name.replace('_node', '').replace('.launch', '.yaml')])
 
 
 @pytest.mark.parametrize('arguments, outputs', [([], None), (['planner:=teb, people', 'planner_frame:=odom'],

@@ -12,6 +12,7 @@ from ros_3d_bb.messages import time_from
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics, is_ending
 from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.nodes.subscribers import wait_for_subscribers
 from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.simulation.scenario import overridden, read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
@@ -20,9 +21,6 @@ from ros_3d_bb.stamped import NS
 
 CLOCK_LEAD_NS = NS  # between the time that is told while waiting and the first image
 PAUSE_NS = 3 * NS  # between two rounds of a scene, so that the people of one are not taken for those of the next
-POLL_S = 0.05
-SETTLING_S = 1.0  # who has subscribed one topic still connects to the others
-LONGEST_WAIT_S = 60.0  # for subscribers: those who have not come by then will not come
 PROGRESS_S = 1.0  # between two lines of the log
 
 
@@ -82,15 +80,8 @@ class SimulatorNode(object):
 
     def _wait_for_subscribers(self):
         """Some of them, rosbag among them, do not even subscribe before there is a time."""
-        color_pub, wanted, began_s = self._pubs[COLOR_TOPIC], self._params.wait_for_subscribers, time.monotonic()
-        while color_pub.get_num_connections() < wanted and not rospy.is_shutdown():
-            if time.monotonic() - began_s > LONGEST_WAIT_S:
-                raise RuntimeError('%d subscribers of %s came within %.0f s; %d expected (~wait_for_subscribers)' % (
-                    color_pub.get_num_connections(), color_pub.resolved_name, LONGEST_WAIT_S, wanted))
-            self._tell_time(START_NS)
-            time.sleep(POLL_S)
-        if wanted:
-            time.sleep(SETTLING_S)
+        wait_for_subscribers(self._pubs[COLOR_TOPIC], self._params.wait_for_subscribers,
+                             lambda: self._tell_time(START_NS))
 
     def _play(self, start_ns):
         """One round of the scene, its first image at a stamp."""

@@ -1,0 +1,114 @@
+"""The node that reads a RealSense, or a recording of one, without the driver realsense2_camera."""
+import contextlib
+import sys
+import threading
+import time
+from typing import NamedTuple
+
+import rospy
+import tf2_ros
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header
+
+from ros_3d_bb.camera_messages import (COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, TYPES, CameraFrame, image_messages_of,
+                                       transform_messages)
+from ros_3d_bb.messages import time_from
+from ros_3d_bb.nodes.diagnostics import Diagnostics, is_ending
+from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.nodes.subscribers import wait_for_subscribers
+from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.realsense import (CameraLost, RealSense, RealSenseParams, check_params, frame_links, librealsense,
+                                 optical_frame)
+from ros_3d_bb.stamped import NS
+
+RETRY_S = 2.0
+CLOSING_S = 5.0  # at most
+START_NS = NS  # the time that is told until the first image of a recording says another
+
+
+class RealSenseNodeParams(NamedTuple):
+    """See config/realsense.yaml."""
+
+    frame_prefix: str = 'camera'
+    publish_clock: bool = False
+    wait_for_subscribers: int = 0
+
+
+class RealSenseNode(object):
+    """Publish colour, depth aligned to it, and camera_info, with the topics and frames of realsense2_camera.
+
+    Publishes: camera/color/image_raw, camera/aligned_depth_to_color/image_raw, camera_info of both, /tf_static, and
+    /clock where it tells the time of a recording. A camera that is not there, or is unplugged, is waited for.
+    Parameters: config/realsense.yaml.
+    """
+
+    def __init__(self):
+        self._params, self._camera_params = read_params(RealSenseNodeParams, RealSenseParams)
+        check_not_negative(self._params, 'wait_for_subscribers')
+        check_params(self._camera_params)
+        librealsense()
+        self._diagnostics = Diagnostics()
+        self._pubs = {topic: rospy.Publisher(topic, TYPES[topic], queue_size=10)
+                      for topic in (COLOR_TOPIC, DEPTH_TOPIC) + INFO_TOPICS}
+        self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=10) if self._params.publish_clock else None
+        self._static_transforms = tf2_ros.StaticTransformBroadcaster()
+        self.failed = False
+        self._worker = threading.Thread(target=self._run)
+        self._worker.daemon = True
+        self._worker.start()
+        rospy.on_shutdown(self._wait)
+
+    def _wait(self):
+        """Let the camera be closed: librealsense must not be torn down while it is read."""
+        if threading.current_thread() is not self._worker:
+            self._worker.join(CLOSING_S)
+
+    def _run(self):
+        """Read the camera until the end, whenever it is there; rospy publishes from any thread but the main one."""
+        try:
+            wait_for_subscribers(self._pubs[COLOR_TOPIC], self._params.wait_for_subscribers,
+                                 lambda: self._tell_time(START_NS))
+            while not is_ending():
+                try:
+                    with contextlib.closing(RealSense(self._camera_params)) as camera:
+                        rospy.loginfo('reading %s', self._camera_params.file or 'the camera')
+                        self._read(camera)
+                except CameraLost as error:
+                    self._diagnostics.warn('camera lost', '%s; trying again every %.0f s' % (error, RETRY_S))
+                    time.sleep(RETRY_S)
+        except Exception as error:  # without this thread the node does nothing: better no node than such a one
+            if not is_ending():
+                self.failed = True
+                rospy.logfatal('the camera is read no more: %s', error)
+                rospy.signal_shutdown('the camera cannot be read')
+
+    def _read(self, camera):
+        links = frame_links(self._params.frame_prefix, camera.link_from_color)
+        while not (is_ending() or camera.is_over):
+            with self._diagnostics.refusing('images'):
+                pair = camera.read()
+                if pair is not None:
+                    self._publish(camera, pair, links)
+                    links = ()  # they are latched
+        if camera.is_over:
+            rospy.loginfo('the recording is over')
+            rospy.signal_shutdown('the recording is over')
+
+    def _publish(self, camera, pair, links):
+        stamp = time_from(pair.stamp_ns)
+        self._tell_time(pair.stamp_ns)
+        if links:
+            self._static_transforms.sendTransform(transform_messages(stamp, links))
+        header = Header(stamp=stamp, frame_id=optical_frame(self._params.frame_prefix, 'color'))
+        for topic, message in image_messages_of(CameraFrame(header, camera.camera, pair.color, pair.depth, ())):
+            self._pubs[topic].publish(message)
+        self._diagnostics.count('images')
+
+    def _tell_time(self, stamp_ns):
+        if self._clock_pub is not None:
+            self._clock_pub.publish(Clock(time_from(stamp_ns)))
+
+
+def main():
+    """Run the node; the exit status is 1 where the camera or the recording could not be read."""
+    sys.exit(run_node('realsense_node', RealSenseNode).failed)

@@ -1,0 +1,138 @@
+"""realsense_node on a recording, and on a camera that comes and goes. Needs a master: it is about what is published."""
+import subprocess
+
+import numpy as np
+import pytest
+import rospy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import CameraInfo, Image
+from tf2_msgs.msg import TFMessage
+
+from ros_3d_bb.estimation import DepthImage
+from ros_3d_bb.images import depth_from, rgb_from
+from ros_3d_bb.messages import camera_from_message, transform_from_message
+from ros_3d_bb.nodes import realsense_node
+from ros_3d_bb.realsense import CameraLost, Pair
+from ros_3d_bb.stamped import NS
+from support.realsense_recordings import (COLOR_CAMERA, START_MS, STEP_MS, SUFFIX, colored, sloping_depth,
+                                          write_recording)
+from support.ros import Recorder, diagnostics_of, wait_until
+
+FRAMES = 6
+COLOR, DEPTH = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
+TOPICS = {COLOR: Image, DEPTH: Image, 'camera/color/camera_info': CameraInfo,
+          'camera/aligned_depth_to_color/camera_info': CameraInfo, '/tf_static': TFMessage, '/clock': Clock}
+
+
+@pytest.fixture(scope='module')
+def recording(tmp_path_factory):
+    rospy.init_node('test_realsense_node')
+    path = str(tmp_path_factory.mktemp('recording') / ('a' + SUFFIX))
+    return write_recording(path, [colored(number) for number in range(FRAMES)], [sloping_depth()] * FRAMES)
+
+
+def node(*params):
+    if rospy.has_param('/realsense_node'):  # of the run before
+        rospy.delete_param('/realsense_node')
+    return subprocess.Popen(['rosrun', 'ros_3d_bb', 'realsense_node'] + ['_' + param for param in params],
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
+
+
+@pytest.fixture(scope='module')
+def played(recording):
+    """{topic: messages} of a recording that was played once."""
+    recorders = {topic: Recorder(topic, kind, publisher_expected=False) for topic, kind in TOPICS.items()}
+    process = node('file:=' + recording, 'publish_clock:=true', 'real_time:=false', 'wait_for_subscribers:=1')
+    assert process.wait(timeout=60) == 0
+    wait_until(lambda: len(recorders[COLOR].messages) == FRAMES, 'all images')
+    for recorder in recorders.values():
+        recorder.__exit__()
+    return {topic: recorder.messages for topic, recorder in recorders.items()}
+
+
+def test_all_images_come_with_one_stamp_for_colour_depth_and_camera(played):
+    expected = [(START_MS + number * STEP_MS) / 1000 for number in range(FRAMES)]
+    for topic in set(TOPICS) - {'/tf_static', '/clock'}:
+        headers = [message.header for message in played[topic]]
+        np.testing.assert_allclose([header.stamp.to_sec() for header in headers], expected, atol=1e-6)
+        assert [header.stamp for header in headers] == [message.header.stamp for message in played[COLOR]]
+        assert set(header.frame_id for header in headers) == {'camera_color_optical_frame'}
+    assert [message.clock for message in played['/clock'][-FRAMES:]] == [image.header.stamp for image in played[COLOR]]
+
+
+def test_the_images_are_those_of_the_recording_and_depth_is_in_millimetres(played):
+    for number, message in enumerate(played[COLOR]):
+        assert message.encoding == 'rgb8'
+        np.testing.assert_array_equal(rgb_from(message), colored(number))
+    assert played[DEPTH][0].encoding == '16UC1'
+    depth = depth_from(played[DEPTH][0])
+    assert depth.values.shape == (480, 640) and depth.values[244, 320] * depth.scale_m == pytest.approx(0.8)
+
+
+def test_the_intrinsics_have_the_lens_of_the_camera(played):
+    for topic in ('camera/color/camera_info', 'camera/aligned_depth_to_color/camera_info'):
+        camera = camera_from_message(played[topic][0])
+        assert camera.distortion_model == COLOR_CAMERA.distortion_model == 'inverse_brown_conrady'
+        np.testing.assert_allclose(camera[2:6] + camera.distortion, COLOR_CAMERA[2:6] + COLOR_CAMERA.distortion,
+                                   rtol=1e-6)
+
+
+def test_the_frames_of_the_camera_are_told_once_and_are_a_tree(played):
+    message, = played['/tf_static']
+    links = {link.child_frame_id: link for link in message.transforms}
+    assert {child: link.header.frame_id for child, link in links.items()} == {
+        'camera_color_frame': 'camera_link', 'camera_color_optical_frame': 'camera_color_frame',
+        'camera_depth_frame': 'camera_link', 'camera_depth_optical_frame': 'camera_depth_frame'}
+    ahead = transform_from_message(links['camera_color_optical_frame'])[:3, 2]
+    np.testing.assert_allclose(ahead, (1, 0, 0), atol=1e-12)
+
+
+@pytest.mark.parametrize('params, complaint', [
+    (('file:=/nowhere.bag',), '/nowhere.bag'), (('filters:=median',), "has 'median'"), (('hight:=3',), '~height')])
+def test_what_is_missing_or_wrong_is_said_at_the_start(recording, params, complaint):
+    process = node(*params)
+    output, _none = process.communicate(timeout=30)
+    assert process.returncode == 1 and complaint in output and 'Traceback' not in output
+
+
+class ComingAndGoing(object):
+    """In place of a camera: not there, then there with a bad image among good ones, unplugged, then there again."""
+
+    opened, closed = 0, 0
+    camera, link_from_color, is_over = COLOR_CAMERA, np.eye(4), False
+
+    def __init__(self, _params):
+        ComingAndGoing.opened += 1
+        if ComingAndGoing.opened in (1, 3):
+            raise CameraLost('no images of a RealSense')
+        unplugged = CameraLost('the RealSense has sent no images for 5 s')
+        self._events = ['pair', ValueError('colour came without depth'), None, 'pair']
+        self._events += [unplugged] if ComingAndGoing.opened == 2 else ['pair'] * 1000
+
+    def read(self):
+        rospy.sleep(0.05)
+        event = self._events.pop(0)
+        if isinstance(event, Exception):
+            raise event
+        return event and Pair(rospy.get_rostime().to_nsec(), colored(ComingAndGoing.opened),
+                              DepthImage(np.full((480, 640), 2500, np.uint16), 0.0001))
+
+    def close(self):
+        ComingAndGoing.closed += 1
+
+
+def test_a_camera_that_is_unplugged_is_waited_for_and_bad_images_are_left_out(recording, monkeypatch):
+    for name in ('/realsense_node', '/test_realsense_node'):
+        if rospy.has_param(name):
+            rospy.delete_param(name)
+    monkeypatch.setattr(realsense_node, 'RealSense', ComingAndGoing)
+    monkeypatch.setattr(realsense_node, 'RETRY_S', 0.1)
+    with Recorder(DEPTH, Image, publisher_expected=False) as depth, Recorder(COLOR, Image, False) as color:
+        realsense_node.RealSenseNode()
+        wait_until(lambda: any(message.data[0] == 4 for message in color.messages), 'images of the camera that is back')
+        depth.wait_for(3)
+    assert ComingAndGoing.opened == 4 and ComingAndGoing.closed == 1
+    assert depth.messages[0].encoding == '32FC1' and depth_from(depth.messages[0]).values[0, 0] == pytest.approx(0.25)
+    assert abs(color.messages[-1].header.stamp.to_nsec() - rospy.get_rostime().to_nsec()) < 60 * NS
+    _level, _message, counts = diagnostics_of('test_realsense_node')
+    assert counts['camera lost'] >= 3 and counts['images refused'] >= 1

@@ -1,0 +1,65 @@
+"""What realsense.launch starts, with a stand-in for realsense2_camera that knows the published arguments only."""
+import os
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+
+from support.launching import (ROOT, RS_CAMERA_ARGUMENTS, dumped, given_to_stand_ins, loaded,
+                               stand_in_launch_file)
+
+
+@pytest.fixture
+def packages(tmp_path):
+    stand_in_launch_file(tmp_path, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS)
+    return tmp_path
+
+
+def test_the_driver_aligns_depth_to_colour_of_the_same_size_and_rate(packages):
+    given = given_to_stand_ins(dumped('realsense.launch', packages))
+    assert given == {'align_depth': 'true', 'camera': 'camera', 'initial_reset': 'false', 'color_width': '640',
+                     'color_height': '480', 'color_fps': '30', 'depth_width': '640', 'depth_height': '480',
+                     'depth_fps': '30'}
+
+
+def test_what_differs_between_robots_reaches_the_driver(packages):
+    given = given_to_stand_ins(dumped('realsense.launch', packages, 'camera:=front', 'serial_no:=0123', 'fps:=15',
+                                      'width:=848', 'filters:=disparity,spatial', 'initial_reset:=true'))
+    assert given['camera'] == 'front' and given['filters'] == 'disparity,spatial' and given['initial_reset'] == 'true'
+    assert (given['color_width'], given['depth_width'], given['color_fps'], given['depth_fps']) == (
+        '848', '848', '15', '15')
+    assert given['serial_no'].lstrip('0') == '123'
+
+
+def test_exposure_is_automatic_or_in_the_units_of_the_sensor(packages):
+    automatic = dumped('realsense.launch', packages)
+    assert automatic['/camera/rgb_camera/enable_auto_exposure'] is True
+    assert automatic['/camera/rgb_camera/auto_exposure_priority'] is False
+    assert '/camera/rgb_camera/exposure' not in automatic
+    fixed = dumped('realsense.launch', packages, 'exposure:=0.008', 'camera:=front')
+    assert fixed['/front/rgb_camera/enable_auto_exposure'] is False and fixed['/front/rgb_camera/exposure'] == 80
+
+
+def test_every_argument_that_is_passed_is_a_published_one():
+    include = ElementTree.parse(os.path.join(ROOT, 'launch', 'realsense.launch')).find('group/include')
+    passed = [argument.get('name') for argument in include.findall('arg')]
+    assert include.get('file').endswith('(find realsense2_camera)/launch/rs_camera.launch') and len(passed) > 8
+    assert set(passed) <= set(RS_CAMERA_ARGUMENTS)
+
+
+def test_without_the_driver_our_node_reads_the_camera_with_the_same_names():
+    parameters, nodes = loaded('realsense.launch', 'driver:=pyrealsense2', 'camera:=front', 'width:=848', 'fps:=15',
+                               'filters:=spatial', 'exposure:=0.008')
+    assert set(nodes) == {'realsense_node'} and '/use_sim_time' not in parameters
+    expected = {'frame_prefix': 'front', 'width': 848, 'height': 480, 'fps': 15, 'filters': 'spatial',
+                'exposure': 0.008, 'file': '', 'publish_clock': False}
+    assert {name: parameters['/realsense_node/' + name] for name in expected} == expected
+    assert dict(nodes['realsense_node'].remap_args) == {'camera/' + topic: 'front/' + topic for topic in (
+        'color/image_raw', 'color/camera_info', 'aligned_depth_to_color/image_raw',
+        'aligned_depth_to_color/camera_info')}
+
+
+def test_a_recording_is_played_by_our_node_with_its_own_time():
+    parameters, nodes = loaded('realsense.launch', 'file:=/some/where.bag', 'repeat:=true')
+    assert set(nodes) == {'realsense_node'} and parameters['/use_sim_time'] is True
+    assert parameters['/realsense_node/file'] == '/some/where.bag' and parameters['/realsense_node/repeat'] is True
+    assert parameters['/realsense_node/publish_clock'] is True
