@@ -12,8 +12,8 @@ COLOR_CAMERA = Camera(640, 480, 614.0, 613.0, 322.1, 243.7, 'inverse_brown_conra
                       (0.02, -0.05, 0.001, -0.0005, 0.01))
 DEPTH_FROM_COLOR = transform_from((0.0148, 0.0002, 0.0004), (0.002, -0.001, 0.0015, 1.0))
 START_MS, STEP_MS = 1700000000000.25, 33.5
-# pyrealsense2 2.58 and later write the second, and read both.
-SUFFIX = '.db3' if tuple(int(part) for part in rs.__version__.split('.')[:2]) >= (2, 58) else '.bag'
+# pyrealsense2 2.58 and later write the first, and read both; old ones do not tell their version.
+SUFFIX = '.db3' if tuple(int(part) for part in getattr(rs, '__version__', '2.0').split('.')[:2]) >= (2, 58) else '.bag'
 CLOCKS = {'global': rs.timestamp_domain.global_time, 'camera': rs.timestamp_domain.hardware_clock}
 
 

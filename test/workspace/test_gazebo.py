@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import xacro
 
-from ros_3d_bb.geometry import transform_from, transform_points
+from ros_3d_bb.geometry import transform_points
 from support.launching import dumped, given_to_stand_ins, stand_in_launch_file, write
+from support.urdf import base_from
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 CAMERA, LAUNCH = os.path.join(ROOT, 'urdf', 'd435i.urdf.xacro'), os.path.join(ROOT, 'launch', 'gazebo.launch')
@@ -39,25 +40,6 @@ def robot(tmp_path, monkeypatch):
     monkeypatch.setenv('JACKAL_URDF_EXTRAS', CAMERA)
     return lambda **arguments: ElementTree.fromstring(
         xacro.process_file(str(tmp_path / 'robot.urdf.xacro'), mappings=arguments).toxml())
-
-
-def parent_from_child(joint):
-    """The 4x4 transform of a URDF joint; rpy are rotations about the fixed axes x, y, z in this order."""
-    origin = joint.find('origin')
-    xyz, rpy = ([float(value) for value in (origin.get(key, '0 0 0') if origin is not None else '0 0 0').split()]
-                for key in ('xyz', 'rpy'))
-    roll, pitch, yaw = (transform_from((0, 0, 0), np.append(np.sin(angle / 2) * axis, np.cos(angle / 2)))
-                        for angle, axis in zip(rpy, np.eye(3)))
-    return transform_from(xyz, (0, 0, 0, 1)).dot(yaw).dot(pitch).dot(roll)
-
-
-def base_from(frame, description):
-    joints = {joint.find('child').get('link'): joint for joint in description.findall('joint')}
-    transform = np.eye(4)
-    while frame != 'base_link':
-        transform = parent_from_child(joints[frame]).dot(transform)
-        frame = joints[frame].find('parent').get('link')
-    return transform
 
 
 def test_the_camera_adds_its_frames_to_the_robot_as_one_tree(robot):
