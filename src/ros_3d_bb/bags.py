@@ -1,6 +1,7 @@
 """Bags of what a camera on a robot sends, made of measurement sessions and of scenarios."""
 import argparse
 import collections
+import contextlib
 import itertools
 import os
 import sys
@@ -19,6 +20,7 @@ from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulator_messages import CAMERA_FRAME, START_NS, simulated_messages
 from ros_3d_bb.stamped import NS
 
+PARTIAL = '.active'  # as rosbag record calls what is not complete yet
 MOUNT_M = (0.17, 0.0, 0.20)  # camera on a Jackal, metres forward, left and up of base_link (thesis 3.5.1)
 
 
@@ -47,18 +49,31 @@ def write_bag(images, path, compression='lz4'):
     int
         Number of images written. If `images` raises, no bag is left.
     """
-    partial, count = path + '.active', 0
+    count = 0
+    with new_bag(path, compression) as bag:
+        for stamp_ns, messages in images:
+            for topic, message in messages:
+                bag.write('/' + topic, message, time_from(stamp_ns))
+            count += 1
+    return count
+
+
+@contextlib.contextmanager
+def new_bag(path, compression):
+    """An open rosbag.Bag to be written: beside its place, and moved there when the block ends without an error."""
+    partial = path + PARTIAL
     try:
         with rosbag.Bag(partial, 'w', compression=compression) as bag:
-            for stamp_ns, messages in images:
-                for topic, message in messages:
-                    bag.write('/' + topic, message, time_from(stamp_ns))
-                count += 1
+            yield bag
         os.replace(partial, path)
     finally:
-        if os.path.exists(partial):
-            os.remove(partial)
-    return count
+        remove_partial(path)
+
+
+def remove_partial(path):
+    """Remove what was written of a bag that did not become complete, if there is any."""
+    if os.path.exists(path + PARTIAL):
+        os.remove(path + PARTIAL)
 
 
 def images_in(path, topics):

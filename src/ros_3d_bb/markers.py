@@ -12,6 +12,7 @@ from ros_3d_bb.params import check_not_negative, nearest_name
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
 
+MARKERS_TOPIC = 'visualization_marker_array'
 CYLINDER, ID, VELOCITY, PREDICTION, HISTORY, ELLIPSE, PREDICTION_ELLIPSE = NAMESPACES = (
     'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse', 'prediction_ellipse')
 BLUE, GREEN, RED = (0.1, 0.3, 1.0), (0.1, 0.9, 0.2), (0.95, 0.1, 0.1)

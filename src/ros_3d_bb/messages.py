@@ -13,7 +13,7 @@ from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.tracked import Detection, TrackedObject
 
-BOXES_TOPIC, TRACKS_TOPIC = 'yolo_bounding_box', 'ros_3d_bb/tracks'
+BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC = 'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'
 MAX_BOXES = 1000  # more in one image are a fault of their sender, and would stall the pipeline
 
 

@@ -146,6 +146,11 @@ class Pairing(object):
             self._waiting.append(Stamped(stamp_ns, now_ns, boxes))
         return self._settled(now_ns)
 
+    def end(self):
+        """Nothing more will come: settle what still waits. Returns as the others, all with None."""
+        waiting, self._waiting = self._waiting, []
+        return [(None, entry.value) for entry in waiting]
+
     def _is_of_time_before(self, stamp_ns):
         """Whether boxes were still on their way when time went back; they are dropped without a word."""
         return self.newest_ns is not None and self.newest_ns + self._length_ns < stamp_ns <= self._end_before_ns

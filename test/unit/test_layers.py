@@ -23,9 +23,10 @@ PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime', 'yaml', 'matplotlib', 
 NOISE, TRACKING_BENCHMARK = os.path.join('evaluation', 'noise'), os.path.join('evaluation', 'tracking')
 SPEED_PICTURE = os.path.join('evaluation', 'speed_picture.py')  # of a benchmark, which imports it last
 ASSIGNMENT = os.path.join('tracking', 'association.py')  # SciPy's solver has no equal
-# convert to and from ROS messages, but run in no node
-ROS_TYPES = {'bags.py', 'camera_messages.py', 'markers.py', 'messages.py', 'planner_messages.py', 'report.py',
-             'simulator_messages.py'}
+# know ROS messages, bags and transforms, but neither nodes nor topics nor a master
+ROS_TYPES = {'bag_processing.py', 'bag_reading.py', 'bag_transforms.py', 'bags.py', 'camera_messages.py',
+             'following.py', 'lifting.py', 'markers.py', 'messages.py', 'pipeline.py', 'planner_messages.py',
+             'process_bag.py', 'report.py', 'searching.py', 'simulator_messages.py'}
 
 # what a session is, without the windows that show it
 WITHOUT_WINDOW = {'__init__.py', 'analysis.py', 'command_line.py', 'document.py', 'drafts.py', 'entries.py',

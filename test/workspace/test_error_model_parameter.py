@@ -3,7 +3,7 @@ import os
 
 import pytest
 
-from ros_3d_bb.nodes.bbox3d_node import Bbox3dParams, error_model_of
+from ros_3d_bb.lifting import Bbox3dParams, error_model_of
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'error_models')
 

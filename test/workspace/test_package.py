@@ -14,17 +14,16 @@ import yaml
 from ros_3d_bb.detection.bodies import DepthPeopleParams
 from ros_3d_bb.detection.runtime import RuntimeParams
 from ros_3d_bb.detection.yolov5 import DetectionParams
+from ros_3d_bb.following import TRACKING_PARAMS, TrackerNodeParams
+from ros_3d_bb.lifting import Bbox3dParams
 from ros_3d_bb.markers import NAMESPACES, MarkerParams
-from ros_3d_bb.nodes.bbox3d_node import Bbox3dParams
-from ros_3d_bb.nodes.depth_detector_node import DepthDetectorParams
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
 from ros_3d_bb.nodes.realsense_node import RealSenseNodeParams
 from ros_3d_bb.nodes.simulator_node import SimulatorParams
-from ros_3d_bb.nodes.tracker_node import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.nodes.viewer_node import ViewerParams
-from ros_3d_bb.nodes.yolov5_node import Yolov5NodeParams
 from ros_3d_bb.params import params_from
 from ros_3d_bb.realsense import RealSenseParams
+from ros_3d_bb.searching import DepthDetectorParams, Yolov5NodeParams
 from support.standard_library import STANDARD_LIBRARY, TEST_STANDARD_LIBRARY
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))

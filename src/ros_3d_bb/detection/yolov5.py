@@ -65,6 +65,11 @@ class Yolov5(object):
         """Class names by number."""
         return self._runtime.names
 
+    @property
+    def description(self):
+        """What runs the network, in words."""
+        return self._runtime.description
+
     def warm_up(self):
         """Search once in nothing: the first run of a network takes several times as long as those after it."""
         self.detect(np.zeros((480, 640, 3), np.uint8))

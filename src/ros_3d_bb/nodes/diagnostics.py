@@ -1,5 +1,4 @@
 """What a node did with its input, on /diagnostics and in the log."""
-import collections
 import contextlib
 import threading
 import time
@@ -7,6 +6,8 @@ import time
 import diagnostic_updater
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
+
+from ros_3d_bb.tally import Tally
 
 PERIOD_S = 1.0
 WARNING_LASTS_S = 5.0
@@ -17,7 +18,7 @@ def is_ending():
     return rospy.is_shutdown() or rospy.core.is_shutdown_requested()
 
 
-class Diagnostics(object):
+class Diagnostics(Tally):
     """Counts what happened to each input and publishes the counts on /diagnostics once a second.
 
     A warning is logged at most every `WARNING_LASTS_S` for one cause, and shown as the node's state for as long.
@@ -25,7 +26,7 @@ class Diagnostics(object):
     """
 
     def __init__(self):
-        self._counts = collections.OrderedDict()
+        super(Diagnostics, self).__init__()
         self._warning, self._warned_at, self._logged_at = '', None, {}
         self._updater = diagnostic_updater.Updater()
         self._updater.setHardwareID('none')
@@ -34,9 +35,10 @@ class Diagnostics(object):
         thread.daemon = True
         thread.start()
 
-    def count(self, event, amount=1):
-        """Something went as it should."""
-        self._counts[event] = self._counts.get(event, 0) + amount
+    def note(self, event, sentence):
+        """Something happened that one should know of."""
+        rospy.loginfo('%s', sentence)
+        super(Diagnostics, self).note(event, sentence)
 
     def warn(self, event, sentence):
         """Something was refused or missing; `sentence` says what, why, and what happens next."""
@@ -51,9 +53,8 @@ class Diagnostics(object):
     def refusing(self, inputs):
         """Around what a callback does with its input: a ValueError there refuses that one, and the node goes on."""
         try:
-            yield
-        except ValueError as error:
-            self.warn('%s refused' % inputs, '%s refused: %s; waiting for the next' % (inputs, error))
+            with super(Diagnostics, self).refusing(inputs):
+                yield
         except rospy.ROSException:
             if not is_ending():
                 raise
@@ -62,11 +63,11 @@ class Diagnostics(object):
         recent = self._warned_at is not None and time.monotonic() - self._warned_at < WARNING_LASTS_S
         if recent:
             status.summary(DiagnosticStatus.WARN, self._warning)
-        elif not self._counts:
+        elif not self.counts:
             status.summary(DiagnosticStatus.STALE, 'no input yet')
         else:
             status.summary(DiagnosticStatus.OK, 'working')
-        for event, amount in list(self._counts.items()):
+        for event, amount in list(self.counts.items()):
             status.add(event, str(amount))
         return status
 

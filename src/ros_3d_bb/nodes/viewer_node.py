@@ -11,7 +11,7 @@ from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
 from ros_3d_bb.images import depth_from, rgb_from
-from ros_3d_bb.messages import boxes2d_from_message, boxes3d_from_message, camera_from_message, stamp_of
+from ros_3d_bb.messages import BOXES3D_TOPIC, boxes2d_from_message, boxes3d_from_message, camera_from_message, stamp_of
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
@@ -24,7 +24,7 @@ from ros_3d_bb.viewer_picture import FrameRate, View, compose, text_picture
 from ros_3d_bb.window import Window, WindowError
 
 COLOR_TOPIC, DEPTH_TOPIC = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
-CAMERA_INFO_TOPIC, BOXES3D_TOPIC = 'camera/color/camera_info', 'ros_3d_bb/bb_3d'
+CAMERA_INFO_TOPIC = 'camera/color/camera_info'
 ENABLE_SERVICE = 'detector/enable'
 KEYS = 'keys: s saves, p pauses the detector, q quits'
 

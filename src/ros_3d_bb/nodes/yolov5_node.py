@@ -1,27 +1,16 @@
 """The node that finds people in colour images with YOLOv5."""
-import os
-from typing import NamedTuple
-
 import rospy
 from sensor_msgs.msg import Image
 
-from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime
-from ros_3d_bb.detection.yolov5 import DetectionParams, Yolov5
-from ros_3d_bb.images import rgb_from
-from ros_3d_bb.messages import stamp_of
+from ros_3d_bb.camera_messages import COLOR_TOPIC
+from ros_3d_bb.detection.runtime import RuntimeParams
+from ros_3d_bb.detection.yolov5 import DetectionParams
 from ros_3d_bb.nodes.boxes_output import BoxesOutput, Switch
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import subscribe
+from ros_3d_bb.searching import Yolov5NodeParams, opened_yolov5, search_color
 from ros_3d_bb.worker import NewestWorker
-
-
-class Yolov5NodeParams(NamedTuple):
-    """See config/yolov5.yaml."""
-
-    weights: str = ''
-    enabled: bool = True
-    publish_empty: bool = True
 
 
 class Yolov5Node(object):
@@ -33,20 +22,15 @@ class Yolov5Node(object):
 
     def __init__(self):
         self._params, detection, running = read_params(Yolov5NodeParams, DetectionParams, RuntimeParams)
-        if not self._params.weights:
-            raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
-                             'checkpoint such as yolov5n.pt')
-        runtime = open_runtime(os.path.abspath(os.path.expanduser(self._params.weights)), running, rospy.logwarn)
-        self._detector = Yolov5(runtime, detection)
-        self._detector.warm_up()
+        self._detector = opened_yolov5(self._params.weights, detection, running, rospy.logwarn)
         self._diagnostics = Diagnostics()
         self._output = BoxesOutput(self._params.publish_empty)
         self._worker = NewestWorker(self._search, self._on_error)
         rospy.on_shutdown(self._worker.stop)
         self._switch = Switch(self._params.enabled)
-        subscribe('camera/color/image_raw', Image, self._on_image, 1)
+        subscribe(COLOR_TOPIC, Image, self._on_image, 1)
         rospy.loginfo('looking for %s with %s on %s', ', '.join(map(str, detection.classes)), self._params.weights,
-                      runtime.description)
+                      self._detector.description)
 
     def _on_image(self, message):
         if self._switch.on and self._worker.offer(message):
@@ -58,9 +42,7 @@ class Yolov5Node(object):
                 self._detect(message)
 
     def _detect(self, message):
-        stamp_of(message)
-        image = rgb_from(message)
-        found = self._detector.detect(image)
+        image, found = search_color(self._detector, message)
         self._diagnostics.count('images searched')
         self._output.publish(message.header, image, found, self._detector.names)
 

@@ -1,0 +1,172 @@
+"""The whole pipeline on a bag without a ROS master: the same bag and parameters give the same bytes."""
+import collections
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, NamedTuple, Optional
+
+from sensor_msgs.msg import Image
+from tf2_msgs.msg import TFMessage
+
+from ros_3d_bb.bag_reading import BagError, BagReader, Raw, message_in
+from ros_3d_bb.bag_transforms import BagTransforms
+from ros_3d_bb.bags import new_bag
+from ros_3d_bb.camera_messages import COLOR_TOPIC, TF_TOPIC
+from ros_3d_bb.messages import BOXES_TOPIC
+from ros_3d_bb.pipeline import INPUTS, OUTPUTS, STATIC_TOPIC, Pipeline, Settings
+from ros_3d_bb.searching import opened_yolov5, search_color
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tally import Tally
+
+MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
+
+
+class Waiting(NamedTuple):
+    """A message that was read and waits for its turn: of a node's `topic` (None: of no interest), `message` where it
+    was needed ahead, and the search in it.
+    """
+
+    raw: Raw
+    topic: Optional[str]
+    message: Any
+    search: Optional[Future]
+
+
+class BagRun(object):
+    """One bag on its way through the pipeline."""
+
+    def __init__(self, reader, settings, tally):
+        self._reader, self._settings, self._tally = reader, settings, tally
+        self._topics = {settings.name(topic): topic for topic in INPUTS if topic in _wanted(settings.detector)}
+        self._transforms = BagTransforms()
+        self._pipeline = Pipeline(settings, tally, self._transforms)
+        self._detect = None
+        if settings.detector == 'yolov5':
+            params, detection, running = settings.yolov5
+            self._detector = opened_yolov5(params.weights, detection, running,
+                                           lambda line: tally.note('remarks of the detector', line))
+            self._detect = lambda message: search_color(self._detector, message)[1]
+        needed = BOXES_TOPIC if settings.detector == 'none' else COLOR_TOPIC
+        reader.check_topic(settings.name(needed), INPUTS[needed])
+
+    def outputs(self):
+        """Yield (Raw, [(topic, message), ...]): each message of the bag, and what the nodes would publish then."""
+        static = self._settings.name(STATIC_TOPIC)
+        for raw in self._reader.messages([static]):
+            with self._tally.refusing('transforms'):
+                self._transforms.set_static(message_in(raw, TFMessage))
+        with ThreadPoolExecutor(self._settings.searches) as pool:
+            for waiting in self._ahead(pool):
+                yield waiting.raw, self._handled(waiting)
+        self._pipeline.end()
+
+    def _ahead(self, pool):
+        """Yield the messages when later ones have been read: those that a node waits for, images to be searched."""
+        ahead_ns = int(self._settings.tracker[0].tf_timeout * NS)
+        queue, size, searches = collections.deque(), 0, 0
+        for raw in self._reader.messages():
+            queue.append(self._begun(raw, pool))
+            size, searches = size + len(raw.data), searches + (queue[-1].search is not None)
+            while queue and (size > MAX_WAITING_BYTES or (
+                    raw.time.to_nsec() - queue[0].raw.time.to_nsec() >= ahead_ns
+                    and (self._detect is None or searches > 2 * self._settings.searches))):
+                waiting = queue.popleft()
+                size, searches = size - len(waiting.raw.data), searches - (waiting.search is not None)
+                yield waiting
+        while queue:
+            yield queue.popleft()
+
+    def _begun(self, raw, pool):
+        """A message that was read; what can be done ahead of its turn is begun."""
+        topic, message, search = self._topics.get(raw.topic), None, None
+        if topic == TF_TOPIC:
+            with self._tally.refusing('transforms'):
+                message = message_in(raw, TFMessage)
+                self._transforms.ahead(message)
+        elif topic == COLOR_TOPIC and self._detect is not None:
+            with self._tally.refusing('images'):
+                message = message_in(raw, Image)
+                search = pool.submit(self._detect, message)
+        return Waiting(raw, topic, message, search)
+
+    def _handled(self, waiting):
+        """What the nodes would publish at the turn of a message."""
+        raw, topic, message, search = waiting
+        if topic is None or topic == STATIC_TOPIC:
+            return []
+        self._tally.count('messages on %s' % raw.topic)
+        if topic == TF_TOPIC:
+            if message is not None:
+                self._transforms.passed(message)
+            return []
+        with self._tally.refusing('messages on %s' % raw.topic):
+            if topic == COLOR_TOPIC and self._detect is not None:
+                return self._found(message, search, raw.time.to_nsec())
+            return self._pipeline.take(topic, message_in(raw, INPUTS[topic]), raw.time.to_nsec())
+        return []
+
+    def _found(self, message, search, now_ns):
+        if search is None:
+            return []
+        with self._pipeline.searching():
+            found = search.result()
+            self._tally.count('images searched')
+            return self._pipeline.found(message.header, found, now_ns)
+        return []
+
+
+def process_bag(source, target, settings=Settings(), progress=lambda share: None):
+    """Write a bag with what another one holds, and with what the nodes would publish on it.
+
+    Parameters
+    ----------
+    source, target : str
+    settings : Settings
+    progress : callable
+        Called with the share 0..1 that is done, message by message.
+
+    Returns
+    -------
+    tally.Tally
+
+    Raises
+    ------
+    BagError
+        If the source cannot be read; no target is left then.
+    ValueError
+        If a parameter makes no sense.
+    OSError
+        If the target cannot be written.
+    """
+    tally = Tally()
+    with BagReader(source) as reader, new_bag(target, settings.compression) as bag:
+        run, copier = BagRun(reader, settings, tally), Copier(bag, settings)
+        start_ns, end_ns = reader.span_ns
+        for raw, outputs in run.outputs():
+            copier.copy(raw)
+            for topic, message in outputs:
+                bag.write(settings.name(topic), message, raw.time)
+            progress((raw.time.to_nsec() - start_ns) / float(max(end_ns - start_ns, 1)))
+    return tally
+
+
+class Copier(object):
+    """Writes messages of one bag to another as they are, but for those that are made anew."""
+
+    def __init__(self, bag, settings):
+        made = OUTPUTS + (() if settings.detector == 'none' else (BOXES_TOPIC,))
+        self._bag, self._made = bag, set(settings.name(topic) for topic in made)
+        self._keep, self._types = settings.keep, {}
+
+    def copy(self, raw):
+        """Write a message, if it is to be kept. Raises BagError where its topic has messages of two types."""
+        if raw.topic in self._made or self._keep is not None and raw.topic.lstrip('/') not in self._keep:
+            return
+        if self._types.setdefault(raw.topic, raw.md5sum) != raw.md5sum:
+            raise BagError('%s has messages of two types' % raw.topic)
+        unused = type('Unused', (), {'_md5sum': raw.md5sum})  # rosbag wants a class, but takes the header
+        self._bag.write(raw.topic, (raw.datatype, raw.data, raw.md5sum, unused), raw.time, raw=True,
+                        connection_header=raw.connection_header)
+
+
+def _wanted(detector):
+    """The topics that are of use."""
+    return set(INPUTS) - ({COLOR_TOPIC} if detector == 'none' else {BOXES_TOPIC})

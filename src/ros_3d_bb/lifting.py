@@ -1,0 +1,163 @@
+"""From 2D boxes, depth images and camera_info to 3D boxes: what bbox3d_node and process_bag do with messages."""
+from typing import NamedTuple
+
+from std_msgs.msg import Header
+
+from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.error_model import corrected_boxes, read_error_model
+from ros_3d_bb.estimation import DepthImage, check_rect, estimate_boxes, estimator_named
+from ros_3d_bb.geometry import Camera
+from ros_3d_bb.images import depth_from
+from ros_3d_bb.messages import boxes2d_from_message, camera_from_message, stamp_of, time_from
+from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.stamped import NS, Pairing
+
+
+class Bbox3dParams(NamedTuple):
+    """See config/bbox3d.yaml."""
+
+    estimator: str = 'foreground'
+    stride: int = 20
+    error_model: str = ''
+    depth_scale: float = 0.0
+    frame_id: str = ''
+    cache_length: float = 1.0
+    stamp_tolerance: float = 0.005
+    assumed_delay: float = 0.05
+    depth_image_range: float = 6.0
+
+
+class Lifted(NamedTuple):
+    """The 3D boxes (`estimation.Box3D`) of one image, its header, its depth image and its camera."""
+
+    header: Header
+    depth: DepthImage
+    camera: Camera
+    boxes: list
+
+
+class Lifter(object):
+    """Lift arrays of 2D boxes into the camera's optical frame, each with the depth image of its own stamp.
+
+    Each `add_` takes a message and when it arrived (integer nanoseconds, see `stamped.Pairing`), and returns what it
+    settled, a list of Lifted. What is refused goes to the tally.
+
+    Parameters
+    ----------
+    params : Bbox3dParams
+    tally : tally.Tally
+    depth_topic, info_topic : str
+        Where depth images and camera_info come from, for sentences about those that do not.
+
+    Raises
+    ------
+    ValueError
+        If a parameter makes no sense, or the error model cannot be used.
+    """
+
+    def __init__(self, params, tally, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
+        check_not_negative(params, 'depth_scale', 'cache_length', 'stamp_tolerance', 'assumed_delay',
+                           'depth_image_range')
+        self._params, self._tally, self._depth_topic, self._info_topic = params, tally, depth_topic, info_topic
+        self._estimator = estimator_named(params.estimator, params.stride)
+        self._error_model = error_model_of(params)
+        self._pairing = Pairing(*(int(seconds * NS) for seconds in (
+            params.cache_length, params.stamp_tolerance, params.assumed_delay)))
+        self._said_plain = False
+
+    @property
+    def sample(self):
+        """See `estimation.Estimator`."""
+        return self._estimator.sample
+
+    def add_camera_info(self, message, now_ns):
+        """Take a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
+        camera = camera_from_message(message)
+        return self._lifted(self._pairing.add_camera(message.header.stamp.to_nsec(), now_ns, camera))
+
+    def add_depth(self, message, now_ns):
+        """Take a depth image. Raises ValueError where it carries no stamp."""
+        return self._lifted(self._pairing.add_depth(stamp_of(message), now_ns, message))
+
+    def add_boxes(self, message, now_ns):
+        """Take an Int32MultiArray of 2D boxes. Raises ValueError where it is none."""
+        boxes = boxes2d_from_message(message)
+        if boxes.stamp_ns is None and not self._said_plain:
+            self._said_plain = True
+            self._tally.note('2D boxes without a stamp', 'the 2D boxes carry no stamp: each array is paired with the '
+                             'depth image that came nearest to %.3f s before it (~assumed_delay)'
+                             % self._params.assumed_delay)
+        self._tally.count('arrays of 2D boxes')
+        return self._lifted(self._pairing.add_boxes(boxes.stamp_ns, now_ns, boxes))
+
+    def end(self):
+        """Nothing more will come. Says so of the boxes that still wait for their depth image."""
+        self._lifted(self._pairing.end())
+
+    def _lifted(self, pairs):
+        lifted = []
+        for frame, boxes in pairs:
+            with self._tally.refusing('2D boxes'):
+                depth = self._depth_of(frame, boxes)
+                found = self._boxes3d(depth, [tuple(rect) for rect in boxes.boxes.tolist()], frame.camera)
+                header = Header(stamp=time_from(frame.stamp_ns if boxes.stamp_ns is None else boxes.stamp_ns),
+                                frame_id=self._params.frame_id or frame.depth.header.frame_id)
+                lifted.append(Lifted(header, depth, frame.camera, found))
+                self._tally.count('images lifted')
+        return lifted
+
+    def _boxes3d(self, depth, rects_px, camera):
+        """The 3D boxes of rectangles, without those that are unusable or show no depth of their own."""
+        usable = [rect_px for rect_px in rects_px if self._is_usable(rect_px)]
+        boxes = [box for box in estimate_boxes(depth, usable, camera, self._estimator) if box is not None]
+        self._tally.count('boxes lifted', len(boxes))
+        self._tally.count('boxes without depth', len(usable) - len(boxes))
+        if self._error_model is None or not boxes:
+            return boxes
+        boxes = corrected_boxes(boxes, self._error_model)
+        outside_m = self._error_model.distance_outside([box.center_m for box in boxes])
+        self._tally.count('boxes outside of the measured range', int((outside_m > 0).sum()))
+        return boxes
+
+    def _is_usable(self, rect_px):
+        try:
+            check_rect(rect_px)
+            return True
+        except ValueError as error:
+            self._tally.warn('2D boxes refused', '2D %s; the others in this image are used' % error)
+            return False
+
+    def _depth_of(self, frame, boxes):
+        """The depth image of a frame. Raises ValueError where there is none, or it cannot belong to the camera."""
+        if frame is None:
+            raise ValueError(self._why_no_frame(boxes))
+        depth = depth_from(frame.depth, self._params.depth_scale)
+        if depth.values.shape != (frame.camera.height, frame.camera.width):
+            raise ValueError('the depth image has %d x %d pixels, the colour camera %d x %d; depth must be aligned to '
+                             'colour (realsense2_camera: align_depth:=true)'
+                             % (depth.values.shape[::-1] + frame.camera[:2]))
+        return depth
+
+    def _why_no_frame(self, boxes):
+        """What did not come, and on which topic it was expected."""
+        newest_ns, kept_s = self._pairing.newest_ns, self._params.cache_length
+        if newest_ns is None:
+            return 'no depth image has come on %s' % self._depth_topic
+        if not self._pairing.has_camera:
+            return 'no camera_info has come on %s' % self._info_topic
+        if boxes.stamp_ns is None:
+            return 'no depth image has come on %s within %.1f s' % (self._depth_topic, kept_s)
+        return ('no depth image with their stamp %.3f came on %s; the newest has %.3f, and %.1f s are kept '
+                '(~cache_length)' % (boxes.stamp_ns / NS, self._depth_topic, newest_ns / NS, kept_s))
+
+
+def error_model_of(params):
+    """The error model that the parameters name; None where they name none. Raises ValueError where it is unusable."""
+    if not params.error_model:
+        return None
+    try:
+        model = read_error_model(params.error_model)
+    except OSError as error:
+        raise ValueError('the error model cannot be read: %s; an absolute path expected' % error)
+    model.check_estimator(params.estimator)
+    return model

@@ -1,0 +1,130 @@
+"""The whole pipeline as one object: detector, 3D boxes and tracks, message by message, without ROS around it."""
+import contextlib
+from typing import NamedTuple, Optional, Tuple
+
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Int32MultiArray
+from tf2_msgs.msg import TFMessage
+
+from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, TF_TOPIC
+from ros_3d_bb.detection.bodies import DepthPeopleParams
+from ros_3d_bb.detection.checkpoint import cause
+from ros_3d_bb.detection.runtime import RuntimeParams
+from ros_3d_bb.detection.yolov5 import DetectionParams
+from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
+from ros_3d_bb.lifting import Bbox3dParams, Lifter
+from ros_3d_bb.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
+from ros_3d_bb.messages import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_message, boxes3d_to_message,
+                                tracks_to_message)
+from ros_3d_bb.searching import DepthDetectorParams, DepthSearch, Yolov5NodeParams
+
+STATIC_TOPIC, INFO_TOPIC = 'tf_static', INFO_TOPICS[0]
+INPUTS = {COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPIC: CameraInfo, BOXES_TOPIC: Int32MultiArray,
+          TF_TOPIC: TFMessage, STATIC_TOPIC: TFMessage}
+OUTPUTS = BOXES3D_TOPIC, TRACKS_TOPIC, MARKERS_TOPIC
+DETECTORS = 'yolov5', 'depth', 'none'
+
+
+class Settings(NamedTuple):
+    """How bags are processed: the detector, the parameters of each node, `names` of topics that differ from the
+    nodes', the topics to `keep` (None: all), how many images are searched at once.
+    """
+
+    detector: str = 'yolov5'
+    yolov5: tuple = (Yolov5NodeParams(), DetectionParams(), RuntimeParams(device='cpu', threads=1))
+    depth: tuple = (DepthDetectorParams(), DepthPeopleParams())
+    bbox3d: tuple = (Bbox3dParams(),)
+    tracker: tuple = (TrackerNodeParams(), MarkerParams()) + tuple(kind() for kind in TRACKING_PARAMS)
+    names: dict = {}
+    keep: Optional[Tuple[str, ...]] = None
+    searches: int = 1
+    compression: str = 'lz4'
+
+    def name(self, topic):
+        """What a topic of the nodes is called in the bag."""
+        return '/' + self.names.get(topic, topic).lstrip('/')
+
+
+class Pipeline(object):
+    """Detector, 3D boxes and tracks. Give it messages with `take`; it returns what the nodes would publish.
+
+    Raises
+    ------
+    ValueError
+        If a parameter makes no sense.
+    """
+
+    def __init__(self, settings, tally, transforms):
+        self._tally = tally
+        self._lifter = Lifter(settings.bbox3d[0], tally, settings.name(DEPTH_TOPIC), settings.name(INFO_TOPIC))
+        follower, marker_params, *tracking = settings.tracker
+        self._follower, self._markers = Follower(follower, tracking, tally, transforms), MarkerWriter(marker_params)
+        self._search, publish_empty = None, settings.yolov5[0].publish_empty
+        if settings.detector == 'depth':
+            params, people = settings.depth
+            self._search = DepthSearch(params, people, tally, transforms if params.floor_frame else None)
+            publish_empty = params.publish_empty
+        self._publish_empty = publish_empty
+
+    def take(self, topic, message, now_ns):
+        """Take a message of a topic of the nodes, recorded at a time. Returns [(topic, message), ...]."""
+        if topic == INFO_TOPIC:
+            with_camera, _depth = self._follower.looks
+            if with_camera:
+                self._follower.add_camera_info(message)
+            return self._taken('add_camera_info', message, now_ns)
+        if topic == DEPTH_TOPIC:
+            if self._follower.looks[1]:
+                self._follower.add_depth(message, now_ns)
+            return self._taken('add_depth', message, now_ns)
+        if topic == COLOR_TOPIC:
+            return self._searched(self._search.add_color(message, now_ns), now_ns)
+        return self._followed(self._lifter.add_boxes(message, now_ns))
+
+    def found(self, header, found, now_ns):
+        """Take what a detector found in the image of a header. Returns as `take`."""
+        if not len(found.boxes) and not self._publish_empty:
+            return []
+        message = boxes2d_to_message(found.boxes, header)
+        return [(BOXES_TOPIC, message)] + self._followed(self._lifter.add_boxes(message, now_ns))
+
+    @contextlib.contextmanager
+    def searching(self):
+        """Around the search in one image: whatever it raises, the next one is searched."""
+        try:
+            with self._tally.refusing('images'):
+                yield
+        except Exception as error:  # as the nodes' workers do
+            self._tally.warn('searches failed', 'the detector failed: %s; waiting for the next image' % cause(error))
+
+    def end(self):
+        """Nothing more will come."""
+        for part in filter(None, (self._search, self._lifter)):
+            part.end()
+
+    def _taken(self, add, message, now_ns):
+        outputs = []
+        if self._search is not None:
+            outputs += self._searched(getattr(self._search, add)(message, now_ns), now_ns)
+        return outputs + self._followed(getattr(self._lifter, add)(message, now_ns))
+
+    def _searched(self, pairs, now_ns):
+        outputs = []
+        for pair in pairs:
+            with self.searching():
+                found = self._search.search(pair)
+                if found is not None:
+                    outputs += self.found(pair[1].header, found[1], now_ns)
+        return outputs
+
+    def _followed(self, images):
+        outputs = []
+        for lifted in images:
+            boxes = boxes3d_to_message(lifted.boxes, lifted.header, lifted.camera)
+            outputs.append((BOXES3D_TOPIC, boxes))
+            with self._tally.refusing('3D boxes'):
+                followed = self._follower.add_boxes(boxes)
+                if followed is not None:
+                    outputs.append((TRACKS_TOPIC, tracks_to_message(followed.tracks, followed.header)))
+                    outputs.append((MARKERS_TOPIC, self._markers.write(followed.tracks, followed.header)))
+        return outputs

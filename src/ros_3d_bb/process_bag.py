@@ -1,0 +1,248 @@
+"""The command `process_bag`: the pipeline on bags, without a ROS master, several at once."""
+import argparse
+import multiprocessing
+import os
+import resource
+import sys
+import time
+from multiprocessing.connection import wait
+from typing import Any, NamedTuple
+
+import yaml
+
+import ros_3d_bb
+from ros_3d_bb.bag_processing import process_bag
+from ros_3d_bb.bag_reading import BagError
+from ros_3d_bb.bags import remove_partial
+from ros_3d_bb.detection.checkpoint import cause
+from ros_3d_bb.params import params_from
+from ros_3d_bb.pipeline import DETECTORS, Settings
+
+POLL_S, BAR = 0.2, 40
+GIB = 2 ** 30
+FILES = (('--yolov5-params', 'yolov5'), ('--depth-params', 'depth'), ('--bbox3d-params', 'bbox3d'),
+         ('--tracker-params', 'tracker'))
+
+
+class Job(NamedTuple):
+    """A bag to be processed: from where, to where, how, and how much memory it may take, bytes."""
+
+    source: str
+    target: str
+    settings: Settings
+    memory: int
+
+
+class Running(NamedTuple):
+    """A job, its process, and where that says how far it is."""
+
+    job: Job
+    process: Any
+    news: Any
+
+
+def main(arguments=None):
+    """The command. The exit status is 1 where a bag could not be processed."""
+    parser = _parser()
+    given = parser.parse_args(arguments)
+    try:
+        jobs = jobs_from(given)
+    except (ValueError, OSError, yaml.YAMLError) as error:
+        parser.error(str(error))
+    try:
+        failed = run_jobs(jobs, given.jobs, sys.stderr.isatty())
+    except KeyboardInterrupt:
+        print('process_bag: stopped; bags that were not complete are not there', file=sys.stderr)
+        sys.exit(130)
+    sys.exit(1 if failed else 0)
+
+
+def jobs_from(given):
+    """The jobs that the arguments ask for. Raises ValueError or OSError where they make no sense."""
+    if given.out_dir is None and len(given.bags) != 2:
+        raise ValueError('IN and OUT expected, or bags and --out-dir')
+    pairs = [tuple(given.bags)] if given.out_dir is None else [
+        (bag, os.path.join(given.out_dir, os.path.basename(bag))) for bag in given.bags]
+    targets = [os.path.realpath(target) for _source, target in pairs]
+    for source, target in pairs:
+        if os.path.realpath(target) in [os.path.realpath(other) for other, _target in pairs]:
+            raise ValueError('%s is one of the bags to be processed; another place for its result expected' % target)
+        if targets.count(os.path.realpath(target)) > 1:
+            raise ValueError('two bags are called %s; other names, or one call for each, expected' % target)
+    if not (given.jobs >= 1 and given.searches >= 0 and given.memory > 0):
+        raise ValueError('--jobs, --searches and --memory: more than 0 expected')
+    settings = settings_from(given)
+    if given.out_dir is not None:
+        os.makedirs(given.out_dir, exist_ok=True)
+    return [Job(source, target, settings, int(given.memory * GIB)) for source, target in pairs]
+
+
+def settings_from(given):
+    """The settings that the arguments ask for. Raises ValueError, OSError or yaml.YAMLError."""
+    settings = Settings()._replace(detector=given.detector, names=_names(given.remap), compression=given.compression,
+                                   keep=None if given.keep is None else tuple(t.lstrip('/') for t in given.keep))
+    for option, node in FILES:
+        path = getattr(given, option[2:].replace('-', '_'))
+        settings = settings._replace(**{node: read_params(path, getattr(settings, node))})
+    if given.weights:
+        settings = settings._replace(yolov5=(settings.yolov5[0]._replace(weights=given.weights),) + settings.yolov5[1:])
+    if given.error_model:
+        settings = settings._replace(bbox3d=(settings.bbox3d[0]._replace(error_model=given.error_model),))
+    if given.target_frame:
+        settings = settings._replace(tracker=(settings.tracker[0]._replace(target_frame=given.target_frame),)
+                                     + settings.tracker[1:])
+    if settings.detector == 'yolov5' and not settings.yolov5[0].weights:
+        raise ValueError('detector yolov5 needs --weights FILE, a checkpoint such as yolov5n.pt; --detector depth '
+                         'needs none')
+    return settings._replace(searches=given.searches or max(1, _cores() // given.jobs))
+
+
+def read_params(path, defaults):
+    """The parameters of a node, of its types, from a parameter file; what that does not say is as in `defaults`."""
+    if path is None:
+        return defaults
+    with open(path) as stream:
+        content = yaml.safe_load(stream)
+    if not (isinstance(content or {}, dict) and all(isinstance(key, str) for key in content or {})):
+        raise ValueError('%s: names and values of parameters expected' % path)
+    try:
+        found = params_from(content or {}, *[type(part) for part in defaults])
+    except ValueError as error:
+        raise ValueError('%s: %s' % (path, error))
+    return tuple(part._replace(**{key: getattr(new, key) for key in part._fields if key in (content or {})})
+                 for part, new in zip(defaults, found))
+
+
+def run_jobs(jobs, at_once, with_bar):
+    """Process bags, so many at once, each in a process of its own; say what became of each. Returns how many failed."""
+    context = multiprocessing.get_context('spawn')
+    # A catkin workspace puts the folder of the sources, which lack the messages, in front of what they were found by.
+    sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(ros_3d_bb.__file__))))
+    todo, running, shares, failed = list(jobs), [], {}, 0
+    try:
+        while todo or running:
+            while todo and len(running) < at_once:
+                running.append(_started(context, todo.pop(0)))
+            wait([one.news for one in running], POLL_S)
+            for one in list(running):
+                done, text = _news_of(one, shares)
+                if done is None:
+                    continue
+                running.remove(one)
+                failed += not done
+                print(('\r' + 79 * ' ' + '\r' if with_bar else '') + text, file=sys.stdout if done else sys.stderr)
+            if with_bar:
+                _show(sum(shares.values()) / len(jobs), len(jobs) - len(todo) - len(running), len(jobs))
+    finally:
+        for one in running:
+            one.process.join()  # it was interrupted, too, and takes its unfinished bag away
+        if with_bar:
+            print(file=sys.stderr)
+    return failed
+
+
+def _started(context, job):
+    news, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_work, args=(job, sender))
+    process.start()
+    sender.close()
+    return Running(job, process, news)
+
+
+def _news_of(one, shares):
+    """Whether a job has succeeded, None while it runs; and what is to be said of it."""
+    try:
+        while one.news.poll():
+            kind, content = one.news.recv()
+            if kind == 'share':
+                shares[one.job.target] = content
+                continue
+            one.process.join()
+            shares[one.job.target] = 1.0
+            return kind == 'done', content
+    except EOFError:  # killed, as by the kernel where memory ran out
+        one.process.join()
+        shares[one.job.target] = 1.0
+        remove_partial(one.job.target)
+        return False, '%s: its process ended with status %s; no bag was written' % (one.job.source,
+                                                                                    one.process.exitcode)
+    return None, ''
+
+
+def _work(job, sender):
+    """What the process of a job does."""
+    resource.setrlimit(resource.RLIMIT_DATA, (job.memory, resource.getrlimit(resource.RLIMIT_DATA)[1]))
+    said_s = [0.0]
+
+    def progress(share):
+        if time.monotonic() - said_s[0] >= POLL_S:
+            said_s[0] = time.monotonic()
+            sender.send(('share', share))
+    try:
+        tally = process_bag(job.source, job.target, job.settings, progress)
+        sender.send(('done', '\n'.join(_summary(job, tally))))
+    except KeyboardInterrupt:
+        pass
+    except Exception as error:  # one bag must not end the others
+        sender.send(('failed', '%s; no bag was written' % _reason(job, error)))
+
+
+def _reason(job, error):
+    """Why a job failed, in words that name its bag."""
+    if isinstance(error, BagError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return '%s: more than %.1f GiB of memory (--memory)' % (job.source, job.memory / GIB)
+    if isinstance(error, (ValueError, OSError)):
+        return '%s: %s' % (job.source, error)
+    return '%s: %s: %s' % (job.source, type(error).__name__, cause(error))
+
+
+def _summary(job, tally):
+    yield '%s:' % job.target
+    for event, count in tally.counts.items():
+        said = tally.sentences.get(event)
+        yield '  %7d  %s%s' % (count, event, '. The first: %s' % said if said else '')
+
+
+def _show(share, done, count):
+    print('\r[%-*s] %3d %%  %d of %d bags' % (BAR, '#' * int(BAR * share), 100 * share, done, count), end='',
+          file=sys.stderr, flush=True)
+
+
+def _names(remaps):
+    names = {}
+    for remap in remaps:
+        ours, arrow, theirs = remap.partition(':=')
+        if not (ours and arrow and theirs):
+            raise ValueError('--remap %r; TOPIC_OF_THE_NODES:=TOPIC_IN_THE_BAG expected' % remap)
+        names[ours.lstrip('/')] = theirs
+    return names
+
+
+def _cores():
+    return len(os.sched_getaffinity(0))
+
+
+def _parser():
+    parser = argparse.ArgumentParser(prog='process_bag', description='Write bags with what others hold and with 2D '
+                                     'boxes, 3D boxes, tracks and markers; the same input gives the same bytes.')
+    parser.add_argument('bags', nargs='+', metavar='BAG', help='IN OUT; or, with --out-dir, bags to be processed')
+    parser.add_argument('--out-dir', metavar='DIR', help='where the results go, under the names of the bags')
+    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='bags at once (default: 1)')
+    parser.add_argument('--detector', choices=DETECTORS, default='yolov5',
+                        help='none: the 2D boxes are in the bag (default: yolov5)')
+    parser.add_argument('--weights', metavar='FILE', help='checkpoint or export for yolov5')
+    for option, node in FILES:
+        config = {'depth': 'depth_detector'}.get(node, node)
+        parser.add_argument(option, metavar='FILE', help='parameter file, as config/%s.yaml' % config)
+    parser.add_argument('--error-model', metavar='FILE', help='error model for the 3D boxes')
+    parser.add_argument('--target-frame', metavar='FRAME', help='of the tracks (default: map)')
+    parser.add_argument('--remap', action='append', default=[], metavar='TOPIC:=TOPIC',
+                        help="a topic of the nodes, and what it is called in the bag")
+    parser.add_argument('--keep', nargs='*', metavar='TOPIC', help='topics of the input to copy (default: all)')
+    parser.add_argument('--searches', type=int, default=0, metavar='N',
+                        help='images that yolov5 searches at once (default: cores / jobs); no matter for the result')
+    parser.add_argument('--memory', type=float, default=8.0, metavar='GIB', help='for each bag (default: 8)')
+    parser.add_argument('--compression', choices=('none', 'bz2', 'lz4'), default='lz4', help='default: lz4')
+    return parser

@@ -1,0 +1,158 @@
+"""From images to 2D boxes: what the detector nodes and process_bag do with messages."""
+import os
+from typing import NamedTuple
+
+import genpy
+import tf2_ros
+
+from ros_3d_bb.detection.depth_people import DepthPeople
+from ros_3d_bb.detection.floor import floor_from_transform
+from ros_3d_bb.detection.runtime import open_runtime
+from ros_3d_bb.detection.yolov5 import Yolov5
+from ros_3d_bb.geometry import transform_from
+from ros_3d_bb.images import depth_from, rgb_from
+from ros_3d_bb.messages import camera_from_message, stamp_of
+from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.stamped import NS, Pairing
+
+CACHE_NS = NS  # how long images wait for each other
+NEWEST = genpy.Time(0)  # what tf takes it for
+
+
+class Yolov5NodeParams(NamedTuple):
+    """See config/yolov5.yaml."""
+
+    weights: str = ''
+    enabled: bool = True
+    publish_empty: bool = True
+
+
+class DepthDetectorParams(NamedTuple):
+    """See config/depth_detector.yaml."""
+
+    floor_frame: str = 'base_link'
+    floor_height: float = -0.065
+    frame_id: str = ''
+    stamp_tolerance: float = 0.005
+    enabled: bool = True
+    publish_empty: bool = True
+
+
+def opened_yolov5(weights, detection, running, warn):
+    """The YOLOv5 detector of a path, ready to be used at full speed. Raises ValueError where it cannot be used."""
+    if not weights:
+        raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
+                         'checkpoint such as yolov5n.pt')
+    detector = Yolov5(open_runtime(os.path.abspath(os.path.expanduser(weights)), running, warn), detection)
+    detector.warm_up()
+    return detector
+
+
+def search_color(detector, message):
+    """Find objects in a colour image with a `detection.yolov5.Yolov5`.
+
+    Returns
+    -------
+    (numpy.ndarray, ros_3d_bb.detection.boxes.Detections)
+        The image, RGB, and what is in it.
+
+    Raises
+    ------
+    ValueError
+        If the image cannot be used.
+    """
+    stamp_of(message)
+    image = rgb_from(message)
+    return image, detector.detect(image)
+
+
+class DepthSearch(object):
+    """Look for people in colour images, each with the depth image of its own stamp.
+
+    Each `add_` takes a message and when it arrived, and returns what is ready to be searched, a list for `search`.
+
+    Parameters
+    ----------
+    params : DepthDetectorParams
+    people : DepthPeopleParams
+    tally : tally.Tally
+    transforms
+        As for `following.Follower`; None where no frame of the floor is given.
+
+    Raises
+    ------
+    ValueError
+        If a parameter makes no sense.
+    """
+
+    names = ('person',)
+
+    def __init__(self, params, people, tally, transforms):
+        check_not_negative(params, 'stamp_tolerance')
+        self._params, self._tally, self._transforms = params, tally, transforms
+        self._detector = DepthPeople(people)
+        self._pairing = Pairing(CACHE_NS, int(params.stamp_tolerance * NS), 0)
+
+    def add_camera_info(self, message, now_ns):
+        """Take a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
+        camera = camera_from_message(message)
+        return self._ready(self._pairing.add_camera(message.header.stamp.to_nsec(), now_ns, camera))
+
+    def add_depth(self, message, now_ns):
+        """Take a depth image. Raises ValueError where it carries no stamp."""
+        return self._ready(self._pairing.add_depth(stamp_of(message), now_ns, message))
+
+    def add_color(self, message, now_ns):
+        """Take a colour image. Raises ValueError where it carries no stamp."""
+        return self._ready(self._pairing.add_boxes(stamp_of(message), now_ns, message))
+
+    def end(self):
+        """Nothing more will come. Says so of the colour images that still wait for their depth image."""
+        self._ready(self._pairing.end())
+
+    def _ready(self, pairs):
+        for frame, color in pairs:
+            if frame is None:
+                self._tally.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f '
+                                 'of the colour image came; waiting for the next' % (stamp_of(color) / NS))
+        return [pair for pair in pairs if pair[0] is not None]
+
+    def search(self, pair):
+        """Find people in what `add_` returned.
+
+        Returns
+        -------
+        (numpy.ndarray, ros_3d_bb.detection.boxes.Detections) or None
+            The image, RGB, and who is in it. None while no floor is known.
+
+        Raises
+        ------
+        ValueError
+            If the images cannot be used.
+        """
+        frame, color = pair
+        image = rgb_from(color)
+        camera_frame = self._params.frame_id or color.header.frame_id
+        found = self._detector.detect(image, depth_from(frame.depth), frame.camera, self._floor(camera_frame))
+        if found is None:
+            self._tally.warn('images without floor', 'no floor is known from tf nor seen in the depth image: nobody is '
+                             'looked for; waiting for the next image')
+            return None
+        self._tally.count('images searched')
+        return image, found
+
+    def _floor(self, camera_frame):
+        """The floor where tf says it is; None where it does not, so that it is fitted.
+
+        The newest transform serves: the camera stands still in the robot, and nothing has to be waited for.
+        """
+        if self._transforms is None:
+            return None
+        try:
+            camera_from_base = self._transforms.lookup(camera_frame, self._params.floor_frame, NEWEST)
+        except tf2_ros.TransformException as error:
+            self._tally.warn('images without transform', 'no transform from %s to %s: %s; the floor is looked for in '
+                             'the depth image' % (self._params.floor_frame, camera_frame, error))
+            return None
+        base_from_floor = transform_from((0, 0, self._params.floor_height), (0, 0, 0, 1))
+        return floor_from_transform(camera_from_base.dot(base_from_floor))

@@ -1,0 +1,40 @@
+"""What became of each input: counted, and said where something was refused or missing."""
+import collections
+import contextlib
+
+
+class Tally(object):
+    """Counts events, and keeps the first sentence that was said about each.
+
+    Attributes
+    ----------
+    counts : dict
+        How often each event was, in the order in which they came up.
+    sentences : dict
+        By event, of those about which something was said.
+    """
+
+    def __init__(self):
+        self.counts = collections.OrderedDict()
+        self.sentences = {}
+
+    def count(self, event, amount=1):
+        """Something went as it should."""
+        self.counts[event] = self.counts.get(event, 0) + amount
+
+    def note(self, event, sentence):
+        """Something happened that one should know of."""
+        self.count(event)
+        self.sentences.setdefault(event, sentence)
+
+    def warn(self, event, sentence):
+        """Something was refused or missing; `sentence` says what, why, and what happens next."""
+        self.note(event, sentence)
+
+    @contextlib.contextmanager
+    def refusing(self, inputs):
+        """Around what is done with one input: a ValueError there refuses that one, and the next is taken."""
+        try:
+            yield
+        except ValueError as error:
+            self.warn('%s refused' % inputs, '%s refused: %s; waiting for the next' % (inputs, error))
