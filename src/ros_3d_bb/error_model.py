@@ -12,6 +12,7 @@ import numpy as np
 import yaml
 
 from ros_3d_bb.params import nearest_name
+from ros_3d_bb.yaml_file import load_yaml
 
 STEEPEST_BIAS = 0.5  # metres a metre; a steeper one has no safe inverse
 NEAREST_SHARE = 0.2  # of a measured range: no correction puts anybody nearer
@@ -233,7 +234,7 @@ def read_error_model(path):
     """
     with open(str(path), encoding='utf-8') as stream:
         try:
-            return checked(_filled(ErrorModel, yaml.safe_load(stream), ''))
+            return checked(_filled(ErrorModel, load_yaml(stream), ''))
         except (ValueError, OverflowError, yaml.YAMLError) as error:
             raise ValueError('%s: not an error model: %s' % (path, error))
 

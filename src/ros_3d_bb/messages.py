@@ -11,9 +11,10 @@ from ros_3d_bb.estimation import Box3D
 from ros_3d_bb.geometry import Camera, transform_from, transform_points
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tracking.tracked import Detection, TrackedObject
+from ros_3d_bb.tracking.tracked import FARTHEST_M, LARGEST_M, Detection, TrackedObject
 
 BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC = 'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'
+LATEST_NS = 2 ** 31 * NS  # differences of stamps have to fit into a duration
 MAX_BOXES = 1000  # more in one image are a fault of their sender, and would stall the pipeline
 
 
@@ -39,12 +40,16 @@ def stamp_of(message):
     Raises
     ------
     ValueError
-        If it is zero: such a message cannot be paired or transformed.
+        If it is zero: such a message cannot be paired or transformed. If it is beyond what tf2 can reckon with: it
+        would end the process.
     """
     stamp_ns = message.header.stamp.to_nsec()
     if stamp_ns == 0:
         raise ValueError('the %s of frame %r carries no stamp (zero)' % (type(message).__name__,
                                                                          message.header.frame_id))
+    if stamp_ns >= LATEST_NS:
+        raise ValueError('the %s of frame %r carries the stamp %d s, of the year 2038 or later'
+                         % (type(message).__name__, message.header.frame_id, stamp_ns // NS))
     return stamp_ns
 
 
@@ -169,14 +174,15 @@ def detections_from_message(message, fixed_from_camera):
     Raises
     ------
     ValueError
-        If a centre is not finite, a size not positive or a covariance none.
+        If a centre is not finite, a size not positive, one of them absurdly large, or a covariance none.
     """
     detections = []
     for number, box in enumerate(message.boxes):
         center, size = box.center.position, box.size
         values = np.array([center.x, center.y, center.z, size.x, size.y])
-        if not (np.isfinite(values).all() and (values[3:] > 0).all()):
-            raise ValueError('3D box %d has centre (%g, %g, %g) and size (%g, %g); finite and positive expected'
+        if not ((np.abs(values) < FARTHEST_M).all() and (0 < values[3:]).all() and (values[3:] < LARGEST_M).all()):
+            raise ValueError('3D box %d has centre (%g, %g, %g) and size (%g, %g); finite numbers and sizes of more '
+                             'than 0 and less than 10 m expected'
                              % ((number,) + tuple(values)))
         detections.append(Detection(transform_points(fixed_from_camera, values[:3]), np.array([size.x, size.x, size.y]),
                                     _covariance_in(fixed_from_camera, box, number), box.truncated))
@@ -188,7 +194,8 @@ def _covariance_in(fixed_from_camera, box, number):
     covariance_m2 = np.array(box.position_covariance).reshape(3, 3)
     if not covariance_m2.any():
         return None
-    if not (np.isfinite(covariance_m2).all() and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T).min() > -1e-9):
+    if not ((np.abs(covariance_m2) < FARTHEST_M).all()
+            and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T).min() > -1e-9):
         raise ValueError('3D box %d has the position_covariance %s; a finite, positive semi-definite matrix, or zeros '
                          'where it is not known, expected' % (number, list(box.position_covariance)))
     rotation = fixed_from_camera[:3, :3]

@@ -17,6 +17,7 @@ from ros_3d_bb.bags import remove_partial
 from ros_3d_bb.detection.checkpoint import cause
 from ros_3d_bb.params import params_from
 from ros_3d_bb.pipeline import DETECTORS, Settings
+from ros_3d_bb.yaml_file import load_yaml
 
 POLL_S, BAR = 0.2, 40
 GIB = 2 ** 30
@@ -102,7 +103,7 @@ def read_params(path, defaults):
     if path is None:
         return defaults
     with open(path) as stream:
-        content = yaml.safe_load(stream)
+        content = load_yaml(stream)
     if not (isinstance(content or {}, dict) and all(isinstance(key, str) for key in content or {})):
         raise ValueError('%s: names and values of parameters expected' % path)
     try:

@@ -31,7 +31,8 @@ class Bbox3dNode(object):
                               rospy.resolve_name(INFO_TOPICS[0]))
         self._lock = threading.Lock()
         self._boxes_pub = rospy.Publisher(BOXES3D_TOPIC, BoundingBox3DArray, queue_size=10)
-        self._images = SampleImages(int(params.cache_length * NS), self._lifter.sample, params.depth_image_range)
+        self._images = SampleImages(int(params.cache_length * NS), self._lifter.sample, params.depth_image_range,
+                                    self._diagnostics)
         # Each depth image is kept for boxes that may come for it later, so none may be dropped on the way.
         subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)

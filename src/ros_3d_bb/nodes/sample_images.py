@@ -14,7 +14,8 @@ class SampleImages(object):
     ros_3d_bb/depth (as grey). Subscribes camera/color/image_raw only while one of the first two is subscribed.
     """
 
-    def __init__(self, cache_ns, sample, depth_range_m):
+    def __init__(self, cache_ns, sample, depth_range_m, diagnostics):
+        self._diagnostics = diagnostics
         self._cache_ns, self._sample, self._depth_range_m = cache_ns, sample, depth_range_m
         self._raw_pub, self._color_pub, self._depth_pub = (
             rospy.Publisher('ros_3d_bb/' + name, Image, queue_size=1) for name in ('raw', 'color', 'depth'))
@@ -52,5 +53,7 @@ class SampleImages(object):
 
     def _on_color(self, message):
         colors = self._colors
-        if colors is not None:
+        if colors is None:
+            return
+        with self._diagnostics.refusing('colour images'):
             colors.add(stamp_of(message), 0, message)

@@ -5,6 +5,7 @@ from typing import NamedTuple, Optional, Tuple
 import yaml
 
 from ros_3d_bb.params import nearest_name
+from ros_3d_bb.yaml_file import load_yaml
 
 Color = Tuple[int, int, int]
 Point = Tuple[float, float]
@@ -140,8 +141,8 @@ def read_scenario(path):
 def _loaded(path):
     with open(path) as stream:
         try:
-            content = yaml.safe_load(stream)
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            content = load_yaml(stream)
+        except yaml.YAMLError as error:
             raise ScenarioError('%s is not YAML: %s' % (path, error))
     return {} if content is None else content
 

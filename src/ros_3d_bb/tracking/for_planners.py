@@ -4,18 +4,23 @@ Positions and velocities as in `tracked.TrackedObject`; points are (n, 3), metre
 """
 import numpy as np
 
+from ros_3d_bb.tracking.tracked import FARTHEST_M, LARGEST_M
+
 SWATH_STEP_S = 0.1  # a person at 3 m/s is 0.3 m further on, less than a body is wide: the footprints overlap
 LOWEST, HIGHEST = 0.25, 0.75  # of a cylinder's height: well off the floor, and below 2 m, where costmaps stop looking
 
 
 def check_tracks(tracks):
-    """Raise ValueError where a track has a number that is not finite, or a size or step that is not positive."""
+    """Raise ValueError where a track has a number that is not finite or absurdly large, or a size or step that is not
+    positive.
+    """
     for track in tracks:
         values = np.concatenate([track.position_m, track.velocity_mps, track.size_m, track.prediction_m.ravel()])
-        if not (np.isfinite(values).all() and (track.size_m > 0).all()):
+        if not ((np.abs(values) < FARTHEST_M).all() and (0 < track.size_m).all() and (track.size_m < LARGEST_M).all()):
+            shown = tuple(np.asarray(value).tolist() for value in (track.position_m, track.velocity_mps, track.size_m,
+                                                                   track.prediction_m))
             raise ValueError('track %d has position %s, velocity %s, size %s and prediction %s; finite numbers and a '
-                             'positive size expected' % ((track.id,) + tuple(np.asarray(value).tolist() for value in (
-                                 track.position_m, track.velocity_mps, track.size_m, track.prediction_m))))
+                             'size of more than 0 and less than 10 m expected' % ((track.id,) + shown))
         if len(track.prediction_m) and not track.prediction_step_s > 0:
             raise ValueError('track %d has predictions in steps of %g s; a positive step expected'
                              % (track.id, track.prediction_step_s))

@@ -4,6 +4,7 @@ from typing import Callable, NamedTuple, Optional, Tuple
 import numpy as np
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
+LARGEST_M, FARTHEST_M = 10.0, 1e8  # nobody is wider or taller, and no map is larger
 
 
 class Detection(NamedTuple):
