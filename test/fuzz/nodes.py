@@ -3,6 +3,7 @@ import contextlib
 import time
 import warnings
 from typing import Callable, NamedTuple
+from unittest import mock
 
 import numpy as np
 from geometry_msgs.msg import TransformStamped
@@ -53,7 +54,6 @@ class Network(object):
 
 
 def _yolov5(source):
-    from unittest import mock
     with mock.patch('ros_3d_bb.searching.open_runtime', lambda *_given: Network(source)):
         return Yolov5Node()
 

@@ -4,4 +4,4 @@ STANDARD_LIBRARY = {'argparse', 'ast', 'base64', 'bisect', 'collections', 'concu
                     'itertools', 'json', 'math', 'multiprocessing', 'os', 'pathlib', 'pickle', 'platform', 're',
                     'resource', 'signal', 'socket', 'struct', 'subprocess', 'sys', 'tempfile', 'threading', 'time',
                     'typing', 'warnings', 'xmlrpc', 'zipfile', 'zlib'}
-TEST_STANDARD_LIBRARY = {'atexit', 'bz2', 'glob', 'random', 'shutil', 'stat', 'types', 'xml'}
+TEST_STANDARD_LIBRARY = {'atexit', 'bz2', 'glob', 'random', 'shutil', 'stat', 'types', 'unittest', 'xml'}

@@ -1,8 +1,20 @@
 """Wrong input, for a few seconds; `./run fuzz` takes minutes. And what it found, each by itself."""
+import genpy
+import numpy as np
 import pytest
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
 
 from fuzz.functions import FUNCTIONS, fuzz_functions
+from fuzz.hostile import good_boxes, good_frame
 from fuzz.nodes import TARGETS, fuzz_node
+from ros_3d_bb import overlay
+from ros_3d_bb.messages import detections_from_message, stamp_of
+from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray
+from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
+from ros_3d_bb.tracking.for_planners import check_tracks
+from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
+from support.masterless import masterless
 
 
 def test_functions_refuse_wrong_values_by_a_value_error():
@@ -16,3 +28,55 @@ def test_functions_refuse_wrong_values_by_a_value_error():
 def test_nodes_live_through_wrong_messages_and_the_next_good_one_works(name):
     sent, _cpu_s = fuzz_node(name, 7, 1000)
     assert sent >= 1000
+
+
+@pytest.mark.parametrize('secs', [2 ** 31, 2 ** 32 - 1])
+def test_stamps_that_tf2_cannot_reckon_with_are_refused(secs):
+    """Its C++ raises an exception that nobody catches, and the process ends."""
+    with pytest.raises(ValueError, match='2038'):
+        stamp_of(Image(header=Header(stamp=genpy.Time(secs))))
+    assert stamp_of(Image(header=Header(stamp=genpy.Time(2 ** 31 - 1)))) > 0
+
+
+def box_of(size_m=0.5, variance_m2=0.0, x_m=1.0):
+    box = BoundingBox3D(position_covariance=[variance_m2, 0, 0, 0, variance_m2, 0, 0, 0, variance_m2])
+    box.center.position.x, box.center.position.z, box.size.x, box.size.y = x_m, 3.0, size_m, 1.7
+    return BoundingBox3DArray(boxes=[box])
+
+
+@pytest.mark.parametrize('box', [box_of(size_m=1e6), box_of(x_m=1e300), box_of(variance_m2=1e308)])
+def test_boxes_of_absurd_size_place_or_covariance_are_refused(box):
+    with pytest.raises(ValueError, match='expected'):
+        detections_from_message(box, np.eye(4))
+
+
+def test_tracks_of_absurd_size_get_to_no_planner():
+    """A costmap's points of a person of 1000 km would be petabytes."""
+    track = TrackedObject(1, np.zeros(3), np.array([1e6, 1e6, 1.7]), np.zeros(3), np.zeros(3), VISIBLE, False, 0, 0,
+                          np.zeros((0, 3)), 0.25)
+    with pytest.raises(ValueError, match='less than 10 m expected'):
+        check_tracks([track])
+
+
+def test_edges_far_outside_the_image_are_not_walked_along(monkeypatch):
+    """OpenCV takes a tenth of a second for one of 2^31 pixels."""
+    corners = []
+    monkeypatch.setattr(overlay.cv2, 'rectangle', lambda _image, *given: corners.extend(given[0] + given[1]))
+    overlay.draw_boxes(np.zeros((48, 64, 3), np.uint8), np.array([[-2 ** 31, 5, 2 ** 31 - 1, 20], [3, 4, 9, 1e300]]),
+                       ['', ''])
+    assert corners == [-4, 5, 68, 20, 3, 4, 9, 52]
+
+
+def test_a_colour_image_without_a_stamp_stops_no_picture():
+    """It comes to a callback that is there only while somebody looks at the pictures."""
+    with masterless() as connections:
+        Bbox3dNode()
+        for stamp_ns in (10 ** 12, 2 * 10 ** 12):
+            frame = good_frame(stamp_ns)
+            frame['yolo_bounding_box'] = good_boxes(stamp_ns)
+            for topic in ('camera/color/camera_info', 'camera/aligned_depth_to_color/image_raw',
+                          'camera/color/image_raw', 'yolo_bounding_box'):
+                if topic in connections.subscribers:
+                    connections.send(topic, frame[topic])
+            connections.send('camera/color/image_raw', Image())
+        assert connections.publishers['ros_3d_bb/color'].count == 1

@@ -71,10 +71,13 @@ def read_sequence(path):
     """
     with open(path, newline='', encoding='utf-8-sig') as stream:
         reader = csv.DictReader(stream)
-        if not set(COLUMNS) <= set(reader.fieldnames or ()):
-            raise ValueError('%s has the columns %s; %s expected'
-                             % (path, ','.join(reader.fieldnames or ()), ','.join(COLUMNS)))
-        rows = [_row(path, reader.line_num, line) for line in reader]
+        try:
+            if not set(COLUMNS) <= set(reader.fieldnames or ()):
+                raise ValueError('%s has the columns %s; %s expected'
+                                 % (path, ','.join(reader.fieldnames or ()), ','.join(COLUMNS)))
+            rows = [_row(path, reader.line_num, line) for line in reader]
+        except csv.Error as error:
+            raise ValueError('%s cannot be read as a table (%s)' % (path, error))
     return _sequence(path, os.path.splitext(os.path.basename(path))[0], rows)
 
 
