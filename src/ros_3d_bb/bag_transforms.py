@@ -3,7 +3,7 @@ import collections
 
 import tf2_ros
 
-from ros_3d_bb.messages import LATEST_NS, transform_from_message
+from ros_3d_bb.messages import check_transforms, transform_from_message
 from ros_3d_bb.stamped import NS
 
 JUMP_NS = NS  # transforms that go back by more are of a new time
@@ -23,13 +23,13 @@ class BagTransforms(object):
 
     def set_static(self, message):
         """Take a message of tf_static; it holds from the beginning to the end. Raises ValueError as `ahead`."""
-        _check(message)
+        check_transforms(message)
         for transform in message.transforms:
             self._buffer.set_transform_static(transform, 'bag')
 
     def ahead(self, message):
         """Take a tf message before its turn. Raises ValueError where a stamp is beyond what tf2 can reckon with."""
-        _check(message)
+        check_transforms(message)
         if self._held or self._goes_back(message):
             self._held.append(message)
         else:
@@ -60,10 +60,3 @@ class BagTransforms(object):
         for transform in message.transforms:
             self._buffer.set_transform(transform, 'bag')
             self._newest_ns = max(self._newest_ns, transform.header.stamp.to_nsec())
-
-
-def _check(message):
-    for transform in message.transforms:
-        if transform.header.stamp.to_nsec() >= LATEST_NS:
-            raise ValueError('the transform of %s carries the stamp %d s, of the year 2038 or later'
-                             % (transform.child_frame_id, transform.header.stamp.secs))

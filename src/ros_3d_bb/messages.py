@@ -53,6 +53,16 @@ def stamp_of(message):
     return stamp_ns
 
 
+def check_transforms(message):
+    """Raise ValueError where a transform in a tf2_msgs/TFMessage has a stamp beyond what tf2 can reckon with: it would
+    end the process.
+    """
+    for transform in message.transforms:
+        if transform.header.stamp.to_nsec() >= LATEST_NS:
+            raise ValueError('the transform of %s carries the stamp %d s, of the year 2038 or later'
+                             % (transform.child_frame_id, transform.header.stamp.secs))
+
+
 def boxes2d_to_message(boxes, header):
     """2D boxes as std_msgs/Int32MultiArray, with the stamp and frame of their image in the layout.
 

@@ -7,6 +7,7 @@ from unittest import mock
 
 import numpy as np
 from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
 
 from fuzz import hostile
 from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
@@ -90,7 +91,10 @@ def fuzz_node(name, seed, count, deadline_s=float('inf')):
             for _round in range(EVERY):
                 now_ns += PERIOD_NS
                 connections.now = time_from(now_ns)
-                _send_transforms(connections, now_ns, source.random() < 0.9)
+                if source.random() < 0.9:
+                    _send_transforms(connections, now_ns)
+                elif source.random() < 0.3:
+                    _send_transforms(connections, source.choice((0, 2 ** 31, 2 ** 32 - 1)) * NS)
                 messages = _round_of(source, now_ns, connections)
                 for topic, message in messages:
                     try:
@@ -128,14 +132,16 @@ def _round_of(source, now_ns, connections):
     return [(topic, good[topic] if topic in good and source.random() < 0.4 else made[topic]()) for topic in topics]
 
 
-def _send_transforms(connections, now_ns, are_there):
-    for buffer in connections.buffers:
-        for parent, child in (('map', 'base_link'), ('base_link', 'camera')) if are_there else ():
-            transform = TransformStamped(child_frame_id=child)
-            transform.header.frame_id, transform.header.stamp = parent, time_from(now_ns)
-            turn = transform.transform.rotation
-            turn.x, turn.y, turn.z, turn.w = (-0.5, 0.5, -0.5, 0.5) if child == 'camera' else (0.0, 0.0, 0.0, 1.0)
-            buffer.set_transform(transform, 'fuzz')
+def _send_transforms(connections, now_ns):
+    message = TFMessage()
+    for parent, child in (('map', 'base_link'), ('base_link', 'camera')):
+        transform = TransformStamped(child_frame_id=child)
+        transform.header.frame_id, transform.header.stamp = parent, time_from(now_ns)
+        turn = transform.transform.rotation
+        turn.x, turn.y, turn.z, turn.w = (-0.5, 0.5, -0.5, 0.5) if child == 'camera' else (0.0, 0.0, 0.0, 1.0)
+        message.transforms.append(transform)
+    if '/tf' in connections.subscribers:
+        connections.send('/tf', on_the_wire(message))
 
 
 def _check_good(name, target, node, connections, now_ns):
@@ -146,7 +152,7 @@ def _check_good(name, target, node, connections, now_ns):
     for step in range(6):
         now_ns += 2 * NS if not step else PERIOD_NS
         connections.now = time_from(now_ns)
-        _send_transforms(connections, now_ns, True)
+        _send_transforms(connections, now_ns)
         good = hostile.good_frame(now_ns)
         good[BOXES_TOPIC] = hostile.good_boxes(now_ns)
         boxes = hostile.boxes3d(hostile.Source(0), now_ns)

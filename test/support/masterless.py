@@ -89,6 +89,7 @@ class Connections(object):
 
     def send(self, topic, message):
         """Call the callback of a topic."""
+        message._connection_header = {'callerid': 'test'}  # which tf2's listener asks for
         self.subscribers[topic].callback(message)
 
     def _keeping(self, kept, kind):
@@ -115,8 +116,9 @@ def masterless(params=()):
         'rospy.Service': mock.Mock(), 'rospy.Timer': connections._timer, 'rospy.on_shutdown': mock.Mock(),
         'rospy.get_param': lambda name, default=None: dict(params) if name == '~' else default,
         'rospy.resolve_name': lambda name: '/' + name, 'rospy.is_shutdown': lambda: False,
-        'rospy.get_rostime': lambda: connections.now,
-        'tf2_ros.Buffer': connections._buffer, 'tf2_ros.TransformListener': mock.Mock(),
+        'rospy.get_rostime': lambda: connections.now, 'rospy.rostime.get_rostime': lambda: connections.now,
+        'rospy.logwarn_throttle': lambda _period_s, text, *arguments: text % arguments,
+        'tf2_ros.Buffer': connections._buffer,
         'diagnostic_updater.Updater': mock.Mock(),
         'ros_3d_bb.nodes.yolov5_node.NewestWorker': Immediately,
         'ros_3d_bb.nodes.depth_detector_node.NewestWorker': Immediately}

@@ -2,8 +2,10 @@
 import genpy
 import numpy as np
 import pytest
+from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
 
 from fuzz.functions import FUNCTIONS, fuzz_functions
 from fuzz.hostile import good_boxes, good_frame
@@ -12,6 +14,7 @@ from ros_3d_bb import overlay
 from ros_3d_bb.messages import detections_from_message, stamp_of
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
+from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.tracking.for_planners import check_tracks
 from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
 from support.masterless import masterless
@@ -36,6 +39,19 @@ def test_stamps_that_tf2_cannot_reckon_with_are_refused(secs):
     with pytest.raises(ValueError, match='2038'):
         stamp_of(Image(header=Header(stamp=genpy.Time(secs))))
     assert stamp_of(Image(header=Header(stamp=genpy.Time(2 ** 31 - 1)))) > 0
+
+
+@pytest.mark.parametrize('topic', ['/tf', '/tf_static'])
+def test_transforms_with_such_stamps_are_refused_and_the_next_ones_serve(topic):
+    with masterless({'tf_timeout': 0.0}) as connections:
+        TrackerNode()
+        for secs in (2 ** 32 - 1, 2 ** 31, 100):
+            transform = TransformStamped(child_frame_id='camera')
+            transform.header.frame_id, transform.header.stamp = 'map', genpy.Time(secs)
+            transform.transform.rotation.w = 1.0
+            connections.send(topic, TFMessage([transform]))
+        connections.send('ros_3d_bb/bb_3d', BoundingBox3DArray(header=Header(stamp=genpy.Time(100), frame_id='camera')))
+        assert connections.publishers['ros_3d_bb/tracks'].count == 1
 
 
 def box_of(size_m=0.5, variance_m2=0.0, x_m=1.0):

@@ -31,9 +31,8 @@ def published(node_class, bag_path, params=()):
         node_class()
         for topic, message, _time in bag.read_messages():
             before = {name: publisher.count for name, publisher in connections.publishers.items()}
-            for transform in message.transforms if topic == '/tf' else ():
-                for buffer in connections.buffers:
-                    buffer.set_transform(transform, 'test')
+            if topic in connections.subscribers:
+                connections.send(topic, message)
             if topic[1:] in connections.subscribers:
                 connections.send(topic[1:], on_the_wire(message))
             for name, publisher in connections.publishers.items():

@@ -5,7 +5,7 @@ import time
 import rospy
 import tf2_ros
 
-from ros_3d_bb.messages import transform_from_message
+from ros_3d_bb.messages import check_transforms, transform_from_message
 
 LONGEST_WAIT_S = 0.05  # without news; shutting down takes no longer
 
@@ -19,17 +19,30 @@ class _Listener(tf2_ros.TransformListener):
 
     def callback(self, data):
         """Of /tf."""
+        if not _are_usable(data):
+            return
         tf2_ros.TransformListener.callback(self, data)
         self._tell()
 
     def static_callback(self, data):
         """Of /tf_static."""
+        if not _are_usable(data):
+            return
         tf2_ros.TransformListener.static_callback(self, data)
         self._tell()
 
     def _tell(self):
         with self.news:
             self.news.notify_all()
+
+
+def _are_usable(message):
+    try:
+        check_transforms(message)
+        return True
+    except ValueError as error:
+        rospy.logwarn_throttle(5.0, 'transforms refused: %s; waiting for the next' % error)
+        return False
 
 
 class Transforms(object):
