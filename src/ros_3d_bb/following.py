@@ -44,6 +44,8 @@ class Followed(NamedTuple):
 class Follower(object):
     """Follow 3D boxes in a fixed frame. Without a transform at their stamp there is no answer and nobody ages.
 
+    Depth images and camera_info are those of one camera, that of the boxes.
+
     Parameters
     ----------
     params : TrackerNodeParams
@@ -65,7 +67,7 @@ class Follower(object):
         self._params, self._tally, self._transforms = params, tally, transforms
         self._tracker = _tracker_of(params.tracker, *tracking)
         self._camera_lock = threading.Lock()  # images come while a transform is waited for
-        self._last_stamp_ns = 0
+        self._newest_ns = None  # of the images that were taken
         self._camera, self._depths = None, StampedCache(int(params.depth_cache_length * NS))
 
     @property
@@ -101,8 +103,9 @@ class Follower(object):
         tracks = self._track(stamp_ns, message)
         if tracks is None:
             return None
+        self._newest_ns = stamp_ns if self._newest_ns is None else max(stamp_ns, self._newest_ns)
         self._tally.count('images tracked')
-        return Followed(Header(stamp=time_from(self._last_stamp_ns), frame_id=self._params.target_frame), tracks)
+        return Followed(Header(stamp=time_from(self._newest_ns), frame_id=self._params.target_frame), tracks)
 
     def _track(self, stamp_ns, message):
         """The tracks after one array of boxes; None where there is no transform for it."""
@@ -126,20 +129,20 @@ class Follower(object):
             entry = self._depths.at(stamp_ns, int(self._params.stamp_tolerance * NS))
         depth_at = None
         if entry is not None:
-            depth = depth_from(entry.value, self._params.depth_scale)
-            if depth.values.shape == (camera.height, camera.width):  # bbox3d_node says what is wrong with any other
-                depth_at = functools.partial(depths_towards, camera, depth)
+            with self._tally.refusing('depth images'):  # the boxes are good without
+                depth = depth_from(entry.value, self._params.depth_scale)
+                if depth.values.shape == (camera.height, camera.width):  # bbox3d_node says what is wrong with others
+                    depth_at = functools.partial(depths_towards, camera, depth)
         return View(fixed_from_camera, edges_of(camera), frame_id, depth_at)
 
     def _follow_time(self, stamp_ns):
         """Forget tracks and transforms where the stamps went back: a bag looped, or somebody sought in it."""
-        if stamp_ns < self._last_stamp_ns - JUMP_NS:
+        if self._newest_ns is not None and stamp_ns < self._newest_ns - JUMP_NS:
             self._tally.note('jumps back in time', 'time went back from %.3f to %.3f: tracks and transforms of the '
-                             'time before are forgotten' % (self._last_stamp_ns / NS, stamp_ns / NS))
+                             'time before are forgotten' % (self._newest_ns / NS, stamp_ns / NS))
             self._tracker.reset()
             self._transforms.go_back()
-            self._last_stamp_ns = stamp_ns
-        self._last_stamp_ns = max(stamp_ns, self._last_stamp_ns)
+            self._newest_ns = None
 
 
 def _tracker_of(name, thesis, *kalman):

@@ -186,6 +186,8 @@ def detections_from_message(message, fixed_from_camera):
     ValueError
         If a centre is not finite, a size not positive, one of them absurdly large, or a covariance none.
     """
+    if len(message.boxes) > MAX_BOXES:
+        raise ValueError('%d 3D boxes in one image; at most %d expected' % (len(message.boxes), MAX_BOXES))
     detections = []
     for number, box in enumerate(message.boxes):
         center, size = box.center.position, box.size

@@ -241,6 +241,11 @@ def test_a_runtime_that_cannot_run_a_file_says_which_can(name, runtime):
         open_runtime(name, RuntimeParams(runtime=runtime))
 
 
+def test_an_export_for_the_cpu_does_not_pretend_to_run_on_a_gpu():
+    with pytest.raises(ValueError, match="device is 'cuda', and a.onnx runs on the CPU"):
+        open_runtime('a.onnx', RuntimeParams(device='cuda'))
+
+
 def test_on_a_cpu_a_checkpoint_runs_on_onnx_runtime_with_the_threads_asked_for(official_output):
     assert open_runtime(official_output[0], RuntimeParams(threads=3)).description == 'ONNX Runtime, 3 threads'
     assert open_runtime(official_output[0], ON_TORCH).description == 'torch on the CPU, 1 thread'

@@ -8,6 +8,7 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.measuring import NoiseParams
 from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
@@ -168,6 +169,13 @@ def test_a_box_cut_by_the_border_shows_only_one_side_of_a_person():
     assert track.position_m[1] == pytest.approx(1.5 + 0.125, abs=0.03)
 
 
+@pytest.mark.parametrize('y', [-0.02, 0.02, 1.3])
+def test_a_slim_person_cut_above_is_where_the_box_is(y):
+    """Of whom the whole width is seen."""
+    track, = play(Tracker(), 1, lambda _time_s: [at(3, y, truncated=True, width=0.38)])[-1]
+    assert track.position_m[1] == pytest.approx(y, abs=0.01)
+
+
 def test_a_person_who_stands_is_not_said_to_move_and_one_who_slows_down_moves_on_for_a_while():
     """0.2 m/s begins it, 0.1 m/s ends it."""
     def speed(mps):
@@ -231,6 +239,29 @@ def test_two_cameras_with_the_same_stamp_are_both_taken():
     assert ids(objects) == [1] and objects[0].position_m[0] == pytest.approx(3.01, abs=0.02)
 
 
+@pytest.mark.parametrize('later_ns', [1, NS // 1000, NS // 60])
+def test_a_second_camera_is_believed_whenever_its_images_come(later_ns):
+    """Only that one sees the person."""
+    tracker = Tracker()
+    for frame in range(30):
+        stamp_ns = START_NS + frame * NS // 30
+        tracker.update(stamp_ns, [], VIEW._replace(camera='front'))
+        objects = tracker.update(stamp_ns + later_ns, [at(3, 0.03 * frame - 0.5)], VIEW._replace(camera='side'))
+    assert objects[0].velocity_mps[1] == pytest.approx(0.9, abs=0.1)
+
+
+def test_somebody_seen_is_published_however_unsure_the_boxes_are():
+    track, = play(Tracker(), 2, lambda _time_s: [at(3, 0, sigma=1.0)])[-1]
+    assert track.status == VISIBLE and track.covariance[0, 0] > 0.05
+
+
+def test_an_image_without_an_answer_from_the_future_holds_up_nobodys_end():
+    tracker = Tracker()
+    play(tracker, 1, standing((3, 0)))
+    tracker.skip(START_NS + 100 * NS)
+    assert play(tracker, 1, standing(), start_s=1)[-1] == []
+
+
 def test_time_without_an_answer_ages_nobody():
     tracker = Tracker()
     play(tracker, 1, standing((3, 0)))
@@ -284,7 +315,10 @@ def test_prediction_goes_as_far_and_in_such_steps_as_asked_for():
 
 
 @pytest.mark.parametrize('name,value', [('outlier_share', 1.0), ('memory', -1), ('newcomer_density', 0.0),
-                                        ('height_sigma', float('nan'))])
+                                        ('height_sigma', float('nan')), ('noise_unknown', -1.0),
+                                        ('noise_correlated', float('nan')), ('prediction_step', 0.0)])
 def test_parameters_that_make_no_sense_are_named(name, value):
+    kinds = [kind(**({name: value} if name in kind._fields else {}))
+             for kind in (TrackerParams, NoiseParams, PredictionParams)]
     with pytest.raises(ValueError, match=name):
-        Tracker(TrackerParams(**{name: value}))
+        Tracker(*kinds)

@@ -49,6 +49,8 @@ def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
     if path.endswith('.onnx'):
         if params.runtime == 'torch':
             raise ValueError('runtime torch cannot run %s; use auto or onnxruntime, or the .pt checkpoint' % path)
+        if params.device not in ('auto', 'cpu'):
+            raise ValueError('device is %r, and %s runs on the CPU; use the .pt checkpoint' % (params.device, path))
         return OnnxRuntime(path, threads)
     if path.endswith(('.torchscript', '.torchscript.pt')):
         if params.runtime == 'onnxruntime':
@@ -80,7 +82,10 @@ def on_gpu(device):
         return not device.startswith('cpu')
     if gpu_count() == 0:
         return False
-    from ros_3d_bb.detection.torch_runtime import torch_device
+    try:
+        from ros_3d_bb.detection.torch_runtime import torch_device
+    except ImportError:  # without torch nothing runs there
+        return False
     return torch_device('auto').type == 'cuda'
 
 

@@ -8,6 +8,7 @@ from ros_3d_bb.tracking.kalman import Measurements
 FLOOR_M = 0.02  # nobody's centre is known better than that: people sway as they walk
 USUAL_PERIOD_S = 1 / 30.0  # of images, for the first one
 PERSON_WIDTH_M = 0.5
+PART_M = 0.3  # a box that the image border cuts and that is narrower shows only a part of the width
 MAX_SHIFT_M = 0.2
 CUT_SIGMA_M = 0.08  # what is not seen of a cut person leaves the side open by so much
 NEARER_M = 0.25  # a box hides another one behind it from this difference in depth on
@@ -53,8 +54,8 @@ def sightings_of(detections, view, elapsed_s, params):
 
     An error that lasts for several images would be taken for certainty if each image counted as a new opinion. The part
     of the covariance that lasts is therefore widened by how many images it lasts for, which makes the filter the same
-    at any frame rate. The centre of a person whom the image border or somebody nearer cuts is put half a width behind
-    the edge that is seen, and its side is less sure.
+    at any frame rate. The centre of a person whom somebody nearer hides in part, or of whom the image border leaves
+    only a part of the width, is put half a width behind the edge that is seen. The side of a cut box is less sure.
 
     Parameters
     ----------
@@ -76,7 +77,8 @@ def sightings_of(detections, view, elapsed_s, params):
                             for detection in detections]).reshape(-1, 3, 3)
     seen = _seen(positions_m[:, :2], sizes_m[:, 0], view)
     hidden = _hidden_side(seen)
-    side = np.where(truncated, np.sign(seen.bearings), hidden)
+    is_part = sizes_m[:, 0] < PART_M
+    side = np.where(truncated, np.sign(seen.bearings) * is_part, hidden)
     shift_m = np.clip((PERSON_WIDTH_M - sizes_m[:, 0]) / 2, 0, MAX_SHIFT_M)
     noise_m2 = _noise(covariances[:, :2, :2], seen, truncated | (hidden != 0), elapsed_s, params)
     ground = Measurements(seen.positions_m + (side * shift_m)[:, None] * seen.sides, noise_m2, seen.rays)

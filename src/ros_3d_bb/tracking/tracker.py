@@ -27,6 +27,7 @@ RECENT_NS = 7 * NS // 10  # who was seen so recently comes before those who were
 BEHIND_M = 0.45  # no less sure is where somebody is who does not come out from behind something
 LOST_M = 2.4  # who may be anywhere within this (standard deviation) is forgotten
 TRIES_S = 0.6  # how long a track that is not confirmed yet waits to be seen again
+UNSURE_SHARE = 0.1  # of the density of a box at its centre: a newcomer's is not higher
 TAKEN_NS = NS // 5  # nobody new begins near somebody seen so recently
 HIDING_S = 0.3  # who was missed for longer hides nobody
 SMOOTHING = 0.1  # share of the newest sighting in size and height
@@ -62,7 +63,7 @@ class _Image(NamedTuple):
 
 
 class _State(NamedTuple):
-    """What images change: the tracks, and the stamps of the latest image and of the latest one without an answer."""
+    """What images change: the tracks, the stamp of the latest image, and that of one without an answer since then."""
 
     tracks: np.ndarray
     now_ns: int
@@ -82,7 +83,8 @@ class Tracker(object):
     """
 
     def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams()):
-        _check(params)
+        for kind in (params, noise, prediction):
+            _check(kind)
         self._params, self._noise, self._prediction = params, noise, prediction
         self._outliers = kalman.Outliers(params.outlier_share, params.outlier_offset, params.outlier_spread)
         self._last_id = 0
@@ -129,6 +131,7 @@ class Tracker(object):
         """The people who are published now, by id, at the stamp of the newest image."""
         tracks, params = np.sort(self._state.tracks, order='id'), self._params
         known = (tracks['missed_s'] <= params.missed_limit) & (_sigma(tracks) < params.unsure_limit)
+        known |= tracks['status'] == VISIBLE
         known &= (tracks['status'] != OUT_OF_VIEW) | (tracks['unseen_s'] <= params.out_of_view_limit)
         return objects_of(tracks[tracks['confirmed'] & known], self._prediction)
 
@@ -160,7 +163,7 @@ class Tracker(object):
         looked_s = 0.0 if now_ns is None else max(image.stamp_ns - max(now_ns, skipped_ns), 0) / NS
         tracks['mean'], tracks['covariance'] = kalman.predict(tracks['mean'], tracks['covariance'], elapsed_s,
                                                               self._params.acceleration)
-        sightings = sightings_of(image.detections, image.view, elapsed_s, self._noise)
+        sightings = sightings_of(image.detections, image.view, self._since_last_s(image), self._noise)
         rows, columns = self._associate(tracks, sightings, image.stamp_ns)
         self._see(tracks, rows, _taken(sightings, columns), image.stamp_ns)
         self._miss(tracks, _others(len(tracks), rows), before, image.view, looked_s)
@@ -168,14 +171,23 @@ class Tracker(object):
         others = _others(len(image.detections), columns)
         if len(others):
             tracks = np.concatenate((tracks, self._newcomers(tracks, _taken(sightings, others), others, image)))
-        return _State(tracks, image.stamp_ns, skipped_ns)
+        return _State(tracks, image.stamp_ns, 0)
+
+    def _since_last_s(self, image):
+        """Seconds since the last image of the same camera; 0 where there is none."""
+        stamps_ns = [other.stamp_ns for _state, other in self._history
+                     if other.view.camera == image.view.camera and other.stamp_ns < image.stamp_ns]
+        return (image.stamp_ns - stamps_ns[-1]) / NS if stamps_ns else 0.0
 
     def _associate(self, tracks, sightings, stamp_ns):
         """Rows of tracks and columns of sightings that belong together."""
         params = self._params
         cost = kalman.unlikeliness(tracks['mean'], tracks['covariance'], sightings.ground, self._outliers)
         cost += ((tracks['size_m'][:, 2:] - sightings.sizes_m[:, 2]) / params.height_sigma) ** 2 / 2
-        cost[cost >= -2 * np.log(2 * np.pi * params.newcomer_density)] = np.inf
+        # The more unsure a box, the less it tells anybody from a newcomer; it is then somebody's rather than nobody's.
+        sharpest = 1 / (2 * np.pi * np.sqrt(np.linalg.det(sightings.ground.noise_m2)))
+        density = np.minimum(params.newcomer_density, UNSURE_SHARE * sharpest)
+        cost[cost >= -2 * np.log(2 * np.pi * density)] = np.inf
         away = stamp_ns - tracks['last_ns'] >= RECENT_NS
         rank = np.where(tracks['confirmed'], away.astype(int), 2)
         pairs = []
@@ -282,11 +294,10 @@ def _sigma(tracks):
 
 
 def _check(params):
-    if not params.outlier_share < 1:
-        raise ValueError('outlier_share is %g; less than 1 expected' % params.outlier_share)
     for name, value in params._asdict().items():
-        if not value >= 0:
+        if not 0 <= value < 1e6:
             raise ValueError('%s is %g; 0 or more expected' % (name, value))
-    for name in ('newcomer_density', 'height_sigma'):
-        if not getattr(params, name) > 0:
-            raise ValueError('%s is %g; more than 0 expected' % (name, getattr(params, name)))
+        if name in ('newcomer_density', 'height_sigma', 'prediction_step') and not value > 0:
+            raise ValueError('%s is %g; more than 0 expected' % (name, value))
+        if name == 'outlier_share' and not value < 1:
+            raise ValueError('%s is %g; less than 1 expected' % (name, value))

@@ -53,8 +53,8 @@ def _say(run, scores):
 
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench tracking', description=__doc__)
-    data = os.environ.get('ROS_3D_BB_DATA')
-    parser.add_argument('--data', default=data and os.path.join(data, 'data', 'trajectories'), metavar='DIR',
+    data = os.path.join(os.environ.get('ROS_3D_BB_DATA', ''), 'data', 'trajectories')
+    parser.add_argument('--data', default=data if os.path.isdir(data) else None, metavar='DIR',
                         help='folder of CSV files with the columns %s (default: $ROS_3D_BB_DATA/data/trajectories, '
                         'and without it recordings that are made)' % ','.join(COLUMNS))
     parser.add_argument('--seed', type=int, default=0, metavar='N', help='of all that is random (default: 0)')
@@ -62,7 +62,7 @@ def _arguments():
                         help='runs of each sequence, standing and driving each (default: 2)')
     parser.add_argument('--seconds', type=float, default=SECONDS, help='length of a run (default: %g)' % SECONDS)
     parser.add_argument('--bound', action='store_true',
-                        help='also our tracker when it is told whose each detection is: no association is better')
+                        help='also our tracker when it is told whose each detection is')
     parser.add_argument('--scenarios', nargs='+', metavar='FILE', help='instead: the whole pipeline on rendered scenes')
     parser.add_argument('--weights', help='of YOLOv5, for --scenarios; without, the weight-free detector')
     parser.add_argument('--json', metavar='FILE', help='also write the scores there')
@@ -70,6 +70,8 @@ def _arguments():
     for name in ('repetitions', 'seconds'):
         if not getattr(arguments, name) > 0:
             parser.error('--%s is %g; more than 0 expected' % (name, getattr(arguments, name)))
+    if arguments.weights and not arguments.scenarios:
+        parser.error('--weights is for --scenarios; people of recordings are not rendered')
     if not 0 <= arguments.seed < 2 ** 32:
         parser.error('--seed is %d; 0 to %d expected' % (arguments.seed, 2 ** 32 - 1))
     return arguments

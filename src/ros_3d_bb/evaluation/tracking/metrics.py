@@ -195,7 +195,9 @@ def _metrics():
 
 
 def _data_of(images: List[Scored]):
-    """What TrackEval's metrics take: numbers from 0, without gaps."""
+    """What TrackEval's metrics take: numbers from 0, without gaps. Raises ValueError without images."""
+    if not images:
+        raise ValueError('a run without images; it is too short')
     people, tracks = (np.unique(np.concatenate([image[part] for image in images])) for part in (0, 1))
     return {'gt_ids': [np.searchsorted(people, image.people) for image in images],
             'tracker_ids': [np.searchsorted(tracks, image.tracks) for image in images],

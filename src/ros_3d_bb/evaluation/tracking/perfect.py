@@ -1,7 +1,8 @@
-"""The bound: what a tracker would score if it were told whose each detection is."""
+"""What a tracker scores that is told whose each detection is, and remembers people as long as ours."""
 from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.tracker import TrackerParams
 
-FORGOTTEN_S = 3.0  # who was not found for so long gets another number: nobody could know them again
+FORGOTTEN_S = TrackerParams().memory  # who was not found for so long gets another number
 COASTS_S = 1.0
 
 
