@@ -73,3 +73,23 @@ def window_on():
     yield window_on_session
     for driver in drivers:
         driver.close()
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A small measurement session, to be annotated."""
+    from support.small_session import write_small_session
+    return write_small_session(str(tmp_path))
+
+
+@pytest.fixture
+def document(folder):
+    """It, opened."""
+    from ros_3d_bb_annotator.document import Document
+    return Document.open(folder)
+
+
+@pytest.fixture
+def drive(window_on, folder):
+    """The annotator's window on it."""
+    return window_on(folder)

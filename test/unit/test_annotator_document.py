@@ -15,16 +15,6 @@ from support.small_session import (FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read
                                    write_small_session)
 
 
-@pytest.fixture
-def folder(tmp_path):
-    return write_small_session(str(tmp_path))
-
-
-@pytest.fixture
-def document(folder):
-    return Document.open(folder)
-
-
 def states(document):
     return [measurement.state for measurement in document.measurements]
 

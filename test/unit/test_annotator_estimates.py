@@ -7,18 +7,8 @@ import pytest
 
 from ros_3d_bb.measurements import read_session
 from ros_3d_bb_annotator.document import Document
-from support.small_session import FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json, write_small_session
+from support.small_session import FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json
 from support.synthetic_session import write_synthetic_session
-
-
-@pytest.fixture
-def folder(tmp_path):
-    return write_small_session(str(tmp_path))
-
-
-@pytest.fixture
-def document(folder):
-    return Document.open(folder)
 
 
 def test_a_box_drawn_by_hand_is_estimated_and_chosen(document, folder):

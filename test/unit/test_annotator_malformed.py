@@ -8,12 +8,7 @@ import pytest
 from ros_3d_bb.measurements import SessionError, read_session
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.validation import problems_of
-from support.small_session import NEAR_BOX, change_json, read_json, write_small_session
-
-
-@pytest.fixture
-def folder(tmp_path):
-    return write_small_session(str(tmp_path))
+from support.small_session import NEAR_BOX, change_json, read_json
 
 
 def write_depth(folder, pixels):

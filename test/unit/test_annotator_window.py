@@ -7,20 +7,10 @@ import pytest
 
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.measurement import Mark
-from support.small_session import FAR_BOX, NEAR_BOX, change_json, write_small_session
+from support.small_session import FAR_BOX, NEAR_BOX, change_json
 from support.window import Qt, QtCore, QtWidgets
 
 CONTROL, SHIFT, ALT = Qt.ControlModifier, Qt.ShiftModifier, Qt.AltModifier
-
-
-@pytest.fixture
-def folder(tmp_path):
-    return write_small_session(str(tmp_path))
-
-
-@pytest.fixture
-def drive(window_on, folder):
-    return window_on(folder)
 
 
 def opened(folder):

@@ -13,16 +13,6 @@ from support.window import Qt, QtCore, QtGui, QtWidgets
 CONTROL, SHIFT, ALT = Qt.ControlModifier, Qt.ShiftModifier, Qt.AltModifier
 
 
-@pytest.fixture
-def folder(tmp_path):
-    return write_small_session(str(tmp_path))
-
-
-@pytest.fixture
-def drive(window_on, folder):
-    return window_on(folder)
-
-
 def opened(folder):
     """What another program finds in the session."""
     return Document.open(folder).measurements
