@@ -1,5 +1,6 @@
 """The figures of the latency benchmark, on records of which the answer is known."""
-import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -78,12 +79,30 @@ def test_percentiles_are_in_order_and_within_the_values(values_ms):
     assert min(values_ms) - 1e-6 <= found['p50_ms'] <= found['p95_ms'] <= found['p99_ms'] <= max(values_ms) + 1e-6
 
 
+HOLDS_AND_COMPUTES = """
+input()
+held = b'1' * (32 * 2 ** 20)
+begin_s = time.process_time()
+while time.process_time() < begin_s + 0.1:
+    pass
+print('done', flush=True)
+input()
+"""
+
+
 def test_a_process_uses_what_it_computes_and_holds():
-    before = usage_of(os.getpid())
-    held = np.ones(4 * 10 ** 6)
-    while usage_of(os.getpid()).cpu_s <= before.cpu_s:
-        held.sum()
-    assert usage_of(os.getpid()).rss_mb - before.rss_mb == pytest.approx(32, abs=8)
+    """One of its own: memory that this one has freed would be taken again."""
+    process = subprocess.Popen([sys.executable, '-c', 'import time; print("ready", flush=True)' + HOLDS_AND_COMPUTES],
+                               stdin=subprocess.PIPE, stdout=subprocess.PIPE, universal_newlines=True)
+    process.stdout.readline()
+    before = usage_of(process.pid)
+    process.stdin.write('\n')
+    process.stdin.flush()
+    process.stdout.readline()
+    after = usage_of(process.pid)
+    process.communicate('\n')
+    assert after.rss_mb - before.rss_mb == pytest.approx(33.5, abs=3)
+    assert after.cpu_s - before.cpu_s >= 0.08
 
 
 def test_a_process_that_is_gone_uses_nothing():
