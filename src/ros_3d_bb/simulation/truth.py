@@ -2,7 +2,7 @@
 import numpy as np
 
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject, prediction_times_s
 
 LEAST_VISIBLE = 0.25  # share of the body that an image must show for the person to count as visible
 MOVING_MPS = 0.05
@@ -23,7 +23,7 @@ def truth_at(simulator, frame, stamp_ns):
     -------
     list of TrackedObject
     """
-    times_s = PREDICTION_STEP_S * np.arange(1, int(round(PREDICTION_S / PREDICTION_STEP_S)) + 1)
+    times_s = prediction_times_s(PREDICTION_S, PREDICTION_STEP_S)
     paths = np.stack([simulator.positions_at(frame.time_s + time_s) for time_s in times_s], axis=1)
     start_ns = stamp_ns - int(round(frame.time_s * NS))
     return [TrackedObject(person.id, person.position_m, person.size_m, person.velocity_mps, person.velocity_mps,

@@ -3,7 +3,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.tracking.tracked import TrackedObject
+from ros_3d_bb.tracking.tracked import TrackedObject, prediction_times_s
 
 
 class PredictionParams(NamedTuple):
@@ -14,10 +14,6 @@ class PredictionParams(NamedTuple):
     prediction_acceleration: float = 0.03
     standing_speed: float = 0.15
     position_bias: float = 0.05
-
-    def times_s(self):
-        """The times (steps,) ahead of the image at which positions are predicted."""
-        return self.prediction_step * np.arange(1, int(round(self.prediction_time / self.prediction_step)) + 1)
 
 
 def objects_of(tracks, params):
@@ -37,7 +33,7 @@ def objects_of(tracks, params):
     -------
     list of TrackedObject, n
     """
-    times_s = params.times_s()
+    times_s = prediction_times_s(params.prediction_time, params.prediction_step)
     velocity_mps, level = tracks['mean'][:, 2:], np.eye(3)[:, :2]
     speed2 = (velocity_mps ** 2).sum(axis=1, keepdims=True)
     carried_mps = velocity_mps * speed2 / (speed2 + params.standing_speed ** 2 + 1e-12)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.association import match_greedily, plane_distances
-from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject
+from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject, prediction_times_s
 
 
 class ThesisTrackerParams(NamedTuple):
@@ -119,8 +119,7 @@ class ThesisTracker(object):
 
     def _published(self, track):
         params = self._params
-        steps = int(round(params.prediction_time / params.prediction_step))
-        times_s = params.prediction_step * np.arange(1, steps + 1)
+        times_s = prediction_times_s(params.prediction_time, params.prediction_step)
         return TrackedObject(
             track.id, track.position_m, track.size_m, track.velocity_mps, track.instant_velocity_mps,
             OCCLUDED if track.unseen_ns else VISIBLE, bool(np.linalg.norm(track.velocity_mps) >= params.moving_speed),

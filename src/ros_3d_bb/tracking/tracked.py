@@ -64,3 +64,8 @@ class TrackedObject(NamedTuple):
     prediction_step_s: float
     covariance: Optional[np.ndarray] = None
     prediction_covariance_m2: Optional[np.ndarray] = None
+
+
+def prediction_times_s(time_s, step_s):
+    """The times (steps,) after an image at which positions are predicted: each step up to `time_s`, seconds."""
+    return step_s * np.arange(1, int(round(time_s / step_s)) + 1)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject
+from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject, prediction_times_s
 
 
 class NorfairParams(NamedTuple):
@@ -68,8 +68,7 @@ class Norfair(object):
         first_ns = self._first_seen_ns.setdefault(thing.id, last_ns)
         position_m = np.append(thing.estimate[0], detection.position_m[2])
         velocity_mps = np.append(thing.filter.x[2:4].ravel() * params.rate_hz, 0)
-        steps = int(round(params.prediction_time / params.prediction_step))
-        times_s = params.prediction_step * np.arange(1, steps + 1)
+        times_s = prediction_times_s(params.prediction_time, params.prediction_step)
         return TrackedObject(thing.id, position_m, detection.size_m, velocity_mps, velocity_mps,
                              VISIBLE if last_ns == self._now_ns else OCCLUDED,
                              bool(np.linalg.norm(velocity_mps) >= params.moving_speed), first_ns, last_ns,
