@@ -67,6 +67,11 @@ class BagReader(object):
             return 0, 0
         return tuple(int(1e9 * time_s) for time_s in (self._bag.get_start_time(), self._bag.get_end_time()))
 
+    @property
+    def topics(self):
+        """{name: type} of the topics in it."""
+        return dict(self._types)
+
     def check_topic(self, topic, kind):
         """Raise BagError where a bag does not have a topic of messages of a class; name what it has instead."""
         if self._types.get(topic) == kind._type:

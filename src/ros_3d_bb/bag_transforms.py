@@ -45,6 +45,10 @@ class BagTransforms(object):
         while self._held and not self._goes_back(self._held[0]):
             self._set(self._held.popleft())
 
+    def frames_as_yaml(self):
+        """What is known now, as tf2 says it."""
+        return self._buffer.all_frames_as_yaml()
+
     def lookup(self, target_frame, source_frame, stamp):
         """`target_from_source` at a stamp, a 4x4 matrix. Raises tf2_ros.TransformException."""
         return transform_from_message(self._buffer.lookup_transform_core(target_frame.lstrip('/'),

@@ -4,6 +4,7 @@ from typing import NamedTuple
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.diagnosis.camera_faults import units_fault
 from ros_3d_bb.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.estimation import DepthImage, check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.geometry import Camera
@@ -130,8 +131,12 @@ class Lifter(object):
     def _depth_of(self, frame, boxes):
         """The depth image of a frame. Raises ValueError where there is none, or it cannot belong to the camera."""
         if frame is None:
+            self._tally.count('arrays without a depth image')
             raise ValueError(self._why_no_frame(boxes))
         depth = depth_from(frame.depth, self._params.depth_scale)
+        fault = units_fault(depth)
+        if fault:
+            raise ValueError(fault)
         if depth.values.shape != (frame.camera.height, frame.camera.width):
             raise ValueError('the depth image has %d x %d pixels, the colour camera %d x %d; depth must be aligned to '
                              'colour (realsense2_camera: align_depth:=true)'
@@ -147,8 +152,11 @@ class Lifter(object):
             return 'no camera_info has come on %s' % self._info_topic
         if boxes.stamp_ns is None:
             return 'no depth image has come on %s within %.1f s' % (self._depth_topic, kept_s)
+        late_s = (newest_ns - boxes.stamp_ns) / NS
         return ('no depth image with their stamp %.3f came on %s; the newest has %.3f, and %.1f s are kept '
-                '(~cache_length)' % (boxes.stamp_ns / NS, self._depth_topic, newest_ns / NS, kept_s))
+                '(~cache_length)%s' % (boxes.stamp_ns / NS, self._depth_topic, newest_ns / NS, kept_s,
+                                       ': the boxes are %.1f s too old; the detector is slower than that'
+                                       % (late_s - kept_s) if late_s > kept_s else ''))
 
 
 def error_model_of(params):

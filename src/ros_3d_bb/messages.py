@@ -128,6 +128,8 @@ def camera_from_message(message):
     ValueError
         If they are not usable: an uncalibrated camera has zeros there; or the distortion model is not known.
     """
+    if not any(message.K):
+        raise ValueError('it is empty (all of K is zero): the driver does not know the calibration of the camera')
     return Camera(message.width, message.height, message.K[0], message.K[4], message.K[2], message.K[5],
                   message.distortion_model, message.D)
 

@@ -9,6 +9,7 @@ from ros_3d_bb.detection.depth_people import DepthPeople
 from ros_3d_bb.detection.floor import floor_from_transform
 from ros_3d_bb.detection.runtime import open_runtime
 from ros_3d_bb.detection.yolov5 import Yolov5
+from ros_3d_bb.diagnosis.camera_faults import units_fault
 from ros_3d_bb.geometry import transform_from
 from ros_3d_bb.images import depth_from, rgb_from
 from ros_3d_bb.messages import camera_from_message, stamp_of
@@ -133,7 +134,11 @@ class DepthSearch(object):
         frame, color = pair
         image = rgb_from(color)
         camera_frame = self._params.frame_id or color.header.frame_id
-        found = self._detector.detect(image, depth_from(frame.depth), frame.camera, self._floor(camera_frame))
+        depth = depth_from(frame.depth)
+        fault = units_fault(depth)
+        if fault:
+            raise ValueError(fault)
+        found = self._detector.detect(image, depth, frame.camera, self._floor(camera_frame))
         if found is None:
             self._tally.warn('images without floor', 'no floor is known from tf nor seen in the depth image: nobody is '
                              'looked for; waiting for the next image')

@@ -95,11 +95,12 @@ def camera_info(stamp_ns, width=64, height=48, focal=60.0):
 
 
 def diagnostics_of(node, timeout_s=TIMEOUT_S):
-    """The next diagnostic status of a node: (level, message, {event: count})."""
+    """The next diagnostic status of a node: (level, message, {event: count}, and what it shows in words)."""
     with Recorder('/diagnostics', DiagnosticArray) as recorder:
         def mine():
             return [status for message in recorder.messages for status in message.status
                     if status.name.startswith(node)]
         wait_until(mine, 'diagnostics of ' + node, timeout_s)
         status = mine()[-1]
-        return status.level, status.message, {entry.key: int(entry.value) for entry in status.values}
+        return status.level, status.message, {
+            entry.key: int(entry.value) if entry.value.isdigit() else entry.value for entry in status.values}

@@ -9,6 +9,7 @@ from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.lifting import Bbox3dParams, Lifter
 from ros_3d_bb.messages import BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_message
 from ros_3d_bb.msg import BoundingBox3DArray
+from ros_3d_bb.nodes.depth_camera import DepthCameraCheck
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.sample_images import SampleImages
 from ros_3d_bb.nodes.startup import read_params, run_node
@@ -33,16 +34,20 @@ class Bbox3dNode(object):
         self._boxes_pub = rospy.Publisher(BOXES3D_TOPIC, BoundingBox3DArray, queue_size=10)
         self._images = SampleImages(int(params.cache_length * NS), self._lifter.sample, params.depth_image_range,
                                     self._diagnostics)
+        self._alignment = DepthCameraCheck(with_frames=not params.frame_id)
+        self._diagnostics.check(self._alignment.faults)
         # Each depth image is kept for boxes that may come for it later, so none may be dropped on the way.
         subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
         subscribe(BOXES_TOPIC, Int32MultiArray, self._on_boxes)
 
     def _on_camera_info(self, message):
+        self._alignment.color = message
         with self._diagnostics.refusing('camera_info'), self._lock:
             self._publish(self._lifter.add_camera_info(message, arrival_clock_ns()))
 
     def _on_depth(self, message):
+        self._alignment.depth_frame = message.header.frame_id
         with self._diagnostics.refusing('depth images'), self._lock:
             self._publish(self._lifter.add_depth(message, arrival_clock_ns()))
 
@@ -53,6 +58,7 @@ class Bbox3dNode(object):
     def _publish(self, images):
         for lifted in images:
             self._boxes_pub.publish(boxes3d_to_message(lifted.boxes, lifted.header, lifted.camera))
+            self._diagnostics.answered(lifted.header.stamp)
             self._images.publish(lifted.header, lifted.depth, lifted.boxes)
 
 

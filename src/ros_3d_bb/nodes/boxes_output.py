@@ -1,4 +1,6 @@
 """What every 2D detector offers: boxes, a picture of them, and a switch."""
+import time
+
 import rospy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
@@ -6,7 +8,10 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 from ros_3d_bb.images import fill_image
 from ros_3d_bb.messages import boxes2d_to_message
+from ros_3d_bb.nodes.transport import inputs
 from ros_3d_bb.overlay import draw_boxes
+
+SILENT_S = 5.0  # no image is searched for so long
 
 
 class BoxesOutput(object):
@@ -28,12 +33,30 @@ class BoxesOutput(object):
 
 
 class Switch(object):
-    """Whether the detector works; the service ~enable (std_srvs/SetBool) changes it."""
+    """Whether the detector works; the service ~enable (std_srvs/SetBool) changes it.
 
-    def __init__(self, on):
+    The diagnostics say whether it is on, and complain where images come and none is answered.
+    """
+
+    def __init__(self, on, diagnostics):
         self.on = on
+        self._answered_s = time.monotonic()
+        diagnostics.show('detector', lambda: 'working' if self.on else 'paused')
+        diagnostics.check(self._faults)
         rospy.Service('~enable', SetBool, self._on_request)
+
+    def answered(self):
+        """An image was searched."""
+        self._answered_s = time.monotonic()
+
+    def _faults(self):
+        came_s = min((noted.came_s or 0.0 for noted in inputs()), default=0.0)
+        now_s = time.monotonic()
+        if self.on and now_s - came_s < 1.0 and now_s - self._answered_s > SILENT_S:
+            yield 'no answers', ('the detector is silent: images come, and none has been answered for %.0f s; it hangs, '
+                                 'is starved of CPU, or refuses all of them' % (now_s - self._answered_s))
 
     def _on_request(self, request):
         self.on = request.data
+        self.answered()
         return SetBoolResponse(True, 'detector %s' % ('enabled' if request.data else 'paused'))

@@ -27,13 +27,15 @@ class DepthDetectorNode(object):
     def __init__(self):
         params, people = read_params(DepthDetectorParams, DepthPeopleParams)
         self._diagnostics = Diagnostics()
-        self._search = DepthSearch(params, people, self._diagnostics,
-                                   Transforms(wait_s=0) if params.floor_frame else None)
+        transforms = Transforms(wait_s=0) if params.floor_frame else None
+        if transforms is not None:
+            self._diagnostics.show('tf age', transforms.age)
+        self._search = DepthSearch(params, people, self._diagnostics, transforms)
         self._lock = threading.Lock()
         self._output = BoxesOutput(params.publish_empty)
         self._worker = NewestWorker(self._work, self._on_error)
         rospy.on_shutdown(self._worker.stop)
-        self._switch = Switch(params.enabled)
+        self._switch = Switch(params.enabled, self._diagnostics)
         subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
         subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(COLOR_TOPIC, Image, self._on_color)
@@ -61,6 +63,8 @@ class DepthDetectorNode(object):
             found = self._search.search(pair) if self._switch.on else None  # it may have been paused meanwhile
             if found is not None:
                 self._output.publish(pair[1].header, *found, names=self._search.names)
+                self._diagnostics.answered(pair[1].header.stamp)
+                self._switch.answered()
 
     def _on_error(self, error):
         self._diagnostics.warn('searches failed', 'the detector failed: %s; waiting for the next image' % error)

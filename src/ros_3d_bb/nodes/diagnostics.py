@@ -7,10 +7,14 @@ import diagnostic_updater
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from ros_3d_bb.nodes.input_watch import InputWatch, unheard
+from ros_3d_bb.stamped import NS
 from ros_3d_bb.tally import Tally
 
 PERIOD_S = 1.0
 WARNING_LASTS_S = 5.0
+REMINDER_S = 30.0  # between two lines of the log about what stays wrong
+UNHEARD_S = 5.0  # without subscribers; they may be starting, too
 
 
 def is_ending():
@@ -19,15 +23,20 @@ def is_ending():
 
 
 class Diagnostics(Tally):
-    """Counts what happened to each input and publishes the counts on /diagnostics once a second.
+    """Counts what happened to each input and publishes the counts on /diagnostics once a second, with rates, latency
+    and what else the node shows.
 
-    A warning is logged at most every `WARNING_LASTS_S` for one cause, and shown as the node's state for as long.
-    Timed by the machine's clock: a paused bag must not silence it.
+    A warning is logged at most every `WARNING_LASTS_S` for one cause, and shown as the node's state for as long. What
+    is wrong around it (see `check`) is its state while it lasts. Timed by the machine's clock: a paused bag must not
+    silence it.
     """
 
     def __init__(self):
         super(Diagnostics, self).__init__()
         self._warning, self._warned_at, self._logged_at = '', None, {}
+        self._lags_ns, self._looked_s, self._heard_s = [], time.monotonic(), time.monotonic()
+        inputs = InputWatch()
+        self._shown, self._checks = [inputs.values], [inputs.faults]
         self._updater = diagnostic_updater.Updater()
         self._updater.setHardwareID('none')
         self._updater.add('pipeline', self._report)
@@ -49,6 +58,18 @@ class Diagnostics(Tally):
             self._logged_at[event] = now_s
             rospy.logwarn('%s', sentence)
 
+    def answered(self, stamp):
+        """An image of a stamp was answered: its result is published, or it has none. A rate and a latency come of it."""
+        self._lags_ns.append((rospy.get_rostime() - stamp).to_nsec())
+
+    def show(self, name, text):
+        """Add a value to what is published: `text()` is asked for it once a second."""
+        self._shown.append(lambda: [(name, text())])
+
+    def check(self, faults):
+        """Ask `faults()` once a second what is wrong now: (event, sentence) pairs."""
+        self._checks.append(faults)
+
     @contextlib.contextmanager
     def refusing(self, inputs):
         """Around what a callback does with its input: a ValueError there refuses that one, and the node goes on."""
@@ -61,15 +82,49 @@ class Diagnostics(Tally):
 
     def _report(self, status):
         recent = self._warned_at is not None and time.monotonic() - self._warned_at < WARNING_LASTS_S
+        lasting = [self._remind(event, sentence) for check in self._checks for event, sentence in check()]
+        self._note_unheard()
         if recent:
             status.summary(DiagnosticStatus.WARN, self._warning)
+        elif lasting:
+            status.summary(DiagnosticStatus.WARN, lasting[0])
         elif not self.counts:
             status.summary(DiagnosticStatus.STALE, 'no input yet')
         else:
             status.summary(DiagnosticStatus.OK, 'working')
         for event, amount in list(self.counts.items()):
             status.add(event, str(amount))
+        for name, text in self._answers() + [entry for shown in self._shown for entry in shown()]:
+            status.add(name, text)
         return status
+
+    def _remind(self, event, sentence):
+        """Log what lasts, now and then; returns the sentence."""
+        now_s = time.monotonic()
+        if now_s - self._logged_at.get(event, -REMINDER_S) >= REMINDER_S:
+            self._logged_at[event] = now_s
+            rospy.logwarn('%s', sentence)
+        return sentence
+
+    def _note_unheard(self):
+        """Say once that nobody subscribes, and again after somebody did: that is no fault of the node."""
+        now_s, topics = time.monotonic(), unheard()
+        if not topics:
+            self._heard_s = now_s
+        elif self._heard_s is not None and now_s - self._heard_s > UNHEARD_S:
+            self._heard_s = None
+            rospy.loginfo('nobody subscribes %s: nobody sees what this node finds', ' or '.join(topics))
+
+    def _answers(self):
+        """(name, text) of what was answered since the last report."""
+        lags_ns, self._lags_ns = self._lags_ns, []
+        now_s = time.monotonic()
+        passed_s, self._looked_s = max(now_s - self._looked_s, 1e-3), now_s
+        answers = [('rate', '%.1f Hz' % (len(lags_ns) / passed_s))]
+        if lags_ns:
+            mean_ms, most_ms = (1000 * lag_ns / NS for lag_ns in (sum(lags_ns) / len(lags_ns), max(lags_ns)))
+            answers.append(('latency', 'mean %.1f ms, most %.1f ms from stamp to result' % (mean_ms, most_ms)))
+        return answers
 
     def _run(self):
         while not rospy.is_shutdown():

@@ -71,6 +71,7 @@ class PlannerBridgeNode(object):
         self._news = None
         self._diagnostics = Diagnostics()
         self._transforms = Transforms(self._params.tf_timeout)
+        self._diagnostics.show('tf age', self._transforms.age)
         rospy.on_shutdown(self._empty_all)
         subscribe(TRACKS_TOPIC, TrackedObjectArray, self._on_tracks, 2)
         self._timer = rospy.Timer(rospy.Duration.from_sec(self._params.resend_period), self._on_timer, reset=True)
@@ -83,6 +84,7 @@ class PlannerBridgeNode(object):
                 for topic in self._topics:
                     self._send(topic, news.arrival_ns)
             self._diagnostics.count('tracks handed on')
+            self._diagnostics.answered(message.header.stamp)
 
     def _read(self, message):
         """The news in a message. Raises ValueError where a planner should not see them."""

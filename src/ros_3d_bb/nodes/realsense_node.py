@@ -103,6 +103,7 @@ class RealSenseNode(object):
         for topic, message in image_messages_of(CameraFrame(header, camera.camera, pair.color, pair.depth, ())):
             self._pubs[topic].publish(message)
         self._diagnostics.count('images')
+        self._diagnostics.answered(stamp)
 
     def _tell_time(self, stamp_ns):
         if self._clock_pub is not None:

@@ -62,6 +62,7 @@ class ReplayNode(object):
             for topic, message in messages:
                 self._pubs[topic].publish(restamped(message, stamp))
             self._diagnostics.count('images')
+            self._diagnostics.answered(stamp)
 
 
 def main():

@@ -108,6 +108,7 @@ class SimulatorNode(object):
         for topic, message in messages:
             self._pubs[topic].publish(message)
         self._diagnostics.count('images')
+        self._diagnostics.answered(time_from(stamp_ns))
 
     def _tell_time(self, stamp_ns):
         if self._clock_pub is not None:

@@ -30,7 +30,9 @@ class TrackerNode(object):
         self._markers = MarkerWriter(marker_params)
         self._lock = threading.Lock()
         self._diagnostics = Diagnostics()
-        self._follower = Follower(params, tracking, self._diagnostics, Transforms(params.tf_timeout))
+        transforms = Transforms(params.tf_timeout)
+        self._diagnostics.show('tf age', transforms.age)
+        self._follower = Follower(params, tracking, self._diagnostics, transforms)
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
         self._subscribe()
@@ -57,6 +59,7 @@ class TrackerNode(object):
             if followed is None:
                 return
             self._tracks_pub.publish(tracks_to_message(followed.tracks, followed.header))
+            self._diagnostics.answered(followed.header.stamp)
             if self._markers_pub.get_num_connections():
                 self._markers_pub.publish(self._markers.write(followed.tracks, followed.header))
 

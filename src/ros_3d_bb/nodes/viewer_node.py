@@ -11,7 +11,7 @@ from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
 from ros_3d_bb.images import depth_from, rgb_from
-from ros_3d_bb.messages import BOXES3D_TOPIC, boxes2d_from_message, boxes3d_from_message, camera_from_message, stamp_of
+from ros_3d_bb.messages import BOXES3D_TOPIC, boxes2d_from_message, boxes3d_from_message, camera_from_message, stamp_of, time_from
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
@@ -222,6 +222,7 @@ class ViewerNode(object):
         view = View(snapshot.color.pixels, snapshot.depth, snapshot.boxes2d, snapshot.boxes3d, lines,
                     tuple(self._warnings(snapshot, is_early, rate_hz)))
         self._window.show(compose(view, self._params.panel_width, self._params.depth_image_range))
+        self._diagnostics.answered(time_from(snapshot.stamp_ns))
         return news
 
     def _warnings(self, snapshot, is_early, rate_hz):

@@ -27,7 +27,7 @@ class Yolov5Node(object):
         self._output = BoxesOutput(self._params.publish_empty)
         self._worker = NewestWorker(self._search, self._on_error)
         rospy.on_shutdown(self._worker.stop)
-        self._switch = Switch(self._params.enabled)
+        self._switch = Switch(self._params.enabled, self._diagnostics)
         subscribe(COLOR_TOPIC, Image, self._on_image, 1)
         rospy.loginfo('looking for %s with %s on %s', ', '.join(map(str, detection.classes)), self._params.weights,
                       self._detector.description)
@@ -45,6 +45,8 @@ class Yolov5Node(object):
         image, found = search_color(self._detector, message)
         self._diagnostics.count('images searched')
         self._output.publish(message.header, image, found, self._detector.names)
+        self._diagnostics.answered(message.header.stamp)
+        self._switch.answered()
 
     def _on_error(self, error):
         self._diagnostics.warn('searches failed', 'the detector failed: %s; waiting for the next image' % error)

@@ -1,0 +1,1 @@
+"""What keeps a pipeline from working, and what to do about it: from observations to sentences."""

@@ -1,0 +1,55 @@
+"""Depth that is not aligned to colour, and depth in other units than its encoding says."""
+import numpy as np
+
+GRID = 16  # as many rows and columns of a depth image are looked at
+LEAST_SAMPLES = 8  # fewer valid pixels say nothing
+NEAREST_M, FARTHEST_M = 0.1, 100.0  # no depth camera of people measures outside
+SAME_PX = 1.0  # intrinsics that differ by less are the same: half a pixel is 1 cm at 6 m
+
+
+def units_fault(depth):
+    """Whether a depth image counts in other units than it is read in, by where most of a few hundred pixels lie.
+
+    Parameters
+    ----------
+    depth : estimation.DepthImage
+
+    Returns
+    -------
+    str
+        A sentence, empty where nothing is wrong.
+    """
+    values = depth.values[::max(1, depth.values.shape[0] // GRID), ::max(1, depth.values.shape[1] // GRID)]
+    valid = values[np.isfinite(values) & (values > 0)]
+    if valid.size < LEAST_SAMPLES:
+        return ''
+    median_m = float(np.median(valid)) * depth.scale_m
+    if NEAREST_M <= median_m <= FARTHEST_M:
+        return ''
+    integers = depth.values.dtype.kind == 'u'
+    unit = 'metres' if median_m < NEAREST_M else 'millimetres'
+    return ('the depth image has the wrong unit: half of its pixels are nearer than %.3g m; it seems to hold %s in a %s, '
+            'which has to hold %s (REP 118), or set depth_scale'
+            % (median_m, unit, '16UC1' if integers else '32FC1', 'millimetres' if integers else 'metres'))
+
+
+def intrinsics_fault(color, depth):
+    """In what the camera of a depth image differs from that of the colour image; a phrase, empty where in nothing.
+
+    Parameters
+    ----------
+    color, depth : geometry.Camera
+    """
+    if color[:2] != depth[:2]:
+        return 'the depth camera has %d x %d pixels, the colour camera %d x %d' % (depth[:2] + color[:2])
+    if max(abs(mine - other) for mine, other in zip(color[2:6], depth[2:6])) > SAME_PX:
+        return ('the intrinsics fx fy cx cy of depth are %.1f %.1f %.1f %.1f, those of colour %.1f %.1f %.1f %.1f'
+                % (depth[2:6] + color[2:6]))
+    return ''
+
+
+def frames_fault(color_frame, depth_frame):
+    """Whether a depth image says that it was taken in another frame than the colour image; a phrase, or empty."""
+    if color_frame and depth_frame and color_frame.lstrip('/') != depth_frame.lstrip('/'):
+        return 'the depth image is in the frame %s, the colour camera in %s' % (depth_frame, color_frame)
+    return ''

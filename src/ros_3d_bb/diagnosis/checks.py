@@ -1,0 +1,204 @@
+"""All checks of a graph or a bag: from what was seen to findings, what is wrong first named where it begins.
+
+A check whose ground is missing is left out: without depth images nothing is said of their units.
+"""
+from ros_3d_bb.diagnosis.camera_faults import frames_fault, intrinsics_fault
+from ros_3d_bb.diagnosis.seen import Finding
+from ros_3d_bb.diagnosis.tf_tree import why_missing
+from ros_3d_bb.diagnosis.topic_faults import (LATE_S, LEAST_PAIRED, LEAST_RATE_HZ, clock_fault, paired_share,
+                                              silence_fault, span)
+
+COLOR, DEPTH, INFO, BOXES2D, BOXES3D, TRACKS = 'color', 'depth', 'info', 'boxes2d', 'boxes3d', 'tracks'
+IMAGES = COLOR, DEPTH, INFO
+ALIGN = ('start the camera with realsense.launch, or realsense2_camera with align_depth:=true, and take '
+         'camera/aligned_depth_to_color/image_raw')
+
+
+def findings(seen):
+    """What is well and what is wrong, a list of Finding.
+
+    Parameters
+    ----------
+    seen : Seen
+    """
+    found = _clock(seen)
+    has_boxes_only = seen.is_bag and has_come(seen, BOXES2D) and not has_come(seen, COLOR)
+    found += [_stream(seen, key) for key in IMAGES if not (has_boxes_only and key == COLOR)]
+    found += _camera(seen) + _alignment(seen) + _encodings(seen) + _stamps(seen) + _pairs_of_images(seen)
+    found += _transforms(seen) + _detector(seen) + _pairs_of_boxes(seen) + _results(seen)
+    return found + _nodes(seen, any(finding.is_wrong for finding in found))
+
+
+def has_come(seen, key):
+    """Whether messages of the right type came on the topic of a role."""
+    return key in seen.streams and seen.streams[key].count > 0
+
+
+def _judged(subject, fact, fault='', fix=''):
+    return Finding(subject, '' if fault else fact, fault, fix)
+
+
+def _clock(seen):
+    if seen.clock is None:
+        return []
+    if seen.clock.use_sim_time and not seen.clock.count:
+        return [Finding('time', fault='/use_sim_time is set and nothing comes on /clock: time stands still for all nodes',
+                        fix='play the bag with rosbag play --clock, or rosparam set use_sim_time false, and start the '
+                            'nodes again')]
+    if seen.clock.count and not seen.clock.use_sim_time:
+        return [Finding('time', fault='somebody publishes /clock, and /use_sim_time is not set: nodes do not heed it',
+                        fix='rosparam set use_sim_time true before the nodes start')]
+    return [Finding('time', 'from /clock' if seen.clock.use_sim_time else "the machine's clock")]
+
+
+def _stream(seen, key):
+    stream = seen.streams[key]
+    if not stream.count:
+        taken = [other.topic for other in seen.streams.values() if other.count]
+        return Finding(stream.role.title, '', *silence_fault(stream, seen.topics, taken, seen.seconds))
+    if key in (COLOR, DEPTH) and 0 < stream.rate_hz < LEAST_RATE_HZ:
+        return Finding(stream.role.title, '', 'only %.1f Hz on %s' % (stream.rate_hz, stream.topic),
+                       'USB 3, a wired network, a lower resolution or rate of the camera (realsense.launch fps:=15)')
+    return Finding(stream.role.title, '%s, %.1f Hz' % (stream.topic, stream.rate_hz))
+
+
+def _camera(seen):
+    if seen.color_camera is None:
+        return []
+    camera, frame_id, fault = seen.color_camera
+    return [_judged('camera', '%d x %d pixels, focal length %.0f, frame %s' % (camera[:3] + (frame_id,))
+                    if camera else '', fault and '%s: %s' % (seen.streams[INFO].topic, fault),
+                    'a RealSense fills it in by itself; calibrate other cameras (camera_calibration), and give the '
+                    'driver the file')]
+
+
+def _alignment(seen):
+    """Depth has to have the pixels, the intrinsics and the frame of colour."""
+    if seen.depth is None or seen.color_camera is None or seen.color_camera.camera is None:
+        return []
+    camera, frame_id, _fault = seen.color_camera
+    fault = ''
+    if (seen.depth.width, seen.depth.height) != camera[:2]:
+        fault = 'the depth image has %d x %d pixels, the colour camera %d x %d' % (
+            (seen.depth.width, seen.depth.height) + camera[:2])
+    elif seen.depth_camera is not None and seen.depth_camera.camera is not None:
+        fault = intrinsics_fault(camera, seen.depth_camera.camera)
+    return [_judged('alignment', 'depth has the pixels and the frame of colour',
+                    fault or frames_fault(frame_id, seen.depth.frame_id), ALIGN)]
+
+
+def _encodings(seen):
+    found = []
+    for subject, image, fix in (
+            ('colour', seen.color, 'set the camera to rgb8 or bgr8'),
+            ('depth', seen.depth, 'mend the driver; where it cannot be, set depth_scale to metres per unit in '
+             'config/bbox3d.yaml and config/tracker.yaml: 1.0 for metres, 0.001 for millimetres')):
+        if image is not None:
+            found.append(_judged(subject + ' encoding', '%s, %d x %d pixels' % (image.encoding, image.width,
+                                                                              image.height), image.fault, fix))
+    return found
+
+
+def _stamps(seen):
+    found = []
+    for key in IMAGES:
+        stream = seen.streams[key]
+        if not has_come(seen, key):
+            continue
+        if not stream.stamps_ns:
+            found.append(Finding('stamps', '', 'the messages on %s carry no stamp (zero)' % stream.topic,
+                                 'its publisher has to copy the time at which the image was taken'))
+        elif seen.is_bag:
+            if abs(stream.lag_s) > LATE_S:
+                return found + [Finding('stamps', '', 'the stamps on %s are %s from the time of their recording'
+                                        % (stream.topic, span(abs(stream.lag_s))),
+                                        'where a bag is recorded of one that is played, set use_sim_time and play with '
+                                        '--clock; process_bag takes this one as it is')]
+        elif seen.clock is None or not (seen.clock.use_sim_time and not seen.clock.count):
+            fault, fix = clock_fault(stream, seen.clock is not None and seen.clock.use_sim_time)
+            if fault:
+                return found + [Finding('stamps', '', fault, fix)]
+    if not found and has_come(seen, DEPTH) and seen.streams[DEPTH].lag_s is not None:
+        found.append(Finding('stamps', 'depth images come %s after their stamp' % span(seen.streams[DEPTH].lag_s)))
+    return found
+
+
+def _pairs_of_images(seen):
+    share = None
+    if has_come(seen, COLOR) and has_come(seen, DEPTH):
+        share = paired_share(seen.streams[COLOR].stamps_ns, seen.streams[DEPTH].stamps_ns, seen.stamp_tolerance_s)
+    if share is None:
+        return []
+    return [_judged('pairs', '%.0f %% of the colour images have a depth image with their stamp' % (100 * share),
+                    'only %.0f %% of the colour images have a depth image with their stamp, within %g s'
+                    % (100 * share, seen.stamp_tolerance_s) if share < LEAST_PAIRED else '',
+                    'take depth that is aligned to colour (realsense.launch), one rate for both, or a larger '
+                    'stamp_tolerance (config/bbox3d.yaml)')]
+
+
+def _transforms(seen):
+    if seen.tf is None:
+        return []
+    target, source, stamp_s, links, fault = seen.tf
+    subject = 'transforms'
+    if not fault:
+        return [Finding(subject, '%s to %s is known at the stamp of the image' % (source, target))]
+    why, fix = why_missing(links, target, source, stamp_s)
+    return [Finding(subject, '', 'no transform from %s to %s at the stamp of the image: %s' % (source, target,
+                                                                                              why or fault),
+                    fix or 'look at rosrun tf view_frames')]
+
+
+def _detector(seen):
+    """Images come: then boxes have to, with nobody in view, too."""
+    if has_come(seen, BOXES2D):
+        return [Finding('detector', '%s, %.1f Hz' % (seen.streams[BOXES2D].topic, seen.streams[BOXES2D].rate_hz))]
+    if not has_come(seen, COLOR) or seen.is_bag:
+        return []
+    fault, fix = silence_fault(seen.streams[BOXES2D], seen.topics, (), seen.seconds)
+    return [Finding('detector', '', 'images come and no 2D boxes: %s' % fault, fix)]
+
+
+def _pairs_of_boxes(seen):
+    if not (has_come(seen, BOXES2D) and has_come(seen, DEPTH)):
+        return []
+    boxes, depth = seen.streams[BOXES2D], seen.streams[DEPTH]
+    if not boxes.stamps_ns:
+        return [Finding('boxes and depth', 'the 2D boxes carry no stamp: paired by when they come (assumed_delay)')]
+    share = paired_share(boxes.stamps_ns, depth.stamps_ns, seen.stamp_tolerance_s)
+    late_s = boxes.lag_s - depth.lag_s if boxes.lag_s is not None and depth.lag_s is not None else 0.0
+    if late_s > seen.cache_length_s:
+        return [Finding('boxes and depth', '', 'the 2D boxes come %.1f s after their depth image, which is kept for '
+                        '%g s' % (late_s, seen.cache_length_s),
+                        'a faster detector (smaller network, device:=cuda), or a larger cache_length '
+                        '(config/bbox3d.yaml)')]
+    if share is not None and share < LEAST_PAIRED:
+        return [Finding('boxes and depth', '', 'only %.0f %% of the 2D boxes have a depth image with their stamp'
+                        % (100 * share), 'the detector has to copy the stamp of its image into the label, or write no '
+                        'label at all; compare rostopic echo %s' % boxes.topic)]
+    return [] if share is None else [Finding('boxes and depth', '%.0f %% paired by stamp' % (100 * share))]
+
+
+def _results(seen):
+    """3D boxes and tracks, as far as what they are made of came."""
+    found = []
+    sound = all(has_come(seen, key) for key in (DEPTH, INFO, BOXES2D)) and not seen.is_bag
+    for key, needs, subject in ((BOXES3D, sound, '3D boxes'),
+                                (TRACKS, has_come(seen, BOXES3D) and not (seen.tf and seen.tf.fault), 'tracks')):
+        if has_come(seen, key):
+            stream = seen.streams[key]
+            found.append(Finding(subject, '%s, %.1f Hz' % (stream.topic, stream.rate_hz)))
+        elif needs and not seen.is_bag and key in seen.streams:
+            found.append(Finding(subject, '', *silence_fault(seen.streams[key], seen.topics, (), seen.seconds)))
+    return found
+
+
+def _nodes(seen, is_explained):
+    """What nodes say of themselves; of what is wrong only where no other check has said why."""
+    found = []
+    for name, (level, sentence) in sorted(seen.nodes.items()):
+        if level == 0:
+            found.append(Finding(name, sentence))
+        elif not is_explained:
+            found.append(Finding(name, '', sentence, 'see its log, and "When nothing is shown" in the README'))
+    return found

@@ -1,0 +1,88 @@
+"""From messages to what was seen of them, the same for a running graph and for a bag."""
+import collections
+
+from ros_3d_bb.diagnosis.camera_faults import units_fault
+from ros_3d_bb.diagnosis.roles import ROLES
+from ros_3d_bb.diagnosis.seen import CameraSeen, ImageSeen, Stream
+from ros_3d_bb.images import depth_from, rgb_from
+from ros_3d_bb.messages import boxes2d_from_message, camera_from_message
+from ros_3d_bb.stamped import NS
+
+KEPT = 1000  # stamps of a topic
+
+
+class Observation(object):
+    """The messages of one topic: how many, their stamps, when they came, and the newest.
+
+    Parameters
+    ----------
+    key : str
+        A role, see `roles.ROLES`.
+    topic : str
+    """
+
+    def __init__(self, key, topic):
+        self.role, self.topic, self.newest = ROLES[key], topic, None
+        self._count, self._first_s, self._last_s = 0, None, None
+        self._stamps_ns, self._lags_s = collections.deque(maxlen=KEPT), (None, None)
+
+    def take(self, message, came_s, ros_ns, machine_s=None):
+        """Take a message that came at `came_s` on any clock, at a ROS time, and at a time of the machine's clock."""
+        self._count += 1
+        self._first_s, self._last_s = came_s if self._first_s is None else self._first_s, came_s
+        self.newest = message
+        stamp_ns = _stamp_in(message)
+        if stamp_ns:
+            self._stamps_ns.append(stamp_ns)
+            self._lags_s = (ros_ns - stamp_ns) / NS, None if machine_s is None else machine_s - stamp_ns / NS
+
+    @property
+    def middle_ns(self):
+        """A stamp from the middle of the time, for which transforms must have come; None where there is none."""
+        return self._stamps_ns[len(self._stamps_ns) // 2] if self._stamps_ns else None
+
+    def stream(self, published_kind, publishers=()):
+        """The Stream that was seen."""
+        passed_s = self._last_s - self._first_s if self._count > 1 else 0.0
+        return Stream(self.role, self.topic, published_kind, publishers, self._count,
+                      (self._count - 1) / passed_s if passed_s > 0 else 0.0, tuple(self._stamps_ns), *self._lags_s)
+
+
+def _stamp_in(message):
+    """The stamp of a message, or of the image that it is about; None where it carries none that can be read."""
+    if hasattr(message, 'header'):
+        return message.header.stamp.to_nsec()
+    try:
+        return boxes2d_from_message(message).stamp_ns
+    except ValueError:
+        return None
+
+
+def camera_seen(message):
+    """The CameraSeen of a CameraInfo, None of None."""
+    if message is None:
+        return None
+    try:
+        return CameraSeen(camera_from_message(message), message.header.frame_id)
+    except ValueError as error:
+        return CameraSeen(None, message.header.frame_id, str(error))
+
+
+def color_seen(message):
+    """The ImageSeen of a colour image, None of None."""
+    return _image_seen(message, rgb_from, lambda _pixels: '')
+
+
+def depth_seen(message):
+    """The ImageSeen of a depth image, None of None."""
+    return _image_seen(message, depth_from, units_fault)
+
+
+def _image_seen(message, read, fault_of):
+    if message is None:
+        return None
+    try:
+        fault = fault_of(read(message))
+    except ValueError as error:
+        fault = str(error)
+    return ImageSeen(message.width, message.height, message.encoding, message.header.frame_id, fault)

@@ -1,0 +1,28 @@
+"""The topics of the pipeline, by role."""
+from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS
+from ros_3d_bb.diagnosis.seen import Role
+from ros_3d_bb.messages import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
+
+IMAGE, CAMERA = 'sensor_msgs/Image', 'the camera (roslaunch ros_3d_bb realsense.launch)'
+CAMERA_SILENT = 'is the camera plugged in, the bag still playing (not paused), the network fast enough for images?'
+DETECTOR_SILENT = ('is the detector paused (rosservice call /yolov5_node/enable true), still loading its weights, or '
+                   'told to say nothing of empty images (publish_empty: false)?')
+ROLES = {
+    COLOR: Role('colour images', COLOR_TOPIC, IMAGE, 'camera_image', CAMERA, CAMERA_SILENT),
+    DEPTH: Role('depth images', DEPTH_TOPIC, IMAGE, 'camera_depth', CAMERA, CAMERA_SILENT),
+    INFO: Role('camera_info', INFO_TOPICS[0], 'sensor_msgs/CameraInfo', 'camera_info', CAMERA, CAMERA_SILENT),
+    BOXES2D: Role('2D boxes', BOXES_TOPIC, 'std_msgs/Int32MultiArray', 'bb_topic',
+                  'a detector (pipeline.launch detector:=yolov5 or depth)', DETECTOR_SILENT),
+    BOXES3D: Role('3D boxes', BOXES3D_TOPIC, 'ros_3d_bb/BoundingBox3DArray', '', 'bbox3d_node (pipeline.launch)',
+                  'see what bbox3d_node says in its log'),
+    TRACKS: Role('tracks', TRACKS_TOPIC, 'ros_3d_bb/TrackedObjectArray', '', 'tracker_node (pipeline.launch)',
+                 'see what tracker_node says in its log')}
+
+
+def role_named(name, kind):
+    """The Role of what a node calls a topic; a plain one where it is none of the pipeline's."""
+    for role in ROLES.values():
+        if role.name == name:
+            return role
+    return Role(kind, name, kind, '', 'its publisher', 'is its publisher at work?')

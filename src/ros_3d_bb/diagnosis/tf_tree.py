@@ -1,0 +1,103 @@
+"""What tf knows, in a sentence: which frames, which link is missing, which one stands still."""
+from typing import NamedTuple
+
+from yaml import YAMLError
+
+from ros_3d_bb.params import nearest_name
+from ros_3d_bb.yaml_file import load_yaml
+
+NAMED = 8  # frames that a sentence names
+
+
+class Link(NamedTuple):
+    """A frame's parent, and the time between whose stamps the transform is known, seconds; 0 and 0: always."""
+
+    parent: str
+    oldest_s: float
+    newest_s: float
+
+    @property
+    def is_static(self):
+        """Whether it is known for all times."""
+        return self.newest_s == 0
+
+
+def links_in(text):
+    """The links {frame: Link} in what tf2's all_frames_as_yaml says; none where a frame's name makes it no YAML."""
+    try:
+        entries = load_yaml(text) or {}
+    except YAMLError:
+        return {}
+    return {str(frame): Link(str(entry['parent']), float(entry['oldest_transform']),
+                             float(entry['most_recent_transform']))
+            for frame, entry in entries.items()}
+
+
+def chain(links, frame):
+    """A frame, its parent, and so on to the root."""
+    found = [frame]
+    while found[-1] in links and links[found[-1]].parent not in found:
+        found.append(links[found[-1]].parent)
+    return found
+
+
+def why_missing(links, target, source, stamp_s):
+    """Why there is no transform from a camera's frame to the fixed frame of the tracks at a stamp.
+
+    Returns
+    -------
+    str, str
+        What is wrong, and what to do. Empty where the links say nothing against it.
+    """
+    frames = set(links) | set(link.parent for link in links.values())
+    if not frames:
+        return ('tf knows no frames at all: nobody publishes /tf or /tf_static',
+                "start the robot's description (robot_state_publisher) and localisation; for a camera alone: "
+                'frame_world:=%s' % source)
+    if source not in frames:
+        return _unknown_source(frames, source)
+    up, down = chain(links, source), chain(links, target)
+    if target not in frames:
+        return ('tf knows no frame %s; it knows %s, and there it ends' % (target, ' < '.join(up)),
+                'start what localises the robot in %s, or track in another frame: frame_world:=%s' % (target, up[-1]))
+    if up[-1] != down[-1]:
+        return ('tf has two trees, %s and %s, and nothing links them'
+                % (' < '.join(up), ' < '.join(down)), _missing_link(frames, up[-1], target))
+    return _why_untimely(links, up, down, stamp_s)
+
+
+def _unknown_source(frames, source):
+    known = sorted(frames)
+    return ('tf knows no frame %s; it knows %s%s'
+            % (source, ', '.join(known[:NAMED]), ' and %d more' % (len(known) - NAMED) if len(known) > NAMED else ''),
+            'publish where the camera is: rosrun tf2_ros static_transform_publisher X Y Z YAW PITCH ROLL base_link %s; '
+            'or, if it has another name in tf, such as %s: frame_id:=%s'
+            % ((source,) + 2 * (nearest_name(source, known),)))
+
+
+def _missing_link(frames, root, target):
+    parent = 'base_link' if root != 'base_link' and 'base_link' in frames else target
+    if root in ('odom', 'base_link'):
+        return 'start what localises the robot (publishes %s to %s), or frame_world:=%s' % (target, root, root)
+    return 'rosrun tf2_ros static_transform_publisher X Y Z YAW PITCH ROLL %s %s' % (parent, root)
+
+
+def _why_untimely(links, up, down, stamp_s):
+    """Of frames in one tree: the link between them that is not known at the stamp; 0 asks for the newest."""
+    if not stamp_s:
+        return '', ''
+    between = [frame for frame in up if frame not in down] + [frame for frame in down if frame not in up]
+    moving = [(links[frame], frame) for frame in between if not links[frame].is_static]
+    behind = [(link.newest_s, link, frame) for link, frame in moving if link.newest_s < stamp_s]
+    if behind:
+        newest_s, link, frame = min(behind)
+        return ('the transform from %s to %s ends %.3f s before the stamp of the image'
+                % (frame, link.parent, stamp_s - newest_s),
+                'is what publishes %s still running, in time, and on a machine with the same clock?' % frame)
+    ahead = [(link.oldest_s, link, frame) for link, frame in moving if link.oldest_s > stamp_s]
+    if ahead:
+        oldest_s, link, frame = max(ahead)
+        return ('the transform from %s to %s begins %.3f s after the stamp of the image'
+                % (frame, link.parent, oldest_s - stamp_s),
+                'images from before the start need nothing; else compare the clocks of the machines (chrony)')
+    return '', ''

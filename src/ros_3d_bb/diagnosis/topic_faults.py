@@ -1,0 +1,92 @@
+"""Topics on which nothing comes, stamps that are far from now, and stamps that do not pair."""
+from ros_3d_bb.params import nearest_name
+from ros_3d_bb.stamped import NS
+
+LATE_S, EARLY_S = 5.0, 2.0  # by so much a stamp may be before and after ROS time
+LEAST_RATE_HZ = 4.0  # of images; people who walk are lost between slower ones
+LEAST_PAIRED = 0.5  # share of boxes that find their depth image
+
+
+def silence_fault(stream, topics, taken=(), seconds=5.0):
+    """Why nothing came on a topic, and what to do: (fault, fix).
+
+    Parameters
+    ----------
+    stream : Stream
+    topics : dict
+        {name: type} of all that is published.
+    taken : collection of str
+        Topics that have another role already and are not suggested.
+    seconds : float
+        How long it was waited for.
+    """
+    role, topic = stream.role, stream.topic
+    if not stream.published_kind:
+        return 'nobody publishes %s' % topic, _rename(stream, topics, taken)
+    if stream.published_kind != role.kind:
+        return ('%s has the type %s; %s expected' % (topic, stream.published_kind, role.kind),
+                _rename(stream, topics, taken))
+    unreachable = [publisher for publisher in stream.publishers if publisher.problem]
+    names = ', '.join(publisher.node for publisher in stream.publishers) or 'somebody'
+    if unreachable:
+        return ('nothing comes on %s: %s publishes it, but %s' % (topic, unreachable[0].node, unreachable[0].problem),
+                'set ROS_IP on both machines to the address that the other one reaches (or let their names be known in '
+                '/etc/hosts) and start the nodes again; of a node that is gone: rosnode cleanup')
+    return ('nothing has come on %s for %.0f s, though %s publishes it' % (topic, seconds, names), role.when_silent)
+
+
+def _rename(stream, topics, taken):
+    role = stream.role
+    others = [name for name, kind in topics.items() if kind == role.kind and name != stream.topic and name not in taken]
+    if not others:
+        return 'start %s; nothing else of the type %s is published' % (role.source, role.kind)
+    other = nearest_name(stream.topic, sorted(others))
+    launch = ' (launch argument %s:=%s)' % (role.argument, other) if role.argument else ''
+    return 'start %s, or, if it is %s, remap %s:=%s%s' % (role.source, other, role.name, other, launch)
+
+
+def clock_fault(stream, use_sim_time):
+    """Why the stamps on a topic are far from ROS time, and what to do: (fault, fix); empty where they are not."""
+    lag_s = stream.lag_s
+    if lag_s is None or -EARLY_S <= lag_s <= LATE_S:
+        return '', ''
+    fault = 'the stamps on %s are %s %s ROS time' % (stream.topic, span(abs(lag_s)), 'before' if lag_s > 0 else 'after')
+    if use_sim_time and stream.machine_lag_s is not None and -EARLY_S <= stream.machine_lag_s <= LATE_S:
+        return (fault + ', which comes from /clock; they are of the clock of the machine',
+                'for a camera that runs now: rosparam set use_sim_time false, and start the nodes again')
+    if use_sim_time:
+        return fault + ', which comes from /clock', 'let only one bag or simulator publish /clock'
+    if lag_s > 3600:
+        return (fault + ', the clock of this machine',
+                'a bag is played with rosbag play --clock, and rosparam set use_sim_time true before the nodes start')
+    return (fault + ', the clock of this machine',
+            'set the clocks of all machines by one of them (chrony); or what comes before takes that long')
+
+
+def span(seconds):
+    """A time in words that one can grasp."""
+    for unit, length_s in (('days', 86400.0), ('hours', 3600.0), ('minutes', 60.0)):
+        if seconds >= 2 * length_s:
+            return '%.1f %s' % (seconds / length_s, unit)
+    return '%.1f s' % seconds
+
+
+def paired_share(stamps_ns, among_ns, tolerance_s):
+    """The share of stamps that have a partner among others, of those from the time that the others cover.
+
+    Returns
+    -------
+    float or None
+        None where that time has none.
+    """
+    others = sorted(among_ns)
+    tolerance_ns = int(tolerance_s * NS)
+    covered = [stamp for stamp in stamps_ns if others and others[0] <= stamp <= others[-1]]
+    if not covered:
+        return None
+    paired, at = 0, 0
+    for stamp in sorted(covered):
+        while at < len(others) and others[at] < stamp - tolerance_ns:
+            at += 1
+        paired += at < len(others) and others[at] <= stamp + tolerance_ns
+    return paired / float(len(covered))

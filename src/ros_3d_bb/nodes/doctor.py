@@ -1,0 +1,111 @@
+"""The command `doctor`: what keeps a running pipeline, or a bag, from working, and the fix of each."""
+import argparse
+import os
+import socket
+import sys
+import time
+from urllib.parse import urlparse
+
+import rosgraph
+import rospy
+
+from ros_3d_bb.bag_reading import BagError
+from ros_3d_bb.diagnosis.bag_look import look_at_bag
+from ros_3d_bb.diagnosis.checks import findings
+from ros_3d_bb.diagnosis.seen import Finding
+from ros_3d_bb.nodes.graph import PATIENCE_S
+from ros_3d_bb.nodes.graph_look import GraphLook
+
+LOCAL = 'localhost', '127.0.0.1', '127.0.1.1', '::1'
+
+
+def main():
+    """The command. The exit status is 0 where all is well, 1 where something is wrong."""
+    arguments = _parser().parse_args(rospy.myargv()[1:])
+    if arguments.bag:
+        found = bag_findings(arguments)
+    else:
+        found = machine_findings()
+        if not any(finding.is_wrong for finding in found):
+            rospy.init_node('doctor', anonymous=True)
+            found += graph_findings(arguments)
+    wrong = sum(finding.is_wrong for finding in found)
+    for finding in found:
+        print('\n'.join(finding.lines))
+    print('doctor: %s' % ('all is well' if not wrong else '1 thing is wrong' if wrong == 1
+                          else '%d things are wrong' % wrong))
+    sys.stdout.flush()
+    sys.exit(1 if wrong else 0)
+
+
+def bag_findings(arguments):
+    """The findings about a bag."""
+    names = dict(remapping.split(':=') for remapping in sys.argv if ':=' in remapping)
+
+    def name_of(topic):
+        return '/' + names.get(topic, topic).lstrip('/')
+    try:
+        seen = look_at_bag(arguments.bag, name_of, arguments.target_frame or 'map')
+    except BagError as error:
+        return [Finding('bag', '', str(error), 'rosbag info %s says what is in it' % arguments.bag)]
+    return findings(seen)
+
+
+def graph_findings(arguments):
+    """The findings about the running graph: listen again as long as something is wrong and there is patience."""
+    deadline_s = time.monotonic() + arguments.patience
+    while True:
+        look = GraphLook(arguments.target_frame)
+        time.sleep(arguments.seconds)
+        found = findings(look.seen())
+        look.close()
+        if not any(finding.is_wrong for finding in found) or time.monotonic() >= deadline_s or rospy.is_shutdown():
+            return found
+
+
+def machine_findings():
+    """Whether there is a master, and whether others can reach this machine by the name that it goes by."""
+    uri = os.environ.get('ROS_MASTER_URI', '')
+    address = urlparse(uri)
+    fix = ('roscore, or roslaunch, starts one on this machine; of a robot: export ROS_MASTER_URI=http://ROBOT:11311')
+    if not (address.hostname and address.port):
+        return [Finding('master', '', 'ROS_MASTER_URI is %r; http://HOST:11311 expected' % uri, fix)]
+    try:
+        socket.create_connection((address.hostname, address.port), PATIENCE_S).close()
+        rosgraph.Master('/doctor').getPid()
+    except socket.gaierror:
+        return [Finding('master', '', 'this machine does not know the name %s (ROS_MASTER_URI=%s)'
+                        % (address.hostname, uri), 'export ROS_MASTER_URI with the address in numbers, or put the name '
+                        'into /etc/hosts')]
+    except (OSError, rosgraph.MasterException) as error:
+        return [Finding('master', '', 'no ROS master answers at %s (%s)' % (uri, getattr(error, 'strerror', None)
+                                                                           or error), fix)]
+    return [Finding('master', uri), _own_name(address.hostname)]
+
+
+def _own_name(master_host):
+    """Others connect to this machine by that name."""
+    name = rosgraph.network.get_host_name()
+    try:
+        socket.getaddrinfo(name, None)
+    except socket.gaierror:
+        return Finding('this machine', '', 'it calls itself %s, a name that it does not know itself' % name,
+                       'export ROS_IP with the address by which the others reach it, or put the name into /etc/hosts')
+    if name in LOCAL and master_host not in LOCAL:
+        return Finding('this machine', '', 'it calls itself %s, and the master is on %s: nobody there can reach it'
+                       % (name, master_host), 'export ROS_IP with the address by which the others reach it, and start '
+                       'the nodes here again')
+    return Finding('this machine', 'calls itself %s' % name)
+
+
+def _parser():
+    parser = argparse.ArgumentParser(
+        prog='doctor', description='Say what keeps a running pipeline, or a bag, from working, and the fix of each. '
+        'Topics with other names are given as remappings: camera/color/image_raw:=/front/color/image_raw')
+    parser.add_argument('bag', nargs='?', help='a bag; without one the running graph is listened to')
+    parser.add_argument('--seconds', type=float, default=5.0, metavar='S', help='how long to listen (default: 5)')
+    parser.add_argument('--patience', type=float, default=0.0, metavar='S',
+                        help='listen again for so long while something is wrong: nodes may be starting (default: 0)')
+    parser.add_argument('--target-frame', default='', metavar='FRAME',
+                        help="fixed frame of the tracks (default: tracker_node's, of a bag map)")
+    return parser

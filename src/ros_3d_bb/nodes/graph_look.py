@@ -1,0 +1,115 @@
+"""What goes on in a running graph, for the checks: its topics, listened to for some seconds."""
+import functools
+import os
+import time
+
+import rospy
+import tf2_ros
+from diagnostic_msgs.msg import DiagnosticArray
+from rosgraph_msgs.msg import Clock as ClockMessage
+from sensor_msgs.msg import CameraInfo
+
+from ros_3d_bb.diagnosis.bag_look import CLASSES, tf_seen
+from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, INFO
+from ros_3d_bb.diagnosis.observing import Observation, camera_seen, color_seen, depth_seen
+from ros_3d_bb.diagnosis.roles import ROLES
+from ros_3d_bb.diagnosis.seen import Clock, Seen
+from ros_3d_bb.nodes.graph import published_topics, publishers_of
+from ros_3d_bb.nodes.transport import IMAGE_BUFFER
+
+NAMES_S = 1.5  # nodes say once a second what their topics are called
+OURS = ': pipeline'  # ends the names of our nodes' diagnostics
+
+
+class GraphLook(object):
+    """Listens to the graph; `seen` says what came. Names of topics: those that doctor is given as remappings, else those
+    that the running nodes say they use.
+    """
+
+    def __init__(self, target_frame=''):
+        self._target_frame, self._statuses = target_frame, {}
+        self._clocks, self._depth_info = [], None
+        self._buffer = tf2_ros.Buffer(debug=False)
+        self._listener = tf2_ros.TransformListener(self._buffer)
+        self._subscribers = [rospy.Subscriber('/diagnostics', DiagnosticArray, self._on_diagnostics),
+                             rospy.Subscriber('/clock', ClockMessage, self._clocks.append, queue_size=10)]
+        time.sleep(NAMES_S)
+        self._topics = published_topics()
+        self._observed = {key: Observation(key, self._topic_of(role.name)) for key, role in ROLES.items()}
+        self._began_s = time.monotonic()
+        for key, one in self._observed.items():
+            if self._topics.get(one.topic) == one.role.kind:
+                self._subscribe(one.topic, CLASSES[key], functools.partial(self._on_message, one))
+        self._subscribe(os.path.dirname(self._observed[DEPTH].topic) + '/camera_info', CameraInfo, self._on_depth_info)
+
+    def close(self):
+        """Listen no more."""
+        self._listener.unregister()
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+
+    def seen(self):
+        """What was seen until now, a Seen."""
+        self._topics.update(published_topics())
+        streams = {key: one.stream(self._topics.get(one.topic, ''), self._publishers(one))
+                   for key, one in self._observed.items()}
+        newest = {key: one.newest for key, one in self._observed.items()}
+        return Seen(
+            streams, _to_be_suggested(self._topics), time.monotonic() - self._began_s,
+            color_camera=camera_seen(newest[INFO]), depth_camera=camera_seen(self._depth_info),
+            color=color_seen(newest[COLOR]), depth=depth_seen(newest[DEPTH]), tf=self._tf(newest[BOXES3D]),
+            clock=Clock(bool(rospy.get_param('/use_sim_time', False)), len(self._clocks)),
+            nodes={name: self._statuses[name][:2] for name in self._statuses},
+            stamp_tolerance_s=self._param('bbox3d_node', 'stamp_tolerance', 0.005),
+            cache_length_s=self._param('bbox3d_node', 'cache_length', 1.0))
+
+    def lookup(self, target_frame, source_frame, stamp):
+        """As of `BagTransforms`."""
+        return self._buffer.lookup_transform(target_frame.lstrip('/'), source_frame.lstrip('/'), stamp)
+
+    def frames_as_yaml(self):
+        """As of `BagTransforms`."""
+        return self._buffer.all_frames_as_yaml()
+
+    def _tf(self, boxes3d):
+        target = self._target_frame or self._param('tracker_node', 'target_frame', 'map')
+        source = self._param('tracker_node', 'camera_frame', '') or (
+            boxes3d.header.frame_id if boxes3d is not None else self._param('bbox3d_node', 'frame_id', ''))
+        return tf_seen(self, self._observed[DEPTH], target, source)
+
+    def _param(self, node, name, default):
+        return rospy.get_param(rospy.resolve_name('%s/%s' % (node, name)), default)
+
+    def _publishers(self, one):
+        return () if one.newest is not None or one.topic not in self._topics else publishers_of(one.topic, False)
+
+    def _topic_of(self, name):
+        """What a topic of the nodes is called in this graph."""
+        resolved = rospy.resolve_name(name)
+        if resolved != rospy.get_namespace() + name:
+            return resolved
+        said = [values['input ' + name] for _level, _sentence, values in self._statuses.values()
+                if 'input ' + name in values]
+        return said[0].split()[0] if said else resolved
+
+    def _subscribe(self, topic, kind, callback):
+        self._subscribers.append(rospy.Subscriber(topic, kind, callback, queue_size=10, buff_size=IMAGE_BUFFER))
+
+    def _on_message(self, one, message):
+        one.take(message, time.monotonic(), rospy.get_rostime().to_nsec(), time.time())
+
+    def _on_depth_info(self, message):
+        self._depth_info = message
+
+    def _on_diagnostics(self, message):
+        prefix = rospy.get_namespace().strip('/')
+        for status in message.status:
+            if status.name.endswith(OURS) and status.name.startswith(prefix):
+                values = {entry.key: entry.value for entry in status.values}
+                self._statuses[status.name[:-len(OURS)]] = ord(status.level) if isinstance(
+                    status.level, bytes) else status.level, status.message, values
+
+
+def _to_be_suggested(topics):
+    """Without our own images, which no camera sends."""
+    return {name: kind for name, kind in topics.items() if '/ros_3d_bb/' not in name or not kind.endswith('/Image')}

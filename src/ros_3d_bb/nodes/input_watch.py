@@ -1,0 +1,79 @@
+"""What a node's topics say of what is wrong around it: silence, stamps far from now, time that stands still."""
+import time
+
+import rospy
+from rospy.topics import get_topic_manager
+
+from ros_3d_bb.diagnosis.roles import role_named
+from ros_3d_bb.diagnosis.seen import Stream
+from ros_3d_bb.diagnosis.topic_faults import clock_fault, silence_fault
+from ros_3d_bb.nodes.graph import published_topics, publishers_of
+from ros_3d_bb.nodes.transport import inputs
+
+SILENT_S = 5.0
+ASKED_S = 10.0  # between two questions to the master about one topic
+NO_RESULTS = '/rosout', '/diagnostics', '/clock', '/tf', '/tf_static'
+
+
+class InputWatch(object):
+    """Looks at the inputs once a second; costs their callbacks nothing but a note of each message."""
+
+    def __init__(self):
+        self._began_s, self._looked_s = time.monotonic(), time.monotonic()
+        self._counts, self._silences = {}, {}
+
+    def values(self):
+        """(name, text) of each input: its topic, and its rate since the last call."""
+        now_s = time.monotonic()
+        passed_s, self._looked_s = max(now_s - self._looked_s, 1e-3), now_s
+        for noted in inputs():
+            new = noted.count - self._counts.get(noted, 0)
+            self._counts[noted] = noted.count
+            yield 'input ' + noted.name, '%s %.1f Hz' % (noted.subscriber.resolved_name, new / passed_s)
+
+    def faults(self):
+        """(event, sentence) of what is wrong now."""
+        if rospy.rostime.is_rostime_initialized() and not rospy.get_rostime() and rospy.get_param('/use_sim_time', 0):
+            yield 'time stands still', ('/use_sim_time is set and nothing comes on /clock; play the bag with rosbag '
+                                        'play --clock, or rosparam set use_sim_time false, and start the nodes again')
+            return
+        now_s = time.monotonic()
+        for noted in inputs():
+            if now_s - (noted.came_s or self._began_s) > SILENT_S:
+                yield 'silence on ' + noted.name, self._silence(noted, now_s)
+            elif noted.count:
+                fault = clock_fault(_stream(noted), not rospy.rostime.is_wallclock())
+                if fault[0]:
+                    yield 'clocks', '%s; %s' % fault
+
+    def _silence(self, noted, now_s):
+        """Why nothing comes; the master is not asked about it each time."""
+        asked_s, sentence = self._silences.get(noted, (-ASKED_S, ''))
+        if now_s - asked_s < ASKED_S:
+            return sentence
+        others = inputs()
+        taken = set(other.subscriber.resolved_name for other in others if other.count) | set(get_topic_manager().pubs)
+        try:
+            topics = published_topics()
+            connected = noted.subscriber.get_num_connections() > 0
+            stream = _stream(noted)._replace(publishers=publishers_of(noted.subscriber.resolved_name, connected))
+            stream = stream._replace(published_kind=topics.get(stream.topic, ''))
+            sentence = '%s; %s' % silence_fault(stream, topics, taken, now_s - (noted.came_s or self._began_s))
+        except (OSError, rospy.ROSException) as error:
+            sentence = 'nothing comes on %s, and the master does not answer (%s)' % (_stream(noted).topic, error)
+        self._silences[noted] = now_s, sentence
+        return sentence
+
+
+def unheard():
+    """The results of this node, where nobody subscribes any of them; empty where somebody does."""
+    results = [(topic, publisher) for topic, publisher in sorted(get_topic_manager().pubs.items())
+               if topic not in NO_RESULTS]
+    return [] if any(publisher.has_connections() for _topic, publisher in results) else [
+        topic for topic, _publisher in results]
+
+
+def _stream(noted):
+    lag_s, machine_lag_s = noted.lags_s
+    return Stream(role_named(noted.name, noted.kind._type), noted.subscriber.resolved_name, count=noted.count,
+                  lag_s=lag_s, machine_lag_s=machine_lag_s)
