@@ -26,7 +26,9 @@ ASSIGNMENT = os.path.join('tracking', 'association.py')  # SciPy's solver has no
 # know ROS messages, bags and transforms, but neither nodes nor topics nor a master
 ROS_TYPES = {'bag_processing.py', 'bag_reading.py', 'bag_transforms.py', 'bags.py', 'camera_messages.py',
              'following.py', 'lifting.py', 'markers.py', 'messages.py', 'pipeline.py', 'planner_messages.py',
-             'process_bag.py', 'report.py', 'searching.py', 'simulator_messages.py'}
+             'process_bag.py', 'report.py', 'searching.py', 'simulator_messages.py',
+             os.path.join('diagnosis', 'bag_look.py'), os.path.join('diagnosis', 'observing.py'),
+             os.path.join('diagnosis', 'roles.py')}
 
 # what a session is, without the windows that show it
 WITHOUT_WINDOW = {'__init__.py', 'analysis.py', 'command_line.py', 'document.py', 'drafts.py', 'entries.py',

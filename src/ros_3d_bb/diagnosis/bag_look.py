@@ -79,7 +79,7 @@ def _read(reader, observed, depth_info, seconds):
         if time_ns - begin_ns > seconds * NS:
             break
         take, kind = takers[raw.topic]
-        _try(lambda: take(message_in(raw, kind), time_ns / NS, time_ns))
+        _try(lambda: take(message_in(raw, kind), time_ns))
     return transforms
 
 

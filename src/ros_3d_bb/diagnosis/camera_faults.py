@@ -28,8 +28,8 @@ def units_fault(depth):
         return ''
     integers = depth.values.dtype.kind == 'u'
     unit = 'metres' if median_m < NEAREST_M else 'millimetres'
-    return ('the depth image has the wrong unit: half of its pixels are nearer than %.3g m; it seems to hold %s in a %s, '
-            'which has to hold %s (REP 118), or set depth_scale'
+    return ('the depth image has the wrong unit: half of its pixels are nearer than %.3g m; it seems to hold %s in a '
+            '%s, which has to hold %s (REP 118), or set depth_scale'
             % (median_m, unit, '16UC1' if integers else '32FC1', 'millimetres' if integers else 'metres'))
 
 

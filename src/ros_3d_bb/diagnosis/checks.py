@@ -42,7 +42,7 @@ def _clock(seen):
     if seen.clock is None:
         return []
     if seen.clock.use_sim_time and not seen.clock.count:
-        return [Finding('time', fault='/use_sim_time is set and nothing comes on /clock: time stands still for all nodes',
+        return [Finding('time', fault='/use_sim_time is set and nothing comes on /clock: time stands still',
                         fix='play the bag with rosbag play --clock, or rosparam set use_sim_time false, and start the '
                             'nodes again')]
     if seen.clock.count and not seen.clock.use_sim_time:
@@ -94,33 +94,38 @@ def _encodings(seen):
             ('depth', seen.depth, 'mend the driver; where it cannot be, set depth_scale to metres per unit in '
              'config/bbox3d.yaml and config/tracker.yaml: 1.0 for metres, 0.001 for millimetres')):
         if image is not None:
-            found.append(_judged(subject + ' encoding', '%s, %d x %d pixels' % (image.encoding, image.width,
-                                                                              image.height), image.fault, fix))
+            fact = '%s, %d x %d pixels' % (image.encoding, image.width, image.height)
+            found.append(_judged(subject + ' encoding', fact, image.fault, fix))
     return found
 
 
 def _stamps(seen):
-    found = []
+    """Stamps that are missing, or far from now; the first fault is enough."""
     for key in IMAGES:
         stream = seen.streams[key]
         if not has_come(seen, key):
             continue
         if not stream.stamps_ns:
-            found.append(Finding('stamps', '', 'the messages on %s carry no stamp (zero)' % stream.topic,
-                                 'its publisher has to copy the time at which the image was taken'))
-        elif seen.is_bag:
-            if abs(stream.lag_s) > LATE_S:
-                return found + [Finding('stamps', '', 'the stamps on %s are %s from the time of their recording'
-                                        % (stream.topic, span(abs(stream.lag_s))),
-                                        'where a bag is recorded of one that is played, set use_sim_time and play with '
-                                        '--clock; process_bag takes this one as it is')]
-        elif seen.clock is None or not (seen.clock.use_sim_time and not seen.clock.count):
-            fault, fix = clock_fault(stream, seen.clock is not None and seen.clock.use_sim_time)
-            if fault:
-                return found + [Finding('stamps', '', fault, fix)]
-    if not found and has_come(seen, DEPTH) and seen.streams[DEPTH].lag_s is not None:
-        found.append(Finding('stamps', 'depth images come %s after their stamp' % span(seen.streams[DEPTH].lag_s)))
-    return found
+            return [Finding('stamps', '', 'the messages on %s carry no stamp (zero)' % stream.topic,
+                            'its publisher has to copy the time at which the image was taken')]
+        fault, fix = _stamp_fault(seen, stream)
+        if fault:
+            return [Finding('stamps', '', fault, fix)]
+    if not has_come(seen, DEPTH):
+        return []
+    return [Finding('stamps', 'depth images come %s after them' % span(max(0.0, seen.streams[DEPTH].lag_s)))]
+
+
+def _stamp_fault(seen, stream):
+    if seen.is_bag:
+        if abs(stream.lag_s) <= LATE_S:
+            return '', ''
+        return ('the stamps on %s are %s from the time of their recording' % (stream.topic, span(abs(stream.lag_s))),
+                'where a bag is recorded of one that is played, set use_sim_time and play with --clock; process_bag '
+                'takes this one as it is')
+    if seen.clock.use_sim_time and not seen.clock.count:
+        return '', ''  # said already
+    return clock_fault(stream, seen.clock.use_sim_time)
 
 
 def _pairs_of_images(seen):
@@ -129,9 +134,9 @@ def _pairs_of_images(seen):
         share = paired_share(seen.streams[COLOR].stamps_ns, seen.streams[DEPTH].stamps_ns, seen.stamp_tolerance_s)
     if share is None:
         return []
-    return [_judged('pairs', '%.0f %% of the colour images have a depth image with their stamp' % (100 * share),
-                    'only %.0f %% of the colour images have a depth image with their stamp, within %g s'
-                    % (100 * share, seen.stamp_tolerance_s) if share < LEAST_PAIRED else '',
+    fact = '%.0f %% of the colour images have a depth image with their stamp' % (100 * share)
+    return [_judged('pairs', fact,
+                    'only %s, within %g s' % (fact, seen.stamp_tolerance_s) if share < LEAST_PAIRED else '',
                     'take depth that is aligned to colour (realsense.launch), one rate for both, or a larger '
                     'stamp_tolerance (config/bbox3d.yaml)')]
 
@@ -144,9 +149,8 @@ def _transforms(seen):
     if not fault:
         return [Finding(subject, '%s to %s is known at the stamp of the image' % (source, target))]
     why, fix = why_missing(links, target, source, stamp_s)
-    return [Finding(subject, '', 'no transform from %s to %s at the stamp of the image: %s' % (source, target,
-                                                                                              why or fault),
-                    fix or 'look at rosrun tf view_frames')]
+    said = 'no transform from %s to %s at the stamp of the image: %s' % (source, target, why or fault)
+    return [Finding(subject, '', said, fix or 'look at rosrun tf view_frames')]
 
 
 def _detector(seen):

@@ -23,13 +23,13 @@ class Observation(object):
 
     def __init__(self, key, topic):
         self.role, self.topic, self.newest = ROLES[key], topic, None
-        self._count, self._first_s, self._last_s = 0, None, None
+        self._count, self._first_ns, self._last_ns = 0, None, None
         self._stamps_ns, self._lags_s = collections.deque(maxlen=KEPT), (None, None)
 
-    def take(self, message, came_s, ros_ns, machine_s=None):
-        """Take a message that came at `came_s` on any clock, at a ROS time, and at a time of the machine's clock."""
+    def take(self, message, ros_ns, machine_s=None):
+        """Take a message that came at a ROS time, and at a time of the machine's clock."""
         self._count += 1
-        self._first_s, self._last_s = came_s if self._first_s is None else self._first_s, came_s
+        self._first_ns, self._last_ns = ros_ns if self._first_ns is None else self._first_ns, ros_ns
         self.newest = message
         stamp_ns = _stamp_in(message)
         if stamp_ns:
@@ -43,7 +43,7 @@ class Observation(object):
 
     def stream(self, published_kind, publishers=()):
         """The Stream that was seen."""
-        passed_s = self._last_s - self._first_s if self._count > 1 else 0.0
+        passed_s = (self._last_ns - self._first_ns) / NS if self._count > 1 else 0.0  # less than 0 where time jumps
         return Stream(self.role, self.topic, published_kind, publishers, self._count,
                       (self._count - 1) / passed_s if passed_s > 0 else 0.0, tuple(self._stamps_ns), *self._lags_s)
 

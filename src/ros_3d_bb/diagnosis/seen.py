@@ -79,8 +79,10 @@ class Clock(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """All that was observed; None where nothing was. `topics`: {name: type} of all that is published; `nodes`: {name:
-    (level, sentence)} of what nodes say of themselves. `seconds`: for how long.
+    """All that was observed; None where nothing was. `clock` is None of a bag.
+
+    `topics`: {name: type} of all that is published; `nodes`: {name: (level, sentence)} of what nodes say of themselves;
+    `seconds`: for how long it was listened.
     """
 
     streams: Dict[str, Stream]

@@ -53,8 +53,8 @@ class Switch(object):
         came_s = min((noted.came_s or 0.0 for noted in inputs()), default=0.0)
         now_s = time.monotonic()
         if self.on and now_s - came_s < 1.0 and now_s - self._answered_s > SILENT_S:
-            yield 'no answers', ('the detector is silent: images come, and none has been answered for %.0f s; it hangs, '
-                                 'is starved of CPU, or refuses all of them' % (now_s - self._answered_s))
+            yield 'no answers', ('the detector is silent: images come, and none has been answered for %.0f s; it '
+                                 'hangs, is starved of CPU, or refuses all of them' % (now_s - self._answered_s))
 
     def _on_request(self, request):
         self.on = request.data

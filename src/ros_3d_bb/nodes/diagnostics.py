@@ -33,7 +33,8 @@ class Diagnostics(Tally):
 
     def __init__(self):
         super(Diagnostics, self).__init__()
-        self._warning, self._warned_at, self._logged_at = '', None, {}
+        self._warning, self._warned_at = '', None
+        self._logged_at, self._lasted = {}, set()
         self._lags_ns, self._looked_s, self._heard_s = [], time.monotonic(), time.monotonic()
         inputs = InputWatch()
         self._shown, self._checks = [inputs.values], [inputs.faults]
@@ -52,14 +53,11 @@ class Diagnostics(Tally):
     def warn(self, event, sentence):
         """Something was refused or missing; `sentence` says what, why, and what happens next."""
         self.count(event)
-        now_s = time.monotonic()
-        self._warning, self._warned_at = sentence, now_s
-        if now_s - self._logged_at.get(event, -WARNING_LASTS_S) >= WARNING_LASTS_S:
-            self._logged_at[event] = now_s
-            rospy.logwarn('%s', sentence)
+        self._warning, self._warned_at = sentence, time.monotonic()
+        self._log(event, sentence, WARNING_LASTS_S)
 
     def answered(self, stamp):
-        """An image of a stamp was answered: its result is published, or it has none. A rate and a latency come of it."""
+        """An image of a stamp was answered: its result is published, or it has none. Makes a rate and a latency."""
         self._lags_ns.append((rospy.get_rostime() - stamp).to_nsec())
 
     def show(self, name, text):
@@ -82,7 +80,7 @@ class Diagnostics(Tally):
 
     def _report(self, status):
         recent = self._warned_at is not None and time.monotonic() - self._warned_at < WARNING_LASTS_S
-        lasting = [self._remind(event, sentence) for check in self._checks for event, sentence in check()]
+        lasting = self._lasting()
         self._note_unheard()
         if recent:
             status.summary(DiagnosticStatus.WARN, self._warning)
@@ -98,13 +96,20 @@ class Diagnostics(Tally):
             status.add(name, text)
         return status
 
-    def _remind(self, event, sentence):
-        """Log what lasts, now and then; returns the sentence."""
+    def _lasting(self):
+        """The sentences about what is wrong now; each is logged when it begins, and now and then."""
+        faults = [fault for check in self._checks for fault in check()]
+        before, self._lasted = self._lasted, set(event for event, _sentence in faults)
+        for event, sentence in faults:
+            self._log(event, sentence, REMINDER_S if event in before else WARNING_LASTS_S)
+        return [sentence for _event, sentence in faults]
+
+    def _log(self, event, sentence, pause_s):
+        """Log a warning, unless the last one about the event is less than a pause ago."""
         now_s = time.monotonic()
-        if now_s - self._logged_at.get(event, -REMINDER_S) >= REMINDER_S:
+        if now_s - self._logged_at.get(event, float('-inf')) >= pause_s:
             self._logged_at[event] = now_s
             rospy.logwarn('%s', sentence)
-        return sentence
 
     def _note_unheard(self):
         """Say once that nobody subscribes, and again after somebody did: that is no fault of the node."""

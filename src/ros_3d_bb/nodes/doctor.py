@@ -74,12 +74,11 @@ def machine_findings():
         socket.create_connection((address.hostname, address.port), PATIENCE_S).close()
         rosgraph.Master('/doctor').getPid()
     except socket.gaierror:
-        return [Finding('master', '', 'this machine does not know the name %s (ROS_MASTER_URI=%s)'
-                        % (address.hostname, uri), 'export ROS_MASTER_URI with the address in numbers, or put the name '
-                        'into /etc/hosts')]
+        return [Finding('master', '', 'this machine does not know the name %s in ROS_MASTER_URI' % address.hostname,
+                        'export ROS_MASTER_URI with the address in numbers, or put the name into /etc/hosts')]
     except (OSError, rosgraph.MasterException) as error:
-        return [Finding('master', '', 'no ROS master answers at %s (%s)' % (uri, getattr(error, 'strerror', None)
-                                                                           or error), fix)]
+        reason = getattr(error, 'strerror', None) or error
+        return [Finding('master', '', 'no ROS master answers at %s (%s)' % (uri, reason), fix)]
     return [Finding('master', uri), _own_name(address.hostname)]
 
 

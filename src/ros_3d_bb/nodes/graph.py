@@ -1,4 +1,4 @@
-"""What the master and other nodes know of a topic: who publishes it, with what type, and whether they can be reached."""
+"""What the master knows of a topic: who publishes it, with what type; and whether those can be reached."""
 import socket
 from urllib.parse import urlparse
 

@@ -22,8 +22,9 @@ OURS = ': pipeline'  # ends the names of our nodes' diagnostics
 
 
 class GraphLook(object):
-    """Listens to the graph; `seen` says what came. Names of topics: those that doctor is given as remappings, else those
-    that the running nodes say they use.
+    """Listens to the graph; `seen` says what came.
+
+    Names of topics: those that doctor is given as remappings, else those that the running nodes say they use.
     """
 
     def __init__(self, target_frame=''):
@@ -96,7 +97,7 @@ class GraphLook(object):
         self._subscribers.append(rospy.Subscriber(topic, kind, callback, queue_size=10, buff_size=IMAGE_BUFFER))
 
     def _on_message(self, one, message):
-        one.take(message, time.monotonic(), rospy.get_rostime().to_nsec(), time.time())
+        one.take(message, rospy.get_rostime().to_nsec(), time.time())
 
     def _on_depth_info(self, message):
         self._depth_info = message

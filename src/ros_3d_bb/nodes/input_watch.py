@@ -33,11 +33,11 @@ class InputWatch(object):
 
     def faults(self):
         """(event, sentence) of what is wrong now."""
-        if rospy.rostime.is_rostime_initialized() and not rospy.get_rostime() and rospy.get_param('/use_sim_time', 0):
+        now_s = time.monotonic()
+        if now_s - self._began_s > SILENT_S and not rospy.get_rostime():
             yield 'time stands still', ('/use_sim_time is set and nothing comes on /clock; play the bag with rosbag '
                                         'play --clock, or rosparam set use_sim_time false, and start the nodes again')
             return
-        now_s = time.monotonic()
         for noted in inputs():
             if now_s - (noted.came_s or self._began_s) > SILENT_S:
                 yield 'silence on ' + noted.name, self._silence(noted, now_s)

@@ -11,7 +11,8 @@ from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
 from ros_3d_bb.images import depth_from, rgb_from
-from ros_3d_bb.messages import BOXES3D_TOPIC, boxes2d_from_message, boxes3d_from_message, camera_from_message, stamp_of, time_from
+from ros_3d_bb.messages import (BOXES3D_TOPIC, boxes2d_from_message, boxes3d_from_message, camera_from_message,
+                                stamp_of, time_from)
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node

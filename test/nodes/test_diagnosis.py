@@ -1,0 +1,272 @@
+"""What nodes and doctor say of a graph in which one thing is wrong, and that it is forgotten when that ends. Needs a
+master because the faults are those of topics, transforms and clocks.
+"""
+import argparse
+import os
+import subprocess
+import threading
+import time
+
+import numpy as np
+import pytest
+import rosgraph
+import rospy
+from geometry_msgs.msg import TransformStamped
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Int32MultiArray
+from tf2_msgs.msg import TFMessage
+
+from ros_3d_bb.images import fill_image
+from ros_3d_bb.messages import boxes2d_to_message, time_from
+from ros_3d_bb.nodes.doctor import graph_findings
+from ros_3d_bb.stamped import NS
+from support.ros import Recorder, camera_info, depth_message, diagnostics_of, header_at, wait_until
+
+COLOR, DEPTH = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
+INFO, DEPTH_INFO, BOXES = 'camera/color/camera_info', 'camera/aligned_depth_to_color/camera_info', 'yolo_bounding_box'
+KINDS = {'/tf': TFMessage, INFO: CameraInfo, DEPTH_INFO: CameraInfo, DEPTH: Image, COLOR: Image, BOXES: Int32MultiArray}
+PERIOD_S = 0.1
+
+
+class Rig(object):
+    """A camera and a detector at work; `change(topic, message)` returns what is sent instead, or None."""
+
+    def __init__(self):
+        self.change = unchanged
+        self.pubs = {topic: rospy.Publisher(topic, kind, queue_size=10) for topic, kind in KINDS.items()}
+        thread = threading.Thread(target=self._run)
+        thread.daemon = True
+        thread.start()
+
+    def _run(self):
+        while not rospy.is_shutdown():
+            stamp_ns = int(time.time() * NS)
+            for topic in KINDS:
+                message = self.change(topic, made(topic, stamp_ns))
+                if message is not None and topic in self.pubs:
+                    self.pubs[topic].publish(message)
+            time.sleep(PERIOD_S)
+
+
+def unchanged(_topic, message):
+    return message
+
+
+def made(topic, stamp_ns):
+    if topic == '/tf':
+        transform = TransformStamped(header=header_at(stamp_ns, 'map'), child_frame_id='camera_color_optical_frame')
+        turn = transform.transform.rotation
+        turn.x, turn.y, turn.z, turn.w = -0.5, 0.5, -0.5, 0.5
+        return TFMessage([transform])
+    if topic in (INFO, DEPTH_INFO):
+        return camera_info(stamp_ns)
+    if topic == DEPTH:
+        return depth_message(stamp_ns, 2000)
+    if topic == COLOR:
+        return fill_image(Image(header=header_at(stamp_ns)), np.zeros((48, 64, 3), np.uint8), 'rgb8')
+    return boxes2d_to_message(np.array([[20, 10, 44, 38]]), header_at(stamp_ns))
+
+
+def without(*topics):
+    """Nothing comes on some topics."""
+    return lambda topic, message: None if topic in topics else message
+
+
+def replaced(topic, make):
+    """A message of one topic is made anew."""
+    return lambda other, message: make(message) if other == topic else message
+
+
+def metres(message):
+    return fill_image(Image(header=message.header), np.full((48, 64), 2, np.uint16), '16UC1')
+
+
+def millimetres(message):
+    return fill_image(Image(header=message.header), np.full((48, 64), 2000, np.float32), '32FC1')
+
+
+def smaller(message):
+    return fill_image(Image(header=message.header), np.full((24, 32), 2000, np.uint16), '16UC1')
+
+
+def other_frame(message):
+    message.header.frame_id = 'camera_depth_optical_frame'
+    return message
+
+
+def empty(message):
+    return CameraInfo(header=message.header)
+
+
+def wider(message):
+    return camera_info(message.header.stamp.to_nsec(), focal=45.0)
+
+
+def long_ago(_topic, message):
+    """As of a bag of two years ago that is played without its clock."""
+    if isinstance(message, Int32MultiArray):
+        label, stamp = message.layout.dim[0].label, time_from(int((time.time() - 63e6) * NS))
+        message.layout.dim[0].label = label.split(';')[0] + ';stamp=%d.%09d;frame=c' % (stamp.secs, stamp.nsecs)
+        return message
+    for part in getattr(message, 'transforms', [message]):
+        part.header.stamp = part.header.stamp - rospy.Duration(63000000)
+    return message
+
+
+def old_boxes(message):
+    stamp_ns = int((time.time() - 3) * NS)
+    return boxes2d_to_message(np.array([[20, 10, 44, 38]]), header_at(stamp_ns))
+
+
+# what is wrong; who says what in its log; what doctor says, and its fix
+FAULTS = {
+    'no tf': (without('/tf'), 'tracker_node',
+              'the transform from camera_color_optical_frame to map ends', 'ends', 'is what publishes'),
+    'depth of another size': (replaced(DEPTH, smaller), 'bbox3d_node', 'depth must be aligned to colour',
+                              'the depth image has 32 x 24 pixels, the colour camera 64 x 48', 'realsense.launch'),
+    'depth of another camera': (replaced(DEPTH_INFO, wider), 'bbox3d_node', 'depth is not aligned to colour: the '
+                                'intrinsics', 'intrinsics fx fy cx cy of depth are 45.0', 'align_depth:=true'),
+    'depth in another frame': (replaced(DEPTH, other_frame), 'bbox3d_node', 'depth is not aligned to colour: the depth '
+                               'image is in the frame camera_depth_optical_frame', 'camera_depth_optical_frame',
+                               'align_depth:=true'),
+    'metres in a 16UC1': (replaced(DEPTH, metres), 'bbox3d_node', 'metres in a 16UC1', 'metres in a 16UC1',
+                          'depth_scale'),
+    'millimetres in a 32FC1': (replaced(DEPTH, millimetres), 'bbox3d_node', 'millimetres in a 32FC1',
+                               'millimetres in a 32FC1', 'depth_scale'),
+    'empty camera_info': (replaced(INFO, empty), 'bbox3d_node', 'camera_info refused: it is empty', 'it is empty',
+                          'camera_calibration'),
+    'stamps of two years ago': (long_ago, 'bbox3d_node', '729.2 days before ROS time', '729.2 days before ROS time',
+                                'use_sim_time'),
+    'no boxes': (without(BOXES), 'bbox3d_node', 'nothing has come on /yolo_bounding_box',
+                 'images come and no 2D boxes', 'enable'),
+    'boxes older than the cache': (replaced(BOXES, old_boxes), 'bbox3d_node', 's too old; the detector is slower',
+                                   'the 2D boxes come 3.0 s after their depth image', 'cache_length'),
+}
+
+
+@pytest.fixture(scope='module')
+def rig():
+    rospy.init_node('test_diagnosis')
+    return Rig()
+
+
+@pytest.fixture(scope='module')
+def log(rig):
+    with Recorder('/rosout', Log) as recorder:
+        yield recorder
+
+
+@pytest.fixture
+def healthy(rig):
+    """The graph, in which nothing is wrong before and after."""
+    rig.change = unchanged
+    wait_until_well()
+    yield rig
+    rig.change = unchanged
+    wait_until_well()
+
+
+def wait_until_well():
+    for node in ('bbox3d_node', 'tracker_node'):
+        wait_until(lambda: diagnostics_of(node)[:2] == (0, 'working'), '%s working' % node)
+
+
+def wait_for_line(log, node, words):
+    wait_until(lambda: any(message.name == '/' + node and words in message.msg for message in log.messages),
+               'the line %r of %s' % (words, node))
+
+
+def diagnosed():
+    """What doctor says is wrong, as it prints it."""
+    found = graph_findings(argparse.Namespace(seconds=2.0, patience=0.0, target_frame=''))
+    return '\n'.join(line for finding in found if finding.is_wrong for line in finding.lines)
+
+
+def test_of_a_healthy_graph_all_is_well(healthy):
+    process = subprocess.run(['rosrun', 'ros_3d_bb', 'doctor', '--seconds', '3', '--patience', '60'],
+                             stdout=subprocess.PIPE, universal_newlines=True)
+    lines = process.stdout.splitlines()
+    assert process.returncode == 0 and lines[-1] == 'doctor: all is well', process.stdout
+    assert all(line.startswith('ok ') for line in lines[:-1]) and len(lines) > 15
+
+
+def test_nodes_show_rates_latency_and_the_age_of_transforms(healthy):
+    for node in ('bbox3d_node', 'tracker_node'):
+        values = diagnostics_of(node)[2]
+        assert 0 < float(values['rate'].split()[0]) < 30 and values['latency'].endswith('from stamp to result')
+        assert values['input ' + DEPTH].startswith('/' + DEPTH)
+    assert abs(float(values['tf age'].split()[0])) < 5
+
+
+@pytest.mark.parametrize('name', sorted(FAULTS))
+def test_what_is_wrong_is_named_by_a_node_and_by_doctor_and_forgotten_at_its_end(healthy, log, name):
+    change, node, words, fault, fix = FAULTS[name]
+    log.emptied()
+    healthy.change = change
+    wait_for_line(log, node, words)
+    wait_until(lambda: words in diagnostics_of(node)[1] and diagnostics_of(node)[0] == 1, 'the state of ' + node)
+    said = diagnosed()
+    assert fault in said and fix in said, said
+
+
+def test_a_topic_of_another_name_is_suggested(healthy, log):
+    """Depth comes on the topic of another camera."""
+    log.emptied()
+    other = rospy.Publisher('front/aligned_depth_to_color/image_raw', Image, queue_size=1)
+    healthy.pubs.pop(DEPTH).unregister()
+    try:
+        wait_for_line(log, 'bbox3d_node', 'nobody publishes /%s; start the camera' % DEPTH)
+        said = diagnosed()
+        assert 'nobody publishes /' + DEPTH in said
+        assert 'camera_depth:=/front/aligned_depth_to_color/image_raw' in said
+    finally:
+        other.unregister()
+        healthy.pubs[DEPTH] = rospy.Publisher(DEPTH, Image, queue_size=10)
+
+
+def test_a_publisher_that_cannot_be_reached_is_named(healthy, log):
+    """A node on a machine whose name nobody here knows says that it publishes depth."""
+    ghost, address = rosgraph.Master('/ghost'), 'http://no.such.host.invalid:40000'
+    log.emptied()
+    healthy.pubs.pop(DEPTH).unregister()
+    ghost.registerPublisher('/' + DEPTH, 'sensor_msgs/Image', address)
+    try:
+        wait_for_line(log, 'bbox3d_node', '/ghost publishes it, but it calls its machine no.such.host.invalid')
+        said = diagnosed()
+        assert '/ghost publishes it, but it calls its machine no.such.host.invalid' in said and 'ROS_IP' in said
+    finally:
+        ghost.unregisterPublisher('/' + DEPTH, address)
+        healthy.pubs[DEPTH] = rospy.Publisher(DEPTH, Image, queue_size=10)
+
+
+def test_time_that_stands_still_is_named(healthy):
+    """A node that starts with /use_sim_time and without /clock, and doctor, in processes of their own."""
+    rospy.set_param('/use_sim_time', True)
+    try:
+        process = subprocess.Popen(['rosrun', 'ros_3d_bb', 'bbox3d_node', '__name:=without_time'])
+        wait_until(lambda: 'nothing comes on /clock' in diagnostics_of('without_time')[1], 'the reason')
+        doctor = subprocess.run(['rosrun', 'ros_3d_bb', 'doctor', '--seconds', '1'], stdout=subprocess.PIPE,
+                                universal_newlines=True)
+        assert doctor.returncode == 1 and 'nothing comes on /clock' in doctor.stdout
+        assert 'fix: play the bag with rosbag play --clock' in doctor.stdout
+    finally:
+        process.terminate()
+        process.wait()
+        rospy.delete_param('/use_sim_time')
+
+
+def test_the_pipeline_checks_itself_where_it_is_asked_to(healthy, tmp_path):
+    """Without a detector and with depth on a topic that nobody publishes."""
+    environment = dict(os.environ, ROS_NAMESPACE='/other')
+    process = subprocess.Popen(['roslaunch', 'ros_3d_bb', 'pipeline.launch', 'detector:=none', 'check:=true',
+                                'camera_depth:=/other/depth'], env=environment, stdout=subprocess.PIPE,
+                               universal_newlines=True)
+    said = ''
+    for line in process.stdout:
+        said += line
+        if 'doctor: ' in line:
+            break
+    process.terminate()
+    process.wait()
+    assert 'nobody publishes /other/depth' in said and 'wrong' in said
