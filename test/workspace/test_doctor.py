@@ -2,6 +2,7 @@
 import os
 import socket
 import subprocess
+import time
 from unittest import mock
 
 import numpy as np
@@ -33,10 +34,10 @@ def changed(bag, folder, change):
     """The bag with `change(topic, message)`, a (topic, message) pair or None, in place of each of its messages."""
     path = str(folder / 'changed.bag')
     with rosbag.Bag(bag) as before, rosbag.Bag(path, 'w') as after:
-        for topic, message, time in before.read_messages():
+        for topic, message, stamp in before.read_messages():
             pair = change(topic, message)
             if pair is not None:
-                after.write(pair[0], pair[1], time)
+                after.write(pair[0], pair[1], stamp)
     return path
 
 
@@ -171,6 +172,10 @@ def test_a_node_listens_to_the_depth_camera_until_it_is_that_of_colour(subscribe
     assert list(check.faults()) == [] and subscriber.call_count == 1
     check.color = info(focal=610.0)  # another one: compared anew
     assert list(check.faults()) == [] and subscriber.call_count == 2
+    subscriber.call_args[0][2](info(focal=610.0))
+    assert list(check.faults()) == []
+    with mock.patch('time.monotonic', lambda began_s=time.monotonic(): began_s + 11):  # the driver may be another one
+        assert list(check.faults()) == [] and subscriber.call_count == 3
 
 
 def test_a_depth_image_in_another_frame_is_named_where_names_can_be_relied_on(subscriber):

@@ -1,4 +1,6 @@
 """Whether depth is aligned to colour, by what the cameras of both say."""
+import time
+
 import rospy
 from sensor_msgs.msg import CameraInfo
 
@@ -6,12 +8,12 @@ from ros_3d_bb.camera_messages import DEPTH_TOPIC
 from ros_3d_bb.diagnosis.camera_faults import frames_fault, intrinsics_fault
 from ros_3d_bb.messages import camera_from_message
 
+AGAIN_S = 10.0  # until they are compared again: the driver may have been started anew
 REMEDY = 'start the camera with realsense.launch, or with align_depth:=true'
 
 
 class DepthCameraCheck(object):
-    """Compares the camera_info beside the depth image with that of colour until they agree, and again where that of
-    colour changes.
+    """Compares the camera_info beside the depth image with that of colour, now and then: it listens until they agree.
 
     The node sets what came last: `color`, a CameraInfo, and `depth_frame`. `with_frames`: whether the names of their
     frames can be relied on.
@@ -20,7 +22,7 @@ class DepthCameraCheck(object):
     def __init__(self, with_frames):
         self._with_frames = with_frames
         self.color, self.depth_frame = None, ''
-        self._agreed, self._depth, self._subscriber = None, None, None
+        self._agreed, self._agreed_s, self._depth, self._subscriber = None, None, None, None
 
     def faults(self):
         """(event, sentence) of what is wrong now. Asked once a second."""
@@ -37,7 +39,7 @@ class DepthCameraCheck(object):
             color = camera_from_message(message)
         except ValueError:  # the node says so
             return ''
-        if color == self._agreed:
+        if color == self._agreed and time.monotonic() - self._agreed_s < AGAIN_S:
             return ''
         if self._subscriber is None:
             topic = rospy.resolve_name(DEPTH_TOPIC).rpartition('/')[0] + '/camera_info'
@@ -45,7 +47,7 @@ class DepthCameraCheck(object):
         fault = intrinsics_fault(color, self._depth) if self._depth is not None else ''
         if self._depth is not None and not fault:
             self._subscriber.unregister()
-            self._agreed, self._depth, self._subscriber = color, None, None
+            self._agreed, self._agreed_s, self._depth, self._subscriber = color, time.monotonic(), None, None
         return fault
 
     def _on_depth_camera(self, message):

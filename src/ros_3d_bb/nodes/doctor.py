@@ -28,7 +28,10 @@ def main():
         found = machine_findings()
         if not any(finding.is_wrong for finding in found):
             rospy.init_node('doctor', anonymous=True)
-            found += graph_findings(arguments)
+            try:
+                found += graph_findings(arguments)
+            except (KeyboardInterrupt, OSError, rospy.ROSException) as error:
+                found.append(Finding('master', '', 'it ended while it was listened to (%s)' % error, 'start it again'))
     wrong = sum(finding.is_wrong for finding in found)
     for finding in found:
         print('\n'.join(finding.lines))

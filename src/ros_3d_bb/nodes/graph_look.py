@@ -107,8 +107,7 @@ class GraphLook(object):
         for status in message.status:
             if status.name.endswith(OURS) and status.name.startswith(prefix):
                 values = {entry.key: entry.value for entry in status.values}
-                self._statuses[status.name[:-len(OURS)]] = ord(status.level) if isinstance(
-                    status.level, bytes) else status.level, status.message, values
+                self._statuses[status.name[:-len(OURS)]] = status.level, status.message, values
 
 
 def _to_be_suggested(topics):
