@@ -152,6 +152,14 @@ def test_a_bag_needs_no_boxes_and_one_with_boxes_no_colour():
     assert not any(finding.is_wrong for finding in findings(seen))
 
 
+def test_what_a_bag_lacks_has_to_be_recorded():
+    seen = silent(INFO, published_kind='')._replace(is_bag=True, clock=None, color_camera=None)
+    wrong, = (finding for finding in findings(seen) if finding.is_wrong)
+    assert wrong.fault == 'there is no /camera/info in it' and wrong.fix.startswith('record it')
+    wrong, = (finding for finding in findings(silent(INFO)._replace(is_bag=True, clock=None)) if finding.is_wrong)
+    assert wrong.fault == 'there is nothing on /camera/info in the first 5 s'
+
+
 def test_stamps_far_from_the_time_of_recording_are_named():
     seen = with_stream(DEPTH, lag_s=7300.0)._replace(is_bag=True, clock=None)
     wrong, = (finding for finding in findings(seen) if finding.is_wrong)

@@ -10,11 +10,13 @@ import pytest
 import rosbag
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
+from std_srvs.srv import SetBoolRequest
 
 from ros_3d_bb.bags import scenario_images, write_bag
 from ros_3d_bb.diagnosis.bag_look import look_at_bag
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.images import fill_image
+from ros_3d_bb.nodes.boxes_output import Switch
 from ros_3d_bb.nodes.depth_camera import DepthCameraCheck
 from ros_3d_bb.simulation.scenario import scenario_from
 
@@ -62,8 +64,8 @@ def test_in_a_sound_bag_all_is_well(bag):
 
 def test_a_bag_without_camera_info_says_so_and_exits_with_1(bag, tmp_path):
     said, status = doctor(changed(bag, tmp_path, lambda topic, message: None if topic == INFO else (topic, message)))
-    assert status == 1 and 'wrong  camera_info: nobody publishes /camera/color/camera_info' in said
-    assert 'fix: start the camera' in said and 'camera_info:=' + DEPTH_INFO in said
+    assert status == 1 and 'wrong  camera_info: there is no /camera/color/camera_info in it' in said
+    assert 'fix: record it' in said and 'camera_info:=' + DEPTH_INFO in said
 
 
 def metres(topic, message):
@@ -105,7 +107,7 @@ def later(topic, message):
 
 @pytest.mark.parametrize('change, fault, fix', [
     (metres, 'metres in a 16UC1', 'depth_scale'),
-    (renamed, 'nobody publishes ' + DEPTH, 'camera_depth:=/front/depth/image_raw'),
+    (renamed, 'there is no %s in it' % DEPTH, 'camera_depth:=/front/depth/image_raw'),
     (other_intrinsics, 'the intrinsics fx fy cx cy of depth are 385.0', 'align_depth:=true'),
     (empty_info, 'it is empty', 'camera_calibration'),
     (small_depth, 'the depth image has 64 x 48 pixels, the colour camera 640 x 480', 'align_depth:=true'),
@@ -186,3 +188,35 @@ def test_a_depth_image_in_another_frame_is_named_where_names_can_be_relied_on(su
     check = DepthCameraCheck(with_frames=False)
     check.color, check.depth_frame = info(), 'camera_depth_optical_frame'
     assert list(check.faults()) == []
+
+
+class Noting(object):
+    """In place of Diagnostics: keeps what it is to show and to check."""
+
+    def show(self, _name, text):
+        self.text = text
+
+    def check(self, faults):
+        self.faults = faults
+
+
+def test_a_detector_that_answers_no_images_is_silent_unless_it_is_paused():
+    """Images come all the time; the clock of the machine is the test's."""
+    diagnostics, now_s = Noting(), [1000.0]
+    images = mock.Mock()
+    type(images).came_s = mock.PropertyMock(side_effect=lambda: now_s[0])
+    with mock.patch('time.monotonic', lambda: now_s[0]), mock.patch('rospy.Service') as service, \
+            mock.patch('ros_3d_bb.nodes.boxes_output.inputs', lambda: [images]):
+        switch = Switch(True, diagnostics)
+        now_s[0] += 4
+        assert list(diagnostics.faults()) == [] and diagnostics.text() == 'working'
+        now_s[0] += 2
+        (event, sentence), = diagnostics.faults()
+        assert event == 'no answers' and 'images come, and none has been answered for 6 s' in sentence
+        switch.answered()
+        assert list(diagnostics.faults()) == []
+        service.call_args[0][2](SetBoolRequest(False))
+        now_s[0] += 60
+        assert list(diagnostics.faults()) == [] and diagnostics.text() == 'paused'
+        service.call_args[0][2](SetBoolRequest(True))
+        assert list(diagnostics.faults()) == []

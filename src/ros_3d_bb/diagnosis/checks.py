@@ -55,7 +55,7 @@ def _stream(seen, key):
     stream = seen.streams[key]
     if not stream.count:
         taken = [other.topic for other in seen.streams.values() if other.count]
-        return Finding(stream.role.title, '', *silence_fault(stream, seen.topics, taken, seen.seconds))
+        return Finding(stream.role.title, '', *silence_fault(stream, seen.topics, taken, seen.seconds, seen.is_bag))
     if key in (COLOR, DEPTH) and 0 < stream.rate_hz < LEAST_RATE_HZ:
         return Finding(stream.role.title, '', 'only %.1f Hz on %s' % (stream.rate_hz, stream.topic),
                        'USB 3, a wired network, a lower resolution or rate of the camera (realsense.launch fps:=15)')

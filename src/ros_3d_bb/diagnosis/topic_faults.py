@@ -7,7 +7,7 @@ LEAST_RATE_HZ = 4.0  # of images; people who walk are lost between slower ones
 LEAST_PAIRED = 0.5  # share of boxes that find their depth image
 
 
-def silence_fault(stream, topics, taken=(), seconds=5.0):
+def silence_fault(stream, topics, taken=(), seconds=5.0, is_bag=False):
     """Why nothing came on a topic, and what to do: (fault, fix).
 
     Parameters
@@ -19,13 +19,16 @@ def silence_fault(stream, topics, taken=(), seconds=5.0):
         Topics that have another role already and are not suggested.
     seconds : float
         How long it was waited for.
+    is_bag : bool
+        Whether the topics are those of a bag.
     """
     role, topic = stream.role, stream.topic
-    if not stream.published_kind:
-        return 'nobody publishes %s' % topic, _rename(stream, topics, taken)
     if stream.published_kind != role.kind:
-        return ('%s has the type %s; %s expected' % (topic, stream.published_kind, role.kind),
-                _rename(stream, topics, taken))
+        fault = ('%s has the type %s; %s expected' % (topic, stream.published_kind, role.kind) if stream.published_kind
+                 else ('there is no %s in it' if is_bag else 'nobody publishes %s') % topic)
+        return fault, _rename(stream, topics, taken, 'record it' if is_bag else 'start ' + role.source)
+    if is_bag:
+        return 'there is nothing on %s in the first %.0f s' % (topic, seconds), 'record it from the start'
     unreachable = [publisher for publisher in stream.publishers if publisher.problem]
     names = ', '.join(publisher.node for publisher in stream.publishers) or 'somebody'
     if unreachable:
@@ -35,14 +38,14 @@ def silence_fault(stream, topics, taken=(), seconds=5.0):
     return ('nothing has come on %s for %.0f s, though %s publishes it' % (topic, seconds, names), role.when_silent)
 
 
-def _rename(stream, topics, taken):
+def _rename(stream, topics, taken, start):
     role = stream.role
     others = [name for name, kind in topics.items() if kind == role.kind and name != stream.topic and name not in taken]
     if not others:
-        return 'start %s; nothing else of the type %s is published' % (role.source, role.kind)
+        return '%s; there is nothing else of the type %s' % (start, role.kind)
     other = nearest_name(stream.topic, sorted(others))
     launch = ' (launch argument %s:=%s)' % (role.argument, other) if role.argument else ''
-    return 'start %s, or, if it is %s, remap %s:=%s%s' % (role.source, other, role.name, other, launch)
+    return '%s, or, if it is %s, remap %s:=%s%s' % (start, other, role.name, other, launch)
 
 
 def clock_fault(stream, use_sim_time):

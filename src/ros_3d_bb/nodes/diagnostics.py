@@ -58,7 +58,7 @@ class Diagnostics(Tally):
 
     def answered(self, stamp):
         """An image of a stamp was answered: its result is published, or it has none. Makes a rate and a latency."""
-        self._lags_ns.append((rospy.get_rostime() - stamp).to_nsec())
+        self._lags_ns.append(rospy.get_rostime().to_nsec() - stamp.to_nsec())
 
     def show(self, name, text):
         """Add a value to what is published: `text()` is asked for it once a second."""

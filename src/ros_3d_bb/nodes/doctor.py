@@ -13,7 +13,7 @@ from ros_3d_bb.bag_reading import BagError
 from ros_3d_bb.diagnosis.bag_look import look_at_bag
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.diagnosis.seen import Finding
-from ros_3d_bb.nodes.graph import PATIENCE_S
+from ros_3d_bb.nodes.graph import NO_ANSWER, PATIENCE_S
 from ros_3d_bb.nodes.graph_look import GraphLook
 
 LOCAL = 'localhost', '127.0.0.1', '127.0.1.1', '::1'
@@ -30,7 +30,7 @@ def main():
             rospy.init_node('doctor', anonymous=True)
             try:
                 found += graph_findings(arguments)
-            except (KeyboardInterrupt, OSError, rospy.ROSException) as error:
+            except (KeyboardInterrupt,) + NO_ANSWER as error:
                 found.append(Finding('master', '', 'it ended while it was listened to (%s)' % error, 'start it again'))
     wrong = sum(finding.is_wrong for finding in found)
     for finding in found:
@@ -79,7 +79,7 @@ def machine_findings():
     except socket.gaierror:
         return [Finding('master', '', 'this machine does not know the name %s in ROS_MASTER_URI' % address.hostname,
                         'export ROS_MASTER_URI with the address in numbers, or put the name into /etc/hosts')]
-    except (OSError, rosgraph.MasterException) as error:
+    except NO_ANSWER + (rosgraph.MasterException,) as error:
         reason = getattr(error, 'strerror', None) or error
         return [Finding('master', '', 'no ROS master answers at %s (%s)' % (uri, reason), fix)]
     return [Finding('master', uri), _own_name(address.hostname)]

@@ -1,5 +1,7 @@
 """What the master knows of a topic: who publishes it, with what type; and whether those can be reached."""
+import http.client
 import socket
+import xmlrpc.client
 from urllib.parse import urlparse
 
 import rospy
@@ -7,17 +9,18 @@ import rospy
 from ros_3d_bb.diagnosis.seen import Publisher
 
 PATIENCE_S = 2.0  # for a connection within one network
+NO_ANSWER = OSError, http.client.HTTPException, xmlrpc.client.Error, rospy.ROSException  # of a master that is not there
 
 
 def published_topics():
-    """{name: type} of all topics that somebody publishes. Raises OSError or rospy.ROSException without a master."""
+    """{name: type} of all topics that somebody publishes. Raises one of `NO_ANSWER` without a master."""
     return dict(rospy.get_published_topics())
 
 
 def publishers_of(topic, is_connected):
     """Who publishes a topic, a tuple of Publisher; of those that send nothing here, what keeps them from it.
 
-    Raises OSError or rospy.ROSException without a master.
+    Raises one of `NO_ANSWER` without a master.
     """
     master = rospy.get_master()
     _code, _text, (publishing, _subscribing, _services) = master.getSystemState()

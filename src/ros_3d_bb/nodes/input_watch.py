@@ -7,7 +7,7 @@ from rospy.topics import get_topic_manager
 from ros_3d_bb.diagnosis.roles import role_named
 from ros_3d_bb.diagnosis.seen import Stream
 from ros_3d_bb.diagnosis.topic_faults import clock_fault, silence_fault
-from ros_3d_bb.nodes.graph import published_topics, publishers_of
+from ros_3d_bb.nodes.graph import NO_ANSWER, published_topics, publishers_of
 from ros_3d_bb.nodes.transport import inputs
 
 SILENT_S = 5.0
@@ -59,7 +59,7 @@ class InputWatch(object):
             stream = _stream(noted)._replace(publishers=publishers_of(noted.subscriber.resolved_name, connected))
             stream = stream._replace(published_kind=topics.get(stream.topic, ''))
             sentence = '%s; %s' % silence_fault(stream, topics, taken, now_s - (noted.came_s or self._began_s))
-        except (OSError, rospy.ROSException) as error:
+        except NO_ANSWER as error:
             sentence = 'nothing comes on %s, and the master does not answer (%s)' % (_stream(noted).topic, error)
         self._silences[noted] = now_s, sentence
         return sentence

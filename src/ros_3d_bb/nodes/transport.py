@@ -49,7 +49,7 @@ class Input(object):
         if self._newest is None or not self._newest[0]:
             return None, None
         stamp, ros_time, machine_s = self._newest
-        return (ros_time - stamp).to_sec(), machine_s - stamp.to_sec()
+        return ros_time.to_sec() - stamp.to_sec(), machine_s - stamp.to_sec()
 
 
 def subscribe(topic, kind, callback, at_once=AT_ONCE):
