@@ -9,9 +9,9 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.bag_reading import BagError, BagReader, Raw, message_in
 from ros_3d_bb.bag_transforms import BagTransforms
 from ros_3d_bb.bags import new_bag
-from ros_3d_bb.camera_messages import COLOR_TOPIC, TF_TOPIC
+from ros_3d_bb.camera_messages import COLOR_TOPIC, STATIC_TOPIC, TF_TOPIC
 from ros_3d_bb.messages import BOXES_TOPIC
-from ros_3d_bb.pipeline import INPUTS, OUTPUTS, STATIC_TOPIC, Pipeline, Settings
+from ros_3d_bb.pipeline import INPUTS, OUTPUTS, Pipeline, Settings
 from ros_3d_bb.searching import opened_yolov5, search_color
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tally import Tally

@@ -12,7 +12,7 @@ from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.geometry import Camera, quaternion_from
 from ros_3d_bb.images import fill_image
 
-TF_TOPIC = 'tf'
+TF_TOPIC, STATIC_TOPIC = 'tf', 'tf_static'
 COLOR_TOPIC, DEPTH_TOPIC = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
 INFO_TOPICS = ('camera/color/camera_info', 'camera/aligned_depth_to_color/camera_info')
 TYPES = {TF_TOPIC: TFMessage, COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPICS[0]: CameraInfo,

@@ -6,7 +6,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, TF_TOPIC
+from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, STATIC_TOPIC, TF_TOPIC
 from ros_3d_bb.detection.bodies import DepthPeopleParams
 from ros_3d_bb.detection.checkpoint import cause
 from ros_3d_bb.detection.runtime import RuntimeParams
@@ -18,7 +18,7 @@ from ros_3d_bb.messages import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2
                                 tracks_to_message)
 from ros_3d_bb.searching import DepthDetectorParams, DepthSearch, Yolov5NodeParams
 
-STATIC_TOPIC, INFO_TOPIC = 'tf_static', INFO_TOPICS[0]
+INFO_TOPIC = INFO_TOPICS[0]
 INPUTS = {COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPIC: CameraInfo, BOXES_TOPIC: Int32MultiArray,
           TF_TOPIC: TFMessage, STATIC_TOPIC: TFMessage}
 OUTPUTS = BOXES3D_TOPIC, TRACKS_TOPIC, MARKERS_TOPIC

@@ -141,6 +141,15 @@ def test_what_follows_from_a_fault_is_not_named_beside_it():
     seen.streams[BOXES3D] = sound_stream(BOXES3D, count=0)
     seen.streams[TRACKS] = sound_stream(TRACKS, count=0)
     assert [finding.subject for finding in findings(seen) if finding.is_wrong] == ['depth images']
+    seen.streams[BOXES3D] = sound_stream(BOXES3D)  # of the images before
+    assert [finding.subject for finding in findings(seen) if finding.is_wrong] == ['depth images']
+
+
+def test_before_the_first_clock_nothing_is_said_of_stamps():
+    seen = sound(clock=Clock(True, 9))
+    for key in seen.streams:
+        seen.streams[key] = sound_stream(key, lag_s=None, machine_lag_s=None)
+    assert not any(finding.is_wrong or finding.subject == 'stamps' for finding in findings(seen))
 
 
 def test_a_bag_needs_no_boxes_and_one_with_boxes_no_colour():

@@ -111,7 +111,7 @@ def _stamps(seen):
         fault, fix = _stamp_fault(seen, stream)
         if fault:
             return [Finding('stamps', '', fault, fix)]
-    if not has_come(seen, DEPTH):
+    if not has_come(seen, DEPTH) or seen.streams[DEPTH].lag_s is None:
         return []
     return [Finding('stamps', 'depth images come %s after them' % span(max(0.0, seen.streams[DEPTH].lag_s)))]
 
@@ -186,13 +186,13 @@ def _pairs_of_boxes(seen):
 def _results(seen):
     """3D boxes and tracks, as far as what they are made of came."""
     found = []
-    sound = all(has_come(seen, key) for key in (DEPTH, INFO, BOXES2D)) and not seen.is_bag
-    for key, needs, subject in ((BOXES3D, sound, '3D boxes'),
-                                (TRACKS, has_come(seen, BOXES3D) and not (seen.tf and seen.tf.fault), 'tracks')):
+    can_lift = all(has_come(seen, key) for key in (DEPTH, INFO, BOXES2D))
+    can_track = has_come(seen, BOXES3D) and seen.tf is not None and not seen.tf.fault
+    for key, needs, subject in ((BOXES3D, can_lift, '3D boxes'), (TRACKS, can_track, 'tracks')):
         if has_come(seen, key):
             stream = seen.streams[key]
             found.append(Finding(subject, '%s, %.1f Hz' % (stream.topic, stream.rate_hz)))
-        elif needs and not seen.is_bag and key in seen.streams:
+        elif needs and not seen.is_bag:
             found.append(Finding(subject, '', *silence_fault(seen.streams[key], seen.topics, (), seen.seconds)))
     return found
 

@@ -34,6 +34,7 @@ class Observation(object):
         stamp_ns = _stamp_in(message)
         if stamp_ns:
             self._stamps_ns.append(stamp_ns)
+        if stamp_ns and ros_ns:  # 0 before the first /clock
             self._lags_s = (ros_ns - stamp_ns) / NS, None if machine_s is None else machine_s - stamp_ns / NS
 
     @property

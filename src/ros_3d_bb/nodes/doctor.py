@@ -30,7 +30,9 @@ def main():
             rospy.init_node('doctor', anonymous=True)
             try:
                 found += graph_findings(arguments)
-            except (KeyboardInterrupt,) + NO_ANSWER as error:
+            except KeyboardInterrupt:
+                sys.exit('doctor: stopped')
+            except NO_ANSWER as error:
                 found.append(Finding('master', '', 'it ended while it was listened to (%s)' % error, 'start it again'))
     wrong = sum(finding.is_wrong for finding in found)
     for finding in found:
@@ -55,15 +57,27 @@ def bag_findings(arguments):
 
 
 def graph_findings(arguments):
-    """The findings about the running graph: listen again as long as something is wrong and there is patience."""
+    """The findings about the running graph: listen again as long as something is wrong and there is patience.
+
+    Raises KeyboardInterrupt where it is stopped, one of `graph.NO_ANSWER` where the master is.
+    """
     deadline_s = time.monotonic() + arguments.patience
     while True:
         look = GraphLook(arguments.target_frame)
-        time.sleep(arguments.seconds)
+        _sleep(arguments.seconds)
         found = findings(look.seen())
         look.close()
-        if not any(finding.is_wrong for finding in found) or time.monotonic() >= deadline_s or rospy.is_shutdown():
+        if not any(finding.is_wrong for finding in found) or time.monotonic() >= deadline_s:
             return found
+
+
+def _sleep(seconds):
+    """Sleep by the machine's clock. Raises KeyboardInterrupt where it is stopped: rospy takes the signal itself."""
+    until_s = time.monotonic() + seconds
+    while time.monotonic() < until_s:
+        time.sleep(0.05)
+        if rospy.core.is_shutdown_requested() or rospy.is_shutdown():
+            raise KeyboardInterrupt
 
 
 def machine_findings():

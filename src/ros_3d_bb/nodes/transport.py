@@ -44,9 +44,9 @@ class Input(object):
     @property
     def lags_s(self):
         """How long before it came the stamp of the newest message was, by ROS time and by the machine's clock, seconds;
-        None and None where it carries none.
+        None and None where it carries none, or came before the first /clock.
         """
-        if self._newest is None or not self._newest[0]:
+        if self._newest is None or not self._newest[0] or not self._newest[1]:
             return None, None
         stamp, ros_time, machine_s = self._newest
         return ros_time.to_sec() - stamp.to_sec(), machine_s - stamp.to_sec()
