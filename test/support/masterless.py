@@ -114,6 +114,7 @@ def masterless(params=()):
         'rospy.Publisher': connections._keeping(connections.publishers, Publisher),
         'rospy.Subscriber': connections._keeping(connections.subscribers, Subscriber),
         'rospy.Service': mock.Mock(), 'rospy.Timer': connections._timer, 'rospy.on_shutdown': mock.Mock(),
+        'rospy.set_param': mock.Mock(),
         'rospy.get_param': lambda name, default=None: dict(params) if name == '~' else default,
         'rospy.resolve_name': lambda name: '/' + name, 'rospy.is_shutdown': lambda: False,
         'rospy.get_rostime': lambda: connections.now, 'rospy.rostime.get_rostime': lambda: connections.now,

@@ -30,7 +30,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 # rosdep keys of what is no ROS package; None: optional, imported where it is used, with an error that says so.
 KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-pytorch-pip', 'onnxruntime': None,
         'yaml': 'python3-yaml', 'matplotlib': 'python3-matplotlib', 'scipy': 'python3-scipy',
-        'norfair': None, 'trackeval': None, 'pyrealsense2': None,
+        'rospkg': 'python3-rospkg', 'norfair': None, 'trackeval': None, 'pyrealsense2': None,
         'PyQt5': None}  # comes with python_qt_binding, and serves where that is not
 TEST_KEYS = {'pytest': 'python3-pytest'}
 CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams, RuntimeParams), 'bbox3d.yaml': (Bbox3dParams,),

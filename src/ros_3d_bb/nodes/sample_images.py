@@ -16,10 +16,15 @@ class SampleImages(object):
 
     def __init__(self, cache_ns, sample, depth_range_m, diagnostics):
         self._diagnostics = diagnostics
-        self._cache_ns, self._sample, self._depth_range_m = cache_ns, sample, depth_range_m
+        self._cache_ns = cache_ns
+        self.tune(sample, depth_range_m)
         self._raw_pub, self._color_pub, self._depth_pub = (
             rospy.Publisher('ros_3d_bb/' + name, Image, queue_size=1) for name in ('raw', 'color', 'depth'))
         self._colors, self._subscriber = None, None
+
+    def tune(self, sample, depth_range_m):
+        """Draw the next images with these samples, and this depth as black."""
+        self._sample, self._depth_range_m = sample, depth_range_m
 
     def publish(self, header, depth, boxes):
         """Publish the images of one set of 3D boxes, as far as somebody subscribes."""

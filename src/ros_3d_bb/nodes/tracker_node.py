@@ -7,13 +7,14 @@ from visualization_msgs.msg import MarkerArray
 
 from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
-from ros_3d_bb.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
+from ros_3d_bb.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter, check_params
 from ros_3d_bb.messages import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_message
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.tuning import Tuning
 from ros_3d_bb.stamped import arrival_clock_ns
 
 
@@ -22,11 +23,12 @@ class TrackerNode(object):
 
     Subscribes: ros_3d_bb/bb_3d, tf; camera/color/camera_info and camera/aligned_depth_to_color/image_raw, to tell who
     is out of view or hidden. Publishes: ros_3d_bb/tracks, visualization_marker_array, both with the stamp of the newest
-    image. Without a transform at that stamp nothing is published and nobody ages. Parameters: config/tracker.yaml.
+    image. Without a transform at that stamp nothing is published and nobody ages. Parameters: config/tracker.yaml; many
+    can be changed while it runs, see `Tuning`.
     """
 
     def __init__(self):
-        params, marker_params, *tracking = read_params(TrackerNodeParams, MarkerParams, *TRACKING_PARAMS)
+        params, marker_params, *tracking = given = read_params(TrackerNodeParams, MarkerParams, *TRACKING_PARAMS)
         self._markers = MarkerWriter(marker_params)
         self._lock = threading.Lock()
         self._diagnostics = Diagnostics()
@@ -34,6 +36,13 @@ class TrackerNode(object):
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
         self._subscribe()
+        self._tuning = Tuning('tracker.yaml', given, self._tune)
+
+    def _tune(self, _params, marker_params, *tracking):
+        check_params(marker_params)
+        with self._lock:
+            self._follower.tune(tracking)
+            self._markers.tune(marker_params)
 
     def _subscribe(self):
         subscribe(BOXES3D_TOPIC, BoundingBox3DArray, self._on_boxes)
