@@ -101,7 +101,8 @@ def test_a_value_that_makes_no_sense_is_refused_with_all_that_came_with_it(track
 
 
 @pytest.mark.parametrize('change, words', [
-    ({'target_frame': 'odom'}, '~target_frame cannot be changed while the node runs; did you mean ~'),
+    ({'target_frame': 'odom'}, 'parameter ~target_frame is read at the start only; those that can be changed: accel'),
+    ({'memry': 1.0}, 'unknown parameter ~memry; did you mean ~memory?'),
     ({'min_sightings': 2.5}, 'parameter ~min_sightings is 2.5, a float; int expected'),
     ({'marker_namespaces': 'cylinder, elipse'}, "marker_namespaces has 'elipse'; did you mean ellipse?"),
     ({'prediction_step': 1e-6}, 'prediction_step is 1e-06 and prediction_time 2; at most 1000 steps expected'),

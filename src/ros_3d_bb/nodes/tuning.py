@@ -9,7 +9,7 @@ from dynamic_reconfigure.msg import Config, ConfigDescription
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
 from ros_3d_bb.live_parameters import description_of, parameters_in, plain_values
-from ros_3d_bb.params import nearest_name, params_from
+from ros_3d_bb.params import params_from
 
 
 class Tuning(object):
@@ -59,9 +59,9 @@ class Tuning(object):
             return ReconfigureResponse(message)
 
     def _change(self, given):
-        for name in sorted(set(given) - set(self._names)):
-            raise ValueError('~%s cannot be changed while the node runs; did you mean ~%s? Those that can: %s'
-                             % (name, nearest_name(name, self._names), ', '.join(sorted(self._names))))
+        for name in sorted(set(given) & set(self._values()) - set(self._names)):
+            raise ValueError('parameter ~%s is read at the start only; those that can be changed: %s'
+                             % (name, ', '.join(sorted(self._names))))
         params = params_from(dict(self._values(), **given), *(type(each) for each in self._params))
         self._take(*params)
         self._params = params
