@@ -100,19 +100,25 @@ def test_a_value_that_makes_no_sense_is_refused_with_all_that_came_with_it(track
     assert kept == [0.35, 0.1, 4.0]
 
 
-@pytest.mark.parametrize('change, words', [
-    ({'target_frame': 'odom'}, 'parameter ~target_frame is read at the start only; those that can be changed: accel'),
-    ({'memry': 1.0}, 'unknown parameter ~memry; did you mean ~memory?'),
-    ({'min_sightings': 2.5}, 'parameter ~min_sightings is 2.5, a float; int expected'),
-    ({'marker_namespaces': 'cylinder, elipse'}, "marker_namespaces has 'elipse'; did you mean ellipse?"),
-    ({'prediction_step': 1e-6}, 'prediction_step is 1e-06 and prediction_time 2; at most 1000 steps expected'),
-    ({'memory': float('nan')}, 'memory is nan; 0 or more expected')])
-def test_requests_that_the_client_would_not_send_are_refused_with_the_reason(tracker, said, change, words):
-    before = tracker.get_configuration(TIMEOUT_S)
-    request = rospy.ServiceProxy('/tracker_node/set_parameters', Reconfigure)
-    answer = request(encode_config(change)).config
-    assert {entry.name: entry.value for entry in answer.doubles} == {
-        name: value for name, value in before.items() if isinstance(value, float)}
+@pytest.mark.parametrize('node, change, words', [
+    ('tracker_node', {'target_frame': 'odom'},
+     'parameter ~target_frame is read at the start only; those that can be changed: accel'),
+    ('tracker_node', {'memry': 1.0}, 'unknown parameter ~memry; did you mean ~memory?'),
+    ('tracker_node', {'min_sightings': 2.5}, 'parameter ~min_sightings is 2.5, a float; int expected'),
+    ('tracker_node', {'marker_namespaces': 'cylinder, elipse'},
+     "marker_namespaces has 'elipse'; did you mean ellipse?"),
+    ('tracker_node', {'prediction_step': 1e-6},
+     'prediction_step is 1e-06 and prediction_time 2; at most 1000 steps expected'),
+    ('tracker_node', {'memory': float('nan')}, 'memory is nan; 0 or more expected'),
+    ('depth_detector_node', {'min_depth': 7.0}, 'min_depth is 7 and max_depth is 6.5; the first must be less'),
+    ('depth_detector_node', {'floor_height': float('nan'), 'min_depth': 1.0}, 'parameter ~floor_height is nan'),
+    ('bbox3d_node', {'estimator': 'mean'}, "estimator is 'mean'; foreground or median expected"),
+    ('bbox3d_node', {'stride': 0}, 'stride is 0; at least 1 expected')])
+def test_requests_that_make_no_sense_are_refused_with_the_reason(clients, said, node, change, words):
+    before = clients[node].get_configuration(TIMEOUT_S)
+    answer = rospy.ServiceProxy('/%s/set_parameters' % node, Reconfigure)(encode_config(change)).config
+    assert {entry.name: entry.value for entry in answer.doubles + answer.ints + answer.strs} == {
+        name: value for name, value in before.items() if name != 'groups'}
     said(words)
 
 
