@@ -66,15 +66,15 @@ class Follower(object):
     def __init__(self, params, tracking, tally, transforms):
         _check(params)
         self._params, self._tally, self._transforms = params, tally, transforms
-        make, self._own = TRACKERS[params.tracker]
-        self._tracker = make(*tracking[self._own])
+        self._tracker = _trackers_of(tracking)[params.tracker]
         self._camera_lock = threading.Lock()  # images come while a transform is waited for
         self._newest_ns = None  # of the images that were taken
         self._camera, self._depths = None, StampedCache(int(params.depth_cache_length * NS))
 
     def tune(self, tracking):
         """Take the next boxes with other parameters of tracking; tracks go on. Raises ValueError as at the start."""
-        self._tracker.tune(*tracking[self._own])
+        _trackers_of(tracking)  # also what the other one would refuse is refused
+        self._tracker.tune(*tracking[TRACKERS[self._params.tracker][1]])
 
     @property
     def looks(self):
@@ -149,6 +149,11 @@ class Follower(object):
             self._tracker.reset()
             self._transforms.go_back()
             self._newest_ns = None
+
+
+def _trackers_of(tracking):
+    """New trackers by name. Raises ValueError where the parameters of one of them make no sense."""
+    return {name: make(*tracking[own]) for name, (make, own) in TRACKERS.items()}
 
 
 def _check(params):

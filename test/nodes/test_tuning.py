@@ -73,6 +73,7 @@ def test_no_slider_reaches_a_value_that_is_refused(clients, node):
     for entry in client.get_parameter_descriptions(TIMEOUT_S):
         values = [entry['min'], entry['max']] if entry['type'] != 'str' else [
             word['value'] for word in (ast.literal_eval(entry['edit_method'])['enum'] if entry['edit_method'] else [])]
+        assert not entry['edit_method'] or entry['default'] in values
         for value in values + [entry['default']]:
             assert client.update_configuration({entry['name']: value})[entry['name']] == value
             given = rospy.get_param('/%s/%s' % (node, entry['name']))
@@ -110,6 +111,7 @@ def test_a_value_that_makes_no_sense_is_refused_with_all_that_came_with_it(track
     ('tracker_node', {'prediction_step': 1e-6},
      'prediction_step is 1e-06 and prediction_time 2; at most 1000 steps expected'),
     ('tracker_node', {'memory': float('nan')}, 'memory is nan; 0 or more expected'),
+    ('tracker_node', {'alpha': 7.0}, 'alpha is 7; more than 0 and at most 1 expected'),  # of the tracker not in use
     ('depth_detector_node', {'min_depth': 7.0}, 'min_depth is 7 and max_depth is 6.5; the first must be less'),
     ('depth_detector_node', {'floor_height': float('nan'), 'min_depth': 1.0}, 'parameter ~floor_height is nan'),
     ('bbox3d_node', {'estimator': 'mean'}, "estimator is 'mean'; foreground or median expected"),
