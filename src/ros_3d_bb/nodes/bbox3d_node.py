@@ -20,10 +20,22 @@ from ros_3d_bb.stamped import NS, arrival_clock_ns
 class Bbox3dNode(object):
     """Lift 2D boxes into the camera's optical frame.
 
-    Subscribes: camera/aligned_depth_to_color/image_raw, camera/color/camera_info, yolo_bounding_box.
-    Publishes: ros_3d_bb/bb_3d, with the stamp of the image that the boxes were found in; images to look at (see
-    `SampleImages`) while somebody subscribes. Parameters: config/bbox3d.yaml; some can be changed while it runs, see
-    `Tuning`.
+    Each array of 2D boxes meets the depth image of its own stamp, however long the detector takes. Parameters:
+    config/bbox3d.yaml; some can be changed while it runs.
+
+    Subscribes
+    ----------
+    yolo_bounding_box : std_msgs/Int32MultiArray
+        2D boxes.
+    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
+        Depth with the pixels of the colour image.
+    camera/color/camera_info : sensor_msgs/CameraInfo
+        Of the colour camera.
+
+    Publishes
+    ---------
+    ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
+        In the camera's optical frame, with the stamp of the image that the boxes were found in.
     """
 
     def __init__(self):

@@ -10,7 +10,15 @@ from ros_3d_bb.overlay import draw_boxes
 
 
 class BoxesOutput(object):
-    """Publishes yolo_bounding_box, and yolo_result_out while somebody subscribes."""
+    """What a detector found, for bbox3d_node and for people.
+
+    Publishes
+    ---------
+    yolo_bounding_box : std_msgs/Int32MultiArray
+        x1, y1, x2, y2 of each person, pixels; stamp and frame of the image in `layout.dim[0].label`.
+    yolo_result_out : sensor_msgs/Image
+        The colour image with the 2D boxes, while somebody subscribes.
+    """
 
     def __init__(self, publish_empty):
         self._publish_empty = publish_empty
@@ -28,7 +36,13 @@ class BoxesOutput(object):
 
 
 class Switch(object):
-    """Whether the detector works; the service ~enable (std_srvs/SetBool) changes it."""
+    """Whether the detector works.
+
+    Services
+    --------
+    ~enable : std_srvs/SetBool
+        Pauses the detector, and lets it go on.
+    """
 
     def __init__(self, on):
         self.on = on

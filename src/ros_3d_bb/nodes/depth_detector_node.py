@@ -20,9 +20,20 @@ from ros_3d_bb.worker import NewestWorker
 class DepthDetectorNode(object):
     """Find people in depth and colour.
 
-    Subscribes: camera/color/image_raw, camera/aligned_depth_to_color/image_raw, camera/color/camera_info, tf.
-    Publishes: yolo_bounding_box; yolo_result_out while somebody subscribes. Services: ~enable (std_srvs/SetBool).
-    Parameters: config/depth_detector.yaml; most can be changed while it runs, see `Tuning`.
+    It needs no weights. Parameters: config/depth_detector.yaml; most can be changed while it runs.
+
+    Subscribes
+    ----------
+    camera/color/image_raw : sensor_msgs/Image
+        Colour.
+    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
+        Depth with the pixels of the colour image.
+    camera/color/camera_info : sensor_msgs/CameraInfo
+        Of the colour camera.
+    /tf : tf2_msgs/TFMessage
+        Where the floor is; not with an empty ~floor_frame.
+    /tf_static : tf2_msgs/TFMessage
+        The same.
     """
 
     def __init__(self):

@@ -10,8 +10,21 @@ from ros_3d_bb.stamped import StampedCache
 
 
 class SampleImages(object):
-    """Publishes ros_3d_bb/raw (the colour image), ros_3d_bb/color (with boxes and samples, thesis Fig. 3.5) and
-    ros_3d_bb/depth (as grey). Subscribes camera/color/image_raw only while one of the first two is subscribed.
+    """What the 3D boxes of an image were made of.
+
+    Subscribes
+    ----------
+    camera/color/image_raw : sensor_msgs/Image
+        Colour; only while somebody looks at ros_3d_bb/raw or ros_3d_bb/color.
+
+    Publishes
+    ---------
+    ros_3d_bb/raw : sensor_msgs/Image
+        The colour image that the boxes belong to, while somebody subscribes.
+    ros_3d_bb/color : sensor_msgs/Image
+        The same with boxes and depth samples (thesis Fig. 3.5), while somebody subscribes.
+    ros_3d_bb/depth : sensor_msgs/Image
+        The depth image in grey, while somebody subscribes.
     """
 
     def __init__(self, cache_ns, sample, depth_range_m, diagnostics):

@@ -21,10 +21,28 @@ from ros_3d_bb.stamped import arrival_clock_ns
 class TrackerNode(object):
     """Track 3D boxes in a fixed frame.
 
-    Subscribes: ros_3d_bb/bb_3d, tf; camera/color/camera_info and camera/aligned_depth_to_color/image_raw, to tell who
-    is out of view or hidden. Publishes: ros_3d_bb/tracks, visualization_marker_array, both with the stamp of the newest
-    image. Without a transform at that stamp nothing is published and nobody ages. Parameters: config/tracker.yaml; many
-    can be changed while it runs, see `Tuning`.
+    Without a transform at the stamp of the boxes nothing is published and nobody ages. Parameters:
+    config/tracker.yaml; many can be changed while it runs.
+
+    Subscribes
+    ----------
+    ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
+        3D boxes.
+    camera/color/camera_info : sensor_msgs/CameraInfo
+        Tells who is out of view; not with ~tracker thesis.
+    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
+        Tells whom something hides; not with ~tracker thesis or without ~use_depth.
+    /tf : tf2_msgs/TFMessage
+        Where the camera is in ~target_frame.
+    /tf_static : tf2_msgs/TFMessage
+        The same.
+
+    Publishes
+    ---------
+    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
+        In ~target_frame, with the stamp of the newest image.
+    visualization_marker_array : visualization_msgs/MarkerArray
+        The same for RViz, while somebody subscribes.
     """
 
     def __init__(self):

@@ -18,7 +18,7 @@ class Tuning(object):
     What dynamic_reconfigure generates code for is made at the start here, of that file and the node's types, and a
     value that makes no sense is refused with all that came with it, where dynamic_reconfigure's own server would put
     another in its place. The answer to such a request is what stays in force: an error would end rqt_reconfigure's
-    thread. Services: ~set_parameters. Publishes, latched: ~parameter_descriptions, ~parameter_updates.
+    thread.
 
     Parameters
     ----------
@@ -28,6 +28,18 @@ class Tuning(object):
         All parameters of the node, as `startup.read_params` returned them.
     take : callable
         Called with changed ones, in the same order; raises ValueError, and changes nothing, where they make no sense.
+
+    Publishes
+    ---------
+    ~parameter_descriptions : dynamic_reconfigure/ConfigDescription
+        What can be changed while the node runs, within what limits; latched.
+    ~parameter_updates : dynamic_reconfigure/Config
+        What is in force; latched.
+
+    Services
+    --------
+    ~set_parameters : dynamic_reconfigure/Reconfigure
+        Changes parameters that are marked Live, as rqt_reconfigure does.
     """
 
     def __init__(self, file, params, take):

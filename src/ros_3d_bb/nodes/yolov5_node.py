@@ -17,9 +17,13 @@ from ros_3d_bb.worker import NewestWorker
 class Yolov5Node(object):
     """Find people in colour images.
 
-    Subscribes: camera/color/image_raw. Publishes: yolo_bounding_box; yolo_result_out while somebody subscribes.
-    Services: ~enable (std_srvs/SetBool) pauses and resumes. Parameters: config/yolov5.yaml; some can be changed while
-    it runs, see `Tuning`.
+    Only the newest image is searched; those that come meanwhile are skipped. Parameters: config/yolov5.yaml; some can
+    be changed while it runs.
+
+    Subscribes
+    ----------
+    camera/color/image_raw : sensor_msgs/Image
+        Colour.
     """
 
     def __init__(self):
