@@ -28,7 +28,8 @@ html_math_renderer = 'mathml'
 
 def _names(folder):
     """The pages in a folder, as Sphinx names them."""
-    return sorted(os.path.relpath(path, HERE)[:-len('.md')] for path in glob.glob(os.path.join(HERE, folder, '*.md')))
+    names = [os.path.relpath(path, HERE)[:-len('.md')] for path in glob.glob(os.path.join(HERE, folder, '*.md'))]
+    return sorted(names, key=lambda name: (not name.endswith('index'), name))
 
 
 def _prepare(_app, name, source):
@@ -46,7 +47,7 @@ def _write_inline(self, node):
 
 
 def _write_block(self, node):
-    self.body.append('<div class="math">%s</div>' % convert(node.astext(), display='block'))
+    self.body.append('<div class="math" style="margin: 1em 0">%s</div>' % convert(node.astext(), display='block'))
     raise nodes.SkipNode
 
 
