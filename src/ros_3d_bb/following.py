@@ -18,6 +18,7 @@ from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.visibility import depths_towards, edges_of
 
 TRACKING_PARAMS = ThesisTrackerParams, TrackerParams, NoiseParams, PredictionParams
+TRACKERS = {'thesis': (ThesisTracker, slice(0, 1)), 'kalman': (Tracker, slice(1, 4))}  # with their part of those
 JUMP_NS = NS  # stamps that go back by more are a jump in time, by less a late message
 
 
@@ -65,10 +66,15 @@ class Follower(object):
     def __init__(self, params, tracking, tally, transforms):
         _check(params)
         self._params, self._tally, self._transforms = params, tally, transforms
-        self._tracker = _tracker_of(params.tracker, *tracking)
+        self._tracker = _trackers_of(tracking)[params.tracker]
         self._camera_lock = threading.Lock()  # images come while a transform is waited for
         self._newest_ns = None  # of the images that were taken
         self._camera, self._depths = None, StampedCache(int(params.depth_cache_length * NS))
+
+    def tune(self, tracking):
+        """Take the next boxes with other parameters of tracking; tracks go on. Raises ValueError as at the start."""
+        _trackers_of(tracking)  # also what the other one would refuse is refused
+        self._tracker.tune(*tracking[TRACKERS[self._params.tracker][1]])
 
     @property
     def looks(self):
@@ -145,16 +151,16 @@ class Follower(object):
             self._newest_ns = None
 
 
-def _tracker_of(name, thesis, *kalman):
-    """The tracker of a name. Raises ValueError."""
-    trackers = {'thesis': lambda: ThesisTracker(thesis), 'kalman': lambda: Tracker(*kalman)}
-    if name not in trackers:
-        raise ValueError('parameter ~tracker is %r; did you mean %s? Known: %s'
-                         % (name, nearest_name(name, sorted(trackers)), ', '.join(sorted(trackers))))
-    return trackers[name]()
+def _trackers_of(tracking):
+    """New trackers by name. Raises ValueError where the parameters of one of them make no sense."""
+    return {name: make(*tracking[own]) for name, (make, own) in TRACKERS.items()}
 
 
 def _check(params):
+    if params.tracker not in TRACKERS:
+        raise ValueError('parameter ~tracker is %r; did you mean %s? Known: %s'
+                         % (params.tracker, nearest_name(params.tracker, sorted(TRACKERS)),
+                            ', '.join(sorted(TRACKERS))))
     if not params.target_frame:
         raise ValueError('parameter ~target_frame is empty; map or odom expected')
     check_not_negative(params, 'tf_timeout', 'depth_scale', 'depth_cache_length', 'stamp_tolerance')

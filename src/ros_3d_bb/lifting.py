@@ -57,14 +57,25 @@ class Lifter(object):
     """
 
     def __init__(self, params, tally, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
-        check_not_negative(params, 'depth_scale', 'cache_length', 'stamp_tolerance', 'assumed_delay',
-                           'depth_image_range')
-        self._params, self._tally, self._depth_topic, self._info_topic = params, tally, depth_topic, info_topic
-        self._estimator = estimator_named(params.estimator, params.stride)
+        _check(params)
+        self._tally, self._depth_topic, self._info_topic = tally, depth_topic, info_topic
         self._error_model = error_model_of(params)
         self._pairing = Pairing(*(int(seconds * NS) for seconds in (
             params.cache_length, params.stamp_tolerance, params.assumed_delay)))
         self._said_plain = False
+        self.tune(params)
+
+    def tune(self, params):
+        """Lift the next boxes with another estimator, stride or assumed delay.
+
+        Raises ValueError, and keeps the old ones, where they make no sense.
+        """
+        _check(params)
+        estimator = estimator_named(params.estimator, params.stride)
+        if self._error_model is not None:
+            self._error_model.check_estimator(params.estimator)
+        self._params, self._estimator = params, estimator
+        self._pairing.assumed_delay_ns = int(params.assumed_delay * NS)
 
     @property
     def sample(self):
@@ -157,6 +168,10 @@ class Lifter(object):
                 '(~cache_length)%s' % (boxes.stamp_ns / NS, self._depth_topic, newest_ns / NS, kept_s,
                                        ': the boxes are %.1f s too old; the detector is slower than that'
                                        % (late_s - kept_s) if late_s > kept_s else ''))
+
+
+def _check(params):
+    check_not_negative(params, 'depth_scale', 'cache_length', 'stamp_tolerance', 'assumed_delay', 'depth_image_range')
 
 
 def error_model_of(params):

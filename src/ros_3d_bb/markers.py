@@ -58,15 +58,19 @@ class MarkerWriter(object):
     """
 
     def __init__(self, params=MarkerParams()):
-        _check(params)
+        self._drawn = set()  # (namespace, id)
+        self._histories = {}  # id: [(stamp_ns, Point)], oldest first
+        self.tune(params)
+
+    def tune(self, params):
+        """Draw the next tracks with other parameters. Raises ValueError as at the start, and changes nothing."""
+        check_params(params)
         self._params = params
         self._lifetime = genpy.Duration.from_sec(params.marker_lifetime)
         shapes = {CYLINDER: self._cylinder, ID: self._number, VELOCITY: self._velocity, PREDICTION: self._prediction,
                   HISTORY: self._history, ELLIPSE: self._ellipse, PREDICTION_ELLIPSE: self._prediction_ellipses}
         self._shapes = [(namespace, shapes[namespace]) for namespace in NAMESPACES
                         if namespace in params.marker_namespaces]
-        self._drawn = set()  # (namespace, id)
-        self._histories = {}  # id: [(stamp_ns, Point)], oldest first
 
     def write(self, tracks, header):
         """The markers for one image.
@@ -161,7 +165,8 @@ class MarkerWriter(object):
         return COLORS[self._params.marker_color](track)
 
 
-def _check(params):
+def check_params(params):
+    """Raise ValueError, naming the parameter, where one makes no sense."""
     check_not_negative(params, 'marker_lifetime', 'marker_history')
     if params.marker_color not in COLORS:
         raise ValueError('parameter ~marker_color is %r; %s expected' % (params.marker_color, ', '.join(COLORS)))

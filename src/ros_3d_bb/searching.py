@@ -89,10 +89,19 @@ class DepthSearch(object):
     names = ('person',)
 
     def __init__(self, params, people, tally, transforms):
-        check_not_negative(params, 'stamp_tolerance')
+        _check(params)
         self._params, self._tally, self._transforms = params, tally, transforms
         self._detector = DepthPeople(people)
         self._pairing = Pairing(CACHE_NS, int(params.stamp_tolerance * NS), 0)
+
+    def tune(self, params, people):
+        """Search the next images with another floor height and other people.
+
+        Raises ValueError, and keeps the old ones, where they make no sense.
+        """
+        _check(params)
+        self._detector.tune(people)
+        self._params = params
 
     def add_camera_info(self, message, now_ns):
         """Take a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
@@ -161,3 +170,9 @@ class DepthSearch(object):
             return None
         base_from_floor = transform_from((0, 0, self._params.floor_height), (0, 0, 0, 1))
         return floor_from_transform(camera_from_base.dot(base_from_floor))
+
+
+def _check(params):
+    check_not_negative(params, 'stamp_tolerance')
+    if not abs(params.floor_height) < 1e6:
+        raise ValueError('parameter ~floor_height is %g; metres in ~floor_frame expected' % params.floor_height)

@@ -101,11 +101,11 @@ class Pairing(object):
     tolerance_ns : int
         By how much the stamps of a pair may differ.
     assumed_delay_ns : int
-        How long the detector takes, for boxes without a stamp.
+        How long the detector takes, for boxes without a stamp; an attribute, too.
     """
 
     def __init__(self, length_ns, tolerance_ns, assumed_delay_ns):
-        self._length_ns, self._tolerance_ns, self._assumed_delay_ns = length_ns, tolerance_ns, assumed_delay_ns
+        self._length_ns, self._tolerance_ns, self.assumed_delay_ns = length_ns, tolerance_ns, assumed_delay_ns
         self._depths, self._cameras = StampedCache(length_ns), StampedCache(length_ns)
         self._waiting = []
         self._end_before_ns = 0  # the last stamp before time went back
@@ -138,7 +138,7 @@ class Pairing(object):
     def add_boxes(self, stamp_ns, now_ns, boxes):
         """Take the boxes of one image; `stamp_ns` None where they carry no stamp."""
         if stamp_ns is None:
-            depth = self._depths.arrived_at(now_ns - self._assumed_delay_ns, self._length_ns)
+            depth = self._depths.arrived_at(now_ns - self.assumed_delay_ns, self._length_ns)
             if depth is None:
                 return self._settled(now_ns) + [(None, boxes)]
             stamp_ns = depth.stamp_ns

@@ -4,6 +4,7 @@ import itertools
 import numpy as np
 import pytest
 import rospy
+from dynamic_reconfigure.client import Client
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 
@@ -11,7 +12,8 @@ from ros_3d_bb.images import fill_image
 from ros_3d_bb.messages import boxes2d_to_message, time_from
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.stamped import NS
-from support.ros import Recorder, camera_info, depth_message, diagnostics_of, header_at, publisher, wait_until
+from support.ros import (TIMEOUT_S, Recorder, camera_info, depth_message, diagnostics_of, header_at, publisher,
+                         wait_until)
 
 PERIOD = NS // 30
 BOX = np.array([[20, 10, 44, 38]])
@@ -251,3 +253,21 @@ def unheard(rig, color, stamp_ns):
     rig.send_camera(stamp_ns)
     rig.send_boxes(stamp_ns)
     return color.get_num_connections() == 0
+
+
+def test_a_changed_estimator_works_from_the_next_image_on(rig, output, now):
+    """Half of the box is a person at 2 m, and half of it wall: to the median both are one."""
+    depth_mm = np.full((48, 64), 5000, np.uint16)
+    depth_mm[:, 27:37] = 2000
+    client, depths_m = Client('bbox3d_node', timeout=TIMEOUT_S), []
+    for number, estimator in enumerate(('median', 'foreground', 'median')):
+        client.update_configuration({'estimator': estimator, 'stride': 2})
+        stamp_ns = now + number * PERIOD
+        rig.info.publish(camera_info(stamp_ns))
+        rig.depth.publish(fill_image(Image(header=header_at(stamp_ns)), depth_mm, '16UC1'))
+        rig.send_boxes(stamp_ns)
+        wait_until(lambda: output.messages and output.messages[-1].header.stamp == time_from(stamp_ns), 'its boxes')
+        depths_m.append(output.messages[-1].boxes[0].center.position.z)
+    client.update_configuration({'stride': 20})
+    client.close()
+    assert depths_m == pytest.approx([5.0, 2.09, 5.0])

@@ -2,6 +2,7 @@
 import numpy as np
 import pytest
 import rospy
+from dynamic_reconfigure.client import Client
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool
@@ -13,7 +14,7 @@ from ros_3d_bb.simulation.scenario import scenario_from
 from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulator_messages import simulated_messages
 from ros_3d_bb.stamped import NS
-from support.ros import Recorder, diagnostics_of, publisher
+from support.ros import TIMEOUT_S, Recorder, diagnostics_of, publisher
 
 START_NS = 1000 * NS
 PEOPLE = [{'start': [4.0, 0.8], 'facing': 3.1, 'height': 1.8}, {'start': [5.0, -0.9], 'facing': 1.6, 'height': 1.7}]
@@ -114,3 +115,15 @@ def test_the_annotated_image_has_the_stamp_of_its_own(rig, output):
     with Recorder('yolo_result_out', Image) as pictures:
         stamp_ns, _boxes = rig.send()
         assert pictures.wait_for(1)[0].header.stamp.to_nsec() == stamp_ns
+
+
+def test_a_changed_range_works_from_the_next_image_on(rig, output):
+    """One of the people is 4 m away and one 5 m."""
+    client = Client('depth_detector_node', timeout=TIMEOUT_S)
+    counts = []
+    for max_depth in (6.5, 4.5, 6.5):
+        client.update_configuration({'max_depth': max_depth})
+        rig.send()
+        counts.append(len(boxes2d_from_message(output.wait_for(len(counts) + 1)[-1]).boxes))
+    client.close()
+    assert counts == [2, 1, 2]

@@ -1,10 +1,12 @@
 """tracker_node on made 3D boxes. Needs a master because it asks tf2 for the camera at the stamp of each image."""
 import itertools
+import threading
 import time
 
 import numpy as np
 import pytest
 import rospy
+from dynamic_reconfigure.client import Client
 from geometry_msgs.msg import Point, TransformStamped
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
@@ -13,7 +15,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ros_3d_bb.messages import time_from
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 from ros_3d_bb.stamped import NS
-from support.ros import Recorder, diagnostics_of, header_at, publisher, wait_until
+from support.ros import TIMEOUT_S, Recorder, diagnostics_of, header_at, publisher, wait_until
 
 PERIOD = NS // 10
 _stamps = itertools.count(1000 * NS, 100 * NS)
@@ -242,3 +244,52 @@ def test_somebody_behind_a_pillar_is_occluded_and_keeps_the_number(rig, tracks, 
     assert track.id == number and track.status == TrackedObject.OCCLUDED
     rig.send(now + 25 * PERIOD, (0.0, 0.0, 3.0))
     assert [track.id for track in tracks.wait_for(26)[-1].objects] == [number]
+
+
+@pytest.fixture
+def tuned(rig):
+    """Changes parameters; afterwards they are as they were."""
+    client = Client('tracker_node', timeout=TIMEOUT_S)
+    before = {name: value for name, value in client.get_configuration(TIMEOUT_S).items() if name != 'groups'}
+    yield client.update_configuration
+    client.update_configuration(before)
+    client.close()
+
+
+def test_changed_parameters_work_from_the_next_image_on_and_numbers_are_kept(rig, tracks, markers, tuned, now):
+    number = rig.stand(tracks, now)
+    tuned({'prediction_time': 3.0, 'missed_limit': 2.0, 'marker_namespaces': 'cylinder'})
+    rig.send(now + 10 * PERIOD)
+    track, = tracks.wait_for(11)[-1].objects
+    assert track.id == number and len(track.prediction) == 12
+    for frame in range(11, 20):  # by the old limit gone after 0.35 s
+        rig.send(now + frame * PERIOD)
+        assert [track.id for track in tracks.wait_for(frame + 1)[-1].objects] == [number]
+    rig.send(now + 20 * PERIOD, (0.0, 0.0, 3.0))
+    assert [track.id for track in tracks.wait_for(21)[-1].objects] == [number]
+    drawn = markers.wait_for(21)[-1].markers
+    assert [(marker.ns, marker.id) for marker in drawn if marker.action == Marker.ADD] == [('cylinder', number)]
+
+
+def test_parameters_that_are_changed_together_change_together(rig, tracks, tuned, now):
+    """While images come as fast as they are tracked, two pairs of values take turns: no message mixes them."""
+    pairs = [{'prediction_time': 1.0, 'prediction_step': 0.1}, {'prediction_time': 3.0, 'prediction_step': 0.5}]
+    both, turns, seen, over = {(10, 0.1), (6, 0.5)}, [], set(), threading.Event()
+
+    def take_turns():
+        while not over.is_set():
+            tuned(dict(pairs[len(turns) % 2]))
+            turns.append(None)
+
+    rig.stand(tracks, now)
+    thread = threading.Thread(target=take_turns)
+    thread.start()
+    for frame in range(10, 1000):
+        rig.send(now + frame * PERIOD, (0.0, 0.0, 3.0))
+        track, = tracks.wait_for(frame + 1)[-1].objects
+        seen.add((len(track.prediction), track.prediction_step.to_sec()))
+        if len(turns) > 20 and both <= seen:
+            break
+    over.set()
+    thread.join()
+    assert both <= seen <= both | {(8, 0.25)}  # that of the start

@@ -1,5 +1,6 @@
 """viewer_node on simulated images. Needs a master: five topics have to meet, and services and keys to be answered."""
 import contextlib
+import itertools
 import os
 import signal
 import subprocess
@@ -261,6 +262,25 @@ def test_keys_store_pause_and_quit(rig, window):
     assert process.wait(timeout=20) == 0
     assert asked == [False, True, False, True]  # who goes leaves no detector paused
     service.shutdown()
+
+
+def test_a_measurement_has_the_label_that_was_set_just_before(rig, window):
+    """The window shows the label from rospy's cache, which hears of a new one some time later."""
+    _process, folder = window
+    wait_until(lambda: all(pub.get_num_connections() >= 2 for pub in rig.pubs.values()), 'the connections')
+    labels, tries = [], itertools.count()
+
+    def stored():
+        label = 'mark %d' % next(tries)
+        rospy.set_param('window/label', label)
+        if capture('window').success:
+            labels.append(label)
+            return True
+        return False
+    for _measurement in range(10):
+        rig.send()
+        wait_until(stored, 'a measurement')
+    assert [frame.label for frame in entries(folder)] == labels
 
 
 def test_ctrl_c_ends_the_window(window):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import rospy
 import yaml
+from dynamic_reconfigure.client import Client
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool
@@ -15,7 +16,7 @@ from ros_3d_bb.images import fill_image, rgb_from
 from ros_3d_bb.measurements import read_color, read_session
 from ros_3d_bb.messages import boxes2d_from_message, stamp_of
 from ros_3d_bb.stamped import NS
-from support.ros import Recorder, diagnostics_of, header_at, launched, publisher, wait_until
+from support.ros import TIMEOUT_S, Recorder, diagnostics_of, header_at, launched, publisher, wait_until
 
 START = 1000 * NS
 CONFIG = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'yolov5.yaml')
@@ -119,6 +120,19 @@ def test_images_that_cannot_be_used_are_refused_and_the_next_works(camera, found
     assert found.messages == []
     camera.publish(color_message(images[0][0], START + 1))
     assert boxes2d_from_message(found.wait_for(1)[0]).stamp_ns == START + 1
+
+
+def test_changed_thresholds_work_from_the_next_image_on(camera, found, images):
+    """Each with what it lets through; a class that the model has not is refused, and the confidence with it."""
+    client = Client('yolov5_node', timeout=TIMEOUT_S)
+    changes = [({'confidence': 1.0}, 0), ({'confidence': 0.25}, 1), ({'confidence': 1.0, 'classes': 'unicorn'}, 1),
+               ({'image_size': 320}, 1)]
+    for number, (change, count) in enumerate(changes):
+        client.update_configuration(change)
+        camera.publish(color_message(images[0][0], START + number))
+        assert len(boxes2d_from_message(found.wait_for(number + 1)[-1]).boxes) == count
+    client.update_configuration({'image_size': 640})
+    client.close()
 
 
 @pytest.mark.parametrize('name,parameter,reason', [

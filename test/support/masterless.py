@@ -77,6 +77,8 @@ class Connections(object):
     ----------
     publishers, subscribers : dict
         By topic.
+    services : dict
+        Types by name.
     buffers : list
         tf buffers.
     now : genpy.Time
@@ -84,7 +86,7 @@ class Connections(object):
     """
 
     def __init__(self):
-        self.publishers, self.subscribers, self.buffers, self.timers = {}, {}, [], []
+        self.publishers, self.subscribers, self.services, self.buffers, self.timers = {}, {}, {}, [], []
         self.now = genpy.Time(1)
 
     def send(self, topic, message):
@@ -102,6 +104,9 @@ class Connections(object):
         self.buffers.append(Buffer(**options))
         return self.buffers[-1]
 
+    def _service(self, name, kind, _handler):
+        self.services[name] = kind
+
     def _timer(self, _period, callback, **_options):
         self.timers.append(callback)
 
@@ -113,7 +118,8 @@ def masterless(params=()):
     replaced = {
         'rospy.Publisher': connections._keeping(connections.publishers, Publisher),
         'rospy.Subscriber': connections._keeping(connections.subscribers, Subscriber),
-        'rospy.Service': mock.Mock(), 'rospy.Timer': connections._timer, 'rospy.on_shutdown': mock.Mock(),
+        'rospy.Service': connections._service, 'rospy.Timer': connections._timer, 'rospy.on_shutdown': mock.Mock(),
+        'rospy.set_param': mock.Mock(),
         'rospy.get_param': lambda name, default=None: dict(params) if name == '~' else default,
         'rospy.resolve_name': lambda name: '/' + name, 'rospy.is_shutdown': lambda: False,
         'rospy.get_rostime': lambda: connections.now, 'rospy.rostime.get_rostime': lambda: connections.now,

@@ -153,8 +153,28 @@ def test_each_detection_belongs_to_exactly_one_track(frames):
 
 
 @pytest.mark.parametrize('name,value', [('alpha', 0.0), ('alpha', 1.1), ('disappearance_limit', -1.0),
-                                        ('prediction_step', 0.0), ('prediction_time', float('nan')),
+                                        ('prediction_step', 0.0), ('prediction_step', 1e-6),
+                                        ('prediction_time', float('nan')),
                                         ('moving_speed', -0.1)])
 def test_parameters_that_make_no_sense_are_named(name, value):
     with pytest.raises(ValueError, match=name):
         ThesisTracker(ThesisTrackerParams()._replace(**{name: value}))
+
+
+def test_other_parameters_work_from_the_next_image_on_and_tracks_go_on():
+    """At alpha 1 the velocity is that between the last two sightings."""
+    tracker = ThesisTracker()
+    for frame in range(5):
+        before, = tracker.update(seconds(frame / 10), [at(0.1 * frame, 0)])
+    assert before.velocity_mps[0] < 0.7
+    tracker.tune(ThesisTrackerParams(alpha=1.0, prediction_time=1.0))
+    track, = tracker.update(seconds(0.5), [at(0.5, 0)])
+    assert track.velocity_mps[0] == pytest.approx(1.0) and len(track.prediction_m) == 4
+    assert (track.id, track.first_seen_ns) == (before.id, before.first_seen_ns)
+
+
+def test_parameters_that_are_refused_leave_the_old_ones():
+    tracker = ThesisTracker()
+    with pytest.raises(ValueError, match='alpha'):
+        tracker.tune(ThesisTrackerParams(alpha=2.0, prediction_time=1.0))
+    assert len(tracker.update(0, [at(0, 0)])[0].prediction_m) == 8

@@ -316,9 +316,38 @@ def test_prediction_goes_as_far_and_in_such_steps_as_asked_for():
 
 @pytest.mark.parametrize('name,value', [('outlier_share', 1.0), ('memory', -1), ('newcomer_density', 0.0),
                                         ('height_sigma', float('nan')), ('noise_unknown', -1.0),
-                                        ('noise_correlated', float('nan')), ('prediction_step', 0.0)])
+                                        ('noise_correlated', float('nan')), ('prediction_step', 0.0),
+                                        ('prediction_step', 1e-6)])
 def test_parameters_that_make_no_sense_are_named(name, value):
     kinds = [kind(**({name: value} if name in kind._fields else {}))
              for kind in (TrackerParams, NoiseParams, PredictionParams)]
     with pytest.raises(ValueError, match=name):
         Tracker(*kinds)
+
+
+def test_other_parameters_work_from_the_next_image_on_and_tracks_go_on():
+    """Nobody is found any more; by the old limit the person would be gone after 0.35 s, and come back after 4 s."""
+    tracker = Tracker()
+    number, = ids(play(tracker, 1, standing((3, 0)))[-1])
+    tracker.tune(TrackerParams(missed_limit=2.0), NoiseParams(), PredictionParams(prediction_time=1.0))
+    missed = play(tracker, 1, standing(), start_s=1)[-1]
+    assert ids(missed) == [number] and len(missed[0].prediction_m) == 4
+    tracker.tune(TrackerParams(memory=0.5), NoiseParams(), PredictionParams())
+    assert play(tracker, 0.1, standing(), start_s=2)[-1] == []
+    assert ids(play(tracker, 1, standing((3, 0)), start_s=3)[-1]) == [number + 1]
+
+
+def test_parameters_that_are_refused_leave_all_the_old_ones():
+    tracker = Tracker()
+    with pytest.raises(ValueError, match='noise_unknown'):
+        tracker.tune(TrackerParams(), NoiseParams(noise_unknown=-1.0), PredictionParams(prediction_time=1.0))
+    assert len(play(tracker, 1, standing((3, 0)))[-1][0].prediction_m) == 8
+
+
+def test_images_that_come_late_are_done_again_with_the_new_parameters():
+    """Late by three images: the track of before the change is the one of after it."""
+    tracker = Tracker()
+    play(tracker, 1, standing((3, 0)))
+    number, = ids(tracker.objects())
+    tracker.tune(TrackerParams(acceleration=0.5), NoiseParams(), PredictionParams())
+    assert ids(tracker.update(START_NS + int(0.9 * NS) + 1, [at(3, 0)], VIEW)) == [number]

@@ -3,7 +3,8 @@ import os
 
 import pytest
 
-from ros_3d_bb.lifting import Bbox3dParams, error_model_of
+from ros_3d_bb.lifting import Bbox3dParams, Lifter, error_model_of
+from ros_3d_bb.tally import Tally
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'error_models')
 
@@ -23,6 +24,15 @@ def test_the_shipped_models_are_for_their_estimators(name, estimator):
     assert error_model_of(params(path, estimator)).provenance.estimator == estimator
     with pytest.raises(ValueError, match='is for the estimator %s, not %s' % (estimator, other)):
         error_model_of(params(path, other))
+
+
+def test_an_estimator_that_the_model_is_not_for_is_refused_later_too():
+    path = os.path.join(FOLDER, 'thesis.yaml')
+    lifter = Lifter(params(path, 'median'), Tally())
+    sample = lifter.sample
+    with pytest.raises(ValueError, match='is for the estimator median, not foreground'):
+        lifter.tune(params(path, 'foreground'))
+    assert lifter.sample is sample
 
 
 def test_a_file_that_is_not_there_is_named():

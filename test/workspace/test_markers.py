@@ -238,3 +238,21 @@ def test_parameters_that_make_no_sense_are_refused(params, said):
 
 def test_nobody_has_no_markers():
     assert MarkerWriter().write([], header()).markers == []
+
+
+def test_other_parameters_work_from_the_next_image_on_and_what_is_not_drawn_any_more_goes():
+    """The history goes on: it was kept while it was not drawn, too."""
+    writer = MarkerWriter(MarkerParams(marker_namespaces=['cylinder', 'id']))
+    writer.write([track(3)], header())
+    writer.tune(MarkerParams(marker_namespaces=['cylinder', 'history'], marker_lifetime=0.5))
+    markers = writer.write([track(3, position=(2.5, 1.0, 0.9))], header(SECOND_NS + NS))
+    assert sorted(keys(markers)) == [('cylinder', 3), ('history', 3)]
+    assert keys(markers, Marker.DELETE) == [('id', 3)]
+    assert all(marker.lifetime.to_sec() == 0.5 for marker in markers.markers if marker.action == Marker.ADD)
+
+
+def test_parameters_that_are_refused_leave_the_old_ones():
+    writer = MarkerWriter(MarkerParams(marker_namespaces=['id']))
+    with pytest.raises(ValueError, match='marker_color'):
+        writer.tune(MarkerParams(marker_color='pink'))
+    assert keys(writer.write([track(3)], header())) == [('id', 3)]

@@ -16,6 +16,7 @@ from ros_3d_bb.detection.runtime import RuntimeParams
 from ros_3d_bb.detection.yolov5 import DetectionParams
 from ros_3d_bb.following import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.lifting import Bbox3dParams
+from ros_3d_bb.live_parameters import description_of, parameters_in
 from ros_3d_bb.markers import NAMESPACES, MarkerParams
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
 from ros_3d_bb.nodes.realsense_node import RealSenseNodeParams
@@ -30,7 +31,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 # rosdep keys of what is no ROS package; None: optional, imported where it is used, with an error that says so.
 KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-pytorch-pip', 'onnxruntime': None,
         'yaml': 'python3-yaml', 'matplotlib': 'python3-matplotlib', 'scipy': 'python3-scipy',
-        'norfair': None, 'trackeval': None, 'pyrealsense2': None,
+        'rospkg': 'python3-rospkg', 'norfair': None, 'trackeval': None, 'pyrealsense2': None,
         'PyQt5': None}  # comes with python_qt_binding, and serves where that is not
 TEST_KEYS = {'pytest': 'python3-pytest'}
 CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams, RuntimeParams), 'bbox3d.yaml': (Bbox3dParams,),
@@ -44,6 +45,7 @@ SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id
                                     'exposure', 'file', 'repeat'},
                  'depth_detector.yaml': {'floor_frame', 'frame_id'},
                  'viewer.yaml': {'session', 'label', 'window', 'frame_id'}}
+TUNED = {'yolov5.yaml', 'bbox3d.yaml', 'tracker.yaml', 'depth_detector.yaml'}  # whose nodes have a `Tuning`
 REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag', 'session:=/some/session', 'record:=/some/record.json']
 
 
@@ -133,6 +135,16 @@ def test_parameters_have_a_comment_with_the_default(name):
         key, value = line.split(': ')
         assert re.search(r'Default: %s' % re.escape(value.replace("''", 'empty')), comment), key
         comment = ''
+
+
+@pytest.mark.parametrize('name', sorted(CONFIGS))
+def test_parameters_are_live_only_where_a_node_listens_and_their_defaults_are_within_the_limits(name):
+    with open(inside('config', name)) as stream:
+        live = [parameter for parameter in parameters_in(stream.read()) if parameter.live is not None]
+    assert bool(live) == (name in TUNED)
+    least, largest, defaults = description_of(live, CONFIGS[name])[1:]
+    for key, value in defaults.items():
+        assert isinstance(value, str) or least[key] <= value <= largest[key] != least[key], key
 
 
 # These need packages that are not on every machine; tests of their own load them with stand-ins.

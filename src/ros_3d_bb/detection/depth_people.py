@@ -39,8 +39,13 @@ class DepthPeople(object):
     """
 
     def __init__(self, params=DepthPeopleParams()):
+        self.tune(params)
+        self._hog, self._floor = PersonHog(), None
+
+    def tune(self, params):
+        """Search the next images with other parameters. Raises ValueError as at the start, and changes nothing."""
         check_params(params)
-        self._params, self._hog, self._floor = params, PersonHog(), None
+        self._params = params
 
     def detect(self, image, depth, camera, floor=None):
         """Find people.

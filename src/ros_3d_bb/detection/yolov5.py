@@ -10,6 +10,7 @@ import numpy as np
 from ros_3d_bb.detection.boxes import Detections, suppressed
 
 GREY = (114, 114, 114)  # the colour around letterboxed images that YOLOv5 is trained with
+LARGEST_INPUT_PX = 4096  # more takes more memory than a machine has
 MAX_CANDIDATES = 5000  # the best so many go into the suppression; more come only of a useless confidence
 
 
@@ -60,6 +61,10 @@ class Yolov5(object):
         self._input_hw = runtime.input_hw or (size, size)
         self._stride = runtime.stride if runtime.input_hw is None else None
 
+    def tuned(self, params):
+        """Another detector with the same network. Raises ValueError as at the start."""
+        return Yolov5(self._runtime, params)
+
     @property
     def names(self):
         """Class names by number."""
@@ -98,6 +103,8 @@ def check_params(params):
     for name in ('max_det', 'image_size'):
         if getattr(params, name) < 1:
             raise ValueError('%s is %d; at least 1 expected' % (name, getattr(params, name)))
+    if params.image_size > LARGEST_INPUT_PX:
+        raise ValueError('image_size is %d; at most %d expected' % (params.image_size, LARGEST_INPUT_PX))
 
 
 def class_number(entry, names):

@@ -14,15 +14,29 @@ from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.sample_images import SampleImages
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.tuning import Tuning
 from ros_3d_bb.stamped import NS, arrival_clock_ns
 
 
 class Bbox3dNode(object):
     """Lift 2D boxes into the camera's optical frame.
 
-    Subscribes: camera/aligned_depth_to_color/image_raw, camera/color/camera_info, yolo_bounding_box.
-    Publishes: ros_3d_bb/bb_3d, with the stamp of the image that the boxes were found in; images to look at (see
-    `SampleImages`) while somebody subscribes. Parameters: config/bbox3d.yaml.
+    Each array of 2D boxes meets the depth image of its own stamp, however long the detector takes. Parameters:
+    config/bbox3d.yaml; some can be changed while it runs.
+
+    Subscribes
+    ----------
+    yolo_bounding_box : std_msgs/Int32MultiArray
+        2D boxes.
+    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
+        Depth with the pixels of the colour image.
+    camera/color/camera_info : sensor_msgs/CameraInfo
+        Of the colour camera.
+
+    Publishes
+    ---------
+    ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
+        In the camera's optical frame, with the stamp of the image that the boxes were found in.
     """
 
     def __init__(self):
@@ -40,6 +54,12 @@ class Bbox3dNode(object):
         subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
         subscribe(BOXES_TOPIC, Int32MultiArray, self._on_boxes)
+        self._tuning = Tuning('bbox3d.yaml', [params], self._tune)
+
+    def _tune(self, params):
+        with self._lock:
+            self._lifter.tune(params)
+            self._images.tune(self._lifter.sample, params.depth_image_range)
 
     def _on_camera_info(self, message):
         self._alignment.color = message

@@ -15,7 +15,15 @@ SILENT_S = 5.0  # no image is searched for so long
 
 
 class BoxesOutput(object):
-    """Publishes yolo_bounding_box, and yolo_result_out while somebody subscribes."""
+    """What a detector found, for bbox3d_node and for people.
+
+    Publishes
+    ---------
+    yolo_bounding_box : std_msgs/Int32MultiArray
+        x1, y1, x2, y2 of each person, pixels; stamp and frame of the image in `layout.dim[0].label`.
+    yolo_result_out : sensor_msgs/Image
+        The colour image with the 2D boxes, while somebody subscribes.
+    """
 
     def __init__(self, publish_empty):
         self._publish_empty = publish_empty
@@ -33,9 +41,14 @@ class BoxesOutput(object):
 
 
 class Switch(object):
-    """Whether the detector works; the service ~enable (std_srvs/SetBool) changes it.
+    """Whether the detector works.
 
-    The diagnostics say whether it is on, and complain where images come and none is answered.
+    The diagnostics say so, and complain where images come and none is answered.
+
+    Services
+    --------
+    ~enable : std_srvs/SetBool
+        Pauses the detector, and lets it go on.
     """
 
     def __init__(self, on, diagnostics):

@@ -11,6 +11,7 @@ from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.tuning import Tuning
 from ros_3d_bb.searching import DepthDetectorParams, DepthSearch
 from ros_3d_bb.stamped import arrival_clock_ns
 from ros_3d_bb.worker import NewestWorker
@@ -19,9 +20,20 @@ from ros_3d_bb.worker import NewestWorker
 class DepthDetectorNode(object):
     """Find people in depth and colour.
 
-    Subscribes: camera/color/image_raw, camera/aligned_depth_to_color/image_raw, camera/color/camera_info, tf.
-    Publishes: yolo_bounding_box; yolo_result_out while somebody subscribes. Services: ~enable (std_srvs/SetBool).
-    Parameters: config/depth_detector.yaml.
+    It needs no weights. Parameters: config/depth_detector.yaml; most can be changed while it runs.
+
+    Subscribes
+    ----------
+    camera/color/image_raw : sensor_msgs/Image
+        Colour.
+    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
+        Depth with the pixels of the colour image.
+    camera/color/camera_info : sensor_msgs/CameraInfo
+        Of the colour camera.
+    /tf : tf2_msgs/TFMessage
+        Where the floor is; not with an empty ~floor_frame.
+    /tf_static : tf2_msgs/TFMessage
+        The same.
     """
 
     def __init__(self):
@@ -31,7 +43,7 @@ class DepthDetectorNode(object):
         if transforms is not None:
             self._diagnostics.show('tf age', transforms.age)
         self._search = DepthSearch(params, people, self._diagnostics, transforms)
-        self._lock = threading.Lock()
+        self._lock, self._searching = threading.Lock(), threading.Lock()
         self._output = BoxesOutput(params.publish_empty)
         self._worker = NewestWorker(self._work, self._on_error)
         rospy.on_shutdown(self._worker.stop)
@@ -39,6 +51,11 @@ class DepthDetectorNode(object):
         subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
         subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(COLOR_TOPIC, Image, self._on_color)
+        self._tuning = Tuning('depth_detector.yaml', [params, people], self._tune)
+
+    def _tune(self, params, people):
+        with self._searching:
+            self._search.tune(params, people)
 
     def _on_camera_info(self, message):
         with self._diagnostics.refusing('camera_info'), self._lock:
@@ -59,7 +76,7 @@ class DepthDetectorNode(object):
                 self._diagnostics.count('images skipped for a newer one')
 
     def _work(self, pair):
-        with self._diagnostics.refusing('images'):
+        with self._diagnostics.refusing('images'), self._searching:
             found = self._search.search(pair) if self._switch.on else None  # it may have been paused meanwhile
             if found is not None:
                 self._output.publish(pair[1].header, *found, names=self._search.names)

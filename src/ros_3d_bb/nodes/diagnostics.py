@@ -29,6 +29,11 @@ class Diagnostics(Tally):
     A warning is logged at most every `WARNING_LASTS_S` for one cause, and shown as the node's state for as long. What
     is wrong around it (see `check`) is its state while it lasts. Timed by the machine's clock: a paused bag must not
     silence it.
+
+    Publishes
+    ---------
+    /diagnostics : diagnostic_msgs/DiagnosticArray
+        What the node did with its input, and what it is missing, once a second.
     """
 
     def __init__(self):

@@ -35,9 +35,21 @@ class LatencyProbeParams(NamedTuple):
 class LatencyProbeNode(object):
     """Record stamps and arrivals for a while, and what each node uses meanwhile; then write them down and end.
 
-    Subscribes: camera/color/camera_info, which stands for the images; yolo_bounding_box, ros_3d_bb/bb_3d,
-    ros_3d_bb/tracks, visualization_marker_array. Parameters: see `LatencyProbeParams`; launch/latency.launch. The
-    record: see `ros_3d_bb.evaluation.latency_result.result_of`.
+    Parameters: see `LatencyProbeParams`; launch/latency.launch. The record: see
+    `ros_3d_bb.evaluation.latency_result.result_of`.
+
+    Subscribes
+    ----------
+    camera/color/camera_info : sensor_msgs/CameraInfo
+        Stands for the images.
+    yolo_bounding_box : std_msgs/Int32MultiArray
+        2D boxes.
+    ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
+        3D boxes.
+    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
+        Tracks.
+    visualization_marker_array : visualization_msgs/MarkerArray
+        Markers.
     """
 
     def __init__(self):

@@ -58,9 +58,32 @@ class PlannerTopic(object):
 class PlannerBridgeNode(object):
     """Hand tracks on to planners.
 
-    Subscribes: ros_3d_bb/tracks, tf. Publishes, as ~outputs says: ~points and ~clearing_points, /people, ~obstacles,
-    ~objects, ~detections. Where no tracks come for ~timeout, each is emptied once. Parameters:
+    ~outputs says which of the topics there are. Where no tracks come for ~timeout, each is emptied once. Parameters:
     config/planner_bridge.yaml.
+
+    Subscribes
+    ----------
+    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
+        Tracks.
+    /tf : tf2_msgs/TFMessage
+        From the frame of the tracks to ~planner_frame.
+    /tf_static : tf2_msgs/TFMessage
+        The same.
+
+    Publishes
+    ---------
+    ~points : sensor_msgs/PointCloud2
+        `costmap`: people now and soon, as points for an obstacle layer.
+    ~clearing_points : sensor_msgs/PointCloud2
+        `costmap`: a ring around the robot, to which the costmap is cleared before; not with ~clearing_range 0.
+    /people : people_msgs/People
+        `people`: for social_navigation_layers.
+    ~obstacles : costmap_converter/ObstacleArrayMsg
+        `teb`: for teb_local_planner.
+    ~objects : derived_object_msgs/ObjectArray
+        `mpc`: for mpc_planner_jackal.
+    ~detections : vision_msgs/Detection3DArray
+        `vision`: for readers of 3D detections.
     """
 
     def __init__(self):

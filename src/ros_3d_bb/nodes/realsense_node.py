@@ -27,7 +27,7 @@ START_NS = NS  # the time that is told until the first image of a recording says
 
 
 class RealSenseNodeParams(NamedTuple):
-    """See config/realsense.yaml."""
+    """See config/realsense.yaml. `publish_clock`: whether this node tells the time, that of a recording."""
 
     frame_prefix: str = 'camera'
     publish_clock: bool = False
@@ -37,9 +37,22 @@ class RealSenseNodeParams(NamedTuple):
 class RealSenseNode(object):
     """Publish colour, depth aligned to it, and camera_info, with the topics and frames of realsense2_camera.
 
-    Publishes: camera/color/image_raw, camera/aligned_depth_to_color/image_raw, camera_info of both, /tf_static, and
-    /clock where it tells the time of a recording. A camera that is not there, or is unplugged, is waited for.
-    Parameters: config/realsense.yaml.
+    A camera that is not there, or is unplugged, is waited for. Parameters: config/realsense.yaml.
+
+    Publishes
+    ---------
+    camera/color/image_raw : sensor_msgs/Image
+        Colour.
+    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
+        Depth with the pixels of the colour image.
+    camera/color/camera_info : sensor_msgs/CameraInfo
+        Of the colour camera.
+    camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
+        The same, as depth is aligned to colour.
+    /tf_static : tf2_msgs/TFMessage
+        The frames of the camera, below the frame ~frame_prefix + "_link".
+    /clock : rosgraph_msgs/Clock
+        The time of a recording; only with ~publish_clock.
     """
 
     def __init__(self):

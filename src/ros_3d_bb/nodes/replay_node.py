@@ -25,8 +25,22 @@ class ReplayParams(NamedTuple):
 class ReplayNode(object):
     """Play the images of a bag forwards and backwards, so that nobody jumps, each stamped with the time it is sent.
 
-    Publishes: what bags of `scenario_to_bag` and `session_to_bag` hold of a camera: images, camera_info, /tf; where it
-    is asked to, yolo_bounding_box. Parameters: see `ReplayParams`; launch/latency.launch.
+    For bags of `scenario_to_bag` and `session_to_bag`. Parameters: see `ReplayParams`; launch/latency.launch.
+
+    Publishes
+    ---------
+    camera/color/image_raw : sensor_msgs/Image
+        Colour.
+    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
+        Depth with the pixels of the colour image.
+    camera/color/camera_info : sensor_msgs/CameraInfo
+        Of the colour camera.
+    camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
+        The same, as depth is aligned to colour.
+    /tf : tf2_msgs/TFMessage
+        From the map to the camera.
+    yolo_bounding_box : std_msgs/Int32MultiArray
+        The 2D boxes in the bag; only with ~boxes.
     """
 
     def __init__(self):

@@ -10,16 +10,34 @@ from ros_3d_bb.stamped import StampedCache
 
 
 class SampleImages(object):
-    """Publishes ros_3d_bb/raw (the colour image), ros_3d_bb/color (with boxes and samples, thesis Fig. 3.5) and
-    ros_3d_bb/depth (as grey). Subscribes camera/color/image_raw only while one of the first two is subscribed.
+    """What the 3D boxes of an image were made of.
+
+    Subscribes
+    ----------
+    camera/color/image_raw : sensor_msgs/Image
+        Colour; only while somebody looks at ros_3d_bb/raw or ros_3d_bb/color.
+
+    Publishes
+    ---------
+    ros_3d_bb/raw : sensor_msgs/Image
+        The colour image that the boxes belong to, while somebody subscribes.
+    ros_3d_bb/color : sensor_msgs/Image
+        The same with boxes and depth samples (thesis Fig. 3.5), while somebody subscribes.
+    ros_3d_bb/depth : sensor_msgs/Image
+        The depth image in grey, while somebody subscribes.
     """
 
     def __init__(self, cache_ns, sample, depth_range_m, diagnostics):
         self._diagnostics = diagnostics
-        self._cache_ns, self._sample, self._depth_range_m = cache_ns, sample, depth_range_m
+        self._cache_ns = cache_ns
+        self.tune(sample, depth_range_m)
         self._raw_pub, self._color_pub, self._depth_pub = (
             rospy.Publisher('ros_3d_bb/' + name, Image, queue_size=1) for name in ('raw', 'color', 'depth'))
         self._colors, self._subscriber = None, None
+
+    def tune(self, sample, depth_range_m):
+        """Draw the next images with these samples, and this depth as black."""
+        self._sample, self._depth_range_m = sample, depth_range_m
 
     def publish(self, header, depth, boxes):
         """Publish the images of one set of 3D boxes, as far as somebody subscribes."""

@@ -39,9 +39,25 @@ class SimulatorParams(NamedTuple):
 class SimulatorNode(object):
     """Play a scenario: colour, aligned depth, camera_info, tf from the map to the camera, and ground truth.
 
-    Publishes: camera/color/image_raw, camera/aligned_depth_to_color/image_raw, camera_info of both, ground_truth, /tf,
-    and /clock where it tells the time. Without it, images that the machine is too slow for are left out; with it, time
-    waits for them. Parameters: config/simulator.yaml.
+    Where it tells the time (~publish_clock), time waits for images that the machine is too slow for; else they are left
+    out. Parameters: config/simulator.yaml.
+
+    Publishes
+    ---------
+    camera/color/image_raw : sensor_msgs/Image
+        Colour.
+    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
+        Depth with the pixels of the colour image.
+    camera/color/camera_info : sensor_msgs/CameraInfo
+        Of the colour camera.
+    camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
+        The same, as depth is aligned to colour.
+    ground_truth : ros_3d_bb/TrackedObjectArray
+        The people, in the map; their prediction is where they will be.
+    /tf : tf2_msgs/TFMessage
+        From the map to the camera.
+    /clock : rosgraph_msgs/Clock
+        The time; only with ~publish_clock.
     """
 
     def __init__(self):

@@ -7,26 +7,46 @@ from visualization_msgs.msg import MarkerArray
 
 from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
-from ros_3d_bb.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
+from ros_3d_bb.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter, check_params
 from ros_3d_bb.messages import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_message
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.tuning import Tuning
 from ros_3d_bb.stamped import arrival_clock_ns
 
 
 class TrackerNode(object):
     """Track 3D boxes in a fixed frame.
 
-    Subscribes: ros_3d_bb/bb_3d, tf; camera/color/camera_info and camera/aligned_depth_to_color/image_raw, to tell who
-    is out of view or hidden. Publishes: ros_3d_bb/tracks, visualization_marker_array, both with the stamp of the newest
-    image. Without a transform at that stamp nothing is published and nobody ages. Parameters: config/tracker.yaml.
+    Without a transform at the stamp of the boxes nothing is published and nobody ages. Parameters:
+    config/tracker.yaml; many can be changed while it runs.
+
+    Subscribes
+    ----------
+    ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
+        3D boxes.
+    camera/color/camera_info : sensor_msgs/CameraInfo
+        Tells who is out of view; not with ~tracker thesis.
+    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
+        Tells whom something hides; not with ~tracker thesis or without ~use_depth.
+    /tf : tf2_msgs/TFMessage
+        Where the camera is in ~target_frame.
+    /tf_static : tf2_msgs/TFMessage
+        The same.
+
+    Publishes
+    ---------
+    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
+        In ~target_frame, with the stamp of the newest image.
+    visualization_marker_array : visualization_msgs/MarkerArray
+        The same for RViz, while somebody subscribes.
     """
 
     def __init__(self):
-        params, marker_params, *tracking = read_params(TrackerNodeParams, MarkerParams, *TRACKING_PARAMS)
+        params, marker_params, *tracking = given = read_params(TrackerNodeParams, MarkerParams, *TRACKING_PARAMS)
         self._markers = MarkerWriter(marker_params)
         self._lock = threading.Lock()
         self._diagnostics = Diagnostics()
@@ -36,6 +56,13 @@ class TrackerNode(object):
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
         self._subscribe()
+        self._tuning = Tuning('tracker.yaml', given, self._tune)
+
+    def _tune(self, _params, marker_params, *tracking):
+        check_params(marker_params)
+        with self._lock:
+            self._follower.tune(tracking)
+            self._markers.tune(marker_params)
 
     def _subscribe(self):
         subscribe(BOXES3D_TOPIC, BoundingBox3DArray, self._on_boxes)

@@ -55,9 +55,30 @@ class Color(NamedTuple):
 class ViewerNode(object):
     """Show colour, depth and boxes of one image, and append it to a measurement session.
 
-    Subscribes: camera/color/image_raw, camera/aligned_depth_to_color/image_raw, camera/color/camera_info,
-    yolo_bounding_box, ros_3d_bb/bb_3d. Services: ~capture (std_srvs/Trigger); calls detector/enable
-    (std_srvs/SetBool). Parameters: config/viewer.yaml; ~label is read at each measurement.
+    Parameters: config/viewer.yaml; ~label is read at each measurement.
+
+    Subscribes
+    ----------
+    camera/color/image_raw : sensor_msgs/Image
+        Colour.
+    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
+        Depth with the pixels of the colour image.
+    camera/color/camera_info : sensor_msgs/CameraInfo
+        Of the colour camera.
+    yolo_bounding_box : std_msgs/Int32MultiArray
+        2D boxes.
+    ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
+        3D boxes.
+
+    Services
+    --------
+    ~capture : std_srvs/Trigger
+        Appends what is newest to the session, as the key `s`; answers as what, or why not.
+
+    Calls
+    -----
+    detector/enable : std_srvs/SetBool
+        Pauses the detector, and lets it go on: the key `p`.
     """
 
     def __init__(self):
@@ -137,7 +158,7 @@ class ViewerNode(object):
         if not self._params.session:
             raise ValueError('no session is given; start the viewer with session:=FOLDER')
         snapshot = self._snapshot_to_store()
-        label = str(rospy.get_param('~label', self._params.label))
+        label = self._label()
         appended = append(self._params.session, Measurement(
             snapshot.color.pixels, snapshot.depth, snapshot.camera, self._params.frame_id or snapshot.color.frame_id,
             snapshot.stamp_ns, snapshot.boxes2d or (), snapshot.boxes3d or (), label))
@@ -146,6 +167,11 @@ class ViewerNode(object):
                  'with %d 3D box%s' % (len(snapshot.boxes3d), '' if len(snapshot.boxes3d) == 1 else 'es'))
         return 'saved %s %s%s: number %d in %s' % (appended.id, found, label and ', label %s' % label, appended.count,
                                                    self._params.session)
+
+    def _label(self):
+        """As the master has it: rospy's cache hears of a label some time after it was set."""
+        code, _text, label = rospy.get_master().getParam(rospy.resolve_name('~label'))
+        return str(label) if code == 1 else self._params.label
 
     def _snapshot_to_store(self):
         """The newest snapshot. Raises ValueError where there is none to store, or it lacks boxes and nobody knows."""

@@ -9,6 +9,7 @@ from ros_3d_bb.nodes.boxes_output import BoxesOutput, Switch
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import subscribe
+from ros_3d_bb.nodes.tuning import Tuning
 from ros_3d_bb.searching import Yolov5NodeParams, opened_yolov5, search_color
 from ros_3d_bb.worker import NewestWorker
 
@@ -16,21 +17,30 @@ from ros_3d_bb.worker import NewestWorker
 class Yolov5Node(object):
     """Find people in colour images.
 
-    Subscribes: camera/color/image_raw. Publishes: yolo_bounding_box; yolo_result_out while somebody subscribes.
-    Services: ~enable (std_srvs/SetBool) pauses and resumes. Parameters: config/yolov5.yaml.
+    Only the newest image is searched; those that come meanwhile are skipped. Parameters: config/yolov5.yaml; some can
+    be changed while it runs.
+
+    Subscribes
+    ----------
+    camera/color/image_raw : sensor_msgs/Image
+        Colour.
     """
 
     def __init__(self):
-        self._params, detection, running = read_params(Yolov5NodeParams, DetectionParams, RuntimeParams)
-        self._detector = opened_yolov5(self._params.weights, detection, running, rospy.logwarn)
+        params, detection, running = given = read_params(Yolov5NodeParams, DetectionParams, RuntimeParams)
+        self._detector = opened_yolov5(params.weights, detection, running, rospy.logwarn)
         self._diagnostics = Diagnostics()
-        self._output = BoxesOutput(self._params.publish_empty)
+        self._output = BoxesOutput(params.publish_empty)
         self._worker = NewestWorker(self._search, self._on_error)
         rospy.on_shutdown(self._worker.stop)
-        self._switch = Switch(self._params.enabled, self._diagnostics)
+        self._switch = Switch(params.enabled, self._diagnostics)
         subscribe(COLOR_TOPIC, Image, self._on_image, 1)
-        rospy.loginfo('looking for %s with %s on %s', ', '.join(map(str, detection.classes)), self._params.weights,
+        rospy.loginfo('looking for %s with %s on %s', ', '.join(map(str, detection.classes)), params.weights,
                       self._detector.description)
+        self._tuning = Tuning('yolov5.yaml', given, self._tune)
+
+    def _tune(self, _params, detection, _running):
+        self._detector = self._detector.tuned(detection)  # an image is searched with the one or the other
 
     def _on_image(self, message):
         if self._switch.on and self._worker.offer(message):
@@ -42,9 +52,10 @@ class Yolov5Node(object):
                 self._detect(message)
 
     def _detect(self, message):
-        image, found = search_color(self._detector, message)
+        detector = self._detector
+        image, found = search_color(detector, message)
         self._diagnostics.count('images searched')
-        self._output.publish(message.header, image, found, self._detector.names)
+        self._output.publish(message.header, image, found, detector.names)
         self._diagnostics.answered(message.header.stamp)
         self._switch.answered()
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.association import match_greedily, plane_distances
-from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject, prediction_times_s
+from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject, check_steps, prediction_times_s
 
 
 class ThesisTrackerParams(NamedTuple):
@@ -56,11 +56,15 @@ class ThesisTracker(object):
     """
 
     def __init__(self, params=ThesisTrackerParams()):
-        _check(params)
-        self._params = params
+        self.tune(params)
         self._tracks = []
         self._last_id = 0
         self._now_ns = None
+
+    def tune(self, params):
+        """Go on with other parameters and the same tracks. Raises ValueError as at the start, and changes nothing."""
+        _check(params)
+        self._params = params
 
     def update(self, stamp_ns, detections, view=None):
         """Take the detections of one image.
@@ -133,5 +137,4 @@ def _check(params):
     for name in ('disappearance_limit', 'prediction_time', 'moving_speed'):
         if not getattr(params, name) >= 0:
             raise ValueError('%s is %g; 0 or more expected' % (name, getattr(params, name)))
-    if not params.prediction_step > 0:
-        raise ValueError('prediction_step is %g; more than 0 expected' % params.prediction_step)
+    check_steps(params.prediction_time, params.prediction_step)

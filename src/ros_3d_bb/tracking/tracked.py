@@ -5,6 +5,7 @@ import numpy as np
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
 LARGEST_M, FARTHEST_M = 10.0, 1e8  # nobody is wider or taller, and no map is larger
+MOST_STEPS = 1000  # of a prediction; more only cost memory
 
 
 class Detection(NamedTuple):
@@ -69,3 +70,12 @@ class TrackedObject(NamedTuple):
 def prediction_times_s(time_s, step_s):
     """The times (steps,) after an image at which positions are predicted: each step up to `time_s`, seconds."""
     return step_s * np.arange(1, int(round(time_s / step_s)) + 1)
+
+
+def check_steps(time_s, step_s):
+    """Raise ValueError where positions cannot be predicted up to `time_s` in steps of `step_s`, seconds."""
+    if not step_s > 0:
+        raise ValueError('prediction_step is %g; more than 0 expected' % step_s)
+    if time_s / step_s > MOST_STEPS:
+        raise ValueError('prediction_step is %g and prediction_time %g; at most %d steps expected'
+                         % (step_s, time_s, MOST_STEPS))

@@ -16,7 +16,7 @@ from ros_3d_bb.tracking import kalman
 from ros_3d_bb.tracking.association import assign
 from ros_3d_bb.tracking.measuring import NoiseParams, sightings_of
 from ros_3d_bb.tracking.prediction import PredictionParams, objects_of
-from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, View
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, View, check_steps
 from ros_3d_bb.tracking.visibility import places_in
 
 TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
@@ -83,12 +83,17 @@ class Tracker(object):
     """
 
     def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams()):
-        for kind in (params, noise, prediction):
-            _check(kind)
-        self._params, self._noise, self._prediction = params, noise, prediction
-        self._outliers = kalman.Outliers(params.outlier_share, params.outlier_offset, params.outlier_spread)
+        self.tune(params, noise, prediction)
         self._last_id = 0
         self.reset()
+
+    def tune(self, params, noise, prediction):
+        """Go on with other parameters and the same tracks. Raises ValueError as at the start, and changes nothing."""
+        for kind in (params, noise, prediction):
+            _check(kind)
+        check_steps(prediction.prediction_time, prediction.prediction_step)
+        self._params, self._noise, self._prediction = params, noise, prediction
+        self._outliers = kalman.Outliers(params.outlier_share, params.outlier_offset, params.outlier_spread)
 
     def reset(self):
         """Forget all tracks, as after a jump in time. Numbers are not used again."""
@@ -297,7 +302,7 @@ def _check(params):
     for name, value in params._asdict().items():
         if not 0 <= value < 1e6:
             raise ValueError('%s is %g; 0 or more expected' % (name, value))
-        if name in ('newcomer_density', 'height_sigma', 'prediction_step') and not value > 0:
+        if name in ('newcomer_density', 'height_sigma') and not value > 0:
             raise ValueError('%s is %g; more than 0 expected' % (name, value))
         if name == 'outlier_share' and not value < 1:
             raise ValueError('%s is %g; less than 1 expected' % (name, value))

@@ -1,0 +1,95 @@
+"""Parameters that are changed while a node runs, by the tools of dynamic_reconfigure."""
+import os
+import threading
+
+import rospkg
+import rospy
+from dynamic_reconfigure.encoding import decode_config, encode_config, encode_description, get_tree
+from dynamic_reconfigure.msg import Config, ConfigDescription
+from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
+
+from ros_3d_bb.live_parameters import description_of, parameters_in, plain_values
+from ros_3d_bb.params import params_from
+
+
+class Tuning(object):
+    """Lets people change those parameters of a node that its file in config/ marks as live (see `live_parameters`).
+
+    What dynamic_reconfigure generates code for is made at the start here, of that file and the node's types, and a
+    value that makes no sense is refused with all that came with it, where dynamic_reconfigure's own server would put
+    another in its place. The answer to such a request is what stays in force: an error would end rqt_reconfigure's
+    thread.
+
+    Parameters
+    ----------
+    file : str
+        Name of the parameter file in config/.
+    params : list of NamedTuple
+        All parameters of the node, as `startup.read_params` returned them.
+    take : callable
+        Called with changed ones, in the same order; raises ValueError, and changes nothing, where they make no sense.
+
+    Publishes
+    ---------
+    ~parameter_descriptions : dynamic_reconfigure/ConfigDescription
+        What can be changed while the node runs, within what limits; latched.
+    ~parameter_updates : dynamic_reconfigure/Config
+        What is in force; latched.
+
+    Services
+    --------
+    ~set_parameters : dynamic_reconfigure/Reconfigure
+        Changes parameters that are marked Live, as rqt_reconfigure does.
+    """
+
+    def __init__(self, file, params, take):
+        self._params, self._take, self._lock = list(params), take, threading.Lock()
+        with open(os.path.join(rospkg.RosPack().get_path('ros_3d_bb'), 'config', file), encoding='utf-8') as stream:
+            live = [parameter for parameter in parameters_in(stream.read()) if parameter.live is not None]
+        self._names = [parameter.name for parameter in live]
+        description = encode_description(description_of(live, [type(each) for each in params]))
+        self._groups = get_tree(description)
+        self._descriptions_pub, self._updates_pub = (
+            rospy.Publisher('~parameter_' + name, kind, queue_size=1, latch=True)
+            for name, kind in (('descriptions', ConfigDescription), ('updates', Config)))
+        self._keep_in_step(rospy.get_param('~', {}))
+        self._descriptions_pub.publish(description)
+        self._updates_pub.publish(self._message())
+        rospy.Service('~set_parameters', Reconfigure, self._on_request)
+
+    def _on_request(self, request):
+        with self._lock:
+            before = self._values()
+            try:
+                self._change(decode_config(request.config))
+            except ValueError as error:
+                rospy.logwarn('change of parameters refused: %s; all stay as they are', error)
+            for name in self._keep_in_step(before):
+                rospy.loginfo('~%s is %s now, %s before', name, self._values()[name], before[name])
+            message = self._message()
+            self._updates_pub.publish(message)  # also where nothing changed: sliders go back to what is in force
+            return ReconfigureResponse(message)
+
+    def _change(self, given):
+        for name in sorted(set(given) & set(self._values()) - set(self._names)):
+            raise ValueError('parameter ~%s is read at the start only; those that can be changed: %s'
+                             % (name, ', '.join(sorted(self._names))))
+        params = params_from(dict(self._values(), **given), *(type(each) for each in self._params))
+        self._take(*params)
+        self._params = params
+
+    def _values(self):
+        return {name: value for each in self._params for name, value in each._asdict().items()}
+
+    def _keep_in_step(self, known):
+        """Tell the parameter server which live parameters differ from those known. Returns their names."""
+        values = self._values()
+        changed = [name for name in self._names if name not in known or known[name] != values[name]]
+        for name in changed:
+            rospy.set_param('~' + name, list(values[name]) if isinstance(values[name], tuple) else values[name])
+        return changed
+
+    def _message(self):
+        """What is in force."""
+        values = plain_values(self._params)
+        return encode_config(dict({name: values[name] for name in self._names}, groups=self._groups))

@@ -1,0 +1,140 @@
+"""Parameters of running nodes by dynamic_reconfigure's own client and command. Needs a master because those do."""
+import ast
+import os
+import subprocess
+
+import pytest
+import rospy
+import yaml
+from dynamic_reconfigure.client import Client
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.msg import Config
+from dynamic_reconfigure.srv import Reconfigure
+from rosgraph_msgs.msg import Log
+
+from ros_3d_bb.live_parameters import parameters_in
+from support.ros import TIMEOUT_S, Recorder, wait_until
+
+CONFIG = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config')
+NODES = ['bbox3d_node', 'depth_detector_node', 'tracker_node']
+
+
+def text_of(node):
+    with open(os.path.join(CONFIG, node.replace('_node', '.yaml')), encoding='utf-8') as stream:
+        return stream.read()
+
+
+def live_of(node):
+    """The live parameters of a node by name, as its file has them."""
+    return {parameter.name: parameter for parameter in parameters_in(text_of(node)) if parameter.live is not None}
+
+
+@pytest.fixture(scope='module')
+def clients():
+    """dynamic_reconfigure's client of each node."""
+    rospy.init_node('test_tuning')
+    made = {node: Client(node, timeout=TIMEOUT_S) for node in NODES}
+    yield made
+    for client in made.values():
+        client.close()
+
+
+@pytest.fixture
+def tracker(clients):
+    """The tracker's client; afterwards all is as it was."""
+    client = clients['tracker_node']
+    before = {name: client.get_configuration(TIMEOUT_S)[name] for name in live_of('tracker_node')}
+    yield client
+    client.update_configuration(before)
+
+
+@pytest.fixture
+def said(clients):
+    """What the nodes say."""
+    with Recorder('/rosout', Log) as log:
+        yield lambda words: wait_until(lambda: any(words in entry.msg for entry in log.messages), words)
+
+
+@pytest.mark.parametrize('node', NODES)
+def test_what_is_offered_is_what_the_parameter_file_says(clients, node):
+    expected, values = live_of(node), yaml.safe_load(text_of(node))
+    offered = {entry['name']: entry for entry in clients[node].get_parameter_descriptions(TIMEOUT_S)}
+    assert set(offered) == set(expected) and len(expected) >= 4
+    for name, entry in offered.items():
+        assert entry['description'] == expected[name].description
+        assert entry['default'] == (', '.join(values[name]) if isinstance(values[name], list) else values[name])
+        assert entry['type'] in ('bool', 'str') or entry['min'] <= entry['default'] <= entry['max'] > entry['min']
+
+
+@pytest.mark.parametrize('node', NODES)
+def test_no_slider_reaches_a_value_that_is_refused(clients, node):
+    """Each parameter at both of its limits, or with each of its words, the others at their defaults."""
+    client = clients[node]
+    for entry in client.get_parameter_descriptions(TIMEOUT_S):
+        values = [entry['min'], entry['max']] if entry['type'] != 'str' else [
+            word['value'] for word in (ast.literal_eval(entry['edit_method'])['enum'] if entry['edit_method'] else [])]
+        assert not entry['edit_method'] or entry['default'] in values
+        for value in values + [entry['default']]:
+            assert client.update_configuration({entry['name']: value})[entry['name']] == value
+            given = rospy.get_param('/%s/%s' % (node, entry['name']))
+            assert value == (', '.join(given) if isinstance(given, list) else given)
+
+
+def test_values_are_found_in_the_groups_where_rqt_reconfigure_looks_for_them(tracker):
+    groups = tracker.get_configuration(TIMEOUT_S)['groups']['groups']
+    sections = {name: parameter.section for name, parameter in live_of('tracker_node').items()}
+    assert set(groups) == set(sections.values()) and len(groups) > 5
+    for name, section in sections.items():
+        assert name in groups[section]
+    assert groups['thesis']['alpha'] == 0.2 and groups['both trackers']['prediction_time'] == 2.0
+
+
+def test_a_value_that_makes_no_sense_is_refused_with_all_that_came_with_it(tracker, said):
+    before = tracker.get_configuration(TIMEOUT_S)
+    with Recorder('/tracker_node/parameter_updates', Config) as updates:
+        known = len(updates.wait_for(1))
+        answer = tracker.update_configuration({'missed_limit': 1.0, 'outlier_share': 1.5, 'marker_history': 9.0})
+        updates.wait_for(known + 1)  # sliders go back
+    assert answer == before
+    said('outlier_share is 1.5; less than 1 expected; all stay as they are')
+    kept = [rospy.get_param('/tracker_node/' + name) for name in ('missed_limit', 'outlier_share', 'marker_history')]
+    assert kept == [0.35, 0.1, 4.0]
+
+
+@pytest.mark.parametrize('node, change, words', [
+    ('tracker_node', {'target_frame': 'odom'},
+     'parameter ~target_frame is read at the start only; those that can be changed: accel'),
+    ('tracker_node', {'memry': 1.0}, 'unknown parameter ~memry; did you mean ~memory?'),
+    ('tracker_node', {'min_sightings': 2.5}, 'parameter ~min_sightings is 2.5, a float; int expected'),
+    ('tracker_node', {'marker_namespaces': 'cylinder, elipse'},
+     "marker_namespaces has 'elipse'; did you mean ellipse?"),
+    ('tracker_node', {'prediction_step': 1e-6},
+     'prediction_step is 1e-06 and prediction_time 2; at most 1000 steps expected'),
+    ('tracker_node', {'memory': float('nan')}, 'memory is nan; 0 or more expected'),
+    ('tracker_node', {'alpha': 7.0}, 'alpha is 7; more than 0 and at most 1 expected'),  # of the tracker not in use
+    ('depth_detector_node', {'min_depth': 7.0}, 'min_depth is 7 and max_depth is 6.5; the first must be less'),
+    ('depth_detector_node', {'floor_height': float('nan'), 'min_depth': 1.0}, 'parameter ~floor_height is nan'),
+    ('bbox3d_node', {'estimator': 'mean'}, "estimator is 'mean'; foreground or median expected"),
+    ('bbox3d_node', {'stride': 0}, 'stride is 0; at least 1 expected')])
+def test_requests_that_make_no_sense_are_refused_with_the_reason(clients, said, node, change, words):
+    before = clients[node].get_configuration(TIMEOUT_S)
+    answer = rospy.ServiceProxy('/%s/set_parameters' % node, Reconfigure)(encode_config(change)).config
+    assert {entry.name: entry.value for entry in answer.doubles + answer.ints + answer.strs} == {
+        name: value for name, value in before.items() if name != 'groups'}
+    said(words)
+
+
+def test_lists_stay_lists_on_the_parameter_server(tracker):
+    tracker.update_configuration({'marker_namespaces': 'cylinder, id'})
+    assert rospy.get_param('/tracker_node/marker_namespaces') == ['cylinder', 'id']
+
+
+def test_the_command_of_dynamic_reconfigure_works(tracker, said):
+    def dynparam(*arguments):
+        command = ('rosrun', 'dynamic_reconfigure', 'dynparam') + arguments
+        return subprocess.check_output(command, stderr=subprocess.STDOUT, universal_newlines=True, timeout=TIMEOUT_S)
+    assert dynparam('list').split() == ['/' + node for node in NODES]
+    dynparam('set', '/tracker_node', 'prediction_time', '3.0')
+    said('~prediction_time is 3.0 now, 2.0 before')
+    assert rospy.get_param('/tracker_node/prediction_time') == 3.0
+    assert "'prediction_time': 3.0" in dynparam('get', '/tracker_node')
