@@ -16,7 +16,8 @@ class DepthCameraCheck(object):
     """Compares the camera_info beside the depth image with that of colour, now and then: it listens until they agree.
 
     The node sets what came last: `color`, a CameraInfo, and `depth_frame`. `with_frames`: whether the names of their
-    frames can be relied on.
+    frames can be relied on. The topic, camera/aligned_depth_to_color/camera_info or what is beside the depth image, is
+    subscribed only meanwhile.
     """
 
     def __init__(self, with_frames):
