@@ -40,22 +40,23 @@ def released(text):
             for version, _date, content in changelog.foreach_version()}
 
 
-def test_what_is_forthcoming_becomes_a_version_with_every_line():
-    """As catkin_prepare_release does it."""
+def test_every_line_of_the_newest_section_is_read():
+    """As a version of its own, which catkin_prepare_release makes of what is forthcoming."""
     text = changelog_text()
     label = get_forthcoming_label(text)
-    assert label == 'Forthcoming'
-    lines = released(rename_section(text, label, '99.0.0 (2030-01-01)'))['99.0.0']
-    first_section = text.split('Forthcoming\n')[1].split('\n\n')[0]
-    assert len(lines) == first_section.count('\n* ') and all(line.strip() for line in lines)
-    assert lines[0].replace('\n', ' ') == first_section.split('\n* ')[1].replace('\n  ', ' ')
+    if label:
+        text = rename_section(text, label, '99.0.0 (2030-01-01)')
+    version = '99.0.0' if label else package_for('noetic').version
+    lines = released(text)[version]
+    written = text.split('\n%s (' % version)[1].split('\n\n')[0].split('\n* ')[1:]
+    assert [line.split() for line in lines] == [line.split() for line in written]
 
 
 def test_the_version_is_the_last_that_was_released():
-    """Before the first one it stands for none."""
-    version = package_for('noetic').version
-    assert version == (sorted(released(changelog_text()), key=lambda name: [int(part) for part in name.split('.')])
-                       or ['0.1.0'])[-1]
+    """0.1.0 stands for none."""
+    versions = released(changelog_text())
+    newest = max(versions, key=lambda name: [int(part) for part in name.split('.')]) if versions else '0.1.0'
+    assert package_for('noetic').version == newest
 
 
 @pytest.mark.parametrize('distro', sorted(RELEASES))
