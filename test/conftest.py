@@ -14,7 +14,7 @@ settings.register_profile('repeatable', derandomize=True, database=None, deadlin
 settings.load_profile('repeatable')
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)
-from support.missing import imports_when_loaded, missing_requirements, needs_of  # noqa: E402 (found there)
+from support.missing import imports_when_loaded, misses_something, missing_requirements  # noqa: E402 (found there)
 if importlib.util.find_spec('ros_3d_bb') is None:  # no workspace is sourced: the pure modules need none
     sys.path.insert(0, os.path.join(os.path.dirname(HERE), 'src'))
 if importlib.util.find_spec('ros_3d_bb_annotator') is None:
@@ -33,7 +33,7 @@ def left_out(config):
 
 
 def pytest_configure(config):
-    config.addinivalue_line('markers', 'needs(*modules): modules of requirements.txt that the test itself imports')
+    config.addinivalue_line('markers', 'needs(*modules): modules that a test needs later than its file is imported')
 
 
 def pytest_report_header(config):
@@ -48,7 +48,7 @@ def pytest_ignore_collect(path, config):
 
 def pytest_collection_modifyitems(config, items):
     """Leave out single tests."""
-    gone = [item for item in items if needs_of(item) & left_out(config)]
+    gone = [item for item in items if config.getoption('--leave-out') and misses_something(item)]
     config.hook.pytest_deselected(items=gone)
     items[:] = [item for item in items if item not in gone]
 

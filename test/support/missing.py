@@ -7,13 +7,21 @@ import re
 TEST = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
+def is_missing(module):
+    """Whether this Python does not find a module, such as `onnx` or `torch.export`."""
+    try:
+        return importlib.util.find_spec(module) is None
+    except ImportError:  # the package that it is in
+        return True
+
+
 def missing_requirements():
     """Names of modules: what requirements*.txt ask for and this Python does not find."""
     names = set()
     for name in ('requirements.txt', 'requirements_no_deps.txt'):
         with open(os.path.join(TEST, name)) as stream:
             names.update(re.findall(r'^([\w-]+)', stream.read(), re.MULTILINE))
-    return set(name for name in names if importlib.util.find_spec(name) is None)
+    return set(filter(is_missing, names))
 
 
 def imports_when_loaded(path):
@@ -32,6 +40,6 @@ def imports_when_loaded(path):
     return found
 
 
-def needs_of(item):
-    """Modules that a test needs beyond what its file imports: `@pytest.mark.needs('module')`."""
-    return set(name for mark in item.iter_markers('needs') for name in mark.args)
+def misses_something(item):
+    """Whether a module is missing that a test says it needs: `@pytest.mark.needs('module')`."""
+    return any(is_missing(name) for mark in item.iter_markers('needs') for name in mark.args)

@@ -39,6 +39,7 @@ def follow(tracker, count, places_of):
     return [tracker.update(stamp(number + 1), at(*places_of(number / 30.0)), None) for number in range(count)]
 
 
+@pytest.mark.needs('norfair')
 def test_norfair_follows_somebody_who_walks_and_gives_seconds_and_metres():
     outputs = follow(Norfair(), 60, lambda time_s: [(1 + 1.2 * time_s, 2 - 0.5 * time_s)])
     person, = outputs[-1]
@@ -49,6 +50,7 @@ def test_norfair_follows_somebody_who_walks_and_gives_seconds_and_metres():
     assert 0 < person.first_seen_ns < person.last_seen_ns == stamp(60)
 
 
+@pytest.mark.needs('norfair')
 def test_norfair_keeps_somebody_for_a_while_who_is_not_seen():
     tracker = Norfair()
     follow(tracker, 30, lambda _time_s: [(1.0, 2.0)])

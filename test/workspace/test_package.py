@@ -100,6 +100,7 @@ def test_what_the_tests_import_is_declared_or_in_their_requirements():
     assert declared('test_depend') - set(TEST_KEYS.values()) - names == {'rosbash', 'rostest', 'xdotool', 'xvfb'}
 
 
+@pytest.mark.needs('vermin')
 def test_the_robot_needs_no_more_than_python_3_6():
     subprocess.check_call([sys.executable, '-c', 'from vermin import main; main()', '--no-tips', '--target=3.6-',
                            '--violations'] + python_files())
