@@ -37,6 +37,7 @@ TEST_KEYS = {'pytest': 'python3-pytest', 'hypothesis': 'python3-hypothesis',
              'catkin_pkg': 'python3-catkin-pkg-modules'}
 # What Melodic's own Python packages need on Python 3.
 FOR_MELODIC = {'python3-gnupg', 'python3-pycryptodome'}
+FOR_DEBIAN = {'tf2_tools'}  # which has programs of tf2_ros there
 CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams, RuntimeParams), 'bbox3d.yaml': (Bbox3dParams,),
            'tracker.yaml': (TrackerNodeParams, MarkerParams) + TRACKING_PARAMS, 'simulator.yaml': (SimulatorParams,),
            'planner_bridge.yaml': (PlannerBridgeParams,), 'realsense.yaml': (RealSenseNodeParams, RealSenseParams),
@@ -86,7 +87,8 @@ def test_every_import_is_declared_and_every_dependency_is_used():
     for path in glob.glob(inside('msg', '*')):
         with open(path) as stream:
             needed.update(re.findall(r'^(\w+)/', stream.read(), re.MULTILINE))
-    assert declared('depend', 'exec_depend') == (needed - {'ros_3d_bb'}) | {'message_runtime'} | FOR_MELODIC
+    needed = needed - {'ros_3d_bb'} | {'message_runtime'} | FOR_MELODIC | FOR_DEBIAN
+    assert declared('depend', 'exec_depend') == needed
 
 
 def test_what_the_tests_import_is_declared_or_in_their_requirements():
@@ -97,7 +99,8 @@ def test_what_the_tests_import_is_declared_or_in_their_requirements():
     known = declared('depend', 'exec_depend', 'test_depend')
     assert [name for name in names
             if TEST_KEYS.get(name, KEYS.get(name) or name) not in known and name not in required] == []
-    assert declared('test_depend') - set(TEST_KEYS.values()) - names == {'rosbash', 'rostest', 'xdotool', 'xvfb'}
+    programs = declared('test_depend') - set(TEST_KEYS.values()) - names
+    assert programs == {'rosbash', 'rosservice', 'rostest', 'xdotool', 'xvfb'}
 
 
 @pytest.mark.needs('vermin')

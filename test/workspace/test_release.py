@@ -67,6 +67,7 @@ def test_no_key_is_one_of_pip(distro):
 
 def test_torch_is_asked_for_where_the_system_has_it():
     assert [distro for distro in sorted(RELEASES) if 'python3-torch' in keys_of(package_for(distro))] == ['']
+    assert keys_of(package_for('')) - keys_of(package_for('noetic')) == {'python3-torch', 'tf2_tools'}
 
 
 def test_on_melodic_what_its_python_2_leaves_out_is_asked_for():
