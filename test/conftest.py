@@ -14,6 +14,7 @@ settings.register_profile('repeatable', derandomize=True, database=None, deadlin
 settings.load_profile('repeatable')
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)
+from support.missing import imports_when_loaded, misses_something, missing_requirements  # noqa: E402 (found there)
 if importlib.util.find_spec('ros_3d_bb') is None:  # no workspace is sourced: the pure modules need none
     sys.path.insert(0, os.path.join(os.path.dirname(HERE), 'src'))
 if importlib.util.find_spec('ros_3d_bb_annotator') is None:
@@ -21,8 +22,35 @@ if importlib.util.find_spec('ros_3d_bb_annotator') is None:
 DATA = os.environ.get('ROS_3D_BB_DATA', '')
 
 
+def pytest_addoption(parser):
+    parser.addoption('--leave-out', action='store_true', help='leave out the tests that need packages of '
+                     'requirements.txt that are not installed, instead of failing there')
+
+
+def left_out(config):
+    """Modules whose tests are left out: none, unless that was asked for."""
+    return missing_requirements() if config.getoption('--leave-out') else set()
+
+
+def pytest_configure(config):
+    config.addinivalue_line('markers', 'needs(*modules): modules that a test needs later than its file is imported')
+
+
 def pytest_report_header(config):
-    return 'ROS_3D_BB_DATA: %s' % (DATA or 'not set; the tests use data that they make themselves')
+    data = 'ROS_3D_BB_DATA: %s' % (DATA or 'not set; the tests use data that they make themselves')
+    return [data] + ['left out: what needs ' + ', '.join(sorted(left_out(config)))] * bool(left_out(config))
+
+
+def pytest_ignore_collect(path, config):
+    """Whether a file cannot even be imported."""
+    return bool(path.basename.startswith('test_') and imports_when_loaded(str(path)) & left_out(config)) or None
+
+
+def pytest_collection_modifyitems(config, items):
+    """Leave out single tests."""
+    gone = [item for item in items if config.getoption('--leave-out') and misses_something(item)]
+    config.hook.pytest_deselected(items=gone)
+    items[:] = [item for item in items if item not in gone]
 
 
 @pytest.fixture(scope='session', autouse=True)

@@ -39,11 +39,17 @@ def clients():
         client.close()
 
 
+def in_force(client):
+    """What a node answers now: `get_configuration` returns what it published last, as far as it has come here."""
+    return client.update_configuration({})
+
+
 @pytest.fixture
 def tracker(clients):
     """The tracker's client; afterwards all is as it was."""
     client = clients['tracker_node']
-    before = {name: client.get_configuration(TIMEOUT_S)[name] for name in live_of('tracker_node')}
+    values = in_force(client)
+    before = {name: values[name] for name in live_of('tracker_node')}
     yield client
     client.update_configuration(before)
 
@@ -81,7 +87,7 @@ def test_no_slider_reaches_a_value_that_is_refused(clients, node):
 
 
 def test_values_are_found_in_the_groups_where_rqt_reconfigure_looks_for_them(tracker):
-    groups = tracker.get_configuration(TIMEOUT_S)['groups']['groups']
+    groups = in_force(tracker)['groups']['groups']
     sections = {name: parameter.section for name, parameter in live_of('tracker_node').items()}
     assert set(groups) == set(sections.values()) and len(groups) > 5
     for name, section in sections.items():
@@ -90,7 +96,7 @@ def test_values_are_found_in_the_groups_where_rqt_reconfigure_looks_for_them(tra
 
 
 def test_a_value_that_makes_no_sense_is_refused_with_all_that_came_with_it(tracker, said):
-    before = tracker.get_configuration(TIMEOUT_S)
+    before = in_force(tracker)
     with Recorder('/tracker_node/parameter_updates', Config) as updates:
         known = len(updates.wait_for(1))
         answer = tracker.update_configuration({'missed_limit': 1.0, 'outlier_share': 1.5, 'marker_history': 9.0})
@@ -117,7 +123,7 @@ def test_a_value_that_makes_no_sense_is_refused_with_all_that_came_with_it(track
     ('bbox3d_node', {'estimator': 'mean'}, "estimator is 'mean'; foreground or median expected"),
     ('bbox3d_node', {'stride': 0}, 'stride is 0; at least 1 expected')])
 def test_requests_that_make_no_sense_are_refused_with_the_reason(clients, said, node, change, words):
-    before = clients[node].get_configuration(TIMEOUT_S)
+    before = in_force(clients[node])
     answer = rospy.ServiceProxy('/%s/set_parameters' % node, Reconfigure)(encode_config(change)).config
     assert {entry.name: entry.value for entry in answer.doubles + answer.ints + answer.strs} == {
         name: value for name, value in before.items() if name != 'groups'}

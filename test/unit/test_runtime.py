@@ -22,8 +22,10 @@ from support.official_reference import made
 from support.red_detector import write_red_detector
 
 
-RUNTIMES = ['torch', 'onnxruntime']
+needs_onnx = pytest.mark.needs('onnxruntime', 'onnx')
+RUNTIMES = ['torch', pytest.param('onnxruntime', marks=needs_onnx)]
 ON_TORCH, ON_ONNX = RuntimeParams('torch', 'cpu', 1), RuntimeParams('onnxruntime', 'cpu', 1)
+BOTH = [ON_TORCH, pytest.param(ON_ONNX, marks=needs_onnx)]
 
 
 def image_of(height=96, width=128):
@@ -70,6 +72,7 @@ def test_raw_output_agrees_with_plain_numpy(tmp_path, release, model, runtime):
         assert difference[:, :4].max() <= 0.01 and difference[:, 4:].max() <= 1e-4
 
 
+@needs_onnx
 def test_every_runtime_finds_the_same_in_a_measurement_session(session_folder, official_output):
     """Boxes within 1 px and scores within 0.01, at both of the sizes that are measured."""
     session = read_session(session_folder)
@@ -83,7 +86,7 @@ def test_every_runtime_finds_the_same_in_a_measurement_session(session_folder, o
             np.testing.assert_allclose(one.scores, other.scores, atol=0.01, rtol=0)
 
 
-@pytest.mark.parametrize('params', [ON_TORCH, ON_ONNX])
+@pytest.mark.parametrize('params', BOTH)
 def test_only_predictions_above_the_least_objectness_come_back(tmp_path, params):
     path = str(tmp_path / 'random.pt')
     write_checkpoint(path, layout('6.0', 'n'))
@@ -95,7 +98,7 @@ def test_only_predictions_above_the_least_objectness_come_back(tmp_path, params)
     assert run(image_of(), 1.0).shape == (0, 85)
 
 
-@pytest.mark.parametrize('params', [ON_TORCH, ON_ONNX])
+@pytest.mark.parametrize('params', BOTH)
 def test_anchors_kept_twice_as_in_release_5_are_read_once(tmp_path, params):
     path = str(tmp_path / 'five.pt')
     network = write_checkpoint(path, layout('5.0', 's'), anchor_grid=True)
@@ -103,6 +106,7 @@ def test_anchors_kept_twice_as_in_release_5_are_read_once(tmp_path, params):
     np.testing.assert_allclose(found, predicted(network, image_of(64, 64)), atol=1e-3, rtol=1e-4)
 
 
+@needs_onnx
 @pytest.mark.parametrize('activation', ['nn.ReLU()', 'nn.LeakyReLU(0.1)', 'nn.Hardswish()'])
 def test_every_activation_is_exported(tmp_path, activation):
     path = str(tmp_path / 'other.pt')
@@ -111,6 +115,7 @@ def test_every_activation_is_exported(tmp_path, activation):
     np.testing.assert_allclose(found, predicted(network, image_of()), atol=1e-3, rtol=1e-4)
 
 
+@needs_onnx
 def test_four_scales_are_exported(tmp_path):
     path = str(tmp_path / 'six.pt')
     network = write_checkpoint(path, layout('6.0', 'n6', 3))
@@ -119,6 +124,7 @@ def test_four_scales_are_exported(tmp_path):
     np.testing.assert_allclose(run(image_of(128, 64), -1), predicted(network, image_of(128, 64)), atol=1e-3, rtol=1e-4)
 
 
+@needs_onnx
 def test_views_need_no_copy_by_the_caller(tmp_path):
     """Images that came as bgr8, with rows longer than the image, or that cannot be written to."""
     path = str(tmp_path / 'random.pt')
@@ -138,6 +144,7 @@ def test_weights_that_do_not_fit_their_layout_are_refused(tmp_path):
         open_runtime(path)
 
 
+@needs_onnx
 @pytest.mark.parametrize('dynamic', [False, True])
 def test_onnx_exports_give_the_same_predictions(tmp_path, dynamic):
     network = random_network(layout('6.0', 'n', 3)).fuse()
@@ -186,7 +193,7 @@ class NotADetector(torch.nn.Module):
         return images.mean(dim=3).mean(dim=2)
 
 
-@pytest.mark.parametrize('suffix', ['onnx', 'torchscript'])
+@pytest.mark.parametrize('suffix', [pytest.param('onnx', marks=needs_onnx), 'torchscript'])
 @pytest.mark.parametrize('kind', ['missing', 'damaged', 'other'])
 def test_exports_that_cannot_be_run_are_refused(tmp_path, suffix, kind):
     path = str(tmp_path / ('model.' + suffix))
@@ -207,6 +214,7 @@ def test_onnx_without_onnx_runtime_says_what_to_install(tmp_path, monkeypatch):
         open_runtime(str(tmp_path / 'model.onnx'))
 
 
+@needs_onnx
 def test_names_in_an_export_are_never_run(tmp_path):
     victim = tmp_path / 'touched'
     path = exported_onnx(str(tmp_path / 'model.onnx'), random_network(layout('6.0', 'n', 3)), (64, 64),
@@ -246,18 +254,21 @@ def test_an_export_for_the_cpu_does_not_pretend_to_run_on_a_gpu():
         open_runtime('a.onnx', RuntimeParams(device='cuda'))
 
 
+@needs_onnx
 def test_on_a_cpu_a_checkpoint_runs_on_onnx_runtime_with_the_threads_asked_for(official_output):
     assert open_runtime(official_output[0], RuntimeParams(threads=3)).description == 'ONNX Runtime, 3 threads'
     assert open_runtime(official_output[0], ON_TORCH).description == 'torch on the CPU, 1 thread'
     assert torch.get_num_threads() == 1
 
 
+@needs_onnx
 def test_threads_are_those_of_the_machine_but_not_many(monkeypatch, official_output):
     assert physical_cores() >= 1
     monkeypatch.setattr(seam, 'physical_cores', lambda: 64)
     assert open_runtime(official_output[0], RuntimeParams(device='cpu')).description == 'ONNX Runtime, 4 threads'
 
 
+@needs_onnx
 def test_waiting_threads_leave_the_cores_to_others(official_output):
     """ONNX Runtime's threads spin by default."""
     options = session_of(export(official_output[0], 'any'), 2).get_session_options()
@@ -281,12 +292,14 @@ def test_a_gpu_is_used_by_torch_in_half_precision(monkeypatch, official_output):
     assert next(runtime._network.parameters()).dtype == torch.float16
 
 
+@needs_onnx
 def test_a_gpu_that_torch_cannot_use_changes_nothing(monkeypatch, official_output):
     monkeypatch.setattr(seam, 'gpu_count', lambda: 1)
     monkeypatch.setattr(torch.cuda, 'is_available', lambda: False)
     assert open_runtime(official_output[0]).description.startswith('ONNX Runtime')
 
 
+@pytest.mark.needs('torch.export')  # as torch 2 has, which convolves such numbers on a CPU
 def test_half_precision_finds_the_same_boxes(official_output):
     """Half the numbers' length on the CPU, as on a GPU: within 1 px and 0.01 of the recorded predictions."""
     path, cases = official_output

@@ -39,6 +39,7 @@ def follow(tracker, count, places_of):
     return [tracker.update(stamp(number + 1), at(*places_of(number / 30.0)), None) for number in range(count)]
 
 
+@pytest.mark.needs('norfair')
 def test_norfair_follows_somebody_who_walks_and_gives_seconds_and_metres():
     outputs = follow(Norfair(), 60, lambda time_s: [(1 + 1.2 * time_s, 2 - 0.5 * time_s)])
     person, = outputs[-1]
@@ -49,6 +50,7 @@ def test_norfair_follows_somebody_who_walks_and_gives_seconds_and_metres():
     assert 0 < person.first_seen_ns < person.last_seen_ns == stamp(60)
 
 
+@pytest.mark.needs('norfair')
 def test_norfair_keeps_somebody_for_a_while_who_is_not_seen():
     tracker = Norfair()
     follow(tracker, 30, lambda _time_s: [(1.0, 2.0)])
@@ -99,6 +101,7 @@ def test_the_original_sees_detections_from_where_the_camera_is_when_they_arrive(
             assert np.allclose(np.linalg.inv(late.view.fixed_from_camera).dot(np.append(other.position_m, 1)), seen)
 
 
+@pytest.mark.needs('trackeval')
 def test_with_perfect_association_everybody_keeps_one_number_and_nobody_is_invented():
     run = simulate(made_sequences(0, 20)[1], DRIVING, 0, seconds=2)
     outputs = outputs_with_perfect_association(ThesisTracker, run)
@@ -110,6 +113,7 @@ def test_with_perfect_association_everybody_keeps_one_number_and_nobody_is_inven
         assert len(set(thing.id for thing in things)) == len(things) >= len(set(image.sources) - {FALSE, DOUBLE})
 
 
+@pytest.mark.needs('norfair', 'trackeval')
 def test_all_trackers_get_the_same_runs_and_all_scores():
     runs, said = list(runs_of(made_sequences(0, 20)[:1], 0, 1, 2)), []
     trackers = compare(runs, CONTESTANTS, on_run=lambda run, scores: said.append((run.name, sorted(scores))))
@@ -127,6 +131,7 @@ def run_command(monkeypatch, *arguments):
     command.main()
 
 
+@pytest.mark.needs('norfair', 'trackeval')
 def test_the_command_writes_all_keys_of_the_design(monkeypatch, tmp_path, capsys):
     monkeypatch.delenv('ROS_3D_BB_DATA', raising=False)
     path = tmp_path / 'scores.json'
@@ -143,6 +148,7 @@ def test_the_command_writes_all_keys_of_the_design(monkeypatch, tmp_path, capsys
     assert 'made; no recordings are at hand' in capsys.readouterr().out
 
 
+@pytest.mark.needs('norfair', 'trackeval')
 def test_the_command_runs_the_whole_pipeline_on_a_scene(monkeypatch, tmp_path, capsys):
     scenario, path = tmp_path / 'short.yaml', tmp_path / 'scores.json'
     with open(os.path.join(SCENARIOS, 'thesis_a_start.yaml')) as stream:

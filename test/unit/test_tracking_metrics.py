@@ -9,6 +9,7 @@ from ros_3d_bb.evaluation.tracking.generator import HORIZONS_S, Image, Run, Trut
 from ros_3d_bb.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject
 
+pytestmark = pytest.mark.needs('trackeval')
 IMAGES = 40
 PLACES_M = np.array([(3.0, 0.0), (4.0, 1.5)])
 VELOCITY_MPS = np.array([0.5, 0.0])

@@ -1,43 +1,106 @@
-"""The installed package, built with plain cmake: everything a user needs is in it, and it runs from there."""
+"""The installed package, built with plain cmake: all that a user needs is in it, and it runs without the sources.
+
+It is built from a copy of the sources, and the copy is gone before anything runs.
+"""
+import contextlib
 import glob
 import os
+import shutil
+import socket
 import subprocess
 import sys
 
 import pytest
+import yaml
+
+from support.launching import RS_CAMERA_ARGUMENTS, stand_in_launch_file, write
+from support.small_session import write_small_session
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+PROGRAMS = sorted(os.path.basename(path) for path in glob.glob(os.path.join(ROOT, 'scripts', '*'))) + ['annotator']
+NODES = [name for name in PROGRAMS if name.endswith('_node')]
+FOLDERS = ('launch', 'config', 'rviz', 'msg', 'urdf', 'worlds')
+# Loads launch files, and prints what they would set and start: [nodes, parameters] by name.
+LOAD = """
+import glob, os, sys
+import roslaunch, yaml
+found = {}
+for path in glob.glob(os.path.join(sys.argv[1], '*.launch')):
+    config = roslaunch.config.ROSLaunchConfig()
+    roslaunch.xmlloader.XmlLoader(resolve_anon=False).load(path, config, argv=sys.argv[2:], verbose=False)
+    found[os.path.basename(path)] = [sorted('%s/%s' % (node.package, node.type) for node in config.nodes),
+                                     {name: str(given.value).strip() for name, given in config.params.items()}]
+print(yaml.safe_dump(found))
+"""
+ARGUMENTS = ['weights:=/weights.pt', 'bag:=/some.bag', 'session:=/session', 'record:=/record.json']
+
+
+def built(tmp_path_factory, *options, **environment):
+    """Build a copy of the sources with cmake, install it, and delete the copy. Returns the folders of both."""
+    source, build = str(tmp_path_factory.mktemp('source') / 'ros_3d_bb'), str(tmp_path_factory.mktemp('build'))
+    shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns('.git', '__pycache__'))
+    for command in (['cmake', source, '-DPYTHON_EXECUTABLE=' + sys.executable] + list(options),
+                    ['make', '-j2', 'install']):
+        result = subprocess.run(command, cwd=build, env=dict(os.environ, **environment), stdout=subprocess.PIPE,
+                                stderr=subprocess.STDOUT)
+        assert result.returncode == 0, result.stdout.decode()
+    shutil.rmtree(source)
+    shutil.rmtree(build)
+    return source, build
 
 
 @pytest.fixture(scope='module')
 def installed(tmp_path_factory):
-    build, prefix = str(tmp_path_factory.mktemp('build')), str(tmp_path_factory.mktemp('install'))
-    for command in (['cmake', ROOT, '-DCMAKE_INSTALL_PREFIX=' + prefix, '-DCATKIN_ENABLE_TESTING=OFF',
-                     '-DPYTHON_EXECUTABLE=' + sys.executable], ['make', '-j2', 'install']):
-        result = subprocess.run(command, cwd=build, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-        assert result.returncode == 0, result.stdout.decode()
+    """An install space."""
+    prefix = str(tmp_path_factory.mktemp('install'))
+    built(tmp_path_factory, '-DCMAKE_INSTALL_PREFIX=' + prefix, '-DCATKIN_ENABLE_TESTING=OFF')
     return prefix
 
 
-def run_in(prefix, command):
-    """Run a shell command with the install space sourced and nothing else of this environment."""
+@pytest.fixture(scope='module')
+def packaged(tmp_path_factory):
+    """What a Debian package would hold, as bloom's rules build it: (stage, folders that it was made in)."""
+    stage = str(tmp_path_factory.mktemp('stage'))
+    made_in = built(tmp_path_factory, '-DCATKIN_BUILD_BINARY_PACKAGE=1', '-DCMAKE_INSTALL_PREFIX=/opt/ros/noetic',
+                    '-DCMAKE_PREFIX_PATH=/opt/ros/noetic', '-DBUILD_TESTING=OFF', '-DCATKIN_ENABLE_TESTING=OFF',
+                    DESTDIR=stage)
+    return stage, made_in
+
+
+def environment_of(prefix, more=None):
+    """The install space sourced and nothing else of this environment."""
     path = os.path.dirname(sys.executable) + ':/usr/bin:/bin'
-    environment = {'PATH': path, 'HOME': os.path.expanduser('~'), 'ROS_HOSTNAME': 'localhost'}
+    environment = {'PATH': path, 'HOME': os.path.expanduser('~'), 'ROS_HOSTNAME': 'localhost', 'ROS_LOG_DIR': prefix}
     for name in ('ROS_DISTRO', 'ROS_ETC_DIR'):
         if name in os.environ:
             environment[name] = os.environ[name]
-    result = subprocess.run(['bash', '-c', '. %s/setup.bash && %s' % (prefix, command)], env=environment,
-                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True, cwd='/')
-    assert result.returncode == 0, result.stdout
+    return dict(environment, **(more or {}))
+
+
+def run_in(prefix, command, *arguments, **options):
+    """Run a shell command with arguments there. Returns its output, or what `status` asks for: both."""
+    # setup.bash would take the arguments for its own
+    words = 'arguments=("$@"); set --; . %s/setup.bash && exec %s "${arguments[@]}"' % (prefix, command)
+    result = subprocess.run(['bash', '-c', words, 'bash']
+                            + [str(argument) for argument in arguments],
+                            env=environment_of(prefix, options.get('environment')), stdout=subprocess.PIPE,
+                            stderr=subprocess.STDOUT, universal_newlines=True, cwd='/')
+    assert result.returncode == options.get('status', 0), result.stdout
     return result.stdout
+
+
+def files_in(folder):
+    """Paths of all files in a folder, relative to it."""
+    return sorted(os.path.relpath(os.path.join(parent, name), folder)
+                  for parent, _folders, names in os.walk(folder) for name in names)
 
 
 def test_launch_config_rviz_and_scripts_are_installed(installed):
     share = os.path.join(installed, 'share', 'ros_3d_bb')
-    for folder in ('launch', 'config', 'rviz', 'msg', 'urdf', 'worlds'):
-        assert sorted(os.listdir(os.path.join(share, folder))) == sorted(os.listdir(os.path.join(ROOT, folder)))
-    scripts = [os.path.basename(path) for path in glob.glob(os.path.join(ROOT, 'scripts', '*'))] + ['annotator']
-    assert sorted(os.listdir(os.path.join(installed, 'lib', 'ros_3d_bb'))) == sorted(scripts)
+    for folder in FOLDERS:
+        assert files_in(os.path.join(share, folder)) == files_in(os.path.join(ROOT, folder))
+    assert sorted(os.listdir(os.path.join(installed, 'lib', 'ros_3d_bb'))) == sorted(PROGRAMS)
+    assert os.path.exists(os.path.join(share, 'LICENSE'))
 
 
 def test_the_package_is_found_and_imported_from_there(installed):
@@ -46,9 +109,94 @@ def test_the_package_is_found_and_imported_from_there(installed):
     assert where.startswith(installed)
 
 
-def test_the_tool_and_the_launch_files_run_from_there(installed):
-    assert 'usage: session_to_bag' in run_in(installed, 'rosrun ros_3d_bb session_to_bag --help')
-    assert 'usage: annotator' in run_in(installed, 'rosrun ros_3d_bb annotator --help')
-    nodes = run_in(installed, 'roslaunch --nodes ros_3d_bb playback.launch bag:=x weights:=y')
-    assert {'/yolov5_node', '/bbox3d_node', '/tracker_node', '/player', '/rviz'} <= set(nodes.split())
-    assert installed in run_in(installed, 'roslaunch --files ros_3d_bb pipeline.launch')
+@pytest.mark.parametrize('name', [name for name in PROGRAMS if name not in NODES])
+def test_each_tool_says_how_it_is_used(installed, name):
+    assert 'usage: ' + name in run_in(installed, 'rosrun ros_3d_bb', name, '--help')
+
+
+@pytest.fixture(scope='module')
+def master():
+    """The URI of a ROS master."""
+    with contextlib.closing(socket.socket()) as one:
+        one.bind(('', 0))
+        port = str(one.getsockname()[1])
+    process = subprocess.Popen(['rosmaster', '--core', '-p', port], stdout=subprocess.DEVNULL,
+                               stderr=subprocess.DEVNULL)
+    yield 'http://localhost:' + port
+    process.terminate()
+    process.wait()
+
+
+@pytest.mark.parametrize('name', NODES)
+def test_each_node_starts_and_reads_its_parameters(installed, master, name):
+    """Which it can only refuse once all that it imports was found."""
+    output = run_in(installed, 'rosrun ros_3d_bb', name, '_frobnicate:=1', status=1,
+                    environment={'ROS_MASTER_URI': master})
+    assert "/%s cannot start" % name in output and 'frobnicate' in output and 'Traceback' not in output
+
+
+@pytest.fixture(scope='module')
+def loaded(installed, tmp_path_factory):
+    """What each launch file would set and start; packages that not every machine has are stand-ins."""
+    packages = tmp_path_factory.mktemp('packages')
+    stand_in_launch_file(packages, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS)
+    stand_in_launch_file(packages, 'gazebo_ros/launch/empty_world.launch', ('world_name', 'gui'))
+    stand_in_launch_file(packages, 'jackal_gazebo/launch/spawn_jackal.launch', ('x', 'y', 'z', 'yaw'))
+    for name in ('jackal_description', 'xacro'):
+        write(packages / name / 'package.xml', '<package format="2"><name>%s</name></package>' % name)
+    write(packages / 'xacro' / 'xacro', '#!/bin/sh\necho "$JACKAL_URDF_EXTRAS"\n')
+    (packages / 'xacro' / 'xacro').chmod(0o755)
+    load = packages / 'load.py'
+    write(load, LOAD)
+    return yaml.safe_load(run_in(installed, 'env "ROS_PACKAGE_PATH=%s:$ROS_PACKAGE_PATH" python3' % packages, load,
+                                 os.path.join(installed, 'share', 'ros_3d_bb', 'launch'), *ARGUMENTS))
+
+
+def test_all_launch_files_load_and_start_what_is_installed(installed, loaded):
+    assert sorted(loaded) == sorted(os.listdir(os.path.join(ROOT, 'launch')))
+    started = set(node for nodes, _parameters in loaded.values() for node in nodes if node.startswith('ros_3d_bb/'))
+    assert started == set('ros_3d_bb/' + name for name in NODES)
+
+
+def test_files_that_launch_files_name_are_installed(installed, loaded):
+    named = [value for _nodes, parameters in loaded.values() for value in parameters.values() if installed in value]
+    share = os.path.join(installed, 'share', 'ros_3d_bb')
+    for path in ('config/scenarios/demo.yaml', 'urdf/d435i.urdf.xacro'):
+        assert os.path.join(share, path) in named
+    for path in named:
+        assert os.path.exists(path), path
+
+
+def test_a_scene_becomes_a_bag_boxes_tracks_and_a_report(installed, tmp_path):
+    scene, result, picture = tmp_path / 'scene.bag', tmp_path / 'result.bag', tmp_path / 'report.png'
+    scenario = os.path.join(installed, 'share', 'ros_3d_bb', 'config', 'scenarios', 'thesis_b_moving.yaml')
+    run_in(installed, 'rosrun ros_3d_bb', 'scenario_to_bag', scenario, scene, '--images', '20', '--boxes')
+    run_in(installed, 'rosrun ros_3d_bb', 'process_bag', '--detector', 'none', scene, result)
+    assert '20 of 20 images answered' in run_in(installed, 'rosrun ros_3d_bb', 'scene_report', result, picture)
+    assert picture.exists()
+
+
+def test_the_annotator_and_the_tool_for_sessions_work_there(installed, tmp_path):
+    session, bag = write_small_session(str(tmp_path / 'session')), tmp_path / 'session.bag'
+    assert 'nothing wrong' in run_in(installed, 'rosrun ros_3d_bb', 'annotator', '--validate', session)
+    run_in(installed, 'rosrun ros_3d_bb', 'session_to_bag', session, bag)
+    assert bag.exists()
+
+
+def test_a_debian_package_holds_files_below_its_prefix_only(packaged):
+    stage, _made_in = packaged
+    assert set(path.split(os.sep)[:3] == ['opt', 'ros', 'noetic'] for path in files_in(stage)) == {True}
+    inside = os.path.join(stage, 'opt', 'ros', 'noetic')
+    # the environment of the whole prefix is another package's
+    assert sorted(os.listdir(inside)) == ['include', 'lib', 'share']
+    for folder in FOLDERS:
+        assert files_in(os.path.join(inside, 'share', 'ros_3d_bb', folder)) == files_in(os.path.join(ROOT, folder))
+
+
+def test_no_file_of_a_debian_package_names_the_folders_that_it_was_made_in(packaged):
+    stage, made_in = packaged
+    # Python puts the path that it found a file by in place of the one in its compiled form
+    for path in [path for path in files_in(stage) if not path.endswith('.pyc')]:
+        with open(os.path.join(stage, path), 'rb') as stream:
+            content = stream.read()
+        assert not [folder for folder in made_in + (stage,) if folder.encode() in content], path

@@ -141,6 +141,7 @@ def test_hostile_checkpoints_are_refused(tmp_path, little_memory):
 MODELS = [b'', b'\x08\x07' * 1000, b'\x3a\xff\xff\xff\xff\x0f', bytes(range(256)) * 40, b'(' * 10 ** 6]
 
 
+@pytest.mark.needs('onnxruntime')
 @pytest.mark.parametrize('content', MODELS, ids=beginnings(MODELS))
 def test_hostile_onnx_files_are_refused(tmp_path, content):
     path = tmp_path / 'weights.onnx'

@@ -10,6 +10,7 @@ import os
 import warnings
 from typing import NamedTuple
 
+from ros_3d_bb.detection.checkpoint import WeightsError
 from ros_3d_bb.detection.exports import export_folder, exported_runtime
 from ros_3d_bb.detection.onnx_runtime import OnnxRuntime, OnnxUnusable
 
@@ -41,11 +42,22 @@ def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
     Raises
     ------
     WeightsError
-        If the file cannot be used; names the file and what was expected.
+        If the file cannot be used, or needs torch where that is missing; names the file and what was expected.
     ValueError
         If a parameter makes no sense, the device does not exist, or the runtime asked for cannot run this file.
     """
-    path, threads = str(path), checked_threads(params)
+    threads = checked_threads(params)
+    try:
+        return _opened(str(path), params, threads, warn)
+    except ImportError as error:
+        if error.name != 'torch':
+            raise
+        raise WeightsError('weights %s: torch is not installed; install it with "pip3 install torch", or find people '
+                           'without weights (detector:=depth)' % path)
+
+
+def _opened(path, params, threads, warn):
+    """The runtime for a kind of file. Torch, which is large and which few systems bring, is imported where needed."""
     if path.endswith('.onnx'):
         if params.runtime == 'torch':
             raise ValueError('runtime torch cannot run %s; use auto or onnxruntime, or the .pt checkpoint' % path)

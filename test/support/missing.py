@@ -1,0 +1,45 @@
+"""Which tests need packages of requirements.txt that a machine with no more than the keys of package.xml lacks."""
+import ast
+import importlib.util
+import os
+import re
+
+TEST = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+
+
+def is_missing(module):
+    """Whether this Python does not find a module, such as `onnx` or `torch.export`."""
+    try:
+        return importlib.util.find_spec(module) is None
+    except ImportError:  # the package that it is in
+        return True
+
+
+def missing_requirements():
+    """Names of modules: what requirements*.txt ask for and this Python does not find."""
+    names = set()
+    for name in ('requirements.txt', 'requirements_no_deps.txt'):
+        with open(os.path.join(TEST, name)) as stream:
+            names.update(re.findall(r'^([\w-]+)', stream.read(), re.MULTILINE))
+    return set(filter(is_missing, names))
+
+
+def imports_when_loaded(path):
+    """Modules that a file of the tests imports at its top, and what those of test/support import for it."""
+    with open(path) as stream:
+        body = ast.parse(stream.read()).body
+    names = [name.name for node in body if isinstance(node, ast.Import) for name in node.names]
+    for node in body:
+        if isinstance(node, ast.ImportFrom):
+            names += [node.module] + ['%s.%s' % (node.module, name.name) for name in node.names]
+    found = set(name.split('.')[0] for name in names)
+    for name in names:
+        helper = os.path.join(TEST, *name.split('.')) + '.py'
+        if name.startswith('support.') and os.path.exists(helper):
+            found |= imports_when_loaded(helper)
+    return found
+
+
+def misses_something(item):
+    """Whether a module is missing that a test says it needs: `@pytest.mark.needs('module')`."""
+    return any(is_missing(name) for mark in item.iter_markers('needs') for name in mark.args)
