@@ -121,13 +121,15 @@ def masterless(params=()):
         'rospy.Service': connections._service, 'rospy.Timer': connections._timer, 'rospy.on_shutdown': mock.Mock(),
         'rospy.set_param': mock.Mock(),
         'rospy.get_param': lambda name, default=None: dict(params) if name == '~' else default,
+        'rospy.set_param': mock.Mock(),
         'rospy.resolve_name': lambda name: '/' + name, 'rospy.is_shutdown': lambda: False,
         'rospy.get_rostime': lambda: connections.now, 'rospy.rostime.get_rostime': lambda: connections.now,
         'rospy.logwarn_throttle': lambda _period_s, text, *arguments: text % arguments,
         'tf2_ros.Buffer': connections._buffer,
         'diagnostic_updater.Updater': mock.Mock(),
         'ros_3d_bb.nodes.yolov5_node.NewestWorker': Immediately,
-        'ros_3d_bb.nodes.depth_detector_node.NewestWorker': Immediately}
+        'ros_3d_bb.nodes.depth_detector_node.NewestWorker': Immediately,
+        'ros_3d_bb.nodes.numbers.NewestWorker': Immediately}
     for level in ('loginfo', 'logwarn', 'loginfo_once'):
         replaced['rospy.' + level] = lambda text, *arguments: text % arguments
     with contextlib.ExitStack() as stack:

@@ -11,6 +11,7 @@ from ros_3d_bb.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter, check_p
 from ros_3d_bb.messages import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_message
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
+from ros_3d_bb.nodes.numbers import Numbers
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
@@ -53,6 +54,7 @@ class TrackerNode(object):
         transforms = Transforms(params.tf_timeout)
         self._diagnostics.show('tf age', transforms.age)
         self._follower = Follower(params, tracking, self._diagnostics, transforms)
+        self._numbers = Numbers(self._diagnostics)
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
         self._subscribe()
@@ -85,10 +87,11 @@ class TrackerNode(object):
             followed = self._follower.add_boxes(message)
             if followed is None:
                 return
-            self._tracks_pub.publish(tracks_to_message(followed.tracks, followed.header))
+            tracks = self._numbers.continued(followed.tracks)
+            self._tracks_pub.publish(tracks_to_message(tracks, followed.header))
             self._diagnostics.answered(followed.header.stamp)
             if self._markers_pub.get_num_connections():
-                self._markers_pub.publish(self._markers.write(followed.tracks, followed.header))
+                self._markers_pub.publish(self._markers.write(tracks, followed.header))
 
 
 def main():

@@ -59,7 +59,7 @@ class ThesisTracker(object):
         self.tune(params)
         self._tracks = []
         self._last_id = 0
-        self._now_ns = None
+        self._now_ns, self._skipped_ns = None, 0
 
     def tune(self, params):
         """Go on with other parameters and the same tracks. Raises ValueError as at the start, and changes nothing."""
@@ -106,19 +106,19 @@ class ThesisTracker(object):
         return [self._published(track) for track in self._tracks]
 
     def skip(self, stamp_ns):
-        """Let an image pass whose detections could not be used: nobody ages. Raises ValueError as `update`."""
-        self._advance(stamp_ns)
+        """Let an image pass whose detections could not be used: nobody ages. Never an error: its stamp may be wrong."""
+        self._skipped_ns = max(stamp_ns, self._skipped_ns)
 
     def reset(self):
         """Forget all tracks, as after a jump in time. Numbers are not used again."""
-        self._tracks, self._now_ns = [], None
+        self._tracks, self._now_ns, self._skipped_ns = [], None, 0
 
     def _advance(self, stamp_ns):
-        """Nanoseconds since the image before, 0 for the first."""
-        elapsed_ns = stamp_ns - self._now_ns if self._now_ns is not None else 0
-        if self._now_ns is not None and elapsed_ns <= 0:
+        """Nanoseconds since the image before, skipped or not; 0 for the first."""
+        if self._now_ns is not None and stamp_ns <= self._now_ns:
             raise ValueError('stamp %.9f is not later than the last, %.9f' % (stamp_ns / NS, self._now_ns / NS))
-        self._now_ns = stamp_ns
+        elapsed_ns = 0 if self._now_ns is None else max(stamp_ns - max(self._now_ns, self._skipped_ns), 0)
+        self._now_ns, self._skipped_ns = stamp_ns, 0
         return elapsed_ns
 
     def _published(self, track):
