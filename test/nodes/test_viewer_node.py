@@ -2,6 +2,8 @@
 import contextlib
 import itertools
 import os
+import pathlib
+import resource
 import signal
 import subprocess
 from typing import Any, NamedTuple
@@ -22,6 +24,7 @@ from ros_3d_bb.simulation.scenario import scenario_from
 from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulator_messages import CAMERA_FRAME, simulated_messages
 from ros_3d_bb.stamped import NS
+from support.processes import pid_of
 from support.ros import Recorder, launched, publisher, wait_until
 from support.screen import press, start_screen
 
@@ -196,6 +199,29 @@ def test_another_camera_is_refused(rig, folder):
     rig.send(focal_factor=1.1)
     wait_until(lambda: 'another camera' in capture().message, 'a refusal')
     assert len(entries(folder)) == count
+
+
+def test_a_full_disk_stores_nothing_says_so_and_takes_nothing_away(rig, folder):
+    """Files of this node may not grow beyond 2 kB, as on a disk with so much left; then they may."""
+    rig.send()
+    captured(len(entries(folder)), folder)
+    before, pid = files_in(folder), pid_of('/viewer_node')
+    unlimited = resource.prlimit(pid, resource.RLIMIT_FSIZE)
+    sent = rig.send()
+    resource.prlimit(pid, resource.RLIMIT_FSIZE, (2000, unlimited[1]))
+    wait_until(lambda: 'File too large' in capture().message, 'a refusal')
+    assert files_in(folder) == before
+    resource.prlimit(pid, resource.RLIMIT_FSIZE, unlimited)
+    captured(len(entries(folder)), folder)
+    check_stored(folder, sent, -1)
+    assert set(before.items()) <= {(name, content) for name, content in files_in(folder).items()} | {
+        ('frames.json', before['frames.json'])}
+
+
+def files_in(folder):
+    """{path: content}."""
+    return {os.path.relpath(str(path), folder): path.read_bytes()
+            for path in pathlib.Path(folder).glob('**/*') if path.is_file()}
 
 
 def test_without_a_session_nothing_is_stored():

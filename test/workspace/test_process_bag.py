@@ -2,6 +2,7 @@
 import bz2
 import hashlib
 import os
+import resource
 import stat
 import struct
 import subprocess
@@ -257,6 +258,20 @@ def test_results_get_the_rights_that_the_user_wants(scene, tmp_path):
     finally:
         os.umask(before)
     assert stat.S_IMODE(os.stat(str(tmp_path / 'out.bag')).st_mode) == 0o640
+
+
+def test_a_full_disk_is_named_and_an_older_result_stays(scene, tmp_path):
+    """No file may grow beyond 50 kB, as on a disk with so much left; then they may."""
+    target = tmp_path / 'out.bag'
+    target.write_text('an older result')
+    command = ['rosrun', 'ros_3d_bb', 'process_bag', '--detector', 'depth', scene, str(target)]
+    limit = (50000, resource.getrlimit(resource.RLIMIT_FSIZE)[1])
+    result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True,
+                            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit))
+    assert result.returncode == 1 and 'File too large' in result.stdout and 'no bag was written' in result.stdout
+    assert 'Traceback' not in result.stdout
+    assert os.listdir(str(tmp_path)) == ['out.bag'] and target.read_text() == 'an older result'
+    assert run_tool('--detector', 'depth', scene, target).returncode == 0 and messages_in(target)
 
 
 def test_no_code_is_made_of_the_definitions_in_a_bag(tmp_path, monkeypatch):

@@ -1,6 +1,7 @@
 """Numbers of tracks that stay unique when the tracker is killed and started again."""
 import rospy
 
+from ros_3d_bb.nodes.registration import on_new_master
 from ros_3d_bb.worker import NewestWorker
 
 RESERVED = 1000  # numbers at a time: whoever is started again goes on with the next thousand
@@ -31,6 +32,7 @@ class Numbers(object):
                              % (self._name, self._before))
         self._reserved = self._before + RESERVED
         rospy.set_param(self._name, self._reserved)
+        on_new_master(lambda: self._worker.offer(self._reserved))
         # In a thread of its own, as a master that does not answer must not hold up the tracks.
         self._worker = NewestWorker(self._reserve, self._on_error)
 

@@ -4,6 +4,7 @@ import sys
 import rospy
 
 from ros_3d_bb.memory import reuse_freed_memory
+from ros_3d_bb.nodes.registration import Registration
 from ros_3d_bb.params import params_from
 
 
@@ -19,6 +20,7 @@ def run_node(name, node_class, run=lambda _node: rospy.spin()):
     """
     reuse_freed_memory()
     rospy.init_node(name)
+    Registration()
     try:
         node = node_class()
     except ValueError as error:
