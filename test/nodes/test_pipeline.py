@@ -10,10 +10,11 @@ import rospy
 from std_msgs.msg import Int32MultiArray
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_3d_bb.bags import MOUNT_M, START_NS, SessionBagOptions, session_images, write_bag
+from ros_3d_bb.bags import MOUNT_M, START_NS, SessionBagOptions, scenario_images, session_images, write_bag
 from ros_3d_bb.estimation import estimator_named
 from ros_3d_bb.measurements import read_depth, read_session
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
+from ros_3d_bb.simulation.scenario import scenario_from
 from ros_3d_bb.stamped import NS
 from support.ros import Recorder, launched, wait_until
 
@@ -124,3 +125,31 @@ def test_playback_shows_the_person_tracked_in_the_map(session, weights, tmp_path
     assert all(message.objects[0].id >= 1 for message in tracks.messages if message.objects)
     drawn = set(marker.ns for message in markers.messages for marker in message.markers if marker.action == Marker.ADD)
     assert drawn == {'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse'}
+
+
+def test_a_bag_that_loops_begins_anew_with_other_numbers(tmp_path):
+    """Each round of the bag both people are followed from its first half second on, and nobody of the round before."""
+    path = str(tmp_path / 'people.bag')
+    people = [{'start': [4.0, 0.8], 'facing': 3.1}, {'start': [5.0, -0.9], 'facing': 1.6}]
+    count = write_bag(scenario_images(scenario_from({'duration': 3.0, 'rate': 10.0, 'people': people}), True), path)
+    with Recorder('ros_3d_bb/tracks', TrackedObjectArray, False) as tracks, \
+            launched('playback.launch', 'bag:=' + path, 'detector:=none', 'rviz:=false', 'loop:=true', 'delay:=4'):
+        wait_until(lambda: len(rounds_of(tracks.messages)) == 3, 'two rounds', 60)
+    numbers = [0]
+    for messages in rounds_of(tracks.messages)[:2]:
+        assert len(messages) > count / 2
+        for message in messages[6:]:
+            assert len(message.objects) == 2
+        round_numbers = sorted(set(track.id for message in messages for track in message.objects))
+        assert len(round_numbers) == 2 and round_numbers[0] > numbers[-1]
+        numbers += round_numbers
+
+
+def rounds_of(messages):
+    """Messages by round: each begins where stamps go back."""
+    rounds = []
+    for message in list(messages):
+        if not rounds or message.header.stamp < rounds[-1][-1].header.stamp:
+            rounds.append([])
+        rounds[-1].append(message)
+    return rounds

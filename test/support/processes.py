@@ -11,7 +11,7 @@ from xmlrpc.client import Fault, ServerProxy
 
 import rospy
 
-from support.ros import TIMEOUT_S
+from support.ros import TIMEOUT_S, wait_until
 
 BUSY = 'while True: pass'
 
@@ -60,19 +60,16 @@ def starved(at_once):
 
 
 @contextlib.contextmanager
-def never_reading(topic, kind):
-    """A subscriber of all publishers of a topic that takes nothing of what they send."""
-    _code, _said, (publishers, _subscribers, _services) = rospy.get_master().getSystemState()
-    nodes = [node for name, nodes in publishers if name == topic for node in nodes]
-    assert nodes, 'nobody publishes %s' % topic
-    with contextlib.ExitStack() as stack:
-        for node in nodes:
-            uri = rospy.get_master().lookupNode(node)[2]
-            _code, _said, (_protocol, host, port) = ServerProxy(uri).requestTopic('/deaf', topic, [['TCPROS']])
-            connection = stack.enter_context(socket.socket())
-            connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-            connection.connect((host, port))
-            fields = ['callerid=/deaf', 'topic=' + topic, 'md5sum=' + kind._md5sum, 'type=' + kind._type]
-            header = b''.join(struct.pack('<I', len(field)) + field.encode() for field in fields)
-            connection.sendall(struct.pack('<I', len(header)) + header)
+def never_reading(node, topic, kind):
+    """A subscriber of a node that takes nothing of what that sends."""
+    uri = rospy.get_master().lookupNode(node)[2]
+    _code, _said, (_protocol, host, port) = ServerProxy(uri).requestTopic('/deaf', topic, [['TCPROS']])
+    with contextlib.closing(socket.socket()) as connection:
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        connection.connect((host, port))
+        fields = ['callerid=/deaf', 'topic=' + topic, 'md5sum=' + kind._md5sum, 'type=' + kind._type]
+        header = b''.join(struct.pack('<I', len(field)) + field.encode() for field in fields)
+        connection.sendall(struct.pack('<I', len(header)) + header)
+        wait_until(lambda: any(entry[1] == '/deaf' and entry[4] == topic for entry in ServerProxy(uri).getBusInfo(
+            '/deaf')[2]), 'the connection of a subscriber of ' + topic)
         yield

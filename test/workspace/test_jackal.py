@@ -107,6 +107,18 @@ def test_either_the_description_or_one_node_says_where_the_camera_is(monkeypatch
     assert (nodes['camera_mount'].args if 'camera_mount' in nodes else None) == expected
 
 
+def test_on_the_robot_nodes_that_die_are_started_again(packages):
+    """Elsewhere only where that is asked for, as a fault of the set-up would be said again and again."""
+    arguments = ['driver:=pyrealsense2', 'planner:=costmap']
+    _parameters, nodes = loaded('jackal.launch', *arguments)
+    assert len(nodes) == 6 and all(node.respawn and node.respawn_delay == 1 for node in nodes.values())
+    _parameters, nodes = loaded('jackal.launch', 'respawn:=false', *arguments)
+    assert not any(node.respawn for node in nodes.values())
+    _parameters, nodes = loaded('pipeline.launch', 'planner:=costmap', 'weights:=yolov5n.pt')
+    assert len(nodes) == 4 and not any(node.respawn for node in nodes.values())
+    assert given_to_stand_ins(dumped('jackal.launch', packages))['respawn'] == 'true'
+
+
 def test_a_second_computer_gets_the_pipeline_and_the_camera_stays():
     _parameters, nodes = loaded('jackal.launch', 'driver:=pyrealsense2', 'computer:=192.168.131.20',
                                 'planner:=costmap')

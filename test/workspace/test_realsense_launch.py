@@ -18,7 +18,7 @@ def test_the_driver_aligns_depth_to_colour_of_the_same_size_and_rate(packages):
     given = given_to_stand_ins(dumped('realsense.launch', packages))
     assert given == {'align_depth': 'true', 'camera': 'camera', 'initial_reset': 'false', 'color_width': '640',
                      'color_height': '480', 'color_fps': '30', 'depth_width': '640', 'depth_height': '480',
-                     'depth_fps': '30'}
+                     'depth_fps': '30', 'respawn': 'false'}
 
 
 def test_what_differs_between_robots_reaches_the_driver(packages):
