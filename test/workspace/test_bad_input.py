@@ -1,0 +1,160 @@
+"""Each kind of bad message: refused with a reason, or used as far as it goes; and the next good one works at once.
+
+Real nodes, without a master. What is wrong here one by one is mixed at random in test/fuzz.
+"""
+import contextlib
+from unittest import mock
+
+import genpy
+import numpy as np
+import pytest
+
+from fuzz import hostile
+from fuzz.nodes import TARGETS, _quiet, _send_transforms
+from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.messages import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message, time_from
+from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
+from ros_3d_bb.stamped import NS
+from support.masterless import masterless, on_the_wire
+
+INFO_TOPIC = INFO_TOPICS[0]
+START_NS, PERIOD_NS = 1000 * NS, NS // 30
+HOUR_NS = 3600 * NS
+
+
+def boxes2d(*numbers):
+    return lambda message: setattr(message, 'data', list(numbers))
+
+
+def label(text):
+    return lambda message: setattr(message.layout.dim[0], 'label', text)
+
+
+def fields(**values):
+    """A change of fields, a, or a__b for one of a field's own."""
+    def change(message):
+        for name, value in values.items():
+            part, parts = message, name.split('__')
+            for inner in parts[:-1]:
+                part = part[int(inner)] if inner.isdigit() else getattr(part, inner)
+            setattr(part, parts[-1], value)
+    return change
+
+
+def truncated(message):
+    message.data = message.data[:100]
+
+
+def nan_and_inf(message):
+    """A depth image in metres, of which few pixels are measured."""
+    depth_m = np.full((message.height, message.width), np.nan, np.float32)
+    depth_m[::2], depth_m[8:44:2, 26:38], depth_m[::5] = 4.0, 2.0, np.inf
+    message.encoding, message.step, message.data = '32FC1', 4 * message.width, depth_m.tobytes()
+
+
+def intrinsics(number, value):
+    return lambda message: message.K.__setitem__(number, value)
+
+
+IMAGES = [(fields(step=1), 'image data is too short'), (truncated, 'image data is too short: 100 bytes'),
+          (fields(width=0, height=0, step=0, data=b''), 'image is empty: 0 x 0 pixels'),
+          (fields(encoding='9UC7'), "has encoding '9UC7'; expected one of"),
+          (fields(header__stamp=genpy.Time()), 'carries no stamp (zero)')]
+CAMERAS = [(intrinsics(0, 0.0), 'fx=0 fy=60'), (intrinsics(4, float('nan')), 'fy=nan'),
+           (fields(width=0, height=0), 'camera size 0 x 0 is not positive')]
+CASES = [('bbox3d_node', BOXES_TOPIC) + case for case in (
+    (boxes2d(26, 8, 38), '3 numbers; a multiple of 4 expected'),
+    (boxes2d(38, 44, 26, 8), '(38, 44, 26, 8) is empty or reversed'), (boxes2d(26, 8, 26, 8), 'is empty or reversed'),
+    (boxes2d(*[10] * 10 ** 6), '250000 2D boxes in one image; at most 1000 expected'),
+    (boxes2d(), None), (boxes2d(200, 200, 300, 300), None), (boxes2d(*[-2 ** 31] * 2 + [2 ** 31 - 1] * 2), None),
+    (label('boxes;stamp=x'), "2D boxes carry the label 'boxes;stamp=x'"),
+    (label('boxes;stamp=0.000000000;frame=camera'), 'no depth image with their stamp 0.000'),
+    (label('boxes;stamp=5.000000000;frame=camera'), 'no depth image with their stamp 5.000'),
+    (label('boxes;stamp=4600.000000000;frame=camera'), None))]  # they wait for their image, for ~cache_length
+CASES += [(node, DEPTH_TOPIC) + case for node in ('bbox3d_node', 'depth_detector_node', 'tracker_node', 'viewer_node')
+          for case in IMAGES + [(nan_and_inf, None), (fields(header__stamp=time_from(START_NS + HOUR_NS)), None),
+                                (fields(header__stamp=time_from(START_NS - 900 * NS)), None)]]
+CASES += [(node, COLOR_TOPIC) + case for node in ('yolov5_node', 'depth_detector_node', 'viewer_node')
+          for case in IMAGES + [(fields(header__stamp=time_from(START_NS + HOUR_NS)), None),
+                                (fields(header__stamp=time_from(START_NS - 900 * NS)), None)]]
+CASES += [(node, INFO_TOPIC) + case for node in ('bbox3d_node', 'depth_detector_node', 'tracker_node', 'viewer_node')
+          for case in CAMERAS]
+CASES += [(node, INFO_TOPIC, fields(width=32, height=24), 'aligned') for node in ('bbox3d_node', 'depth_detector_node')]
+CASES += [('bbox3d_node', INFO_TOPIC, intrinsics(0, 90.0), None)]
+CASES += [('tracker_node', BOXES3D_TOPIC) + case for case in (
+    (fields(boxes__0__center__position__z=float('nan')), 'has centre (0, 0, nan)'),
+    (fields(boxes__0__center__position__z=1e30), 'has centre (0, 0, 1e+30)'),
+    (fields(boxes__0__size__x=-1.0), 'and size (-1, 1.7)'),
+    (fields(boxes__0__position_covariance=[-1.0] * 9), 'positive semi-definite matrix'),
+    (fields(boxes__0__position_covariance=[float('nan')] * 9), 'positive semi-definite matrix'),
+    (fields(boxes__0__center__orientation__w=2.0), None),  # a cylinder's orientation is not read
+    (fields(header__stamp=genpy.Time()), 'carries no stamp (zero)'),
+    (fields(header__stamp=time_from(START_NS + HOUR_NS)), 'no transform from camera to map at 4600.000'),
+    (fields(header__stamp=time_from(START_NS - 900 * NS)), 'no transform from camera to map at 100.000'),
+    (fields(header__frame_id=''), 'no transform'), (fields(header__frame_id='nowhere'), 'no transform from nowhere'))]
+
+
+class Rig(object):
+    """A node, and what it says."""
+
+    def __init__(self, connections, name, said):
+        self.said, self._target, self._connections = said, TARGETS[name], connections
+        self._node, self._now_ns = self._target.make(None), START_NS
+
+    def send(self, topic=None, change=None):
+        """Send all of one image, in which a message was changed."""
+        self._now_ns += PERIOD_NS
+        self._connections.now = time_from(self._now_ns)
+        _send_transforms(self._connections, self._now_ns)
+        messages = good_messages(self._now_ns)
+        if topic is not None:
+            change(messages[topic])
+        for name, message in messages.items():
+            if name in self._connections.subscribers:
+                self._connections.send(name, on_the_wire(message))
+
+    def has_answered(self):
+        """Whether there is something for the newest image."""
+        if not self._target.output:
+            return self._node._snapshots.newest.stamp_ns == self._now_ns
+        newest = self._connections.publishers[self._target.output].newest
+        stamp_ns = newest.header.stamp.to_nsec() if hasattr(newest, 'header') else boxes2d_from_message(newest).stamp_ns
+        return stamp_ns == self._now_ns
+
+
+def good_messages(stamp_ns):
+    """{topic: message} in the order in which they are sent."""
+    good = hostile.good_frame(stamp_ns)
+    box = BoundingBox3D()
+    box.center.position.z, box.center.orientation.w = 3.0, 1.0
+    box.size.x, box.size.y, box.size.z = 0.5, 1.7, 0.5
+    boxes = BoundingBox3DArray(boxes=[box])
+    boxes.header.frame_id, boxes.header.stamp = 'camera', time_from(stamp_ns)
+    return {INFO_TOPIC: good[INFO_TOPIC], DEPTH_TOPIC: good[DEPTH_TOPIC], COLOR_TOPIC: good[COLOR_TOPIC],
+            BOXES_TOPIC: hostile.good_boxes(stamp_ns), BOXES3D_TOPIC: boxes,
+            TRACKS_TOPIC: TrackedObjectArray(header=boxes.header)}
+
+
+@pytest.fixture
+def rig_of():
+    """Makes the rig of a node."""
+    said = []
+
+    def made(name):
+        connections = stack.enter_context(masterless(TARGETS[name].params))
+        stack.enter_context(mock.patch('rospy.logwarn', lambda text, *values: said.append(text % values)))
+        return Rig(connections, name, said)
+    with contextlib.ExitStack() as stack, _quiet():
+        yield made
+
+
+@pytest.mark.parametrize('node, topic, change, reason', CASES)
+def test_a_bad_message_is_said_and_the_next_good_one_works(rig_of, node, topic, change, reason):
+    rig = rig_of(node)
+    for _image in range(5):
+        rig.send()
+    assert rig.has_answered() and not rig.said
+    rig.send(topic, change)
+    assert reason is None or any(reason in sentence for sentence in rig.said), rig.said
+    rig.send()
+    assert rig.has_answered()
