@@ -7,7 +7,9 @@ import time
 
 import pytest
 import rospy
+from std_srvs.srv import Trigger
 
+from ros_3d_bb.measurements import read_session
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.registration import Registration
 from support.processes import killed_and_back, pid_of
@@ -48,7 +50,7 @@ def port():
     return port
 
 
-def test_the_master_is_killed_and_started_again(port):
+def test_the_master_is_killed_and_started_again(port, tmp_path):
     """Who is connected goes on meanwhile and afterwards; the nodes register again, and are found by who comes later."""
     with contextlib.ExitStack() as running:
         with master(port):
@@ -58,7 +60,13 @@ def test_the_master_is_killed_and_started_again(port):
             running.enter_context(launched('pipeline.launch', 'detector:=depth', 'planner:=costmap', 'respawn:=true'))
             stage = Stage()
             before, pids = stage.recovered('(before the fault)', 60), [pid_of(node) for node in NODES]
+            running.enter_context(launched('viewer.launch', 'window:=false', 'label:=A1', 'session:=%s' % tmp_path))
+            rospy.wait_for_service('viewer_node/capture', timeout=20)
+            capture = rospy.ServiceProxy('viewer_node/capture', Trigger, persistent=True)
+            wait_until(lambda: stage.step() and capture().success, 'a measurement')
         assert sum(stage.step() for _image in range(RECOVERY_IMAGES)) == RECOVERY_IMAGES, 'without a master'
+        wait_until(lambda: capture().success, 'a measurement without a master')
+        assert [frame.label for frame in read_session(str(tmp_path)).frames] == ['A1', 'A1']
         with master(port):
             began_s = time.monotonic()
             assert stage.recovered('master killed and started again') == before

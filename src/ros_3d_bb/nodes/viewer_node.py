@@ -1,4 +1,5 @@
 """The node that shows what the camera and the pipeline see, and takes measurements."""
+import contextlib
 import os
 import threading
 import time
@@ -89,6 +90,7 @@ class ViewerNode(object):
         self._lock, self._capture_lock = threading.Lock(), threading.Lock()
         self._rate, self._came, self._answer = FrameRate(), set(), ''
         self._captured_ns, self._is_said, self._is_paused = None, False, False
+        self._newest_label = self._params.label
         self._diagnostics = Diagnostics()
         rospy.Service('~capture', Trigger, lambda _request: TriggerResponse(*self.capture()))
         for topic, kind, callback in ((BOXES3D_TOPIC, BoundingBox3DArray, self._on_boxes3d),
@@ -169,9 +171,19 @@ class ViewerNode(object):
                                                    self._params.session)
 
     def _label(self):
-        """As the master has it: rospy's cache hears of a label some time after it was set."""
-        code, _text, label = rospy.get_master().getParam(rospy.resolve_name('~label'))
-        return str(label) if code == 1 else self._params.label
+        """As the master has it, as rospy's cache hears of a label some time after it was set; as before, where the
+        master does not answer.
+        """
+        with contextlib.suppress(OSError):
+            code, _text, label = rospy.get_master().getParam(rospy.resolve_name('~label'))
+            self._newest_label = str(label) if code == 1 else self._params.label
+        return self._newest_label
+
+    def _label_to_show(self):
+        try:
+            return rospy.get_param_cached('~label', '')
+        except OSError:  # no master
+            return self._newest_label
 
     def _snapshot_to_store(self):
         """The newest snapshot. Raises ValueError where there is none to store, or it lacks boxes and nobody knows."""
@@ -238,7 +250,7 @@ class ViewerNode(object):
         if snapshot is None:
             self._window.show(text_picture((KEYS,), (self._why_nothing(),), 3 * self._params.panel_width))
             return None
-        label = rospy.get_param_cached('~label', '')
+        label = self._label_to_show()
         news = (snapshot.stamp_ns, snapshot.boxes2d, snapshot.boxes3d is None, rate_hz == 0, self._answer,
                 self._is_paused, label)
         if news == shown:
