@@ -77,6 +77,7 @@ def test_the_master_is_killed_and_started_again(port, tmp_path):
             with Recorder('/ros_3d_bb/tracks', TrackedObjectArray) as newcomer:
                 stage.send()
                 newcomer.wait_for(1)
+            rospy.wait_for_service('viewer_node/capture', timeout=20)
             wait_until(lambda: rospy.has_param('/tracker_node_numbers'), 'the numbers in the new master')
             killed_and_back('/tracker_node', lambda: time.sleep(0.1))
             after = stage.recovered('tracker killed after that')

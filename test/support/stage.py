@@ -128,7 +128,7 @@ class Stage(object):
         return False
 
     def check(self):
-        """Of the tracks that came: stamps are of images and in order, nobody is there who is not, numbers are of one."""
+        """Of the tracks that came: stamps are of images, in order; nobody is there who is not; numbers are of one."""
         messages = self.tracks.messages[self._checked:]
         self._checked += len(messages)
         for message in messages:
@@ -157,7 +157,7 @@ def _scene(number):
     """The messages of a picture without their stamps, and who is where."""
     simulator = Simulator(scenario_from({'rate': 10.0, 'people': SCENES[number]}))
     frame = simulator.frame(0)
-    messages = [(topic, message) for topic, message in simulated_messages(simulator, frame, START_NS) if topic in TOPICS]
+    messages = [entry for entry in simulated_messages(simulator, frame, START_NS) if entry[0] in TOPICS]
     names = ('who stays', 'who is only in scene %d' % number)
     return messages, {name: person.position_m for name, person in zip(names, frame.people)}
 

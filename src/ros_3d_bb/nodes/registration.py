@@ -76,5 +76,5 @@ class Registration(object):
     def _say_away(self, error):
         if not (self._is_away or is_ending()):
             self._is_away = True
-            rospy.logwarn('the ROS master does not answer (%s): nodes that are connected go on, others do not find each '
-                          'other; looking for it every %.0f s', error, PERIOD_S)
+            rospy.logwarn('the ROS master does not answer (%s): nodes that are connected go on, others do not find '
+                          'each other; looking for it every %.0f s', error, PERIOD_S)
