@@ -7,6 +7,7 @@ import time
 
 import pytest
 import rospy
+from dynamic_reconfigure.client import Client
 from std_srvs.srv import Trigger
 
 from ros_3d_bb.measurements import read_session
@@ -64,6 +65,7 @@ def test_the_master_is_killed_and_started_again(port, tmp_path):
             rospy.wait_for_service('viewer_node/capture', timeout=20)
             capture = rospy.ServiceProxy('viewer_node/capture', Trigger, persistent=True)
             wait_until(lambda: stage.step() and capture().success, 'a measurement')
+            Client('tracker_node', timeout=20).update_configuration({'marker_history': 3.0})
         assert sum(stage.step() for _image in range(RECOVERY_IMAGES)) == RECOVERY_IMAGES, 'without a master'
         wait_until(lambda: capture().success, 'a measurement without a master')
         assert [frame.label for frame in read_session(str(tmp_path)).frames] == ['A1', 'A1']
@@ -78,6 +80,7 @@ def test_the_master_is_killed_and_started_again(port, tmp_path):
                 stage.send()
                 newcomer.wait_for(1)
             rospy.wait_for_service('viewer_node/capture', timeout=20)
+            wait_until(lambda: rospy.get_param('/tracker_node/marker_history', 0) == 3, 'what was changed meanwhile')
             wait_until(lambda: rospy.has_param('/tracker_node_numbers'), 'the numbers in the new master')
             killed_and_back('/tracker_node', lambda: time.sleep(0.1))
             after = stage.recovered('tracker killed after that')

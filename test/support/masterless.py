@@ -121,7 +121,6 @@ def masterless(params=()):
         'rospy.Service': connections._service, 'rospy.Timer': connections._timer, 'rospy.on_shutdown': mock.Mock(),
         'rospy.set_param': mock.Mock(),
         'rospy.get_param': lambda name, default=None: dict(params) if name == '~' else default,
-        'rospy.set_param': mock.Mock(),
         'rospy.resolve_name': lambda name: '/' + name, 'rospy.is_shutdown': lambda: False,
         'rospy.get_rostime': lambda: connections.now, 'rospy.rostime.get_rostime': lambda: connections.now,
         'rospy.logwarn_throttle': lambda _period_s, text, *arguments: text % arguments,

@@ -9,6 +9,7 @@ from dynamic_reconfigure.msg import Config, ConfigDescription
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
 from ros_3d_bb.live_parameters import description_of, parameters_in, plain_values
+from ros_3d_bb.nodes.registration import on_new_master
 from ros_3d_bb.params import params_from
 
 
@@ -56,6 +57,7 @@ class Tuning(object):
         self._descriptions_pub.publish(description)
         self._updates_pub.publish(self._message())
         rospy.Service('~set_parameters', Reconfigure, self._on_request)
+        on_new_master(lambda: self._keep_in_step({}))
 
     def _on_request(self, request):
         with self._lock:
