@@ -16,6 +16,7 @@ from ros_3d_bb.messages import (BOXES3D_TOPIC, boxes2d_from_message, boxes3d_fro
                                 stamp_of, time_from)
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
+from ros_3d_bb.nodes.registration import on_new_master
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.params import check_not_negative
@@ -92,6 +93,7 @@ class ViewerNode(object):
         self._captured_ns, self._is_said, self._is_paused = None, False, False
         self._newest_label = self._params.label
         self._diagnostics = Diagnostics()
+        on_new_master(lambda: rospy.set_param('~label', self._newest_label))
         rospy.Service('~capture', Trigger, lambda _request: TriggerResponse(*self.capture()))
         for topic, kind, callback in ((BOXES3D_TOPIC, BoundingBox3DArray, self._on_boxes3d),
                                       ('yolo_bounding_box', Int32MultiArray, self._on_boxes2d),
@@ -171,9 +173,7 @@ class ViewerNode(object):
                                                    self._params.session)
 
     def _label(self):
-        """As the master has it, as rospy's cache hears of a label some time after it was set; as before, where the
-        master does not answer.
-        """
+        """As the master has it: rospy's cache hears of a label some time after it was set. Without master as before."""
         with contextlib.suppress(OSError):
             code, _text, label = rospy.get_master().getParam(rospy.resolve_name('~label'))
             self._newest_label = str(label) if code == 1 else self._params.label
