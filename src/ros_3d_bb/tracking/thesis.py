@@ -105,7 +105,7 @@ class ThesisTracker(object):
                 self._tracks.append(_Track(self._last_id, stamp_ns, detection))
         return [self._published(track) for track in self._tracks]
 
-    def skip(self, stamp_ns):
+    def skip(self, stamp_ns, _camera=''):
         """Let an image pass whose detections could not be used: nobody ages. Never an error: its stamp may be wrong."""
         self._skipped_ns = max(stamp_ns, self._skipped_ns)
 

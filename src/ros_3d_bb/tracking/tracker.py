@@ -3,8 +3,8 @@
 Each person is a constant-velocity Kalman filter in the plane (`kalman`). Boxes are given to people by the sum of their
 likelihoods, those seen a moment ago first; a box that a newcomer explains better than any of them starts a new track,
 which is published once it was seen often enough. Who is not seen is carried on: published for a moment where the
-camera should have found them, for longer where somebody or something hides them (`visibility`), and remembered for
-longer still, so that they get their number back.
+camera should have found them, for longer where somebody or something hides them (`visibility`, `unseen`), and
+remembered for longer still, so that they get their number back.
 """
 import collections
 from typing import NamedTuple
@@ -16,20 +16,18 @@ from ros_3d_bb.tracking import kalman
 from ros_3d_bb.tracking.association import assign
 from ros_3d_bb.tracking.measuring import NoiseParams, sightings_of
 from ros_3d_bb.tracking.prediction import PredictionParams, objects_of
-from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, View, check_steps
-from ros_3d_bb.tracking.visibility import places_in
+from ros_3d_bb.tracking.tracked import OUT_OF_VIEW, VISIBLE, View, check_steps
+from ros_3d_bb.tracking.unseen import SEEN, Look, carried, miss, others_of, sigma_of
 
 TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
                   ('size_m', float, 3), ('sightings', int), ('first_ns', np.int64), ('last_ns', np.int64),
                   ('missed_s', float), ('unseen_s', float), ('status', int), ('confirmed', bool), ('moving', bool)])
 LATEST_NS = NS // 2  # images that come later than others by more are refused
 RECENT_NS = 7 * NS // 10  # who was seen so recently comes before those who were away
-BEHIND_M = 0.45  # no less sure is where somebody is who does not come out from behind something
 LOST_M = 2.4  # who may be anywhere within this (standard deviation) is forgotten
 TRIES_S = 0.6  # how long a track that is not confirmed yet waits to be seen again
 UNSURE_SHARE = 0.1  # of the density of a box at its centre: a newcomer's is not higher
 TAKEN_NS = NS // 5  # nobody new begins near somebody seen so recently
-HIDING_S = 0.3  # who was missed for longer hides nobody
 SMOOTHING = 0.1  # share of the newest sighting in size and height
 CUT_SMOOTHING = 0.02  # a box that the image border cuts tells little of them
 STILL_MOVING = 0.5  # of the speed at which somebody begins to move
@@ -63,18 +61,22 @@ class _Image(NamedTuple):
 
 
 class _State(NamedTuple):
-    """What images change: the tracks, the stamp of the latest image, and that of one without an answer since then."""
+    """What images change: the tracks, the stamp of the latest image; by camera, the stamp of one without an answer since
+    the camera's latest, and its `unseen.Look`.
+    """
 
     tracks: np.ndarray
     now_ns: int
-    skipped_ns: int
+    skipped_ns: dict
+    looks: dict
 
 
 class Tracker(object):
     """Tracks people from image to image.
 
     Call `update` with the detections of each image, `skip` for an image whose detections could not be used, `reset`
-    where time jumped. Images may come late and out of order: what happened since is done again with them.
+    where time jumped. Images of several cameras may come in any order, and late: what happened since is done again with
+    them.
 
     Raises
     ------
@@ -97,13 +99,15 @@ class Tracker(object):
 
     def reset(self):
         """Forget all tracks, as after a jump in time. Numbers are not used again."""
-        self._state = _State(np.zeros(0, TRACK), None, 0)
+        self._state = _State(np.zeros(0, TRACK), None, {}, {})
         self._history = collections.deque()  # (state before, image) of the latest images
         self._ids = {}  # of the tracks begun in them, by stamp, camera and number of the detection
 
-    def skip(self, stamp_ns):
+    def skip(self, stamp_ns, camera=''):
         """Let an image pass whose detections could not be used: nobody ages. Never an error: it may be late."""
-        self._state = self._state._replace(skipped_ns=max(stamp_ns, self._state.skipped_ns))
+        skipped_ns = self._state.skipped_ns
+        self._state = self._state._replace(
+            skipped_ns=dict(skipped_ns, **{camera: max(stamp_ns, skipped_ns.get(camera, 0))}))
 
     def update(self, stamp_ns, detections, view):
         """Take the detections of one image.
@@ -126,29 +130,31 @@ class Tracker(object):
             If the image comes too late, or a second time; nothing changes then.
         """
         images = [_Image(stamp_ns, tuple(detections), view)] + self._taken_back(stamp_ns, view.camera)
+        given_id = self._last_id
         for image in images:
             self._history.append((self._state, image))
-            self._state = self._after(image)
+            self._state = self._after(image, given_id)
         self._forget_history()
         return self.objects()
 
     def objects(self):
         """The people who are published now, by id, at the stamp of the newest image."""
         tracks, params = np.sort(self._state.tracks, order='id'), self._params
-        known = (tracks['missed_s'] <= params.missed_limit) & (_sigma(tracks) < params.unsure_limit)
+        known = (tracks['missed_s'] <= params.missed_limit) & (sigma_of(tracks) < params.unsure_limit)
         known |= tracks['status'] == VISIBLE
         known &= (tracks['status'] != OUT_OF_VIEW) | (tracks['unseen_s'] <= params.out_of_view_limit)
         return objects_of(tracks[tracks['confirmed'] & known], self._prediction)
 
     def _taken_back(self, stamp_ns, camera):
-        """Undo the images after a stamp; returns them, oldest first."""
+        """Undo the images after a stamp, and of the same one those of cameras with a later name; returns them, oldest
+        first."""
         if any(image.stamp_ns == stamp_ns and image.view.camera == camera for _state, image in self._history):
             raise ValueError('stamp %.9f of camera %r comes a second time' % (stamp_ns / NS, camera))
         if self._state.now_ns is not None and stamp_ns < self._state.now_ns - LATEST_NS:
             raise ValueError('stamp %.9f is %.3f s before the latest, more than %.1f s late'
                              % (stamp_ns / NS, (self._state.now_ns - stamp_ns) / NS, LATEST_NS / NS))
         images = []
-        while self._history and self._history[-1][1].stamp_ns > stamp_ns:
+        while self._history and _order(self._history[-1][1]) > (stamp_ns, camera):
             before, image = self._history.pop()
             self._state = before._replace(skipped_ns=self._state.skipped_ns)
             images.insert(0, image)
@@ -160,23 +166,30 @@ class Tracker(object):
             self._history.popleft()
         self._ids = {key: number for key, number in self._ids.items() if key[0] >= oldest_ns}
 
-    def _after(self, image):
-        """The state after an image."""
-        tracks, now_ns, skipped_ns = self._state
-        before, tracks = tracks, tracks.copy()
-        elapsed_s = 0.0 if now_ns is None else (image.stamp_ns - now_ns) / NS
-        looked_s = 0.0 if now_ns is None else max(image.stamp_ns - max(now_ns, skipped_ns), 0) / NS
+    def _after(self, image, given_id):
+        """The state after an image. Numbers up to `given_id` were given before this one or a late one came."""
+        before, now_ns, skipped_ns, looks = self._state
+        tracks, stamp_ns, view = before.copy(), image.stamp_ns, image.view
+        elapsed_s = 0.0 if now_ns is None else (stamp_ns - now_ns) / NS
+        looked_s = 0.0 if now_ns is None else max(stamp_ns - max(now_ns, skipped_ns.get(view.camera, 0)), 0) / NS
         tracks['mean'], tracks['covariance'] = kalman.predict(tracks['mean'], tracks['covariance'], elapsed_s,
                                                               self._params.acceleration)
-        sightings = sightings_of(image.detections, image.view, self._since_last_s(image), self._noise)
-        rows, columns = self._associate(tracks, sightings, image.stamp_ns)
-        self._see(tracks, rows, _taken(sightings, columns), image.stamp_ns)
-        self._miss(tracks, _others(len(tracks), rows), before, image.view, looked_s)
-        tracks = tracks[self._is_remembered(tracks)]
-        others = _others(len(image.detections), columns)
-        if len(others):
-            tracks = np.concatenate((tracks, self._newcomers(tracks, _taken(sightings, others), others, image)))
-        return _State(tracks, image.stamp_ns, 0)
+        sightings = sightings_of(image.detections, view, self._since_last_s(image), self._noise)
+        rows, columns = self._associate(tracks, sightings, stamp_ns)
+        if self._last_id > given_id:
+            self._give_back_ids(tracks, rows, [(stamp_ns, view.camera, column) for column in columns], given_id)
+        self._see(tracks, rows, _taken(sightings, columns), stamp_ns)
+        others = others_of(looks, view, stamp_ns)
+        places = miss(tracks, before, _others(len(tracks), rows), view, others, looked_s, self._params.max_range)
+        kept, newcomers = self._is_remembered(tracks), np.zeros(0, TRACK)
+        tracks, unknown = tracks[kept], _others(len(image.detections), columns)
+        if len(unknown):
+            newcomers = self._newcomers(tracks, _taken(sightings, unknown), unknown, image)
+            tracks = np.concatenate((tracks, newcomers))
+        looks = carried(others, kept, len(newcomers))
+        looks[view.camera] = Look(stamp_ns, view, np.concatenate((places[kept], np.full(len(newcomers), SEEN))))
+        return _State(tracks, stamp_ns, {camera: skipped for camera, skipped in skipped_ns.items()
+                                         if camera != view.camera}, looks)
 
     def _since_last_s(self, image):
         """Seconds since the last image of the same camera; 0 where there is none."""
@@ -220,34 +233,10 @@ class Tracker(object):
         seen['z_m2'] += share * (sightings.z_m2 - seen['z_m2'])
         tracks[rows] = seen
 
-    def _miss(self, tracks, rows, before, view, looked_s):
-        """Say why the tracks in `rows` were not seen, and count for how long, and how long of that they should have.
-
-        Who was hidden, should have come out by now and did not, is still behind what hid them.
-        """
-        if not len(rows):
-            return
-        missed = tracks[rows]
-        places = self._places(missed, tracks, view)
-        held = (places == VISIBLE) & (missed['status'] == OCCLUDED)
-        held[held] = self._places(before[rows][held], tracks, view) == OCCLUDED
-        missed['mean'][held], places[held] = before['mean'][rows][held], OCCLUDED
-        held &= _sigma(missed) > BEHIND_M
-        missed['covariance'][held] = before['covariance'][rows][held]
-        missed['unseen_s'] += looked_s
-        missed['missed_s'] += np.where(places == VISIBLE, looked_s, 0)
-        missed['status'] = np.where(places == VISIBLE, OCCLUDED, places)
-        tracks[rows] = missed
-
-    def _places(self, missed, tracks, view):
-        """What the camera could see of the places of missed people."""
-        hiding = tracks[tracks['confirmed'] & (tracks['missed_s'] < HIDING_S)]
-        return places_in(view, _positions(missed), missed['size_m'], _positions(hiding), self._params.max_range)
-
     def _is_remembered(self, tracks):
         """Which tracks are kept; those that are not confirmed yet only for a few more tries."""
         limit_s = np.where(tracks['confirmed'], self._params.memory, TRIES_S)
-        return (tracks['unseen_s'] < limit_s) & (_sigma(tracks) < LOST_M)
+        return (tracks['unseen_s'] < limit_s) & (sigma_of(tracks) < LOST_M)
 
     def _newcomers(self, tracks, sightings, columns, image):
         """Tracks of sightings that belong to nobody and do not double anybody."""
@@ -273,6 +262,18 @@ class Tracker(object):
             self._ids[key] = self._last_id
         return self._ids[key]
 
+    def _give_back_ids(self, tracks, rows, keys, given_id):
+        """Call tracks that a late image began by the number of the track that their next detections had begun."""
+        for row, key in zip(rows, keys):
+            number = tracks['id'][row]
+            if key in self._ids and number > given_id:
+                first = next(other for other, known in self._ids.items() if known == number)
+                tracks['id'][row] = self._ids[first] = self._ids.pop(key)
+
+
+def _order(image):
+    return image.stamp_ns, image.view.camera
+
 
 def _others(count, numbers):
     """Those of 0..count that are not among the numbers."""
@@ -286,16 +287,6 @@ def _taken(sightings, columns):
     ground, *others = sightings
     return type(sightings)(kalman.Measurements(*(values[columns] for values in ground)),
                            *(values[columns] for values in others))
-
-
-def _positions(tracks):
-    """Centres (n, 3), metres."""
-    return np.column_stack((tracks['mean'][:, :2], tracks['z_m']))
-
-
-def _sigma(tracks):
-    """Standard deviations (n,) of the positions, along the axis of the frame where they are less sure."""
-    return np.sqrt(np.maximum(tracks['covariance'][:, 0, 0], tracks['covariance'][:, 1, 1]))
 
 
 def _check(params):

@@ -1,0 +1,220 @@
+"""The tracker with two cameras on one robot: one person is one track, whoever sees them, and when their images come.
+
+`FRONT` stands at the origin of the map, 1 m up, and looks along x, `LEFT` 45 degrees to the left of that. Each sees 31
+degrees to either side, so that both see what is from 14 to 31 degrees to the left.
+"""
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
+from ros_3d_bb.tracking.tracker import Tracker
+
+START_NS, PERIOD_NS = 1000 * NS, NS // 30
+EDGES = -0.6, 0.6
+
+
+def looking(yaw, camera):
+    turn = transform_from((0, 0, 0), (0, 0, np.sin(yaw / 2), np.cos(yaw / 2)))
+    return View(transform_from((0, 0, 1), (0, 0, 0, 1)).dot(turn).dot(transform_from((0, 0, 0), OPTICAL_ROTATION)),
+                EDGES, camera)
+
+
+FRONT, LEFT = looking(0, 'front'), looking(np.pi / 4, 'left')
+IN_FRONT, IN_BOTH, AT_LEFT, BEHIND = 0.0, np.radians(22.5), np.radians(50), np.radians(180)  # bearings
+
+
+def around(bearing, range_m=3.0):
+    """The place at a bearing, to the left of x."""
+    return np.array([range_m * np.cos(bearing), range_m * np.sin(bearing)])
+
+
+def shown(view, place_m, offset_m=(0, 0)):
+    """The detections of somebody at a place, none where the camera does not see it; `offset_m` of its calibration."""
+    distance, bearing = view.bearings(np.array([place_m]))
+    if not abs(np.tan(bearing[0])) < EDGES[1] - 0.05 or abs(bearing[0]) > 1:
+        return []
+    center = np.append(np.add(place_m, offset_m), 0.85)
+    return [Detection(center, np.array([0.5, 0.5, 1.7]), np.eye(3) * 0.04 ** 2)]
+
+
+def images_of(seconds, place_at, views=(FRONT, LEFT), start_s=0.0, offsets_m=None):
+    """(stamp_ns, detections, view) of cameras that take turns at 30 Hz each; `place_at(seconds)` may be None."""
+    images = []
+    for number in range(int(seconds * 30) * len(views)):
+        view = views[number % len(views)]
+        stamp_ns = START_NS + int(start_s * NS) + number * PERIOD_NS // len(views)
+        place_m = place_at((stamp_ns - START_NS) / NS)
+        found = [] if place_m is None else shown(view, place_m, (offsets_m or {}).get(view.camera, (0, 0)))
+        images.append((stamp_ns, found, view))
+    return images
+
+
+def play(tracker, images):
+    return [tracker.update(*image) for image in images]
+
+
+def standing(bearing):
+    return lambda _time_s: around(bearing)
+
+
+def ids(objects):
+    return [track.id for track in objects]
+
+
+@pytest.mark.parametrize('bearing', [IN_FRONT, IN_BOTH, AT_LEFT])
+def test_whom_any_camera_sees_is_visible(bearing):
+    published = play(Tracker(), images_of(2, standing(bearing)))
+    assert all([(track.id, track.status) for track in objects] == [(1, VISIBLE)] for objects in published[20:])
+
+
+def test_who_walks_from_one_view_into_the_other_keeps_the_number():
+    published = play(Tracker(), images_of(4, lambda time_s: around(0.3 * time_s - 0.3)))
+    assert all([(track.id, track.status) for track in objects] == [(1, VISIBLE)] for objects in published[20:])
+    speed_mps = np.linalg.norm(published[-1][0].velocity_mps)
+    assert speed_mps == pytest.approx(0.9, abs=0.1)
+
+
+@settings(max_examples=20)
+@given(st.floats(0, 0.3), st.floats(-np.pi, np.pi), st.integers(0, 1000))
+def test_one_person_is_one_track_though_the_cameras_do_not_quite_agree(apart_m, direction, seed):
+    """About where somebody is whom both see, by up to 0.3 m."""
+    random = np.random.RandomState(seed)
+    images = images_of(1.5, standing(IN_BOTH), offsets_m={'left': around(direction, apart_m)})
+    noisy = [(stamp_ns, [found._replace(position_m=found.position_m + random.normal(0, 0.04, 3)) for found in
+                         detections], view) for stamp_ns, detections, view in images]
+    published = play(Tracker(), noisy)
+    assert all(ids(objects) == [1] for objects in published[20:])
+
+
+def test_two_people_side_by_side_whom_both_see_are_two_tracks():
+    """0.7 m apart, where the cameras disagree by 0.15 m."""
+    places = [around(IN_BOTH, 2.5), around(IN_BOTH, 2.5) + (0.5, 0.5)]
+    tracker = Tracker()
+    for stamp_ns, _detections, view in images_of(3, standing(IN_BOTH)):
+        offset_m = (0.15, 0) if view is LEFT else (0, 0)
+        objects = tracker.update(stamp_ns, [found for place_m in places for found in shown(view, place_m, offset_m)],
+                                 view)
+    assert ids(objects) == [1, 2]
+    for track, place_m in zip(objects, places):
+        assert np.linalg.norm(track.position_m[:2] - place_m) < 0.2
+
+
+@pytest.mark.parametrize('bearing', [IN_FRONT, IN_BOTH, AT_LEFT])
+def test_who_is_gone_is_published_for_as_long_as_with_one_camera(bearing):
+    """0.35 s after they should have been seen, however many cameras look, of which some cannot see them."""
+    tracker = Tracker()
+    play(tracker, images_of(1, standing(bearing)))
+    after = play(tracker, images_of(1, lambda _time_s: None, start_s=1.0))
+    states = [objects[0].status if objects else None for objects in after]
+    assert set(states[2:20]) == {OCCLUDED} and 19 <= len([state for state in states if state is not None]) <= 24
+
+
+def test_out_of_view_is_who_is_out_of_all_views():
+    """Walks out of the left one, past its other border."""
+    published = play(Tracker(), images_of(5, lambda time_s: around(0.9 + 0.4 * time_s)))
+    states = [objects[0].status if objects else None for objects in published[20:]]
+    assert OUT_OF_VIEW in states and states[-1] is None
+    assert 55 <= states.count(OUT_OF_VIEW) <= 60 and states.count(OCCLUDED) <= 2  # at the border
+
+
+def test_a_camera_that_ends_keeps_nobody_and_holds_up_nobody():
+    """Its people are seen for one second more, then out of view for one, then gone; the other camera goes on."""
+    tracker, places = Tracker(), [around(IN_FRONT), around(AT_LEFT)]
+    for stamp_ns, _none, view in images_of(1, standing(IN_FRONT)):
+        tracker.update(stamp_ns, [found for place_m in places for found in shown(view, place_m)], view)
+    assert ids(tracker.objects()) == [1, 2]
+    after = play(tracker, images_of(7, standing(IN_FRONT), views=(FRONT,), start_s=1.0))
+    assert all((objects[0].id, objects[0].status) == (1, VISIBLE) for objects in after)
+    others = [objects[1].status if len(objects) > 1 else None for objects in after]
+    visible, out, gone = (others.count(state) for state in (VISIBLE, OUT_OF_VIEW, None))
+    assert others == [VISIBLE] * visible + [OUT_OF_VIEW] * out + [None] * gone and visible == 30 and out in (29, 30)
+    back = play(tracker, images_of(1, standing(AT_LEFT), views=(LEFT,), start_s=8.0))
+    assert ids(back[-1])[-1] == 3  # too long ago: somebody else
+
+
+def test_images_without_an_answer_of_one_camera_keep_nobody_of_the_other():
+    """There is no transform for the camera at the left."""
+    tracker = Tracker()
+    play(tracker, images_of(1, standing(IN_FRONT), views=(FRONT,)))
+    for stamp_ns, detections, view in images_of(1, lambda _time_s: None, start_s=1.0):
+        if view is LEFT:
+            tracker.skip(stamp_ns, 'left')
+        else:
+            tracker.update(stamp_ns, detections, view)
+    assert tracker.objects() == []
+
+
+def test_who_does_not_come_out_from_behind_something_is_still_there_though_another_camera_looks_elsewhere():
+    """Walks at 1 m/s behind a screen that hides y = 0 to 1 m from the camera in front, and stays there for 1.5 s; the
+    other camera looks back."""
+    def depth_at(points):
+        behind_screen = (points[:, 0] / points[:, 2] < 0) & (points[:, 0] / points[:, 2] > -1 / 4.0)
+        return np.where(behind_screen, 1.5, 6.0)
+
+    def walk(time_s):
+        y_m = min(time_s - 1.5, max(0.5, time_s - 3))
+        return None if -0.2 < y_m < 1.2 else (4.0, y_m)
+    views = FRONT._replace(depth_at=depth_at), looking(np.pi, 'rear')
+    published = play(Tracker(), images_of(5, walk, views=views))
+    assert all(objects[0].status == OCCLUDED for objects in published[84:250])
+    assert all(0 < objects[0].position_m[1] < 1.1 for objects in published[120:250])
+    assert [(track.id, track.status) for track in published[-1]] == [(1, VISIBLE)]
+
+
+def test_whom_one_camera_sees_is_not_hidden_by_what_stands_before_the_other():
+    def depth_at(points):
+        return np.full(len(points), 1.0)
+    published = play(Tracker(), images_of(2, standing(IN_BOTH), views=(FRONT, LEFT._replace(depth_at=depth_at))))
+    assert all([track.status for track in objects] == [VISIBLE] for objects in published[20:])
+
+
+def walk_into_both(time_s):
+    return around(0.5 * time_s - 0.2)
+
+
+@settings(max_examples=20)
+@given(st.permutations(range(10)), st.booleans())
+def test_the_order_in_which_the_images_come_does_not_matter(order, same_stamps):
+    """Those of both cameras, at turns or at the same time, of somebody who was known before."""
+    images = images_of(1, walk_into_both)
+    if same_stamps:
+        images = [(image[0] - (number % 2) * (PERIOD_NS // 2),) + image[1:] for number, image in enumerate(images)]
+    before, late = images[:-10], images[-10:]
+    expected, shuffled = Tracker(), Tracker()
+    play(expected, before + late)
+    play(shuffled, before + [late[number] for number in order])
+    one, other = expected.objects(), shuffled.objects()
+    assert ids(one) == ids(other) == [1]
+    assert (one[0].status, one[0].last_seen_ns) == (other[0].status, other[0].last_seen_ns)
+    assert one[0].covariance.tobytes() == other[0].covariance.tobytes()
+    assert one[0].position_m.tobytes() == other[0].position_m.tobytes()
+
+
+@settings(max_examples=20)
+@given(st.integers(1, 14), st.sampled_from([IN_FRONT, IN_BOTH, AT_LEFT]))
+def test_the_delay_of_one_camera_changes_no_number(delay, bearing):
+    """Its images come up to 0.45 s late, and show somebody earlier than what the other one has shown by then."""
+    images = [(number + (2 * delay if image[2] is LEFT else 0), image)
+              for number, image in enumerate(images_of(1.5, standing(bearing)))]
+    published = play(Tracker(), [image for _turn, image in sorted(images, key=lambda pair: pair[0])])
+    assert all(ids(objects) == [1] for objects in published[45:])
+    assert set(number for objects in published for number in ids(objects)) == {1}
+
+
+@settings(max_examples=60)
+@given(st.lists(st.tuples(st.integers(0, 12), st.booleans(), st.lists(st.floats(-0.6, 1.4), max_size=3)), min_size=1,
+                max_size=25))
+def test_whatever_comes_in_whatever_order_numbers_are_given_once(given_images):
+    tracker, taken = Tracker(), set()
+    for steps, is_left, bearings in given_images:
+        stamp_ns, view = START_NS + steps * PERIOD_NS, (FRONT, LEFT)[is_left]
+        if (stamp_ns, is_left) in taken:
+            continue
+        taken.add((stamp_ns, is_left))
+        objects = tracker.update(stamp_ns, [found for bearing in bearings for found in shown(view, around(bearing))],
+                                 view)
+        assert ids(objects) == sorted(set(ids(objects)))
+        assert len(set(tracker._state.tracks['id'].tolist())) == len(tracker._state.tracks)
