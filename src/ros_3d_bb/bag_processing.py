@@ -11,7 +11,7 @@ from ros_3d_bb.bag_transforms import BagTransforms
 from ros_3d_bb.bags import new_bag
 from ros_3d_bb.camera_messages import COLOR_TOPIC, STATIC_TOPIC, TF_TOPIC
 from ros_3d_bb.messages import BOXES_TOPIC
-from ros_3d_bb.pipeline import INPUTS, OUTPUTS, Pipeline, Settings
+from ros_3d_bb.pipeline import INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, Pipeline, Settings
 from ros_3d_bb.searching import opened_yolov5, search_color
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tally import Tally
@@ -20,12 +20,13 @@ MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
 
 
 class Waiting(NamedTuple):
-    """A message that was read and waits for its turn: of a node's `topic` (None: of no interest), `message` where it
-    was needed ahead, and the search in it.
+    """A message that was read and waits for its turn: of a node's `topic` (None: of no interest) and a `camera`,
+    `message` where it was needed ahead, and the search in it.
     """
 
     raw: Raw
     topic: Optional[str]
+    camera: str
     message: Any
     search: Optional[Future]
 
@@ -35,7 +36,9 @@ class BagRun(object):
 
     def __init__(self, reader, settings, tally):
         self._reader, self._settings, self._tally = reader, settings, tally
-        self._topics = {settings.name(topic): topic for topic in INPUTS if topic in _wanted(settings.detector)}
+        self._topics = {settings.name(topic): (topic, '') for topic in (TF_TOPIC, STATIC_TOPIC)}
+        self._topics.update((settings.name(topic, camera), (topic, camera)) for camera in settings.cameras
+                            for topic in _wanted(settings.detector))
         self._transforms = BagTransforms()
         self._pipeline = Pipeline(settings, tally, self._transforms)
         self._detect = None
@@ -45,7 +48,8 @@ class BagRun(object):
                                            lambda line: tally.note('remarks of the detector', line))
             self._detect = lambda message: search_color(self._detector, message)[1]
         needed = BOXES_TOPIC if settings.detector == 'none' else COLOR_TOPIC
-        reader.check_topic(settings.name(needed), INPUTS[needed])
+        for camera in settings.cameras:
+            reader.check_topic(settings.name(needed, camera), INPUTS[needed])
 
     def outputs(self):
         """Yield (Raw, [(topic, message), ...]): each message of the bag, and what the nodes would publish then."""
@@ -76,7 +80,7 @@ class BagRun(object):
 
     def _begun(self, raw, pool):
         """A message that was read; what can be done ahead of its turn is begun."""
-        topic, message, search = self._topics.get(raw.topic), None, None
+        (topic, camera), message, search = self._topics.get(raw.topic, (None, '')), None, None
         if topic == TF_TOPIC:
             with self._tally.refusing('transforms'):
                 message = message_in(raw, TFMessage)
@@ -85,11 +89,11 @@ class BagRun(object):
             with self._tally.refusing('images'):
                 message = message_in(raw, Image)
                 search = pool.submit(self._detect, message)
-        return Waiting(raw, topic, message, search)
+        return Waiting(raw, topic, camera, message, search)
 
     def _handled(self, waiting):
         """What the nodes would publish at the turn of a message."""
-        raw, topic, message, search = waiting
+        raw, topic, camera, message, search = waiting
         if topic is None or topic == STATIC_TOPIC:
             return []
         self._tally.count('messages on %s' % raw.topic)
@@ -99,17 +103,17 @@ class BagRun(object):
             return []
         with self._tally.refusing('messages on %s' % raw.topic):
             if topic == COLOR_TOPIC and self._detect is not None:
-                return self._found(message, search, raw.time.to_nsec())
-            return self._pipeline.take(topic, message_in(raw, INPUTS[topic]), raw.time.to_nsec())
+                return self._found(message, search, raw.time.to_nsec(), camera)
+            return self._pipeline.take(topic, message_in(raw, INPUTS[topic]), raw.time.to_nsec(), camera)
         return []
 
-    def _found(self, message, search, now_ns):
+    def _found(self, message, search, now_ns, camera):
         if search is None:
             return []
         with self._pipeline.searching():
             found = search.result()
             self._tally.count('images searched')
-            return self._pipeline.found(message.header, found, now_ns)
+            return self._pipeline.found(message.header, found, now_ns, camera)
         return []
 
 
@@ -152,8 +156,9 @@ class Copier(object):
     """Writes messages of one bag to another as they are, but for those that are made anew."""
 
     def __init__(self, bag, settings):
-        made = OUTPUTS + (() if settings.detector == 'none' else (BOXES_TOPIC,))
-        self._bag, self._made = bag, set(settings.name(topic) for topic in made)
+        made = set(settings.name(topic, camera) for topic in OUTPUTS_OF_CAMERA for camera in settings.cameras
+                   if topic != BOXES_TOPIC or settings.detector != 'none')
+        self._bag, self._made = bag, made | set(settings.name(topic) for topic in OUTPUTS)
         self._keep, self._types = settings.keep, {}
 
     def copy(self, raw):
@@ -168,5 +173,5 @@ class Copier(object):
 
 
 def _wanted(detector):
-    """The topics that are of use."""
-    return set(INPUTS) - ({COLOR_TOPIC} if detector == 'none' else {BOXES_TOPIC})
+    """The topics of a camera that are of use."""
+    return set(INPUTS) - {TF_TOPIC, STATIC_TOPIC} - ({COLOR_TOPIC} if detector == 'none' else {BOXES_TOPIC})

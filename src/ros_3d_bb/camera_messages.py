@@ -15,6 +15,7 @@ from ros_3d_bb.images import fill_image
 TF_TOPIC, STATIC_TOPIC = 'tf', 'tf_static'
 COLOR_TOPIC, DEPTH_TOPIC = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
 INFO_TOPICS = ('camera/color/camera_info', 'camera/aligned_depth_to_color/camera_info')
+CAMERA = 'camera'  # namespace of the only camera's topics
 TYPES = {TF_TOPIC: TFMessage, COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPICS[0]: CameraInfo,
          INFO_TOPICS[1]: CameraInfo}
 
@@ -29,6 +30,17 @@ class CameraFrame(NamedTuple):
     color: np.ndarray
     depth: DepthImage
     transforms: Sequence[Any]
+
+
+def topic_of(camera, topic):
+    """What a topic is called for one of several cameras, by its namespace; '' is the only camera.
+
+    Images are where a driver puts those of a camera of that name: front/color/image_raw. What is made of them is below
+    it, too: front/ros_3d_bb/bb_3d.
+    """
+    if not camera:
+        return topic
+    return '%s/%s' % (camera, topic[len(CAMERA) + 1:] if topic.startswith(CAMERA + '/') else topic)
 
 
 def messages_of(frame):

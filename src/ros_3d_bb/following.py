@@ -1,8 +1,10 @@
 """From 3D boxes and transforms to tracks: what tracker_node and process_bag do with messages."""
 import functools
+import re
 import threading
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
 import tf2_ros
 from std_msgs.msg import Header
 
@@ -19,7 +21,8 @@ from ros_3d_bb.tracking.visibility import depths_towards, edges_of
 
 TRACKING_PARAMS = ThesisTrackerParams, TrackerParams, NoiseParams, PredictionParams
 TRACKERS = {'thesis': (ThesisTracker, slice(0, 1)), 'kalman': (Tracker, slice(1, 4))}  # with their part of those
-JUMP_NS = NS  # stamps that go back by more are a jump in time, by less a late message
+JUMP_NS = NS  # stamps of a camera that go back by more are a jump in time, by less a late message
+NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/\w+)*$')
 
 
 class TrackerNodeParams(NamedTuple):
@@ -27,12 +30,21 @@ class TrackerNodeParams(NamedTuple):
 
     tracker: str = 'kalman'
     target_frame: str = 'map'
+    cameras: list = ()
     camera_frame: str = ''
     use_depth: bool = True
     depth_scale: float = 0.0
     depth_cache_length: float = 1.0
     stamp_tolerance: float = 0.005
     tf_timeout: float = 0.2
+
+
+class Located(NamedTuple):
+    """A BoundingBox3DArray of a camera (its namespace, '' for the only one) whose transform is known, (4, 4)."""
+
+    message: Any
+    camera: str
+    fixed_from_camera: np.ndarray
 
 
 class Followed(NamedTuple):
@@ -45,7 +57,7 @@ class Followed(NamedTuple):
 class Follower(object):
     """Follow 3D boxes in a fixed frame. Without a transform at their stamp there is no answer and nobody ages.
 
-    Depth images and camera_info are those of one camera, that of the boxes.
+    Each message comes with the namespace of its camera, '' for the only one. Methods may be called from any thread.
 
     Parameters
     ----------
@@ -67,9 +79,17 @@ class Follower(object):
         _check(params)
         self._params, self._tally, self._transforms = params, tally, transforms
         self._tracker = _trackers_of(tracking)[params.tracker]
-        self._camera_lock = threading.Lock()  # images come while a transform is waited for
-        self._newest_ns = None  # of the images that were taken
-        self._camera, self._depths = None, StampedCache(int(params.depth_cache_length * NS))
+        self._images_lock, self._tracks_lock = threading.Lock(), threading.Lock()
+        self._newest_ns = {}  # by camera, of the images that were taken
+        self._before_ns, self._jump_ns = {}, 0  # of cameras whose stamps have not gone back yet; where others' went
+        self._frames = {}  # and the cameras that have them
+        self._intrinsics = {}
+        self._depths = {camera: StampedCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
+
+    @property
+    def cameras(self):
+        """The namespaces of the cameras."""
+        return tuple(self._params.cameras) or ('',)
 
     def tune(self, tracking):
         """Take the next boxes with other parameters of tracking; tracks go on. Raises ValueError as at the start."""
@@ -82,17 +102,17 @@ class Follower(object):
         with_camera = self._params.tracker != 'thesis'  # which does not ask where the camera looks
         return with_camera, with_camera and self._params.use_depth
 
-    def add_camera_info(self, message):
+    def add_camera_info(self, message, camera=''):
         """Take a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
-        self._camera = camera_from_message(message)
+        self._intrinsics[camera] = camera_from_message(message)
 
-    def add_depth(self, message, now_ns):
+    def add_depth(self, message, now_ns, camera=''):
         """Take a depth image. Raises ValueError where it carries no stamp."""
-        with self._camera_lock:
-            self._depths.add(stamp_of(message), now_ns, message)
+        with self._images_lock:
+            self._depths[camera].add(stamp_of(message), now_ns, message)
 
-    def add_boxes(self, message):
-        """Take a BoundingBox3DArray.
+    def add_boxes(self, message, camera=''):
+        """Take a BoundingBox3DArray: `locate` it and `follow` what is in it.
 
         Returns
         -------
@@ -104,51 +124,94 @@ class Follower(object):
         ValueError
             If it cannot be used.
         """
+        located = self.locate(message, camera)
+        return None if located is None else self.follow(located)
+
+    def locate(self, message, camera=''):
+        """Find out where the camera of a BoundingBox3DArray was, which may have to be waited for.
+
+        Returns
+        -------
+        Located or None
+            None where there is no transform for it. Raises ValueError as `add_boxes`.
+        """
         stamp_ns = stamp_of(message)
-        self._follow_time(stamp_ns)
-        tracks = self._track(stamp_ns, message)
-        if tracks is None:
-            return None
-        self._newest_ns = stamp_ns if self._newest_ns is None else max(stamp_ns, self._newest_ns)
-        self._tally.count('images tracked')
-        return Followed(Header(stamp=time_from(self._newest_ns), frame_id=self._params.target_frame), tracks)
-
-    def _track(self, stamp_ns, message):
-        """The tracks after one array of boxes; None where there is no transform for it."""
-        camera_frame = self._params.camera_frame or message.header.frame_id
+        frame_id = self._params.camera_frame or message.header.frame_id
+        with self._tracks_lock:
+            if not self._follow_time(stamp_ns, camera):
+                return None
         try:
-            fixed_from_camera = self._transforms.lookup(self._params.target_frame, camera_frame, message.header.stamp)
+            return Located(message, camera, self._transforms.lookup(self._params.target_frame, frame_id,
+                                                                    message.header.stamp))
         except tf2_ros.TransformException as error:
-            self._tracker.skip(stamp_ns)
+            with self._tracks_lock:
+                self._tracker.skip(stamp_ns, camera or message.header.frame_id)
             self._tally.warn('no transform', 'no transform from %s to %s at %.3f: %s; tracks are kept as they are'
-                             % (camera_frame, self._params.target_frame, stamp_ns / NS, error))
+                             % (frame_id, self._params.target_frame, stamp_ns / NS, error))
             return None
-        return self._tracker.update(stamp_ns, detections_from_message(message, fixed_from_camera),
-                                    self._view(stamp_ns, message.header.frame_id, fixed_from_camera))
 
-    def _view(self, stamp_ns, frame_id, fixed_from_camera):
+    def follow(self, located):
+        """Track what is in a Located. Returns Followed; raises ValueError as `add_boxes`."""
+        message, camera, fixed_from_camera = located
+        stamp_ns = stamp_of(message)
+        if camera:
+            self._check_frame(message.header.frame_id, camera)
+        detections = detections_from_message(message, fixed_from_camera)
+        with self._tracks_lock:
+            tracks = self._tracker.update(stamp_ns, detections, self._view(stamp_ns, located))
+            self._newest_ns[camera] = max(stamp_ns, self._newest_ns.get(camera, stamp_ns))
+            newest_ns = max(self._newest_ns.values())
+        self._tally.count('images tracked')
+        return Followed(Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame), tracks)
+
+    def _view(self, stamp_ns, located):
         """What the camera saw at a stamp, as far as it is known."""
-        camera = self._camera
+        name = located.camera or located.message.header.frame_id
+        camera = self._intrinsics.get(located.camera)
         if camera is None:
-            return View(fixed_from_camera, camera=frame_id)
-        with self._camera_lock:
-            entry = self._depths.at(stamp_ns, int(self._params.stamp_tolerance * NS))
+            return View(located.fixed_from_camera, camera=name)
+        with self._images_lock:
+            entry = self._depths[located.camera].at(stamp_ns, int(self._params.stamp_tolerance * NS))
         depth_at = None
         if entry is not None:
             with self._tally.refusing('depth images'):  # the boxes are good without
                 depth = depth_from(entry.value, self._params.depth_scale)
                 if depth.values.shape == (camera.height, camera.width):  # bbox3d_node says what is wrong with others
                     depth_at = functools.partial(depths_towards, camera, depth)
-        return View(fixed_from_camera, edges_of(camera), frame_id, depth_at)
+        return View(located.fixed_from_camera, edges_of(camera), name, depth_at)
 
-    def _follow_time(self, stamp_ns):
-        """Forget tracks and transforms where the stamps went back: a bag looped, or somebody sought in it."""
-        if self._newest_ns is not None and stamp_ns < self._newest_ns - JUMP_NS:
+    def _follow_time(self, stamp_ns, camera):
+        """Forget tracks and transforms where the stamps of a camera went back: a bag looped, or somebody sought in it.
+
+        Other cameras may still send images of the time before then; returns whether this is none of them.
+        """
+        newest_ns = self._newest_ns.get(camera)
+        if newest_ns is not None and stamp_ns < newest_ns - JUMP_NS:
             self._tally.note('jumps back in time', 'time went back from %.3f to %.3f: tracks and transforms of the '
-                             'time before are forgotten' % (self._newest_ns / NS, stamp_ns / NS))
+                             'time before are forgotten' % (newest_ns / NS, stamp_ns / NS))
             self._tracker.reset()
             self._transforms.go_back()
-            self._newest_ns = None
+            self._newest_ns.pop(camera)
+            self._before_ns, self._newest_ns, self._jump_ns = self._newest_ns, {}, stamp_ns
+        if camera not in self._before_ns:
+            return True
+        now_ns = max(self._newest_ns.values(), default=self._jump_ns)
+        if stamp_ns > max(self._before_ns[camera] - JUMP_NS, now_ns + JUMP_NS):
+            self._tally.count('images of the time before')
+            return False
+        del self._before_ns[camera]
+        return True
+
+    def _check_frame(self, frame_id, camera):
+        """Say so where two cameras have one frame: tf then takes them to be in one place."""
+        cameras = self._frames.setdefault(frame_id, [])
+        if camera in cameras:
+            return
+        cameras.append(camera)
+        if len(cameras) > 1:
+            self._tally.note('cameras with one frame', 'the boxes of %s are all in the frame %s: they are taken for '
+                             'those of cameras in one place; each camera needs a frame of its own'
+                             % (' and '.join(cameras), frame_id))
 
 
 def _trackers_of(tracking):
@@ -164,3 +227,13 @@ def _check(params):
     if not params.target_frame:
         raise ValueError('parameter ~target_frame is empty; map or odom expected')
     check_not_negative(params, 'tf_timeout', 'depth_scale', 'depth_cache_length', 'stamp_tolerance')
+    for camera in params.cameras:
+        if not (isinstance(camera, str) and NAMESPACE.match(camera)) or list(params.cameras).count(camera) > 1:
+            raise ValueError('parameter ~cameras is %s; different namespaces expected, such as front, rear'
+                             % list(params.cameras))
+    if params.cameras and params.camera_frame:
+        raise ValueError('parameter ~camera_frame is %r, and ~cameras are %s; one frame serves one camera only'
+                         % (params.camera_frame, ', '.join(params.cameras)))
+    if params.cameras and params.tracker == 'thesis':
+        raise ValueError('parameter ~tracker is thesis, and ~cameras are %s; that tracker knows one camera only'
+                         % ', '.join(params.cameras))

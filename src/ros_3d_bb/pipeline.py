@@ -6,7 +6,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, STATIC_TOPIC, TF_TOPIC
+from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, topic_of
 from ros_3d_bb.detection.bodies import DepthPeopleParams
 from ros_3d_bb.detection.checkpoint import cause
 from ros_3d_bb.detection.runtime import RuntimeParams
@@ -21,7 +21,7 @@ from ros_3d_bb.searching import DepthDetectorParams, DepthSearch, Yolov5NodePara
 INFO_TOPIC = INFO_TOPICS[0]
 INPUTS = {COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPIC: CameraInfo, BOXES_TOPIC: Int32MultiArray,
           TF_TOPIC: TFMessage, STATIC_TOPIC: TFMessage}
-OUTPUTS = BOXES3D_TOPIC, TRACKS_TOPIC, MARKERS_TOPIC
+OUTPUTS_OF_CAMERA, OUTPUTS = (BOXES_TOPIC, BOXES3D_TOPIC), (TRACKS_TOPIC, MARKERS_TOPIC)
 DETECTORS = 'yolov5', 'depth', 'none'
 
 
@@ -40,13 +40,20 @@ class Settings(NamedTuple):
     searches: int = 1
     compression: str = 'lz4'
 
-    def name(self, topic):
-        """What a topic of the nodes is called in the bag."""
+    @property
+    def cameras(self):
+        """The namespaces of the cameras, '' of the only one."""
+        return tuple(self.tracker[0].cameras) or ('',)
+
+    def name(self, topic, camera=''):
+        """What a topic of the nodes, those of a camera, is called in the bag."""
+        topic = topic_of(camera, topic)
         return '/' + self.names.get(topic, topic).lstrip('/')
 
 
 class Pipeline(object):
-    """Detector, 3D boxes and tracks. Give it messages with `take`; it returns what the nodes would publish.
+    """Detectors and 3D boxes of each camera, and tracks. Give it messages with `take`; it returns what the nodes would
+    publish.
 
     Raises
     ------
@@ -56,37 +63,39 @@ class Pipeline(object):
 
     def __init__(self, settings, tally, transforms):
         self._tally = tally
-        self._lifter = Lifter(settings.bbox3d[0], tally, settings.name(DEPTH_TOPIC), settings.name(INFO_TOPIC))
         follower, marker_params, *tracking = settings.tracker
         self._follower, self._markers = Follower(follower, tracking, tally, transforms), MarkerWriter(marker_params)
-        self._search, publish_empty = None, settings.yolov5[0].publish_empty
+        self._lifters = {camera: Lifter(settings.bbox3d[0], tally, settings.name(DEPTH_TOPIC, camera),
+                                        settings.name(INFO_TOPIC, camera)) for camera in settings.cameras}
+        self._searches, self._publish_empty = {}, settings.yolov5[0].publish_empty
         if settings.detector == 'depth':
             params, people = settings.depth
-            self._search = DepthSearch(params, people, tally, transforms if params.floor_frame else None)
-            publish_empty = params.publish_empty
-        self._publish_empty = publish_empty
+            self._searches = {camera: DepthSearch(params, people, tally, transforms if params.floor_frame else None)
+                              for camera in settings.cameras}
+            self._publish_empty = params.publish_empty
 
-    def take(self, topic, message, now_ns):
+    def take(self, topic, message, now_ns, camera=''):
         """Take a message of a topic of the nodes, recorded at a time. Returns [(topic, message), ...]."""
         if topic == INFO_TOPIC:
             with_camera, _depth = self._follower.looks
             if with_camera:
-                self._follower.add_camera_info(message)
-            return self._taken('add_camera_info', message, now_ns)
+                self._follower.add_camera_info(message, camera)
+            return self._taken('add_camera_info', message, now_ns, camera)
         if topic == DEPTH_TOPIC:
             if self._follower.looks[1]:
-                self._follower.add_depth(message, now_ns)
-            return self._taken('add_depth', message, now_ns)
+                self._follower.add_depth(message, now_ns, camera)
+            return self._taken('add_depth', message, now_ns, camera)
         if topic == COLOR_TOPIC:
-            return self._searched(self._search.add_color(message, now_ns), now_ns)
-        return self._followed(self._lifter.add_boxes(message, now_ns))
+            return self._searched(self._searches[camera].add_color(message, now_ns), now_ns, camera)
+        return self._followed(self._lifters[camera].add_boxes(message, now_ns), camera)
 
-    def found(self, header, found, now_ns):
+    def found(self, header, found, now_ns, camera=''):
         """Take what a detector found in the image of a header. Returns as `take`."""
         if not len(found.boxes) and not self._publish_empty:
             return []
         message = boxes2d_to_message(found.boxes, header)
-        return [(BOXES_TOPIC, message)] + self._followed(self._lifter.add_boxes(message, now_ns))
+        return [(topic_of(camera, BOXES_TOPIC), message)] + self._followed(
+            self._lifters[camera].add_boxes(message, now_ns), camera)
 
     @contextlib.contextmanager
     def searching(self):
@@ -99,31 +108,31 @@ class Pipeline(object):
 
     def end(self):
         """Nothing more will come."""
-        for part in filter(None, (self._search, self._lifter)):
+        for part in list(self._searches.values()) + list(self._lifters.values()):
             part.end()
 
-    def _taken(self, add, message, now_ns):
+    def _taken(self, add, message, now_ns, camera):
         outputs = []
-        if self._search is not None:
-            outputs += self._searched(getattr(self._search, add)(message, now_ns), now_ns)
-        return outputs + self._followed(getattr(self._lifter, add)(message, now_ns))
+        if self._searches:
+            outputs += self._searched(getattr(self._searches[camera], add)(message, now_ns), now_ns, camera)
+        return outputs + self._followed(getattr(self._lifters[camera], add)(message, now_ns), camera)
 
-    def _searched(self, pairs, now_ns):
+    def _searched(self, pairs, now_ns, camera):
         outputs = []
         for pair in pairs:
             with self.searching():
-                found = self._search.search(pair)
+                found = self._searches[camera].search(pair)
                 if found is not None:
-                    outputs += self.found(pair[1].header, found[1], now_ns)
+                    outputs += self.found(pair[1].header, found[1], now_ns, camera)
         return outputs
 
-    def _followed(self, images):
+    def _followed(self, images, camera):
         outputs = []
         for lifted in images:
             boxes = boxes3d_to_message(lifted.boxes, lifted.header, lifted.camera)
-            outputs.append((BOXES3D_TOPIC, boxes))
+            outputs.append((topic_of(camera, BOXES3D_TOPIC), boxes))
             with self._tally.refusing('3D boxes'):
-                followed = self._follower.add_boxes(boxes)
+                followed = self._follower.add_boxes(boxes, camera)
                 if followed is not None:
                     outputs.append((TRACKS_TOPIC, tracks_to_message(followed.tracks, followed.header)))
                     outputs.append((MARKERS_TOPIC, self._markers.write(followed.tracks, followed.header)))

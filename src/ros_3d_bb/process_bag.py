@@ -90,12 +90,19 @@ def settings_from(given):
     if given.error_model:
         settings = settings._replace(bbox3d=(settings.bbox3d[0]._replace(error_model=given.error_model),))
     if given.target_frame:
-        settings = settings._replace(tracker=(settings.tracker[0]._replace(target_frame=given.target_frame),)
-                                     + settings.tracker[1:])
+        settings = with_tracker(settings, target_frame=given.target_frame)
+    if given.cameras:
+        settings = with_tracker(settings, cameras=[camera.strip() for camera in given.cameras.split(',')])
     if settings.detector == 'yolov5' and not settings.yolov5[0].weights:
         raise ValueError('detector yolov5 needs --weights FILE, a checkpoint such as yolov5n.pt; --detector depth '
                          'needs none')
     return settings._replace(searches=given.searches or max(1, _cores() // given.jobs))
+
+
+def with_tracker(settings, **changed):
+    """Settings with other parameters of the tracker (`following.TrackerNodeParams`)."""
+    params, *others = settings.tracker
+    return settings._replace(tracker=(params._replace(**changed),) + tuple(others))
 
 
 def read_params(path, defaults):
@@ -239,6 +246,8 @@ def _parser():
         parser.add_argument(option, metavar='FILE', help='parameter file, as config/%s.yaml' % config)
     parser.add_argument('--error-model', metavar='FILE', help='error model for the 3D boxes')
     parser.add_argument('--target-frame', metavar='FRAME', help='of the tracks (default: map)')
+    parser.add_argument('--cameras', metavar='NAMES', help='namespaces of several cameras, separated by commas (front, '
+                        'rear: topics front/color/image_raw, ...)')
     parser.add_argument('--remap', action='append', default=[], metavar='TOPIC:=TOPIC',
                         help="a topic of the nodes, and what it is called in the bag")
     parser.add_argument('--keep', nargs='*', metavar='TOPIC', help='topics of the input to copy (default: all)')

@@ -130,7 +130,8 @@ def test_a_camera_that_ends_keeps_nobody_and_holds_up_nobody():
     assert all((objects[0].id, objects[0].status) == (1, VISIBLE) for objects in after)
     others = [objects[1].status if len(objects) > 1 else None for objects in after]
     visible, out, gone = (others.count(state) for state in (VISIBLE, OUT_OF_VIEW, None))
-    assert others == [VISIBLE] * visible + [OUT_OF_VIEW] * out + [None] * gone and visible == 30 and out in (29, 30)
+    assert others == [VISIBLE] * visible + [OUT_OF_VIEW] * out + [None] * gone and visible == 30
+    assert 15 <= out <= 30  # until nobody knows where they are
     back = play(tracker, images_of(1, standing(AT_LEFT), views=(LEFT,), start_s=8.0))
     assert ids(back[-1])[-1] == 3  # too long ago: somebody else
 
@@ -193,12 +194,14 @@ def test_the_order_in_which_the_images_come_does_not_matter(order, same_stamps):
     assert one[0].position_m.tobytes() == other[0].position_m.tobytes()
 
 
-@settings(max_examples=20)
-@given(st.integers(1, 14), st.sampled_from([IN_FRONT, IN_BOTH, AT_LEFT]))
-def test_the_delay_of_one_camera_changes_no_number(delay, bearing):
+@settings(max_examples=14)
+@given(st.integers(1, 14), st.booleans())
+def test_the_delay_of_one_camera_changes_no_number(delay, into_front):
     """Its images come up to 0.45 s late, and show somebody earlier than what the other one has shown by then."""
+    def walk(time_s):
+        return around(0.6 - 0.5 * time_s if into_front else 0.1 + 0.5 * time_s)
     images = [(number + (2 * delay if image[2] is LEFT else 0), image)
-              for number, image in enumerate(images_of(1.5, standing(bearing)))]
+              for number, image in enumerate(images_of(1.5, walk))]
     published = play(Tracker(), [image for _turn, image in sorted(images, key=lambda pair: pair[0])])
     assert all(ids(objects) == [1] for objects in published[45:])
     assert set(number for objects in published for number in ids(objects)) == {1}

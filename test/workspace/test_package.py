@@ -43,7 +43,7 @@ CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams, RuntimeParams), 'b
            'planner_bridge.yaml': (PlannerBridgeParams,), 'realsense.yaml': (RealSenseNodeParams, RealSenseParams),
            'depth_detector.yaml': (DepthDetectorParams, DepthPeopleParams), 'viewer.yaml': (ViewerParams,)}
 SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id', 'error_model'},
-                 'tracker.yaml': {'target_frame', 'camera_frame'}, 'simulator.yaml': {'scenario'},
+                 'tracker.yaml': {'target_frame', 'cameras', 'camera_frame'}, 'simulator.yaml': {'scenario'},
                  'planner_bridge.yaml': {'outputs', 'planner_frame', 'robot_frame'},
                  'realsense.yaml': {'frame_prefix', 'publish_clock', 'serial', 'width', 'height', 'fps', 'filters',
                                     'exposure', 'file', 'repeat'},

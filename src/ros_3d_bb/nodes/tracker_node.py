@@ -1,11 +1,12 @@
 """The node that makes tracks of 3D boxes in a fixed frame."""
+import functools
 import threading
 
 import rospy
 from sensor_msgs.msg import CameraInfo, Image
 from visualization_msgs.msg import MarkerArray
 
-from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS, topic_of
 from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter, check_params
 from ros_3d_bb.messages import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_message
@@ -23,7 +24,9 @@ class TrackerNode(object):
     """Track 3D boxes in a fixed frame.
 
     Without a transform at the stamp of the boxes nothing is published and nobody ages. Parameters:
-    config/tracker.yaml; many can be changed while it runs.
+    config/tracker.yaml; many can be changed while it runs. With ~cameras it subscribes to boxes, camera_info and depth
+    of each: for the camera front to front/ros_3d_bb/bb_3d, front/color/camera_info and
+    front/aligned_depth_to_color/image_raw.
 
     Subscribes
     ----------
@@ -57,7 +60,8 @@ class TrackerNode(object):
         self._numbers = Numbers(self._diagnostics)
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
-        self._subscribe()
+        for camera in self._follower.cameras:
+            self._subscribe(camera)
         self._tuning = Tuning('tracker.yaml', given, self._tune)
 
     def _tune(self, _params, marker_params, *tracking):
@@ -66,32 +70,38 @@ class TrackerNode(object):
             self._follower.tune(tracking)
             self._markers.tune(marker_params)
 
-    def _subscribe(self):
-        subscribe(BOXES3D_TOPIC, BoundingBox3DArray, self._on_boxes)
+    def _subscribe(self, camera):
+        def of_camera(callback):
+            return functools.partial(callback, camera=camera)
+        subscribe(topic_of(camera, BOXES3D_TOPIC), BoundingBox3DArray, of_camera(self._on_boxes))
         with_camera, with_depth = self._follower.looks
         if with_camera:
-            subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, 1)
+            subscribe(topic_of(camera, INFO_TOPICS[0]), CameraInfo, of_camera(self._on_camera_info), 1)
         if with_depth:
-            subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
+            subscribe(topic_of(camera, DEPTH_TOPIC), Image, of_camera(self._on_depth), KEPT_AT_ONCE)
 
-    def _on_camera_info(self, message):
+    def _on_camera_info(self, message, camera):
         with self._diagnostics.refusing('camera_info'):
-            self._follower.add_camera_info(message)
+            self._follower.add_camera_info(message, camera)
 
-    def _on_depth(self, message):
+    def _on_depth(self, message, camera):
         with self._diagnostics.refusing('depth images'):
-            self._follower.add_depth(message, arrival_clock_ns())
+            self._follower.add_depth(message, arrival_clock_ns(), camera)
 
-    def _on_boxes(self, message):
-        with self._diagnostics.refusing('3D boxes'), self._lock:
-            followed = self._follower.add_boxes(message)
-            if followed is None:
+    def _on_boxes(self, message, camera):
+        with self._diagnostics.refusing('3D boxes'):
+            located = self._follower.locate(message, camera)  # one camera's wait for a transform holds up no other
+            if located is None:
                 return
-            tracks = self._numbers.continued(followed.tracks)
-            self._tracks_pub.publish(tracks_to_message(tracks, followed.header))
-            self._diagnostics.answered(followed.header.stamp)
-            if self._markers_pub.get_num_connections():
-                self._markers_pub.publish(self._markers.write(tracks, followed.header))
+            with self._lock:
+                self._publish(self._follower.follow(located))
+
+    def _publish(self, followed):
+        tracks = self._numbers.continued(followed.tracks)
+        self._tracks_pub.publish(tracks_to_message(tracks, followed.header))
+        self._diagnostics.answered(followed.header.stamp)
+        if self._markers_pub.get_num_connections():
+            self._markers_pub.publish(self._markers.write(tracks, followed.header))
 
 
 def main():

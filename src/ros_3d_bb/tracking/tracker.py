@@ -62,7 +62,7 @@ class _Image(NamedTuple):
 
 class _State(NamedTuple):
     """What images change: the tracks, the stamp of the latest image; by camera, the stamp of one without an answer since
-    the camera's latest, and its `unseen.Look`.
+    its latest, and its `unseen.Look`.
     """
 
     tracks: np.ndarray
@@ -130,7 +130,7 @@ class Tracker(object):
             If the image comes too late, or a second time; nothing changes then.
         """
         images = [_Image(stamp_ns, tuple(detections), view)] + self._taken_back(stamp_ns, view.camera)
-        given_id = self._last_id
+        given_id = self._last_id if len(images) > 1 else None
         for image in images:
             self._history.append((self._state, image))
             self._state = self._after(image, given_id)
@@ -167,7 +167,7 @@ class Tracker(object):
         self._ids = {key: number for key, number in self._ids.items() if key[0] >= oldest_ns}
 
     def _after(self, image, given_id):
-        """The state after an image. Numbers up to `given_id` were given before this one or a late one came."""
+        """The state after an image. Where that is done again, numbers up to `given_id` were given before; else None."""
         before, now_ns, skipped_ns, looks = self._state
         tracks, stamp_ns, view = before.copy(), image.stamp_ns, image.view
         elapsed_s = 0.0 if now_ns is None else (stamp_ns - now_ns) / NS
@@ -176,7 +176,7 @@ class Tracker(object):
                                                               self._params.acceleration)
         sightings = sightings_of(image.detections, view, self._since_last_s(image), self._noise)
         rows, columns = self._associate(tracks, sightings, stamp_ns)
-        if self._last_id > given_id:
+        if given_id is not None:
             self._give_back_ids(tracks, rows, [(stamp_ns, view.camera, column) for column in columns], given_id)
         self._see(tracks, rows, _taken(sightings, columns), stamp_ns)
         others = others_of(looks, view, stamp_ns)
@@ -263,12 +263,14 @@ class Tracker(object):
         return self._ids[key]
 
     def _give_back_ids(self, tracks, rows, keys, given_id):
-        """Call tracks that a late image began by the number of the track that their next detections had begun."""
+        """Call tracks that late images began by the number of the track that one of their next detections had begun."""
         for row, key in zip(rows, keys):
             number = tracks['id'][row]
-            if key in self._ids and number > given_id:
-                first = next(other for other, known in self._ids.items() if known == number)
-                tracks['id'][row] = self._ids[first] = self._ids.pop(key)
+            if key in self._ids and (number > given_id or not tracks['confirmed'][row]):
+                former = self._ids.pop(key)
+                self._ids = {other: former if known == number else known for other, known in self._ids.items()}
+                for known in [state.tracks for state, _image in self._history] + [tracks]:
+                    known['id'][known['id'] == number] = former
 
 
 def _order(image):
