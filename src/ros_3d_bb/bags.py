@@ -11,13 +11,13 @@ import numpy as np
 import rosbag
 from std_msgs.msg import Header
 
-from ros_3d_bb.camera_messages import CameraFrame, messages_of
+from ros_3d_bb.camera_messages import CameraFrame, messages_of, topic_of
 from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.measurements import SessionError, read_color, read_depth, read_session
 from ros_3d_bb.messages import BOXES_TOPIC, boxes2d_to_message, time_from
 from ros_3d_bb.simulation.scenario import ScenarioError, overridden, read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulator_messages import CAMERA_FRAME, START_NS, simulated_messages
+from ros_3d_bb.simulator_messages import START_NS, frame_id_of, simulated_messages
 from ros_3d_bb.stamped import NS
 
 PARTIAL = '.active'  # as rosbag record calls what is not complete yet
@@ -124,8 +124,9 @@ def scenario_images(scenario, with_boxes=False):
         messages = simulated_messages(simulator, frame, stamp_ns)
         if with_boxes:
             boxes = [person.box_px for person in frame.people if person.box_px is not None]
-            header = Header(stamp=time_from(stamp_ns), frame_id=CAMERA_FRAME)
-            messages.append((BOXES_TOPIC, boxes2d_to_message(np.array(boxes, int).reshape(-1, 4), header)))
+            header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(frame.camera))
+            messages.append((topic_of(frame.camera, BOXES_TOPIC),
+                             boxes2d_to_message(np.array(boxes, int).reshape(-1, 4), header)))
         yield stamp_ns, messages
 
 

@@ -22,7 +22,7 @@ from ros_3d_bb.messages import boxes2d_to_message, boxes3d_to_message, time_from
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.simulation.scenario import scenario_from
 from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulator_messages import CAMERA_FRAME, simulated_messages
+from ros_3d_bb.simulator_messages import frame_id_of, simulated_messages
 from ros_3d_bb.stamped import NS
 from support.processes import pid_of
 from support.ros import Recorder, launched, publisher, wait_until
@@ -68,7 +68,7 @@ class Rig(object):
         boxes = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, self.simulator.camera,
                                estimator_named('foreground'))
         if with_boxes:
-            header = Header(stamp=time_from(stamp_ns), frame_id=CAMERA_FRAME)
+            header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(''))
             self.pubs[BOXES2D].publish(boxes2d_to_message(np.array(rects_px), header))
             self.pubs[BOXES3D].publish(boxes3d_to_message(boxes, header, self.simulator.camera))
         return Sent(frame, self.simulator.camera, stamp_ns, tuple(rects_px), boxes)
@@ -112,7 +112,7 @@ def check_stored(folder, sent, number):
     """That a measurement holds what was sent, to the bit."""
     session = read_session(folder)
     frame = session.frames[number]
-    assert (session.camera, session.depth_scale_m, session.frame_id) == (sent.camera, 0.001, CAMERA_FRAME)
+    assert (session.camera, session.depth_scale_m, session.frame_id) == (sent.camera, 0.001, frame_id_of(''))
     np.testing.assert_array_equal(read_color(frame, session.camera), sent.frame.color)
     np.testing.assert_array_equal(read_depth(frame, session).values, sent.frame.depth_mm)
     assert (frame.stamp_ns, frame.boxes_px) == (sent.stamp_ns, sent.rects_px)

@@ -112,7 +112,7 @@ def _view(frame, camera):
     """What the tracker is told of the camera, as tracker_node does it."""
     depth = DepthImage(frame.depth_mm, 0.001)
     depth_at = functools.partial(depths_towards, camera, depth)
-    return View(frame.poses.map_from_camera, edges_of(camera), depth_at=depth_at)
+    return View(frame.poses.map_from_camera, edges_of(camera), frame.camera, depth_at)
 
 
 def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6.0):

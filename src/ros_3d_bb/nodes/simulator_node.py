@@ -7,7 +7,7 @@ from typing import NamedTuple
 import rospy
 from rosgraph_msgs.msg import Clock
 
-from ros_3d_bb.camera_messages import COLOR_TOPIC, TYPES
+from ros_3d_bb.camera_messages import COLOR_TOPIC, TF_TOPIC, TYPES, topic_of
 from ros_3d_bb.messages import time_from
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics, is_ending
@@ -40,7 +40,8 @@ class SimulatorNode(object):
     """Play a scenario: colour, aligned depth, camera_info, tf from the map to the camera, and ground truth.
 
     Where it tells the time (~publish_clock), time waits for images that the machine is too slow for; else they are left
-    out. Parameters: config/simulator.yaml.
+    out. Of several cameras each has its images below its name, as front/color/image_raw. Parameters:
+    config/simulator.yaml.
 
     Publishes
     ---------
@@ -64,9 +65,11 @@ class SimulatorNode(object):
         self._params, = read_params(SimulatorParams)
         self._simulator = Simulator(_scenario(self._params))
         self._diagnostics = Diagnostics()
-        self._pubs = {topic: rospy.Publisher('/tf' if topic == 'tf' else topic, kind, queue_size=10)
-                      for topic, kind in TYPES.items()}
-        self._pubs[TRUTH_TOPIC] = rospy.Publisher(TRUTH_TOPIC, TrackedObjectArray, queue_size=10)
+        kinds = {topic_of(camera, topic): kind for camera in self._simulator.cameras for topic, kind in TYPES.items()
+                 if topic != TF_TOPIC}
+        kinds[TRUTH_TOPIC] = TrackedObjectArray
+        self._pubs = {topic: rospy.Publisher(topic, kind, queue_size=10) for topic, kind in kinds.items()}
+        self._pubs[TF_TOPIC] = rospy.Publisher('/' + TF_TOPIC, TYPES[TF_TOPIC], queue_size=10)
         self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=10) if self._params.publish_clock else None
         self.failed = False
         self._worker = threading.Thread(target=self._run)
@@ -96,8 +99,9 @@ class SimulatorNode(object):
 
     def _wait_for_subscribers(self):
         """Some of them, rosbag among them, do not even subscribe before there is a time."""
-        wait_for_subscribers(self._pubs[COLOR_TOPIC], self._params.wait_for_subscribers,
-                             lambda: self._tell_time(START_NS))
+        for camera in self._simulator.cameras:
+            wait_for_subscribers(self._pubs[topic_of(camera, COLOR_TOPIC)], self._params.wait_for_subscribers,
+                                 lambda: self._tell_time(START_NS))
 
     def _play(self, start_ns):
         """One round of the scene, its first image at a stamp."""
@@ -109,7 +113,7 @@ class SimulatorNode(object):
             number += 1
             rospy.loginfo_throttle(PROGRESS_S, 'image %d of %d' % (number, self._simulator.frame_count))
             if self._clock_pub is None:
-                missed = int((time.monotonic() - began_s) * self._simulator.scenario.rate) - number
+                missed = int((time.monotonic() - began_s) * self._simulator.rate) - number
                 if missed > 0:
                     self._diagnostics.count('images left out', missed)
                     number += missed

@@ -1,5 +1,6 @@
 """Scenario files: a room, a robot, and people in it, as YAML. `config/scenarios/README.md` describes the form."""
 import os
+import re
 from typing import NamedTuple, Optional, Tuple
 
 import yaml
@@ -55,10 +56,21 @@ class Follow(NamedTuple):
     rate: float = 1.0
 
 
+class Mount(NamedTuple):
+    """One of several cameras: `name` is the namespace of its topics; `mount` in base_link, turned to the left by `yaw`
+    and tilted up by `pitch`.
+    """
+
+    name: str
+    mount: Tuple[float, float, float] = (0.17, 0.0, 0.20)
+    yaw: float = 0.0
+    pitch: float = 0.0
+
+
 class Robot(NamedTuple):
-    """`pose` (x, y, yaw) at the start; `mount` of the camera in base_link, tilted up by `pitch`; `base_height` of
-    base_link above the floor (Jackal: wheels of radius 0.098 m, hung 0.033 m above it); `odometry_drift` (x, y, yaw) a
-    second, of the odom frame in the map.
+    """`pose` (x, y, yaw) at the start; `mount` of the camera in base_link, tilted up by `pitch`, or several `cameras`;
+    `base_height` of base_link above the floor (Jackal: wheels of radius 0.098 m, hung 0.033 m above it);
+    `odometry_drift` (x, y, yaw) a second, of the odom frame in the map.
     """
 
     pose: Tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -67,8 +79,14 @@ class Robot(NamedTuple):
     follow: Optional[Follow] = None
     mount: Tuple[float, float, float] = (0.17, 0.0, 0.20)
     pitch: float = 0.0
+    cameras: Tuple[Mount, ...] = ()
     base_height: float = 0.065
     odometry_drift: Tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def mounts(self):
+        """All cameras; the only one has no name."""
+        return self.cameras or (Mount('', self.mount, 0.0, self.pitch),)
 
 
 class Person(NamedTuple):
@@ -110,13 +128,14 @@ class Scenario(NamedTuple):
 
 MOVE_KEYS = {'to': ('to', 'speed', 'rate'), 'turn': ('turn', 'rate'), 'wait': ('wait', 'facing', 'crouch')}
 RECORDS = {'room': Room, 'robot': Robot, 'follow': Follow}
-LISTS = {'furniture': Furniture, 'people': Person, 'moves': Move}
+LISTS = {'furniture': Furniture, 'people': Person, 'moves': Move, 'cameras': Mount}
 VECTORS = {'bounds': 4, 'at': 2, 'size': 3, 'to': 2, 'start': 2, 'pose': 3, 'mount': 3, 'odometry_drift': 3, 'color': 3,
            'skin': 3, 'hair': 3, 'shirt': 3, 'trousers': 3}
 FLAGS, WHOLE = {'repeat', 'long_hair', 'short_sleeves', 'depth_noise'}, {'seed', 'person'}
 COLORS = {'color', 'skin', 'hair', 'shirt', 'trousers'}
 POSITIVE = {'duration', 'rate', 'height', 'speed', 'girth', 'distance', 'size'}
 FRACTIONS = {'crouch', 'hips'}
+NAME = re.compile(r'[A-Za-z]\w*$')  # of a namespace of topics
 
 
 def read_scenario(path):
@@ -153,13 +172,12 @@ def scenario_from(content):
     room, robot = scenario.room, scenario.robot
     if not (room.bounds[0] < room.bounds[1] and room.bounds[2] < room.bounds[3]):
         raise ScenarioError('room.bounds is %s; x0 < x1 and y0 < y1 expected' % (list(room.bounds),))
-    camera_m = sum(abs(part) for part in robot.mount[:2])  # the camera has to stay inside, whichever way it looks
+    # The cameras have to stay inside, whichever way the robot looks.
+    camera_m = max(sum(abs(part) for part in camera.mount[:2]) for camera in robot.mounts)
     _check_inside(room.bounds, 'robot', robot.pose[:2], robot.moves, camera_m)
     for number, person in enumerate(scenario.people, 1):
         _check_inside(room.bounds, 'people[%d]' % number, person.start, person.moves)
-    if not 0 < robot.base_height + robot.mount[2] < room.height:
-        raise ScenarioError('robot.mount is %s, with robot.base_height %g, outside the room, which is %g high'
-                            % (list(robot.mount), robot.base_height, room.height))
+    _check_cameras(robot, room)
     if robot.follow is not None and not 1 <= robot.follow.person <= len(scenario.people):
         raise ScenarioError('robot.follow.person is %d; 1 to %d expected' % (robot.follow.person, len(scenario.people)))
     return scenario
@@ -169,6 +187,18 @@ def overridden(scenario, rate=None, seed=None):
     """A scenario with another rate or seed, as far as given. Raises ScenarioError where they make no sense."""
     given = {name: _value(name, value, name) for name, value in (('rate', rate), ('seed', seed)) if value is not None}
     return scenario._replace(**given)
+
+
+def _check_cameras(robot, room):
+    names = [camera.name for camera in robot.cameras]
+    if len(set(names)) < len(names):
+        raise ScenarioError('robot.cameras have the names %s; different ones expected' % ', '.join(names))
+    if robot.cameras and (robot.mount, robot.pitch) != (Robot().mount, Robot().pitch):
+        raise ScenarioError('robot has mount or pitch, and cameras, which have their own; one of both expected')
+    for camera in robot.mounts:
+        if not 0 < robot.base_height + camera.mount[2] < room.height:
+            raise ScenarioError('robot.mount is %s, with robot.base_height %g, outside the room, which is %g high'
+                                % (list(camera.mount), robot.base_height, room.height))
 
 
 def _check_inside(bounds, name, start, moves, margin_m=0.0):
@@ -215,6 +245,10 @@ def _value(name, value, where):
         if not (isinstance(value, list) and len(value) == VECTORS[name]):
             raise ScenarioError('%s is %r; %d numbers expected' % (where, value, VECTORS[name]))
         return tuple(_checked(name, _number(entry, where), where) for entry in value)
+    if name == 'name':
+        if not (isinstance(value, str) and NAME.match(value)):
+            raise ScenarioError('%s is %r; a name such as front expected' % (where, value))
+        return value
     if name in FLAGS:
         if not isinstance(value, bool):
             raise ScenarioError('%s is %r; true or false expected' % (where, value))

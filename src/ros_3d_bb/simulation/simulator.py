@@ -56,7 +56,9 @@ class Poses(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """`time_s` since the start; `color` (h, w, 3) uint8 RGB; `depth_mm` (h, w) uint16, aligned to colour, 0 is none."""
+    """`time_s` since the start; `color` (h, w, 3) uint8 RGB; `depth_mm` (h, w) uint16, aligned to colour, 0 is none;
+    `camera`: the name of that one of several, '' of the only one.
+    """
 
     number: int
     time_s: float
@@ -64,10 +66,13 @@ class Frame(NamedTuple):
     depth_mm: np.ndarray
     poses: Poses
     people: List[Truth]
+    camera: str = ''
 
 
 class Simulator(object):
     """Renders a scenario. Each frame is a function of the scenario and its number alone.
+
+    Several cameras take turns, evenly spread over the period of each: the first one's frames are 0, n, 2 n, ...
 
     Parameters
     ----------
@@ -88,13 +93,23 @@ class Simulator(object):
         self._stereo = StereoCamera(camera, scenario.seed) if scenario.depth_noise else None
 
     @property
+    def cameras(self):
+        """The names of the cameras, '' of the only one."""
+        return [mount.name for mount in self.scenario.robot.mounts]
+
+    @property
+    def rate(self):
+        """Frames a second, of all cameras together."""
+        return self.scenario.rate * len(self.cameras)
+
+    @property
     def frame_count(self):
         """Number of frames in the scene."""
-        return int(np.ceil(self.scenario.duration * self.scenario.rate))
+        return int(np.ceil(self.scenario.duration * self.rate))
 
     def time_s(self, number):
         """When a frame is taken, seconds from the start."""
-        return number / self.scenario.rate
+        return number / self.rate
 
     def frame(self, number):
         """Render a frame.
@@ -103,8 +118,8 @@ class Simulator(object):
         -------
         Frame
         """
-        time_s = self.time_s(number)
-        poses, states = self.poses_at(time_s), [motion.at(time_s) for motion in self._motions]
+        time_s, turn = self.time_s(number), number % len(self.cameras)
+        poses, states = self.poses_at(time_s, turn), [motion.at(time_s) for motion in self._motions]
         bodies = [body.posed(state.posture).moved(np.append(state.position_m, 0), state.heading_rad)
                   for body, state in zip(self._bodies, states)]
         shadows = [(state.position_m[0], state.position_m[1], SHADOW_RADIUS_M) for state in states]
@@ -112,24 +127,26 @@ class Simulator(object):
         depth_mm = (self._stereo.measure(drawn.inverse_depth, number) if self._stereo is not None
                     else np.rint(1000 / drawn.inverse_depth).clip(0, 65535).astype(np.uint16))
         people = [self._truth(index, state, bodies[index], drawn) for index, state in enumerate(states)]
-        return Frame(number, time_s, self._color_sensor.take(drawn.color, number), depth_mm, poses, people)
+        return Frame(number, time_s, self._color_sensor.take(drawn.color, number), depth_mm, poses, people,
+                     self.cameras[turn])
 
-    def poses_at(self, time_s):
-        """Where odometry, robot and camera are at a time.
+    def poses_at(self, time_s, camera=0):
+        """Where odometry, robot and camera are at a time; `camera` is its place in the list.
 
         Returns
         -------
         Poses
         """
         robot, state = self.scenario.robot, self._robot.at(time_s)
+        mount = robot.mounts[camera]
         x, y, yaw = np.array(robot.odometry_drift) * time_s
         map_from_odom = _upright(x, y, 0, yaw)
         map_from_base = _upright(state.position_m[0], state.position_m[1], robot.base_height, state.heading_rad)
-        base_from_mount = _upright(*robot.mount + (0,))
-        c, s = np.cos(robot.pitch), np.sin(robot.pitch)
-        base_from_mount[:3, :3] = [[c, 0, -s], [0, 1, 0], [s, 0, c]]
+        base_from_mount, tilted = _upright(*mount.mount + (mount.yaw,)), np.eye(4)
+        c, s = np.cos(mount.pitch), np.sin(mount.pitch)
+        tilted[:3, :3] = [[c, 0, -s], [0, 1, 0], [s, 0, c]]
         return Poses(map_from_odom, np.linalg.inv(map_from_odom).dot(map_from_base),
-                     base_from_mount.dot(FRONT_FROM_OPTICAL))
+                     base_from_mount.dot(tilted).dot(FRONT_FROM_OPTICAL))
 
     def positions_at(self, time_s):
         """Where the people stand, (n, 2) in the map; also beyond the scene's end."""

@@ -1,0 +1,202 @@
+"""Several cameras without a master: in bags, in the nodes' callbacks, and in launch files."""
+import hashlib
+
+import numpy as np
+import pytest
+import rosbag
+import tf2_ros
+from std_msgs.msg import Header
+
+from ros_3d_bb.bag_processing import process_bag
+from ros_3d_bb.bag_reading import BagError
+from ros_3d_bb.bags import scenario_images, write_bag
+from ros_3d_bb.evaluation.identities import score
+from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
+from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from
+from ros_3d_bb.messages import stamp_of, time_from
+from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray
+from ros_3d_bb.nodes.tracker_node import TrackerNode
+from ros_3d_bb.pipeline import Settings
+from ros_3d_bb.process_bag import with_tracker
+from ros_3d_bb.report import read_recording
+from ros_3d_bb.simulation.scenario import scenario_from
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tally import Tally
+from support.launching import loaded
+from support.masterless import masterless, on_the_wire
+
+# Somebody walks from the view of the front camera into that of the left one; somebody stands where both see them.
+SCENE = {'duration': 3.2, 'rate': 6.0, 'robot': {'cameras': [{'name': 'front'}, {'name': 'left', 'yaw': 0.6}]},
+         'people': [{'start': [3.0, -0.2], 'moves': [{'to': [2.4, 2.2], 'speed': 0.9}]}, {'start': [4.6, 1.4]}]}
+BOTH = with_tracker(Settings(detector='none'), cameras=['front', 'left'])
+START_NS, PERIOD_NS = 1000 * NS, NS // 10
+
+
+@pytest.fixture(scope='module')
+def bags(tmp_path_factory):
+    """A bag of the scene with its 2D boxes, and what process_bag makes of it."""
+    folder = tmp_path_factory.mktemp('bags')
+    write_bag(scenario_images(scenario_from(SCENE), with_boxes=True), str(folder / 'in.bag'))
+    process_bag(str(folder / 'in.bag'), str(folder / 'out.bag'), BOTH)
+    return str(folder / 'in.bag'), str(folder / 'out.bag')
+
+
+def messages_on(bag_path, topic):
+    with rosbag.Bag(bag_path) as bag:
+        return [message for _topic, message, _time in bag.read_messages('/' + topic)]
+
+
+def test_everybody_is_one_track_wherever_they_are_seen(bags):
+    with rosbag.Bag(bags[1]) as bag:
+        recording = read_recording(bag)
+    assert len(recording.moments) == recording.answered == 39
+    result = score(recording.moments)
+    for person in result.people:
+        assert len(person.ids) == 1 and person.rmse_m < 0.25, person
+    assert result.false_share == 0
+    last = recording.moments[-1]
+    assert len(last.tracks) == len(last.truth) == 2
+
+
+def test_each_cameras_boxes_are_in_its_namespace_and_all_people_on_one_topic(bags):
+    frames = {camera: set(message.header.frame_id for message in messages_on(bags[1], camera + '/ros_3d_bb/bb_3d'))
+              for camera in ('front', 'left')}
+    assert frames == {'front': {'front_color_optical_frame'}, 'left': {'left_color_optical_frame'}}
+    tracks = messages_on(bags[1], 'ros_3d_bb/tracks')
+    stamps = [stamp_of(message) for message in tracks]
+    assert len(tracks) == 39 and stamps == sorted(stamps)
+    assert not messages_on(bags[1], 'ros_3d_bb/bb_3d')
+
+
+def test_the_same_bag_gives_the_same_bytes(bags, tmp_path):
+    process_bag(bags[1], str(tmp_path / 'again.bag'), BOTH)  # also where results are there already
+    digests = []
+    for path in (bags[1], str(tmp_path / 'again.bag')):
+        with open(path, 'rb') as stream:
+            digests.append(hashlib.sha256(stream.read()).hexdigest())
+    assert digests[0] == digests[1]
+
+
+def test_a_camera_that_a_bag_does_not_have_is_named(bags, tmp_path):
+    with pytest.raises(BagError, match='no std_msgs/Int32MultiArray on /rear/yolo_bounding_box; did you mean'):
+        process_bag(bags[0], str(tmp_path / 'out.bag'), with_tracker(BOTH, cameras=['front', 'rear']))
+
+
+def test_the_node_publishes_what_process_bag_writes(bags):
+    found = []
+    with masterless({'tf_timeout': 0.0, 'cameras': 'front, left'}) as connections, rosbag.Bag(bags[1]) as bag:
+        TrackerNode()
+        for topic, message, _time in bag.read_messages():
+            name = topic if topic == '/tf' else topic[1:]
+            if name in connections.subscribers:
+                connections.send(name, on_the_wire(message))
+                if name.endswith('bb_3d'):
+                    found.append(connections.publishers['ros_3d_bb/tracks'].newest)
+    assert [str(message) for message in found] == [str(message) for message in messages_on(bags[1], 'ros_3d_bb/tracks')]
+
+
+class Transforms(object):
+    """Cameras that look along x from one place; none for the frames in `missing`."""
+
+    def __init__(self):
+        self.missing, self.jumps = set(), 0
+
+    def lookup(self, _target, source, _stamp):
+        if source in self.missing:
+            raise tf2_ros.LookupException('no such frame')
+        return transform_from((0, 0, 1), OPTICAL_ROTATION)
+
+    def go_back(self):
+        self.jumps += 1
+
+
+class Rig(object):
+    """A Follower of two cameras, and boxes for it."""
+
+    def __init__(self):
+        self.transforms, self.tally = Transforms(), Tally()
+        params = TrackerNodeParams(cameras=['front', 'rear'])
+        self.follower = Follower(params, [kind() for kind in TRACKING_PARAMS], self.tally, self.transforms)
+
+    def send(self, stamp_ns, camera, frame_id=None, count=1):
+        box = BoundingBox3D()
+        box.center.position.z = 3.0
+        box.size.x, box.size.y, box.size.z = 0.5, 1.7, 0.5
+        header = Header(stamp=time_from(stamp_ns), frame_id=frame_id or camera)
+        return self.follower.add_boxes(BoundingBox3DArray(header=header, boxes=[box] * count), camera)
+
+
+@pytest.fixture
+def rig():
+    return Rig()
+
+
+def test_stamps_of_tracks_never_go_back_whichever_camera_is_late(rig):
+    random, stamps = np.random.RandomState(3), []
+    for number in range(40):
+        for camera, late in (('front', 0), ('rear', 3)):
+            if number >= late:
+                stamp_ns = START_NS + (number - late) * PERIOD_NS + random.randint(PERIOD_NS // 2)
+                followed = rig.send(stamp_ns, camera)
+                stamps.append(stamp_of(followed))
+    assert stamps == sorted(stamps) and [track.id for track in followed.tracks] == [1]
+
+
+def test_a_camera_that_is_far_behind_the_other_is_no_jump_in_time(rig):
+    """By 1.5 s: its images are refused, and the tracks go on."""
+    for number in range(30):
+        followed = rig.send(START_NS + number * PERIOD_NS, 'front')
+        with pytest.raises(ValueError, match='late'):
+            rig.send(START_NS + (number - 15) * PERIOD_NS, 'rear')
+    assert not rig.transforms.jumps and [track.id for track in followed.tracks] == [1]
+
+
+def test_where_time_goes_back_images_of_the_time_before_are_left_out(rig):
+    """A bag loops; the rear camera's detector takes longer. Tracks begin once more, and once only."""
+    for number in range(200):
+        for camera in ('front', 'rear'):
+            rig.send(START_NS + number * PERIOD_NS, camera)
+    for number in range(20):
+        front = rig.send(START_NS + number * PERIOD_NS, 'front')
+        late = number - 3
+        rear = rig.send(START_NS + (200 + late if late < 0 else late) * PERIOD_NS, 'rear')
+        assert (rear is None) == (late < 0)
+    assert rig.transforms.jumps == 1 and rig.tally.counts['images of the time before'] == 3
+    assert [track.id for track in front.tracks] == [2] and stamp_of(rear) == START_NS + 19 * PERIOD_NS
+
+
+def test_a_camera_without_a_transform_leaves_the_other_to_go_on(rig):
+    rig.transforms.missing.add('rear')
+    for number in range(20):
+        followed = rig.send(START_NS + number * PERIOD_NS, 'front', count=int(number < 10))
+        assert rig.send(START_NS + number * PERIOD_NS + PERIOD_NS // 2, 'rear') is None
+    assert followed.tracks == [] and rig.tally.counts['no transform'] == 20
+
+
+def test_cameras_with_the_same_frame_are_taken_and_pointed_out(rig):
+    for number in range(10):
+        for camera in ('front', 'rear'):
+            followed = rig.send(START_NS + number * PERIOD_NS, camera, frame_id='camera_color_optical_frame')
+    assert [track.id for track in followed.tracks] == [1]
+    assert rig.tally.counts['cameras with one frame'] == 1
+    assert 'front and rear are all in the frame camera_color' in rig.tally.sentences['cameras with one frame']
+
+
+@pytest.mark.parametrize('params,complaint', [
+    ({'cameras': ['front', 'front']}, 'different namespaces expected'),
+    ({'cameras': ['front camera']}, 'different namespaces expected'), ({'cameras': [1]}, 'different namespaces'),
+    ({'cameras': ['front', 'rear'], 'camera_frame': 'mount'}, 'one frame serves one camera only'),
+    ({'cameras': ['front'], 'tracker': 'thesis'}, 'knows one camera only')])
+def test_parameters_that_make_no_sense_are_refused(params, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        Follower(TrackerNodeParams(**params), [kind() for kind in TRACKING_PARAMS], Tally(), Transforms())
+
+
+@pytest.mark.parametrize('cameras', ['front,rear', 'front, left, rear', 'front'])
+def test_the_pipeline_starts_a_detector_and_bbox3d_for_each_camera_and_one_tracker(cameras):
+    parameters, _nodes = loaded('pipeline.launch', 'detector:=depth', 'cameras:=' + cameras)
+    names = [name.strip() for name in cameras.split(',')]
+    started = set(name.rsplit('/', 1)[0] for name in parameters if name.count('/') > 1)
+    assert started - {'/tracker_node'} == set('/%s/%s' % (name, node) for name in names
+                                              for node in ('depth_detector_node', 'bbox3d_node'))
+    assert parameters['/tracker_node/cameras'] == cameras
