@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb.geometry import Camera
-from ros_3d_bb.simulation.scenario import Follow, Furniture, Move, Person, Robot, Room, Scenario
+from ros_3d_bb.simulation.scenario import Follow, Furniture, Mount, Move, Person, Robot, Room, Scenario
 from ros_3d_bb.simulation.simulator import D435I_COLOR, Simulator
 from ros_3d_bb.simulation.truth import PREDICTION_STEP_S, truth_at
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
@@ -66,6 +66,19 @@ def test_frames_fill_the_duration_at_the_rate(duration, rate, count):
     simulator = Simulator(scene(duration=duration, rate=rate), Camera(8, 6, 8, 8, 4, 3))
     assert simulator.frame_count == count
     assert [simulator.time_s(number) for number in (0, count)] == [0, count / float(rate)]
+
+
+def test_several_cameras_take_turns_and_look_where_they_are_mounted():
+    """One ahead, one to the left by 90 degrees, 2 m above the floor and down; a person in front of each."""
+    robot = Robot(pose=(1.0, 0.0, 0.0), cameras=(Mount('front'), Mount('side', (0.0, 0.3, 1.9), np.pi / 2, -0.4)))
+    simulator = Simulator(scene(Person((4.0, 0.0)), Person((1.0, 3.0)), robot=robot), CAMERA)
+    assert (simulator.cameras, simulator.rate, simulator.frame_count) == (['front', 'side'], 20.0, 60)
+    frames = [simulator.frame(number) for number in (0, 1, 2)]
+    assert [(frame.camera, frame.time_s) for frame in frames] == [('front', 0.0), ('side', 0.05), ('front', 0.1)]
+    assert [seen(frame) for frame in frames] == [[1], [2], [1]]
+    side = frames[1].poses.map_from_camera
+    np.testing.assert_allclose(side[:3, 3], (1.0, 0.3, 1.965), atol=1e-9)
+    np.testing.assert_allclose(side[:3, 2], (0, np.cos(0.4), -np.sin(0.4)), atol=1e-9)
 
 
 @pytest.fixture(scope='module')

@@ -61,8 +61,8 @@ class _Image(NamedTuple):
 
 
 class _State(NamedTuple):
-    """What images change: the tracks, the stamp of the latest image; by camera, the stamp of one without an answer since
-    its latest, and its `unseen.Look`.
+    """What images change: the tracks, and the stamp of the latest image; by camera, the stamp of one without an answer
+    since its latest, and its `unseen.Look`.
     """
 
     tracks: np.ndarray
