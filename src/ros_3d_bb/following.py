@@ -94,7 +94,8 @@ class Follower(object):
     def tune(self, tracking):
         """Take the next boxes with other parameters of tracking; tracks go on. Raises ValueError as at the start."""
         _trackers_of(tracking)  # also what the other one would refuse is refused
-        self._tracker.tune(*tracking[TRACKERS[self._params.tracker][1]])
+        with self._tracks_lock:
+            self._tracker.tune(*tracking[TRACKERS[self._params.tracker][1]])
 
     @property
     def looks(self):

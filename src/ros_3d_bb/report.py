@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import rosbag
 
-from ros_3d_bb.camera_messages import COLOR_TOPIC
+from ros_3d_bb.camera_messages import COLOR_TOPIC, topic_of
 from ros_3d_bb.evaluation.identities import Moment, score, table
 from ros_3d_bb.evaluation.picture import Paths, scene_picture
 from ros_3d_bb.images import rgb_from
@@ -42,14 +42,14 @@ def read_recording(bag):
         If one of them is missing, or they are not in the same frame; says what was expected.
     """
     truth, tracks, boxes, links, robot = {}, {}, {}, {}, []
-    for topic, message, _time in bag.read_messages(['/' + name for name in (
-            TRUTH_TOPIC, TRACKS_TOPIC, BOXES_TOPIC, 'tf')]):
+    boxes_topics = topics_of_cameras(bag, BOXES_TOPIC)
+    for topic, message, _time in bag.read_messages(['/' + TRUTH_TOPIC, '/' + TRACKS_TOPIC, '/tf'] + boxes_topics):
         if topic == '/tf':
             links.update({(link.header.frame_id, link.child_frame_id): transform_from_message(link)
                           for link in message.transforms})
             if {(MAP_FRAME, ODOM_FRAME), (ODOM_FRAME, BASE_FRAME)} <= set(links):
                 robot.append(links[MAP_FRAME, ODOM_FRAME].dot(links[ODOM_FRAME, BASE_FRAME])[:2, 3])
-        elif topic == '/' + BOXES_TOPIC:
+        elif topic in boxes_topics:
             found = boxes2d_from_message(message)
             boxes[found.stamp_ns] = found.boxes
         else:
@@ -65,6 +65,12 @@ def read_recording(bag):
                       tracks_from_message(tracks[stamp_ns]) if stamp_ns in tracks else [])
                for stamp_ns in sorted(truth)]
     return Recording(moments, len(set(truth) & set(tracks)), boxes, np.array(robot).reshape(-1, 2))
+
+
+def topics_of_cameras(bag, topic):
+    """What a topic is called in an open bag: as it is for the only camera, or that of each of several."""
+    ending = topic_of('?', topic)[1:]
+    return [name for name in bag.get_type_and_topic_info().topics if name.endswith(ending)]
 
 
 def paths_of(recording):
@@ -85,7 +91,7 @@ def panels_of(bag, recording, count=PANELS):
     stamps = [stamp_ns for stamp_ns in stamps if stamp_ns in recording.boxes] or stamps
     wanted = set(stamps[pick] for pick in np.linspace(0, len(stamps) - 1, count + 2)[1:-1].astype(int))
     panels = []
-    for _topic, message, _time in bag.read_messages(['/' + COLOR_TOPIC]):
+    for _topic, message, _time in bag.read_messages(topics_of_cameras(bag, COLOR_TOPIC)):
         stamp_ns = message.header.stamp.to_nsec()
         if stamp_ns in wanted:
             boxes = recording.boxes.get(stamp_ns, np.zeros((0, 4), int))

@@ -18,7 +18,7 @@ from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline import Settings
 from ros_3d_bb.process_bag import with_tracker
-from ros_3d_bb.report import read_recording
+from ros_3d_bb.report import panels_of, read_recording
 from ros_3d_bb.simulation.scenario import scenario_from
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tally import Tally
@@ -56,6 +56,12 @@ def test_everybody_is_one_track_wherever_they_are_seen(bags):
     assert result.false_share == 0
     last = recording.moments[-1]
     assert len(last.tracks) == len(last.truth) == 2
+
+
+def test_the_report_shows_images_of_both(bags):
+    with rosbag.Bag(bags[1]) as bag:
+        recording = read_recording(bag)
+        assert len(recording.boxes) == 39 and len(panels_of(bag, recording)) == 6
 
 
 def test_each_cameras_boxes_are_in_its_namespace_and_all_people_on_one_topic(bags):
