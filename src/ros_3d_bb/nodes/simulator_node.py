@@ -65,6 +65,9 @@ class SimulatorNode(object):
         self._params, = read_params(SimulatorParams)
         self._simulator = Simulator(_scenario(self._params))
         self._diagnostics = Diagnostics()
+        if any(self._simulator.cameras):
+            rospy.loginfo('the scenario has several cameras; for the pipeline: cameras:=%s',
+                          ','.join(self._simulator.cameras))
         kinds = {topic_of(camera, topic): kind for camera in self._simulator.cameras for topic, kind in TYPES.items()
                  if topic != TF_TOPIC}
         kinds[TRUTH_TOPIC] = TrackedObjectArray
