@@ -89,6 +89,15 @@ def official_output(tmp_path_factory):
     return official_reference.made(str(tmp_path_factory.mktemp('reference') / 'random.pt'))
 
 
+@pytest.fixture(scope='session')
+def reader(tmp_path_factory, weights):
+    """Somebody who types what the README tells."""
+    from support.reader import Reader
+    reader = Reader(tmp_path_factory.mktemp('reader'), weights)
+    yield reader
+    reader.leave()
+
+
 @pytest.fixture
 def window_on():
     """Opens the annotator's window on the session in a folder; the windows are closed at the end."""

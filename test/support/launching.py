@@ -21,6 +21,16 @@ RS_CAMERA_ARGUMENTS = tuple('''
     filters clip_distance linear_accel_cov initial_reset reconnect_timeout wait_for_device_timeout
     unite_imu_method topic_odom_in calib_odom_file publish_odom_tf
     stereo_module/exposure/1 stereo_module/gain/1 stereo_module/exposure/2 stereo_module/gain/2'''.split())
+# A robot that takes in the camera as jackal.urdf.xacro does.
+JACKAL_TO_BE_EXTENDED = """<robot name="jackal" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <link name="base_link"/>
+  <xacro:include filename="$(optenv JACKAL_URDF_EXTRAS empty.urdf)"/>
+</robot>"""
+# The arguments that the launch files of gazebo_ros 2.9 and jackal_gazebo 0.4 declare.
+GAZEBO_ARGUMENTS = {
+    'gazebo_ros/launch/empty_world.launch': ('paused', 'use_sim_time', 'extra_gazebo_args', 'gui', 'headless', 'debug',
+                                             'physics', 'verbose', 'world_name', 'enable_ros_network'),
+    'jackal_gazebo/launch/spawn_jackal.launch': ('x', 'y', 'z', 'yaw', 'joystick', 'config')}
 
 
 def write(path, text):
@@ -36,6 +46,17 @@ def stand_in_launch_file(folder, name, arguments, more=''):
     write(folder / name, '<launch>%s%s</launch>' % (more, ''.join(lines)))
     package = name.split('/')[0]
     write(folder / package / 'package.xml', '<package format="2"><name>%s</name></package>' % package)
+
+
+def stand_in_gazebo(folder):
+    """Packages in place of Gazebo's and Jackal's, in a folder."""
+    for name, arguments in GAZEBO_ARGUMENTS.items():
+        stand_in_launch_file(folder, name, arguments, '<param name="robot_description" value="bare"/>')
+    write(folder / 'jackal_description' / 'urdf' / 'jackal.urdf.xacro', JACKAL_TO_BE_EXTENDED)
+    write(folder / 'xacro' / 'xacro', '#!%s\nimport xacro\nxacro.main()\n' % sys.executable)
+    (folder / 'xacro' / 'xacro').chmod(0o755)
+    for name in ('jackal_description', 'xacro'):
+        write(folder / name / 'package.xml', '<package format="2"><name>%s</name></package>' % name)
 
 
 def dumped(launch_file, packages, *arguments, **environment):

@@ -1,6 +1,5 @@
 """What can be tested of the simulation without Gazebo: the camera, the people, and what the launch file hands on."""
 import os
-import sys
 import xml.etree.ElementTree as ElementTree
 from itertools import combinations
 
@@ -9,7 +8,7 @@ import pytest
 import xacro
 
 from ros_3d_bb.geometry import transform_points
-from support.launching import dumped, given_to_stand_ins, stand_in_launch_file, write
+from support.launching import JACKAL_TO_BE_EXTENDED, dumped, given_to_stand_ins, stand_in_gazebo, write
 from support.urdf import base_from
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -17,15 +16,6 @@ CAMERA, LAUNCH = os.path.join(ROOT, 'urdf', 'd435i.urdf.xacro'), os.path.join(RO
 CAMERA_POSITION = (0.17, 0.0, 0.20)  # in base_link, thesis 3.5.1
 FX, WIDTH, HEIGHT = 614.686, 640, 480  # what the thesis' D435i said of itself
 OWN_ARGUMENTS = {'world', 'gui', 'x', 'y', 'yaw'}
-# A robot that takes in the camera as jackal.urdf.xacro does.
-ROBOT = """<robot name="jackal" xmlns:xacro="http://www.ros.org/wiki/xacro">
-  <link name="base_link"/>
-  <xacro:include filename="$(optenv JACKAL_URDF_EXTRAS empty.urdf)"/>
-</robot>"""
-# The arguments that the launch files of gazebo_ros 2.9 and jackal_gazebo 0.4 declare.
-STUBS = {'gazebo_ros/launch/empty_world.launch': ('paused', 'use_sim_time', 'extra_gazebo_args', 'gui', 'headless',
-                                                  'debug', 'physics', 'verbose', 'world_name', 'enable_ros_network'),
-         'jackal_gazebo/launch/spawn_jackal.launch': ('x', 'y', 'z', 'yaw', 'joystick', 'config')}
 
 
 def default_of(launch_file):
@@ -36,7 +26,7 @@ def default_of(launch_file):
 @pytest.fixture
 def robot(tmp_path, monkeypatch):
     """The robot's description with the camera, as a function of xacro arguments."""
-    write(tmp_path / 'robot.urdf.xacro', ROBOT)
+    write(tmp_path / 'robot.urdf.xacro', JACKAL_TO_BE_EXTENDED)
     monkeypatch.setenv('JACKAL_URDF_EXTRAS', CAMERA)
     return lambda **arguments: ElementTree.fromstring(
         xacro.process_file(str(tmp_path / 'robot.urdf.xacro'), mappings=arguments).toxml())
@@ -209,13 +199,7 @@ def test_the_launch_file_documents_its_arguments_and_hands_on_only_what_the_pipe
 @pytest.fixture
 def simulators(tmp_path):
     """Packages in place of Gazebo's and Jackal's."""
-    for name, arguments in STUBS.items():
-        stand_in_launch_file(tmp_path, name, arguments, '<param name="robot_description" value="bare"/>')
-    write(tmp_path / 'jackal_description' / 'urdf' / 'jackal.urdf.xacro', ROBOT)
-    write(tmp_path / 'xacro' / 'xacro', '#!%s\nimport xacro\nxacro.main()\n' % sys.executable)
-    (tmp_path / 'xacro' / 'xacro').chmod(0o755)
-    for name in ('jackal_description', 'xacro'):
-        write(tmp_path / name / 'package.xml', '<package format="2"><name>%s</name></package>' % name)
+    stand_in_gazebo(tmp_path)
     return tmp_path
 
 

@@ -1,0 +1,47 @@
+"""The fenced blocks of code in Markdown pages."""
+import os
+import re
+from typing import NamedTuple
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+# Whose blocks are run. Pages of doc/ that are not here have none, or tests of their own.
+PAGES = ('README.md',) + tuple('doc/%s.md' % name for name in (
+    'bags', 'benchmarks', 'campaign', 'jackal', 'planners', 'realsense', 'rviz', 'security', 'simulation', 'yolov5'))
+
+
+class Block(NamedTuple):
+    """What stands between two fences: `language` as the opening fence names it, '' where it names none."""
+
+    page: str
+    line: int
+    language: str
+    text: str
+
+
+def blocks_in(page):
+    """The blocks of a page, by its path in the package."""
+    with open(os.path.join(ROOT, page), encoding='utf-8') as stream:
+        text = stream.read()
+    return [Block(page, text.count('\n', 0, match.start()) + 1, match.group(1), match.group(2))
+            for match in re.finditer(r'^```(\w*)\n(.*?)^```$', text, re.DOTALL | re.MULTILINE)]
+
+
+BLOCKS = [block for page in PAGES for block in blocks_in(page)]
+_claimed = []
+
+
+def claimed(beginning, language='bash'):
+    """The block that begins like this, for the test that runs it. Raises LookupError where none does, or another one.
+
+    A block that stands on several pages is run once.
+    """
+    found = {block.text: block for block in BLOCKS if block.language == language and block.text.startswith(beginning)}
+    if len(found) != 1:
+        raise LookupError('%d blocks of %s begin with %r; 1 expected' % (len(found), language, beginning))
+    _claimed.extend(found)
+    return list(found.values())[0]
+
+
+def unclaimed():
+    """The blocks that no test runs."""
+    return [block for block in BLOCKS if block.text not in _claimed]

@@ -1,0 +1,40 @@
+"""As a command: wait until each of some topics has brought something, in a field of its message where one is named.
+
+`hearing.py SECONDS TOPIC[:FIELD] ...` ends with 0 once something that is not empty came on all of them, else with 1 and
+what is missing.
+"""
+import operator
+import sys
+import time
+
+import rospy
+import rostopic
+
+
+def wait_for(wanted, seconds):
+    """Names of `wanted`, a list of 'topic:field', on which nothing came in time."""
+    missing, subscribers = set(wanted), {}
+    deadline_s = time.monotonic() + seconds
+    while missing and time.monotonic() < deadline_s and not rospy.is_shutdown():
+        for name in sorted(missing - set(subscribers)):
+            topic, _colon, field = name.partition(':')
+            kind = rostopic.get_topic_class(rospy.resolve_name(topic))[0]
+            if kind is not None:
+                subscribers[name] = rospy.Subscriber(topic, kind, _checker(name, field, missing), buff_size=2 ** 24)
+        time.sleep(0.1)
+    return sorted(missing)
+
+
+def _checker(name, field, missing):
+    def check(message):
+        value = operator.attrgetter(field)(message) if field else True
+        if value if not hasattr(value, '__len__') else len(value):
+            missing.discard(name)
+    return check
+
+
+if __name__ == '__main__':
+    rospy.init_node('hearing', anonymous=True, disable_rosout=True, disable_signals=True)
+    NOT_HEARD = wait_for(sys.argv[2:], float(sys.argv[1]))
+    print('heard all' if not NOT_HEARD else 'never heard: %s' % ', '.join(NOT_HEARD))
+    sys.exit(1 if NOT_HEARD else 0)

@@ -1,0 +1,198 @@
+"""A reader's machine: what the README tells to type is typed here, with stand-ins for what a test machine has not."""
+import contextlib
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from hashlib import sha1
+
+from support.code_blocks import ROOT
+from support.launching import RS_CAMERA_ARGUMENTS, stand_in_gazebo, stand_in_launch_file, write
+
+SUPPORT = os.path.join(ROOT, 'test', 'support')
+PATIENCE_S = 120  # of a machine that is busy; nothing waits so long where all is well
+# A driver has the camera's frames below camera_link, and knows nothing of the robot.
+CAMERA_DRIVER = """
+<node pkg="ros_3d_bb" type="replay_node" name="realsense">
+  <param name="bag" value="$(env READER_BAG)"/> <param name="rate" value="5"/> <remap from="/tf" to="not_a_driver"/>
+</node>
+<node pkg="tf2_ros" type="static_transform_publisher" name="frames"
+      args="0 0 0 -0.5 0.5 -0.5 0.5 camera_link camera_color_optical_frame"/>"""
+# robot_upstart makes a job of a launch file, so one that can be loaded.
+UPSTART = """#!/bin/bash
+echo "robot_upstart install $*" >> "$READER_LOG"
+roslaunch --nodes "${1%%/*}" "$(basename "$1")" >> "$READER_LOG"
+"""
+
+
+class Reader(object):
+    """Types blocks of code into a shell at home.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        An empty folder for everything.
+    weights : str
+        Path of weights, which take the place of yolov5n.pt.
+    """
+
+    def __init__(self, folder, weights):
+        self.home, self.clone, self.etc = folder / 'home', folder / 'home' / 'ros_3d_bb', folder / 'etc'
+        self.log, self._weights, self._screen = folder / 'log.txt', weights, None
+        for path in (self.home / 'catkin_ws' / 'src', self.etc, folder / 'path' / 'to', self.clone):
+            path.mkdir(parents=True)
+        self.log.write_text('')
+        os.symlink(weights, str(self.home / os.path.basename(weights)))
+        for name in set(os.listdir(ROOT)) - {'config', '.git'}:
+            os.symlink(os.path.join(ROOT, name), str(self.clone / name))
+        shutil.copytree(os.path.join(ROOT, 'config'), str(self.clone / 'config'))
+        self._put_stand_ins(folder / 'packages')
+        self._put_environment(folder / 'cache' / 'venv')
+        self._replacements = [('/path/to/', '%s/path/to/' % folder), ('/etc/ros/', '%s/' % self.etc),
+                              ('/opt/ros/noetic/', '%s/' % self.etc), ('/home/administrator/', '%s/' % self.home),
+                              ('yolov5n.pt', os.path.basename(weights))]
+        self._environment = dict(
+            os.environ, HOME=str(self.home), USER='reader', READER_LOG=str(self.log), READER_WEIGHTS=weights,
+            READER_CLONE=str(self.clone), ROS_3D_BB_CACHE=str(folder / 'cache'), ROS_LOG_DIR=str(folder / 'ros_log'),
+            ROS_PACKAGE_PATH='%s:%s' % (folder / 'packages', os.environ['ROS_PACKAGE_PATH']), ROS_HOSTNAME='localhost')
+        for name in ('DISPLAY', 'ROS_IP', 'JACKAL_URDF_EXTRAS'):
+            self._environment.pop(name, None)
+
+    def _put_stand_ins(self, packages):
+        stand_in_gazebo(packages)
+        stand_in_launch_file(packages, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS, CAMERA_DRIVER)
+        write(packages / 'robot_upstart' / 'package.xml', '<package format="2"><name>robot_upstart</name></package>')
+        write(packages / 'robot_upstart' / 'install', UPSTART)
+        (packages / 'robot_upstart' / 'install').chmod(0o755)
+
+    def _put_environment(self, venv):
+        """The virtual environment that `run` would make, of the Python that runs the tests."""
+        write(venv / 'bin' / 'python3', '#!/bin/sh\nexec %s "$@"\n' % sys.executable)
+        (venv / 'bin' / 'python3').chmod(0o755)
+        wanted = b''.join(open(os.path.join(ROOT, 'test', name), 'rb').read()
+                          for name in ('requirements.txt', 'requirements_no_deps.txt'))
+        (venv / 'installed').write_text(sha1(wanted).hexdigest() + '\n')
+
+    def environment(self, **more):
+        """The reader's variables, and more."""
+        return dict(self._environment, **more)
+
+    def typed(self, block, replaced=(), appended=''):
+        """The text of a block, with paths and addresses of this machine."""
+        text = block.text.rstrip('\n') + appended
+        for old, new in tuple(replaced) + tuple(self._replacements):
+            text = text.replace(old, new)
+        return '. %s/stand_ins/reader.sh\n%s\n' % (SUPPORT, text)
+
+    def types(self, block, at=None, replaced=(), appended='', **environment):
+        """Type a block that ends by itself. Returns what is printed; fails where it fails."""
+        result = subprocess.run(['bash', '-euo', 'pipefail', '-c', self.typed(block, replaced, appended)],
+                                cwd=str(at or self.home), env=self.environment(**environment), stdin=subprocess.DEVNULL,
+                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
+        assert result.returncode == 0, '%s:%d\n%s' % (block.page, block.line, result.stdout)
+        return result.stdout
+
+    @contextlib.contextmanager
+    def running(self, block, at=None, replaced=(), **environment):
+        """Type a block that runs until Ctrl-C. Yields a Graph, and ends it."""
+        graph = Graph(self.environment(**dict({'ROS_MASTER_URI': 'http://localhost:%d' % free_port()}, **environment)))
+        try:
+            graph.start(['bash', '-c', self.typed(block, replaced)], cwd=str(at or self.home))
+            yield graph
+        finally:
+            graph.end()
+
+    def screen(self):
+        """DISPLAY of a screen with nobody else on it."""
+        if self._screen is None:
+            self._screen = subprocess.Popen(['Xvfb', '-displayfd', '1', '-screen', '0', '1600x900x24'],
+                                            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+            self._display = ':' + self._screen.stdout.readline().decode().strip()
+        return self._display
+
+    def leave(self):
+        """Switch the screen off."""
+        if self._screen is not None:
+            self._screen.terminate()
+            self._screen.wait()
+
+
+class Graph(object):
+    """Processes on one ROS master."""
+
+    def __init__(self, environment):
+        self.environment, self._started = environment, []
+
+    def start(self, command, **options):
+        """Start a process; its output goes into a file of its own."""
+        descriptor, path = tempfile.mkstemp('.txt', 'output', self.environment['HOME'])
+        with os.fdopen(descriptor, 'w') as stream:
+            process = subprocess.Popen(command, env=self.environment, stdin=subprocess.DEVNULL, stdout=stream,
+                                       stderr=subprocess.STDOUT, start_new_session=True, **options)
+        self._started.append((process, path))
+        return process
+
+    def output(self):
+        """What all processes have printed."""
+        texts = []
+        for _process, path in self._started:
+            with open(path, errors='replace') as stream:
+                texts.append(stream.read())
+        return '\n'.join(texts)
+
+    def starts_camera(self, bag):
+        """A camera on a robot, from a bag, at 5 Hz."""
+        self.waits(self._has_master, 'a master')
+        self.start([sys.executable, os.path.join(ROOT, 'scripts', 'replay_node'), '_bag:=' + bag, '_rate:=5'])
+
+    def _has_master(self):
+        port = int(self.environment['ROS_MASTER_URI'].rsplit(':', 1)[1])
+        with socket.socket() as connection:
+            return connection.connect_ex(('localhost', port)) == 0
+
+    def hears(self, *wanted):
+        """Wait until something comes on all of these topics ('topic' or 'topic:field that is not empty')."""
+        self.waits(self._has_master, 'a master')
+        result = subprocess.run([sys.executable, os.path.join(SUPPORT, 'hearing.py'), str(PATIENCE_S)] + list(wanted),
+                                env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                universal_newlines=True)
+        assert result.returncode == 0, result.stdout + self.output()
+
+    def shows(self, title):
+        """Wait until there is a window with this title."""
+        self.waits(lambda: subprocess.call(['xdotool', 'search', '--onlyvisible', '--name', title],
+                                           env=self.environment, stdout=subprocess.DEVNULL) == 0, 'window ' + title)
+
+    def says(self, words):
+        """Wait until these words are printed."""
+        self.waits(lambda: words in self.output(), words)
+
+    def waits(self, condition, what):
+        """Wait until a condition holds; fail where that is never so, or the process that was typed has ended."""
+        deadline_s = time.monotonic() + PATIENCE_S
+        while not condition():
+            assert time.monotonic() < deadline_s and self._started[0][0].poll() is None, (
+                'never happened: %s\n%s' % (what, self.output()))
+            time.sleep(0.1)
+
+    def end(self):
+        """Ctrl-C, for all processes, the last first."""
+        for process, _path in reversed(self._started):
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGINT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(40)  # roslaunch itself gives nodes 15 s, and kills them then
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+def free_port():
+    """A port that nobody listens on."""
+    with socket.socket() as listener:
+        listener.bind(('', 0))
+        return listener.getsockname()[1]
