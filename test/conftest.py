@@ -98,6 +98,18 @@ def reader(tmp_path_factory, weights):
     reader.leave()
 
 
+@pytest.fixture(scope='session')
+def camera_bag(session_folder, tmp_path_factory):
+    """A bag at 2 Hz of a camera before which somebody stands, with 2D boxes; it lasts while a detector starts."""
+    from ros_3d_bb.bags import SessionBagOptions, session_images, write_bag
+    from ros_3d_bb.measurements import read_session
+    session = read_session(session_folder)
+    nearest = sorted(session.frames, key=lambda frame: abs(frame.truth_m[1] - 2.4) + abs(frame.truth_m[0]))
+    path = str(tmp_path_factory.mktemp('camera') / 'camera.bag')
+    write_bag(session_images(session._replace(frames=nearest[:5] * 8), SessionBagOptions(2.0, with_boxes=True)), path)
+    return path
+
+
 @pytest.fixture
 def window_on():
     """Opens the annotator's window on the session in a folder; the windows are closed at the end."""

@@ -58,7 +58,8 @@ class Reader(object):
         self._environment = dict(
             os.environ, HOME=str(self.home), USER='reader', READER_LOG=str(self.log), READER_WEIGHTS=weights,
             READER_CLONE=str(self.clone), ROS_3D_BB_CACHE=str(folder / 'cache'), ROS_LOG_DIR=str(folder / 'ros_log'),
-            ROS_PACKAGE_PATH='%s:%s' % (folder / 'packages', os.environ['ROS_PACKAGE_PATH']), ROS_HOSTNAME='localhost')
+            ROS_PACKAGE_PATH='%s:%s' % (folder / 'packages', os.environ['ROS_PACKAGE_PATH']), ROS_HOSTNAME='localhost',
+            READER_BAG='')
         for name in ('DISPLAY', 'ROS_IP', 'JACKAL_URDF_EXTRAS'):
             self._environment.pop(name, None)
 

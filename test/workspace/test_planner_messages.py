@@ -139,8 +139,8 @@ def test_detections_have_box_number_and_covariance():
 
 
 def people_layer():
-    """The sources of the layer that the README recommends."""
-    with open(os.path.join(ROOT, 'README.md')) as stream:
+    """The sources of the layer that doc/planners.md recommends."""
+    with open(os.path.join(ROOT, 'doc', 'planners.md')) as stream:
         snippets = [yaml.safe_load(snippet) for snippet in re.findall(r'```yaml\n(.*?)```', stream.read(), re.DOTALL)]
     layer, = [snippet['local_costmap']['people_layer'] for snippet in snippets if 'local_costmap' in snippet]
     return {name: layer[name] for name in layer['observation_sources'].split()}

@@ -2,24 +2,18 @@
 
 Each has a master of its own, so that none meets what another one has left.
 """
-import json
-import os
 import re
 import subprocess
 import sys
 
-import pytest
-
-from ros_3d_bb.bags import SessionBagOptions, scenario_images, session_images, write_bag
-from ros_3d_bb.measurements import read_session
+from ros_3d_bb.bags import scenario_images, write_bag
 from ros_3d_bb.simulation.scenario import scenario_from
-from support.code_blocks import ROOT, claimed
+from support.code_blocks import claimed
 from support.realsense_recordings import SUFFIX, colored, sloping_depth, write_recording
 
 TRACKS, BOXES = 'ros_3d_bb/tracks:objects', 'ros_3d_bb/bb_3d:boxes'
 IMAGES = 'camera/color/image_raw:data', 'camera/aligned_depth_to_color/image_raw:data', 'camera/color/camera_info:K'
 MARKERS = 'visualization_marker_array:markers'
-POSES, REPETITIONS = 5, 8
 # OpenCV's detector finds people who stand so far from a camera as low as a Jackal's.
 SCENE = {'duration': 1.0, 'rate': 5.0, 'people': [{'start': [4.5, 0.3], 'facing': 3.1}]}
 
@@ -36,35 +30,19 @@ BESIDE_DETECTOR = claimed('roslaunch ros_3d_bb pipeline.launch detector:=none')
 PLANNER = claimed('roslaunch ros_3d_bb pipeline.launch weights:=$HOME/yolov5n.pt planner:=')
 PLANNER_POINTS = claimed('rostopic echo -n 1 /planner_bridge_node')
 DIAGNOSTICS = claimed('rostopic echo -n 1 /diagnostics')
-MEASURE = claimed('roslaunch ros_3d_bb measure.launch')
-CAPTURE, CAPTURED = claimed('rosservice call /viewer_node/capture'), claimed('success: True', 'text')
-CORRECTED = claimed('roslaunch ros_3d_bb pipeline.launch weights:=$HOME/yolov5n.pt error_model:=')
 SIMULATION = claimed('roslaunch ros_3d_bb simulation.launch scenario:=')
-WITHOUT_RVIZ = claimed('roslaunch ros_3d_bb simulation.launch rviz:=false')
-VIEWER = claimed('roslaunch ros_3d_bb viewer.launch')
 GAZEBO = claimed('roslaunch ros_3d_bb gazebo.launch')
 
 
-@pytest.fixture(scope='module')
-def bag(session_folder, tmp_path_factory):
-    """Images of a session in which somebody stands in the middle, as a bag with 2D boxes."""
-    session = read_session(session_folder)
-    nearest = sorted(session.frames, key=lambda frame: abs(frame.truth_m[1] - 2.4) + abs(frame.truth_m[0]))
-    path = str(tmp_path_factory.mktemp('bag') / 'camera.bag')
-    frames = nearest[:POSES] * REPETITIONS  # as long as a detector may take to start, at 2 Hz
-    write_bag(session_images(session._replace(frames=frames), SessionBagOptions(2.0, with_boxes=True)), path)
-    return path
-
-
-def test_a_jackal_gets_camera_tracks_and_planner_with_one_command(reader, bag):
-    with reader.running(JACKAL, READER_BAG=bag) as graph:
+def test_a_jackal_gets_camera_tracks_and_planner_with_one_command(reader, camera_bag):
+    with reader.running(JACKAL, READER_BAG=camera_bag) as graph:
         graph.start(['rosrun', 'tf2_ros', 'static_transform_publisher', *'0 0 0 0 0 0 odom base_link'.split()])
         graph.hears(TRACKS, 'planner_bridge_node/points:width')
 
 
-def test_the_desk_shows_rviz_on_the_robots_master(reader, bag):
+def test_the_desk_shows_rviz_on_the_robots_master(reader, camera_bag):
     with reader.running(PIPELINE) as robot:
-        robot.starts_camera(bag)
+        robot.starts_camera(camera_bag)
         robot.hears(TRACKS, MARKERS)
         master = robot.environment['ROS_MASTER_URI']
         with reader.running(DESK, replaced=[('http://192.168.131.1:11311', master), ('192.168.131.100', '127.0.0.1')],
@@ -72,8 +50,8 @@ def test_the_desk_shows_rviz_on_the_robots_master(reader, bag):
             desk.shows('RViz')
 
 
-def test_a_realsense_sends_images_and_another_terminal_tracks_people(reader, bag):
-    with reader.running(REALSENSE, READER_BAG=bag) as camera:
+def test_a_realsense_sends_images_and_another_terminal_tracks_people(reader, camera_bag):
+    with reader.running(REALSENSE, READER_BAG=camera_bag) as camera:
         camera.hears(*IMAGES)
         with reader.running(TRIPOD, ROS_MASTER_URI=camera.environment['ROS_MASTER_URI'],
                             DISPLAY=reader.screen()) as pipeline:
@@ -93,8 +71,8 @@ def test_a_recording_of_a_realsense_is_played(reader):
         graph.hears(*IMAGES)
 
 
-def test_a_bag_is_played_and_shown(reader, bag):
-    with reader.running(PLAYBACK, replaced=[('/path/to/some.bag', bag)], DISPLAY=reader.screen()) as graph:
+def test_a_bag_is_played_and_shown(reader, camera_bag):
+    with reader.running(PLAYBACK, replaced=[('/path/to/some.bag', camera_bag)], DISPLAY=reader.screen()) as graph:
         graph.shows('RViz')
         graph.hears(TRACKS)
 
@@ -108,53 +86,13 @@ def test_another_detector_publishes_boxes_that_become_3d_boxes(reader, tmp_path)
         graph.hears('yolo_bounding_box:data', BOXES, TRACKS)
 
 
-def test_planners_get_points_and_diagnostics_say_how_it_goes(reader, bag):
+def test_planners_get_points_and_diagnostics_say_how_it_goes(reader, camera_bag):
     with reader.running(PLANNER) as graph:
-        graph.starts_camera(bag)
+        graph.starts_camera(camera_bag)
         graph.hears('planner_bridge_node/points:width')
         master = {'ROS_MASTER_URI': graph.environment['ROS_MASTER_URI']}
         assert re.match(r'\d+\n---\n$', reader.types(PLANNER_POINTS, **master))
         assert 'values' in reader.types(DIAGNOSTICS, **master)
-
-
-@pytest.fixture(scope='module')
-def campaign(reader, session_folder):
-    """The session at home, as a campaign that has been annotated; its images are links."""
-    folder = reader.home / 'campaign'
-    for name in ('color', 'depth'):
-        (folder / name).mkdir(parents=True)
-        for image in os.listdir(os.path.join(session_folder, name)):
-            os.symlink(os.path.join(session_folder, name, image), str(folder / name / image))
-    with open(os.path.join(session_folder, 'frames.json')) as stream:
-        (folder / 'frames.json').write_text(stream.read())
-    return folder
-
-
-def test_measurements_are_taken_into_the_session(reader, bag, campaign):
-    before = len(read_session(str(campaign)).frames)
-    with reader.running(MEASURE, READER_BAG=bag, DISPLAY=reader.screen()) as graph:
-        graph.shows('ros_3d_bb viewer')
-        graph.hears(BOXES)
-        answer = reader.types(CAPTURE, ROS_MASTER_URI=graph.environment['ROS_MASTER_URI'])
-    assert len(read_session(str(campaign)).frames) == before + 1
-    assert without_figures(answer) == without_figures(CAPTURED.text.replace('/home/you', str(reader.home)))
-
-
-def without_figures(text):
-    return re.sub(r'\d+', '0', re.sub(r'saved \S+', 'saved ID', text)).strip()
-
-
-def test_an_error_model_gives_positions_a_covariance(reader, bag, campaign):
-    (campaign / 'analysis').mkdir(exist_ok=True)
-    model = os.path.join(ROOT, 'config', 'error_models', 'd435i_thesis.yaml')
-    if not (campaign / 'analysis' / 'error_model.yaml').exists():  # the analysis has left one
-        os.symlink(model, str(campaign / 'analysis' / 'error_model.yaml'))
-    with reader.running(CORRECTED) as graph:
-        graph.starts_camera(bag)
-        graph.hears(TRACKS)
-        text = subprocess.check_output(['rostopic', 'echo', '-n', '1', '/ros_3d_bb/bb_3d/boxes[0]/position_covariance'],
-                                       env=graph.environment, universal_newlines=True)
-    assert max(json.loads(text.split('---')[0].replace('(', '[').replace(')', ']'))) > 0
 
 
 def test_a_scene_is_simulated_and_shown(reader):
@@ -163,18 +101,10 @@ def test_a_scene_is_simulated_and_shown(reader):
         graph.hears(TRACKS, 'ground_truth:objects')
 
 
-def test_the_viewer_joins_a_simulation(reader):
-    with reader.running(WITHOUT_RVIZ) as simulation:
-        simulation.hears(BOXES)
-        with reader.running(VIEWER, ROS_MASTER_URI=simulation.environment['ROS_MASTER_URI'],
-                            DISPLAY=reader.screen()) as viewer:
-            viewer.shows('ros_3d_bb viewer')
-
-
-def test_the_pipeline_runs_beside_gazebo(reader, bag):
+def test_the_pipeline_runs_beside_gazebo(reader, camera_bag):
     """Of Gazebo and Jackal there are stand-ins; the robot's camera is the bag's."""
     with reader.running(GAZEBO, DISPLAY=reader.screen()) as graph:
-        graph.starts_camera(bag)
+        graph.starts_camera(camera_bag)
         graph.hears(TRACKS)
         description = subprocess.check_output(['rosparam', 'get', '/robot_description'], env=graph.environment)
     assert b'camera_color_optical_frame' in description

@@ -6,7 +6,7 @@ apt() { said apt "$@"; }
 pip3() { said pip3 "$@"; }
 rosdep() { said rosdep "$@"; }
 systemctl() { said systemctl "$@"; }
-wget() { said wget "$@"; cp "$READER_WEIGHTS" "$(basename "$READER_WEIGHTS")"; }
+wget() { said wget "$@"; ln -sf "$READER_WEIGHTS" .; }
 git() { said git "$@"; ln -sfn "$READER_CLONE" "${@: -1}"; }
 dpkg-query() { echo 'install ok installed'; }
 # The workspace that runs the tests has built the package already; the next one would take a minute more.
@@ -14,6 +14,6 @@ catkin_make() {
   said catkin_make "$@"
   local at=$PWD; [ "${1:-}" != --directory ] || at=$2
   mkdir -p "$at/devel" "$at/build/test_results"
-  echo "export ROS_PACKAGE_PATH=$at/src:\$ROS_PACKAGE_PATH" > "$at/devel/setup.bash"
+  echo "export ROS_PACKAGE_PATH=\$ROS_PACKAGE_PATH:$at/src" > "$at/devel/setup.bash"
 }
 export -f said sudo apt pip3 rosdep systemctl wget git dpkg-query catkin_make

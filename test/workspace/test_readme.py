@@ -1,0 +1,125 @@
+"""What the README and the pages in doc/ say of the package is so: names, links, the nodes' own sentences.
+
+The blocks of code are run by test_readme_tools.py, test_readme_graphs.py and test_readme_campaign.py.
+"""
+import ast
+import glob
+import os
+import re
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+import test_readme_campaign  # noqa: F401  these say which blocks they run
+import test_readme_graphs  # noqa: F401
+import test_readme_tools  # noqa: F401
+
+from support.code_blocks import PAGES, ROOT, claimed, unclaimed
+
+DRAWING = claimed('camera/color/image_raw ──►', 'text')
+FORMAT = re.compile(r'%[-+\d.]*[a-zA-Z]')
+
+
+def text_of(path):
+    with open(os.path.join(ROOT, path), encoding='utf-8') as stream:
+        return stream.read()
+
+
+def prose_of(page):
+    """A page without its blocks of code."""
+    return re.sub(r'^```.*?^```$', '', text_of(page), flags=re.DOTALL | re.MULTILINE)
+
+
+def rows_below(page, header):
+    """Cells of the rows of the table with this first line."""
+    lines = text_of(page).split(header + '\n')[1].splitlines()[1:]
+    ends = [number for number, line in enumerate(lines) if not line.startswith('|')] + [len(lines)]
+    return [[cell.strip() for cell in line.strip('|').split(' | ')] for line in lines[:ends[0]]]
+
+
+def sources():
+    return ''.join(text_of(path) for path in glob.glob(os.path.join(ROOT, 'src', '**', '*.py'), recursive=True)
+                   + glob.glob(os.path.join(ROOT, 'launch', '*')))
+
+
+@pytest.fixture(scope='module')
+def sentences():
+    """All texts in the code, with … for what is put into them."""
+    found = []
+    for path in glob.glob(os.path.join(ROOT, 'src', '**', '*.py'), recursive=True):
+        for node in ast.walk(ast.parse(text_of(path))):
+            text = getattr(node, 'value', getattr(node, 's', None))  # `s` before Python 3.8
+            if isinstance(text, str):
+                found.append(FORMAT.sub('…', text))
+    return found
+
+
+def test_every_block_of_code_is_run():
+    assert unclaimed() == []
+
+
+def test_the_drawing_shows_nodes_and_topics_that_there_are():
+    for node in re.findall(r'\w+_node', DRAWING.text):
+        assert os.path.exists(os.path.join(ROOT, 'scripts', node))
+    topics = re.findall(r'\w+(?:/\w+)+|yolo_\w+|visualization_\w+', DRAWING.text)
+    assert len(topics) > 6 and [topic for topic in topics if topic not in sources()] == []
+
+
+def test_the_topics_and_types_of_the_table_are_in_the_code():
+    text = sources()
+    for topics, kind in (row[:2] for row in rows_below('README.md', '| topic | type | |')):
+        for topic in re.findall(r'`([^`]+)`', topics):
+            assert topic.strip('/').split('/')[-1].rstrip('…') in text, topic
+        for name in re.findall(r'`\w+/(\w+)`', kind):
+            assert name in text, name
+
+
+def test_the_nodes_say_what_the_table_of_symptoms_has_them_say(sentences):
+    rows = rows_below('README.md', '| what you see | cause | what to do |')
+    said = [sentence for row in rows for sentence in re.findall(r'`([^`]+)`', row[0]) if ' ' in sentence]
+    assert len(said) > 10
+    for sentence in said:
+        assert any(sentence in text for text in sentences), sentence
+
+
+@pytest.mark.parametrize('page', PAGES)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r'\]\(([^)]+)\)', prose_of(page)):
+        path, _hash, anchor = target.partition('#')
+        if '://' in target:
+            continue
+        path = os.path.normpath(os.path.join(os.path.dirname(page), path)) if path else page
+        assert os.path.exists(os.path.join(ROOT, path)), target
+        assert not anchor or anchor in anchors_of(path), target
+
+
+def anchors_of(page):
+    """Of its headings, as GitHub makes them."""
+    return [re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-')
+            for heading in re.findall(r'^#+ (.*)$', prose_of(page), re.MULTILINE)]
+
+
+@pytest.mark.parametrize('page', PAGES)
+def test_files_and_launch_arguments_that_are_named_exist(page):
+    known = set(argument.get('name') for path in glob.glob(os.path.join(ROOT, 'launch', '*'))
+                for argument in ElementTree.parse(path).iter('arg'))
+    for code in re.findall(r'`([^`\n]+)`', prose_of(page)):
+        for path in re.findall(r'(?:^|\s)((?:config|doc|launch|msg|rviz|src|test|urdf|worlds)/[\w./]*\w)$', code):
+            assert glob.glob(os.path.join(ROOT, path)), path
+        if ' ' not in code and not code.startswith('-'):
+            assert set(re.findall(r'\b([a-z]\w*):=', code)) - known == set(), code
+
+
+@pytest.mark.parametrize('page,header,launch_file', [
+    ('README.md', '| argument | |', 'pipeline.launch'), ('doc/realsense.md', '| argument | |', 'realsense.launch')])
+def test_tables_of_arguments_have_those_of_the_launch_file(page, header, launch_file):
+    tree = ElementTree.parse(os.path.join(ROOT, 'launch', launch_file))
+    known = set(argument.get('name') for argument in tree.getroot().findall('arg'))
+    listed = set(name for row in rows_below(page, header) for name in re.findall(r'`(\w+)`', row[0]))
+    assert len(listed) > 5 and listed <= known
+
+
+def test_figures_of_others_name_their_source():
+    rows = rows_below('README.md', '| | they | here |')
+    assert len(rows) > 4
+    for source, _they, _here in rows:
+        assert re.search(r'thesis, chapter \d|\]\(https://\S+\)', source), source

@@ -1,0 +1,168 @@
+"""Each command of the README and of doc/ that ends by itself, as typed; long ones on little data, or cut short."""
+import json
+import os
+import re
+import shutil
+import subprocess
+
+import pytest
+import rosbag
+import yaml
+from sensor_msgs.msg import Image
+from std_msgs.msg import Int32MultiArray, MultiArrayDimension
+
+from ros_3d_bb.messages import boxes2d_from_message, time_from
+from support.code_blocks import blocks_in, claimed
+
+DEMO_AND_TESTS = claimed('./run demo\n./run test')
+DEMO = claimed('./run demo weights:=')
+INSTALL = claimed('cd ~/catkin_ws/src && git clone')
+WEIGHTS = claimed('cd && wget ')
+DESCRIPTION = claimed('echo "source $HOME')
+UPSTART = claimed('cd ~/catkin_ws/src && catkin_create_pkg')
+OTHER_COMPUTER = claimed('#!/bin/bash\nsource /opt/ros')
+ARGUMENTS = claimed('roslaunch --ros-args')
+PROCESS_BAG = claimed('rosrun ros_3d_bb process_bag some.bag')
+PROCESS_BAGS = claimed('rosrun ros_3d_bb process_bag day1')
+SESSION_TO_BAG = claimed('rosrun ros_3d_bb session_to_bag')
+SCENARIO_TO_BAG = claimed('rosrun ros_3d_bb scenario_to_bag')
+STAMPED = claimed('message = Int32MultiArray', 'python')
+# What ends a benchmark sooner than its own defaults.
+BENCHMARKS = [(claimed('./run bench accuracy --boxes'), ''), (claimed('./run bench accuracy --scenarios'), ''),
+              (claimed('./run bench scenes'), ''), (claimed('./run bench speed\n'), ' --images 1'),
+              (claimed('./run bench speed --weights'), ' --images 1'),
+              (claimed('./run bench tracking'), ' --seconds 3 --repetitions 1'),
+              (claimed('./run bench latency'), ' --cases free --seconds 2')]
+YAML = [claimed(beginning, 'yaml') for beginning in ('local_costmap:', 'global_costmap:', 'TebLocalPlannerROS:',
+                                                     'max_obstacles:')]
+
+
+@pytest.fixture(scope='module')
+def clone(reader):
+    """The reader's clone, whose scenes are short."""
+    scenarios = reader.clone / 'config' / 'scenarios'
+    for path in scenarios.glob('*.yaml'):
+        if path.name not in ('demo.yaml', 'thesis_a_start.yaml'):
+            path.unlink()
+            continue
+        scene = yaml.safe_load(path.read_text())
+        path.write_text(yaml.safe_dump(dict(scene, duration=3.0, rate=4.0)))
+    return reader.clone
+
+
+@pytest.fixture(scope='module')
+def data(reader, session_folder):
+    """ROS_3D_BB_DATA with a part of the session, and a recording of two people."""
+    session, recordings = reader.home / 'data' / 'data' / 'thesis', reader.home / 'data' / 'data' / 'trajectories'
+    session.mkdir(parents=True)
+    recordings.mkdir()
+    with open(os.path.join(session_folder, 'frames.json')) as stream:
+        content = json.load(stream)
+    content['frames'] = content['frames'][::4]
+    (session / 'frames.json').write_text(json.dumps(content))
+    for name in ('color', 'depth'):
+        os.symlink(os.path.join(session_folder, name), str(session / name))
+    rows = ['%.1f,%d,%.2f,%.2f' % (number / 2.5, person, 1.2 * number / 2.5, 2.0 * person)
+            for number in range(20) for person in (1, 2)]
+    (recordings / 'two.csv').write_text('t_s,id,x_m,y_m\n%s\n' % '\n'.join(rows))
+    return str(reader.home / 'data')
+
+
+def test_the_demo_leaves_a_table_a_picture_and_a_bag_and_the_tests_start(reader, clone):
+    printed = reader.types(DEMO_AND_TESTS, clone)
+    assert 'people are found by depth' in printed and 'running all tests' in printed
+    for kind in ('bag', 'png'):
+        path, = re.findall(r'(/\S+\.%s)' % kind, printed.split('what became of it')[1])[:1]
+        assert os.path.exists(path)
+    assert 'run_tests -j1' in reader.log.read_text()
+
+
+def test_the_demo_takes_weights(reader, clone, weights):
+    assert re.search(r'people are found by /.*/%s' % os.path.basename(weights), reader.types(DEMO, clone))
+
+
+def test_a_robot_is_set_up(reader):
+    """What is typed, one after the other; what is asked of the system is written down."""
+    for block in (INSTALL, WEIGHTS, DESCRIPTION, UPSTART):
+        reader.types(block)
+    said = reader.log.read_text().splitlines()
+    assert os.path.exists(str(reader.home / 'catkin_ws' / 'src' / 'ros_3d_bb' / 'package.xml'))
+    for command in ('git clone URL ros_3d_bb', 'rosdep install --from-paths src --ignore-src', 'catkin_make',
+                    'pip3 install onnxruntime', 'systemctl restart ros', 'systemctl daemon-reload',
+                    'systemctl start people'):
+        assert command in said
+    assert [line for line in said if line.startswith('wget https://github.com/ultralytics/yolov5/releases')]
+    assert '/yolov5_node' in said and '/camera_mount' in said  # robot_upstart could load the launch file
+    setup = (reader.etc / 'setup.bash').read_text()
+    description = re.search('JACKAL_URDF_EXTRAS=(.*)', setup).group(1)
+    assert os.path.exists(description) and '/catkin_ws/devel/setup.bash' in setup
+
+
+def test_the_other_computers_script_runs_its_arguments(reader, tmp_path):
+    script = tmp_path / 'env.sh'
+    (reader.etc / 'setup.bash').touch()
+    (reader.home / 'catkin_ws' / 'devel').mkdir(exist_ok=True)
+    (reader.home / 'catkin_ws' / 'devel' / 'setup.bash').touch()
+    script.write_text(OTHER_COMPUTER.text.replace('/opt/ros/noetic', str(reader.etc)).replace(
+        '/home/administrator', str(reader.home)))
+    script.chmod(0o755)
+    printed = subprocess.check_output([str(script), 'printenv', 'ROS_IP'], env=reader.environment())
+    assert printed == b'192.168.131.20\n'
+
+
+def test_the_arguments_are_listed(reader):
+    listed = set(re.findall(r'^\s+(\w+)(?: \(default .*\))?: ', reader.types(ARGUMENTS), re.MULTILINE))
+    assert {'detector', 'weights', 'error_model', 'frame_world', 'planner'} <= listed
+
+
+def test_bags_are_processed_one_or_many(reader, camera_bag):
+    (reader.home / 'day1').mkdir()
+    for path in ('some.bag', 'day1/one.bag', 'day1/two.bag'):
+        with rosbag.Bag(camera_bag) as whole, rosbag.Bag(str(reader.home / path), 'w') as part:
+            for topic, message, stamp in whole.read_messages(end_time=time_from(1600000002 * 10 ** 9)):
+                part.write(topic, message, stamp)
+    reader.types(PROCESS_BAG)
+    reader.types(PROCESS_BAGS)
+    for path in ('result.bag', 'results/one.bag', 'results/two.bag'):
+        with rosbag.Bag(str(reader.home / path)) as bag:
+            assert bag.get_message_count('/ros_3d_bb/bb_3d') > 1
+
+
+def test_sessions_and_scenes_become_bags(reader, clone, data):
+    at = reader.home / 'bags'
+    at.mkdir()
+    os.symlink(os.path.join(data, 'data', 'thesis'), str(at / 'SESSION'))
+    shutil.copytree(str(clone / 'config' / 'scenarios' / 'rooms'), str(at / 'rooms'))
+    shutil.copy(str(clone / 'config' / 'scenarios' / 'thesis_a_start.yaml'), str(at / 'some_scenario.yaml'))
+    for block in (SESSION_TO_BAG, SCENARIO_TO_BAG):
+        assert 'some.bag: ' in reader.types(block, at)
+
+
+@pytest.mark.parametrize('block,shortened', BENCHMARKS)
+def test_benchmarks_print_a_table(reader, clone, data, block, shortened):
+    printed = reader.types(block, clone, appended=shortened, ROS_3D_BB_DATA=data)
+    assert len(re.findall(r'\d+\.\d+', printed)) > 5, printed
+
+
+def test_a_label_written_by_hand_is_read_as_stamp_and_frame():
+    image = Image()
+    image.header.stamp, image.header.frame_id = time_from(1600000000000000005), 'some_camera'
+    names = {'image': image, 'Int32MultiArray': Int32MultiArray, 'MultiArrayDimension': MultiArrayDimension,
+             'x1': 10, 'y1': 20, 'x2': 30, 'y2': 40}
+    exec(STAMPED.text, names)  # the README's own code
+    boxes = boxes2d_from_message(names['message'])
+    assert (boxes.stamp_ns, boxes.frame_id) == (1600000000000000005, 'some_camera')
+    assert boxes.boxes.tolist() == [[10, 20, 30, 40]]
+
+
+@pytest.mark.parametrize('block', YAML, ids=lambda block: block.text.split(':')[0])
+def test_parameters_of_planners_load_as_a_node_would(reader, tmp_path, block):
+    """Without doubles, tabs or other slips: what roslaunch would set is what stands there."""
+    (tmp_path / 'planner.yaml').write_text(block.text)
+    (tmp_path / 'planner.launch').write_text(
+        '<launch><rosparam command="load" file="%s"/></launch>' % (tmp_path / 'planner.yaml'))
+    printed = subprocess.check_output(['roslaunch', '--dump-params', str(tmp_path / 'planner.launch')],
+                                      env=reader.environment())
+    loaded = yaml.safe_load(printed)
+    assert set(name.split('/')[1] for name in loaded) == set(yaml.safe_load(block.text))
+    assert block in blocks_in('doc/planners.md')
