@@ -42,7 +42,7 @@ class Reader(object):
 
     def __init__(self, folder, weights):
         self.home, self.clone, self.etc = folder / 'home', folder / 'home' / 'ros_3d_bb', folder / 'etc'
-        self.log, self._weights, self._screen = folder / 'log.txt', weights, None
+        self.log, self.cache, self._screen = folder / 'log.txt', folder / 'cache', None
         for path in (self.home / 'catkin_ws' / 'src', self.etc, folder / 'path' / 'to', self.clone):
             path.mkdir(parents=True)
         self.log.write_text('')
@@ -51,13 +51,13 @@ class Reader(object):
             os.symlink(os.path.join(ROOT, name), str(self.clone / name))
         shutil.copytree(os.path.join(ROOT, 'config'), str(self.clone / 'config'))
         self._put_stand_ins(folder / 'packages')
-        self._put_environment(folder / 'cache' / 'venv')
+        self._put_environment(self.cache / 'venv')
         self._replacements = [('/path/to/', '%s/path/to/' % folder), ('/etc/ros/', '%s/' % self.etc),
                               ('/opt/ros/noetic/', '%s/' % self.etc), ('/home/administrator/', '%s/' % self.home),
                               ('yolov5n.pt', os.path.basename(weights))]
         self._environment = dict(
             os.environ, HOME=str(self.home), USER='reader', READER_LOG=str(self.log), READER_WEIGHTS=weights,
-            READER_CLONE=str(self.clone), ROS_3D_BB_CACHE=str(folder / 'cache'), ROS_LOG_DIR=str(folder / 'ros_log'),
+            READER_CLONE=str(self.clone), ROS_3D_BB_CACHE=str(self.cache), ROS_LOG_DIR=str(folder / 'ros_log'),
             ROS_PACKAGE_PATH='%s:%s' % (folder / 'packages', os.environ['ROS_PACKAGE_PATH']), ROS_HOSTNAME='localhost',
             READER_BAG='')
         for name in ('DISPLAY', 'ROS_IP', 'JACKAL_URDF_EXTRAS'):

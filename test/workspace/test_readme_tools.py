@@ -15,9 +15,10 @@ from ros_3d_bb.messages import boxes2d_from_message, time_from
 from support.code_blocks import blocks_in, claimed
 
 DEMO_AND_TESTS = claimed('./run demo\n./run test')
+BUILD = claimed('./run build')
 DEMO = claimed('./run demo weights:=')
 INSTALL = claimed('cd ~/catkin_ws/src && git clone')
-WEIGHTS = claimed('cd && wget ')
+WEIGHTS, ONNX_RUNTIME = claimed('cd && wget '), claimed('pip3 install onnxruntime')
 DESCRIPTION = claimed('echo "source $HOME')
 UPSTART = claimed('cd ~/catkin_ws/src && catkin_create_pkg')
 OTHER_COMPUTER = claimed('#!/bin/bash\nsource /opt/ros')
@@ -81,9 +82,16 @@ def test_the_demo_takes_weights(reader, clone, weights):
     assert re.search(r'people are found by /.*/%s' % os.path.basename(weights), reader.types(DEMO, clone))
 
 
+def test_a_build_is_found_by_its_short_name(reader, clone):
+    printed = reader.types(BUILD, clone, replaced=[('~/.cache/ros_3d_bb', str(reader.cache))],
+                           appended='\nprintf "%s\n" "$ROS_PACKAGE_PATH"')
+    assert 'source %s/workspace/devel/setup.bash' % reader.cache in printed
+    assert re.search(r'%s/workspace-\w+/src$' % reader.cache, printed)
+
+
 def test_a_robot_is_set_up(reader):
     """What is typed, one after the other; what is asked of the system is written down."""
-    for block in (INSTALL, WEIGHTS, DESCRIPTION, UPSTART):
+    for block in (INSTALL, WEIGHTS, ONNX_RUNTIME, DESCRIPTION, UPSTART):
         reader.types(block)
     said = reader.log.read_text().splitlines()
     assert os.path.exists(str(reader.home / 'catkin_ws' / 'src' / 'ros_3d_bb' / 'package.xml'))
