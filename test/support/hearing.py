@@ -8,7 +8,8 @@ import sys
 import time
 
 import rospy
-import rostopic
+
+from support.ros_types import message_class
 
 
 def wait_for(wanted, seconds):
@@ -16,11 +17,12 @@ def wait_for(wanted, seconds):
     missing, subscribers = set(wanted), {}
     deadline_s = time.monotonic() + seconds
     while missing and time.monotonic() < deadline_s and not rospy.is_shutdown():
+        kinds = dict(rospy.get_published_topics())
         for name in sorted(missing - set(subscribers)):
             topic, _colon, field = name.partition(':')
-            kind = rostopic.get_topic_class(rospy.resolve_name(topic))[0]
-            if kind is not None:
-                subscribers[name] = rospy.Subscriber(topic, kind, _checker(name, field, missing), buff_size=2 ** 24)
+            if rospy.resolve_name(topic) in kinds:
+                subscribers[name] = rospy.Subscriber(topic, message_class(kinds[rospy.resolve_name(topic)]),
+                                                     _checker(name, field, missing), buff_size=2 ** 24)
         time.sleep(0.1)
     return sorted(missing)
 

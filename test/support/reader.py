@@ -76,7 +76,7 @@ class Reader(object):
         (venv / 'bin' / 'python3').chmod(0o755)
         wanted = b''.join(open(os.path.join(ROOT, 'test', name), 'rb').read()
                           for name in ('requirements.txt', 'requirements_no_deps.txt'))
-        (venv / 'installed').write_text(sha1(wanted).hexdigest() + '\n')
+        (venv / 'installed').write_text('%s  -\n' % sha1(wanted).hexdigest())  # as sha1sum says it
 
     def environment(self, **more):
         """The reader's variables, and more."""
@@ -159,8 +159,9 @@ class Graph(object):
         """Wait until something comes on all of these topics ('topic' or 'topic:field that is not empty')."""
         self.waits(self._has_master, 'a master')
         result = subprocess.run([sys.executable, os.path.join(SUPPORT, 'hearing.py'), str(PATIENCE_S)] + list(wanted),
-                                env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                                universal_newlines=True)
+                                env=dict(self.environment, PYTHONPATH='%s:%s' % (
+                                    os.path.dirname(SUPPORT), self.environment['PYTHONPATH'])),
+                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
         assert result.returncode == 0, result.stdout + self.output()
 
     def shows(self, title):
