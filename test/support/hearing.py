@@ -3,7 +3,6 @@
 `hearing.py SECONDS TOPIC[:FIELD] ...` ends with 0 once something that is not empty came on all of them, else with 1 and
 what is missing.
 """
-import operator
 import sys
 import time
 
@@ -29,7 +28,7 @@ def wait_for(wanted, seconds):
 
 def _checker(name, field, missing):
     def check(message):
-        value = operator.attrgetter(field)(message) if field else True
+        value = getattr(message, field) if field else True
         if value if not hasattr(value, '__len__') else len(value):
             missing.discard(name)
     return check
