@@ -6,7 +6,8 @@ from typing import NamedTuple
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 # Whose blocks are run. Pages of doc/ that are not here have none, or tests of their own.
 PAGES = ('README.md',) + tuple('doc/%s.md' % name for name in (
-    'bags', 'benchmarks', 'campaign', 'jackal', 'planners', 'realsense', 'rviz', 'security', 'simulation', 'yolov5'))
+    'bags', 'benchmarks', 'cameras', 'campaign', 'detectors', 'doctor', 'faults', 'installing', 'jackal', 'planners',
+    'realsense', 'rviz', 'security', 'simulation', 'tuning'))
 
 
 class Block(NamedTuple):

@@ -27,6 +27,7 @@ UPSTART = """#!/bin/bash
 echo "robot_upstart install $*" >> "$READER_LOG"
 roslaunch --nodes "${1%%/*}" "$(basename "$1")" >> "$READER_LOG"
 """
+SLIDERS = '#!/bin/bash\necho rqt_reconfigure >> "$READER_LOG"\n'
 
 
 class Reader(object):
@@ -66,9 +67,11 @@ class Reader(object):
     def _put_stand_ins(self, packages):
         stand_in_gazebo(packages)
         stand_in_launch_file(packages, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS, CAMERA_DRIVER)
-        write(packages / 'robot_upstart' / 'package.xml', '<package format="2"><name>robot_upstart</name></package>')
-        write(packages / 'robot_upstart' / 'install', UPSTART)
-        (packages / 'robot_upstart' / 'install').chmod(0o755)
+        for package, program, text in (('robot_upstart', 'install', UPSTART),
+                                       ('rqt_reconfigure', 'rqt_reconfigure', SLIDERS)):
+            write(packages / package / 'package.xml', '<package format="2"><name>%s</name></package>' % package)
+            write(packages / package / program, text)
+            (packages / package / program).chmod(0o755)
 
     def _put_environment(self, venv):
         """The virtual environment that `run` would make, of the Python that runs the tests."""

@@ -6,6 +6,8 @@ import re
 import subprocess
 import sys
 
+import yaml
+
 from ros_3d_bb.bags import scenario_images, write_bag
 from ros_3d_bb.simulation.scenario import scenario_from
 from support.code_blocks import claimed
@@ -30,6 +32,8 @@ BESIDE_DETECTOR = claimed('roslaunch ros_3d_bb pipeline.launch detector:=none')
 PLANNER = claimed('roslaunch ros_3d_bb pipeline.launch weights:=$HOME/yolov5n.pt planner:=')
 PLANNER_POINTS = claimed('rostopic echo -n 1 /planner_bridge_node')
 DIAGNOSTICS = claimed('rostopic echo -n 1 /diagnostics')
+LIVE = [claimed('rosrun dynamic_reconfigure dynparam set /tracker_node ' + beginning) for beginning in ('pred', '"{')]
+SLIDERS = claimed('rosrun rqt_reconfigure')
 SIMULATION = claimed('roslaunch ros_3d_bb simulation.launch scenario:=')
 GAZEBO = claimed('roslaunch ros_3d_bb gazebo.launch')
 
@@ -72,7 +76,7 @@ def test_a_recording_of_a_realsense_is_played(reader):
 
 
 def test_a_bag_is_played_and_shown(reader, camera_bag):
-    with reader.running(PLAYBACK, replaced=[('/path/to/some.bag', camera_bag)], DISPLAY=reader.screen()) as graph:
+    with reader.running(PLAYBACK, replaced=[('$HOME/some.bag', camera_bag)], DISPLAY=reader.screen()) as graph:
         graph.shows('RViz')
         graph.hears(TRACKS)
 
@@ -86,13 +90,18 @@ def test_another_detector_publishes_boxes_that_become_3d_boxes(reader, tmp_path)
         graph.hears('yolo_bounding_box:data', BOXES, TRACKS)
 
 
-def test_planners_get_points_and_diagnostics_say_how_it_goes(reader, camera_bag):
+def test_planners_get_points_diagnostics_say_how_it_goes_and_parameters_change(reader, camera_bag):
     with reader.running(PLANNER) as graph:
         graph.starts_camera(camera_bag)
         graph.hears('planner_bridge_node/points:width')
         master = {'ROS_MASTER_URI': graph.environment['ROS_MASTER_URI']}
         assert re.match(r'\d+\n---\n$', reader.types(PLANNER_POINTS, **master))
         assert 'values' in reader.types(DIAGNOSTICS, **master)
+        for block in LIVE + [SLIDERS]:
+            reader.types(block, **master)
+        told = subprocess.check_output(['rosparam', 'get', '/tracker_node'], env=graph.environment)
+    parameters = yaml.safe_load(told)
+    assert [parameters[name] for name in ('prediction_time', 'missed_limit', 'memory')] == [3.0, 1.0, 8.0]
 
 
 def test_a_scene_is_simulated_and_shown(reader):

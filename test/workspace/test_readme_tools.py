@@ -18,11 +18,13 @@ DEMO_AND_TESTS = claimed('./run demo\n./run test')
 BUILD = claimed('./run build')
 DEMO = claimed('./run demo weights:=')
 INSTALL = claimed('cd ~/catkin_ws/src && git clone')
-WEIGHTS, ONNX_RUNTIME = claimed('cd && wget '), claimed('pip3 install onnxruntime')
+WEIGHTS, RUNTIMES = claimed('cd && wget '), claimed('pip3 install torch')
 DESCRIPTION = claimed('echo "source $HOME')
 UPSTART = claimed('cd ~/catkin_ws/src && catkin_create_pkg')
 OTHER_COMPUTER = claimed('#!/bin/bash\nsource /opt/ros')
 ARGUMENTS = claimed('roslaunch --ros-args')
+INSTALL_ON_DEBIAN, OWN_TESTS = claimed('sudo apt install build-essential'), claimed('catkin_make -Dros_3d_bb')
+SAMPLE_BAG = claimed('cd && rosrun ros_3d_bb scenario_to_bag')
 PROCESS_BAG = claimed('rosrun ros_3d_bb process_bag some.bag')
 PROCESS_BAGS = claimed('rosrun ros_3d_bb process_bag day1')
 SESSION_TO_BAG = claimed('rosrun ros_3d_bb session_to_bag')
@@ -91,12 +93,12 @@ def test_a_build_is_found_by_its_short_name(reader, clone):
 
 def test_a_robot_is_set_up(reader):
     """What is typed, one after the other; what is asked of the system is written down."""
-    for block in (INSTALL, WEIGHTS, ONNX_RUNTIME, DESCRIPTION, UPSTART):
+    for block in (INSTALL, WEIGHTS, RUNTIMES, DESCRIPTION, UPSTART):
         reader.types(block)
     said = reader.log.read_text().splitlines()
     assert os.path.exists(str(reader.home / 'catkin_ws' / 'src' / 'ros_3d_bb' / 'package.xml'))
     for command in ('git clone URL ros_3d_bb', 'rosdep install --from-paths src --ignore-src', 'catkin_make',
-                    'pip3 install onnxruntime', 'systemctl restart ros', 'systemctl daemon-reload',
+                    'pip3 install torch onnxruntime', 'systemctl restart ros', 'systemctl daemon-reload',
                     'systemctl start people'):
         assert command in said
     assert [line for line in said if line.startswith('wget https://github.com/ultralytics/yolov5/releases')]
@@ -104,6 +106,13 @@ def test_a_robot_is_set_up(reader):
     setup = (reader.etc / 'setup.bash').read_text()
     description = re.search('JACKAL_URDF_EXTRAS=(.*)', setup).group(1)
     assert os.path.exists(description) and '/catkin_ws/devel/setup.bash' in setup
+
+
+def test_a_workspace_of_ones_own_installs_builds_and_tests(reader):
+    for block in (INSTALL_ON_DEBIAN, OWN_TESTS):
+        reader.types(block, reader.home / 'catkin_ws')
+    said = reader.log.read_text()
+    assert 'rosdep update' in said and 'catkin_make run_tests -j1' in said
 
 
 def test_the_other_computers_script_runs_its_arguments(reader, tmp_path):
@@ -137,6 +146,7 @@ def test_bags_are_processed_one_or_many(reader, camera_bag):
 
 
 def test_sessions_and_scenes_become_bags(reader, clone, data):
+    assert 'some.bag: 2 images' in reader.types(SAMPLE_BAG, replaced=[('--images 60', '--images 2')])
     at = reader.home / 'bags'
     at.mkdir()
     os.symlink(os.path.join(data, 'data', 'thesis'), str(at / 'SESSION'))
