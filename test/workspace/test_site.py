@@ -37,7 +37,7 @@ def test_the_readme_and_the_first_page_lead_to_all_others():
         with open(os.path.join(DOC, folder, page), encoding='utf-8') as stream:
             linked.update(os.path.join(folder, name)
                           for name in re.findall(r'\]\((?:doc/)?([\w/]+\.md)\)', stream.read()))
-    assert set(DOC_PAGES) - linked == {'index.md'}
+    assert set(DOC_PAGES) - linked <= {'index.md'}
 
 
 DOC_PAGES = sorted(os.path.relpath(os.path.join(folder, name), DOC)
