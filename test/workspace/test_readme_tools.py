@@ -33,9 +33,9 @@ STAMPED = claimed('message = Int32MultiArray', 'python')
 # What ends a benchmark sooner than its own defaults.
 BENCHMARKS = [(claimed('./run bench accuracy --boxes'), ''), (claimed('./run bench accuracy --scenarios'), ''),
               (claimed('./run bench scenes'), ''), (claimed('./run bench speed\n'), ' --images 1'),
-              (claimed('./run bench speed --weights'), ' --images 1'),
               (claimed('./run bench tracking'), ' --seconds 3 --repetitions 1'),
               (claimed('./run bench latency'), ' --cases free --seconds 2')]
+DETECTOR_SPEED = claimed('./run bench speed --weights')
 YAML = [claimed(beginning, 'yaml') for beginning in ('local_costmap:', 'global_costmap:', 'TebLocalPlannerROS:',
                                                      'max_obstacles:')]
 
@@ -160,6 +160,13 @@ def test_sessions_and_scenes_become_bags(reader, clone, data):
 def test_benchmarks_print_a_table(reader, clone, data, block, shortened):
     printed = reader.types(block, clone, appended=shortened, ROS_3D_BB_DATA=data)
     assert len(re.findall(r'\d+\.\d+', printed)) > 5, printed
+
+
+def test_the_detector_is_timed_by_runtime(reader, clone, data, official_output):
+    """A checkpoint, as the export that finds people in a made session has one runtime only."""
+    printed = reader.types(DETECTOR_SPEED, clone, appended=' --images 1', ROS_3D_BB_DATA=data,
+                           replaced=[('$HOME/yolov5n.pt', official_output[0])])
+    assert 'torch' in printed and 'onnxruntime' in printed
 
 
 def test_a_label_written_by_hand_is_read_as_stamp_and_frame():
