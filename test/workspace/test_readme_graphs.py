@@ -35,6 +35,7 @@ DIAGNOSTICS = claimed('rostopic echo -n 1 /diagnostics')
 LIVE = [claimed('rosrun dynamic_reconfigure dynparam set /tracker_node ' + beginning) for beginning in ('pred', '"{')]
 SLIDERS = claimed('rosrun rqt_reconfigure')
 SIMULATION = claimed('roslaunch ros_3d_bb simulation.launch scenario:=')
+DOCTOR = claimed('rosrun ros_3d_bb doctor\n')
 GAZEBO = claimed('roslaunch ros_3d_bb gazebo.launch')
 
 
@@ -104,10 +105,12 @@ def test_planners_get_points_diagnostics_say_how_it_goes_and_parameters_change(r
     assert [parameters[name] for name in ('prediction_time', 'missed_limit', 'memory')] == [3.0, 1.0, 8.0]
 
 
-def test_a_scene_is_simulated_and_shown(reader):
+def test_a_scene_is_simulated_and_shown_and_the_doctor_finds_nothing_wrong(reader):
     with reader.running(SIMULATION, DISPLAY=reader.screen()) as graph:
         graph.shows('RViz')
         graph.hears(TRACKS, 'ground_truth:objects')
+        said = reader.types(DOCTOR, appended=' --patience 60', ROS_MASTER_URI=graph.environment['ROS_MASTER_URI'])
+    assert 'doctor: all is well' in said
 
 
 def test_the_pipeline_runs_beside_gazebo(reader, camera_bag):
