@@ -108,6 +108,7 @@ class Lifter(object):
 
     def _lifted(self, pairs):
         lifted = []
+        self._tally.count_some('2D boxes of a time before', self._pairing.take_forgotten())
         for frame, boxes in pairs:
             with self._tally.refusing('2D boxes'):
                 depth = self._depth_of(frame, boxes)
@@ -136,7 +137,7 @@ class Lifter(object):
             check_rect(rect_px)
             return True
         except ValueError as error:
-            self._tally.warn('2D boxes refused', '2D %s; the others in this image are used' % error)
+            self._tally.warn('boxes refused', '2D %s; the others in this image are used' % error)
             return False
 
     def _depth_of(self, frame, boxes):

@@ -121,6 +121,7 @@ class DepthSearch(object):
         self._ready(self._pairing.end())
 
     def _ready(self, pairs):
+        self._tally.count_some('colour images of a time before', self._pairing.take_forgotten())
         for frame, color in pairs:
             if frame is None:
                 self._tally.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f '

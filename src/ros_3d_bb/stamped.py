@@ -109,6 +109,7 @@ class Pairing(object):
         self._depths, self._cameras = StampedCache(length_ns), StampedCache(length_ns)
         self._waiting = []
         self._end_before_ns = 0  # the last stamp before time went back
+        self._forgotten = 0
 
     @property
     def newest_ns(self):
@@ -126,6 +127,7 @@ class Pairing(object):
         if self._depths.add(stamp_ns, now_ns, depth):
             if (self._cameras.newest_ns or 0) > stamp_ns + self._length_ns:  # no camera of the new time has come yet
                 self._cameras.clear()
+            self._forgotten += len(self._waiting)
             self._waiting = []
             self._end_before_ns = newest_ns
         return self._settled(now_ns)
@@ -142,7 +144,9 @@ class Pairing(object):
             if depth is None:
                 return self._settled(now_ns) + [(None, boxes)]
             stamp_ns = depth.stamp_ns
-        if not self._is_of_time_before(stamp_ns):
+        if self._is_of_time_before(stamp_ns):
+            self._forgotten += 1
+        else:
             self._waiting.append(Stamped(stamp_ns, now_ns, boxes))
         return self._settled(now_ns)
 
@@ -150,6 +154,11 @@ class Pairing(object):
         """Nothing more will come: settle what still waits. Returns as the others, all with None."""
         waiting, self._waiting = self._waiting, []
         return [(None, entry.value) for entry in waiting]
+
+    def take_forgotten(self):
+        """How many boxes were dropped without a word since the last call, as time went back."""
+        forgotten, self._forgotten = self._forgotten, 0
+        return forgotten
 
     def _is_of_time_before(self, stamp_ns):
         """Whether boxes were still on their way when time went back; they are dropped without a word."""

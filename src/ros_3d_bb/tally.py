@@ -1,6 +1,7 @@
 """What became of each input: counted, and said where something was refused or missing."""
 import collections
 import contextlib
+import threading
 
 
 class Tally(object):
@@ -15,12 +16,19 @@ class Tally(object):
     """
 
     def __init__(self):
+        self._lock = threading.Lock()  # a topic with two publishers has two threads
         self.counts = collections.OrderedDict()
         self.sentences = {}
 
     def count(self, event, amount=1):
         """Something went as it should."""
-        self.counts[event] = self.counts.get(event, 0) + amount
+        with self._lock:
+            self.counts[event] = self.counts.get(event, 0) + amount
+
+    def count_some(self, event, amount):
+        """The same of what seldom happens: nothing is shown of it until it does."""
+        if amount:
+            self.count(event, amount)
 
     def note(self, event, sentence):
         """Something happened that one should know of."""

@@ -63,16 +63,16 @@ class Bbox3dNode(object):
 
     def _on_camera_info(self, message):
         self._alignment.color = message
-        with self._diagnostics.refusing('camera_info'), self._lock:
+        with self._diagnostics.taking('camera_info'), self._lock:
             self._publish(self._lifter.add_camera_info(message, arrival_clock_ns()))
 
     def _on_depth(self, message):
         self._alignment.depth_frame = message.header.frame_id
-        with self._diagnostics.refusing('depth images'), self._lock:
+        with self._diagnostics.taking('depth images'), self._lock:
             self._publish(self._lifter.add_depth(message, arrival_clock_ns()))
 
     def _on_boxes(self, message):
-        with self._diagnostics.refusing('2D boxes'), self._lock:
+        with self._diagnostics.taking('2D boxes'), self._lock:
             self._publish(self._lifter.add_boxes(message, arrival_clock_ns()))
 
     def _publish(self, images):

@@ -58,26 +58,31 @@ class DepthDetectorNode(object):
             self._search.tune(params, people)
 
     def _on_camera_info(self, message):
-        with self._diagnostics.refusing('camera_info'), self._lock:
+        with self._diagnostics.taking('camera_info'), self._lock:
             self._offer(self._search.add_camera_info(message, arrival_clock_ns()))
 
     def _on_depth(self, message):
-        with self._diagnostics.refusing('depth images'), self._lock:
+        with self._diagnostics.taking('depth images'), self._lock:
             self._offer(self._search.add_depth(message, arrival_clock_ns()))
 
     def _on_color(self, message):
-        with self._diagnostics.refusing('colour images'), self._lock:
+        with self._diagnostics.taking('colour images'), self._lock:
             self._offer(self._search.add_color(message, arrival_clock_ns()))
 
     def _offer(self, pairs):
         """Hand colour images on whose depth image has come."""
         for pair in pairs:
-            if self._switch.on and self._worker.offer(pair):
+            if not self._switch.on:
+                self._diagnostics.count('images while paused')
+            elif self._worker.offer(pair):
                 self._diagnostics.count('images skipped for a newer one')
 
     def _work(self, pair):
         with self._diagnostics.refusing('images'), self._searching:
-            found = self._search.search(pair) if self._switch.on else None  # it may have been paused meanwhile
+            if not self._switch.on:  # it may have been paused meanwhile
+                self._diagnostics.count('images while paused')
+                return
+            found = self._search.search(pair)
             if found is not None:
                 self._output.publish(pair[1].header, *found, names=self._search.names)
                 self._diagnostics.answered(pair[1].header.stamp)

@@ -23,8 +23,8 @@ def is_ending():
 
 
 class Diagnostics(Tally):
-    """Counts what happened to each input and publishes the counts on /diagnostics once a second, with rates, latency
-    and what else the node shows.
+    """Counts the messages that came and what happened to each, and publishes that on /diagnostics once a second, with
+    rates, latency and what else the node shows.
 
     A warning is logged at most every `WARNING_LASTS_S` for one cause, and shown as the node's state for as long. What
     is wrong around it (see `check`) is its state while it lasts. Timed by the machine's clock: a paused bag must not
@@ -43,6 +43,7 @@ class Diagnostics(Tally):
         self._lags_ns, self._looked_s, self._heard_s = [], time.monotonic(), time.monotonic()
         inputs = InputWatch()
         self._shown, self._checks = [inputs.values], [inputs.faults]
+        self._received = Tally()
         self._updater = diagnostic_updater.Updater()
         self._updater.setHardwareID('none')
         self._updater.add('pipeline', self._report)
@@ -74,6 +75,13 @@ class Diagnostics(Tally):
         self._checks.append(faults)
 
     @contextlib.contextmanager
+    def taking(self, inputs):
+        """Around a callback: counts its message as received, so that one sees whether each got an outcome."""
+        self._received.count(inputs)
+        with self.refusing(inputs):
+            yield
+
+    @contextlib.contextmanager
     def refusing(self, inputs):
         """Around what a callback does with its input: a ValueError there refuses that one, and the node goes on."""
         try:
@@ -97,6 +105,8 @@ class Diagnostics(Tally):
             status.summary(DiagnosticStatus.OK, 'working')
         for event, amount in list(self.counts.items()):
             status.add(event, str(amount))
+        for inputs, amount in list(self._received.counts.items()):
+            status.add('%s received' % inputs, str(amount))
         for name, text in self._answers() + [entry for shown in self._shown for entry in shown()]:
             status.add(name, text)
         return status

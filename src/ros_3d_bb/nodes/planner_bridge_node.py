@@ -100,7 +100,7 @@ class PlannerBridgeNode(object):
         self._timer = rospy.Timer(rospy.Duration.from_sec(self._params.resend_period), self._on_timer, reset=True)
 
     def _on_tracks(self, message):
-        with self._diagnostics.refusing('tracks'):
+        with self._diagnostics.taking('tracks'):
             news = self._read(message)
             with self._lock:
                 self._news = news
@@ -152,7 +152,7 @@ class PlannerBridgeNode(object):
 
     def _on_timer(self, _event):
         """Send again what planners take for now; empty what is out of date."""
-        with self._diagnostics.refusing('tracks'), self._lock:
+        with self._diagnostics.refusing('outputs'), self._lock:
             now_ns = _now_ns()
             for topic in self._topics:
                 if topic.sent_ns is None:

@@ -81,15 +81,15 @@ class TrackerNode(object):
             subscribe(topic_of(camera, DEPTH_TOPIC), Image, of_camera(self._on_depth), KEPT_AT_ONCE)
 
     def _on_camera_info(self, message, camera):
-        with self._diagnostics.refusing('camera_info'):
+        with self._diagnostics.taking('camera_info'):
             self._follower.add_camera_info(message, camera)
 
     def _on_depth(self, message, camera):
-        with self._diagnostics.refusing('depth images'):
+        with self._diagnostics.taking('depth images'):
             self._follower.add_depth(message, arrival_clock_ns(), camera)
 
     def _on_boxes(self, message, camera):
-        with self._diagnostics.refusing('3D boxes'):
+        with self._diagnostics.taking('3D boxes'):
             located = self._follower.locate(message, camera)  # one camera's wait for a transform holds up no other
             if located is None:
                 return

@@ -102,23 +102,23 @@ class ViewerNode(object):
             subscribe(topic, kind, callback, KEPT_AT_ONCE)
 
     def _on_color(self, message):
-        with self._diagnostics.refusing('colour images'), self._lock:
+        with self._diagnostics.taking('colour images'), self._lock:
             color, now_ns = Color(rgb_from(message), message.header.frame_id), arrival_clock_ns()
             self._rate.add(now_ns)
             self._note(COLOR_TOPIC, self._snapshots.add_color(stamp_of(message), now_ns, color))
 
     def _on_depth(self, message):
-        with self._diagnostics.refusing('depth images'), self._lock:
+        with self._diagnostics.taking('depth images'), self._lock:
             depth = depth_from(message, self._params.depth_scale)
             self._note(DEPTH_TOPIC, self._snapshots.add_depth(stamp_of(message), arrival_clock_ns(), depth))
 
     def _on_camera_info(self, message):
-        with self._diagnostics.refusing('camera_info'), self._lock:
+        with self._diagnostics.taking('camera_info'), self._lock:
             camera = camera_from_message(message)
             self._note(CAMERA_INFO_TOPIC, self._snapshots.add_camera(stamp_of(message), arrival_clock_ns(), camera))
 
     def _on_boxes2d(self, message):
-        with self._diagnostics.refusing('2D boxes'), self._lock:
+        with self._diagnostics.taking('2D boxes'), self._lock:
             boxes = boxes2d_from_message(message)
             if boxes.stamp_ns is None:
                 rospy.loginfo_once('the 2D boxes carry no stamp: only those of which 3D boxes are made are stored')
@@ -127,7 +127,7 @@ class ViewerNode(object):
                                         tuple(tuple(rect_px) for rect_px in boxes.boxes.tolist()))
 
     def _on_boxes3d(self, message):
-        with self._diagnostics.refusing('3D boxes'), self._lock:
+        with self._diagnostics.taking('3D boxes'), self._lock:
             self._snapshots.add_boxes3d(stamp_of(message), arrival_clock_ns(), boxes3d_from_message(message))
             self._is_said = False
 

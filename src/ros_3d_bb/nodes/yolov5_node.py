@@ -43,13 +43,18 @@ class Yolov5Node(object):
         self._detector = self._detector.tuned(detection)  # an image is searched with the one or the other
 
     def _on_image(self, message):
-        if self._switch.on and self._worker.offer(message):
-            self._diagnostics.count('images skipped for a newer one')
+        with self._diagnostics.taking('colour images'):
+            if not self._switch.on:
+                self._diagnostics.count('images while paused')
+            elif self._worker.offer(message):
+                self._diagnostics.count('images skipped for a newer one')
 
     def _search(self, message):
         with self._diagnostics.refusing('images'):
-            if self._switch.on:  # it may have been paused since the image came
+            if self._switch.on:
                 self._detect(message)
+            else:  # it was paused since the image came
+                self._diagnostics.count('images while paused')
 
     def _detect(self, message):
         detector = self._detector

@@ -1,0 +1,1 @@
+"""The whole graph for half an hour, with faults: `./run soak`."""

@@ -1,0 +1,92 @@
+"""The camera, the robot's transforms and the clock: good images of scenes, and what faults make of them."""
+import itertools
+import threading
+import time
+
+import rospy
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Int32MultiArray
+
+from ros_3d_bb.bags import scenario_images
+from ros_3d_bb.camera_messages import TF_TOPIC, TYPES
+from ros_3d_bb.messages import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, restamped, time_from
+from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
+from ros_3d_bb.simulator_messages import START_NS
+from ros_3d_bb.stamped import NS
+
+ROUNDS = 3  # of one scene, forwards and backwards, before the next
+AFTER_JUMP_NS = 1009  # added at each jump, so that no stamp comes twice
+OTHERS = {BOXES_TOPIC: Int32MultiArray, BOXES3D_TOPIC: BoundingBox3DArray, TRACKS_TOPIC: TrackedObjectArray}
+
+
+def rendered(scenario, images, with_boxes):
+    """The first images of a scenario, [[(topic, message), ...], ...]."""
+    wanted = set(TYPES) | ({BOXES_TOPIC} if with_boxes else set())
+    return [[(topic, message) for topic, message in messages if topic in wanted]
+            for _stamp_ns, messages in itertools.islice(scenario_images(scenario, with_boxes), images)]
+
+
+class Camera(object):
+    """Sends images at a rate, with a clock of its own, until it is stopped.
+
+    Attributes, which faults change
+    -------------------------------
+    sends, tells_time : bool
+        Whether there are images, and whether /clock goes on.
+    missing : set of str
+        Topics that are left out.
+    change : callable or None
+        Makes another message of a (topic, message).
+    throw_in : callable or None
+        Returns [(topic, message), ...] that come with an image of a stamp.
+    images, wrong_ns
+        See `records.Record`.
+    """
+
+    def __init__(self, scenes, rate_hz):
+        self.sends, self.tells_time, self.missing, self.change, self.throw_in = True, True, set(), None, None
+        self.images, self.wrong_ns = [], set()
+        self._scenes, self._period_ns = scenes, int(NS / rate_hz)
+        self._now_ns, self._jump_ns, self._runs = START_NS + 1000 * NS, 0, True
+        types = dict(TYPES, **OTHERS)
+        self._pubs = {topic: rospy.Publisher('/tf' if topic == TF_TOPIC else topic, kind, queue_size=10)
+                      for topic, kind in types.items()}
+        self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=10)
+        self._thread = threading.Thread(target=self._run)
+        self._thread.daemon = True
+        self._thread.start()
+
+    def jump(self, seconds):
+        """Let the stamps of all that follows be later, or earlier."""
+        self._jump_ns += int(seconds * NS) + AFTER_JUMP_NS
+
+    def stop(self):
+        """Send the last image."""
+        self._runs = False
+        self._thread.join()
+
+    def _run(self):
+        played = itertools.chain.from_iterable((scene + scene[-2:0:-1]) * ROUNDS for scene in itertools.cycle(
+            self._scenes))
+        due_s = time.monotonic()
+        while self._runs:
+            due_s = max(due_s + self._period_ns / NS, time.monotonic() - self._period_ns / NS)
+            time.sleep(max(0.0, due_s - time.monotonic()))
+            jump_ns, self._jump_ns = self._jump_ns, 0
+            if self.tells_time or jump_ns:
+                self._now_ns += self._period_ns + jump_ns
+                self._clock_pub.publish(Clock(time_from(self._now_ns)))
+            if self.sends and self.tells_time:
+                self._send(next(played))
+
+    def _send(self, messages):
+        stamp = time_from(self._now_ns)
+        wrong = self.throw_in(self._now_ns, dict(messages)) if self.throw_in else []
+        self.images.append((self._now_ns, time.monotonic()))
+        for topic, message in messages:
+            if topic not in self.missing:
+                message = restamped(message, stamp)
+                self._pubs[topic].publish(self.change(topic, message) if self.change else message)
+        for topic, stamp_ns, message in wrong:
+            self.wrong_ns.add(stamp_ns)
+            self._pubs[topic].publish(message)

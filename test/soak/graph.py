@@ -1,0 +1,91 @@
+"""The pipeline under roslaunch, each node started again where it ends, and what roslaunch says of them."""
+import glob
+import os
+import re
+import subprocess
+import threading
+import time
+import xml.etree.ElementTree as ElementTree
+
+from ros_3d_bb.evaluation.latency import end
+from soak.records import Death
+
+LAUNCH = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'launch')
+STARTED = re.compile(r'process\[([\w/]+)-\d+\]: started with pid \[(\d+)\]')
+ENDED = re.compile(r'\[([\w/]+)-\d+\] process has (died \[pid (\d+), exit code (-?\d+)|finished cleanly)')
+UNCAUGHT = re.compile(r'bad callback|Exception in thread|Segmentation|terminate called|Killed')
+NOT_OF_THE_PACKAGE = ('rosout', 'master')
+
+
+class GraphEnded(Exception):
+    """roslaunch ended, or its nodes never came: says why."""
+
+
+def write_respawning(folder):
+    """Write launch files whose nodes are started again, and with /use_sim_time. Returns the path of the pipeline's."""
+    for path in glob.glob(os.path.join(LAUNCH, '*.launch')):
+        tree = ElementTree.parse(path)
+        for node in tree.iter('node'):
+            node.set('respawn', 'true')
+            node.attrib.pop('required', None)
+        for include in tree.iter('include'):
+            include.set('file', include.get('file').replace('$(find ros_3d_bb)/launch', folder))
+        tree.getroot().insert(0, ElementTree.Element('param', {'name': '/use_sim_time', 'value': 'true'}))
+        tree.write(os.path.join(folder, os.path.basename(path)))
+    return os.path.join(folder, 'pipeline.launch')
+
+
+class Graph(object):
+    """roslaunch and its nodes. Use as a context manager.
+
+    Attributes
+    ----------
+    pids : {node: process number}
+        Of those that run now.
+    deaths, errors : list
+        See `records.Record`.
+    """
+
+    def __init__(self, folder, port, arguments):
+        self.pids, self.deaths, self.errors = {}, [], []
+        self.log = os.path.join(folder, 'launch.log')
+        self._command = ['roslaunch', '-p', str(port), write_respawning(folder)] + arguments
+        self._process, self._is_ending = None, False
+
+    def __enter__(self):
+        # in a session of its own: a Ctrl-C in the terminal reaches it through here, once
+        self._process = subprocess.Popen(self._command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                         universal_newlines=True, errors='replace', start_new_session=True)
+        thread = threading.Thread(target=self._read)
+        thread.daemon = True
+        thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._is_ending = True
+        if self._process.poll() is None:
+            end(self._process)
+
+    def check(self):
+        """Raise GraphEnded if roslaunch has ended."""
+        if self._process.poll() is not None:
+            raise GraphEnded('roslaunch ended with %d; its log is in %s' % (self._process.returncode, self.log))
+
+    def _read(self):
+        with open(self.log, 'w') as log:
+            for line in self._process.stdout:
+                log.write(line)
+                log.flush()
+                if not self._is_ending:
+                    self._understand(time.monotonic(), line.strip())
+
+    def _understand(self, now_s, line):
+        started, ended = STARTED.search(line), ENDED.search(line)
+        if started and started.group(1) not in NOT_OF_THE_PACKAGE:
+            self.pids[started.group(1)] = int(started.group(2))
+        elif ended:
+            node, _how, pid, code = ended.groups()
+            how = 'ended by itself' if code is None else 'died with exit code %s' % code
+            self.deaths.append(Death(now_s, node, int(pid or self.pids.get(node, 0)), how))
+        elif UNCAUGHT.search(line):
+            self.errors.append((now_s, line[:300]))

@@ -1,0 +1,71 @@
+"""What comes out of the graph, with the time at which it came, and what its nodes say of themselves."""
+import functools
+import time
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from std_msgs.msg import Int32MultiArray
+from visualization_msgs.msg import MarkerArray
+
+from ros_3d_bb.evaluation.processes import usage_of
+from ros_3d_bb.markers import MARKERS_TOPIC
+from ros_3d_bb.messages import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
+from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
+from ros_3d_bb.nodes.latency_probe_node import stamp_in
+from soak.invariants import BALANCES
+from soak.records import Status, Track
+
+KINDS = {BOXES_TOPIC: Int32MultiArray, BOXES3D_TOPIC: BoundingBox3DArray, TRACKS_TOPIC: TrackedObjectArray,
+         MARKERS_TOPIC: MarkerArray}
+MANY = 1000  # messages that may come at once; none is to be missed
+
+
+class Witness(object):
+    """Keeps what is published by others than this process.
+
+    Attributes
+    ----------
+    arrivals, tracks, statuses
+        See `records.Record`.
+    empty : {topic: count}
+        Of the arrivals, those in which there is nobody.
+    """
+
+    def __init__(self, graph):
+        self.arrivals, self.tracks, self.statuses = {topic: [] for topic in KINDS}, [], []
+        self.empty = {topic: 0 for topic in KINDS}
+        self._graph = graph
+        for topic, kind in KINDS.items():
+            rospy.Subscriber(topic, kind, functools.partial(self._on_output, topic), queue_size=MANY)
+        rospy.Subscriber('/diagnostics', DiagnosticArray, self._on_diagnostics, queue_size=MANY)
+
+    def newest_status(self, node):
+        """Of a node; None where there is none."""
+        return next((status for status in reversed(self.statuses) if status.node == node), None)
+
+    def _on_output(self, topic, message):
+        now_s = time.monotonic()
+        if message._connection_header['callerid'] == rospy.get_name():
+            return  # a wrong message that was thrown in
+        stamp_ns = stamp_in(message)
+        self.empty[topic] += _is_empty(message)
+        if stamp_ns is not None:
+            self.arrivals[topic].append((now_s, stamp_ns))
+        if topic == TRACKS_TOPIC:
+            self.tracks.append((now_s, stamp_ns, [Track(track.id, track.first_seen.to_nsec(), track.last_seen.to_nsec())
+                                                  for track in message.objects]))
+
+    def _on_diagnostics(self, message):
+        now_s = time.monotonic()
+        for told in message.status:
+            node = told.name.split(':')[0].lstrip('/')
+            pid = self._graph.pids.get(node)
+            used = usage_of(pid) if pid and node in BALANCES else None
+            if used is not None:
+                counts = {entry.key: int(entry.value) for entry in told.values if entry.value.isdigit()}
+                self.statuses.append(Status(now_s, node, pid, counts, *used))
+
+
+def _is_empty(message):
+    parts = (getattr(message, name, None) for name in ('data', 'boxes', 'objects', 'markers'))
+    return not any(parts)
