@@ -12,7 +12,7 @@ WAITING = 103  # the same in the middle of a fault: what `stamped.Pairing` lets 
 WARM_UP_S = 60.0  # caches fill, and libraries take what they keep
 WARM_UP_SHARE = 0.15  # of the whole, where that is shorter
 LEAST_SAMPLES = 20  # of memory or CPU, to say anything
-GROWTH_MB = 20.0
+RISE_MB = 20.0  # of the most memory that a process ever held
 CPU_RATIO, CPU_MORE_MS = 2.0, 5.0
 LAG_IMAGES = 3.0
 
@@ -142,46 +142,59 @@ def nobody_dies_of_a_message(record):
                       len(record.errors)), 'only who is killed', broken)
 
 
+def warm_up_s(record):
+    """How long a process warms up."""
+    return min(WARM_UP_S, WARM_UP_SHARE * (record.ended_s - record.began_s))
+
+
 def processes_of(record):
     """{(node, pid): [Status, ...]} of the processes, without what each needs to warm up."""
-    warm_up_s = min(WARM_UP_S, WARM_UP_SHARE * (record.ended_s - record.began_s))
     processes, began_s = collections.OrderedDict(), {}
     for status in record.statuses:
         key = status.node, status.pid
-        if status.at_s >= began_s.setdefault(key, status.at_s) + warm_up_s:
+        if status.at_s >= began_s.setdefault(key, status.at_s) + warm_up_s(record):
             processes.setdefault(key, []).append(status)
     return {key: statuses for key, statuses in processes.items() if len(statuses) >= LEAST_SAMPLES}
 
 
 class Growth(NamedTuple):
-    """Memory of a process: seconds, megabytes at the start and the end, slope of the fitted line."""
+    """Memory of a process: seconds, megabytes at the start and the end, slope of the fitted line, and by how much it
+    rose without a reason.
+    """
 
     seconds: float
     first_mb: float
     last_mb: float
     mb_per_minute: float
-
-    @property
-    def fitted_mb(self):
-        """By how much the fitted line rises."""
-        return self.mb_per_minute * self.seconds / 60
+    risen_mb: float
 
 
-def growth_of(statuses):
-    """The Growth of a process."""
+def growth_of(record, statuses):
+    """The Growth of a process.
+
+    A fault may take memory once, as queues fill that were never full before; when it comes again, and between the
+    faults, the most that was ever taken has to do.
+    """
     times_s, rss_mb = np.array([(status.at_s, status.rss_mb) for status in statuses]).T
     slope = np.polyfit(times_s - times_s[0], rss_mb, 1)[0]
-    return Growth(float(times_s[-1] - times_s[0]), float(rss_mb[0]), float(rss_mb[-1]), float(60 * slope))
+    born_s = times_s[0] - warm_up_s(record)
+    faults = [fault for fault in record.faults if fault.began_s >= born_s]
+    first_of = {fault.name: number for number, fault in reversed(list(enumerate(faults)))}
+    begun = np.searchsorted([fault.began_s for fault in faults], times_s, side='right') - 1  # the latest, -1: none
+    rises_mb = np.diff(np.maximum.accumulate(rss_mb))
+    counts = [number < 0 or first_of[faults[number].name] != number for number in begun[1:]]
+    return Growth(float(times_s[-1] - times_s[0]), float(rss_mb[0]), float(rss_mb[-1]), float(60 * slope),
+                  float(rises_mb[np.array(counts, bool)].sum()))
 
 
 def memory_is_flat(record):
-    """Of each process, by a line through all that was measured after its warm-up."""
-    growths = {key: growth_of(statuses) for key, statuses in processes_of(record).items()}
-    broken = [(record.ended_s, '%s (process %d): %+.1f MB in %.0f s' % (key + (growth.fitted_mb, growth.seconds)))
-              for key, growth in growths.items() if growth.fitted_mb > GROWTH_MB]
-    most = max([growth.fitted_mb for growth in growths.values()], default=0.0)
-    return Finding('memory is flat', '%d processes, %+.1f MB at most' % (len(growths), most), '%+.0f MB' % GROWTH_MB,
-                   broken)
+    """Of each process after its warm-up, see `growth_of`."""
+    growths = {key: growth_of(record, statuses) for key, statuses in processes_of(record).items()}
+    broken = [(record.ended_s, '%s (process %d): %+.1f MB in %.0f s' % (key + (growth.risen_mb, growth.seconds)))
+              for key, growth in growths.items() if growth.risen_mb > RISE_MB]
+    most = max([growth.risen_mb for growth in growths.values()], default=0.0)
+    return Finding('memory is flat', '%d processes, %+.1f MB at most, but what a fault takes when it first comes'
+                   % (len(growths), most), '%+.0f MB' % RISE_MB, broken)
 
 
 def cpu_ms_of(record, statuses):

@@ -56,13 +56,13 @@ def _inputs(record):
 
 
 def _processes(record):
-    rows = ['%-22s %9s %9s %9s %9s %10s %11s' % ('process of', 'minutes', 'MB begin', 'MB end', 'MB/min', 'ms/image',
-                                                 'then')]
+    titles = 'process of', 'minutes', 'MB begin', 'MB end', 'MB/min', 'risen MB', 'ms/image', 'then'
+    rows = ['%-22s %9s %9s %9s %9s %9s %10s %11s' % titles]
     for (node, _pid), statuses in processes_of(record).items():
-        growth, steps = growth_of(statuses), cpu_ms_of(record, statuses)
+        growth, steps = growth_of(record, statuses), cpu_ms_of(record, statuses)
         times = '%10.1f %11.1f' % halves_ms(steps) if len(steps) > 1 else '%10s %11s' % ('-', '-')
-        rows.append('%-22s %9.1f %9.1f %9.1f %+9.2f %s' % (node, growth.seconds / 60, growth.first_mb, growth.last_mb,
-                                                          growth.mb_per_minute, times))
+        rows.append('%-22s %9.1f %9.1f %9.1f %+9.2f %9.1f %s' % (
+            node, growth.seconds / 60, growth.first_mb, growth.last_mb, growth.mb_per_minute, growth.risen_mb, times))
     return rows
 
 
@@ -77,8 +77,11 @@ def as_json(record, empty, findings, arguments):
         'arrays': {topic: len(arrivals) for topic, arrivals in record.arrivals.items()}, 'empty': empty,
         'faults': [{'name': fault.name, 'began_s': since(fault.began_s), 'ended_s': since(fault.ended_s),
                     'recovered_s': since(fault.recovered_s)} for fault in record.faults],
-        'processes': [dict(node=node, pid=pid, **growth_of(statuses)._asdict())
+        'processes': [dict(node=node, pid=pid, **growth_of(record, statuses)._asdict())
                       for (node, pid), statuses in processes_of(record).items()],
+        'memory_mb': {'%s %d' % key: [(since(status.at_s), status.rss_mb) for status in record.statuses
+                                      if (status.node, status.pid) == key]
+                      for key in set((status.node, status.pid) for status in record.statuses)},
         'counts': [{'node': status.node, 'pid': status.pid, 'at_s': since(status.at_s), 'counts': status.counts}
                    for status in last_of_each(record)],
         'latency_ms': {name: np.percentile(lags[:, 2], (50, 95)).tolist() if len(lags) else None

@@ -10,6 +10,7 @@ import pytest
 
 from ros_3d_bb.bags import scenario_images, write_bag
 from ros_3d_bb.simulation.scenario import scenario_from
+from support.running import processes_naming
 
 NODES = {'replay_node', 'latency_probe_node', 'bbox3d_node', 'tracker_node'}
 
@@ -34,18 +35,6 @@ def benchmark(tmp_path):
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True,
                                 env=environment)
     return start
-
-
-def processes_naming(text):
-    """How many processes have a text in their command line."""
-    found = 0
-    for pid in filter(str.isdigit, os.listdir('/proc')):
-        try:
-            with open('/proc/%s/cmdline' % pid) as stream:
-                found += text in stream.read()
-        except OSError:
-            pass  # it ended meanwhile
-    return found
 
 
 def test_images_are_answered_and_everything_ends(bag, benchmark, tmp_path):

@@ -1,0 +1,87 @@
+"""The soak for two minutes: the whole graph under roslaunch, with faults. What it checks is counted, not timed."""
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from soak.faults import FAULTS
+from soak.graph import write_respawning
+from support.launching import loaded
+from support.running import processes_naming
+
+TEST = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+SCENE = {'duration': 2.0, 'rate': 5.0, 'people': [{'start': [3.0, 0.6], 'facing': 3.1, 'repeat': True, 'moves': [
+    {'to': [3.0, -0.6], 'speed': 0.6}, {'to': [3.0, 0.6], 'speed': 0.6}]}, {'start': [4.0, -0.7], 'facing': 3.1}]}
+PATIENTLY = '600'  # seconds within which it has to recover: that depends on who else uses the machine
+
+
+@pytest.fixture
+def soaking(tmp_path):
+    """Starts a soak of a small scene; its nodes have `tmp_path`, where they log, in their command line."""
+    (tmp_path / 'scene.yaml').write_text(json.dumps(SCENE))
+    environment = dict(os.environ, ROS_HOSTNAME='localhost', ROS_LOG_DIR=str(tmp_path),
+                       PYTHONPATH=os.pathsep.join([TEST, os.environ.get('PYTHONPATH', '')]))
+
+    def start(*arguments):
+        return subprocess.Popen([sys.executable, '-m', 'soak', '--scenarios', str(tmp_path / 'scene.yaml'), '--images',
+                                 '8', '--rate', '5'] + list(arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                universal_newlines=True, env=environment, cwd=str(tmp_path))
+    return start
+
+
+def test_two_minutes_of_faults_break_nothing(soaking, tmp_path):
+    process = soaking('--minutes', '2', '--seed', '7', '--recover-within', PATIENTLY, '--json', 'soak.json')
+    printed, said = process.communicate()
+    assert process.returncode == 0, printed + said
+    with open(str(tmp_path / 'soak.json')) as stream:
+        found = json.load(stream)
+    assert all(invariant['holds'] for invariant in found['invariants']) and len(found['invariants']) == 10
+    assert all(fault['recovered_s'] is not None for fault in found['faults']) and found['faults']
+    counted = {entry['node'] for entry in found['counts']}
+    assert counted == {'depth_detector_node', 'bbox3d_node', 'tracker_node', 'planner_bridge_node'}
+    assert 0 < found['arrays']['ros_3d_bb/tracks'] <= found['images']
+    assert '%d images sent' % found['images'] in printed and 'tracker_node' in printed
+    assert processes_naming(str(tmp_path)) == 0
+
+
+def test_an_invariant_that_breaks_is_named_with_the_time_and_the_exit_status_is_1(soaking):
+    """Nobody recovers within no time at all."""
+    process = soaking('--minutes', '0.2', '--recover-within', '0')
+    printed, said = process.communicate()
+    assert process.returncode == 1, printed + said
+    broken = printed[printed.index('BROKEN  it recovers'):].splitlines()
+    assert broken[1].strip().startswith('at 0:')
+
+
+def test_ctrl_c_ends_everything_and_shows_what_there_is(soaking, tmp_path):
+    process = soaking('--minutes', '30', '--recover-within', PATIENTLY, '--json', 'soak.json')
+    said = ''
+    while process.poll() is None and '   1 faults' not in said[-200:]:  # the progress line
+        said += process.stderr.read(50)
+    process.send_signal(signal.SIGINT)
+    printed, _said = process.communicate()
+    assert process.returncode == 130, printed
+    assert 'invariants\n' in printed and 'BROKEN' not in printed
+    assert os.path.exists(str(tmp_path / 'soak.json'))
+    assert processes_naming(str(tmp_path)) == 0
+
+
+@pytest.mark.parametrize('arguments, complaint', [(('--minutes', '0'), 'more than 0'), (('--rate', '-1'), '-1'),
+                                                  (('--detector', 'yolov5'), 'needs --weights')])
+def test_arguments_that_make_no_sense_are_refused(soaking, arguments, complaint):
+    process = soaking(*arguments)
+    _printed, said = process.communicate()
+    assert process.returncode == 2 and complaint in said
+
+
+def test_nodes_are_started_again_where_they_end(tmp_path):
+    parameters, nodes = loaded(write_respawning(str(tmp_path)), 'detector:=depth', 'planner:=costmap')
+    assert parameters['/use_sim_time'] is True and len(nodes) == 4
+    assert all(node.respawn for node in nodes.values())
+
+
+def test_each_kind_of_fault_says_what_it_is():
+    assert all(fault.__doc__ for fault, _lasts, _disturbs in FAULTS) and len(FAULTS) >= 11
