@@ -20,6 +20,8 @@ from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.nodes.viewer_node import ViewerNode
 from ros_3d_bb.nodes.yolov5_node import Yolov5Node
 from ros_3d_bb.stamped import NS
+from soak.invariants import BALANCES, WAITING, balance_of
+from soak.records import Status
 from support.masterless import masterless, on_the_wire
 
 INFO_TOPIC = INFO_TOPICS[0]
@@ -81,7 +83,7 @@ def fuzz_node(name, seed, count, deadline_s=float('inf')):
     Exception
         What a callback raised.
     AssertionError
-        If good messages did not work after wrong ones.
+        If good messages did not work after wrong ones, or a message has no outcome in the node's counts.
     """
     source, target, sent, began_s = hostile.Source(seed), TARGETS[name], 0, time.process_time()
     with masterless(target.params) as connections, _quiet():
@@ -106,6 +108,7 @@ def fuzz_node(name, seed, count, deadline_s=float('inf')):
                 for timer in connections.timers:
                     timer(None)
             now_ns = _check_good(name, target, node, connections, now_ns)
+            _check_outcomes(name, node)
     return sent, time.process_time() - began_s
 
 
@@ -171,3 +174,10 @@ def _check_good(name, target, node, connections, now_ns):
         newest = node._snapshots.newest
         assert newest is not None and newest.stamp_ns == now_ns, '%s shows an image of the time before' % name
     return now_ns
+
+
+def _check_outcomes(name, node):
+    if name in BALANCES:
+        found = balance_of(Status(0.0, name, 0, dict(node._diagnostics.told()), 0.0, 0.0))
+        assert 0 <= found[3] <= WAITING, '%s: %d inputs, %d published, %d not for a reason, %d without outcome' % (
+            (name,) + found)

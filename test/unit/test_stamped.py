@@ -134,6 +134,20 @@ def test_time_that_goes_back_clears_everything():
     assert play(50 * MS, pairing=pairing) == [(n, n, n) for n in range(60)]
 
 
+@given(st.lists(st.tuples(st.sampled_from(['depth', 'camera', 'boxes', 'plain boxes']), st.integers(1, 200)),
+                max_size=80))
+def test_boxes_are_settled_or_counted_as_forgotten_whatever_comes(events):
+    pairing, settled, forgotten, sent = Pairing(NS, 5 * MS, 50 * MS), [], 0, 0
+    for number, (kind, stamp) in enumerate(events):
+        sent += 'boxes' in kind
+        add = {'depth': pairing.add_depth, 'camera': pairing.add_camera}.get(kind, pairing.add_boxes)
+        settled += add(None if kind == 'plain boxes' else stamp * PERIOD, number * PERIOD, number)
+        forgotten += pairing.take_forgotten()
+    settled += pairing.end()
+    assert len(settled) + forgotten == sent
+    assert len(set(boxes for _frame, boxes in settled)) == len(settled) and pairing.take_forgotten() == 0
+
+
 @given(st.lists(st.integers(0, 5 * NS), min_size=1, max_size=50))
 def test_the_cache_keeps_no_more_than_its_length_in_order(stamps):
     cache = StampedCache(NS)

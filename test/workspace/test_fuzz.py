@@ -19,6 +19,8 @@ from ros_3d_bb.tracking.for_planners import check_tracks
 from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
 from support.masterless import masterless
 
+TOPICS = ('camera/color/camera_info', 'camera/aligned_depth_to_color/image_raw', 'camera/color/image_raw',
+          'yolo_bounding_box')
 
 def test_functions_refuse_wrong_values_by_a_value_error():
     counts = fuzz_functions(7, 10000)
@@ -83,6 +85,19 @@ def test_edges_far_outside_the_image_are_not_walked_along(monkeypatch):
     assert corners == [-4, 5, 68, 20, 3, 4, 9, 52]
 
 
+def test_a_colour_image_that_cannot_be_shown_keeps_no_boxes_back():
+    """Two arrays wait for one depth image, and the colour image is damaged: both are lifted all the same."""
+    with masterless() as connections:
+        Bbox3dNode()
+        for stamp_ns, order in ((10 ** 12, (0, 1, 3)), (2 * 10 ** 12, (0, 2, 3, 3, 1))):
+            frame = good_frame(stamp_ns)
+            frame['yolo_bounding_box'] = good_boxes(stamp_ns)
+            frame['camera/color/image_raw'].step = 1
+            for number in order:
+                connections.send(TOPICS[number], frame[TOPICS[number]])
+        assert connections.publishers['ros_3d_bb/bb_3d'].count == 3
+
+
 def test_a_colour_image_without_a_stamp_stops_no_picture():
     """It comes to a callback that is there only while somebody looks at the pictures."""
     with masterless() as connections:
@@ -90,8 +105,7 @@ def test_a_colour_image_without_a_stamp_stops_no_picture():
         for stamp_ns in (10 ** 12, 2 * 10 ** 12):
             frame = good_frame(stamp_ns)
             frame['yolo_bounding_box'] = good_boxes(stamp_ns)
-            for topic in ('camera/color/camera_info', 'camera/aligned_depth_to_color/image_raw',
-                          'camera/color/image_raw', 'yolo_bounding_box'):
+            for topic in TOPICS:
                 if topic in connections.subscribers:
                     connections.send(topic, frame[topic])
             connections.send('camera/color/image_raw', Image())

@@ -93,7 +93,7 @@ def test_every_import_is_declared_and_every_dependency_is_used():
 
 def test_what_the_tests_import_is_declared_or_in_their_requirements():
     names = imported(glob.glob(inside('test', '**', '*.py'), recursive=True))
-    names -= {'support', 'fuzz', 'conftest'} | TEST_STANDARD_LIBRARY
+    names -= {'support', 'fuzz', 'soak', 'conftest'} | TEST_STANDARD_LIBRARY
     with open(inside('test', 'requirements.txt')) as stream:
         required = set(re.findall(r'^([\w-]+)', stream.read(), re.MULTILINE))
     known = declared('depend', 'exec_depend', 'test_depend')

@@ -103,13 +103,16 @@ class Diagnostics(Tally):
             status.summary(DiagnosticStatus.STALE, 'no input yet')
         else:
             status.summary(DiagnosticStatus.OK, 'working')
-        for event, amount in list(self.counts.items()):
+        for event, amount in self.told():
             status.add(event, str(amount))
-        for inputs, amount in list(self._received.counts.items()):
-            status.add('%s received' % inputs, str(amount))
         for name, text in self._answers() + [entry for shown in self._shown for entry in shown()]:
             status.add(name, text)
         return status
+
+    def told(self):
+        """What is published of the input: (event, how often), and (inputs received, how many)."""
+        return list(self.counts.items()) + [('%s received' % inputs, amount)
+                                            for inputs, amount in list(self._received.counts.items())]
 
     def _lasting(self):
         """The sentences about what is wrong now; each is logged when it begins, and now and then."""

@@ -40,8 +40,15 @@ class SampleImages(object):
         self._sample, self._depth_range_m = sample, depth_range_m
 
     def publish(self, header, depth, boxes):
-        """Publish the images of one set of 3D boxes, as far as somebody subscribes."""
+        """Publish the images of one set of 3D boxes, as far as somebody subscribes.
+
+        A colour image that cannot be shown is refused here: it must not keep back the next 3D boxes.
+        """
         self._follow_subscribers()
+        with self._diagnostics.refusing('colour images'):
+            self._publish(header, depth, boxes)
+
+    def _publish(self, header, depth, boxes):
         if self._depth_pub.get_num_connections():
             grey = visible_depth(depth, self._depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))

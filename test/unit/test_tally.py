@@ -1,0 +1,51 @@
+"""What became of each input is counted, whoever counts at the same time."""
+import sys
+import threading
+
+import pytest
+
+from ros_3d_bb.tally import Tally
+
+
+@pytest.fixture
+def switching():
+    """Threads that take turns as often as Python lets them."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
+
+
+def test_events_are_counted_in_the_order_in_which_they_came_up():
+    tally = Tally()
+    tally.count('images')
+    tally.warn('refused', 'why')
+    tally.warn('refused', 'why again')
+    tally.count('images', 3)
+    assert list(tally.counts.items()) == [('images', 4), ('refused', 2)] and tally.sentences == {'refused': 'why'}
+
+
+def test_what_did_not_happen_is_not_shown():
+    tally = Tally()
+    tally.count_some('jumps', 0)
+    assert not tally.counts
+    tally.count_some('jumps', 2)
+    assert tally.counts == {'jumps': 2}
+
+
+def test_an_input_that_is_refused_is_counted_and_the_next_is_taken():
+    tally = Tally()
+    with tally.refusing('boxes'):
+        raise ValueError('3 numbers')
+    assert tally.counts == {'boxes refused': 1} and '3 numbers' in tally.sentences['boxes refused']
+
+
+def test_no_count_is_lost_between_threads(switching):
+    """rospy has a thread for each publisher of a topic."""
+    tally = Tally()
+    threads = [threading.Thread(target=lambda: [tally.count('images') for _ in range(5000)]) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert tally.counts == {'images': 20000}
