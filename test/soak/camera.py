@@ -1,4 +1,5 @@
 """The camera, the robot's transforms and the clock: good images of scenes, and what faults make of them."""
+import collections
 import itertools
 import threading
 import time
@@ -39,13 +40,13 @@ class Camera(object):
         Makes another message of a (topic, message).
     throw_in : callable or None
         Returns [(topic, message), ...] that come with an image of a stamp.
-    images, wrong_ns
+    images, wrong_ns, sent
         See `records.Record`.
     """
 
     def __init__(self, scenes, rate_hz):
         self.sends, self.tells_time, self.missing, self.change, self.throw_in = True, True, set(), None, None
-        self.images, self.wrong_ns = [], set()
+        self.images, self.wrong_ns, self.sent = [], set(), collections.Counter()
         self._scenes, self._period_ns = scenes, int(NS / rate_hz)
         self._now_ns, self._jump_ns, self._runs = START_NS + 1000 * NS, 0, True
         types = dict(TYPES, **OTHERS)
@@ -86,7 +87,11 @@ class Camera(object):
         for topic, message in messages:
             if topic not in self.missing:
                 message = restamped(message, stamp)
-                self._pubs[topic].publish(self.change(topic, message) if self.change else message)
+                self._publish(topic, self.change(topic, message) if self.change else message)
         for topic, stamp_ns, message in wrong:
             self.wrong_ns.add(stamp_ns)
-            self._pubs[topic].publish(message)
+            self._publish(topic, message)
+
+    def _publish(self, topic, message):
+        self.sent[topic] += self._pubs[topic].get_num_connections() > 0
+        self._pubs[topic].publish(message)

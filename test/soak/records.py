@@ -56,6 +56,8 @@ class Record(NamedTuple):
         The good ones, in the order in which they were sent.
     wrong_ns : set of int
         Stamps of the wrong messages that were thrown in.
+    sent : {topic: count}
+        Messages, good and wrong, to whomever was there.
     arrivals : {topic: [(at_s, stamp_ns), ...]}
     tracks : [(at_s, stamp_ns, [Track, ...]), ...]
     killed : set of int
@@ -68,6 +70,7 @@ class Record(NamedTuple):
     ended_s: float
     images: List[Tuple[int, float]]
     wrong_ns: Set[int]
+    sent: Dict[str, int]
     arrivals: Dict[str, Any]
     tracks: List[Any]
     statuses: List[Status]

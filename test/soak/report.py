@@ -3,11 +3,14 @@ import collections
 
 import numpy as np
 
+from ros_3d_bb.camera_messages import COLOR_TOPIC
 from ros_3d_bb.evaluation.machine import describe_machine
-from ros_3d_bb.messages import TRACKS_TOPIC
-from soak.invariants import (balance_of, cpu_ms_of, findings_of, growth_of, halves_ms, lags_of, last_of_each,
+from ros_3d_bb.messages import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
+from soak.invariants import (BALANCES, balance_of, cpu_ms_of, findings_of, growth_of, halves_ms, lags_of, last_of_each,
                              processes_of, thirds_of)
 
+TOPICS = {'yolov5_node': COLOR_TOPIC, 'depth_detector_node': COLOR_TOPIC, 'bbox3d_node': BOXES_TOPIC,
+          'tracker_node': BOXES3D_TOPIC, 'planner_bridge_node': TRACKS_TOPIC}
 SHOWN = 5  # of the places where an invariant was broken
 
 
@@ -18,9 +21,9 @@ def print_report(record, empty, arguments):
           % (describe_machine(), (record.ended_s - record.began_s) / 60, arguments.seed, arguments.rate,
              arguments.detector))
     answered = len(set(stamp_ns for _at_s, stamp_ns in record.arrivals[TRACKS_TOPIC])
-                   & set(stamp_ns for stamp_ns, _sent_s in record.images))
+                   & set(stamp_ns for stamp_ns, sent_s in record.images if sent_s >= record.began_s))
     print('%d images sent, %d answered with tracks; %d arrays of tracks came, %d of them empty'
-          % (len(record.images), answered, len(record.arrivals[TRACKS_TOPIC]), empty[TRACKS_TOPIC]))
+          % (_sent(record), answered, len(record.arrivals[TRACKS_TOPIC]), empty[TRACKS_TOPIC]))
     for table in (_faults, _inputs, _processes):
         print('\n' + '\n'.join(table(record)))
     print('\ninvariants')
@@ -38,21 +41,33 @@ def _clock(record, at_s):
 
 
 def _faults(record):
-    rows = ['%-36s %5s %12s %12s' % ('fault', 'times', 'median s', 'longest s')]
+    rows = ['%-36s %5s %10s %24s' % ('fault', 'times', 'lasted s', 'then recovery s: median, longest')]
     kinds = collections.OrderedDict()
     for fault in sorted(record.faults, key=lambda fault: fault.name):
-        kinds.setdefault(fault.name, []).append(
-            np.inf if fault.recovered_s is None else fault.recovered_s - fault.ended_s)
-    row = '%-36s %5d %12.2f %12.2f'
-    return rows + [row % (name, len(took_s), np.median(took_s), max(took_s)) for name, took_s in kinds.items()]
+        took_s = np.inf if fault.recovered_s is None else fault.recovered_s - fault.ended_s
+        kinds.setdefault(fault.name, []).append((fault.ended_s - fault.began_s, took_s))
+    for name, times_s in kinds.items():
+        lasted_s, took_s = np.array(times_s).T
+        rows.append('%-36s %5d %10.1f %24.2f %7.2f' % (name, len(took_s), np.median(lasted_s), np.median(took_s),
+                                                       took_s.max()))
+    return rows
 
 
 def _inputs(record):
-    rows = ['%-22s %9s %9s %9s %9s' % ('inputs of', 'came', 'published', 'reasons', 'at work')]
-    totals = collections.OrderedDict()
-    for status in sorted(last_of_each(record), key=lambda status: status.node):
+    """What is sent to a node is what the one before it published, and what was thrown in."""
+    totals, reasons, rows = collections.OrderedDict(), collections.Counter(), []
+    for status in last_of_each(record):
         totals[status.node] = totals.get(status.node, 0) + np.array(balance_of(status))
-    return rows + ['%-22s %9d %9d %9d %9d' % ((node,) + tuple(total)) for node, total in totals.items()]
+        for reason in BALANCES[status.node].reasons:
+            reasons[status.node, reason] += status.counts.get(reason, 0)
+    before = 0
+    for node in (node for node in BALANCES if node in totals):
+        row = (node, BALANCES[node].received, before + record.sent.get(TOPICS[node], 0)) + tuple(totals[node])
+        rows.append('%-22s %-14s %8d %8d %10d %8d %8d' % row)
+        before = totals[node][1]
+    titles = '%-22s %-14s %8s %8s %10s %8s %8s' % ('inputs of', '', 'sent', 'came', 'published', 'not', 'at work')
+    return [titles] + rows + ['not published by %-22s %6d %s' % (node, count, reason)
+                              for (node, reason), count in reasons.items() if count]
 
 
 def _processes(record):
@@ -70,23 +85,27 @@ def as_json(record, empty, findings, arguments):
     """All figures. Times are seconds since the begin."""
     def since(at_s):
         return None if at_s is None else at_s - record.began_s
-    first, last = thirds_of(record, lags_of(record))
     return {
-        'machine': describe_machine(), 'minutes': (record.ended_s - record.began_s) / 60, 'seed': arguments.seed,
-        'rate_hz': arguments.rate, 'detector': arguments.detector, 'images': len(record.images),
+        'machine': describe_machine(), 'minutes': since(record.ended_s) / 60, 'seed': arguments.seed,
+        'rate_hz': arguments.rate, 'detector': arguments.detector, 'images': _sent(record), 'sent': record.sent,
         'arrays': {topic: len(arrivals) for topic, arrivals in record.arrivals.items()}, 'empty': empty,
         'faults': [{'name': fault.name, 'began_s': since(fault.began_s), 'ended_s': since(fault.ended_s),
                     'recovered_s': since(fault.recovered_s)} for fault in record.faults],
-        'processes': [dict(node=node, pid=pid, **growth_of(record, statuses)._asdict())
-                      for (node, pid), statuses in processes_of(record).items()],
-        'memory_mb': {'%s %d' % key: [(since(status.at_s), status.rss_mb) for status in record.statuses
-                                      if (status.node, status.pid) == key]
-                      for key in set((status.node, status.pid) for status in record.statuses)},
-        'counts': [{'node': status.node, 'pid': status.pid, 'at_s': since(status.at_s), 'counts': status.counts}
-                   for status in last_of_each(record)],
-        'latency_ms': {name: np.percentile(lags[:, 2], (50, 95)).tolist() if len(lags) else None
-                       for name, lags in (('first', first), ('last', last))},
+        'processes': [dict(node=status.node, pid=status.pid, counts=status.counts, memory_mb=_memory(record, status))
+                      for status in last_of_each(record)],
+        'latency_ms': [np.percentile(lags[:, 2], (50, 95)).tolist() if len(lags) else None
+                       for lags in thirds_of(record, lags_of(record))],
         'invariants': [{'name': finding.name, 'holds': not finding.broken, 'measured': finding.measured,
                         'limit': finding.limit,
                         'broken': [{'at_s': since(at_s), 'what': what} for at_s, what in finding.broken]}
                        for finding in findings]}
+
+
+def _sent(record):
+    return sum(sent_s >= record.began_s for _stamp_ns, sent_s in record.images)
+
+
+def _memory(record, last):
+    """[[seconds, megabytes], ...] of the process of a Status."""
+    return [(status.at_s - record.began_s, status.rss_mb) for status in record.statuses
+            if (status.node, status.pid) == (last.node, last.pid)]

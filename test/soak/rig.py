@@ -125,7 +125,7 @@ class Rig(object):
         """What was written down."""
         witness, camera, graph = self.witness, self.camera, self.graph
         faults = [fault for fault in self.faults if fault.name != 'interrupted']
-        return Record(self._began_s, time.monotonic(), list(camera.images), set(camera.wrong_ns),
+        return Record(self._began_s, time.monotonic(), list(camera.images), set(camera.wrong_ns), dict(camera.sent),
                       {topic: list(arrivals) for topic, arrivals in witness.arrivals.items()}, list(witness.tracks),
                       list(witness.statuses), faults, list(graph.deaths), set(self.killed), list(graph.errors))
 
