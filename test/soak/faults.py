@@ -112,7 +112,7 @@ def bag_seeks(rig):
 @contextlib.contextmanager
 def wrong_messages(rig):
     """Beside the good ones, on all topics."""
-    rig.camera.throw_in = lambda stamp_ns, good: _wrong(rig.source, stamp_ns, good)
+    rig.camera.throw_in = lambda stamp_ns, good: _wrong(rig.wrong_source, stamp_ns, good)
     try:
         yield 'wrong messages'
     finally:

@@ -14,6 +14,7 @@ LAUNCH = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'l
 STARTED = re.compile(r'process\[([\w/]+)-\d+\]: started with pid \[(\d+)\]')
 ENDED = re.compile(r'\[([\w/]+)-\d+\] process has (died \[pid (\d+), exit code (-?\d+)|finished cleanly)')
 UNCAUGHT = re.compile(r'bad callback|Exception in thread|Segmentation|terminate called|Killed')
+TOLD = 12  # lines of the log, from an exception on
 NOT_OF_THE_PACKAGE = ('rosout', 'master')
 
 
@@ -43,14 +44,14 @@ class Graph(object):
     pids : {node: process number}
         Of those that run now.
     deaths, errors : list
-        See `records.Record`.
+        See `records.Record`; an error is the next lines of the log, too.
     """
 
     def __init__(self, folder, port, arguments):
         self.pids, self.deaths, self.errors = {}, [], []
         self.log = os.path.join(folder, 'launch.log')
         self._command = ['roslaunch', '-p', str(port), write_respawning(folder)] + arguments
-        self._process, self._is_ending = None, False
+        self._process, self._is_ending, self._left = None, False, 0
 
     def __enter__(self):
         # in a session of its own: a Ctrl-C in the terminal reaches it through here, once
@@ -87,5 +88,9 @@ class Graph(object):
             node, _how, pid, code = ended.groups()
             how = 'ended by itself' if code is None else 'died with exit code %s' % code
             self.deaths.append(Death(now_s, node, int(pid or self.pids.get(node, 0)), how))
+        elif self._left > 0:
+            self._left -= 1
+            self.errors[-1] = self.errors[-1][0], '%s\n%s' % (self.errors[-1][1], line[:300])
         elif UNCAUGHT.search(line):
             self.errors.append((now_s, line[:300]))
+            self._left = TOLD

@@ -9,7 +9,7 @@ import rospy
 
 from fuzz import hostile
 from ros_3d_bb.messages import TRACKS_TOPIC
-from ros_3d_bb.simulation.scenario import read_scenario
+from ros_3d_bb.simulation.scenario import ScenarioError, read_scenario
 from soak.camera import Camera, rendered
 from soak.faults import FAULTS
 from soak.graph import Graph, GraphEnded
@@ -30,10 +30,15 @@ class Interrupted(Exception):
 
 
 class Rig(object):
-    """What faults work on: `camera`, `graph`, `witness`, `source` of random values, and who was `killed`."""
+    """What faults work on: `camera`, `graph`, `witness`, and who was `killed`.
+
+    Of the seed are `source`, which says what comes when, and `wrong_source` of wrong messages: these depend on how many
+    images the machine sends, and must not change what comes next.
+    """
 
     def __init__(self, graph, scenes, arguments):
-        self.graph, self.source, self.killed, self.faults = graph, hostile.Source(arguments.seed), set(), []
+        self.graph, self.killed, self.faults = graph, set(), []
+        self.source, self.wrong_source = hostile.Source(arguments.seed), hostile.Source(arguments.seed + 1)
         self.witness, self.camera = Witness(graph), Camera(scenes, arguments.rate)
         self._stopped = threading.Event()
         self._seconds = 60 * arguments.minutes
@@ -139,19 +144,20 @@ def soak(arguments, port, folder):
         What was written down, with how many arrays were empty by topic; or None and why there is nothing; and whether
         somebody ended it.
     """
-    scenes = [rendered(read_scenario(path), arguments.images, arguments.detector == 'none')
-              for path in arguments.scenarios]
     options = {'detector': arguments.detector, 'planner': 'costmap', 'weights': arguments.weights or ''}
-    rig = None
     try:
+        scenes = [rendered(read_scenario(path), arguments.images, arguments.detector == 'none')
+                  for path in arguments.scenarios]
         with Graph(folder, port, ['%s:=%s' % option for option in options.items()]) as graph:
             _wait_for_master(graph)
             rospy.init_node('soak', disable_signals=True)
             rig = Rig(graph, scenes, arguments)
             interrupted = _played(rig)
             return rig.record(), dict(rig.witness.empty), interrupted
-    except (GraphEnded, KeyboardInterrupt) as error:
-        return None, '%s%s' % (error or 'ended before it began', _tail(folder)), False
+    except (GraphEnded, ScenarioError, OSError) as error:
+        return None, '%s%s' % (error, _tail(folder)), False
+    except KeyboardInterrupt:
+        return None, 'ended before it began', False
 
 
 def _played(rig):

@@ -8,13 +8,26 @@ import sys
 import pytest
 
 from soak.faults import FAULTS
-from soak.graph import write_respawning
+from soak.graph import Graph, write_respawning
 from support.launching import loaded
 from support.running import processes_naming
 
 TEST = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 SCENE = {'duration': 2.0, 'rate': 5.0, 'people': [{'start': [3.0, 0.6], 'facing': 3.1, 'repeat': True, 'moves': [
     {'to': [3.0, -0.6], 'speed': 0.6}, {'to': [3.0, 0.6], 'speed': 0.6}]}, {'start': [4.0, -0.7], 'facing': 3.1}]}
+LOG = """\x1b[1mprocess[master]: started with pid [10]\x1b[0m
+process[rosout-1]: started with pid [11]
+\x1b[1mprocess[bbox3d_node-2]: started with pid [12]\x1b[0m
+process[tracker_node-3]: started with pid [13]
+\x1b[31m[bbox3d_node-2] process has died [pid 12, exit code -9, cmd bbox3d_node].
+log file: bbox3d_node-2*.log\x1b[0m
+[bbox3d_node-2] restarting process
+\x1b[1mprocess[bbox3d_node-2]: started with pid [18]\x1b[0m
+[tracker_node-3] process has finished cleanly
+[ERROR] [160.1]: bad callback: <bound method>
+Traceback (most recent call last):
+KeyError: 3
+"""
 PATIENTLY = '600'  # seconds within which it has to recover: that depends on who else uses the machine
 
 
@@ -75,6 +88,23 @@ def test_arguments_that_make_no_sense_are_refused(soaking, arguments, complaint)
     process = soaking(*arguments)
     _printed, said = process.communicate()
     assert process.returncode == 2 and complaint in said
+
+
+def test_a_scenario_that_is_not_there_is_named(soaking):
+    process = soaking('--scenarios', 'nowhere.yaml')
+    _printed, said = process.communicate()
+    assert process.returncode == 1 and 'nowhere.yaml' in said and 'Traceback' not in said
+
+
+def test_the_log_of_the_graph_is_understood(tmp_path):
+    graph = Graph(str(tmp_path), 0, [])
+    for line in LOG.splitlines():
+        graph._understand(1.0, line)
+    assert graph.pids == {'bbox3d_node': 18, 'tracker_node': 13}
+    assert [death[1:] for death in graph.deaths] == [
+        ('bbox3d_node', 12, 'died with exit code -9'), ('tracker_node', 13, 'ended by itself')]
+    (_at_s, text), = graph.errors
+    assert text.startswith('[ERROR] [160.1]: bad callback') and text.endswith('KeyError: 3')
 
 
 def test_nodes_are_started_again_where_they_end(tmp_path):
