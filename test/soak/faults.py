@@ -193,11 +193,16 @@ def subscriber_never_reads(rig):
     """A process that connects to all outputs, and then stops."""
     process = subprocess.Popen([sys.executable, '-c', NEVER_READS] + ['/' + topic for topic in ALL_OUTPUTS])
     try:
-        rig.wait(2.0)
-        yield 'a subscriber never reads'
+        rig.wait_until(lambda: process.poll() is not None or _is_stopped(process.pid), 'a subscriber to stop')
+        yield 'a subscriber never reads' if process.poll() is None else 'a subscriber did not start'
     finally:
         process.kill()
         process.wait()
+
+
+def _is_stopped(pid):
+    with open('/proc/%d/stat' % pid) as stream:
+        return stream.read().rpartition(')')[2].split()[0] == 'T'
 
 
 @contextlib.contextmanager

@@ -13,6 +13,7 @@ WARM_UP_S = 60.0  # caches fill, and libraries take what they keep
 WARM_UP_SHARE = 0.15  # of the whole, where that is shorter
 LEAST_SAMPLES = 20  # of memory or CPU, to say anything
 RISE_MB = 20.0  # of the most memory that a process ever held
+HELD_MB = 150.0  # more than after the warm-up, whatever the reason: images that came while it hung
 CPU_RATIO, CPU_MORE_MS = 2.0, 5.0
 LAG_IMAGES = 3.0
 SHORTEST_S = 60.0  # a soak that was ended before has too few answers to compare
@@ -159,14 +160,15 @@ def processes_of(record):
 
 
 class Growth(NamedTuple):
-    """Memory of a process: seconds, megabytes at the start and the end, slope of the fitted line, and by how much it
-    rose without a reason.
+    """Memory of a process: seconds, megabytes at the start and the end, slope of the fitted line, by how much the most
+    that it held rose, and how much of that without a reason.
     """
 
     seconds: float
     first_mb: float
     last_mb: float
     mb_per_minute: float
+    held_mb: float
     risen_mb: float
 
 
@@ -174,7 +176,8 @@ def growth_of(record, statuses):
     """The Growth of a process.
 
     A fault may take memory once, as queues fill that were never full before; when it comes again, and between the
-    faults, the most that was ever taken has to do.
+    faults, the most that was ever taken has to do. How many images a process takes at once after it hung is chance:
+    that only has a bound.
     """
     times_s, rss_mb = np.array([(status.at_s, status.rss_mb) for status in statuses]).T
     slope = np.polyfit(times_s - times_s[0], rss_mb, 1)[0]
@@ -183,19 +186,23 @@ def growth_of(record, statuses):
     first_of = {fault.name: number for number, fault in reversed(list(enumerate(faults)))}
     begun = np.searchsorted([fault.began_s for fault in faults], times_s, side='right') - 1  # the latest, -1: none
     rises_mb = np.diff(np.maximum.accumulate(rss_mb))
-    counts = [number < 0 or first_of[faults[number].name] != number for number in begun[1:]]
+    hung = '%s hangs' % statuses[0].node
+    counts = [number < 0 or first_of[faults[number].name] != number and faults[number].name != hung
+              for number in begun[1:]]
     return Growth(float(times_s[-1] - times_s[0]), float(rss_mb[0]), float(rss_mb[-1]), float(60 * slope),
-                  float(rises_mb[np.array(counts, bool)].sum()))
+                  float(rises_mb.sum()), float(rises_mb[np.array(counts, bool)].sum()))
 
 
 def memory_is_flat(record):
     """Of each process after its warm-up, see `growth_of`."""
     growths = {key: growth_of(record, statuses) for key, statuses in processes_of(record).items()}
-    broken = [(record.ended_s, '%s (process %d): %+.1f MB in %.0f s' % (key + (growth.risen_mb, growth.seconds)))
-              for key, growth in growths.items() if growth.risen_mb > RISE_MB]
-    most = max([growth.risen_mb for growth in growths.values()], default=0.0)
-    return Finding('memory is flat', '%d processes, %+.1f MB at most, but what a fault takes when it first comes'
-                   % (len(growths), most), '%+.0f MB' % RISE_MB, broken)
+    broken = [(record.ended_s, '%s (process %d): %+.1f MB in %.0f s, %+.1f MB of them without a reason'
+               % (key + (growth.held_mb, growth.seconds, growth.risen_mb)))
+              for key, growth in growths.items() if growth.risen_mb > RISE_MB or growth.held_mb > HELD_MB]
+    held, risen = (max([getattr(growth, name) for growth in growths.values()], default=0.0)
+                   for name in ('held_mb', 'risen_mb'))
+    return Finding('memory is flat', '%d processes, %+.1f MB at most, %+.1f MB of a process without a reason'
+                   % (len(growths), held, risen), '%+.0f MB, %+.0f MB' % (HELD_MB, RISE_MB), broken)
 
 
 def cpu_ms_of(record, statuses):

@@ -1,7 +1,7 @@
 """Each invariant of the soak holds for a record of a graph that works, and breaks for one of a graph that does not."""
 import pytest
 
-from soak.invariants import (CPU_MORE_MS, LAG_IMAGES, RISE_MB, WAITING, WAITING_AT_END, cpu_is_flat,
+from soak.invariants import (CPU_MORE_MS, HELD_MB, LAG_IMAGES, RISE_MB, WAITING, WAITING_AT_END, cpu_is_flat,
                              every_input_has_an_outcome, findings_of, growth_of, it_recovers, memory_is_flat,
                              nobody_dies_of_a_message, numbers_are_not_reused, processes_of, queues_do_not_grow,
                              stamps_are_those_of_images, stamps_do_not_go_back, there_are_no_ghosts)
@@ -173,7 +173,7 @@ def test_memory_that_grows_is_found_and_that_of_the_warm_up_is_none():
     slope = 1.1 * RISE_MB / (SECONDS - 1 - begin_s)
     (_at_s, text), = broken_of(memory_is_flat, faults=[],
                                statuses=statuses_with(rss_mb=lambda second: 100 + slope * second))
-    assert text == 'tracker_node (process 42): +22.0 MB in 254 s'
+    assert text == 'tracker_node (process 42): +22.0 MB in 254 s, +22.0 MB of them without a reason'
     assert broken_of(memory_is_flat, statuses=statuses_with(rss_mb=lambda second: 100 + min(second, begin_s))) == []
 
 
@@ -184,14 +184,24 @@ def test_a_fault_may_take_memory_when_it_first_comes_but_not_again():
     def risen(second):
         return 100 + (second > 101) * 50.0 + (second > 201) * 21.0
     (_at_s, text), = broken_of(memory_is_flat, faults=[once, again], statuses=statuses_with(rss_mb=risen))
-    assert '+21.0 MB' in text
+    assert text.endswith('+71.0 MB in 254 s, +21.0 MB of them without a reason')
     other = again._replace(name='camera pauses')
     assert broken_of(memory_is_flat, faults=[once, other], statuses=statuses_with(rss_mb=risen)) == []
 
 
+@pytest.mark.parametrize('taken_mb, is_broken', [(HELD_MB - 1, False), (HELD_MB + 1, True)])
+def test_what_a_process_takes_after_it_hung_is_bounded(taken_mb, is_broken):
+    hung = [FaultDone('tracker_node hangs', BEGAN_S + begin_s, BEGAN_S + begin_s + 5, BEGAN_S + begin_s + 6, False)
+            for begin_s in (100, 200)]
+    statuses = statuses_with(rss_mb=lambda second: 100 + (second > 101) * 10 + (second > 201) * (taken_mb - 10))
+    assert len(broken_of(memory_is_flat, faults=hung, statuses=statuses)) == is_broken
+    others = [fault._replace(name='bbox3d_node hangs') for fault in hung]
+    assert len(broken_of(memory_is_flat, faults=others, statuses=statuses)) == 1
+
+
 def test_memory_that_is_given_back_and_taken_again_has_not_risen():
     statuses = statuses_with(rss_mb=lambda second: 100 + 30.0 * (second // 10 % 2))
-    assert broken_of(memory_is_flat, statuses=statuses, faults=[])[0][1].endswith('+30.0 MB in 254 s')
+    assert broken_of(memory_is_flat, statuses=statuses, faults=[])[0][1].endswith('+30.0 MB of them without a reason')
     assert growth_of(sound(faults=[]), statuses[50:]).risen_mb == 0
 
 
