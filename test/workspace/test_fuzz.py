@@ -22,6 +22,7 @@ from support.masterless import masterless
 TOPICS = ('camera/color/camera_info', 'camera/aligned_depth_to_color/image_raw', 'camera/color/image_raw',
           'yolo_bounding_box')
 
+
 def test_functions_refuse_wrong_values_by_a_value_error():
     counts = fuzz_functions(7, 10000)
     assert sum(calls for calls, _refused in counts.values()) == 10000 and set(counts) == set(FUNCTIONS)
