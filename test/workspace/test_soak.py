@@ -4,9 +4,12 @@ import os
 import signal
 import subprocess
 import sys
+from unittest import mock
 
 import pytest
 
+from fuzz.hostile import Source, good_frame
+from ros_3d_bb.stamped import NS
 from soak.faults import FAULTS
 from soak.graph import Graph, write_respawning
 from support.launching import loaded
@@ -28,6 +31,7 @@ log file: bbox3d_node-2*.log\x1b[0m
 Traceback (most recent call last):
 KeyError: 3
 """
+NOW_NS = 1000 * NS
 PATIENTLY = '600'  # seconds within which it has to recover: that depends on who else uses the machine
 
 
@@ -111,6 +115,27 @@ def test_nodes_are_started_again_where_they_end(tmp_path):
     parameters, nodes = loaded(write_respawning(str(tmp_path)), 'detector:=depth', 'planner:=costmap')
     assert parameters['/use_sim_time'] is True and len(nodes) == 4
     assert all(node.respawn for node in nodes.values())
+
+
+def named_faults(seed, images):
+    """The faults of two rounds, with so many images in each; nothing is really done."""
+    rig = mock.Mock(source=Source(seed), wrong_source=Source(seed + 1), killed=set())
+    rig.graph.pids = {'depth_detector_node': 1, 'bbox3d_node': 2, 'tracker_node': 3}
+    names = []
+    with mock.patch('soak.faults.os.kill'), mock.patch('soak.faults.subprocess.Popen'), \
+            mock.patch('soak.faults.eating_a_core'):
+        for fault in 2 * rig.source.sample([fault for fault, _lasts, _disturbs in FAULTS], len(FAULTS)):
+            rig.camera.throw_in = None
+            with fault(rig) as name:
+                names.append((name, rig.source.random()))
+                for _image in range(images if rig.camera.throw_in else 0):
+                    rig.camera.throw_in(NOW_NS, good_frame(NOW_NS))
+    return names
+
+
+def test_the_seed_says_what_comes_however_many_images_the_machine_sends():
+    assert named_faults(3, 1) == named_faults(3, 9) != named_faults(4, 1)
+    assert len(set(name for name, _value in named_faults(3, 1))) >= len(FAULTS)
 
 
 def test_each_kind_of_fault_says_what_it_is():
