@@ -1,16 +1,14 @@
 """The pipeline under roslaunch, each node started again where it ends, and what roslaunch says of them."""
-import glob
 import os
 import re
 import subprocess
 import threading
 import time
-import xml.etree.ElementTree as ElementTree
 
 from ros_3d_bb.evaluation.latency import end
 from soak.records import Death
 
-LAUNCH = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'launch')
+LAUNCH = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'soak.launch')
 STARTED = re.compile(r'process\[([\w/]+)-\d+\]: started with pid \[(\d+)\]')
 ENDED = re.compile(r'\[([\w/]+)-\d+\] process has (died \[pid (\d+), exit code (-?\d+)|finished cleanly)')
 UNCAUGHT = re.compile(r'bad callback|Exception in thread|Segmentation|terminate called|Killed')
@@ -20,20 +18,6 @@ NOT_OF_THE_PACKAGE = ('rosout', 'master')
 
 class GraphEnded(Exception):
     """roslaunch ended, or its nodes never came: says why."""
-
-
-def write_respawning(folder):
-    """Write launch files whose nodes are started again, and with /use_sim_time. Returns the path of the pipeline's."""
-    for path in glob.glob(os.path.join(LAUNCH, '*.launch')):
-        tree = ElementTree.parse(path)
-        for node in tree.iter('node'):
-            node.set('respawn', 'true')
-            node.attrib.pop('required', None)
-        for include in tree.iter('include'):
-            include.set('file', include.get('file').replace('$(find ros_3d_bb)/launch', folder))
-        tree.getroot().insert(0, ElementTree.Element('param', {'name': '/use_sim_time', 'value': 'true'}))
-        tree.write(os.path.join(folder, os.path.basename(path)))
-    return os.path.join(folder, 'pipeline.launch')
 
 
 class Graph(object):
@@ -50,7 +34,7 @@ class Graph(object):
     def __init__(self, folder, port, arguments):
         self.pids, self.deaths, self.errors = {}, [], []
         self.log = os.path.join(folder, 'launch.log')
-        self._command = ['roslaunch', '-p', str(port), write_respawning(folder)] + arguments
+        self._command = ['roslaunch', '-p', str(port), LAUNCH] + arguments
         self._process, self._is_ending, self._left = None, False, 0
 
     def __enter__(self):

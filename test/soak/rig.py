@@ -144,7 +144,7 @@ def soak(arguments, port, folder):
         What was written down, with how many arrays were empty by topic; or None and why there is nothing; and whether
         somebody ended it.
     """
-    options = {'detector': arguments.detector, 'planner': 'costmap', 'weights': arguments.weights or ''}
+    options = {'detector': arguments.detector, 'weights': arguments.weights or ''}
     try:
         scenes = [rendered(read_scenario(path), arguments.images, arguments.detector == 'none')
                   for path in arguments.scenarios]

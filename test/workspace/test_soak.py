@@ -11,7 +11,7 @@ import pytest
 from fuzz.hostile import Source, good_frame
 from ros_3d_bb.stamped import NS
 from soak.faults import FAULTS
-from soak.graph import Graph, write_respawning
+from soak.graph import LAUNCH, Graph
 from support.launching import loaded
 from support.running import processes_naming
 
@@ -50,7 +50,7 @@ def soaking(tmp_path):
 
 
 def test_two_minutes_of_faults_break_nothing(soaking, tmp_path):
-    process = soaking('--minutes', '2', '--seed', '7', '--recover-within', PATIENTLY, '--json', 'soak.json')
+    process = soaking('--minutes', '2', '--seed', '8', '--recover-within', PATIENTLY, '--json', 'soak.json')
     printed, said = process.communicate()
     assert process.returncode == 0, printed + said
     with open(str(tmp_path / 'soak.json')) as stream:
@@ -111,8 +111,8 @@ def test_the_log_of_the_graph_is_understood(tmp_path):
     assert text.startswith('[ERROR] [160.1]: bad callback') and text.endswith('KeyError: 3')
 
 
-def test_nodes_are_started_again_where_they_end(tmp_path):
-    parameters, nodes = loaded(write_respawning(str(tmp_path)), 'detector:=depth', 'planner:=costmap')
+def test_nodes_are_started_again_where_they_end():
+    parameters, nodes = loaded(LAUNCH, 'detector:=depth')
     assert parameters['/use_sim_time'] is True and len(nodes) == 4
     assert all(node.respawn for node in nodes.values())
 
