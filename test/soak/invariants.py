@@ -86,12 +86,12 @@ def _was_killed(record, status):
 
 
 def stamps_do_not_go_back(record):
-    """But where a fault made time go back, or sent wrong stamps."""
+    """But where a fault made time go back, or sent wrong stamps, between the two messages."""
     broken, count = [], 0
     for topic, arrivals in record.arrivals.items():
-        for (_before_s, before_ns), (at_s, stamp_ns) in zip(arrivals, arrivals[1:]):
+        for (before_s, before_ns), (at_s, stamp_ns) in zip(arrivals, arrivals[1:]):
             count += 1
-            if stamp_ns < before_ns and not any(fault.disturbs and fault.covers(at_s, BEHIND_S)
+            if stamp_ns < before_ns and not any(fault.disturbs and fault.overlaps(before_s, at_s, BEHIND_S)
                                                 for fault in record.faults):
                 broken.append((at_s, '%s: %.3f after %.3f' % (topic, stamp_ns * 1e-9, before_ns * 1e-9)))
     return Finding('no stamp older than its predecessor', '%d pairs of messages' % count,

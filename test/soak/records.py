@@ -42,9 +42,13 @@ class FaultDone(NamedTuple):
     recovered_s: Optional[float]
     disturbs: bool
 
-    def covers(self, at_s, margin_s=0.0):
+    def covers(self, at_s):
         """Whether a time lies between its beginning and the recovery."""
-        return self.began_s <= at_s and (self.recovered_s is None or at_s <= self.recovered_s + margin_s)
+        return self.overlaps(at_s, at_s, 0.0)
+
+    def overlaps(self, from_s, to_s, margin_s):
+        """Whether a part of a time lies between its beginning and the recovery and so much more."""
+        return self.began_s <= to_s and (self.recovered_s is None or from_s <= self.recovered_s + margin_s)
 
 
 class Record(NamedTuple):

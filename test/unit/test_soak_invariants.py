@@ -101,6 +101,16 @@ def test_a_fault_that_lasts_excuses_no_older_stamp_unless_it_makes_time_go_back(
                          faults=[fault._replace(disturbs=True)])) == 1
 
 
+def test_after_a_jump_the_first_message_may_come_late():
+    """Markers carry no stamp while there is nobody."""
+    jump = sound().faults[0]._replace(disturbs=True)
+    sparse = {'visualization_marker_array': [(BEGAN_S + 90, stamp_at(BEGAN_S + 90)),
+                                             (BEGAN_S + 150, stamp_at(BEGAN_S + 80)),
+                                             (BEGAN_S + 151, stamp_at(BEGAN_S + 79))]}
+    (at_s, _text), = broken_of(stamps_do_not_go_back, arrivals=sparse, faults=[jump])
+    assert at_s == 151
+
+
 def test_equal_stamps_are_in_order():
     twice = [(BEGAN_S, STAMPED_NS), (BEGAN_S + 0.1, STAMPED_NS)]
     assert broken_of(stamps_do_not_go_back, arrivals={'ros_3d_bb/tracks': twice}) == []
