@@ -40,10 +40,13 @@ def write(path, text):
 
 
 def stand_in_launch_file(folder, name, arguments, more=''):
-    """A launch file `package/...` in `folder` that knows these arguments and puts them into parameters /stub/NAME."""
+    """A launch file `package/...` in `folder` that knows these arguments and puts them into parameters /stub/NAME.
+
+    `more` stands below them, and may use them.
+    """
     lines = ['<arg name="%s" default=""/><param name="/stub/%s" type="str" value="$(arg %s)"/>' % ((arg,) * 3)
              for arg in arguments]
-    write(folder / name, '<launch>%s%s</launch>' % (more, ''.join(lines)))
+    write(folder / name, '<launch>%s%s</launch>' % (''.join(lines), more))
     package = name.split('/')[0]
     write(folder / package / 'package.xml', '<package format="2"><name>%s</name></package>' % package)
 

@@ -17,11 +17,14 @@ SUPPORT = os.path.join(ROOT, 'test', 'support')
 PATIENCE_S = 120  # of a machine that is busy; nothing waits so long where all is well
 # A driver has the camera's frames below camera_link, and knows nothing of the robot.
 CAMERA_DRIVER = """
-<node pkg="ros_3d_bb" type="replay_node" name="realsense">
+<node pkg="ros_3d_bb" type="replay_node" name="$(arg camera)_realsense">
   <param name="bag" value="$(env READER_BAG)"/> <param name="rate" value="5"/> <remap from="/tf" to="not_a_driver"/>
+  <remap from="camera/color/image_raw" to="$(arg camera)/color/image_raw"/>
+  <remap from="camera/color/camera_info" to="$(arg camera)/color/camera_info"/>
+  <remap from="camera/aligned_depth_to_color/image_raw" to="$(arg camera)/aligned_depth_to_color/image_raw"/>
 </node>
-<node pkg="tf2_ros" type="static_transform_publisher" name="frames"
-      args="0 0 0 -0.5 0.5 -0.5 0.5 camera_link camera_color_optical_frame"/>"""
+<node pkg="tf2_ros" type="static_transform_publisher" name="$(arg camera)_frames"
+      args="0 0 0 -0.5 0.5 -0.5 0.5 $(arg camera)_link $(arg camera)_color_optical_frame"/>"""
 # robot_upstart makes a job of a launch file, so one that can be loaded.
 UPSTART = """#!/bin/bash
 echo "robot_upstart install $*" >> "$READER_LOG"

@@ -37,6 +37,8 @@ SLIDERS = claimed('rosrun rqt_reconfigure')
 SIMULATION = claimed('roslaunch ros_3d_bb simulation.launch scenario:=')
 DOCTOR = claimed('rosrun ros_3d_bb doctor\n')
 GAZEBO = claimed('roslaunch ros_3d_bb gazebo.launch')
+FRONT, REAR = (claimed('roslaunch ros_3d_bb realsense.launch camera:=' + name) for name in ('front', 'rear'))
+BOTH = claimed('roslaunch ros_3d_bb pipeline.launch cameras:=front,rear')
 
 
 def test_a_jackal_gets_camera_tracks_and_planner_with_one_command(reader, camera_bag):
@@ -120,3 +122,19 @@ def test_the_pipeline_runs_beside_gazebo(reader, camera_bag):
         graph.hears(TRACKS)
         description = subprocess.check_output(['rosparam', 'get', '/robot_description'], env=graph.environment)
     assert b'camera_color_optical_frame' in description
+
+
+def test_two_realsenses_and_one_tracker(reader, camera_bag):
+    """The bag's images, and so those of both cameras, are in one frame."""
+    with reader.running(FRONT, READER_BAG=camera_bag) as front:
+        front.hears(*(topic.replace('camera/', 'front/', 1) for topic in IMAGES))
+        on_it = {'ROS_MASTER_URI': front.environment['ROS_MASTER_URI']}
+        front.start(['rosrun', 'tf2_ros', 'static_transform_publisher',
+                     *'0 0 1 -0.5 0.5 -0.5 0.5 map camera_color_optical_frame'.split()])
+        with reader.running(REAR, READER_BAG=camera_bag, **on_it) as rear, \
+                reader.running(BOTH, DISPLAY=reader.screen(), **on_it) as both:
+            rear.hears(*(topic.replace('camera/', 'rear/', 1) for topic in IMAGES))
+            both.hears('front/' + BOXES, 'rear/' + BOXES, TRACKS, MARKERS)
+            both.shows('RViz')
+            told = subprocess.check_output(['rosparam', 'get', '/stub/serial_no'], env=both.environment)
+    assert told.decode().strip() == 'NUMBER_OF_THE_OTHER'
