@@ -1,6 +1,7 @@
 """Fit an error model to measured positions with ground truth, and say how well it does at positions it never saw.
 
-A position counts once, however often it was measured: its repetitions share one bias of where the person stood.
+In bias and law of the spread a position counts once, however often it was measured: its repetitions share one bias of
+where the person stood. The widening of the spread and the scores count measurements.
 """
 from typing import NamedTuple
 
