@@ -204,5 +204,5 @@ def _nodes(seen, is_explained):
         if level == 0:
             found.append(Finding(name, sentence))
         elif not is_explained:
-            found.append(Finding(name, '', sentence, 'see its log, and "When nothing is shown" in the README'))
+            found.append(Finding(name, '', sentence, 'see its log, and "When something is wrong" in the README'))
     return found
