@@ -40,11 +40,14 @@ class TrackerNodeParams(NamedTuple):
 
 
 class Located(NamedTuple):
-    """A BoundingBox3DArray of a camera (its namespace, '' for the only one) whose transform is known, (4, 4)."""
+    """A BoundingBox3DArray of a camera (its namespace, '' for the only one) whose transform is known, (4, 4), and how
+    often time had gone back until it came.
+    """
 
     message: Any
     camera: str
     fixed_from_camera: np.ndarray
+    jumps: int
 
 
 class Followed(NamedTuple):
@@ -82,6 +85,7 @@ class Follower(object):
         self._images_lock, self._tracks_lock = threading.Lock(), threading.Lock()
         self._newest_ns = {}  # by camera, of the images that were taken
         self._before_ns, self._jump_ns = {}, 0  # of cameras whose stamps have not gone back yet; where others' went
+        self._jumps = 0
         self._frames = {}  # and the cameras that have them
         self._intrinsics = {}
         self._depths = {camera: StampedCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
@@ -118,7 +122,7 @@ class Follower(object):
         Returns
         -------
         Followed or None
-            None where there is no transform for it.
+            None where there is no transform for it, or where it is of the time before a jump back.
 
         Raises
         ------
@@ -134,31 +138,42 @@ class Follower(object):
         Returns
         -------
         Located or None
-            None where there is no transform for it. Raises ValueError as `add_boxes`.
+            As of `add_boxes`, and ValueError, too.
         """
         stamp_ns = stamp_of(message)
         frame_id = self._params.camera_frame or message.header.frame_id
         with self._tracks_lock:
             if not self._follow_time(stamp_ns, camera):
                 return None
+            jumps = self._jumps
         try:
             return Located(message, camera, self._transforms.lookup(self._params.target_frame, frame_id,
-                                                                    message.header.stamp))
+                                                                    message.header.stamp), jumps)
         except tf2_ros.TransformException as error:
             with self._tracks_lock:
-                self._tracker.skip(stamp_ns, camera or message.header.frame_id)
+                if jumps == self._jumps:
+                    self._tracker.skip(stamp_ns, camera or message.header.frame_id)
             self._tally.warn('no transform', 'no transform from %s to %s at %.3f: %s; tracks are kept as they are'
                              % (frame_id, self._params.target_frame, stamp_ns / NS, error))
             return None
 
     def follow(self, located):
-        """Track what is in a Located. Returns Followed; raises ValueError as `add_boxes`."""
-        message, camera, fixed_from_camera = located
+        """Track what is in a Located.
+
+        Returns
+        -------
+        Followed or None
+            None where time went back since it was located. Raises ValueError as `add_boxes`.
+        """
+        message, camera, fixed_from_camera, jumps = located
         stamp_ns = stamp_of(message)
         if camera:
             self._check_frame(message.header.frame_id, camera)
         detections = detections_from_message(message, fixed_from_camera)
         with self._tracks_lock:
+            if jumps != self._jumps:
+                self._leave_out(stamp_ns, camera)
+                return None
             tracks = self._tracker.update(stamp_ns, detections, self._view(stamp_ns, located))
             self._newest_ns[camera] = max(stamp_ns, self._newest_ns.get(camera, stamp_ns))
             newest_ns = max(self._newest_ns.values())
@@ -194,14 +209,20 @@ class Follower(object):
             self._transforms.go_back()
             self._newest_ns.pop(camera)
             self._before_ns, self._newest_ns, self._jump_ns = self._newest_ns, {}, stamp_ns
+            self._jumps += 1
         if camera not in self._before_ns:
             return True
         now_ns = max(self._newest_ns.values(), default=self._jump_ns)
         if stamp_ns > max(self._before_ns[camera] - JUMP_NS, now_ns + JUMP_NS):
-            self._tally.count('images of the time before')
+            self._leave_out(stamp_ns, camera)
             return False
         del self._before_ns[camera]
         return True
+
+    def _leave_out(self, stamp_ns, camera):
+        self._tally.warn('images of the time before', 'boxes%s at %.3f are taken for those of the time before stamps '
+                         'went back to %.3f, and left out' % (' of ' + camera if camera else '', stamp_ns / NS,
+                                                              self._jump_ns / NS))
 
     def _check_frame(self, frame_id, camera):
         """Say so where two cameras have one frame: tf then takes them to be in one place."""

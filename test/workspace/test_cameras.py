@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import rosbag
 import tf2_ros
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped
 from std_msgs.msg import Header
 
 from ros_3d_bb.bag_processing import process_bag
@@ -102,12 +103,15 @@ def test_the_node_publishes_what_process_bag_writes(bags):
 
 
 class Transforms(object):
-    """Cameras that look along x from one place; none for the frames in `missing`."""
+    """Cameras that look along x from one place; none for the frames in `missing`. By frame, `while_waiting` is called
+    in the next wait for one.
+    """
 
     def __init__(self):
-        self.missing, self.jumps = set(), 0
+        self.missing, self.while_waiting, self.jumps = set(), {}, 0
 
     def lookup(self, _target, source, _stamp):
+        self.while_waiting.pop(source, lambda: None)()
         if source in self.missing:
             raise tf2_ros.LookupException('no such frame')
         return transform_from((0, 0, 1), OPTICAL_ROTATION)
@@ -125,11 +129,14 @@ class Rig(object):
         self.follower = Follower(params, [kind() for kind in TRACKING_PARAMS], self.tally, self.transforms)
 
     def send(self, stamp_ns, camera, frame_id=None, count=1):
-        box = BoundingBox3D()
-        box.center.position.z = 3.0
-        box.size.x, box.size.y, box.size.z = 0.5, 1.7, 0.5
-        header = Header(stamp=time_from(stamp_ns), frame_id=frame_id or camera)
-        return self.follower.add_boxes(BoundingBox3DArray(header=header, boxes=[box] * count), camera)
+        return self.follower.add_boxes(boxes(stamp_ns, frame_id or camera, count), camera)
+
+
+def boxes(stamp_ns, frame_id, count=1):
+    box = BoundingBox3D()
+    box.center.position.z = 3.0
+    box.size.x, box.size.y, box.size.z = 0.5, 1.7, 0.5
+    return BoundingBox3DArray(header=Header(stamp=time_from(stamp_ns), frame_id=frame_id), boxes=[box] * count)
 
 
 @pytest.fixture
@@ -169,6 +176,51 @@ def test_where_time_goes_back_images_of_the_time_before_are_left_out(rig):
         assert (rear is None) == (late < 0)
     assert rig.transforms.jumps == 1 and rig.tally.counts['images of the time before'] == 3
     assert [track.id for track in front.tracks] == [2] and stamp_of(rear) == START_NS + 19 * PERIOD_NS
+
+
+def test_an_image_that_waits_for_its_transform_while_time_goes_back_is_left_out(rig):
+    """The front camera's first image of the new time comes in the rear camera's wait; the rear camera ends there."""
+    for number in range(200):
+        rig.send(START_NS + number * PERIOD_NS, 'front')
+    rig.transforms.while_waiting['rear'] = lambda: rig.send(START_NS, 'front')
+    assert rig.send(START_NS + 200 * PERIOD_NS, 'rear') is None
+    for number in range(1, 20):
+        front = rig.send(START_NS + number * PERIOD_NS, 'front')
+    assert rig.transforms.jumps == 1 and rig.tally.counts['images of the time before'] == 1
+    assert [track.id for track in front.tracks] == [2]
+
+
+def test_an_image_that_found_no_transform_while_time_went_back_hides_nobody_of_the_new_time(rig):
+    """Were it counted as skipped, the rear camera's next one would be taken for that of a moment later."""
+    for number in range(200):
+        rig.send(START_NS + number * PERIOD_NS, 'front')
+    rig.transforms.missing.add('rear')
+    rig.transforms.while_waiting['rear'] = lambda: rig.send(START_NS, 'front')
+    assert rig.send(START_NS + 200 * PERIOD_NS, 'rear') is None
+    rig.transforms.missing.clear()
+    for number in range(1, 6):
+        front = rig.send(START_NS + number * PERIOD_NS, 'front')
+    assert len(front.tracks) == 1
+    assert rig.send(START_NS + 17 * PERIOD_NS, 'rear', count=0).tracks == []
+
+
+def test_the_node_publishes_nothing_of_the_time_before():
+    """The tf buffer is asked for the rear camera's transform when the front camera's stamps go back."""
+    with masterless({'tf_timeout': 0.0, 'cameras': 'front, rear'}) as connections:
+        TrackerNode()
+        tracks, transforms = connections.publishers['ros_3d_bb/tracks'], Transforms()
+
+        def send(camera, seconds):
+            connections.send(camera + '/ros_3d_bb/bb_3d', on_the_wire(boxes(START_NS + seconds * NS, camera)))
+
+        def lookup(target, source, stamp):
+            transforms.lookup(target, source, stamp)
+            return TransformStamped(transform=Transform(rotation=Quaternion(-0.5, 0.5, -0.5, 0.5)))
+        connections.buffers[0].lookup_transform = lookup
+        send('front', 20)
+        transforms.while_waiting['rear'] = lambda: send('front', 0)
+        send('rear', 20)
+        assert tracks.count == 2 and tracks.newest.header.stamp == time_from(START_NS)
 
 
 def test_a_camera_without_a_transform_leaves_the_other_to_go_on(rig):

@@ -94,7 +94,9 @@ class TrackerNode(object):
             if located is None:
                 return
             with self._lock:
-                self._publish(self._follower.follow(located))
+                followed = self._follower.follow(located)
+                if followed is not None:
+                    self._publish(followed)
 
     def _publish(self, followed):
         tracks = self._numbers.continued(followed.tracks)
