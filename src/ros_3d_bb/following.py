@@ -22,6 +22,7 @@ from ros_3d_bb.tracking.visibility import depths_towards, edges_of
 TRACKING_PARAMS = ThesisTrackerParams, TrackerParams, NoiseParams, PredictionParams
 TRACKERS = {'thesis': (ThesisTracker, slice(0, 1)), 'kalman': (Tracker, slice(1, 4))}  # with their part of those
 JUMP_NS = NS  # stamps of a camera that go back by more are a jump in time, by less a late message
+ON_THE_WAY_NS = 2 * NS  # so long after one cameras may send images of the time before; who goes on has another clock
 NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/\w+)*$')
 
 
@@ -50,6 +51,14 @@ class Located(NamedTuple):
     jumps: int
 
 
+class _Jump(NamedTuple):
+    """How often time has gone back, and of the last time: the first stamp after it, and when that arrived."""
+
+    number: int = 0
+    stamp_ns: int = 0
+    arrival_ns: int = 0
+
+
 class Followed(NamedTuple):
     """The tracks (`tracked.TrackedObject`) after one image; the header has the newest stamp and the fixed frame."""
 
@@ -60,7 +69,8 @@ class Followed(NamedTuple):
 class Follower(object):
     """Follow 3D boxes in a fixed frame. Without a transform at their stamp there is no answer and nobody ages.
 
-    Each message comes with the namespace of its camera, '' for the only one. Methods may be called from any thread.
+    Each message comes with the namespace of its camera, '' for the only one; boxes and depth also with when they
+    arrived, `now_ns` on a clock of the caller's. Methods may be called from any thread.
 
     Parameters
     ----------
@@ -84,8 +94,7 @@ class Follower(object):
         self._tracker = _trackers_of(tracking)[params.tracker]
         self._images_lock, self._tracks_lock = threading.Lock(), threading.Lock()
         self._newest_ns = {}  # by camera, of the images that were taken
-        self._before_ns, self._jump_ns = {}, 0  # of cameras whose stamps have not gone back yet; where others' went
-        self._jumps = 0
+        self._before_ns, self._jump = {}, _Jump()  # the newest before it, of cameras that may not have jumped yet
         self._frames = {}  # and the cameras that have them
         self._intrinsics = {}
         self._depths = {camera: StampedCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
@@ -116,7 +125,7 @@ class Follower(object):
         with self._images_lock:
             self._depths[camera].add(stamp_of(message), now_ns, message)
 
-    def add_boxes(self, message, camera=''):
+    def add_boxes(self, message, now_ns, camera=''):
         """Take a BoundingBox3DArray: `locate` it and `follow` what is in it.
 
         Returns
@@ -129,10 +138,10 @@ class Follower(object):
         ValueError
             If it cannot be used.
         """
-        located = self.locate(message, camera)
+        located = self.locate(message, now_ns, camera)
         return None if located is None else self.follow(located)
 
-    def locate(self, message, camera=''):
+    def locate(self, message, now_ns, camera=''):
         """Find out where the camera of a BoundingBox3DArray was, which may have to be waited for.
 
         Returns
@@ -143,15 +152,15 @@ class Follower(object):
         stamp_ns = stamp_of(message)
         frame_id = self._params.camera_frame or message.header.frame_id
         with self._tracks_lock:
-            if not self._follow_time(stamp_ns, camera):
+            if not self._is_of_this_time(stamp_ns, now_ns, camera):
                 return None
-            jumps = self._jumps
+            jumps = self._jump.number
         try:
             return Located(message, camera, self._transforms.lookup(self._params.target_frame, frame_id,
                                                                     message.header.stamp), jumps)
         except tf2_ros.TransformException as error:
             with self._tracks_lock:
-                if jumps == self._jumps:
+                if jumps == self._jump.number:
                     self._tracker.skip(stamp_ns, camera or message.header.frame_id)
             self._tally.warn('no transform', 'no transform from %s to %s at %.3f: %s; tracks are kept as they are'
                              % (frame_id, self._params.target_frame, stamp_ns / NS, error))
@@ -171,7 +180,7 @@ class Follower(object):
             self._check_frame(message.header.frame_id, camera)
         detections = detections_from_message(message, fixed_from_camera)
         with self._tracks_lock:
-            if jumps != self._jumps:
+            if jumps != self._jump.number:
                 self._leave_out(stamp_ns, camera)
                 return None
             tracks = self._tracker.update(stamp_ns, detections, self._view(stamp_ns, located))
@@ -196,33 +205,40 @@ class Follower(object):
                     depth_at = functools.partial(depths_towards, camera, depth)
         return View(located.fixed_from_camera, edges_of(camera), name, depth_at)
 
-    def _follow_time(self, stamp_ns, camera):
-        """Forget tracks and transforms where the stamps of a camera went back: a bag looped, or somebody sought in it.
-
-        Other cameras may still send images of the time before then; returns whether this is none of them.
-        """
+    def _is_of_this_time(self, stamp_ns, now_ns, camera):
+        """Whether boxes are none of the time before a jump back; where they are the first after one, follow it."""
         newest_ns = self._newest_ns.get(camera)
         if newest_ns is not None and stamp_ns < newest_ns - JUMP_NS:
-            self._tally.note('jumps back in time', 'time went back from %.3f to %.3f: tracks and transforms of the '
-                             'time before are forgotten' % (newest_ns / NS, stamp_ns / NS))
-            self._tracker.reset()
-            self._transforms.go_back()
-            self._newest_ns.pop(camera)
-            self._before_ns, self._newest_ns, self._jump_ns = self._newest_ns, {}, stamp_ns
-            self._jumps += 1
+            self._go_back(stamp_ns, now_ns, camera)
         if camera not in self._before_ns:
             return True
-        now_ns = max(self._newest_ns.values(), default=self._jump_ns)
-        if stamp_ns > max(self._before_ns[camera] - JUMP_NS, now_ns + JUMP_NS):
+        latest_ns = max(self._newest_ns.values(), default=self._jump.stamp_ns)
+        is_before = stamp_ns > max(self._before_ns[camera] - JUMP_NS, latest_ns + JUMP_NS)
+        if is_before and now_ns - self._jump.arrival_ns < ON_THE_WAY_NS:
             self._leave_out(stamp_ns, camera)
             return False
         del self._before_ns[camera]
         return True
 
+    def _go_back(self, stamp_ns, now_ns, camera):
+        """Forget tracks and transforms, as the stamps of a camera went back: a bag looped, or somebody sought in it.
+
+        Images of other cameras may still be on their way from the time before.
+        """
+        self._tally.note('jumps back in time', 'time went back from %.3f to %.3f: tracks and transforms of the '
+                         'time before are forgotten' % (self._newest_ns.pop(camera) / NS, stamp_ns / NS))
+        self._tracker.reset()
+        self._transforms.go_back()
+        self._before_ns.update(self._newest_ns)
+        self._newest_ns = {}
+        self._jump = _Jump(self._jump.number + 1, stamp_ns, now_ns)
+
     def _leave_out(self, stamp_ns, camera):
+        """Say that boxes are of the time before."""
         self._tally.warn('images of the time before', 'boxes%s at %.3f are taken for those of the time before stamps '
-                         'went back to %.3f, and left out' % (' of ' + camera if camera else '', stamp_ns / NS,
-                                                              self._jump_ns / NS))
+                         'went back to %.3f, and left out; after %.0f s such boxes are taken again'
+                         % (' of ' + camera if camera else '', stamp_ns / NS, self._jump.stamp_ns / NS,
+                            ON_THE_WAY_NS / NS))
 
     def _check_frame(self, frame_id, camera):
         """Say so where two cameras have one frame: tf then takes them to be in one place."""

@@ -87,7 +87,7 @@ class Pipeline(object):
             return self._taken('add_depth', message, now_ns, camera)
         if topic == COLOR_TOPIC:
             return self._searched(self._searches[camera].add_color(message, now_ns), now_ns, camera)
-        return self._followed(self._lifters[camera].add_boxes(message, now_ns), camera)
+        return self._followed(self._lifters[camera].add_boxes(message, now_ns), now_ns, camera)
 
     def found(self, header, found, now_ns, camera=''):
         """Take what a detector found in the image of a header. Returns as `take`."""
@@ -95,7 +95,7 @@ class Pipeline(object):
             return []
         message = boxes2d_to_message(found.boxes, header)
         return [(topic_of(camera, BOXES_TOPIC), message)] + self._followed(
-            self._lifters[camera].add_boxes(message, now_ns), camera)
+            self._lifters[camera].add_boxes(message, now_ns), now_ns, camera)
 
     @contextlib.contextmanager
     def searching(self):
@@ -115,7 +115,7 @@ class Pipeline(object):
         outputs = []
         if self._searches:
             outputs += self._searched(getattr(self._searches[camera], add)(message, now_ns), now_ns, camera)
-        return outputs + self._followed(getattr(self._lifters[camera], add)(message, now_ns), camera)
+        return outputs + self._followed(getattr(self._lifters[camera], add)(message, now_ns), now_ns, camera)
 
     def _searched(self, pairs, now_ns, camera):
         outputs = []
@@ -126,13 +126,13 @@ class Pipeline(object):
                     outputs += self.found(pair[1].header, found[1], now_ns, camera)
         return outputs
 
-    def _followed(self, images, camera):
+    def _followed(self, images, now_ns, camera):
         outputs = []
         for lifted in images:
             boxes = boxes3d_to_message(lifted.boxes, lifted.header, lifted.camera)
             outputs.append((topic_of(camera, BOXES3D_TOPIC), boxes))
             with self._tally.refusing('3D boxes'):
-                followed = self._follower.add_boxes(boxes, camera)
+                followed = self._follower.add_boxes(boxes, now_ns, camera)
                 if followed is not None:
                     outputs.append((TRACKS_TOPIC, tracks_to_message(followed.tracks, followed.header)))
                     outputs.append((MARKERS_TOPIC, self._markers.write(followed.tracks, followed.header)))

@@ -1,9 +1,11 @@
 """Several cameras without a master: in bags, in the nodes' callbacks, and in launch files."""
 import hashlib
+import re
 
 import numpy as np
 import pytest
 import rosbag
+import rospy
 import tf2_ros
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped
 from std_msgs.msg import Header
@@ -89,6 +91,37 @@ def test_a_camera_that_a_bag_does_not_have_is_named(bags, tmp_path):
         process_bag(bags[0], str(tmp_path / 'out.bag'), with_tracker(BOTH, cameras=['front', 'rear']))
 
 
+def test_a_wrong_stamp_in_a_bag_keeps_the_other_camera_out_for_two_seconds_of_the_bag(bags, tmp_path):
+    """The front camera ends with it, 0.7 s after the beginning."""
+    path, last, left = str(tmp_path / 'in.bag'), None, []
+    with rosbag.Bag(bags[0]) as bag, rosbag.Bag(path, 'w') as changed:
+        start = bag.get_start_time()
+        for topic, message, time in bag.read_messages():
+            elapsed_s = time.to_sec() - start
+            if topic.startswith('/front/') and elapsed_s > 0.7:
+                if elapsed_s > 0.9:
+                    continue
+                set_back(message)
+                last = time
+            elif topic == '/left/yolo_bounding_box':
+                left.append(time)
+            changed.write(topic, message, time)
+    process_bag(path, str(tmp_path / 'out.bag'), BOTH)
+    with rosbag.Bag(str(tmp_path / 'out.bag')) as bag:
+        answered = [time for _topic, _message, time in bag.read_messages('/ros_3d_bb/tracks') if time > last]
+    assert answered and answered == [time for time in left if (time - last).to_sec() > 2]
+
+
+def set_back(message):
+    """Give a message of a camera a stamp of 10 s before."""
+    if hasattr(message, 'header'):
+        message.header.stamp -= rospy.Duration(10)
+    else:
+        label = message.layout.dim[0].label
+        stamp = re.search(r'stamp=(\d+)', label).group(1)
+        message.layout.dim[0].label = label.replace(stamp, str(int(stamp) - 10), 1)
+
+
 def test_the_node_publishes_what_process_bag_writes(bags):
     found = []
     with masterless({'tf_timeout': 0.0, 'cameras': 'front, left'}) as connections, rosbag.Bag(bags[1]) as bag:
@@ -121,15 +154,16 @@ class Transforms(object):
 
 
 class Rig(object):
-    """A Follower of two cameras, and boxes for it."""
+    """A Follower of two cameras, and boxes for it, which arrive at `now_ns`."""
 
     def __init__(self):
+        self.now_ns = 0
         self.transforms, self.tally = Transforms(), Tally()
         params = TrackerNodeParams(cameras=['front', 'rear'])
         self.follower = Follower(params, [kind() for kind in TRACKING_PARAMS], self.tally, self.transforms)
 
     def send(self, stamp_ns, camera, frame_id=None, count=1):
-        return self.follower.add_boxes(boxes(stamp_ns, frame_id or camera, count), camera)
+        return self.follower.add_boxes(boxes(stamp_ns, frame_id or camera, count), self.now_ns, camera)
 
 
 def boxes(stamp_ns, frame_id, count=1):
@@ -176,6 +210,48 @@ def test_where_time_goes_back_images_of_the_time_before_are_left_out(rig):
         assert (rear is None) == (late < 0)
     assert rig.transforms.jumps == 1 and rig.tally.counts['images of the time before'] == 3
     assert [track.id for track in front.tracks] == [2] and stamp_of(rear) == START_NS + 19 * PERIOD_NS
+
+
+def test_a_camera_whose_stamps_alone_go_back_keeps_the_others_out_for_two_seconds(rig):
+    """Its clock was corrected by 10 s, or its driver started again: then it is the one that is late."""
+    answered = []
+    for number in range(400):
+        rig.now_ns = number * PERIOD_NS
+        stamp_ns = START_NS + number * PERIOD_NS - (10 * NS if number >= 100 else 0)
+        if number <= 120:
+            rig.send(stamp_ns, 'front')
+        else:
+            with pytest.raises(ValueError, match='is 9.900 s before the latest'):
+                rig.send(stamp_ns, 'front')
+        followed = rig.send(START_NS + number * PERIOD_NS, 'rear')
+        answered.append(followed is not None)
+    assert answered == [True] * 100 + [False] * 20 + [True] * 280, answered
+    assert rig.transforms.jumps == 1 and len(followed.tracks) == 1
+
+
+def test_a_camera_that_ends_with_one_wrong_stamp_keeps_the_others_out_for_two_seconds(rig):
+    for number in range(100):
+        for camera in ('front', 'rear'):
+            rig.send(START_NS + number * PERIOD_NS, camera)
+    rig.send(START_NS, 'front')
+    answered = []
+    for number in range(100, 200):
+        followed = rig.send(START_NS + number * PERIOD_NS, 'rear')
+        answered.append(followed is not None)
+        rig.now_ns += PERIOD_NS
+    assert answered == [False] * 20 + [True] * 80 and len(followed.tracks) == 1
+    assert 'boxes of rear at 1010.000 are taken for' in rig.tally.sentences['images of the time before']
+
+
+def test_images_of_the_time_before_are_left_out_where_time_goes_back_twice(rig):
+    """Somebody seeks in a bag, and once more, before the rear camera's detector is ready."""
+    for number in range(200):
+        for camera in ('front', 'rear'):
+            rig.send(START_NS + number * PERIOD_NS, camera)
+    for seconds in (10, 5):
+        rig.send(START_NS + seconds * NS, 'front')
+    assert rig.send(START_NS + 200 * PERIOD_NS, 'rear') is None
+    assert rig.send(START_NS + 5 * NS + PERIOD_NS, 'front') is not None
 
 
 def test_an_image_that_waits_for_its_transform_while_time_goes_back_is_left_out(rig):

@@ -60,7 +60,7 @@ def stand(follower, seconds=1.0):
     """Somebody stands there; returns the stamp of the last image and what was followed."""
     for frame in range(int(30 * seconds)):
         stamp_ns = START_NS + frame * NS // 30
-        followed = follower.add_boxes(boxes(stamp_ns))
+        followed = follower.add_boxes(boxes(stamp_ns), 0)
     return stamp_ns, followed
 
 
@@ -69,39 +69,39 @@ def test_tracks_have_the_stamp_of_an_image_that_was_taken(follower, transforms):
     stamp_ns, _followed = stand(follower)
     ahead_ns = stamp_ns + 9 * NS // 10
     transforms.missing.add(ahead_ns)
-    assert follower.add_boxes(boxes(ahead_ns)) is None
+    assert follower.add_boxes(boxes(ahead_ns), 0) is None
     with pytest.raises(ValueError, match='3D box 0'):
-        follower.add_boxes(boxes(ahead_ns + 1, z=float('nan')))
-    followed = follower.add_boxes(boxes(stamp_ns + NS // 30))
+        follower.add_boxes(boxes(ahead_ns + 1, z=float('nan')), 0)
+    followed = follower.add_boxes(boxes(stamp_ns + NS // 30), 0)
     assert followed.header.stamp == time_from(stamp_ns + NS // 30) and len(followed.tracks) == 1
 
 
 def test_a_stamp_far_ahead_that_cannot_be_used_ends_nobody(follower, transforms):
     stamp_ns, before = stand(follower)
     transforms.missing.add(stamp_ns + 100 * NS)
-    follower.add_boxes(boxes(stamp_ns + 100 * NS))
-    after = follower.add_boxes(boxes(stamp_ns + NS // 30))
+    follower.add_boxes(boxes(stamp_ns + 100 * NS), 0)
+    after = follower.add_boxes(boxes(stamp_ns + NS // 30), 0)
     assert [track.id for track in after.tracks] == [track.id for track in before.tracks] and not transforms.jumps
 
 
 def test_time_that_goes_back_is_followed_once(follower, transforms, tally):
     stamp_ns, before = stand(follower)
     transforms.missing.add(stamp_ns - 20 * NS)
-    follower.add_boxes(boxes(stamp_ns - 20 * NS))
-    assert follower.add_boxes(boxes(stamp_ns - 19 * NS)).tracks == []
+    follower.add_boxes(boxes(stamp_ns - 20 * NS), 0)
+    assert follower.add_boxes(boxes(stamp_ns - 19 * NS), 0).tracks == []
     assert transforms.jumps == 1 and tally.counts['jumps back in time'] == 1
-    assert follower.add_boxes(boxes(stamp_ns - 19 * NS + NS // 30)).header.stamp < before.header.stamp
+    assert follower.add_boxes(boxes(stamp_ns - 19 * NS + NS // 30), 0).header.stamp < before.header.stamp
 
 
 def test_a_depth_image_that_cannot_be_used_does_not_keep_the_boxes_out(follower, tally):
     follower.add_camera_info(CameraInfo(header=header(START_NS), width=4, height=3, K=[4, 0, 2, 0, 4, 1, 0, 0, 1]))
     depth = Image(header=header(START_NS), width=4, height=3, encoding='nonsense', step=8, data=b'0' * 24)
     follower.add_depth(depth, 0)
-    assert follower.add_boxes(boxes(START_NS)) is not None
+    assert follower.add_boxes(boxes(START_NS), 0) is not None
     assert tally.counts['depth images refused'] == 1
 
 
 def test_more_boxes_than_people_can_be_are_refused(follower):
     with pytest.raises(ValueError, match='2000 3D boxes in one image; at most 1000'):
-        follower.add_boxes(boxes(START_NS, count=2000))
-    assert np.isfinite(follower.add_boxes(boxes(START_NS)).header.stamp.to_sec())
+        follower.add_boxes(boxes(START_NS, count=2000), 0)
+    assert np.isfinite(follower.add_boxes(boxes(START_NS), 0).header.stamp.to_sec())

@@ -90,7 +90,8 @@ class TrackerNode(object):
 
     def _on_boxes(self, message, camera):
         with self._diagnostics.taking('3D boxes'):
-            located = self._follower.locate(message, camera)  # one camera's wait for a transform holds up no other
+            # One camera's wait for a transform holds up no other.
+            located = self._follower.locate(message, arrival_clock_ns(), camera)
             if located is None:
                 return
             with self._lock:
