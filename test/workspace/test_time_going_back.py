@@ -1,0 +1,115 @@
+"""Time that goes back for one of several cameras, or for all, without a master."""
+import pytest
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped
+
+from ros_3d_bb.messages import stamp_of, time_from
+from ros_3d_bb.nodes.tracker_node import TrackerNode
+from ros_3d_bb.stamped import NS
+from support.masterless import masterless, on_the_wire
+from support.two_cameras import PERIOD_NS, START_NS, Rig, Transforms, boxes
+
+
+@pytest.fixture
+def rig():
+    return Rig()
+
+
+def test_where_time_goes_back_images_of_the_time_before_are_left_out(rig):
+    """A bag loops; the rear camera's detector takes longer. Tracks begin once more, and once only."""
+    for number in range(200):
+        for camera in ('front', 'rear'):
+            rig.send(START_NS + number * PERIOD_NS, camera)
+    for number in range(20):
+        front = rig.send(START_NS + number * PERIOD_NS, 'front')
+        late = number - 3
+        rear = rig.send(START_NS + (200 + late if late < 0 else late) * PERIOD_NS, 'rear')
+        assert (rear is None) == (late < 0)
+    assert rig.transforms.jumps == 1 and rig.tally.counts['images of the time before'] == 3
+    assert [track.id for track in front.tracks] == [2] and stamp_of(rear) == START_NS + 19 * PERIOD_NS
+
+
+def test_a_camera_whose_stamps_alone_go_back_keeps_the_others_out_for_two_seconds(rig):
+    """Its clock was corrected by 10 s, or its driver started again: then it is the one that is late."""
+    answered = []
+    for number in range(400):
+        rig.now_ns = number * PERIOD_NS
+        stamp_ns = START_NS + number * PERIOD_NS - (10 * NS if number >= 100 else 0)
+        if number <= 120:
+            rig.send(stamp_ns, 'front')
+        else:
+            with pytest.raises(ValueError, match='is 9.900 s before the latest'):
+                rig.send(stamp_ns, 'front')
+        followed = rig.send(START_NS + number * PERIOD_NS, 'rear')
+        answered.append(followed is not None)
+    assert answered == [True] * 100 + [False] * 20 + [True] * 280, answered
+    assert rig.transforms.jumps == 1 and len(followed.tracks) == 1
+
+
+def test_a_camera_that_ends_with_one_wrong_stamp_keeps_the_others_out_for_two_seconds(rig):
+    for number in range(100):
+        for camera in ('front', 'rear'):
+            rig.send(START_NS + number * PERIOD_NS, camera)
+    rig.send(START_NS, 'front')
+    answered = []
+    for number in range(100, 200):
+        followed = rig.send(START_NS + number * PERIOD_NS, 'rear')
+        answered.append(followed is not None)
+        rig.now_ns += PERIOD_NS
+    assert answered == [False] * 20 + [True] * 80 and len(followed.tracks) == 1
+    assert 'boxes of rear at 1010.000 are taken for' in rig.tally.sentences['images of the time before']
+
+
+def test_images_of_the_time_before_are_left_out_where_time_goes_back_twice(rig):
+    """Somebody seeks in a bag, and once more, before the rear camera's detector is ready."""
+    for number in range(200):
+        for camera in ('front', 'rear'):
+            rig.send(START_NS + number * PERIOD_NS, camera)
+    for seconds in (10, 5):
+        rig.send(START_NS + seconds * NS, 'front')
+    assert rig.send(START_NS + 200 * PERIOD_NS, 'rear') is None
+    assert rig.send(START_NS + 5 * NS + PERIOD_NS, 'front') is not None
+
+
+def test_an_image_that_waits_for_its_transform_while_time_goes_back_is_left_out(rig):
+    """The front camera's first image of the new time comes in the rear camera's wait; the rear camera ends there."""
+    for number in range(200):
+        rig.send(START_NS + number * PERIOD_NS, 'front')
+    rig.transforms.while_waiting['rear'] = lambda: rig.send(START_NS, 'front')
+    assert rig.send(START_NS + 200 * PERIOD_NS, 'rear') is None
+    for number in range(1, 20):
+        front = rig.send(START_NS + number * PERIOD_NS, 'front')
+    assert rig.transforms.jumps == 1 and rig.tally.counts['images of the time before'] == 1
+    assert [track.id for track in front.tracks] == [2]
+
+
+def test_an_image_that_found_no_transform_while_time_went_back_hides_nobody_of_the_new_time(rig):
+    """Were it counted as skipped, the rear camera's next one would be taken for that of a moment later."""
+    for number in range(200):
+        rig.send(START_NS + number * PERIOD_NS, 'front')
+    rig.transforms.missing.add('rear')
+    rig.transforms.while_waiting['rear'] = lambda: rig.send(START_NS, 'front')
+    assert rig.send(START_NS + 200 * PERIOD_NS, 'rear') is None
+    rig.transforms.missing.clear()
+    for number in range(1, 6):
+        front = rig.send(START_NS + number * PERIOD_NS, 'front')
+    assert len(front.tracks) == 1
+    assert rig.send(START_NS + 17 * PERIOD_NS, 'rear', count=0).tracks == []
+
+
+def test_the_node_publishes_nothing_of_the_time_before():
+    """The tf buffer is asked for the rear camera's transform when the front camera's stamps go back."""
+    with masterless({'tf_timeout': 0.0, 'cameras': 'front, rear'}) as connections:
+        TrackerNode()
+        tracks, transforms = connections.publishers['ros_3d_bb/tracks'], Transforms()
+
+        def send(camera, seconds):
+            connections.send(camera + '/ros_3d_bb/bb_3d', on_the_wire(boxes(START_NS + seconds * NS, camera)))
+
+        def lookup(target, source, stamp):
+            transforms.lookup(target, source, stamp)
+            return TransformStamped(transform=Transform(rotation=Quaternion(-0.5, 0.5, -0.5, 0.5)))
+        connections.buffers[0].lookup_transform = lookup
+        send('front', 20)
+        transforms.while_waiting['rear'] = lambda: send('front', 0)
+        send('rear', 20)
+        assert tracks.count == 2 and tracks.newest.header.stamp == time_from(START_NS)
