@@ -210,6 +210,18 @@ def test_images_in_another_order_give_the_same_tracks(order):
         np.testing.assert_allclose(got.position_m, want.position_m, rtol=1e-9)
 
 
+def test_a_late_image_after_a_pause_is_believed_as_if_it_had_come_in_time():
+    """After the pause errors of the boxes are others than before, whichever image comes first."""
+    def after_pause(times_s):
+        tracker = Tracker()
+        play(tracker, 1, standing((3, 0)))
+        for time_s in times_s:
+            tracker.update(START_NS + int(time_s * NS), [at(3, 0)], VIEW)
+        return tracker.objects()[0]
+    in_time, late = after_pause([1.9, 2.1]), after_pause([2.1, 1.9])
+    assert late.covariance.tobytes() == in_time.covariance.tobytes()
+
+
 def test_what_was_published_keeps_its_number_when_a_late_image_shows_somebody_more():
     tracker = Tracker()
     play(tracker, 1, standing((3, 0)))

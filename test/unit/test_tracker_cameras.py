@@ -148,6 +148,36 @@ def test_images_without_an_answer_of_one_camera_keep_nobody_of_the_other():
     assert tracker.objects() == []
 
 
+def test_frames_without_a_transform_are_not_kept_for_ever():
+    """Each image without an answer is of another one; those of the camera in front have answers."""
+    tracker, sizes = Tracker(), []
+    for number, (stamp_ns, detections, view) in enumerate(images_of(10, standing(IN_FRONT), views=(FRONT,))):
+        tracker.skip(stamp_ns, 'frame_%06d' % number)
+        tracker.update(stamp_ns, detections, view)
+        sizes += [len(repr(vars(tracker)))] * (number % 10 == 9)  # which takes long
+    assert max(sizes[15:]) < 1.1 * max(sizes[:15])
+
+
+def test_images_without_an_answer_are_not_kept_for_ever_where_none_has_one():
+    tracker, sizes = Tracker(), []
+    for number in range(4000):
+        tracker.skip(START_NS - number * PERIOD_NS, 'frame_%06d' % number)
+        sizes.append(len(repr(vars(tracker))))
+    assert max(sizes[2000:]) < 1.1 * max(sizes[:2000])
+
+
+@pytest.mark.parametrize('rate_hz', [0.8, 1.5])
+def test_a_slow_camera_is_believed_as_much_beside_a_fast_one_as_alone(rate_hz):
+    """Errors of its boxes do not last from one image to the next. Only the slow one sees the person."""
+    alone, beside = Tracker(), Tracker()
+    slow = [(START_NS + int(number * NS / rate_hz) + 1, shown(LEFT, around(AT_LEFT)), LEFT) for number in range(8)]
+    fast = images_of(8 / rate_hz, lambda _time_s: None, views=(FRONT,))
+    play(alone, slow)
+    play(beside, sorted((image for image in slow + fast if image[0] <= slow[-1][0]), key=lambda image: image[0]))
+    (one,), (other,) = alone.objects(), beside.objects()
+    np.testing.assert_allclose(other.covariance, one.covariance, rtol=1e-6)
+
+
 def test_who_does_not_come_out_from_behind_something_is_still_there_though_another_camera_looks_elsewhere():
     """Walks at 1 m/s behind a screen that hides y = 0 to 1 m from the camera in front, and stays there for 1.5 s; the
     other camera looks back."""
@@ -192,6 +222,49 @@ def test_the_order_in_which_the_images_come_does_not_matter(order, same_stamps):
     assert (one[0].status, one[0].last_seen_ns) == (other[0].status, other[0].last_seen_ns)
     assert one[0].covariance.tobytes() == other[0].covariance.tobytes()
     assert one[0].position_m.tobytes() == other[0].position_m.tobytes()
+
+
+def test_a_late_image_of_one_camera_leaves_what_another_one_could_not_answer():
+    """The one in front has no transform at 1.13 s; at 1.15 s it should see who was there and answers for 0.02 s."""
+    def missed_s(late):
+        tracker = Tracker()
+        play(tracker, images_of(1, standing(IN_FRONT), views=(FRONT,)))
+        images = [(START_NS + int(1.15 * NS), [], FRONT)]
+        images.insert(1 if late else 0, (START_NS + int(1.05 * NS), [], LEFT))
+        tracker.skip(START_NS + int(1.13 * NS), 'front')
+        play(tracker, images)
+        return tracker._state.tracks['missed_s']
+    np.testing.assert_allclose(missed_s(late=False), [0.02], rtol=1e-6)
+    np.testing.assert_array_equal(missed_s(late=True), missed_s(late=False))
+
+
+REAR = looking(np.pi, 'rear')
+KINDS = ['skip', 'none', 'seen']
+ARRIVALS = st.tuples(st.integers(0, 14), st.sampled_from([FRONT, LEFT, REAR]), st.sampled_from(KINDS))
+
+
+@settings(max_examples=100)
+@given(st.lists(ARRIVALS, min_size=2, max_size=14, unique_by=lambda arrival: (arrival[0], arrival[1].camera)),
+       st.floats(0, 2.5), st.integers(1, 3), st.randoms())
+def test_neither_does_it_where_images_have_no_answer(arrivals, pause_s, cameras, random):
+    """Those of up to three cameras within 0.47 s, after a pause; somebody who was known before is found or not. What
+    has no answer may be of the pause, too."""
+    def play_them(arrivals):
+        tracker = Tracker()
+        play(tracker, images_of(0.3, standing(IN_BOTH), views=(FRONT, LEFT, REAR)[:cameras]))
+        for step, view, kind in arrivals:
+            stamp_ns = START_NS + NS // 3 + int(pause_s * NS) + step * PERIOD_NS
+            if kind == 'skip':
+                tracker.skip(stamp_ns - int(random_pauses[step, view.camera] * pause_s * NS), view.camera)
+            else:
+                tracker.update(stamp_ns, shown(view, around(IN_BOTH)) if kind == 'seen' else [], view)
+        return tracker
+    random_pauses = {(step, view.camera): random.choice([0, 0, 0.3, 0.9]) for step, view, _kind in arrivals}
+    in_time = play_them(sorted(arrivals, key=lambda arrival: (arrival[0], arrival[1].camera)))
+    random.shuffle(arrivals)
+    shuffled = play_them(arrivals)
+    assert ids(shuffled.objects()) == ids(in_time.objects())
+    assert shuffled._state.tracks.tobytes() == in_time._state.tracks.tobytes()
 
 
 @settings(max_examples=14)

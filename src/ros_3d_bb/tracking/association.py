@@ -51,3 +51,10 @@ def assign(costs):
     forbidden = 1e6 + np.abs(costs[allowed]).sum()
     pairs = zip(*linear_sum_assignment(np.where(allowed, costs, forbidden)))
     return [(int(row), int(column)) for row, column in pairs if allowed[row, column]]
+
+
+def remaining(count, numbers):
+    """The numbers (k,) below `count` that are not among `numbers`, in order."""
+    left = np.ones(count, bool)
+    left[numbers] = False
+    return np.flatnonzero(left)

@@ -33,6 +33,11 @@ class Sightings(NamedTuple):
     z_m2: np.ndarray
     truncated: np.ndarray
 
+    def taken(self, columns):
+        """Those in `columns` alone."""
+        ground, *others = self
+        return Sightings(Measurements(*(values[columns] for values in ground)), *(values[columns] for values in others))
+
 
 class _Seen(NamedTuple):
     """Detections as the camera saw them: on the ground, (n, 2); distances, bearings, half widths in radians, (n,)."""
@@ -62,7 +67,7 @@ def sightings_of(detections, view, elapsed_s, params):
     detections : sequence of Detection, n
     view : View
     elapsed_s : float
-        Since the image before; 0 for the first.
+        Since the image before of the same camera; 0 for the first.
     params : NoiseParams
 
     Returns

@@ -13,7 +13,7 @@ import numpy as np
 
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking import kalman
-from ros_3d_bb.tracking.association import assign
+from ros_3d_bb.tracking.association import assign, remaining
 from ros_3d_bb.tracking.measuring import NoiseParams, sightings_of
 from ros_3d_bb.tracking.prediction import PredictionParams, objects_of
 from ros_3d_bb.tracking.tracked import OUT_OF_VIEW, VISIBLE, View, check_steps
@@ -23,6 +23,8 @@ TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4))
                   ('size_m', float, 3), ('sightings', int), ('first_ns', np.int64), ('last_ns', np.int64),
                   ('missed_s', float), ('unseen_s', float), ('status', int), ('confirmed', bool), ('moving', bool)])
 LATEST_NS = NS // 2  # images that come later than others by more are refused
+KNOWN_NS = 60 * NS  # a camera that sent nothing for longer, while others did, is a new one
+MOST_SKIPPED = 1000  # where no camera has an answer; the newest ones count
 RECENT_NS = 7 * NS // 10  # who was seen so recently comes before those who were away
 LOST_M = 2.4  # who may be anywhere within this (standard deviation) is forgotten
 TRIES_S = 0.6  # how long a track that is not confirmed yet waits to be seen again
@@ -61,13 +63,13 @@ class _Image(NamedTuple):
 
 
 class _State(NamedTuple):
-    """What images change: the tracks, and the stamp of the latest image; by camera, the stamp of one without an answer
-    since its latest, and its `unseen.Look`.
+    """What images change: the tracks, and the stamp of the latest image; by camera, that of its latest one, and its
+    `unseen.Look`.
     """
 
     tracks: np.ndarray
     now_ns: int
-    skipped_ns: dict
+    stamps_ns: dict
     looks: dict
 
 
@@ -101,13 +103,15 @@ class Tracker(object):
         """Forget all tracks, as after a jump in time. Numbers are not used again."""
         self._state = _State(np.zeros(0, TRACK), None, {}, {})
         self._history = collections.deque()  # (state before, image) of the latest images
+        self._skipped = collections.deque(maxlen=MOST_SKIPPED)  # (stamp_ns, camera) of those without an answer
         self._ids = {}  # of the tracks begun in them, by stamp, camera and number of the detection
 
     def skip(self, stamp_ns, camera=''):
         """Let an image pass whose detections could not be used: nobody ages. Never an error: it may be late."""
-        skipped_ns = self._state.skipped_ns
-        self._state = self._state._replace(
-            skipped_ns=dict(skipped_ns, **{camera: max(stamp_ns, skipped_ns.get(camera, 0))}))
+        self._skipped.append((stamp_ns, camera))
+        if any(image.view.camera == camera and (state.now_ns or 0) < stamp_ns < image.stamp_ns
+               for state, image in self._history):
+            self._take(self._taken_back(stamp_ns, camera), self._last_id)
 
     def update(self, stamp_ns, detections, view):
         """Take the detections of one image.
@@ -129,12 +133,9 @@ class Tracker(object):
         ValueError
             If the image comes too late, or a second time; nothing changes then.
         """
-        images = [_Image(stamp_ns, tuple(detections), view)] + self._taken_back(stamp_ns, view.camera)
-        given_id = self._last_id if len(images) > 1 else None
-        for image in images:
-            self._history.append((self._state, image))
-            self._state = self._after(image, given_id)
-        self._forget_history()
+        self._check_stamp(stamp_ns, view.camera)
+        later = self._taken_back(stamp_ns, view.camera)
+        self._take([_Image(stamp_ns, tuple(detections), view)] + later, self._last_id if later else None)
         return self.objects()
 
     def objects(self):
@@ -145,57 +146,69 @@ class Tracker(object):
         known &= (tracks['status'] != OUT_OF_VIEW) | (tracks['unseen_s'] <= params.out_of_view_limit)
         return objects_of(tracks[tracks['confirmed'] & known], self._prediction)
 
-    def _taken_back(self, stamp_ns, camera):
-        """Undo the images after a stamp, and of the same one those of cameras with a later name; returns them, oldest
-        first."""
+    def _check_stamp(self, stamp_ns, camera):
         if any(image.stamp_ns == stamp_ns and image.view.camera == camera for _state, image in self._history):
             raise ValueError('stamp %.9f of camera %r comes a second time' % (stamp_ns / NS, camera))
         if self._state.now_ns is not None and stamp_ns < self._state.now_ns - LATEST_NS:
             raise ValueError('stamp %.9f is %.3f s before the latest, more than %.1f s late'
                              % (stamp_ns / NS, (self._state.now_ns - stamp_ns) / NS, LATEST_NS / NS))
+
+    def _taken_back(self, stamp_ns, camera):
+        """Undo the images after a stamp, and of the same one those of cameras with a later name; returns them, oldest
+        first."""
         images = []
         while self._history and _order(self._history[-1][1]) > (stamp_ns, camera):
-            before, image = self._history.pop()
-            self._state = before._replace(skipped_ns=self._state.skipped_ns)
+            self._state, image = self._history.pop()
             images.insert(0, image)
         return images
+
+    def _take(self, images, given_id):
+        """Go on with images. Where that is done again, numbers up to `given_id` were given before; else None."""
+        for image in images:
+            self._history.append((self._state, image))
+            self._state = self._after(image, given_id)
+        self._forget_history()
 
     def _forget_history(self):
         oldest_ns = self._state.now_ns - LATEST_NS
         while self._history[0][1].stamp_ns < oldest_ns:
             self._history.popleft()
+        before_ns = self._history[0][0].now_ns or 0  # nothing earlier can count again
+        self._skipped = collections.deque((entry for entry in self._skipped if entry[0] > before_ns), MOST_SKIPPED)
         self._ids = {key: number for key, number in self._ids.items() if key[0] >= oldest_ns}
 
     def _after(self, image, given_id):
-        """The state after an image. Where that is done again, numbers up to `given_id` were given before; else None."""
-        before, now_ns, skipped_ns, looks = self._state
+        """The state after an image; `given_id` as in `_take`."""
+        before, now_ns, stamps_ns, looks = self._state
         tracks, stamp_ns, view = before.copy(), image.stamp_ns, image.view
         elapsed_s = 0.0 if now_ns is None else (stamp_ns - now_ns) / NS
-        looked_s = 0.0 if now_ns is None else max(stamp_ns - max(now_ns, skipped_ns.get(view.camera, 0)), 0) / NS
         tracks['mean'], tracks['covariance'] = kalman.predict(tracks['mean'], tracks['covariance'], elapsed_s,
                                                               self._params.acceleration)
-        sightings = sightings_of(image.detections, view, self._since_last_s(image), self._noise)
+        since_last_s = (stamp_ns - stamps_ns.get(view.camera, stamp_ns)) / NS
+        sightings = sightings_of(image.detections, view, since_last_s, self._noise)
         rows, columns = self._associate(tracks, sightings, stamp_ns)
         if given_id is not None:
             self._give_back_ids(tracks, rows, [(stamp_ns, view.camera, column) for column in columns], given_id)
-        self._see(tracks, rows, _taken(sightings, columns), stamp_ns)
+        self._see(tracks, rows, sightings.taken(columns), stamp_ns)
         others = others_of(looks, view, stamp_ns)
-        places = miss(tracks, before, _others(len(tracks), rows), view, others, looked_s, self._params.max_range)
+        places = miss(tracks, before, remaining(len(tracks), rows), view, others, self._looked_s(image),
+                      self._params.max_range)
         kept, newcomers = self._is_remembered(tracks), np.zeros(0, TRACK)
-        tracks, unknown = tracks[kept], _others(len(image.detections), columns)
+        tracks, unknown = tracks[kept], remaining(len(image.detections), columns)
         if len(unknown):
-            newcomers = self._newcomers(tracks, _taken(sightings, unknown), unknown, image)
+            newcomers = self._newcomers(tracks, sightings.taken(unknown), unknown, image)
             tracks = np.concatenate((tracks, newcomers))
         looks = carried(others, kept, len(newcomers))
         looks[view.camera] = Look(stamp_ns, view, np.concatenate((places[kept], np.full(len(newcomers), SEEN))))
-        return _State(tracks, stamp_ns, {camera: skipped for camera, skipped in skipped_ns.items()
-                                         if camera != view.camera}, looks)
+        known_ns = {camera: last_ns for camera, last_ns in stamps_ns.items() if stamp_ns - last_ns <= KNOWN_NS}
+        return _State(tracks, stamp_ns, dict(known_ns, **{view.camera: stamp_ns}), looks)
 
-    def _since_last_s(self, image):
-        """Seconds since the last image of the same camera; 0 where there is none."""
-        stamps_ns = [other.stamp_ns for _state, other in self._history
-                     if other.view.camera == image.view.camera and other.stamp_ns < image.stamp_ns]
-        return (image.stamp_ns - stamps_ns[-1]) / NS if stamps_ns else 0.0
+    def _looked_s(self, image):
+        """The time that an image answers for: since the one before, or since one of its camera that had no answer."""
+        stamp_ns, camera = image.stamp_ns, image.view.camera
+        before_ns = stamp_ns if self._state.now_ns is None else self._state.now_ns
+        skipped_ns = [skipped_ns for skipped_ns, other in self._skipped if other == camera and skipped_ns < stamp_ns]
+        return (stamp_ns - max(skipped_ns + [before_ns])) / NS
 
     def _associate(self, tracks, sightings, stamp_ns):
         """Rows of tracks and columns of sightings that belong together."""
@@ -212,7 +225,7 @@ class Tracker(object):
         for turn in range(3):
             rows = np.flatnonzero(rank == turn)
             if len(rows):
-                columns = _others(cost.shape[1], [column for _row, column in pairs])
+                columns = remaining(cost.shape[1], [column for _row, column in pairs])
                 pairs += [(rows[row], columns[column]) for row, column in assign(cost[rows[:, None], columns])]
         return np.array(pairs, int).reshape(-1, 2).T
 
@@ -275,20 +288,6 @@ class Tracker(object):
 
 def _order(image):
     return image.stamp_ns, image.view.camera
-
-
-def _others(count, numbers):
-    """Those of 0..count that are not among the numbers."""
-    others = np.ones(count, bool)
-    others[numbers] = False
-    return np.flatnonzero(others)
-
-
-def _taken(sightings, columns):
-    """The sightings in `columns`."""
-    ground, *others = sightings
-    return type(sightings)(kalman.Measurements(*(values[columns] for values in ground)),
-                           *(values[columns] for values in others))
 
 
 def _check(params):
