@@ -1,6 +1,8 @@
 """What a soak wrote down. All times are seconds of one clock of the machine, stamps integer nanoseconds."""
 from typing import Any, Dict, List, NamedTuple, Optional, Set, Tuple
 
+INTERRUPTED = 'interrupted'  # in place of a fault's name: somebody ended the soak before it could recover
+
 
 class Status(NamedTuple):
     """What a node said of itself on /diagnostics, and what its process used by then."""
@@ -82,6 +84,11 @@ class Record(NamedTuple):
     deaths: List[Death]
     killed: Set[int]
     errors: List[Tuple[float, str]]
+
+    @property
+    def finished_faults(self):
+        """Those whose recovery was waited for. The interrupted one excuses what others do, and is judged no further."""
+        return [fault for fault in self.faults if fault.name != INTERRUPTED]
 
     def is_quiet(self, at_s):
         """Whether no fault was there at a time."""

@@ -43,7 +43,7 @@ def _clock(record, at_s):
 def _faults(record):
     rows = ['%-36s %5s %10s %24s' % ('fault', 'times', 'lasted s', 'then recovery s: median, longest')]
     kinds = collections.OrderedDict()
-    for fault in sorted(record.faults, key=lambda fault: fault.name):
+    for fault in sorted(record.finished_faults, key=lambda fault: fault.name):
         took_s = np.inf if fault.recovered_s is None else fault.recovered_s - fault.ended_s
         kinds.setdefault(fault.name, []).append((fault.ended_s - fault.began_s, took_s))
     for name, times_s in kinds.items():
@@ -90,7 +90,7 @@ def as_json(record, empty, findings, arguments):
         'rate_hz': arguments.rate, 'detector': arguments.detector, 'images': _sent(record), 'sent': record.sent,
         'arrays': {topic: len(arrivals) for topic, arrivals in record.arrivals.items()}, 'empty': empty,
         'faults': [{'name': fault.name, 'began_s': since(fault.began_s), 'ended_s': since(fault.ended_s),
-                    'recovered_s': since(fault.recovered_s)} for fault in record.faults],
+                    'recovered_s': since(fault.recovered_s)} for fault in record.finished_faults],
         'processes': [dict(node=status.node, pid=status.pid, counts=status.counts, memory_mb=_memory(record, status))
                       for status in last_of_each(record)],
         'latency_ms': [np.percentile(lags[:, 2], (50, 95)).tolist() if len(lags) else None

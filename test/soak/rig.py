@@ -13,12 +13,14 @@ from ros_3d_bb.simulation.scenario import ScenarioError, read_scenario
 from soak.camera import Camera, rendered
 from soak.faults import FAULTS
 from soak.graph import Graph, GraphEnded
-from soak.records import FaultDone, Record
+from soak.invariants import outcomes_are_known
+from soak.records import INTERRUPTED, FaultDone, Record
 from soak.witness import Witness
 
 START_S = 180.0  # a detector may have to export its network first
-RECOVERY_S = 60.0  # what has not come back by then does not come back
+RECOVERY_S = 60.0  # what has not come back by then, or within --recover-within, does not come back
 QUIET_S = 3.0, 8.0  # between two faults, shortest and longest
+QUIET_SHARE = 1 / 60.0  # of a soak that is so short that this is less
 SHORTEST_S, LONGEST_S = 2.0, 10.0  # of a fault; a short soak has shorter ones
 POLL_S = 0.02
 PROGRESS_S = 0.5
@@ -41,7 +43,8 @@ class Rig(object):
         self.source, self.wrong_source = hostile.Source(arguments.seed), hostile.Source(arguments.seed + 1)
         self.witness, self.camera = Witness(graph), Camera(scenes, arguments.rate)
         self._stopped = threading.Event()
-        self._seconds = 60 * arguments.minutes
+        self._seconds, self._patience_s = 60 * arguments.minutes, max(RECOVERY_S, arguments.recover_within)
+        self._quiet_s = min(QUIET_S[0], QUIET_SHARE * self._seconds)
         self._began_s, self._shown_s, self._doing = time.monotonic(), 0.0, 'starting'
         signal.signal(signal.SIGINT, lambda *_: self._stopped.set())
 
@@ -88,31 +91,36 @@ class Rig(object):
     def play(self):
         """Fault after fault, each kind once before any comes again. Raises Interrupted, GraphEnded."""
         self._doing = 'no fault'
-        self.wait(QUIET_S[0])
+        self.wait(self._quiet_s)
         while True:
             for kind in self.source.sample(FAULTS, len(FAULTS)):
                 if time.monotonic() >= self.ends_s:
                     return
                 self._fault(*kind)
                 self._doing = 'no fault'
-                quiet_s = self.source.uniform(*QUIET_S) if self._seconds > 300 else QUIET_S[0]
+                quiet_s = self.source.uniform(*QUIET_S) if self._seconds > 300 else self._quiet_s
                 self.wait(max(0.0, min(quiet_s, self.ends_s - time.monotonic())))
 
     def _fault(self, fault, lasts, disturbs):
         longest_s = min(LONGEST_S, max(SHORTEST_S, self._seconds / 30))
         began_s, number = time.monotonic(), len(self.faults)
-        self.faults.append(FaultDone('interrupted', began_s, began_s, None, disturbs))
+        self.faults.append(FaultDone(INTERRUPTED, began_s, began_s, None, disturbs))
         with fault(self) as name:
             self._doing = name
             self.wait(self.source.uniform(SHORTEST_S, longest_s) if lasts else 0.0)
         ended_s, sent = time.monotonic(), len(self.camera.images)
-        self.faults[number] = FaultDone(name, began_s, ended_s, None, disturbs)
         self._doing = 'after: %s' % name
+        recovered_s = self._recovered_s(sent)
+        self.faults[number] = FaultDone(name, began_s, ended_s, recovered_s, disturbs)
+
+    def _recovered_s(self, sent):
+        """When one of the images after the first `sent` was answered; None: never. Raises Interrupted, GraphEnded."""
         try:
-            self.wait_until(lambda: self._answered_since(sent), 'an answer', RECOVERY_S)
-            self.faults[number] = FaultDone(name, began_s, ended_s, time.monotonic(), disturbs)
+            self.wait_until(lambda: self._answered_since(sent), 'an answer', self._patience_s)
+            return time.monotonic()
         except GraphEnded:
             self.graph.check()  # no recovery is a finding; no graph is the end
+            return None
 
     def _answered_since(self, sent):
         """Whether one of the images after the first `sent` was answered by tracks."""
@@ -125,14 +133,18 @@ class Rig(object):
         self._doing = 'waiting for the last counts'
         self.camera.stop()
         self.wait(SETTLING_S)
+        try:
+            self.wait_until(lambda: outcomes_are_known(self.witness.statuses), 'the last counts', self._patience_s)
+        except GraphEnded:
+            self.graph.check()  # an input without an outcome is a finding
 
     def record(self):
         """What was written down."""
         witness, camera, graph = self.witness, self.camera, self.graph
-        faults = [fault for fault in self.faults if fault.name != 'interrupted']
         return Record(self._began_s, time.monotonic(), list(camera.images), set(camera.wrong_ns), dict(camera.sent),
                       {topic: list(arrivals) for topic, arrivals in witness.arrivals.items()}, list(witness.tracks),
-                      list(witness.statuses), faults, list(graph.deaths), set(self.killed), list(graph.errors))
+                      list(witness.statuses), list(self.faults), list(graph.deaths), set(self.killed),
+                      list(graph.errors))
 
 
 def soak(arguments, port, folder):

@@ -3,9 +3,10 @@ import pytest
 
 from soak.invariants import (CPU_MORE_MS, HELD_MB, LAG_IMAGES, RISE_MB, WAITING, WAITING_AT_END, cpu_is_flat,
                              every_input_has_an_outcome, findings_of, growth_of, it_recovers, memory_is_flat,
-                             nobody_dies_of_a_message, numbers_are_not_reused, processes_of, queues_do_not_grow,
-                             stamps_are_those_of_images, stamps_do_not_go_back, there_are_no_ghosts)
-from soak.records import Death, FaultDone, Record, Status, Track
+                             nobody_dies_of_a_message, nobody_outlasts_memory, numbers_are_not_reused,
+                             outcomes_are_known, processes_of, queues_do_not_grow, stamps_are_those_of_images,
+                             stamps_do_not_go_back)
+from soak.records import INTERRUPTED, Death, FaultDone, Record, Status, Track
 
 NS = 10 ** 9
 BEGAN_S, SECONDS = 1000.0, 300
@@ -137,15 +138,15 @@ def test_a_number_that_is_given_a_second_time_is_found():
 
 
 @pytest.mark.parametrize('first, last', [(30, 35.0), (0, 41.0), (41, 40.0)])
-def test_ghosts_of_the_past_and_of_the_future_are_found(first, last):
-    ghost = Track(9, stamp_at(BEGAN_S + first), stamp_at(BEGAN_S + last))
-    (at_s, text), = broken_of(there_are_no_ghosts, tracks=tracks_with(40, ghost))
+def test_who_was_seen_last_too_long_ago_or_in_the_future_is_found(first, last):
+    wrong = Track(9, stamp_at(BEGAN_S + first), stamp_at(BEGAN_S + last))
+    (at_s, text), = broken_of(nobody_outlasts_memory, tracks=tracks_with(40, wrong))
     assert at_s == pytest.approx(40.1) and 'track 9' in text
 
 
-def test_somebody_who_is_hidden_is_no_ghost():
+def test_somebody_who_is_hidden_is_remembered():
     hidden = Track(9, STAMPED_NS, stamp_at(BEGAN_S + 36.5))
-    assert broken_of(there_are_no_ghosts, tracks=tracks_with(40, hidden)) == []
+    assert broken_of(nobody_outlasts_memory, tracks=tracks_with(40, hidden)) == []
 
 
 @pytest.mark.parametrize('changed, at_s', [
@@ -162,6 +163,17 @@ def test_a_recovery_that_takes_long_or_never_comes_is_found(recovered_s):
     (at_s, text), = broken_of(it_recovers(2.0), faults=[fault])
     assert at_s == 105 and text == 'tf stops: %s' % ('never' if recovered_s is None else '2.10 s')
     assert broken_of(it_recovers(3.0), faults=[fault._replace(recovered_s=BEGAN_S + 107.1)]) == []
+
+
+def test_an_interrupted_fault_need_not_recover_and_excuses_what_it_did():
+    fault = sound().faults[0]._replace(name=INTERRUPTED, recovered_s=None, disturbs=True)
+    assert broken_of(it_recovers(2.0), faults=[fault]) == []
+    assert broken_of(stamps_do_not_go_back, arrivals=arrivals_back(110), faults=[fault]) == []
+
+
+def test_outcomes_are_known_once_the_newest_counts_of_each_node_say_so():
+    behind = status(9, **{'3D boxes received': 9 + WAITING_AT_END + 1})
+    assert outcomes_are_known([behind, status(10)]) and not outcomes_are_known([status(8), behind])
 
 
 def test_a_queue_that_grows_is_found():
