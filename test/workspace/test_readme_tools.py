@@ -77,7 +77,7 @@ def test_the_demo_leaves_a_table_a_picture_and_a_bag_and_the_tests_start(reader,
     for kind in ('bag', 'png'):
         path, = re.findall(r'(/\S+\.%s)' % kind, printed.split('what became of it')[1])[:1]
         assert os.path.exists(path)
-    assert 'run_tests -j1' in reader.log.read_text()
+    assert 'run_tests -j2' in reader.log.read_text()
 
 
 def test_the_demo_takes_weights(reader, clone, weights):
