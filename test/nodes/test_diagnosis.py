@@ -2,7 +2,7 @@
 master because the faults are those of topics, transforms and clocks.
 """
 import argparse
-import os
+import contextlib
 import subprocess
 import threading
 import time
@@ -18,8 +18,9 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.evaluation.latency import end, free_port
 from ros_3d_bb.images import fill_image
-from ros_3d_bb.messages import boxes2d_to_message, time_from
+from ros_3d_bb.messages import boxes2d_from_message, boxes2d_to_message
 from ros_3d_bb.nodes.doctor import graph_findings
 from ros_3d_bb.stamped import NS
 from support.ros import Recorder, camera_info, depth_message, header_at, wait_until
@@ -98,9 +99,8 @@ def wider(message):
 def long_ago(_topic, message):
     """As of a bag of two years ago that is played without its clock."""
     if isinstance(message, Int32MultiArray):
-        label, stamp = message.layout.dim[0].label, time_from(int((time.time() - 63e6) * NS))
-        message.layout.dim[0].label = label.split(';')[0] + ';stamp=%d.%09d;frame=c' % (stamp.secs, stamp.nsecs)
-        return message
+        boxes = boxes2d_from_message(message)
+        return boxes2d_to_message(boxes.boxes, header_at(boxes.stamp_ns - 63000000 * NS))
     for part in getattr(message, 'transforms', [message]):
         part.header.stamp = part.header.stamp - rospy.Duration(63000000)
     return message
@@ -112,25 +112,39 @@ def old_boxes(message):
 
 
 # what is wrong; who says what in its log; what doctor says, and its fix
-FAULTS = {
+REFUSED = {
     'no tf': (without('/tf'), 'tracker_node',
               'the transform from camera_color_optical_frame to map ends', 'tf knows no frames at all',
               'robot_state_publisher'),
     'depth of another size': (replaced(DEPTH, smaller), 'bbox3d_node', 'depth must be aligned to colour',
                               'the depth image has 32 x 24 pixels, the colour camera 64 x 48', 'realsense.launch'),
-    'depth of another camera': (replaced(DEPTH_INFO, wider), 'bbox3d_node', 'depth is not aligned to colour: the '
-                                'intrinsics', 'intrinsics fx fy cx cy of depth are 45.0', 'align_depth:=true'),
     'metres in a 16UC1': (replaced(DEPTH, metres), 'bbox3d_node', 'metres in a 16UC1', 'metres in a 16UC1',
                           'depth_scale'),
     'empty camera_info': (replaced(INFO, empty), 'bbox3d_node', 'camera_info refused: it is empty', 'it is empty',
                           'camera_calibration'),
+    'boxes older than the cache': (replaced(BOXES, old_boxes), 'bbox3d_node', 's too old; the detector is slower',
+                                   'the 2D boxes come 3.', 'cache_length')}
+LASTING = {
+    'depth of another camera': (replaced(DEPTH_INFO, wider), 'bbox3d_node', 'depth is not aligned to colour: the '
+                                'intrinsics', 'intrinsics fx fy cx cy of depth are 45.0', 'align_depth:=true'),
     'stamps of two years ago': (long_ago, 'bbox3d_node', '729.2 days before ROS time', '729.2 days before ROS time',
                                 'use_sim_time'),
     'no boxes': (without(BOXES), 'bbox3d_node', 'nothing has come on /yolo_bounding_box',
-                 'images come and no 2D boxes', 'enable'),
-    'boxes older than the cache': (replaced(BOXES, old_boxes), 'bbox3d_node', 's too old; the detector is slower',
-                                   'the 2D boxes come 3.0 s after their depth image', 'cache_length'),
-}
+                 'images come and no 2D boxes', 'enable')}
+
+
+@pytest.fixture(scope='module', autouse=True)
+def self_checking(tmp_path_factory):
+    """What a pipeline says that checks itself, without a detector and with depth on a topic that nobody publishes.
+
+    It waits half a minute for what is missing: on a master of its own, while the other tests run.
+    """
+    said = tmp_path_factory.mktemp('self_checking') / 'said.txt'
+    with open(str(said), 'w') as stream:
+        process = subprocess.Popen(['roslaunch', '-p', str(free_port()), 'ros_3d_bb', 'pipeline.launch',
+                                    'detector:=none', 'check:=true', 'camera_depth:=/other/depth'], stdout=stream)
+    yield said
+    end(process)
 
 
 @pytest.fixture(scope='module')
@@ -189,12 +203,12 @@ def wait_for_line(log, node, words):
 
 def diagnosed():
     """What doctor says is wrong, as it prints it."""
-    found = graph_findings(argparse.Namespace(seconds=2.0, patience=0.0, target_frame=''))
+    found = graph_findings(argparse.Namespace(seconds=1.0, patience=0.0, target_frame=''))
     return '\n'.join(line for finding in found if finding.is_wrong for line in finding.lines)
 
 
 def test_of_a_healthy_graph_all_is_well(healthy):
-    process = subprocess.run(['rosrun', 'ros_3d_bb', 'doctor', '--seconds', '3', '--patience', '60'],
+    process = subprocess.run(['rosrun', 'ros_3d_bb', 'doctor', '--seconds', '1', '--patience', '60'],
                              stdout=subprocess.PIPE, universal_newlines=True)
     lines = process.stdout.splitlines()
     assert process.returncode == 0 and lines[-1] == 'doctor: all is well', process.stdout
@@ -202,81 +216,85 @@ def test_of_a_healthy_graph_all_is_well(healthy):
 
 
 def test_nodes_show_rates_latency_and_the_age_of_transforms(healthy, states):
-    for node in ('bbox3d_node', 'tracker_node'):
+    def shows(node):
         values = states.of(node)[2]
-        assert 0 < float(values['rate'].split()[0]) < 30 and values['latency'].endswith('from stamp to result')
-        assert values['input ' + DEPTH].startswith('/' + DEPTH)
-    assert abs(float(values['tf age'].split()[0])) < 5
+        return (0 < float(values['rate'].split()[0]) < 30 and values['latency'].endswith('from stamp to result')
+                and values['input ' + DEPTH].startswith('/' + DEPTH))
+    for node in ('bbox3d_node', 'tracker_node'):
+        wait_until(lambda: shows(node), 'what %s shows in a second with answers' % node)
+    wait_until(lambda: abs(float(states.of('tracker_node')[2]['tf age'].split()[0])) < 5, 'the age of a transform')
 
 
-@pytest.mark.parametrize('name', sorted(FAULTS))
-def test_what_is_wrong_is_named_by_a_node_and_by_doctor_and_forgotten_at_its_end(healthy, log, states, name):
-    change, node, words, fault, fix = FAULTS[name]
+def check_named(fault, rig, log, states):
+    """That a fault is named by a node, in its log and as its state, and by doctor, with its fix."""
     log.emptied()
-    healthy.change = change
+    rig.change, node, words, found, fix = fault
+    said = diagnosed()  # while the node waits until it may complain
     wait_for_line(log, node, words)
     wait_until(lambda: states.of(node)[0] == 1 and words in states.of(node)[1], 'the state of ' + node)
-    said = diagnosed()
-    assert fault in said and fix in said, said
+    assert found in said and fix in said, said
 
 
-def test_a_topic_of_another_name_is_suggested(healthy, log):
-    """Depth comes on the topic of another camera."""
+@pytest.mark.parametrize('name', sorted(REFUSED))
+def test_why_messages_are_refused_is_named_by_a_node_and_by_doctor(rig, log, states, name):
+    """One after the other: the newest warning is a node's state for 5 s, if no other one comes."""
+    check_named(REFUSED[name], rig, log, states)
+
+
+@pytest.mark.parametrize('name', sorted(LASTING))
+def test_what_is_wrong_is_named_by_a_node_and_by_doctor_and_forgotten_at_its_end(healthy, log, states, name):
+    """The refusals, too: nodes are healthy before the first of these."""
+    check_named(LASTING[name], healthy, log, states)
+
+
+@contextlib.contextmanager
+def unpublished(rig, *topics):
+    """Nobody publishes some topics within the block."""
+    for topic in topics:
+        rig.pubs.pop(topic).unregister()
+    try:
+        yield
+    finally:
+        rig.pubs.update((topic, rospy.Publisher(topic, KINDS[topic], queue_size=10)) for topic in topics)
+
+
+def test_another_name_of_a_topic_is_suggested_and_a_publisher_that_cannot_be_reached_is_named(healthy, log):
+    """Depth comes on the topic of another camera. A node on a machine whose name nobody here knows says that it
+    publishes camera_info. There are no 2D boxes meanwhile, which would be refused.
+    """
+    ghost, address = rosgraph.Master('/ghost'), 'http://no.such.host.invalid:40000'
     log.emptied()
     other = rospy.Publisher('front/aligned_depth_to_color/image_raw', Image, queue_size=1)
-    healthy.pubs.pop(DEPTH).unregister()
-    try:
-        wait_for_line(log, 'bbox3d_node', 'nobody publishes /%s; start the camera' % DEPTH)
+    with unpublished(healthy, BOXES, DEPTH, INFO), contextlib.ExitStack() as at_the_end:
+        at_the_end.callback(other.unregister)
+        at_the_end.callback(ghost.unregisterPublisher, '/' + INFO, address)
+        ghost.registerPublisher('/' + INFO, 'sensor_msgs/CameraInfo', address)
         said = diagnosed()
         assert 'nobody publishes /' + DEPTH in said
         assert 'camera_depth:=/front/aligned_depth_to_color/image_raw' in said
-    finally:
-        other.unregister()
-        healthy.pubs[DEPTH] = rospy.Publisher(DEPTH, Image, queue_size=10)
-
-
-def test_a_publisher_that_cannot_be_reached_is_named(healthy, log):
-    """A node on a machine whose name nobody here knows says that it publishes depth."""
-    ghost, address = rosgraph.Master('/ghost'), 'http://no.such.host.invalid:40000'
-    log.emptied()
-    healthy.pubs.pop(DEPTH).unregister()
-    ghost.registerPublisher('/' + DEPTH, 'sensor_msgs/Image', address)
-    try:
-        wait_for_line(log, 'bbox3d_node', '/ghost publishes it, but it calls its machine no.such.host.invalid')
-        said = diagnosed()
         assert '/ghost publishes it, but it calls its machine no.such.host.invalid' in said and 'ROS_IP' in said
-    finally:
-        ghost.unregisterPublisher('/' + DEPTH, address)
-        healthy.pubs[DEPTH] = rospy.Publisher(DEPTH, Image, queue_size=10)
+        wait_for_line(log, 'bbox3d_node', 'nobody publishes /%s; start the camera' % DEPTH)
+        wait_for_line(log, 'bbox3d_node', '/ghost publishes it, but it calls its machine no.such.host.invalid')
 
 
-def test_time_that_stands_still_is_named(healthy, states):
+def test_time_that_stands_still_is_named(states):
     """A node that starts with /use_sim_time and without /clock, and doctor, in processes of their own."""
     rospy.set_param('/use_sim_time', True)
+    process = subprocess.Popen(['rosrun', 'ros_3d_bb', 'bbox3d_node', '__name:=without_time',
+                                'ros_3d_bb/bb_3d:=without_time/bb_3d'])  # no second result for each image
     try:
-        process = subprocess.Popen(['rosrun', 'ros_3d_bb', 'bbox3d_node', '__name:=without_time'])
-        wait_until(lambda: 'nothing comes on /clock' in states.of('without_time')[1], 'the reason')
         doctor = subprocess.run(['rosrun', 'ros_3d_bb', 'doctor', '--seconds', '1'], stdout=subprocess.PIPE,
                                 universal_newlines=True)
         assert doctor.returncode == 1 and 'nothing comes on /clock' in doctor.stdout
         assert 'fix: play the bag with rosbag play --clock' in doctor.stdout
+        wait_until(lambda: 'nothing comes on /clock' in states.of('without_time')[1], 'the reason')
     finally:
-        process.terminate()
+        process.kill()
         process.wait()
         rospy.delete_param('/use_sim_time')
 
 
-def test_the_pipeline_checks_itself_where_it_is_asked_to(healthy):
-    """Without a detector and with depth on a topic that nobody publishes."""
-    environment = dict(os.environ, ROS_NAMESPACE='/other')
-    process = subprocess.Popen(['roslaunch', 'ros_3d_bb', 'pipeline.launch', 'detector:=none', 'check:=true',
-                                'camera_depth:=/other/depth'], env=environment, stdout=subprocess.PIPE,
-                               universal_newlines=True)
-    said = ''
-    for line in process.stdout:
-        said += line
-        if 'doctor: ' in line:
-            break
-    process.terminate()
-    process.wait()
+def test_the_pipeline_checks_itself_where_it_is_asked_to(self_checking):
+    wait_until(lambda: 'doctor: ' in self_checking.read_text(), 'what doctor says', 60)
+    said = self_checking.read_text()
     assert 'nobody publishes /other/depth' in said and 'wrong' in said
