@@ -9,7 +9,8 @@ from ros_3d_bb.diagnosis.tf_tree import links_in, why_missing
 from ros_3d_bb.messages import check_transforms, transform_from_message
 
 LONGEST_WAIT_S = 0.05  # without news; shutting down takes no longer
-EXPLAINED_S = 2.0  # between two looks at the whole tree, which takes as long as some images
+EXPLAINED_S = 2.0  # between two looks at the whole tree for one pair of frames; each takes as long as some images
+ASKED_S = 10.0  # so long a pair of frames is shown after it was asked for
 
 
 class _Listener(tf2_ros.TransformListener):
@@ -55,7 +56,7 @@ class Transforms(object):
         self._buffer = tf2_ros.Buffer(debug=False)
         self._listener = _Listener(self._buffer)
         self._from_before = False
-        self._asked, self._explanation, self._explained_s = None, '', -EXPLAINED_S
+        self._asked, self._explanations = {}, {}  # by (target, source): when; (sentence, when)
 
     def lookup(self, target_frame, source_frame, stamp):
         """`target_from_source` at a stamp, a 4x4 matrix.
@@ -65,20 +66,27 @@ class Transforms(object):
         tf2_ros.TransformException
             If tf does not know it within the wait; says which frames and what tf knows.
         """
+        asked = target_frame.lstrip('/'), source_frame.lstrip('/')
+        self._asked[asked] = time.monotonic()
+        try:
+            return transform_from_message(self._awaited(asked, stamp))
+        except tf2_ros.TransformException as error:
+            explained = type(error)(self._explained(asked, stamp) or str(error))
+            self._forget_time_before()
+            raise explained
+
+    def _awaited(self, asked, stamp):
         deadline_s = time.monotonic() + self._wait_s
-        self._asked = target_frame.lstrip('/'), source_frame.lstrip('/')
         with self._listener.news:
             while True:
                 try:
-                    found = self._buffer.lookup_transform(target_frame.lstrip('/'), source_frame.lstrip('/'), stamp)
+                    found = self._buffer.lookup_transform(asked[0], asked[1], stamp)
                     self._from_before = False
-                    return transform_from_message(found)
-                except tf2_ros.TransformException as error:
+                    return found
+                except tf2_ros.TransformException:
                     left_s = deadline_s - time.monotonic()
                     if left_s <= 0 or rospy.is_shutdown():
-                        explained = type(error)(self._explained(stamp) or str(error))
-                        self._forget_time_before()
-                        raise explained
+                        raise
                 self._listener.news.wait(min(left_s, LONGEST_WAIT_S))
 
     def go_back(self):
@@ -89,22 +97,33 @@ class Transforms(object):
         self._from_before = True
 
     def age(self):
-        """How old the newest transform is that was asked for, in words."""
-        if self._asked is None:
-            return 'not asked for yet'
+        """How old the newest transform is that was asked for, in words: of each camera."""
+        latest_s = max(list(self._asked.values()), default=0.0)
+        for asked, when_s in list(self._asked.items()):
+            if when_s < latest_s - ASKED_S:
+                self._asked.pop(asked)
+        ages = ['%s from %s to %s' % ((self._age_of(asked),) + asked[::-1]) for asked in sorted(self._asked)]
+        return ', '.join(ages) or 'not asked for yet'
+
+    def _age_of(self, asked):
         try:
-            newest = self._buffer.get_latest_common_time(*self._asked)
+            newest = self._buffer.get_latest_common_time(*asked)
         except tf2_ros.TransformException:
-            return 'none from %s to %s' % self._asked[::-1]
+            return 'none'
         return '%.3f s' % (rospy.get_rostime() - newest).to_sec() if newest else 'static'
 
-    def _explained(self, stamp):
-        """Why there is no transform, from all that tf knows; empty where that says nothing."""
+    def _explained(self, asked, stamp):
+        """Why there is no transform, from all that tf knows; empty where that says nothing.
+
+        It takes its time: not under the lock, where other cameras would wait for it.
+        """
         now_s = time.monotonic()
-        if now_s - self._explained_s >= EXPLAINED_S:
+        recent = {frames: said for frames, said in list(self._explanations.items()) if now_s - said[1] < EXPLAINED_S}
+        if asked not in recent:
             links = links_in(self._buffer.all_frames_as_yaml())
-            self._explanation, self._explained_s = why_missing(links, *self._asked, stamp_s=stamp.to_sec())[0], now_s
-        return self._explanation
+            recent[asked] = why_missing(links, *asked, stamp_s=stamp.to_sec())[0], now_s
+        self._explanations = recent
+        return recent[asked][0]
 
     def _forget_time_before(self):
         if self._from_before:

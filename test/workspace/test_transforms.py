@@ -1,0 +1,63 @@
+"""Transforms for several cameras, without a master."""
+import threading
+
+import pytest
+import rospy
+import tf2_ros
+from geometry_msgs.msg import TransformStamped
+from std_msgs.msg import Header
+
+from ros_3d_bb.nodes import transforms as module
+from ros_3d_bb.nodes.transforms import Transforms
+from support.masterless import masterless
+
+STAMP = rospy.Time(100)
+CAMERAS = 'front', 'rear'
+
+
+@pytest.fixture
+def transforms():
+    """tf knows neither camera."""
+    with masterless() as connections:
+        made = Transforms(wait_s=0.0)
+        connections.buffers[0].set_transform(link('map', 'base_link'), 'test')
+        yield made
+
+
+def link(parent, child):
+    made = TransformStamped(header=Header(frame_id=parent, stamp=STAMP), child_frame_id=child)
+    made.transform.rotation.w = 1.0
+    return made
+
+
+def why_not(transforms, camera):
+    with pytest.raises(tf2_ros.TransformException) as error:
+        transforms.lookup('map', camera, STAMP)
+    return str(error.value)
+
+
+def test_each_camera_is_told_of_its_own_frame(transforms):
+    for camera in CAMERAS + CAMERAS:
+        assert 'tf knows no frame %s;' % camera in why_not(transforms, camera)
+
+
+def test_the_age_is_that_of_each_camera(transforms):
+    assert transforms.age() == 'not asked for yet'
+    why_not(transforms, 'rear')
+    assert transforms.age() == 'none from rear to map'
+    why_not(transforms, 'front')
+    assert transforms.age() == 'none from front to map, none from rear to map'
+
+
+def test_while_one_camera_is_explained_transforms_are_taken_and_others_found(transforms, monkeypatch):
+    """The tree is read while the other thread holds it up."""
+    looked = []
+
+    def slow(_links, target, source, stamp_s):
+        thread = threading.Thread(target=lambda: looked.append(transforms.lookup('map', 'base_link', STAMP)))
+        thread.daemon = True
+        thread.start()
+        thread.join(10)
+        return 'gone', ''
+    monkeypatch.setattr(module, 'why_missing', slow)
+    assert why_not(transforms, 'front') == 'gone' and len(looked) == 1
