@@ -135,11 +135,18 @@ def test_lists_stay_lists_on_the_parameter_server(tracker):
     assert rospy.get_param('/tracker_node/marker_namespaces') == ['cylinder', 'id']
 
 
+def test_a_node_without_a_parameter_file_is_tuned_too(clients):
+    client = Client('plain_tracker', timeout=TIMEOUT_S)
+    assert client.update_configuration({'prediction_time': 3.0})['prediction_time'] == 3.0
+    assert isinstance(rospy.get_param('/plain_tracker/marker_namespaces'), list)
+    client.close()
+
+
 def test_the_command_of_dynamic_reconfigure_works(tracker, said):
     def dynparam(*arguments):
         command = ('rosrun', 'dynamic_reconfigure', 'dynparam') + arguments
         return subprocess.check_output(command, stderr=subprocess.STDOUT, universal_newlines=True, timeout=TIMEOUT_S)
-    assert dynparam('list').split() == ['/' + node for node in NODES]
+    assert dynparam('list').split() == ['/' + node for node in sorted(NODES + ['plain_tracker'])]
     dynparam('set', '/tracker_node', 'prediction_time', '3.0')
     said('~prediction_time is 3.0 now, 2.0 before')
     assert rospy.get_param('/tracker_node/prediction_time') == 3.0

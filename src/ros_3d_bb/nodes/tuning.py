@@ -81,14 +81,16 @@ class Tuning(object):
         self._params = params
 
     def _values(self):
-        return {name: value for each in self._params for name, value in each._asdict().items()}
+        """By name, as the parameter server has them: lists, where defaults are tuples."""
+        return {name: list(value) if isinstance(value, tuple) else value
+                for each in self._params for name, value in each._asdict().items()}
 
     def _keep_in_step(self, known):
         """Tell the parameter server which live parameters differ from those known. Returns their names."""
         values = self._values()
         changed = [name for name in self._names if name not in known or known[name] != values[name]]
         for name in changed:
-            rospy.set_param('~' + name, list(values[name]) if isinstance(values[name], tuple) else values[name])
+            rospy.set_param('~' + name, values[name])
         return changed
 
     def _message(self):
