@@ -1,4 +1,5 @@
 """What every 2D detector offers: boxes, a picture of them, and a switch."""
+import contextlib
 import time
 
 import rospy
@@ -8,10 +9,9 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 from ros_3d_bb.images import fill_image
 from ros_3d_bb.messages import boxes2d_to_message
-from ros_3d_bb.nodes.transport import inputs
 from ros_3d_bb.overlay import draw_boxes
 
-SILENT_S = 5.0  # no image is searched for so long
+SILENT_S = 5.0  # an image waits so long for its search to end
 
 
 class BoxesOutput(object):
@@ -43,7 +43,7 @@ class BoxesOutput(object):
 class Switch(object):
     """Whether the detector works.
 
-    The diagnostics say so, and complain where images come and none is answered.
+    The diagnostics say so, and complain where an image was handed over and no search ends.
 
     Services
     --------
@@ -53,23 +53,31 @@ class Switch(object):
 
     def __init__(self, on, diagnostics):
         self.on = on
-        self._answered_s = time.monotonic()
+        self._waits_since_s = None  # the oldest image since a search ended
         diagnostics.show('detector', lambda: 'working' if self.on else 'paused')
         diagnostics.check(self._faults)
         rospy.Service('~enable', SetBool, self._on_request)
 
-    def answered(self):
-        """An image was searched."""
-        self._answered_s = time.monotonic()
+    def offered(self):
+        """An image is handed over to be searched."""
+        if self._waits_since_s is None:
+            self._waits_since_s = time.monotonic()
+
+    @contextlib.contextmanager
+    def searching(self):
+        """Around a search. Whatever comes of it, boxes, no floor or a refused image, the detector is at work."""
+        try:
+            yield
+        finally:
+            self._waits_since_s = None
 
     def _faults(self):
-        came_s = min((noted.came_s or 0.0 for noted in inputs()), default=0.0)
-        now_s = time.monotonic()
-        if self.on and now_s - came_s < 1.0 and now_s - self._answered_s > SILENT_S:
+        since_s, now_s = self._waits_since_s, time.monotonic()
+        if self.on and since_s is not None and now_s - since_s > SILENT_S:
             yield 'no answers', ('the detector is silent: images come, and none has been answered for %.0f s; it '
-                                 'hangs, is starved of CPU, or refuses all of them' % (now_s - self._answered_s))
+                                 'hangs or is starved of CPU' % (now_s - since_s))
 
     def _on_request(self, request):
         self.on = request.data
-        self.answered()
+        self._waits_since_s = None
         return SetBoolResponse(True, 'detector %s' % ('enabled' if request.data else 'paused'))

@@ -74,11 +74,13 @@ class DepthDetectorNode(object):
         for pair in pairs:
             if not self._switch.on:
                 self._diagnostics.count('images while paused')
-            elif self._worker.offer(pair):
+                continue
+            self._switch.offered()
+            if self._worker.offer(pair):
                 self._diagnostics.count('images skipped for a newer one')
 
     def _work(self, pair):
-        with self._diagnostics.refusing('images'), self._searching:
+        with self._diagnostics.refusing('images'), self._switch.searching(), self._searching:
             if not self._switch.on:  # it may have been paused meanwhile
                 self._diagnostics.count('images while paused')
                 return
@@ -86,7 +88,6 @@ class DepthDetectorNode(object):
             if found is not None:
                 self._output.publish(pair[1].header, *found, names=self._search.names)
                 self._diagnostics.answered(pair[1].header.stamp)
-                self._switch.answered()
 
     def _on_error(self, error):
         self._diagnostics.warn('searches failed', 'the detector failed: %s; waiting for the next image' % error)

@@ -46,11 +46,13 @@ class Yolov5Node(object):
         with self._diagnostics.taking('colour images'):
             if not self._switch.on:
                 self._diagnostics.count('images while paused')
-            elif self._worker.offer(message):
+                return
+            self._switch.offered()
+            if self._worker.offer(message):
                 self._diagnostics.count('images skipped for a newer one')
 
     def _search(self, message):
-        with self._diagnostics.refusing('images'):
+        with self._diagnostics.refusing('images'), self._switch.searching():
             if self._switch.on:
                 self._detect(message)
             else:  # it was paused since the image came
@@ -62,7 +64,6 @@ class Yolov5Node(object):
         self._diagnostics.count('images searched')
         self._output.publish(message.header, image, found, detector.names)
         self._diagnostics.answered(message.header.stamp)
-        self._switch.answered()
 
     def _on_error(self, error):
         self._diagnostics.warn('searches failed', 'the detector failed: %s; waiting for the next image' % error)
