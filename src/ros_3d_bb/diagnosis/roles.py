@@ -6,7 +6,7 @@ from ros_3d_bb.messages import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
 
 IMAGE, CAMERA = 'sensor_msgs/Image', 'the camera (roslaunch ros_3d_bb realsense.launch)'
 CAMERA_SILENT = 'is the camera plugged in, the bag still playing (not paused), the network fast enough for images?'
-DETECTOR_SILENT = ('is the detector paused (rosservice call /yolov5_node/enable true), still loading its weights, or '
+DETECTOR_SILENT = ('is the detector paused (its service ~enable takes true), still loading its weights, or '
                    'told to say nothing of empty images (publish_empty: false)?')
 ROLES = {
     COLOR: Role('colour images', COLOR_TOPIC, IMAGE, 'camera_image', CAMERA, CAMERA_SILENT),
