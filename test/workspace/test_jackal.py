@@ -107,6 +107,13 @@ def test_either_the_description_or_one_node_says_where_the_camera_is(monkeypatch
     assert (nodes['camera_mount'].args if 'camera_mount' in nodes else None) == expected
 
 
+def test_several_cameras_are_started_and_placed_by_their_own_launch_files():
+    parameters, nodes = loaded('jackal.launch', 'cameras:=front,rear', 'check:=true')
+    assert not {'realsense_node', 'realsense2_camera', 'camera_mount'} & set(nodes)
+    assert {'yolov5_node', 'bbox3d_node', 'tracker_node', 'doctor'} == set(nodes)
+    assert parameters['/tracker_node/cameras'] == 'front,rear' and '/rear/bbox3d_node/estimator' in parameters
+
+
 def test_on_the_robot_nodes_that_die_are_started_again(packages):
     """Elsewhere only where that is asked for, as a fault of the set-up would be said again and again."""
     arguments = ['driver:=pyrealsense2', 'planner:=costmap']
