@@ -203,7 +203,7 @@ def wait_for_line(log, node, words):
 
 def diagnosed():
     """What doctor says is wrong, as it prints it."""
-    found = graph_findings(argparse.Namespace(seconds=1.0, patience=0.0, target_frame=''))
+    found = graph_findings(argparse.Namespace(seconds=1.0, patience=0.0, target_frame='', camera=''))
     return '\n'.join(line for finding in found if finding.is_wrong for line in finding.lines)
 
 

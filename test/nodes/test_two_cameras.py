@@ -3,6 +3,7 @@
 Needs a master: it is about the names of all nodes and topics together, and about images that come when they may.
 """
 import os
+import subprocess
 
 import pytest
 import rosbag
@@ -10,23 +11,39 @@ import rospy
 
 from ros_3d_bb.evaluation.identities import score
 from ros_3d_bb.messages import stamp_of
+from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.report import read_recording
 from ros_3d_bb.tracking.tracked import OUT_OF_VIEW, VISIBLE
-from support.ros import launched
+from support.ros import Recorder, launched
 
 SCENARIO = os.path.join(os.path.dirname(__file__), '..', '..', 'config', 'scenarios', 'two_cameras.yaml')
 PEOPLE = 4
 
 
 @pytest.fixture(scope='module')
-def bag(tmp_path_factory):
-    """The bag of a run, at half of the scenario's rate: five images a second from each camera."""
+def run(tmp_path_factory):
+    """The bag of a run, at half of the scenario's rate: five images a second from each camera; and what doctor says
+    meanwhile, by the camera that it is asked about."""
     rospy.init_node('test_two_cameras')
     path = str(tmp_path_factory.mktemp('scene') / 'run.bag')
     with launched('simulation.launch', 'scenario:=' + os.path.realpath(SCENARIO), 'cameras:=front, left', 'rate:=5.0',
                   'record:=' + path, 'rviz:=false', 'repeat:=false') as process:
+        with Recorder('ros_3d_bb/tracks', TrackedObjectArray) as tracks:
+            tracks.wait_for(1, 60)
+        doctors = {camera: doctor(camera) for camera in ('', 'left')}
+        said = {camera: asked.communicate()[0] for camera, asked in doctors.items()}
         assert process.wait(timeout=180) == 0
-    return path
+    return path, said
+
+
+def doctor(camera):
+    return subprocess.Popen(['rosrun', 'ros_3d_bb', 'doctor', '--seconds', '2', '--camera', camera],
+                            stdout=subprocess.PIPE, universal_newlines=True)
+
+
+@pytest.fixture(scope='module')
+def bag(run):
+    return run[0]
 
 
 @pytest.fixture(scope='module')
@@ -63,3 +80,14 @@ def test_each_camera_has_its_topics_and_the_tracks_have_one(bag):
     assert {'/ros_3d_bb/tracks', '/visualization_marker_array'} <= set(topics)
     assert not [topic for topic in topics if topic.endswith(('yolo_result_out', 'ros_3d_bb/color'))]
     assert stamps == sorted(stamps)
+
+
+@pytest.mark.parametrize('asked, camera, other', [('', 'front', 'left'), ('left', 'left', 'front')])
+def test_doctor_looks_at_the_topics_of_one_camera(run, asked, camera, other):
+    """How fast images come on a busy machine is another matter."""
+    said = run[1][asked]
+    assert 'cameras: %s; of front, left' % camera in said, said
+    for name in ('color/image_raw', 'aligned_depth_to_color/image_raw', 'color/camera_info', 'yolo_bounding_box',
+                 'ros_3d_bb/bb_3d'):
+        assert '/%s/%s' % (camera, name) in said, said
+    assert 'nobody publishes' not in said and '/%s/' % other not in said, said

@@ -8,17 +8,19 @@ from unittest import mock
 import numpy as np
 import pytest
 import rosbag
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
-from std_srvs.srv import SetBoolRequest
 
 from ros_3d_bb.bags import scenario_images, write_bag
 from ros_3d_bb.diagnosis.bag_look import look_at_bag
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.images import fill_image
-from ros_3d_bb.nodes.boxes_output import Switch
 from ros_3d_bb.nodes.depth_camera import DepthCameraCheck
+from ros_3d_bb.nodes.doctor import tracked_cameras
+from ros_3d_bb.nodes.graph_look import GraphLook
 from ros_3d_bb.simulation.scenario import scenario_from
+from support.masterless import masterless
 
 SCENE = {'duration': 1.0, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}
 DEPTH, INFO = '/camera/aligned_depth_to_color/image_raw', '/camera/color/camera_info'
@@ -130,6 +132,19 @@ def test_names_of_topics_are_given_as_remappings(bag, tmp_path):
     assert status == 0, said
 
 
+def of_front(topic, message):
+    own = ('/camera/', '/yolo_bounding_box', '/ros_3d_bb/bb_3d')
+    return '/front' + topic.replace('/camera/', '/') if topic.startswith(own) else topic, message
+
+
+def test_of_a_bag_with_several_cameras_one_is_looked_at(bag, tmp_path):
+    path = changed(bag, tmp_path, of_front)
+    said, status = doctor(path, '--camera', 'front')
+    assert status == 0 and 'ok     depth images: /front/aligned_depth_to_color/image_raw' in said, said
+    said, status = doctor(path, '--camera', 'rear')
+    assert status == 1 and 'there is no /rear/color/image_raw in it' in said
+
+
 def test_what_is_no_bag_is_said(tmp_path):
     (tmp_path / 'no.bag').write_text('nothing')
     said, status = doctor(str(tmp_path / 'no.bag'))
@@ -138,7 +153,7 @@ def test_what_is_no_bag_is_said(tmp_path):
 
 @pytest.mark.parametrize('uri, fault', [
     (None, 'no ROS master answers at '), ('http://no.such.host.invalid:11311', 'does not know the name no.such.host'),
-    ('localhost', "ROS_MASTER_URI is 'localhost'")])
+    ('localhost', "ROS_MASTER_URI is 'localhost'"), ('http://robot:PORT', "ROS_MASTER_URI is 'http://robot:PORT'")])
 def test_without_a_master_that_is_said(uri, fault):
     with socket.socket() as unused:  # bound and not listened to: nobody answers
         unused.bind(('localhost', 0))
@@ -190,33 +205,45 @@ def test_a_depth_image_in_another_frame_is_named_where_names_can_be_relied_on(su
     assert list(check.faults()) == []
 
 
-class Noting(object):
-    """In place of Diagnostics: keeps what it is to show and to check."""
+@pytest.fixture
+def look():
+    """Makes a GraphLook, {topic: type} of what is published, and (node, {input: topic}) of what nodes say."""
+    with masterless() as connections, mock.patch('rospy.get_namespace', lambda: '/robot1/'), \
+            mock.patch('rospy.resolve_name', lambda name: '/robot1/' + name), mock.patch('time.sleep') as sleep, \
+            mock.patch('ros_3d_bb.nodes.graph_look.published_topics') as topics, \
+            mock.patch('ros_3d_bb.nodes.graph_look.publishers_of', lambda *_: ()):
+        def made(published, said, camera=''):
+            topics.return_value = published
+            message = DiagnosticArray(status=[DiagnosticStatus(name=node + ': pipeline', values=[
+                KeyValue('input ' + name, topic + ' 30.0 Hz') for name, topic in inputs.items()])
+                                              for node, inputs in said])
+            sleep.side_effect = lambda _s: connections.subscribers['/diagnostics'].callback(message)
+            return GraphLook(camera=camera).seen()
+        yield made
 
-    def show(self, _name, text):
-        self.text = text
 
-    def check(self, faults):
-        self.faults = faults
+def test_of_several_cameras_one_is_looked_at(look):
+    """Whichever node says first what its topics are called."""
+    said = [('robot1/%s/bbox3d_node' % camera, {DEPTH[1:]: '/robot1/%s/depth' % camera})
+            for camera in ('front', 'rear')]
+    said.append(('robot1/tracker_node', {'%s/ros_3d_bb/bb_3d' % camera: '/boxes/' + camera
+                                         for camera in ('front', 'rear')}))
+    for camera in ('front', 'rear'):
+        streams = look({}, said, camera).streams
+        assert streams['depth'].topic == '/robot1/%s/depth' % camera
+        assert streams['boxes3d'].topic == '/boxes/' + camera
+        assert streams['color'].topic == '/robot1/%s/color/image_raw' % camera
+        assert streams['tracks'].topic == '/robot1/ros_3d_bb/tracks'
 
 
-def test_a_detector_that_answers_no_images_is_silent_unless_it_is_paused():
-    """Images come all the time; the clock of the machine is the test's."""
-    diagnostics, now_s = Noting(), [1000.0]
-    images = mock.Mock()
-    type(images).came_s = mock.PropertyMock(side_effect=lambda: now_s[0])
-    with mock.patch('time.monotonic', lambda: now_s[0]), mock.patch('rospy.Service') as service, \
-            mock.patch('ros_3d_bb.nodes.boxes_output.inputs', lambda: [images]):
-        switch = Switch(True, diagnostics)
-        now_s[0] += 4
-        assert list(diagnostics.faults()) == [] and diagnostics.text() == 'working'
-        now_s[0] += 2
-        (event, sentence), = diagnostics.faults()
-        assert event == 'no answers' and 'images come, and none has been answered for 6 s' in sentence
-        switch.answered()
-        assert list(diagnostics.faults()) == []
-        service.call_args[0][2](SetBoolRequest(False))
-        now_s[0] += 60
-        assert list(diagnostics.faults()) == [] and diagnostics.text() == 'paused'
-        service.call_args[0][2](SetBoolRequest(True))
-        assert list(diagnostics.faults()) == []
+def test_a_robot_whose_name_begins_in_the_same_way_is_another(look):
+    said = [('robot10/bbox3d_node', {DEPTH[1:]: '/robot10/depth'}), ('robot1/bbox3d_node', {})]
+    seen = look({}, said)
+    assert set(seen.nodes) == {'robot1/bbox3d_node'} and seen.streams['depth'].topic == '/robot1' + DEPTH
+
+
+@pytest.mark.parametrize('given, cameras', [('', ['']), ('front, rear', ['front', 'rear']), (['front'], ['front']),
+                                            ({'front': 1}, [''])])
+def test_the_cameras_are_those_of_the_tracker(given, cameras):
+    with mock.patch('rospy.get_param', lambda name, default: given), mock.patch('rospy.resolve_name', str):
+        assert tracked_cameras() == cameras

@@ -13,8 +13,10 @@ from ros_3d_bb.bag_reading import BagError
 from ros_3d_bb.diagnosis.bag_look import look_at_bag
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.diagnosis.seen import Finding
+from ros_3d_bb.following import TrackerNodeParams
 from ros_3d_bb.nodes.graph import NO_ANSWER, PATIENCE_S
-from ros_3d_bb.nodes.graph_look import GraphLook
+from ros_3d_bb.nodes.graph_look import GraphLook, name_for, tracker_param
+from ros_3d_bb.params import params_from
 
 LOCAL = 'localhost', '127.0.0.1', '127.0.1.1', '::1'
 
@@ -48,7 +50,8 @@ def bag_findings(arguments):
     names = dict(remapping.split(':=') for remapping in sys.argv if ':=' in remapping)
 
     def name_of(topic):
-        return '/' + names.get(topic, topic).lstrip('/')
+        wanted = name_for(arguments.camera, topic)
+        return '/' + names.get(wanted, wanted).lstrip('/')
     try:
         seen = look_at_bag(arguments.bag, name_of, arguments.target_frame or 'map')
     except BagError as error:
@@ -63,12 +66,26 @@ def graph_findings(arguments):
     """
     deadline_s = time.monotonic() + arguments.patience
     while True:
-        look = GraphLook(arguments.target_frame)
+        cameras = tracked_cameras()
+        camera = arguments.camera or cameras[0]
+        look = GraphLook(arguments.target_frame, camera)
         _sleep(arguments.seconds)
         found = findings(look.seen())
         look.close()
+        if len(cameras) > 1:
+            found.insert(0, Finding('cameras', '%s; of %s, looked at one by one: doctor --camera NAME'
+                                    % (camera, ', '.join(cameras))))
         if not any(finding.is_wrong for finding in found) or time.monotonic() >= deadline_s:
             return found
+
+
+def tracked_cameras():
+    """The namespaces of the cameras that the tracker takes, a list; of a single camera ['']."""
+    try:
+        tracker, = params_from({'cameras': tracker_param('cameras', '')}, TrackerNodeParams)
+        return [str(camera) for camera in tracker.cameras] or ['']
+    except ValueError:  # the tracker says so
+        return ['']
 
 
 def _sleep(seconds):
@@ -83,9 +100,13 @@ def _sleep(seconds):
 def machine_findings():
     """Whether there is a master, and whether others can reach this machine by the name that it goes by."""
     uri = os.environ.get('ROS_MASTER_URI', '')
-    address = urlparse(uri)
     fix = ('roscore, or roslaunch, starts one on this machine; of a robot: export ROS_MASTER_URI=http://ROBOT:11311')
-    if not (address.hostname and address.port):
+    try:
+        address = urlparse(uri)
+        is_address = address.hostname and address.port
+    except ValueError:  # http://HOST:PORT, literally
+        is_address = False
+    if not is_address:
         return [Finding('master', '', 'ROS_MASTER_URI is %r; http://HOST:11311 expected' % uri, fix)]
     try:
         socket.create_connection((address.hostname, address.port), PATIENCE_S).close()
@@ -122,6 +143,9 @@ def _parser():
     parser.add_argument('--seconds', type=float, default=5.0, metavar='S', help='how long to listen (default: 5)')
     parser.add_argument('--patience', type=float, default=0.0, metavar='S',
                         help='listen again for so long while something is wrong: nodes may be starting (default: 0)')
+    parser.add_argument('--camera', default='', metavar='NAME',
+                        help='namespace of the one of several cameras to look at (default: of a graph the first of '
+                        "tracker_node's, of a bag none)")
     parser.add_argument('--target-frame', default='', metavar='FRAME',
                         help="fixed frame of the tracks (default: tracker_node's, of a bag map)")
     return parser

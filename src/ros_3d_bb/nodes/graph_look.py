@@ -9,11 +9,13 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import CameraInfo
 
+from ros_3d_bb.camera_messages import topic_of
 from ros_3d_bb.diagnosis.bag_look import CLASSES, tf_seen
 from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, INFO
 from ros_3d_bb.diagnosis.observing import Observation, camera_seen, color_seen, depth_seen
 from ros_3d_bb.diagnosis.roles import ROLES
 from ros_3d_bb.diagnosis.seen import Clock, Seen
+from ros_3d_bb.messages import TRACKS_TOPIC
 from ros_3d_bb.nodes.graph import published_topics, publishers_of
 from ros_3d_bb.nodes.transport import IMAGE_BUFFER
 
@@ -24,11 +26,12 @@ OURS = ': pipeline'  # ends the names of our nodes' diagnostics
 class GraphLook(object):
     """Listens to the graph; `seen` says what came.
 
-    Names of topics: those that doctor is given as remappings, else those that the running nodes say they use.
+    Names of topics: those that doctor is given as remappings, else those that the running nodes say they use. `camera`
+    is the namespace of the one of several to look at.
     """
 
-    def __init__(self, target_frame=''):
-        self._target_frame, self._statuses = target_frame, {}
+    def __init__(self, target_frame='', camera=''):
+        self._target_frame, self._camera, self._statuses = target_frame, camera, {}
         self._clocks, self._depth_info = [], None
         self._buffer = tf2_ros.Buffer(debug=False)
         self._listener = tf2_ros.TransformListener(self._buffer)
@@ -60,9 +63,9 @@ class GraphLook(object):
             color_camera=camera_seen(newest[INFO]), depth_camera=camera_seen(self._depth_info),
             color=color_seen(newest[COLOR]), depth=depth_seen(newest[DEPTH]), tf=self._tf(newest[BOXES3D]),
             clock=Clock(bool(rospy.get_param('/use_sim_time', False)), len(self._clocks)),
-            nodes={name: self._statuses[name][:2] for name in self._statuses},
-            stamp_tolerance_s=self._param('bbox3d_node', 'stamp_tolerance', 0.005),
-            cache_length_s=self._param('bbox3d_node', 'cache_length', 1.0))
+            nodes={name: status[:2] for name, status in list(self._statuses.items())},
+            stamp_tolerance_s=self._bbox3d_param('stamp_tolerance', 0.005),
+            cache_length_s=self._bbox3d_param('cache_length', 1.0))
 
     def lookup(self, target_frame, source_frame, stamp):
         """As of `BagTransforms`."""
@@ -73,25 +76,27 @@ class GraphLook(object):
         return self._buffer.all_frames_as_yaml()
 
     def _tf(self, boxes3d):
-        target = self._target_frame or self._param('tracker_node', 'target_frame', 'map')
-        source = self._param('tracker_node', 'camera_frame', '') or (
-            boxes3d.header.frame_id if boxes3d is not None else self._param('bbox3d_node', 'frame_id', ''))
+        target = self._target_frame or tracker_param('target_frame', 'map')
+        source = tracker_param('camera_frame', '') or (
+            boxes3d.header.frame_id if boxes3d is not None else self._bbox3d_param('frame_id', ''))
         return tf_seen(self, self._observed[DEPTH], target, source)
 
-    def _param(self, node, name, default):
-        return rospy.get_param(rospy.resolve_name('%s/%s' % (node, name)), default)
+    def _bbox3d_param(self, name, default):
+        return _param(topic_of(self._camera, 'bbox3d_node'), name, default)
 
     def _publishers(self, one):
         return () if one.newest is not None or one.topic not in self._topics else publishers_of(one.topic, False)
 
     def _topic_of(self, name):
         """What a topic of the nodes is called in this graph."""
-        resolved = rospy.resolve_name(name)
-        if resolved != rospy.get_namespace() + name:
+        wanted = name_for(self._camera, name)
+        resolved = rospy.resolve_name(wanted)
+        if resolved != rospy.get_namespace() + wanted:
             return resolved
-        said = [values['input ' + name] for _level, _sentence, values in self._statuses.values()
-                if 'input ' + name in values]
-        return said[0].split()[0] if said else resolved
+        beside = (rospy.get_namespace() + self._camera).strip('/') + '/'  # nodes of this camera only
+        said = [values.get('input ' + (name if node.startswith(beside) else wanted), '')
+                for node, (_level, _sentence, values) in list(self._statuses.items())]
+        return next((text.split()[0] for text in said if text), resolved)
 
     def _subscribe(self, topic, kind, callback):
         self._subscribers.append(rospy.Subscriber(topic, kind, callback, queue_size=10, buff_size=IMAGE_BUFFER))
@@ -103,11 +108,25 @@ class GraphLook(object):
         self._depth_info = message
 
     def _on_diagnostics(self, message):
-        prefix = rospy.get_namespace().strip('/')
+        prefix = rospy.get_namespace()[1:]  # ends in a slash: robot1 has nothing of robot10
         for status in message.status:
             if status.name.endswith(OURS) and status.name.startswith(prefix):
                 values = {entry.key: entry.value for entry in status.values}
                 self._statuses[status.name[:-len(OURS)]] = status.level, status.message, values
+
+
+def name_for(camera, topic):
+    """What a topic of the pipeline is called for one of several cameras; the tracks are of all."""
+    return topic if topic == TRACKS_TOPIC else topic_of(camera, topic)
+
+
+def tracker_param(name, default):
+    """A parameter of the tracker, the default where it is not set."""
+    return _param('tracker_node', name, default)
+
+
+def _param(node, name, default):
+    return rospy.get_param(rospy.resolve_name('%s/%s' % (node, name)), default)
 
 
 def _to_be_suggested(topics):
