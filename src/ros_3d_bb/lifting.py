@@ -4,7 +4,7 @@ from typing import NamedTuple
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
-from ros_3d_bb.diagnosis.camera_faults import units_fault
+from ros_3d_bb.diagnosis.camera_faults import ALIGN, size_fault, units_fault
 from ros_3d_bb.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.estimation import DepthImage, check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.geometry import Camera
@@ -149,10 +149,9 @@ class Lifter(object):
         fault = units_fault(depth)
         if fault:
             raise ValueError(fault)
-        if depth.values.shape != (frame.camera.height, frame.camera.width):
-            raise ValueError('the depth image has %d x %d pixels, the colour camera %d x %d; depth must be aligned to '
-                             'colour (realsense2_camera: align_depth:=true)'
-                             % (depth.values.shape[::-1] + frame.camera[:2]))
+        fault = size_fault(frame.camera, *depth.values.shape[::-1])
+        if fault:
+            raise ValueError('%s; depth must be aligned to colour: %s' % (fault, ALIGN))
         return depth
 
     def _why_no_frame(self, boxes):

@@ -5,6 +5,8 @@ GRID = 16  # as many rows and columns of a depth image are looked at
 LEAST_SAMPLES = 8  # fewer valid pixels say nothing
 NEAREST_M, FARTHEST_M = 0.1, 100.0  # no depth camera of people measures outside
 SAME_PX = 1.0  # intrinsics that differ by less are the same: half a pixel is 1 cm at 6 m
+ALIGN = ('start the camera with realsense.launch, or realsense2_camera with align_depth:=true, and take '
+         'camera/aligned_depth_to_color/image_raw')
 
 
 def units_fault(depth):
@@ -31,6 +33,20 @@ def units_fault(depth):
     return ('the depth image has the wrong unit: half of its pixels are nearer than %.3g m; it seems to hold %s in a '
             '%s, which has to hold %s (REP 118), or set depth_scale'
             % (median_m, unit, '16UC1' if integers else '32FC1', 'millimetres' if integers else 'metres'))
+
+
+def size_fault(color, width, height):
+    """Whether a depth image has another size than the camera of the colour image; a phrase, or empty.
+
+    Parameters
+    ----------
+    color : geometry.Camera
+    width, height : int
+        Pixels of the depth image.
+    """
+    if (width, height) == color[:2]:
+        return ''
+    return 'the depth image has %d x %d pixels, the colour camera %d x %d' % ((width, height) + color[:2])
 
 
 def intrinsics_fault(color, depth):

@@ -2,16 +2,14 @@
 
 A check whose ground is missing is left out: without depth images nothing is said of their units.
 """
-from ros_3d_bb.diagnosis.camera_faults import frames_fault, intrinsics_fault
+from ros_3d_bb.diagnosis.camera_faults import ALIGN, frames_fault, intrinsics_fault, size_fault
 from ros_3d_bb.diagnosis.seen import Finding
 from ros_3d_bb.diagnosis.tf_tree import why_missing
-from ros_3d_bb.diagnosis.topic_faults import (LATE_S, LEAST_PAIRED, LEAST_RATE_HZ, clock_fault, paired_share,
-                                              silence_fault, span)
+from ros_3d_bb.diagnosis.topic_faults import (LATE_S, LEAST_PAIRED, LEAST_RATE_HZ, STANDSTILL, clock_fault,
+                                              paired_share, silence_fault, span)
 
 COLOR, DEPTH, INFO, BOXES2D, BOXES3D, TRACKS = 'color', 'depth', 'info', 'boxes2d', 'boxes3d', 'tracks'
 IMAGES = COLOR, DEPTH, INFO
-ALIGN = ('start the camera with realsense.launch, or realsense2_camera with align_depth:=true, and take '
-         'camera/aligned_depth_to_color/image_raw')
 
 
 def findings(seen):
@@ -42,9 +40,7 @@ def _clock(seen):
     if seen.clock is None:
         return []
     if seen.clock.use_sim_time and not seen.clock.count:
-        return [Finding('time', fault='/use_sim_time is set and nothing comes on /clock: time stands still',
-                        fix='play the bag with rosbag play --clock, or rosparam set use_sim_time false, and start the '
-                            'nodes again')]
+        return [Finding('time', '', *STANDSTILL)]
     if seen.clock.count and not seen.clock.use_sim_time:
         return [Finding('time', fault='somebody publishes /clock, and /use_sim_time is not set: nodes do not heed it',
                         fix='rosparam set use_sim_time true before the nodes start')]
@@ -77,11 +73,8 @@ def _alignment(seen):
     if seen.depth is None or seen.color_camera is None or seen.color_camera.camera is None:
         return []
     camera, frame_id, _fault = seen.color_camera
-    fault = ''
-    if (seen.depth.width, seen.depth.height) != camera[:2]:
-        fault = 'the depth image has %d x %d pixels, the colour camera %d x %d' % (
-            (seen.depth.width, seen.depth.height) + camera[:2])
-    elif seen.depth_camera is not None and seen.depth_camera.camera is not None:
+    fault = size_fault(camera, seen.depth.width, seen.depth.height)
+    if not fault and seen.depth_camera is not None and seen.depth_camera.camera is not None:
         fault = intrinsics_fault(camera, seen.depth_camera.camera)
     return [_judged('alignment', 'depth has the pixels and the frame of colour',
                     fault or frames_fault(frame_id, seen.depth.frame_id), ALIGN)]

@@ -5,6 +5,8 @@ from ros_3d_bb.stamped import NS
 LATE_S, EARLY_S = 5.0, 2.0  # by so much a stamp may be before and after ROS time
 LEAST_RATE_HZ = 4.0  # of images; people who walk are lost between slower ones
 LEAST_PAIRED = 0.5  # share of boxes that find their depth image
+STANDSTILL = ('/use_sim_time is set and nothing comes on /clock: time stands still',
+              'play the bag with rosbag play --clock, or rosparam set use_sim_time false, and start the nodes again')
 
 
 def silence_fault(stream, topics, taken=(), seconds=5.0, is_bag=False):

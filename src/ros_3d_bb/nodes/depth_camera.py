@@ -5,11 +5,10 @@ import rospy
 from sensor_msgs.msg import CameraInfo
 
 from ros_3d_bb.camera_messages import DEPTH_TOPIC
-from ros_3d_bb.diagnosis.camera_faults import frames_fault, intrinsics_fault
+from ros_3d_bb.diagnosis.camera_faults import ALIGN, frames_fault, intrinsics_fault
 from ros_3d_bb.messages import camera_from_message
 
 AGAIN_S = 10.0  # until they are compared again: the driver may have been started anew
-REMEDY = 'start the camera with realsense.launch, or with align_depth:=true'
 
 
 class DepthCameraCheck(object):
@@ -33,7 +32,7 @@ class DepthCameraCheck(object):
         fault = self._with_frames and frames_fault(color.header.frame_id, self.depth_frame)
         fault = fault or self._intrinsics_fault(color)
         if fault:
-            yield 'alignment', 'depth is not aligned to colour: %s; positions are wrong; %s' % (fault, REMEDY)
+            yield 'alignment', 'depth is not aligned to colour: %s; positions are wrong; %s' % (fault, ALIGN)
 
     def _intrinsics_fault(self, message):
         try:

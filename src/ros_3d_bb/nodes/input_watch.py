@@ -6,7 +6,7 @@ from rospy.topics import get_topic_manager
 
 from ros_3d_bb.diagnosis.roles import role_named
 from ros_3d_bb.diagnosis.seen import Stream
-from ros_3d_bb.diagnosis.topic_faults import clock_fault, silence_fault
+from ros_3d_bb.diagnosis.topic_faults import STANDSTILL, clock_fault, silence_fault
 from ros_3d_bb.nodes.graph import NO_ANSWER, published_topics, publishers_of
 from ros_3d_bb.nodes.transport import inputs
 
@@ -35,8 +35,7 @@ class InputWatch(object):
         """(event, sentence) of what is wrong now."""
         now_s = time.monotonic()
         if now_s - self._began_s > SILENT_S and not rospy.get_rostime():
-            yield 'time stands still', ('/use_sim_time is set and nothing comes on /clock; play the bag with rosbag '
-                                        'play --clock, or rosparam set use_sim_time false, and start the nodes again')
+            yield 'time stands still', '%s; %s' % STANDSTILL
             return
         for noted in inputs():
             if now_s - (noted.came_s or self._began_s) > SILENT_S:
