@@ -153,7 +153,8 @@ class Diagnostics(Tally):
         while not rospy.is_shutdown():
             try:
                 self._updater.force_update()
-            except rospy.ROSException:
+            except Exception as error:  # one report must not end the thread
                 if not is_ending():
-                    raise
+                    self._log('no report', 'what this node did cannot be reported on /diagnostics (%r); trying again'
+                              % error, WARNING_LASTS_S)
             time.sleep(PERIOD_S)
