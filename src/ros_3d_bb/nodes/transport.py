@@ -1,4 +1,5 @@
 """How nodes subscribe: without delay, and with queues that keep the newest."""
+import threading
 import time
 
 import rospy
@@ -12,7 +13,7 @@ IMAGE_BUFFER = 2 ** 24  # bytes; less than the images that come at once, and ros
 SMALL_BUFFER = 2 ** 16  # rospy's default
 
 
-_inputs = []  # of this process, which is one node
+_inputs, _lock = [], threading.Lock()  # of this process, which is one node
 
 
 class Input(object):
@@ -61,11 +62,13 @@ def subscribe(topic, kind, callback, at_once=AT_ONCE):
     noted = Input(topic, kind, callback)
     noted.subscriber = rospy.Subscriber(topic, kind, noted.take, queue_size=at_once, tcp_nodelay=True,
                                         buff_size=IMAGE_BUFFER if kind is Image else SMALL_BUFFER)
-    _inputs.append(noted)
+    with _lock:
+        _inputs.append(noted)
     return noted.subscriber
 
 
 def inputs():
     """The Input of each topic that is subscribed now."""
-    _inputs[:] = [noted for noted in _inputs if noted.subscriber.impl is not None]
-    return list(_inputs)
+    with _lock:
+        _inputs[:] = [noted for noted in _inputs if noted.subscriber.impl is not None]
+        return list(_inputs)
