@@ -1,18 +1,24 @@
 """The whole pipeline while the ROS master is killed and started again. Needs a master of its own for that."""
 import contextlib
 import os
+import signal
 import socket
 import subprocess
 import time
 
 import pytest
+import rosgraph
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray
 from dynamic_reconfigure.client import Client
+from sensor_msgs.msg import CameraInfo
 from std_srvs.srv import Trigger
 
+from ros_3d_bb.camera_messages import INFO_TOPICS
 from ros_3d_bb.measurements import read_session
 from ros_3d_bb.msg import TrackedObjectArray
-from ros_3d_bb.nodes.registration import Registration
+from ros_3d_bb.nodes.label import Label
+from ros_3d_bb.nodes.registration import Registration, on_new_master
 from support.processes import killed_and_back, pid_of
 from support.ros import TIMEOUT_S, Recorder, launched, wait_until
 from support.stage import RECOVERY_IMAGES, Stage
@@ -44,6 +50,34 @@ def master(port):
         process.wait()
 
 
+class Failing(object):
+    """Cannot be called the first time."""
+
+    calls = 0
+
+    def __call__(self):
+        self.calls += 1
+        if self.calls == 1:
+            raise OSError('the network is gone again')
+
+
+def set_label(label):
+    """As somebody else does, with rosparam set."""
+    rosgraph.Master('/somebody').setParam('/test_master/label', label)
+
+
+@contextlib.contextmanager
+def reports_of(node):
+    """A function that waits for so many reports of a node on /diagnostics."""
+    with Recorder('/diagnostics', DiagnosticArray) as recorder:
+        def wait_for_reports(count):
+            begin = len(recorder.messages)
+            wait_until(lambda: count <= sum(status.name.startswith(node) for message in recorder.messages[begin:]
+                                            for status in message.status), '%d reports of %s' % (count, node), 40)
+        wait_for_reports(1)
+        yield wait_for_reports
+
+
 @pytest.fixture(scope='module')
 def port():
     port = free_port()
@@ -54,18 +88,29 @@ def port():
 def test_the_master_is_killed_and_started_again(port, tmp_path):
     """Who is connected goes on meanwhile and afterwards; the nodes register again, and are found by who comes later."""
     with contextlib.ExitStack() as running:
-        with master(port):
+        with master(port) as first:
             rospy.set_param('/use_sim_time', True)
             rospy.init_node('test_master')
             Registration()  # this process has to be found again, too
             running.enter_context(launched('pipeline.launch', 'detector:=depth', 'planner:=costmap', 'respawn:=true'))
+            label, failing = Label(''), Failing()
+            on_new_master(failing)
+            rospy.set_param('~label', 'A1')
+            assert label.heard() == 'A1'
             stage = Stage()
+            depth_camera_pub = rospy.Publisher(INFO_TOPICS[1], CameraInfo, queue_size=10)
+            rospy.Subscriber(INFO_TOPICS[0], CameraInfo, depth_camera_pub.publish)  # depth is that of colour
             before, pids = stage.recovered('(before the fault)', 60), [pid_of(node) for node in NODES]
             running.enter_context(launched('viewer.launch', 'window:=false', 'label:=A1', 'session:=%s' % tmp_path))
             rospy.wait_for_service('viewer_node/capture', timeout=20)
             capture = rospy.ServiceProxy('viewer_node/capture', Trigger, persistent=True)
             wait_until(lambda: stage.tries(TIMEOUT_S) and capture().success, 'a measurement')
             Client('tracker_node', timeout=20).update_configuration({'marker_history': 3.0})
+            set_label('A2')
+            wait_until(lambda: label.heard() == 'A2', 'the label that was set')
+            wait_for_reports = running.enter_context(reports_of('bbox3d_node'))
+            first.send_signal(signal.SIGSTOP)
+            wait_for_reports(12)  # after 5 s without images it asks the master why
         for _image in range(RECOVERY_IMAGES):
             stage.step()  # without a master
         wait_until(lambda: capture().success, 'a measurement without a master')
@@ -82,6 +127,10 @@ def test_the_master_is_killed_and_started_again(port, tmp_path):
                 newcomer.wait_for(1)
             rospy.wait_for_service('viewer_node/capture', timeout=20)
             wait_until(lambda: rospy.get_param('/tracker_node/marker_history', 0) == 3, 'what was changed meanwhile')
+            wait_until(lambda: failing.calls == 2, 'another registration after one that ended half-way')
+            assert rospy.get_param('~label') == 'A2'
+            set_label('B1')
+            wait_until(lambda: label.heard() == 'B1', 'the label that was set in the new master')
             wait_until(lambda: rospy.has_param('/tracker_node_numbers'), 'the numbers in the new master')
             killed_and_back('/tracker_node', lambda: time.sleep(0.1))
             after = stage.recovered('tracker killed after that')

@@ -14,8 +14,8 @@ from ros_3d_bb.diagnosis.bag_look import look_at_bag
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.diagnosis.seen import Finding
 from ros_3d_bb.following import TrackerNodeParams
-from ros_3d_bb.nodes.graph import NO_ANSWER, PATIENCE_S
 from ros_3d_bb.nodes.graph_look import GraphLook, name_for, tracker_param
+from ros_3d_bb.nodes.master import NO_ANSWER, PATIENCE_S
 from ros_3d_bb.params import params_from
 
 LOCAL = 'localhost', '127.0.0.1', '127.0.1.1', '::1'
@@ -62,7 +62,7 @@ def bag_findings(arguments):
 def graph_findings(arguments):
     """The findings about the running graph: listen again as long as something is wrong and there is patience.
 
-    Raises KeyboardInterrupt where it is stopped, one of `graph.NO_ANSWER` where the master is.
+    Raises KeyboardInterrupt where it is stopped, one of `master.NO_ANSWER` where the master is.
     """
     deadline_s = time.monotonic() + arguments.patience
     while True:
@@ -114,7 +114,7 @@ def machine_findings():
     except socket.gaierror:
         return [Finding('master', '', 'this machine does not know the name %s in ROS_MASTER_URI' % address.hostname,
                         'export ROS_MASTER_URI with the address in numbers, or put the name into /etc/hosts')]
-    except NO_ANSWER + (rosgraph.MasterException,) as error:
+    except NO_ANSWER as error:
         reason = getattr(error, 'strerror', None) or error
         return [Finding('master', '', 'no ROS master answers at %s (%s)' % (uri, reason), fix)]
     return [Finding('master', uri), _own_name(address.hostname)]

@@ -1,5 +1,6 @@
 """What a node's topics say of what is wrong around it: silence, stamps far from now, time that stands still."""
 import time
+import weakref
 
 import rospy
 from rospy.topics import get_topic_manager
@@ -7,7 +8,8 @@ from rospy.topics import get_topic_manager
 from ros_3d_bb.diagnosis.roles import role_named
 from ros_3d_bb.diagnosis.seen import Stream
 from ros_3d_bb.diagnosis.topic_faults import STANDSTILL, clock_fault, silence_fault
-from ros_3d_bb.nodes.graph import NO_ANSWER, published_topics, publishers_of
+from ros_3d_bb.nodes.graph import published_topics, publishers_of
+from ros_3d_bb.nodes.master import NO_ANSWER
 from ros_3d_bb.nodes.transport import inputs
 
 SILENT_S = 5.0
@@ -20,7 +22,8 @@ class InputWatch(object):
 
     def __init__(self):
         self._began_s, self._looked_s = time.monotonic(), time.monotonic()
-        self._counts, self._silences = {}, {}
+        self._counts, self._silences = weakref.WeakKeyDictionary(), weakref.WeakKeyDictionary()
+        self._vain_s, self._vain = -ASKED_S, None  # when the master was last asked in vain, and how it ended
 
     def values(self):
         """(name, text) of each input: its topic, and its rate since the last call."""
@@ -50,24 +53,30 @@ class InputWatch(object):
         asked_s, sentence = self._silences.get(noted, (-ASKED_S, ''))
         if now_s - asked_s < ASKED_S:
             return sentence
+        if now_s - self._vain_s >= ASKED_S:
+            try:
+                self._silences[noted] = now_s, self._reason(noted, now_s)
+                return self._silences[noted][1]
+            except NO_ANSWER as error:
+                self._vain_s, self._vain = time.monotonic(), error
+        return 'nothing comes on %s, and the master does not answer (%s)' % (_stream(noted).topic, self._vain)
+
+    def _reason(self, noted, now_s):
+        """A sentence on why nothing comes. Raises one of `NO_ANSWER`."""
         others = inputs()
         taken = set(other.subscriber.resolved_name for other in others if other.count) | set(get_topic_manager().pubs)
-        try:
-            topics = published_topics()
-            connected = noted.subscriber.get_num_connections() > 0
-            stream = _stream(noted)._replace(publishers=publishers_of(noted.subscriber.resolved_name, connected))
-            stream = stream._replace(published_kind=topics.get(stream.topic, ''))
-            sentence = '%s; %s' % silence_fault(stream, topics, taken, now_s - (noted.came_s or self._began_s))
-        except NO_ANSWER as error:
-            sentence = 'nothing comes on %s, and the master does not answer (%s)' % (_stream(noted).topic, error)
-        self._silences[noted] = now_s, sentence
-        return sentence
+        topics = published_topics()
+        connected = noted.subscriber.get_num_connections() > 0
+        stream = _stream(noted)._replace(publishers=publishers_of(noted.subscriber.resolved_name, connected))
+        stream = stream._replace(published_kind=topics.get(stream.topic, ''))
+        return '%s; %s' % silence_fault(stream, topics, taken, now_s - (noted.came_s or self._began_s))
 
 
 def unheard():
     """The results of this node, where nobody subscribes any of them; empty where somebody does."""
+    tuning = rospy.get_name() + '/parameter_'
     results = [(topic, publisher) for topic, publisher in sorted(get_topic_manager().pubs.items())
-               if topic not in NO_RESULTS]
+               if topic not in NO_RESULTS and not topic.startswith(tuning)]
     return [] if any(publisher.has_connections() for _topic, publisher in results) else [
         topic for topic, _publisher in results]
 

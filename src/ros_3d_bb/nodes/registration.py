@@ -8,17 +8,20 @@ import time
 from xmlrpc.client import ServerProxy
 
 import rospy
-from rosgraph.masterapi import Master, MasterError
+from rosgraph.masterapi import MasterError
 from rospy.impl.registration import get_service_manager, get_topic_manager
 
 from ros_3d_bb.nodes.diagnostics import is_ending
+from ros_3d_bb.nodes.master import log_without_asking, patient_master
 
 PERIOD_S = 1.0
 _functions = []
 
 
 def on_new_master(function):
-    """Have a function called after each registration with a new master, in the thread that does it."""
+    """Have a function called after each registration with a new master, in the thread that does it; again where it, or
+    one after it, raised an exception.
+    """
     _functions.append(function)
 
 
@@ -29,10 +32,11 @@ class Registration(object):
     """
 
     def __init__(self):
-        self._master = Master(rospy.get_name())
+        log_without_asking()
+        self._master = patient_master()
         self._parameters = {name: rospy.get_param(name) for name in (rospy.get_name(), '/use_sim_time')
                             if rospy.has_param(name)}
-        self._is_away = False
+        self._is_away, self._is_registered = False, True
         thread = threading.Thread(target=self._run)
         thread.daemon = True
         thread.start()
@@ -46,17 +50,23 @@ class Registration(object):
                 self._say_away(error)
 
     def _look(self):
-        try:
-            self._master.lookupNode(rospy.get_name())
-            is_known = True
-        except MasterError:
-            is_known = False
+        if not self._is_known() and self._is_registered and not is_ending():
+            rospy.logwarn('the ROS master knows this node no more: it was restarted; registering again')
+            self._is_registered = False
+        if not (self._is_registered or is_ending()):
+            self._register()
+            self._is_registered = True
         if self._is_away:
             self._is_away = False
             rospy.loginfo('the ROS master answers again')
-        if not (is_known or is_ending()):
-            rospy.logwarn('the ROS master knows this node no more: it was restarted; registering again')
-            self._register()
+
+    def _is_known(self):
+        """Not whether it knows the node, as it does after the first call that rospy itself tried again."""
+        try:
+            self._master.lookupService(rospy.get_name() + '/get_loggers')  # registered by init_node, and never again
+            return True
+        except MasterError:
+            return False
 
     def _register(self):
         for name, value in self._parameters.items():

@@ -4,9 +4,11 @@ from sensor_msgs.msg import Image
 
 from ros_3d_bb.images import fill_image, rgb_from
 from ros_3d_bb.messages import stamp_of
+from ros_3d_bb.nodes.master import patient_master
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.overlay import draw_boxes, draw_samples, visible_depth
 from ros_3d_bb.stamped import StampedCache
+from ros_3d_bb.worker import NewestWorker
 
 
 class SampleImages(object):
@@ -34,6 +36,8 @@ class SampleImages(object):
         self._raw_pub, self._color_pub, self._depth_pub = (
             rospy.Publisher('ros_3d_bb/' + name, Image, queue_size=1) for name in ('raw', 'color', 'depth'))
         self._colors, self._subscriber = None, None
+        # In a thread of its own, as a master that does not answer must not hold up the 3D boxes.
+        self._follower = NewestWorker(self._follow, self._on_error)
 
     def tune(self, sample, depth_range_m):
         """Draw the next images with these samples, and this depth as black."""
@@ -44,7 +48,9 @@ class SampleImages(object):
 
         A colour image that cannot be shown is refused here: it must not keep back the next 3D boxes.
         """
-        self._follow_subscribers()
+        wanted = bool(self._raw_pub.get_num_connections() or self._color_pub.get_num_connections())
+        if wanted != (self._subscriber is not None):
+            self._follower.offer(wanted)
         with self._diagnostics.refusing('colour images'):
             self._publish(header, depth, boxes)
 
@@ -52,7 +58,8 @@ class SampleImages(object):
         if self._depth_pub.get_num_connections():
             grey = visible_depth(depth, self._depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))
-        color = self._colors.at(header.stamp.to_nsec()) if self._colors is not None else None
+        colors = self._colors
+        color = colors.at(header.stamp.to_nsec()) if colors is not None else None
         if color is None:
             return
         if self._raw_pub.get_num_connections():
@@ -67,14 +74,19 @@ class SampleImages(object):
             draw_samples(image, box.rect_px, self._sample(depth, box.rect_px))
         return image
 
-    def _follow_subscribers(self):
-        wanted = self._raw_pub.get_num_connections() or self._color_pub.get_num_connections()
+    def _follow(self, wanted):
+        """Subscribe colour, or no more."""
+        patient_master().getPid()  # raises where there is none: rospy would hold a lock until one comes, also at Ctrl-C
         if wanted and self._subscriber is None:
             self._colors = StampedCache(self._cache_ns)
             self._subscriber = subscribe('camera/color/image_raw', Image, self._on_color, KEPT_AT_ONCE)
         elif not wanted and self._subscriber is not None:
             self._subscriber.unregister()
             self._subscriber, self._colors = None, None
+
+    def _on_error(self, error):
+        self._diagnostics.warn('colour images not subscribed', 'the ROS master does not answer (%s): colour images are '
+                               'subscribed, for those who look at them, or no more, when it does' % error)
 
     def _on_color(self, message):
         colors = self._colors

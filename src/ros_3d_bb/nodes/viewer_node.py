@@ -1,5 +1,4 @@
 """The node that shows what the camera and the pipeline see, and takes measurements."""
-import contextlib
 import os
 import threading
 import time
@@ -16,7 +15,7 @@ from ros_3d_bb.messages import (BOXES3D_TOPIC, boxes2d_from_message, boxes3d_fro
                                 stamp_of, time_from)
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
-from ros_3d_bb.nodes.registration import on_new_master
+from ros_3d_bb.nodes.label import Label
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.params import check_not_negative
@@ -91,9 +90,7 @@ class ViewerNode(object):
         self._lock, self._capture_lock = threading.Lock(), threading.Lock()
         self._rate, self._came, self._answer = FrameRate(), set(), ''
         self._captured_ns, self._is_said, self._is_paused = None, False, False
-        self._newest_label = self._params.label
-        self._diagnostics = Diagnostics()
-        on_new_master(lambda: rospy.set_param('~label', self._newest_label))
+        self._label, self._diagnostics = Label(self._params.label), Diagnostics()
         rospy.Service('~capture', Trigger, lambda _request: TriggerResponse(*self.capture()))
         for topic, kind, callback in ((BOXES3D_TOPIC, BoundingBox3DArray, self._on_boxes3d),
                                       ('yolo_bounding_box', Int32MultiArray, self._on_boxes2d),
@@ -162,7 +159,7 @@ class ViewerNode(object):
         if not self._params.session:
             raise ValueError('no session is given; start the viewer with session:=FOLDER')
         snapshot = self._snapshot_to_store()
-        label = self._label()
+        label = self._label.asked()
         appended = append(self._params.session, Measurement(
             snapshot.color.pixels, snapshot.depth, snapshot.camera, self._params.frame_id or snapshot.color.frame_id,
             snapshot.stamp_ns, snapshot.boxes2d or (), snapshot.boxes3d or (), label))
@@ -171,19 +168,6 @@ class ViewerNode(object):
                  'with %d 3D box%s' % (len(snapshot.boxes3d), '' if len(snapshot.boxes3d) == 1 else 'es'))
         return 'saved %s %s%s: number %d in %s' % (appended.id, found, label and ', label %s' % label, appended.count,
                                                    self._params.session)
-
-    def _label(self):
-        """As the master has it: rospy's cache hears of a label some time after it was set. Without master as before."""
-        with contextlib.suppress(OSError):
-            code, _text, label = rospy.get_master().getParam(rospy.resolve_name('~label'))
-            self._newest_label = str(label) if code == 1 else self._params.label
-        return self._newest_label
-
-    def _label_to_show(self):
-        try:
-            return rospy.get_param_cached('~label', '')
-        except OSError:  # no master
-            return self._newest_label
 
     def _snapshot_to_store(self):
         """The newest snapshot. Raises ValueError where there is none to store, or it lacks boxes and nobody knows."""
@@ -250,7 +234,7 @@ class ViewerNode(object):
         if snapshot is None:
             self._window.show(text_picture((KEYS,), (self._why_nothing(),), 3 * self._params.panel_width))
             return None
-        label = self._label_to_show()
+        label = self._label.heard()
         news = (snapshot.stamp_ns, snapshot.boxes2d, snapshot.boxes3d is None, rate_hz == 0, self._answer,
                 self._is_paused, label)
         if news == shown:
