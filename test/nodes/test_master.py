@@ -110,7 +110,7 @@ def test_the_master_is_killed_and_started_again(port, tmp_path):
             wait_until(lambda: label.heard() == 'A2', 'the label that was set')
             wait_for_reports = running.enter_context(reports_of('bbox3d_node'))
             first.send_signal(signal.SIGSTOP)
-            wait_for_reports(12)  # after 5 s without images it asks the master why
+            wait_for_reports(10)  # after 5 s without images it asks the master why
         for _image in range(RECOVERY_IMAGES):
             stage.step()  # without a master
         wait_until(lambda: capture().success, 'a measurement without a master')

@@ -3,5 +3,5 @@ STANDARD_LIBRARY = {'argparse', 'ast', 'base64', 'bisect', 'collections', 'concu
                     'ctypes', 'datetime', 'difflib', 'fcntl', 'functools', 'hashlib', 'html', 'http', 'importlib', 'io',
                     'itertools', 'json', 'math', 'multiprocessing', 'os', 'pathlib', 'pickle', 'platform', 're',
                     'resource', 'signal', 'socket', 'struct', 'subprocess', 'sys', 'tempfile', 'threading', 'time',
-                    'typing', 'urllib', 'warnings', 'xmlrpc', 'zipfile', 'zlib'}
+                    'typing', 'urllib', 'warnings', 'weakref', 'xmlrpc', 'zipfile', 'zlib'}
 TEST_STANDARD_LIBRARY = {'atexit', 'bz2', 'glob', 'random', 'shutil', 'stat', 'types', 'unittest', 'xml'}

@@ -11,8 +11,13 @@ class DepthCameraCheck(object):
     """Compares the camera_info beside the depth image with that of colour.
 
     The node sets what came last: `color`, a CameraInfo, and `depth_frame`. `with_frames`: whether the names of their
-    frames can be relied on. The topic, camera/aligned_depth_to_color/camera_info or what is beside the depth image,
-    stays subscribed: at a new subscription rospy would wait for a master that is away, and hold up all that asks it.
+    frames can be relied on. The topic stays subscribed: at a new subscription rospy would wait for a master that is
+    away, and hold up all that asks it.
+
+    Subscribes
+    ----------
+    camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
+        Of the depth image: what is beside that, whatever it is called. It is compared with that of the colour camera.
     """
 
     def __init__(self, with_frames):
