@@ -95,18 +95,16 @@ def test_an_input_subscribed_while_others_are_looked_through_is_kept():
     """As colour is, when somebody begins to look, while the diagnostics look at the inputs."""
     threads = []
 
-    class Subscriber(object):
-        """Whoever asks whether the first of them is connected gives another thread the time to subscribe the second."""
+    class Inputs(list):
+        """Whoever writes them back gives another thread the time to subscribe the second."""
 
-        @property
-        def impl(self):
+        def __setitem__(self, index, value):
             if not threads:
                 threads.append(threading.Thread(target=subscribe, args=('second', Image, None)))
                 threads[0].start()
                 threads[0].join(0.2)
-            return self
-    with mock.patch('rospy.Subscriber', lambda *_arguments, **_options: Subscriber()), \
-            mock.patch('ros_3d_bb.nodes.transport._inputs', []):
+            super(Inputs, self).__setitem__(index, value)
+    with mock.patch('rospy.Subscriber'), mock.patch('ros_3d_bb.nodes.transport._inputs', Inputs()):
         subscribe('first', Image, None)
         inputs()
         threads[0].join()
