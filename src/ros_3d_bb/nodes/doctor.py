@@ -15,7 +15,7 @@ from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.diagnosis.seen import Finding
 from ros_3d_bb.following import TrackerNodeParams
 from ros_3d_bb.nodes.graph_look import GraphLook, name_for, tracker_param
-from ros_3d_bb.nodes.master import NO_ANSWER, PATIENCE_S
+from ros_3d_bb.nodes.master import NO_ANSWER, PATIENCE_S, patient_master
 from ros_3d_bb.params import params_from
 
 LOCAL = 'localhost', '127.0.0.1', '127.0.1.1', '::1'
@@ -81,8 +81,11 @@ def graph_findings(arguments):
 
 def tracked_cameras():
     """The namespaces of the cameras that the tracker takes, a list; of a single camera ['']."""
+    given = tracker_param('cameras')
+    if not given:
+        return ['']
     try:
-        tracker, = params_from({'cameras': tracker_param('cameras', '')}, TrackerNodeParams)
+        tracker, = params_from({'cameras': given}, TrackerNodeParams)
         return [str(camera) for camera in tracker.cameras] or ['']
     except ValueError:  # the tracker says so
         return ['']
@@ -110,7 +113,7 @@ def machine_findings():
         return [Finding('master', '', 'ROS_MASTER_URI is %r; http://HOST:11311 expected' % uri, fix)]
     try:
         socket.create_connection((address.hostname, address.port), PATIENCE_S).close()
-        rosgraph.Master('/doctor').getPid()
+        patient_master().getPid()
     except socket.gaierror:
         return [Finding('master', '', 'this machine does not know the name %s in ROS_MASTER_URI' % address.hostname,
                         'export ROS_MASTER_URI with the address in numbers, or put the name into /etc/hosts')]

@@ -15,6 +15,8 @@ from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, INFO
 from ros_3d_bb.diagnosis.observing import Observation, camera_seen, color_seen, depth_seen
 from ros_3d_bb.diagnosis.roles import ROLES
 from ros_3d_bb.diagnosis.seen import Clock, Seen
+from ros_3d_bb.following import TrackerNodeParams
+from ros_3d_bb.lifting import Bbox3dParams
 from ros_3d_bb.messages import TRACKS_TOPIC
 from ros_3d_bb.nodes.graph import published_topics, publishers_of
 from ros_3d_bb.nodes.transport import IMAGE_BUFFER
@@ -64,8 +66,8 @@ class GraphLook(object):
             color=color_seen(newest[COLOR]), depth=depth_seen(newest[DEPTH]), tf=self._tf(newest[BOXES3D]),
             clock=Clock(bool(rospy.get_param('/use_sim_time', False)), len(self._clocks)),
             nodes={name: status[:2] for name, status in list(self._statuses.items())},
-            stamp_tolerance_s=self._bbox3d_param('stamp_tolerance', 0.005),
-            cache_length_s=self._bbox3d_param('cache_length', 1.0))
+            stamp_tolerance_s=self._bbox3d_param('stamp_tolerance'),
+            cache_length_s=self._bbox3d_param('cache_length'))
 
     def lookup(self, target_frame, source_frame, stamp):
         """As of `BagTransforms`."""
@@ -76,13 +78,13 @@ class GraphLook(object):
         return self._buffer.all_frames_as_yaml()
 
     def _tf(self, boxes3d):
-        target = self._target_frame or tracker_param('target_frame', 'map')
-        source = tracker_param('camera_frame', '') or (
-            boxes3d.header.frame_id if boxes3d is not None else self._bbox3d_param('frame_id', ''))
+        target = self._target_frame or tracker_param('target_frame')
+        source = tracker_param('camera_frame') or (
+            boxes3d.header.frame_id if boxes3d is not None else self._bbox3d_param('frame_id'))
         return tf_seen(self, self._observed[DEPTH], target, source)
 
-    def _bbox3d_param(self, name, default):
-        return _param(topic_of(self._camera, 'bbox3d_node'), name, default)
+    def _bbox3d_param(self, name):
+        return _param(topic_of(self._camera, 'bbox3d_node'), name, Bbox3dParams())
 
     def _publishers(self, one):
         return () if one.newest is not None or one.topic not in self._topics else publishers_of(one.topic, False)
@@ -120,13 +122,13 @@ def name_for(camera, topic):
     return topic if topic == TRACKS_TOPIC else topic_of(camera, topic)
 
 
-def tracker_param(name, default):
-    """A parameter of the tracker, the default where it is not set."""
-    return _param('tracker_node', name, default)
+def tracker_param(name):
+    """A parameter of the tracker, its default where it is not set."""
+    return _param('tracker_node', name, TrackerNodeParams())
 
 
-def _param(node, name, default):
-    return rospy.get_param(rospy.resolve_name('%s/%s' % (node, name)), default)
+def _param(node, name, defaults):
+    return rospy.get_param(rospy.resolve_name('%s/%s' % (node, name)), getattr(defaults, name))
 
 
 def _to_be_suggested(topics):
