@@ -62,16 +62,22 @@ class Box3D(NamedTuple):
     """An upright cylinder in the camera optical frame, and how well it was seen.
 
     `center_m` (3,) and `size_m` (width, height, width), metres; `rect_px` the rectangle it came from; `support` the
-    share 0..1 of the sampled pixels that carried its depth; `truncated` whether the rectangle touches the border;
-    `covariance_m2` (3, 3) of the centre, None where unknown.
+    share 0..1 of the sampled pixels that carried its depth; `truncated_edges` whether the left, the upper, the right
+    and the lower edge of the rectangle touch the image border; `covariance_m2` (3, 3) of the centre, None where
+    unknown.
     """
 
     center_m: np.ndarray
     size_m: np.ndarray
     rect_px: Tuple[int, int, int, int]
     support: float
-    truncated: bool
+    truncated_edges: Tuple[bool, bool, bool, bool]
     covariance_m2: Optional[Any] = None
+
+    @property
+    def truncated(self):
+        """Whether the image border cuts the object."""
+        return any(self.truncated_edges)
 
 
 def sample_median(depth, rect_px, stride_px=20):
@@ -114,7 +120,7 @@ def estimate_median(samples, rect_px, camera, _nearer=()):
     width_m, height_m = (x2 - x1) / camera.fx * center_m[2], (y2 - y1) / camera.fy * center_m[2]
     on_body = np.abs(depth_m - center_m[2]) <= BODY_HALF_DEPTH_M
     return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px),
-                 np.count_nonzero(on_body) / float(samples.valid.size), is_truncated(rect_px, camera))
+                 np.count_nonzero(on_body) / float(samples.valid.size), truncated_edges(rect_px, camera))
 
 
 def sample_foreground(depth, rect_px):
@@ -175,13 +181,13 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     left_m, right_m = edges((across * samples.depth_m)[on_body])
     layer_m = trimmed_mean(body_m)
     top_m, bottom_m = ((edge - camera.cy) / camera.fy * layer_m for edge in flat_px[1::2])
-    cut_left, cut_top, cut_right, cut_bottom = _cut_edges(rect_px, camera)
+    cut_left, cut_top, cut_right, cut_bottom = cut = truncated_edges(rect_px, camera)
     left_m, right_m = whole(left_m, right_m, cut_left, cut_right, USUAL_WIDTH_M)
     top_m, bottom_m = whole(top_m, bottom_m, cut_top, cut_bottom, USUAL_HEIGHT_M)
     surface_m = np.array([(left_m + right_m) / 2, (top_m + bottom_m) / 2, layer_m])
     width_m = max(right_m - left_m, LEAST_WIDTH_M)
     return Box3D(surface_m * (1 + AXIS_BEHIND_SURFACE_M / layer_m), np.array([width_m, bottom_m - top_m, width_m]),
-                 tuple(rect_px), support, is_truncated(rect_px, camera))
+                 tuple(rect_px), support, cut)
 
 
 def _without_distortion(rect_px, camera):
@@ -272,13 +278,8 @@ def check_rect(rect_px):
         raise ValueError('box (%d, %d, %d, %d) is empty or reversed: x1 < x2 and y1 < y2 expected' % (x1, y1, x2, y2))
 
 
-def is_truncated(rect_px, camera):
-    """Whether a rectangle touches the border of the image."""
-    return any(_cut_edges(rect_px, camera))
-
-
-def _cut_edges(rect_px, camera):
-    """Whether the left, the upper, the right and the lower edge touch the border of the image."""
+def truncated_edges(rect_px, camera):
+    """Whether the left, the upper, the right and the lower edge of a rectangle touch the border of the image."""
     x1, y1, x2, y2 = rect_px
     return (bool(x1 <= BORDER_PX), bool(y1 <= BORDER_PX), bool(x2 >= camera.width - BORDER_PX),
             bool(y2 >= camera.height - BORDER_PX))

@@ -17,7 +17,7 @@ from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.thesis import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.tracked import View
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
-from ros_3d_bb.tracking.visibility import depths_towards, edges_of
+from ros_3d_bb.tracking.visibility import depths_towards
 
 TRACKING_PARAMS = ThesisTrackerParams, TrackerParams, NoiseParams, PredictionParams
 TRACKERS = {'thesis': (ThesisTracker, slice(0, 1)), 'kalman': (Tracker, slice(1, 4))}  # with their part of those
@@ -203,7 +203,7 @@ class Follower(object):
                 depth = depth_from(entry.value, self._params.depth_scale)
                 if depth.values.shape == (camera.height, camera.width):  # bbox3d_node says what is wrong with others
                     depth_at = functools.partial(depths_towards, camera, depth)
-        return View(located.fixed_from_camera, edges_of(camera), name, depth_at)
+        return View(located.fixed_from_camera, camera, name, depth_at)
 
     def _is_of_this_time(self, stamp_ns, now_ns, camera):
         """Whether boxes are none of the time before a jump back; where they are the first after one, follow it."""

@@ -142,6 +142,25 @@ def quaternion_from(matrix):
     return quaternion if quaternion[3] >= 0 else -quaternion
 
 
+def upright_turns(fixed_from_camera):
+    """By how many quarter turns clockwise an image has to be turned so that up in it is nearest to up in the world.
+
+    Parameters
+    ----------
+    fixed_from_camera : numpy.ndarray, (4, 4)
+        From an optical frame to a frame with z up.
+
+    Returns
+    -------
+    int
+        0 for a camera held upright, 1 where the left edge of the image is up, 2 upside down, 3 for the right edge.
+    """
+    x_up, y_up = fixed_from_camera[2, :2]
+    if abs(x_up) > abs(y_up):
+        return 3 if x_up > 0 else 1
+    return 2 if y_up > 0 else 0
+
+
 def transform_points(b_from_a, points):
     """Points (..., 3) given in frame a, in frame b."""
     return np.asarray(points, float).dot(b_from_a[:3, :3].T) + b_from_a[:3, 3]

@@ -8,13 +8,14 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb import msg
 from ros_3d_bb.estimation import Box3D
-from ros_3d_bb.geometry import Camera, transform_from, transform_points
+from ros_3d_bb.geometry import Camera, transform_from
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tracking.tracked import FARTHEST_M, LARGEST_M, Detection, TrackedObject
+from ros_3d_bb.tracking.tracked import FARTHEST_M, LARGEST_M, TrackedObject, detection_from_box
 
 BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC = 'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'
 LATEST_NS = 2 ** 31 * NS  # differences of stamps have to fit into a duration
+EDGE_FLAGS = BoundingBox3D.LEFT, BoundingBox3D.TOP, BoundingBox3D.RIGHT, BoundingBox3D.BOTTOM
 MAX_BOXES = 1000  # more in one image are a fault of their sender, and would stall the pipeline
 
 
@@ -148,6 +149,7 @@ def boxes3d_to_message(boxes, header, camera):
 
 def _box3d_to_message(box, camera):
     message = BoundingBox3D(support=box.support, truncated=box.truncated)
+    message.truncated_edges = sum(flag for flag, cut in zip(EDGE_FLAGS, box.truncated_edges) if cut)
     _set_xyz(message.center.position, box.center_m)
     message.center.orientation.w = 1.0
     _set_xyz(message.size, box.size_m)
@@ -168,7 +170,10 @@ def boxes3d_from_message(message):
 def _box3d_from_message(box):
     roi, covariance_m2 = box.roi, np.reshape(box.position_covariance, (3, 3))
     rect_px = (roi.x_offset, roi.y_offset, roi.x_offset + roi.width, roi.y_offset + roi.height)
-    return Box3D(_xyz(box.center.position), _xyz(box.size), rect_px, box.support, box.truncated,
+    edges = tuple(bool(box.truncated_edges & flag) for flag in EDGE_FLAGS)
+    if box.truncated and not any(edges):
+        edges = (True,) * len(EDGE_FLAGS)  # which of them is not known, so none is trusted
+    return Box3D(_xyz(box.center.position), _xyz(box.size), rect_px, box.support, edges,
                  covariance_m2 if covariance_m2.any() else None)
 
 
@@ -198,22 +203,18 @@ def detections_from_message(message, fixed_from_camera):
             raise ValueError('3D box %d has centre (%g, %g, %g) and size (%g, %g); finite numbers and sizes of more '
                              'than 0 and less than 10 m expected'
                              % ((number,) + tuple(values)))
-        detections.append(Detection(transform_points(fixed_from_camera, values[:3]), np.array([size.x, size.x, size.y]),
-                                    _covariance_in(fixed_from_camera, box, number), box.truncated))
+        _check_covariance(box, number)
+        detections.append(detection_from_box(_box3d_from_message(box), fixed_from_camera))
     return detections
 
 
-def _covariance_in(fixed_from_camera, box, number):
-    """The covariance (3, 3) of a BoundingBox3D's centre in the fixed frame; None where it says none."""
+def _check_covariance(box, number):
+    """Raise ValueError where the covariance of a BoundingBox3D's centre is none."""
     covariance_m2 = np.array(box.position_covariance).reshape(3, 3)
-    if not covariance_m2.any():
-        return None
-    if not ((np.abs(covariance_m2) < FARTHEST_M).all()
-            and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T).min() > -1e-9):
+    if covariance_m2.any() and not ((np.abs(covariance_m2) < FARTHEST_M).all()
+                                    and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T).min() > -1e-9):
         raise ValueError('3D box %d has the position_covariance %s; a finite, positive semi-definite matrix, or zeros '
                          'where it is not known, expected' % (number, list(box.position_covariance)))
-    rotation = fixed_from_camera[:3, :3]
-    return rotation.dot(covariance_m2).dot(rotation.T)
 
 
 def tracks_to_message(tracks, header):

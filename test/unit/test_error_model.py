@@ -180,7 +180,7 @@ def test_a_model_is_for_its_estimator():
 
 
 def test_boxes_are_corrected_and_get_their_covariance():
-    box = Box3D(np.array([0.5, 0.1, 2.0]), np.array([0.5, 1.7, 0.5]), (1, 2, 3, 4), 0.5, False)
+    box = Box3D(np.array([0.5, 0.1, 2.0]), np.array([0.5, 1.7, 0.5]), (1, 2, 3, 4), 0.5, (False,) * 4)
     other = box._replace(center_m=np.array([-0.5, 0.0, 3.0]))
     corrected = corrected_boxes([box, other], MODEL)
     assert corrected_boxes([], MODEL) == [] and [result.size_m is box.size_m for result in corrected] == [True, True]

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ros_3d_bb.estimation import (AXIS_BEHIND_SURFACE_M, DepthImage, estimate_boxes, estimate_foreground,
-                                  estimate_median, estimator_named, is_truncated, near_first, sample_foreground,
-                                  sample_median)
+                                  estimate_median, estimator_named, near_first, sample_foreground,
+                                  sample_median, truncated_edges)
 from ros_3d_bb.geometry import Camera
 from ros_3d_bb.measurements import read_depth, read_session
 
@@ -182,11 +182,10 @@ def test_unknown_estimators_and_strides_are_refused(name, stride, complaint):
         estimator_named(name, stride)
 
 
-@pytest.mark.parametrize('rect,truncated', [((10, 10, 40, 40), False), ((0, 10, 40, 40), True),
-                                            ((10, 1, 40, 40), True), ((10, 10, 63, 40), True),
-                                            ((10, 10, 40, 48), True), ((-9, 10, 90, 40), True)])
-def test_boxes_at_the_border_are_truncated(rect, truncated):
-    assert is_truncated(rect, CAMERA) is truncated
+@pytest.mark.parametrize('rect,cut', [((10, 10, 40, 40), ''), ((0, 10, 40, 40), 'l'), ((10, 1, 40, 40), 't'),
+                                      ((10, 10, 63, 40), 'r'), ((10, 10, 40, 48), 'b'), ((-9, 10, 90, 40), 'lr')])
+def test_edges_at_the_border_are_truncated(rect, cut):
+    assert truncated_edges(rect, CAMERA) == tuple(edge in cut for edge in 'ltrb')
 
 
 WIDE = Camera(640, 480, 420, 420, 319.5, 239.5, 'plumb_bob', (-0.25, 0.06, 0.0005, -0.0004, 0))

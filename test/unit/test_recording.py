@@ -19,7 +19,8 @@ from ros_3d_bb.stamped import NS
 
 CAMERA = Camera(64, 48, 60.0, 61.0, 31.5, 23.25, 'plumb_bob', (0.1, -0.2, 0.001, 0.002, 0.03))
 STAMP_NS = 1616161616 * NS + 123456789
-BOX = Box3D(np.array([0.1234, -0.25, 2.5]), np.array([0.5, 1.75, 0.5]), (10, 0, 30, 48), 0.75, True)
+BOX = Box3D(np.array([0.1234, -0.25, 2.5]), np.array([0.5, 1.75, 0.5]), (10, 0, 30, 48), 0.75,
+            (False, True, False, True))
 
 
 def measurement(number=0, **changes):

@@ -6,20 +6,22 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from
+from ros_3d_bb.geometry import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.measuring import NoiseParams
 from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 
-VIEW = View(transform_from((0, 0, 1), OPTICAL_ROTATION), (-0.6, 0.6))
+CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)  # sees x from -0.6 to 0.6 of the depth
+VIEW = View(transform_from((0, 0, 1), OPTICAL_ROTATION), CAMERA)
 START_NS = 1000 * NS
 SIZE = np.array([0.5, 0.5, 1.7])
 
 
-def at(x, y, height=1.7, truncated=False, width=0.5, sigma=0.04):
-    return Detection(np.array([x, y, height / 2]), np.array([width, width, height]), np.eye(3) * sigma ** 2, truncated)
+def at(x, y, height=1.7, cut='', width=0.5, sigma=0.04):
+    edges = tuple(edge in cut for edge in ('left', 'top', 'right', 'bottom'))
+    return Detection(np.array([x, y, height / 2]), np.array([width, width, height]), np.eye(3) * sigma ** 2, edges)
 
 
 def play(tracker, seconds, detections_at, rate_hz=30, start_s=0.0, view=VIEW):
@@ -165,15 +167,50 @@ def test_a_box_with_the_depth_of_the_background_throws_nobody_off():
 
 def test_a_box_cut_by_the_border_shows_only_one_side_of_a_person():
     """The half of a body that is seen has its centre 0.125 m inside of the person's."""
-    track, = play(Tracker(), 1, lambda _time_s: [at(3, 1.5, truncated=True, width=0.25)])[-1]
+    track, = play(Tracker(), 1, lambda _time_s: [at(3, 1.5, cut='left', width=0.25)])[-1]
     assert track.position_m[1] == pytest.approx(1.5 + 0.125, abs=0.03)
 
 
 @pytest.mark.parametrize('y', [-0.02, 0.02, 1.3])
 def test_a_slim_person_cut_above_is_where_the_box_is(y):
     """Of whom the whole width is seen."""
-    track, = play(Tracker(), 1, lambda _time_s: [at(3, y, truncated=True, width=0.38)])[-1]
+    track, = play(Tracker(), 1, lambda _time_s: [at(3, y, cut='top', width=0.38)])[-1]
     assert track.position_m[1] == pytest.approx(y, abs=0.01)
+
+
+def cut_by(cut, visible_height, bottom=0.0, distance=2.0):
+    """A box of which the border leaves a part of the height."""
+    box = at(distance, 0, height=visible_height, cut=cut)
+    return box._replace(position_m=box.position_m + (0, 0, bottom))
+
+
+def test_a_track_goes_on_where_the_border_cuts_the_box():
+    """First the feet, which the estimator completes to 1.7 m, then the head, too: 0.56 m are left."""
+    def walk(time_s):
+        return [at(2, 0, height=1.75) if time_s < 1 else cut_by(['bottom'], 1.7, bottom=0.05) if time_s < 2
+                else cut_by(['top', 'bottom'], 0.56, bottom=0.3)]
+    published = play(Tracker(), 4, walk)
+    assert set(track.id for objects in published for track in objects) == {1}
+    assert all(len(objects) == 1 and objects[0].status == VISIBLE for objects in published[4:])
+    track, = published[-1]
+    np.testing.assert_allclose((track.position_m[2], track.size_m[2]), (0.875, 1.75), atol=0.03)
+
+
+def test_a_track_that_began_with_a_cut_box_takes_the_height_of_the_first_whole_one():
+    def walk(time_s):
+        return [cut_by(['top', 'bottom'], 0.56, bottom=0.3) if time_s < 2 else at(2, 0, height=1.8)]
+    published = play(Tracker(), 2.2, walk)
+    track, = published[-1]
+    assert track.id == 1
+    np.testing.assert_allclose((track.position_m[2], track.size_m[2]), (0.9, 1.8), atol=0.01)
+
+
+def test_heads_tell_people_apart_where_feet_are_cut():
+    """A child's track does not take the box of an adult at the same place, though the feet of both are cut."""
+    def swapped(time_s):
+        height = 1.1 if time_s < 1 else 1.8
+        return [cut_by(['bottom'], 1.7, bottom=height - 1.7)]
+    assert ids(play(Tracker(), 2, swapped)[-1]) == [2]
 
 
 def test_a_person_who_stands_is_not_said_to_move_and_one_who_slows_down_moves_on_for_a_while():
@@ -292,7 +329,7 @@ def test_a_camera_that_paused_for_long_forgets_everybody():
 
 def test_a_hundred_people_are_told_apart():
     places = [(1.5 + 0.45 * row, (column - 4.5) * 0.5) for row in range(10) for column in range(10)]
-    view = VIEW._replace(edges=(-5, 5))
+    view = VIEW._replace(intrinsics=CAMERA._replace(fx=64.0, fy=64.0))
     walk = play(Tracker(TrackerParams(max_range=9)), 1, standing(*places), view=view)
     assert len(walk[-1]) == 100
     for track in walk[-1]:

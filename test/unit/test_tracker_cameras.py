@@ -7,19 +7,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from
+from ros_3d_bb.geometry import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
 from ros_3d_bb.tracking.tracker import Tracker
 
 START_NS, PERIOD_NS = 1000 * NS, NS // 30
-EDGES = -0.6, 0.6
+CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)
+EDGE = 0.6  # x / z of what the image border shows
 
 
 def looking(yaw, camera):
     turn = transform_from((0, 0, 0), (0, 0, np.sin(yaw / 2), np.cos(yaw / 2)))
     return View(transform_from((0, 0, 1), (0, 0, 0, 1)).dot(turn).dot(transform_from((0, 0, 0), OPTICAL_ROTATION)),
-                EDGES, camera)
+                CAMERA, camera)
 
 
 FRONT, LEFT = looking(0, 'front'), looking(np.pi / 4, 'left')
@@ -34,7 +35,7 @@ def around(bearing, range_m=3.0):
 def shown(view, place_m, offset_m=(0, 0)):
     """The detections of somebody at a place, none where the camera does not see it; `offset_m` of its calibration."""
     distance, bearing = view.bearings(np.array([place_m]))
-    if not abs(np.tan(bearing[0])) < EDGES[1] - 0.05 or abs(bearing[0]) > 1:
+    if not abs(np.tan(bearing[0])) < EDGE - 0.05 or abs(bearing[0]) > 1:
         return []
     center = np.append(np.add(place_m, offset_m), 0.85)
     return [Detection(center, np.array([0.5, 0.5, 1.7]), np.eye(3) * 0.04 ** 2)]

@@ -75,7 +75,7 @@ def test_without_errors_detections_of_whole_people_are_the_truth(exact):
             if share[row] > 1 - 1e-9:
                 whole += 1
                 assert np.allclose(detection.position_m[:2], image.truth.position_m[row])
-                assert not detection.truncated
+                assert not any(detection.truncated_edges)
     assert whole > 100
 
 
@@ -85,7 +85,7 @@ def test_who_is_cut_is_found_off_the_middle_and_truncated_at_the_border(exact):
         what = shown_in(image)
         for detection, source in zip(image.detections, image.sources):
             row, = np.flatnonzero(image.truth.ids == source)
-            if detection.truncated:
+            if any(detection.truncated_edges):
                 truncated += 1
                 of_body, of_box = (np.abs(np.arctan2(*seen_from(image.view, place_m)[0])) for place_m in (
                     image.truth.position_m[row:row + 1], detection.position_m[None, :2]))
@@ -119,13 +119,13 @@ def test_only_who_is_in_view_is_found(exact):
         assert not found[image.truth.status == OCCLUDED].any()
 
 
-def test_the_view_shows_what_its_edges_say():
+def test_the_intrinsics_show_as_much_as_the_field_of_view():
     pose = np.array([1.0, -2.0, 0.7])
     view = view_of(pose, CameraModel())
-    for edge, side in zip(view.edges, (1, -1)):  # left, right
+    for u, side in ((-0.5, 1), (view.intrinsics.width - 0.5, -1)):  # left, right
         point_m = robot.from_frame(pose, 3 * np.array([np.cos(HALF_VIEW), side * np.sin(HALF_VIEW)]))
         (right_m, forward_m), = seen_from(view, point_m[None])
-        assert right_m / forward_m == pytest.approx(edge)
+        assert view.intrinsics.project((right_m, 0, forward_m))[0] == pytest.approx(u)
 
 
 def test_velocities_and_futures_of_the_truth_are_those_of_the_walks(exact):

@@ -8,7 +8,8 @@ from ros_3d_bb.stamped import NS
 from ros_3d_bb.overlay import colors_of
 from ros_3d_bb.viewer_picture import WARNING_INK, FrameRate, View, box_lines, compose, text_picture
 
-BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75, True)
+BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75,
+            (True,) * 4)
 
 
 def view(**changes):

@@ -3,15 +3,16 @@ import functools
 
 import numpy as np
 import pytest
+from hypothesis import assume, given, settings, strategies as st
 
 from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.geometry import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, View
-from ros_3d_bb.tracking.visibility import depths_towards, edges_of, places_in
+from ros_3d_bb.tracking.visibility import depths_towards, places_in
 
 CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
 LOOK = transform_from((0, 0, 1), OPTICAL_ROTATION)
-PLAIN = View(LOOK, edges_of(CAMERA))
+PLAIN = View(LOOK, CAMERA)
 
 
 def place(x, y, view=PLAIN, others=(), farthest_m=6.0):
@@ -25,11 +26,6 @@ def with_depth(values_mm):
     return PLAIN._replace(depth_at=functools.partial(depths_towards, CAMERA, depth))
 
 
-def test_the_image_ends_where_the_camera_says():
-    left, right = edges_of(CAMERA)
-    assert left == pytest.approx(-320 / 600) and right == pytest.approx(320 / 600)
-
-
 @pytest.mark.parametrize('x,y,expected', [
     (3, 0, VISIBLE), (3, 1.3, VISIBLE), (3, 1.7, OUT_OF_VIEW), (3, -1.7, OUT_OF_VIEW), (-3, 0, OUT_OF_VIEW),
     (0.2, 0, OUT_OF_VIEW), (7, 0, OUT_OF_VIEW)])
@@ -40,11 +36,66 @@ def test_places_are_in_view_or_not(x, y, expected):
 def test_a_camera_that_looks_to_the_left_sees_to_the_left():
     """An off-centre principal point: more is seen on one side."""
     camera = Camera(640, 480, 600.0, 600.0, 600.0, 239.5)
-    view = View(LOOK, edges_of(camera))
+    view = View(LOOK, camera)
     assert place(3, 2, view) == VISIBLE and place(3, -2, view) == OUT_OF_VIEW
 
 
-def test_a_view_without_edges_sees_all_that_is_ahead():
+FOLDING = Camera(640, 480, 280, 280, 320, 240, 'plumb_bob', (-0.35, 0.12, 0, 0, -0.019))  # before the border
+
+
+@pytest.mark.parametrize('x,y,expected', [
+    (3, 0, VISIBLE), (3, 2.5, VISIBLE), (-3, 0, OUT_OF_VIEW), (0.5, 3, OUT_OF_VIEW)])
+def test_a_camera_whose_distortion_folds_before_the_border_has_a_view_with_an_end(x, y, expected):
+    assert place(x, y, View(LOOK, FOLDING)) == expected
+
+
+def mounted(height, pitch, roll=0.0):
+    """The transform of a camera at a height, looking along x, then pitched down and rolled clockwise, degrees."""
+    transform = transform_from((0, 0, height), (0, 0, 0, 1))
+    for axis, angle in ((1, pitch), (0, roll)):
+        half = np.radians(angle) / 2
+        quaternion = np.eye(4)[axis] * np.sin(half) + np.eye(4)[3] * np.cos(half)
+        transform = transform.dot(transform_from((0, 0, 0), quaternion))
+    return transform.dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
+
+
+@pytest.mark.parametrize('height,pitch,x,expected', [
+    (2.5, 45, 2.5, VISIBLE), (2.5, 45, 6, OUT_OF_VIEW), (2.5, 45, 0.3, OUT_OF_VIEW), (3, 90, 0, VISIBLE),
+    (3, 90, 2.5, OUT_OF_VIEW), (0.3, -40, 5, OUT_OF_VIEW), (0.3, -40, 1.2, VISIBLE)])
+def test_the_upper_and_the_lower_border_of_the_image_count(height, pitch, x, expected):
+    assert place(x, 0, View(mounted(height, pitch), CAMERA)) == expected
+
+
+def pixels_on_axis(camera, fixed_from_camera, x, y):
+    """Share of the axis of a 1.7 m tall person at (x, y) in the image, by homogeneous coordinates: the oracle."""
+    axis = np.array([(x, y, z, 1) for z in np.linspace(0.02, 1.68, 200)])
+    right, down, forward, _one = np.linalg.inv(fixed_from_camera).dot(axis.T)
+    with np.errstate(all='ignore'):
+        u, v = camera.fx * right / forward + camera.cx, camera.fy * down / forward + camera.cy
+    return ((forward > 0) & (abs(u + 0.5 - camera.width / 2) < camera.width / 2)
+            & (abs(v + 0.5 - camera.height / 2) < camera.height / 2)).mean()
+
+
+@settings(max_examples=300, deadline=None)
+@given(height=st.floats(0.1, 3.0), pitch=st.floats(-60, 90), roll=st.floats(-180, 180), focal=st.floats(200, 1000),
+       x=st.floats(-6, 6), y=st.floats(-6, 6))
+def test_what_is_visible_is_in_the_image_and_what_is_out_of_view_is_not(height, pitch, roll, focal, x, y):
+    """However the camera is mounted; between 10 % and 60 % of the body, and near the borders, either is right."""
+    camera, transform = Camera(640, 480, focal, focal, 319.5, 239.5), mounted(height, pitch, roll)
+    assume(np.hypot(x, y) > 0.5)
+    shown, narrower = (pixels_on_axis(camera._replace(fx=f, fy=f), transform, x, y) for f in (focal, 1.4 * focal))
+    result = place(x, y, View(transform, camera), farthest_m=20.0)
+    assert result != VISIBLE or shown > 0.1
+    assert result != OUT_OF_VIEW or narrower < 0.6
+
+
+def test_people_on_opposite_sides_of_a_camera_that_looks_down_do_not_hide_each_other():
+    view = View(mounted(3, 90), CAMERA)
+    assert place(0.02, 0.9, view, others=[(-0.02, 0.4)]) == OCCLUDED
+    assert place(0.02, 0.9, view, others=[(-0.02, -0.4)]) == VISIBLE
+
+
+def test_a_view_without_intrinsics_sees_all_that_is_ahead():
     view = View(LOOK)
     assert place(3, 2.9, view) == VISIBLE and place(-1, 0, view) == OUT_OF_VIEW
 

@@ -21,6 +21,7 @@ from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedOb
 
 INT32 = st.integers(-2 ** 31, 2 ** 31 - 1)
 STAMP = st.integers(1, 2 ** 32 * NS - 1)
+UNCUT = (False,) * 4
 
 
 def header(stamp_ns, frame_id='camera'):
@@ -45,7 +46,8 @@ def test_2d_boxes_and_their_stamp_survive_to_the_nanosecond(boxes, stamp_ns, fra
 
 @pytest.mark.parametrize('covariance_m2', [None, np.diag([0.01, 0.04, 0.09])])
 def test_the_covariance_of_a_3d_box_is_sent_and_zero_where_unknown(covariance_m2):
-    box = Box3D(np.array([1.0, 0, 3]), np.array([0.5, 1.7, 0.5]), (10, 10, 40, 40), 0.8, False, covariance_m2)
+    box = Box3D(np.array([1.0, 0, 3]), np.array([0.5, 1.7, 0.5]), (10, 10, 40, 40), 0.8, UNCUT,
+                covariance_m2)
     sent, = on_the_wire(boxes3d_to_message([box], header(1), Camera(64, 48, 60.0, 60.0, 31.5, 23.5))).boxes
     expected = np.zeros(9) if covariance_m2 is None else np.ravel(covariance_m2)
     assert list(sent.position_covariance) == expected.tolist()
@@ -122,7 +124,8 @@ def test_transforms():
 
 
 def test_3d_boxes_fill_every_field():
-    box = Box3D(np.array([0.1, 0.2, 3.0]), np.array([0.5, 1.7, 0.5]), (-10, 20, 700, 300), 0.75, True)
+    box = Box3D(np.array([0.1, 0.2, 3.0]), np.array([0.5, 1.7, 0.5]), (-10, 20, 700, 300), 0.75,
+                (True, False, True, False))
     message = on_the_wire(boxes3d_to_message([box], header(5), Camera(640, 480, 600, 600, 320, 240)))
     assert message.header.stamp == time_from(5) and message.header.frame_id == 'camera'
     box, = message.boxes
@@ -131,12 +134,13 @@ def test_3d_boxes_fill_every_field():
     assert (box.size.x, box.size.y, box.size.z) == (0.5, 1.7, 0.5)
     roi = box.roi
     assert (roi.x_offset, roi.y_offset, roi.width, roi.height, roi.do_rectify) == (0, 20, 640, 280, False)
-    assert box.support == 0.75 and box.truncated
+    assert box.support == 0.75 and box.truncated and box.truncated_edges == box.LEFT + box.RIGHT
 
 
 @pytest.mark.parametrize('covariance_m2', [None, np.diag([0.01, 0.04, 0.09])])
 def test_3d_boxes_survive(covariance_m2):
-    sent = Box3D(np.array([0.1, 0.2, 3.0]), np.array([0.5, 1.7, 0.5]), (10, 20, 64, 48), 0.75, True, covariance_m2)
+    sent = Box3D(np.array([0.1, 0.2, 3.0]), np.array([0.5, 1.7, 0.5]), (10, 20, 64, 48), 0.75,
+                 (False, False, True, True), covariance_m2)
     camera = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
     back, other = boxes3d_from_message(on_the_wire(boxes3d_to_message([sent] * 2, header(1), camera)))
     for field, value in sent._asdict().items():
@@ -153,6 +157,20 @@ def test_detections_are_upright_in_the_fixed_frame():
     detection, = detections_from_message(BoundingBox3DArray(boxes=[box]), map_from_camera)
     np.testing.assert_allclose(detection.position_m, (3, -0.5, 0.9))
     np.testing.assert_allclose(detection.size_m, (0.6, 0.6, 1.8))
+
+
+@pytest.mark.parametrize('roll,size,edges', [
+    (0, (0.5, 1.75), 'top'), (90, (1.75, 0.5), 'left'), (180, (0.5, 1.75), 'bottom'), (-90, (1.75, 0.5), 'right'),
+    (20, (0.5, 1.75), 'top'), (70, (1.75, 0.5), 'left'), (-160, (0.5, 1.75), 'bottom')])
+def test_people_stand_upright_however_the_camera_is_mounted(roll, size, edges):
+    """The optical axis is x of the map; roll is about it, clockwise as seen by the camera. The head is cut off."""
+    turn = transform_from((0, 0, 0), (np.sin(np.radians(roll) / 2), 0, 0, np.cos(np.radians(roll) / 2)))
+    box = BoundingBox3D(truncated=True, truncated_edges=getattr(BoundingBox3D, edges.upper()))
+    box.center.position.z, box.size.x, box.size.y, box.size.z = (3.0,) + size + (size[0],)
+    detection, = detections_from_message(BoundingBox3DArray(boxes=[box]),
+                                         turn.dot(transform_from((0, 0, 0), (-0.5, 0.5, -0.5, 0.5))))
+    np.testing.assert_allclose(detection.size_m, (0.5, 0.5, 1.75))
+    assert detection.truncated_edges == (False, True, False, False)
 
 
 @pytest.mark.parametrize('field,value', [('center', float('nan')), ('center', float('inf')), ('size', 0.0),
@@ -173,7 +191,7 @@ def test_the_covariance_of_a_detection_is_turned_into_the_fixed_frame():
     box.size.x = box.size.y = 1.0
     detection, = detections_from_message(BoundingBox3DArray(boxes=[box]), transform_from((0, 0, 1), (-.5, .5, -.5, .5)))
     np.testing.assert_allclose(detection.covariance_m2, np.diag([0.09, 0.01, 0.04]), atol=1e-12)
-    assert detection.truncated
+    assert detection.truncated_edges == (True,) * 4  # the message does not say which
 
 
 @pytest.mark.parametrize('wrong', [-np.eye(3), np.full((3, 3), np.nan), [[1, 5, 0], [5, 1, 0], [0, 0, 1]]])

@@ -13,7 +13,7 @@ import numpy as np
 
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.error_model import read_error_model, write_error_model
-from ros_3d_bb.estimation import estimate_boxes, estimator_named, is_truncated
+from ros_3d_bb.estimation import estimate_boxes, estimator_named, truncated_edges
 from ros_3d_bb.evaluation.error_fit import coverage, data_of, fit_error_model, held_out
 from ros_3d_bb.evaluation.scenes import position_errors_m
 from ros_3d_bb.measurements import read_color, read_depth, read_session
@@ -128,7 +128,7 @@ def _repeatability_m(error_m, truth_m):
 def compare(session, boxes, estimator, model=None):
     """Compare estimators on a session. Returns the scores and positions of design §8, and our raw positions (n, 3)."""
     truth_m = truth_of(session)
-    truncated = np.array([is_truncated(rect_px or frame.boxes_px[0], session.camera)
+    truncated = np.array([any(truncated_edges(rect_px or frame.boxes_px[0], session.camera))
                           for rect_px, frame in zip(boxes, session.frames)])
     ours = estimates_of(session, boxes, estimator, model)
     thesis = _thesis_estimates(session, boxes)

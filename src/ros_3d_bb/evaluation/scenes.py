@@ -12,9 +12,9 @@ from ros_3d_bb.simulation.simulator import Frame
 from ros_3d_bb.simulation.truth import truth_at
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.association import match_greedily
-from ros_3d_bb.tracking.tracked import Detection, TrackedObject, View
+from ros_3d_bb.tracking.tracked import Detection, TrackedObject, View, detection_from_box
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.visibility import depths_towards, edges_of
+from ros_3d_bb.tracking.visibility import depths_towards
 
 LEAST_SHOWN = 0.3  # share of the body; less of it tells nothing of where the person is
 FOUND_IOU = 0.5  # a detection is that of a person where the boxes overlap by so much, else it is false
@@ -103,16 +103,14 @@ def _detections(frame, boxes, camera, estimator):
     """The 2D boxes as bbox3d_node and tracker_node take them: 3D boxes, in the map."""
     rects_px = [tuple(rect) for rect in np.rint(boxes).astype(int).tolist() if rect[0] < rect[2] and rect[1] < rect[3]]
     found = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, camera, estimator)
-    return [Detection(transform_points(frame.poses.map_from_camera, box.center_m), box.size_m[[0, 2, 1]],
-                      truncated=box.truncated)
-            for box in found if box is not None]
+    return [detection_from_box(box, frame.poses.map_from_camera) for box in found if box is not None]
 
 
 def _view(frame, camera):
     """What the tracker is told of the camera, as tracker_node does it."""
     depth = DepthImage(frame.depth_mm, 0.001)
     depth_at = functools.partial(depths_towards, camera, depth)
-    return View(frame.poses.map_from_camera, edges_of(camera), frame.camera, depth_at)
+    return View(frame.poses.map_from_camera, camera, frame.camera, depth_at)
 
 
 def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6.0):

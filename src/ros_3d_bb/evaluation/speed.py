@@ -22,12 +22,12 @@ from ros_3d_bb.evaluation.detector_speed import detector_speed
 from ros_3d_bb.evaluation.machine import describe_machine
 from ros_3d_bb.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb.evaluation.thesis_speed import ThesisTracks, thesis_boxes
-from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from, transform_points
+from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.measurements import read_color, read_session
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tracking.tracked import Detection, View
+from ros_3d_bb.tracking.tracked import View, detection_from_box
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.visibility import depths_towards, edges_of
+from ros_3d_bb.tracking.visibility import depths_towards
 
 OBJECTS = (1, 2, 5, 10, 20, 50, 100)
 WARM_UPS = 10  # images before the times count: until tracks are confirmed, and caches warm
@@ -44,7 +44,7 @@ class Ours(object):
     def __init__(self, crowd):
         self._camera, self._tracker, self._estimator = crowd.camera, Tracker(), estimator_named('foreground')
         depth_at = functools.partial(depths_towards, crowd.camera, crowd.depth)
-        self._view = View(FIXED_FROM_CAMERA, edges_of(crowd.camera), depth_at=depth_at)
+        self._view = View(FIXED_FROM_CAMERA, crowd.camera, depth_at=depth_at)
 
     def estimate(self, depth, rects_px):
         """3D boxes in the frame of the camera."""
@@ -52,8 +52,7 @@ class Ours(object):
 
     def track(self, stamp_ns, boxes):
         """The tracks after one image."""
-        detections = [Detection(transform_points(FIXED_FROM_CAMERA, box.center_m), box.size_m[[0, 2, 1]],
-                                truncated=box.truncated) for box in boxes]
+        detections = [detection_from_box(box, FIXED_FROM_CAMERA) for box in boxes]
         return self._tracker.update(stamp_ns, detections, self._view)
 
 

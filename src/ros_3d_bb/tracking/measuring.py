@@ -4,7 +4,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.tracking.kalman import Measurements
-from ros_3d_bb.tracking.visibility import NEARER_M
+from ros_3d_bb.tracking.visibility import NEARER_M, wrapped
 
 FLOOR_M = 0.02  # nobody's centre is known better than that: people sway as they walk
 USUAL_PERIOD_S = 1 / 30.0  # of images, for the first one
@@ -25,13 +25,24 @@ class NoiseParams(NamedTuple):
 
 class Sightings(NamedTuple):
     """The detections of one image as arrays: where they are on the ground, extents (n, 3), height of the centre and
-    its variance, (n,), and whether the image border cuts them."""
+    its variance, (n,), and whether the image border cuts them on the left, at the top, on the right and at the bottom,
+    (n, 4)."""
 
     ground: Measurements
     sizes_m: np.ndarray
     z_m: np.ndarray
     z_m2: np.ndarray
     truncated: np.ndarray
+
+    @property
+    def cut_sideways(self):
+        """Whether the image border hides a part of the width, (n,)."""
+        return self.truncated[:, 0] | self.truncated[:, 2]
+
+    @property
+    def vertical_cuts(self):
+        """Whether the image border hides the lower and the upper end, (n, 2)."""
+        return self.truncated[:, [3, 1]]
 
     def taken(self, columns):
         """Those in `columns` alone."""
@@ -76,16 +87,18 @@ def sightings_of(detections, view, elapsed_s, params):
     """
     positions_m = np.array([detection.position_m for detection in detections]).reshape(-1, 3)
     sizes_m = np.array([detection.size_m for detection in detections]).reshape(-1, 3)
-    truncated = np.array([detection.truncated for detection in detections], bool)
+    truncated = np.array([detection.truncated_edges for detection in detections], bool).reshape(-1, 4)
     unknown = np.eye(3) * params.noise_unknown ** 2
     covariances = np.array([unknown if detection.covariance_m2 is None else detection.covariance_m2
                             for detection in detections]).reshape(-1, 3, 3)
     seen = _seen(positions_m[:, :2], sizes_m[:, 0], view)
     hidden = _hidden_side(seen)
     is_part = sizes_m[:, 0] < PART_M
-    side = np.where(truncated, np.sign(seen.bearings) * is_part, hidden)
+    cut_left, cut_right = truncated[:, 0], truncated[:, 2]
+    cut = cut_left | cut_right
+    side = np.where(cut, (cut_left.astype(int) - cut_right) * is_part, hidden)
     shift_m = np.clip((PERSON_WIDTH_M - sizes_m[:, 0]) / 2, 0, MAX_SHIFT_M)
-    noise_m2 = _noise(covariances[:, :2, :2], seen, truncated | (hidden != 0), elapsed_s, params)
+    noise_m2 = _noise(covariances[:, :2, :2], seen, cut | (hidden != 0), elapsed_s, params)
     ground = Measurements(seen.positions_m + (side * shift_m)[:, None] * seen.sides, noise_m2, seen.rays)
     return Sightings(ground, sizes_m, positions_m[:, 2], covariances[:, 2, 2], truncated)
 
@@ -100,7 +113,7 @@ def _seen(positions_m, widths_m, view):
 def _hidden_side(seen):
     """On which side somebody nearer hides each in part: 1 left, -1 right, 0 on none, or on both."""
     depths_m = seen.distances_m * np.cos(seen.bearings)
-    to_left = seen.bearings[None, :] - seen.bearings[:, None]
+    to_left = wrapped(seen.bearings[None, :] - seen.bearings[:, None])
     gaps = np.abs(to_left) - seen.half_widths[None, :] - seen.half_widths[:, None]
     hides = (depths_m[None, :] < depths_m[:, None] - NEARER_M) & (gaps < TOUCHING_RAD)
     left, right = (hides & (to_left > 0)).any(axis=1), (hides & (to_left <= 0)).any(axis=1)

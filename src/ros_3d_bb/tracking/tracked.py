@@ -3,41 +3,73 @@ from typing import Callable, NamedTuple, Optional, Tuple
 
 import numpy as np
 
+from ros_3d_bb.geometry import Camera, transform_points, upright_turns
+
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
 LARGEST_M, FARTHEST_M = 10.0, 1e8  # nobody is wider or taller, and no map is larger
 MOST_STEPS = 1000  # of a prediction; more only cost memory
+VERTICAL = 0.02  # horizontal part of the optical axis of a camera that looks straight up or down
 
 
 class Detection(NamedTuple):
     """One object in one image: centre (3,) and extent (3,), x = y = width, z = height.
 
-    `covariance_m2` (3, 3) is that of the centre, None where it is not known. `truncated`: the image border cuts it.
+    `covariance_m2` (3, 3) is that of the centre, None where it is not known. `truncated_edges`: whether the image
+    border cuts the object on its left, at the top, on its right and at the bottom, as seen by a camera held upright.
     """
 
     position_m: np.ndarray
     size_m: np.ndarray
     covariance_m2: Optional[np.ndarray] = None
-    truncated: bool = False
+    truncated_edges: Tuple[bool, bool, bool, bool] = (False, False, False, False)
+
+
+def detection_from_box(box, fixed_from_camera):
+    """A 3D box of an image as a Detection in the fixed frame.
+
+    The cylinder is upright in the fixed frame, whichever edge of the image is up: where the camera is mounted in
+    portrait, the box is as wide as it is high in the image.
+
+    Parameters
+    ----------
+    box : estimation.Box3D
+    fixed_from_camera : numpy.ndarray, (4, 4)
+
+    Returns
+    -------
+    Detection
+    """
+    rotation, turns = fixed_from_camera[:3, :3], upright_turns(fixed_from_camera)
+    width_m, height_m, _depth_m = box.size_m
+    if turns % 2:
+        width_m, height_m = height_m, width_m
+    covariance_m2 = None if box.covariance_m2 is None else rotation.dot(box.covariance_m2).dot(rotation.T)
+    edges = box.truncated_edges[-turns:] + box.truncated_edges[:-turns]
+    return Detection(transform_points(fixed_from_camera, box.center_m), np.array([width_m, width_m, height_m]),
+                     covariance_m2, edges)
 
 
 class View(NamedTuple):
     """Where the camera of an image was, (4, 4) from its optical frame, and what it sees.
 
-    `edges` are x / z of what the left and the right image border show, None where they are not known. `camera` tells
-    the images of one camera from those of another. `depth_at`, where there is a depth image: a function that takes
-    points (k, 3) of the optical frame and returns the depths (k,) that were measured in their direction, metres, nan
-    where none was.
+    `intrinsics` is None where they are not known. `camera` tells the images of one camera from those of another.
+    `depth_at`, where there is a depth image: a function that takes points (k, 3) of the optical frame and returns the
+    depths (k,) that were measured in their direction, metres, nan where none was.
     """
 
     fixed_from_camera: np.ndarray
-    edges: Optional[Tuple[float, float]] = None
+    intrinsics: Optional[Camera] = None
     camera: str = ''
     depth_at: Optional[Callable[[np.ndarray], np.ndarray]] = None
 
     def bearings(self, positions_m):
         """Distances (n,) of positions (n, 2 or 3) from the camera seen from above, and their bearings (n,): 0 straight
-        ahead, positive to the left, radians."""
+        ahead, positive to the left, radians. For a camera that looks straight up or down, ahead is where the upper
+        edge of its image points.
+        """
         ahead = self.fixed_from_camera[:2, 2]
+        if np.hypot(*ahead) < VERTICAL:
+            ahead = -self.fixed_from_camera[:2, 1]
         offsets = np.asarray(positions_m)[:, :2] - self.fixed_from_camera[:2, 3]
         bearings = np.arctan2(ahead[0] * offsets[:, 1] - ahead[1] * offsets[:, 0], offsets.dot(ahead))
         return np.hypot(offsets[:, 0], offsets[:, 1]), bearings

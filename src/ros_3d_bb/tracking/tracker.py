@@ -20,8 +20,8 @@ from ros_3d_bb.tracking.tracked import OUT_OF_VIEW, VISIBLE, View, check_steps
 from ros_3d_bb.tracking.unseen import SEEN, Look, carried, miss, others_of, sigma_of
 
 TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
-                  ('size_m', float, 3), ('sightings', int), ('first_ns', np.int64), ('last_ns', np.int64),
-                  ('missed_s', float), ('unseen_s', float), ('status', int), ('confirmed', bool), ('moving', bool)])
+                  ('size_m', float, 3), ('end_hits', int, 2), ('sightings', int), ('first_ns', np.int64),
+                  ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float), ('status', int), ('confirmed', bool), ('moving', bool)])
 LATEST_NS = NS // 2  # images that come later than others by more are refused
 KNOWN_NS = 60 * NS  # a camera that sent nothing for longer, while others did, is a new one
 MOST_SKIPPED = 1000  # where no camera has an answer; the newest ones count
@@ -31,7 +31,8 @@ TRIES_S = 0.6  # how long a track that is not confirmed yet waits to be seen aga
 UNSURE_SHARE = 0.1  # of the density of a box at its centre: a newcomer's is not higher
 TAKEN_NS = NS // 5  # nobody new begins near somebody seen so recently
 SMOOTHING = 0.1  # share of the newest sighting in size and height
-CUT_SMOOTHING = 0.02  # a box that the image border cuts tells little of them
+CUT_SMOOTHING = 0.02  # the same of the width where the image border cuts the box on a side
+HEAD_SIGMAS = 2.0  # the top of a head is known this much less well than a height: the camera tilts as the robot drives
 STILL_MOVING = 0.5  # of the speed at which somebody begins to move
 
 
@@ -214,7 +215,7 @@ class Tracker(object):
         """Rows of tracks and columns of sightings that belong together."""
         params = self._params
         cost = kalman.unlikeliness(tracks['mean'], tracks['covariance'], sightings.ground, self._outliers)
-        cost += ((tracks['size_m'][:, 2:] - sightings.sizes_m[:, 2]) / params.height_sigma) ** 2 / 2
+        cost += _height_cost(tracks, sightings, params.height_sigma)
         # The more unsure a box, the less it tells anybody from a newcomer; it is then somebody's rather than nobody's.
         sharpest = 1 / (2 * np.pi * np.sqrt(np.linalg.det(sightings.ground.noise_m2)))
         density = np.minimum(params.newcomer_density, UNSURE_SHARE * sharpest)
@@ -240,10 +241,7 @@ class Tracker(object):
                               (stamp_ns - seen['first_ns'] >= self._params.min_age * NS))
         speed = np.linalg.norm(seen['mean'][:, 2:], axis=1)
         seen['moving'] = speed >= self._params.moving_speed * np.where(seen['moving'], STILL_MOVING, 1)
-        share = np.where(sightings.truncated, CUT_SMOOTHING, np.maximum(SMOOTHING, 1 / seen['sightings']))
-        seen['size_m'] += share[:, None] * (sightings.sizes_m - seen['size_m'])
-        seen['z_m'] += share * (sightings.z_m - seen['z_m'])
-        seen['z_m2'] += share * (sightings.z_m2 - seen['z_m2'])
+        _update_size(seen, sightings)
         tracks[rows] = seen
 
     def _is_remembered(self, tracks):
@@ -258,6 +256,7 @@ class Tracker(object):
         new['covariance'][:, :2, :2] = sightings.ground.noise_m2
         new['covariance'][:, [2, 3], [2, 3]] = self._params.initial_speed ** 2
         new['size_m'], new['z_m'], new['z_m2'] = sightings.sizes_m, sightings.z_m, sightings.z_m2
+        new['end_hits'] = ~sightings.vertical_cuts
         new['sightings'], new['first_ns'], new['last_ns'] = 1, image.stamp_ns, image.stamp_ns
         taken_m = tracks['mean'][image.stamp_ns - tracks['last_ns'] < TAKEN_NS, :2]
         kept = []
@@ -284,6 +283,46 @@ class Tracker(object):
                 self._ids = {other: former if known == number else known for other, known in self._ids.items()}
                 for known in [state.tracks for state, _image in self._history] + [tracks]:
                     known['id'][known['id'] == number] = former
+
+
+def _height_cost(tracks, sightings, sigma_m):
+    """What the heights of sightings cost in the association, (n, m), as negative log likelihood.
+
+    Where the image border cuts a box, or always cut those of a track, the height is not known: the top of the head is
+    compared if both have seen it, else nothing.
+    """
+    seen, cut = tracks['end_hits'] > 0, sightings.vertical_cuts
+    cost = ((tracks['size_m'][:, 2:] - sightings.sizes_m[:, 2]) / sigma_m) ** 2 / 2
+    heights_known = seen.all(axis=1)[:, None] & ~cut.any(axis=1)
+    if heights_known.all():
+        return cost
+    tops_m = _ends_of(tracks['z_m'], tracks['size_m'])[:, 1:], _ends_of(sightings.z_m, sightings.sizes_m)[:, 1]
+    top_cost = np.where(seen[:, 1:] & ~cut[:, 1], ((tops_m[0] - tops_m[1]) / (HEAD_SIGMAS * sigma_m)) ** 2 / 2, 0)
+    return np.where(heights_known, cost, top_cost)
+
+
+def _update_size(seen, sightings):
+    """Smooth the size and the height of tracks by one sighting each.
+
+    Lower and upper end are smoothed apart: an end that the image border cuts off stays where it was last seen. Until
+    it is seen for the first time it is where the estimator expects it.
+    """
+    share = np.maximum(SMOOTHING, 1 / seen['sightings'])
+    cut, hits = sightings.vertical_cuts, seen['end_hits']
+    end_share = np.where(cut, np.where(hits > 0, 0, share[:, None]), np.maximum(SMOOTHING, 1 / (hits + 1)))
+    ends_m = _ends_of(seen['z_m'], seen['size_m'])
+    ends_m += end_share * (_ends_of(sightings.z_m, sightings.sizes_m) - ends_m)
+    width_share = np.where(sightings.cut_sideways, CUT_SMOOTHING, share)
+    seen['size_m'][:, :2] += width_share[:, None] * (sightings.sizes_m[:, :2] - seen['size_m'][:, :2])
+    seen['size_m'][:, 2] = ends_m[:, 1] - ends_m[:, 0]
+    seen['z_m'] = ends_m.mean(axis=1)
+    seen['z_m2'] += end_share.mean(axis=1) * (sightings.z_m2 - seen['z_m2'])
+    seen['end_hits'] += ~cut
+
+
+def _ends_of(z_m, sizes_m):
+    """Heights (n, 2) of the lower and the upper end of upright bodies, metres."""
+    return z_m[:, None] + sizes_m[:, 2:] * (-0.5, 0.5)
 
 
 def _order(image):

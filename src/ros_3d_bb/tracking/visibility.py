@@ -3,8 +3,10 @@ import numpy as np
 
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
 
-EDGE_RAD = 0.03  # so near to the image border a person is not found for sure
-NEAREST_M = 0.45  # nor so near to the camera
+EDGE_RAD = 0.04  # people this close to the image border are not detected reliably
+NEAREST_M = 0.45  # nor are people this close to the camera
+LEAST_IN_IMAGE = 0.2  # share of the body axis that has to be in the image for a person to be detected
+AXIS_SAMPLES = np.linspace(-0.47, 0.47, 17)  # points of the body axis that are looked for, in heights from the centre
 BODY_RADIUS_M = 0.27
 NEARER_M = 0.25  # who hides another person is nearer by so much
 SEEN_BESIDE = 0.2  # and leaves so much of a half width to be seen, which is too narrow for a detector
@@ -36,14 +38,39 @@ def places_in(view, positions_m, sizes_m, others_m, farthest_m):
     places[_behind_others(distances_m, bearings, *view.bearings(others_m))] = OCCLUDED
     if view.depth_at is not None:
         places[_behind_something(view, positions_m, sizes_m)] = OCCLUDED
-    places[_outside(view, distances_m, bearings, farthest_m)] = OUT_OF_VIEW
+    places[_out_of_view(view, positions_m, sizes_m, farthest_m)] = OUT_OF_VIEW
     return places
 
 
-def edges_of(camera):
-    """x / z of what the left and the right border of a camera's image show, for `View`."""
-    borders = camera.deproject([[-0.5, camera.cy], [camera.width - 0.5, camera.cy]], 1.0)
-    return float(borders[0, 0]), float(borders[1, 0])
+def share_in_image(view, positions_m, heights_m, margin_rad=0.0):
+    """How much of the axes of upright bodies the image of a camera shows, whatever hides them.
+
+    Parameters
+    ----------
+    view : View
+        Its intrinsics are known.
+    positions_m : numpy.ndarray, (n, 3)
+        Centres in the fixed frame.
+    heights_m : numpy.ndarray, (n,)
+    margin_rad : float
+        Width of the strip along the image border that does not count, as an angle near the optical axis.
+
+    Returns
+    -------
+    numpy.ndarray, (n,)
+        0..1. Points to which the lens distortion gives no pixel are not in the image.
+    """
+    camera = view.intrinsics
+    axes_m = np.repeat(positions_m[:, None], len(AXIS_SAMPLES), axis=1)
+    axes_m[..., 2] += AXIS_SAMPLES * heights_m[:, None]
+    rotation = view.fixed_from_camera[:3, :3]  # its inverse is its transpose
+    points = (axes_m - view.fixed_from_camera[:3, 3]).dot(rotation)
+    in_front = points[..., 2] > 0
+    pixels = camera.project(np.where(in_front[..., None], points, (0, 0, 1)))
+    margin_px = margin_rad * np.array([camera.fx, camera.fy]) - 0.5  # the border is half a pixel from the centres
+    with np.errstate(invalid='ignore'):  # nan is outside
+        inside = (pixels >= margin_px) & (pixels <= np.array([camera.width, camera.height]) - 1 - margin_px)
+    return (in_front & inside.all(axis=-1)).mean(axis=1)
 
 
 def depths_towards(camera, depth, points):
@@ -71,18 +98,26 @@ def depths_towards(camera, depth, points):
     return np.where(inside & measured, depths_m, np.nan)
 
 
-def _outside(view, distances_m, bearings, farthest_m):
+def _out_of_view(view, positions_m, sizes_m, farthest_m):
+    """Which people the camera cannot detect: too close, too far, or with too little of the body in the image."""
+    above_m = np.abs(positions_m[:, 2] - view.fixed_from_camera[2, 3]) - sizes_m[:, 2] / 2
+    horizontal_m, bearings = view.bearings(positions_m)
+    distances_m = np.hypot(horizontal_m, np.maximum(above_m, 0))
     outside = (distances_m < NEAREST_M) | (distances_m > farthest_m)
-    if view.edges is None:
+    if view.intrinsics is None:
         return outside | (np.abs(bearings) > np.pi / 2)
-    left, right = np.arctan(view.edges)  # x is to the right, a bearing to the left
-    return outside | (-bearings < left + EDGE_RAD) | (-bearings > right - EDGE_RAD)
+    return outside | (share_in_image(view, positions_m, sizes_m[:, 2], EDGE_RAD) < LEAST_IN_IMAGE)
 
 
 def _behind_others(distances_m, bearings, others_m, others_bearings):
-    apart = np.abs(others_bearings - bearings[:, None])
+    apart = np.abs(wrapped(others_bearings - bearings[:, None]))
     covered = apart < _half_widths(others_m) + SEEN_BESIDE * _half_widths(distances_m)[:, None]
     return (covered & (others_m < distances_m[:, None] - NEARER_M)).any(axis=1)
+
+
+def wrapped(angles):
+    """Angles from -pi to pi, radians."""
+    return np.remainder(angles + np.pi, 2 * np.pi) - np.pi
 
 
 def _half_widths(distances_m):

@@ -7,6 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.geometry import Camera
+
+SIZE_PX = 1280, 720
 BODY_RADIUS_M = 0.25
 BLIND_M = 0.2  # who is nearer stands above the camera or behind its glass, and hides nobody
 # Thesis 5.2: what is measured minus what is, by depth in metres; measured up to 3 m, so beyond it grows with depth.
@@ -45,6 +48,13 @@ class CameraModel(NamedTuple):
     false_rate: float = 0.01
     false_s: float = 0.1
     double_share: float = 0.02
+
+    @property
+    def intrinsics(self):
+        """A camera without distortion that sees as wide, with square pixels and 16:9."""
+        width, height = SIZE_PX
+        focal_px = width / 2.0 / np.tan(self.field_of_view / 2)
+        return Camera(width, height, focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0)
 
     def depth_sigma_m(self, depth_m):
         """Standard deviation of the depth's error from image to image."""

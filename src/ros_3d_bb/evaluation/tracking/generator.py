@@ -234,8 +234,7 @@ def view_of(pose, camera):
     body[:2, :2] = turned(pose[2], np.eye(2)).T
     fixed_from_camera[:3, :3] = body.dot(OPTICAL_FROM_BODY.T)
     fixed_from_camera[:3, 3] = pose[0], pose[1], CAMERA_HEIGHT_M
-    edge = np.tan(camera.field_of_view / 2)
-    return View(fixed_from_camera, (-edge, edge), 'camera')
+    return View(fixed_from_camera, camera.intrinsics, 'camera')
 
 
 def detection_of(box, view, camera):
@@ -243,8 +242,10 @@ def detection_of(box, view, camera):
     rotation = view.fixed_from_camera[:3, :3]
     point_m = (-box.depth_m * np.tan(box.bearing), CAMERA_HEIGHT_M - box.height_m / 2, box.depth_m)
     covariance_m2 = rotation.dot(camera.covariance_m2(box.bearing, box.depth_m)).dot(rotation.T)
+    left = bool(box.cut) and box.bearing > 0
     return Detection(rotation.dot(point_m) + view.fixed_from_camera[:3, 3],
-                     np.array([box.width_m, box.width_m, box.height_m]), covariance_m2, bool(box.cut))
+                     np.array([box.width_m, box.width_m, box.height_m]), covariance_m2,
+                     (left, False, bool(box.cut) and not left, False))
 
 
 def _nanoseconds(seconds):
