@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Optional, Tuple
 import numpy as np
 
 from ros_3d_bb.body_layer import BODY_HALF_DEPTH_M, edges, first_layer, trimmed_mean, whole, within
+from ros_3d_bb.tracking.tracked import LARGEST_M
 
 FARTHEST_M = 100.0  # farther away no depth camera measures anything
 # A box whose edge is this close to the image border is taken to be cut by it: detectors round to whole pixels and
@@ -244,6 +245,8 @@ def estimator_named(name, stride_px=20):
 def estimate_boxes(depth, rects_px, camera, estimator):
     """The 3D boxes of all rectangles of one image, those in front first, so that nobody gets the depth of another.
 
+    A box that is not plausible (see `is_plausible`) is returned as well, but it takes no depth from the others.
+
     Parameters
     ----------
     depth : DepthImage
@@ -260,10 +263,16 @@ def estimate_boxes(depth, rects_px, camera, estimator):
     found = {}
     for number in near_first(rects_px):
         rect_px = rects_px[number]
-        box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, camera, list(found.values()))
+        nearer = [box for box in found.values() if is_plausible(box)]
+        box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, camera, nearer)
         if box is not None:
             found[number] = box
     return [found.get(number) for number in range(len(rects_px))]
+
+
+def is_plausible(box):
+    """Whether a Box3D lies at a finite place and has the size of something that can be tracked."""
+    return bool(np.isfinite(box.center_m).all() and (box.size_m > 0).all() and (box.size_m < LARGEST_M).all())
 
 
 def near_first(rects_px):

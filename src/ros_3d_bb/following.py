@@ -9,7 +9,7 @@ import tf2_ros
 from std_msgs.msg import Header
 
 from ros_3d_bb.images import depth_from
-from ros_3d_bb.messages import camera_from_message, detections_from_message, stamp_of, time_from
+from ros_3d_bb.messages import camera_from_message, detections_from_message, stamp_of, time_from, usable_boxes3d
 from ros_3d_bb.params import check_not_negative, nearest_name
 from ros_3d_bb.stamped import NS, StampedCache
 from ros_3d_bb.tracking.measuring import NoiseParams
@@ -178,7 +178,9 @@ class Follower(object):
         stamp_ns = stamp_of(message)
         if camera:
             self._check_frame(message.header.frame_id, camera)
-        detections = detections_from_message(message, fixed_from_camera)
+        usable, faults = usable_boxes3d(message)
+        self._tally.leave_out('3D boxes', faults)
+        detections = detections_from_message(usable, fixed_from_camera)
         with self._tracks_lock:
             if jumps != self._jump.number:
                 self._leave_out(stamp_ns, camera)

@@ -6,12 +6,13 @@ from std_msgs.msg import Header
 from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.diagnosis.camera_faults import ALIGN, size_fault, units_fault
 from ros_3d_bb.error_model import corrected_boxes, read_error_model
-from ros_3d_bb.estimation import DepthImage, check_rect, estimate_boxes, estimator_named
+from ros_3d_bb.estimation import DepthImage, check_rect, estimate_boxes, estimator_named, is_plausible
 from ros_3d_bb.geometry import Camera
 from ros_3d_bb.images import depth_from
 from ros_3d_bb.messages import boxes2d_from_message, camera_from_message, stamp_of, time_from
 from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.stamped import NS, Pairing
+from ros_3d_bb.tracking.tracked import LARGEST_M
 
 
 class Bbox3dParams(NamedTuple):
@@ -120,11 +121,12 @@ class Lifter(object):
         return lifted
 
     def _boxes3d(self, depth, rects_px, camera):
-        """The 3D boxes of rectangles, without those that are unusable or show no depth of their own."""
+        """The 3D boxes of rectangles that are usable, show depth of their own and give a plausible box."""
         usable = [rect_px for rect_px in rects_px if self._is_usable(rect_px)]
-        boxes = [box for box in estimate_boxes(depth, usable, camera, self._estimator) if box is not None]
+        estimated = [box for box in estimate_boxes(depth, usable, camera, self._estimator) if box is not None]
+        boxes = [box for box in estimated if self._is_plausible(box)]
         self._tally.count('boxes lifted', len(boxes))
-        self._tally.count('boxes without depth', len(usable) - len(boxes))
+        self._tally.count('boxes without depth', len(usable) - len(estimated))
         if self._error_model is None or not boxes:
             return boxes
         boxes = corrected_boxes(boxes, self._error_model)
@@ -139,6 +141,14 @@ class Lifter(object):
         except ValueError as error:
             self._tally.warn('boxes refused', '2D %s; the others in this image are used' % error)
             return False
+
+    def _is_plausible(self, box):
+        if is_plausible(box):
+            return True
+        self._tally.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and %.3g m '
+                         'high at %.3g m; less than %g m expected; the others in this image are used'
+                         % (tuple(box.rect_px) + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
+        return False
 
     def _depth_of(self, frame, boxes):
         """The depth image of a frame. Raises ValueError where there is none, or it cannot belong to the camera."""

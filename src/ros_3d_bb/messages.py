@@ -177,44 +177,63 @@ def _box3d_from_message(box):
                  covariance_m2 if covariance_m2.any() else None)
 
 
+def usable_boxes3d(message):
+    """The 3D boxes in a BoundingBox3DArray that can be tracked, and what is wrong with the others.
+
+    Returns
+    -------
+    BoundingBox3DArray
+        The message with the usable boxes.
+    list of str
+        One sentence for each of the others.
+
+    Raises
+    ------
+    ValueError
+        If there are too many boxes.
+    """
+    if len(message.boxes) > MAX_BOXES:
+        raise ValueError('%d 3D boxes in one image; at most %d expected' % (len(message.boxes), MAX_BOXES))
+    usable, faults = [], []
+    for number, box in enumerate(message.boxes):
+        try:
+            _check_box3d(box)
+            usable.append(box)
+        except ValueError as error:
+            faults.append('3D box %d has %s' % (number, error))
+    return BoundingBox3DArray(header=message.header, boxes=usable), faults
+
+
+def _check_box3d(box):
+    """Raise ValueError if a centre is not finite, a size not positive, one of them absurdly large, or a covariance
+    none.
+    """
+    center = box.center.position
+    values = np.array([center.x, center.y, center.z, box.size.x, box.size.y])
+    if not ((np.abs(values) < FARTHEST_M).all() and (0 < values[3:]).all() and (values[3:] < LARGEST_M).all()):
+        raise ValueError('centre (%g, %g, %g) and size (%g, %g); finite numbers and sizes of more than 0 and less than '
+                         '%g m expected' % (tuple(values) + (LARGEST_M,)))
+    covariance_m2 = np.array(box.position_covariance).reshape(3, 3)
+    if not ((np.abs(covariance_m2) < FARTHEST_M).all()
+            and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T).min() > -1e-9):
+        raise ValueError('the position_covariance %s; a finite, positive semi-definite matrix, or zeros where it is '
+                         'not known, expected' % list(box.position_covariance))
+
+
 def detections_from_message(message, fixed_from_camera):
     """The 3D boxes in a BoundingBox3DArray as detections in the fixed frame.
 
     Parameters
     ----------
+    message : BoundingBox3DArray
+        With usable boxes only, see `usable_boxes3d`.
     fixed_from_camera : numpy.ndarray, (4, 4)
 
     Returns
     -------
     list of Detection
-
-    Raises
-    ------
-    ValueError
-        If a centre is not finite, a size not positive, one of them absurdly large, or a covariance none.
     """
-    if len(message.boxes) > MAX_BOXES:
-        raise ValueError('%d 3D boxes in one image; at most %d expected' % (len(message.boxes), MAX_BOXES))
-    detections = []
-    for number, box in enumerate(message.boxes):
-        center, size = box.center.position, box.size
-        values = np.array([center.x, center.y, center.z, size.x, size.y])
-        if not ((np.abs(values) < FARTHEST_M).all() and (0 < values[3:]).all() and (values[3:] < LARGEST_M).all()):
-            raise ValueError('3D box %d has centre (%g, %g, %g) and size (%g, %g); finite numbers and sizes of more '
-                             'than 0 and less than 10 m expected'
-                             % ((number,) + tuple(values)))
-        _check_covariance(box, number)
-        detections.append(detection_from_box(_box3d_from_message(box), fixed_from_camera))
-    return detections
-
-
-def _check_covariance(box, number):
-    """Raise ValueError where the covariance of a BoundingBox3D's centre is none."""
-    covariance_m2 = np.array(box.position_covariance).reshape(3, 3)
-    if covariance_m2.any() and not ((np.abs(covariance_m2) < FARTHEST_M).all()
-                                    and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T).min() > -1e-9):
-        raise ValueError('3D box %d has the position_covariance %s; a finite, positive semi-definite matrix, or zeros '
-                         'where it is not known, expected' % (number, list(box.position_covariance)))
+    return [detection_from_box(box, fixed_from_camera) for box in boxes3d_from_message(message)]
 
 
 def tracks_to_message(tracks, header):

@@ -39,6 +39,11 @@ class Tally(object):
         """Something was refused or missing; `sentence` says what, why, and what happens next."""
         self.note(event, sentence)
 
+    def leave_out(self, parts, faults):
+        """Some parts of an input cannot be used; `faults` has one sentence for each. The others are used."""
+        for fault in faults:
+            self.warn('%s left out' % parts, '%s; the others in this image are used' % fault)
+
     @contextlib.contextmanager
     def refusing(self, inputs):
         """Around what is done with one input: a ValueError there refuses that one, and the next is taken."""

@@ -25,7 +25,8 @@ from ros_3d_bb.lifting import Bbox3dParams
 from ros_3d_bb.markers import MarkerParams
 from ros_3d_bb.measurements import read_session
 from ros_3d_bb.messages import (boxes2d_from_message, boxes2d_to_message, boxes3d_from_message, boxes3d_to_message,
-                                camera_from_message, detections_from_message, tracks_from_message, tracks_to_message)
+                                camera_from_message, detections_from_message, tracks_from_message, tracks_to_message,
+                                usable_boxes3d)
 from ros_3d_bb.params import params_from
 from ros_3d_bb.planner_messages import points_to_message
 from ros_3d_bb.process_bag import read_params
@@ -74,7 +75,8 @@ def _boxes3d(source, _folder):
 
 
 def _detections(source, _folder):
-    for detection in detections_from_message(hostile.boxes3d(source, NOW_NS), FROM_CAMERA):
+    usable, _faults = usable_boxes3d(hostile.boxes3d(source, NOW_NS))
+    for detection in detections_from_message(usable, FROM_CAMERA):
         assert np.isfinite(detection.position_m).all() and (detection.size_m > 0).all()
 
 
@@ -206,7 +208,7 @@ FUNCTIONS = {
         lambda source, _folder: camera_from_message(hostile.camera_info(source, NOW_NS, INFO)), 8),
     'boxes2d_from_message, boxes2d_to_message': Function(_boxes2d, 6),
     'boxes3d_from_message, boxes3d_to_message': Function(_boxes3d, 3),
-    'detections_from_message': Function(_detections, 4), 'tracks, planners': Function(_tracks, 3),
+    'usable_boxes3d, detections_from_message': Function(_detections, 4), 'tracks, planners': Function(_tracks, 3),
     'estimate_boxes': Function(_estimates, 2), 'decoded, suppressed': Function(_predictions, 3),
     'decoded_heads': Function(_heads, 2), 'params_from': Function(_params, 15),
     'parse_length': Function(lambda source, _folder: parse_length(

@@ -4,20 +4,27 @@ The weight-free detector always runs. YOLOv5 runs where ROS_3D_BB_DATA has its w
 truth stand in for it, so that estimator and tracker are tested all the same.
 """
 import glob
+import json
 import os
 
+import numpy as np
 import pytest
 
 from conftest import DATA
+from ros_3d_bb.error_model import read_error_model
 from ros_3d_bb.evaluation.identities import score
-from ros_3d_bb.evaluation.scene_benchmark import RANGE_M, depth_detector, result_of, yolov5_detector
-from ros_3d_bb.evaluation.scenes import run_scene, score_detections
+from ros_3d_bb.evaluation.scene_benchmark import (RANGE_M, depth_detector, exact_detector, main, result_of,
+                                                  yolov5_detector)
+from ros_3d_bb.evaluation.scenes import look_at_scene, run_scene, score_detections
 from ros_3d_bb.simulation.scenario import read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
 SCENES = sorted(os.path.basename(path) for path in glob.glob(os.path.join(FOLDER, '*.yaml')))
 THESIS_SCENES = [name for name in SCENES if name.startswith('thesis_')]
+APPROACHES = {'approach_jackal.yaml': (0.265, 1.75), 'approach_child.yaml': (0.265, 1.15),
+              'approach_high_mount.yaml': (1.0, 1.75), 'approach_tall.yaml': (1.0, 1.95)}  # heights: camera, person
+ERROR_MODEL = os.path.join(FOLDER, os.pardir, 'error_models', 'simulated_d435i.yaml')
 # Of the 15 images a second, so that as many remain as a small computer manages: 7.5 and 5 a second.
 EVERY = {'depth': 2, 'yolov5': 3}
 OTHERS_EVERY = {'depth': 6, 'yolov5': 12}  # in the scenes where only detections count
@@ -44,6 +51,7 @@ def runs(yolov5):
 
 def test_there_are_the_scenes_that_the_package_promises():
     assert len(THESIS_SCENES) == 6
+    assert set(APPROACHES) == set(name for name in SCENES if name.startswith('approach_'))
     assert {'crowd_of_12.yaml', 'corridor.yaml', 'behind_a_pillar.yaml', 'turning_robot.yaml',
             'empty_room.yaml'} <= set(SCENES)
 
@@ -83,3 +91,71 @@ def test_the_benchmark_says_what_the_scores_say(runs):
     assert result['worst_m'] == max(person.worst_m for person in tracked.people)
     empty = result_of(runs['depth', 'empty_room.yaml'], 'depth')
     assert empty['people'] == 0 and empty['rmse_m'] is None and empty['recall'] == 1.0
+
+
+@pytest.fixture
+def approach():
+    return Simulator(read_scenario(os.path.join(FOLDER, 'approach_jackal.yaml')))
+
+
+@pytest.mark.parametrize('name', sorted(APPROACHES))
+def test_somebody_comes_within_half_a_metre_stays_for_two_seconds_and_goes(name):
+    camera_m, person_m = APPROACHES[name]
+    simulator = Simulator(read_scenario(os.path.join(FOLDER, name)))
+    times_s = [simulator.time_s(number) for number in range(simulator.frame_count)]
+    cameras_m = np.array([simulator.poses_at(time_s).map_from_camera[:3, 3] for time_s in times_s])
+    people_m = np.array([simulator.positions_at(time_s)[0] for time_s in times_s])
+    distances_m = np.linalg.norm(people_m - cameras_m[:, :2], axis=1)
+    assert cameras_m[:, 2] == pytest.approx(camera_m)
+    assert simulator.scenario.people[0].height == person_m
+    assert distances_m.min() == pytest.approx(0.5, abs=1e-6) and distances_m[[0, -1]].min() > 3.5
+    assert 1.5 <= np.count_nonzero(distances_m < 0.51) / simulator.rate <= 2.5
+
+
+def test_exact_boxes_are_the_true_ones_with_a_jitter_that_is_the_same_each_time(approach):
+    jitters_px = []
+    for number in range(0, 285, 19):
+        frame = approach.frame(number)
+        boxes, again = (exact_detector(approach)(frame) for _time in range(2))
+        assert boxes.tolist() == again.tolist() and boxes.shape == (1, 4)
+        assert (boxes >= 0).all() and (boxes <= [640, 480] * 2).all() and (boxes == np.rint(boxes)).all()
+        inside = (np.array(frame.people[0].box_px) > 4) & (np.array(frame.people[0].box_px) < [636, 476] * 2)
+        jitters_px += list((boxes[0] - frame.people[0].box_px)[inside])
+    assert len(jitters_px) > 25 and 0.7 < np.std(jitters_px) < 1.4 and np.abs(jitters_px).max() <= 4
+
+
+def test_exact_boxes_have_the_covariance_of_the_error_model(approach):
+    """In the map, whose x is the range of a camera that looks along it: as the model says at 3.7 m."""
+    model = read_error_model(ERROR_MODEL)
+    plain = next(look_at_scene(approach, exact_detector(approach)))
+    image = next(look_at_scene(approach, exact_detector(approach), error_model=model))
+    (before,), (detection,) = plain.detections, image.detections
+    assert before.covariance_m2 is None
+    camera_m = image.frame.poses.map_from_camera[:3, 3]
+    x_m, y_m, z_m = detection.position_m - camera_m
+    expected, = model.covariance(np.array([(-y_m, -z_m, x_m)]))
+    assert detection.covariance_m2[0, 0] == pytest.approx(expected[2, 2])
+    assert detection.covariance_m2[2, 2] == pytest.approx(expected[1, 1])
+
+
+def test_results_tell_how_well_tracks_hold(approach):
+    """At 5 images a second, from where the person starts; and what a result had before is still there."""
+    steps = run_scene(approach, exact_detector(approach), 6, error_model=read_error_model(ERROR_MODEL))
+    result = result_of(steps, 'exact', approach.camera)
+    assert set(result) == {'detector', 'images', 'people', 'recall', 'false_boxes', 'id_switches', 'rmse_m', 'worst_m',
+                           'track_ids', 'not_visible', 'velocity_rmse_mps', 'prediction_1s_m'}
+    assert result['images'] == 48 and result['recall'] == 1 and result['false_boxes'] == 0
+    assert result['track_ids'] >= 1 and result['velocity_rmse_mps'] < 0.5 and result['prediction_1s_m'] < 0.6
+
+
+@pytest.mark.parametrize('every,images', [([], {'depth': 4, 'exact': 8}),
+                                          (['--every', '4'], {'depth': 2, 'exact': 2})])
+def test_the_command_writes_a_row_for_each_detector(every, images, tmp_path, monkeypatch):
+    """Without --every the exact boxes come with each image, and the detectors search every second one."""
+    scene, scores = tmp_path / 'short.yaml', tmp_path / 'scores.json'
+    scene.write_text('duration: 0.5\npeople: [{start: [3.0, 0.0]}]\n')
+    monkeypatch.setattr('sys.argv', ['scenes', str(scene), '--error-model', ERROR_MODEL, '--json', str(scores)] + every)
+    main()
+    rows = json.loads(scores.read_text())['scenes']
+    assert {row['detector']: row['images'] for row in rows} == images
+    assert [row['scene'] for row in rows] == ['short', 'short']

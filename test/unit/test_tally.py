@@ -49,3 +49,11 @@ def test_no_count_is_lost_between_threads(switching):
     for thread in threads:
         thread.join()
     assert tally.counts == {'images': 20000}
+
+
+def test_parts_that_are_left_out_are_counted_one_by_one():
+    tally = Tally()
+    tally.leave_out('3D boxes', [])
+    assert not tally.counts
+    tally.leave_out('3D boxes', ['box 0 is 11 m wide', 'box 2 is 12 m wide'])
+    assert tally.counts == {'3D boxes left out': 2} and 'box 0 is 11 m wide' in tally.sentences['3D boxes left out']

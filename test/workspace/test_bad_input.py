@@ -92,6 +92,7 @@ CASES += [('tracker_node', BOXES3D_TOPIC) + case for case in (
     (fields(header__stamp=time_from(START_NS + HOUR_NS)), 'no transform from camera to map at 4600.000'),
     (fields(header__stamp=time_from(START_NS - 900 * NS)), 'no transform from camera to map at 100.000'),
     (fields(header__frame_id=''), 'no transform'), (fields(header__frame_id='nowhere'), 'no transform from nowhere'))]
+CASES += [('viewer_node', BOXES3D_TOPIC, fields(boxes__0__center__position__z=float('nan')), 'has centre (0, 0, nan)')]
 
 
 class Rig(object):

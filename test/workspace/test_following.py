@@ -11,6 +11,7 @@ from ros_3d_bb.messages import time_from
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tally import Tally
+from ros_3d_bb.tracking.tracked import VISIBLE
 
 START_NS = 1000 * NS
 
@@ -70,8 +71,8 @@ def test_tracks_have_the_stamp_of_an_image_that_was_taken(follower, transforms):
     ahead_ns = stamp_ns + 9 * NS // 10
     transforms.missing.add(ahead_ns)
     assert follower.add_boxes(boxes(ahead_ns), 0) is None
-    with pytest.raises(ValueError, match='3D box 0'):
-        follower.add_boxes(boxes(ahead_ns + 1, z=float('nan')), 0)
+    with pytest.raises(ValueError, match='2000 3D boxes'):
+        follower.add_boxes(boxes(ahead_ns + 1, count=2000), 0)
     followed = follower.add_boxes(boxes(stamp_ns + NS // 30), 0)
     assert followed.header.stamp == time_from(stamp_ns + NS // 30) and len(followed.tracks) == 1
 
@@ -105,3 +106,26 @@ def test_more_boxes_than_people_can_be_are_refused(follower):
     with pytest.raises(ValueError, match='2000 3D boxes in one image; at most 1000'):
         follower.add_boxes(boxes(START_NS, count=2000), 0)
     assert np.isfinite(follower.add_boxes(boxes(START_NS), 0).header.stamp.to_sec())
+
+
+def test_a_box_that_cannot_be_used_takes_no_other_with_it(follower, tally):
+    """A box as wide as a wall, and one without a place, come with each image of a person who stands there."""
+    _stamp_ns, alone = stand(follower)
+    for frame in range(30, 60):
+        message = boxes(START_NS + frame * NS // 30)
+        wall, nowhere = boxes(0).boxes + boxes(0, z=float('nan')).boxes
+        wall.size.x, wall.size.y = 9.34, 10.93
+        message.boxes = [wall, nowhere] + message.boxes
+        track, = follower.add_boxes(message, 0).tracks
+    assert track.id == alone.tracks[0].id and track.status == VISIBLE
+    assert tally.counts['3D boxes left out'] == 60 and tally.counts['images tracked'] == 60
+    assert '3D boxes refused' not in tally.counts
+
+
+def test_an_image_all_of_whose_boxes_are_left_out_is_one_without_people(follower, tally):
+    """The track goes on without a detection, as it does where the detector finds nothing."""
+    stamp_ns, before = stand(follower)
+    after = follower.add_boxes(boxes(stamp_ns + NS // 30, z=float('nan')), 0)
+    assert after.header.stamp == time_from(stamp_ns + NS // 30)
+    assert [(track.id, track.last_seen_ns) for track in after.tracks] == [(before.tracks[0].id, stamp_ns)]
+    assert tally.counts['3D boxes left out'] == 1

@@ -13,7 +13,7 @@ from ros_3d_bb.estimation import Box3D, DepthImage
 from ros_3d_bb.geometry import Camera, transform_from
 from ros_3d_bb.messages import (boxes2d_from_message, boxes2d_to_message, boxes3d_from_message, boxes3d_to_message,
                                 camera_from_message, detections_from_message, restamped, stamp_of, time_from,
-                                tracks_from_message, tracks_to_message, transform_from_message)
+                                tracks_from_message, tracks_to_message, transform_from_message, usable_boxes3d)
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.thesis import ThesisTracker
@@ -173,16 +173,27 @@ def test_people_stand_upright_however_the_camera_is_mounted(roll, size, edges):
     assert detection.truncated_edges == (False, True, False, False)
 
 
-@pytest.mark.parametrize('field,value', [('center', float('nan')), ('center', float('inf')), ('size', 0.0),
-                                         ('size', -1.0), ('size', float('nan'))])
-def test_3d_boxes_that_cannot_be_are_refused(field, value):
-    box = BoundingBox3D()
-    box.size.x = box.size.y = box.size.z = 1.0
-    (box.center.position if field == 'center' else box.size).x = value
-    with pytest.raises(ValueError, match='3D box 1'):
-        good = BoundingBox3D()
-        good.size.x = good.size.y = 1.0
-        detections_from_message(BoundingBox3DArray(boxes=[good, box]), np.eye(4))
+def box_of(width_m=0.5, height_m=1.7, x_m=0.0, covariance_m2=np.zeros((3, 3))):
+    box = BoundingBox3D(position_covariance=np.ravel(covariance_m2).tolist())
+    box.center.position.x, box.center.position.z = x_m, 3.0
+    box.size.x, box.size.y, box.size.z = width_m, height_m, width_m
+    return box
+
+
+@pytest.mark.parametrize('wrong', [
+    {'x_m': float('nan')}, {'x_m': float('inf')}, {'x_m': 1e300}, {'width_m': 0.0}, {'width_m': -1.0},
+    {'width_m': float('nan')}, {'width_m': 10.0}, {'width_m': 1e6}, {'height_m': 10.93},
+    {'covariance_m2': -np.eye(3)}, {'covariance_m2': np.full((3, 3), np.nan)},
+    {'covariance_m2': 1e308 * np.eye(3)}, {'covariance_m2': [[1, 5, 0], [5, 1, 0], [0, 0, 1]]}])
+def test_a_3d_box_that_cannot_be_used_takes_no_other_with_it(wrong):
+    good, other = box_of(x_m=-1.0), box_of(x_m=2.0, width_m=9.99, covariance_m2=np.eye(3))
+    message = BoundingBox3DArray(header=header(7), boxes=[good, box_of(**wrong), other])
+    usable, faults = usable_boxes3d(message)
+    assert usable.boxes == [good, other] and usable.header == message.header
+    assert len(faults) == 1 and faults[0].startswith('3D box 1 has ')
+    assert len(message.boxes) == 3
+    positions_m = [detection.position_m[0] for detection in detections_from_message(usable, np.eye(4))]
+    assert positions_m == [-1.0, 2.0]
 
 
 def test_the_covariance_of_a_detection_is_turned_into_the_fixed_frame():
@@ -192,14 +203,6 @@ def test_the_covariance_of_a_detection_is_turned_into_the_fixed_frame():
     detection, = detections_from_message(BoundingBox3DArray(boxes=[box]), transform_from((0, 0, 1), (-.5, .5, -.5, .5)))
     np.testing.assert_allclose(detection.covariance_m2, np.diag([0.09, 0.01, 0.04]), atol=1e-12)
     assert detection.truncated_edges == (True,) * 4  # the message does not say which
-
-
-@pytest.mark.parametrize('wrong', [-np.eye(3), np.full((3, 3), np.nan), [[1, 5, 0], [5, 1, 0], [0, 0, 1]]])
-def test_a_matrix_that_is_no_covariance_is_refused(wrong):
-    box = BoundingBox3D(position_covariance=np.ravel(wrong).tolist())
-    box.size.x = box.size.y = 1.0
-    with pytest.raises(ValueError, match='3D box 0 has the position_covariance'):
-        detections_from_message(BoundingBox3DArray(boxes=[box]), np.eye(4))
 
 
 def test_the_covariance_of_tracks_and_predictions_survives():

@@ -75,7 +75,7 @@ def score(moments):
     pairs, false, last_track = [], 0, {}
     for moment in moments:
         seen = [track for track in moment.tracks if track.status == VISIBLE]
-        pairs.append(_pairs(moment.truth, seen, last_track))
+        pairs.append(pairs_of(moment.truth, seen, last_track))
         last_track.update({pair.person: pair.track for pair in pairs[-1]})
         false += len(seen) - len(pairs[-1])
     people = sorted(set(person.id for moment in moments for person in moment.truth))
@@ -83,14 +83,14 @@ def score(moments):
                       false / float(max(1, len(moments))))
 
 
-def _pairs(people, tracks, before):
-    """The pairs of one image; `before`: the last track of each person."""
+def pairs_of(people, tracks, before, gate_m=GATE_M):
+    """The pairs (list of Pair) of people and tracks in one image; `before`: the last track of each person, by id."""
     if not people or not tracks:
         return []
     distances = plane_distances([person.position_m for person in people], [track.position_m for track in tracks])
-    near = distances <= GATE_M
+    near = distances <= gate_m
     kept = [[before.get(person.id) == track.id for track in tracks] for person in people]
-    cost = np.where(np.array(kept) & near, distances - 2 * GATE_M, distances)
+    cost = np.where(np.array(kept) & near, distances - 2 * gate_m, distances)
     return [Pair(people[row].id, tracks[column].id, tracks[column].position_m[:2] - people[row].position_m[:2])
             for row, column in match_greedily(cost) if near[row, column]]
 

@@ -8,14 +8,20 @@ import numpy as np
 
 from ros_3d_bb.detection.depth_people import DepthPeople
 from ros_3d_bb.detection.floor import floor_from_transform
+from ros_3d_bb.error_model import read_error_model
 from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.evaluation.identities import score
-from ros_3d_bb.evaluation.scenes import run_scene, score_detections
+from ros_3d_bb.evaluation.scene_tracks import is_in_image, score_tracks
+from ros_3d_bb.evaluation.scenes import LEAST_SHOWN, run_scene, score_detections
 from ros_3d_bb.simulation.scenario import ScenarioError, read_scenario
-from ros_3d_bb.simulation.simulator import Simulator
+from ros_3d_bb.simulation.simulator import D435I_COLOR, Simulator
 
-RANGE_M = {'yolov5': (2.0, 8.0), 'depth': (2.0, 6.0)}  # in which a detector has to find people
-COLUMNS = '%-22s %-7s %7s %7s %8s %9s %8s %8s'
+RANGE_M = {'yolov5': (2.0, 8.0), 'depth': (2.0, 6.0), 'exact': (0.5, 8.0)}  # in which a detector has to find people
+EVERY = {'yolov5': 2, 'depth': 2, 'exact': 1}  # one image of so many is used
+JITTER_PX = 1.0  # standard deviation of the edges of the boxes of `exact`
+COLUMNS = '%-20s %-8s %6s %6s %6s %8s %7s %7s %4s %11s %9s %9s'
+HEADINGS = ('scene', 'detector', 'images', 'recall', 'false', 'switches', 'RMSE', 'worst', 'IDs', 'not visible',
+            'velocity', '1 s ahead')
 
 
 def depth_detector(simulator):
@@ -33,33 +39,49 @@ def yolov5_detector(weights):
     return lambda frame: detector.detect(frame.color).boxes
 
 
-def result_of(steps, detector):
-    """The scores of a run as a dictionary, see `./run bench scenes`; `detector` yolov5 or depth.
+def exact_detector(simulator):
+    """The true boxes of the people for `run_scene`, each edge off by about `JITTER_PX` as that of a detector.
+
+    Left out are people of whom too little is shown: see `scene_tracks.is_in_image`, or `LEAST_SHOWN` of the body.
+    """
+    seed, camera = simulator.scenario.seed, simulator.camera
+
+    def detect(frame):
+        random = np.random.RandomState([seed, frame.number])
+        jitter_px = np.rint(random.normal(0, JITTER_PX, (len(frame.people), 4)))
+        shown = [person.visible >= LEAST_SHOWN or is_in_image(person, frame.poses.map_from_camera, camera)
+                 for person in frame.people]
+        boxes = [person.box_px + jitter for person, jitter, is_shown in zip(frame.people, jitter_px, shown) if is_shown]
+        return np.clip(np.reshape(boxes, (-1, 4)), 0, [camera.width, camera.height] * 2)
+
+    return detect
+
+
+def result_of(steps, detector, camera=D435I_COLOR):
+    """The scores of a run as a dictionary, see `./run bench scenes`; `detector` yolov5, depth or exact.
 
     Lengths in metres, shares 0..1; errors are those of all people in the scene together.
     """
     found, tracked = score_detections(steps, *RANGE_M[detector]), score([step.moment for step in steps])
     followed = [person for person in tracked.people if person.ids]
-    return {'detector': detector, 'images': found.images, 'people': len(tracked.people), 'recall': found.recall,
-            'false_boxes': found.false_rate, 'id_switches': sum(person.switches for person in tracked.people),
-            'rmse_m': float(np.sqrt(np.mean([person.rmse_m ** 2 for person in followed]))) if followed else None,
-            'worst_m': max([person.worst_m for person in followed], default=None)}
+    result = {'detector': detector, 'images': found.images, 'people': len(tracked.people), 'recall': found.recall,
+              'false_boxes': found.false_rate, 'id_switches': sum(person.switches for person in tracked.people),
+              'rmse_m': float(np.sqrt(np.mean([person.rmse_m ** 2 for person in followed]))) if followed else None,
+              'worst_m': max([person.worst_m for person in followed], default=None)}
+    result.update(score_tracks(steps, camera)._asdict())
+    return result
 
 
 def main():
     """The command `./run bench scenes`."""
-    parser = argparse.ArgumentParser(prog='./run bench scenes', description=__doc__)
-    parser.add_argument('scenarios', nargs='+', help='scenario files')
-    parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, the weight-free detector only')
-    parser.add_argument('--every', type=int, default=2, metavar='N', help='use one image of N (default: 2)')
-    parser.add_argument('--json', metavar='FILE', help='also write the scores there')
-    arguments = parser.parse_args()
+    arguments = _parser().parse_args()
     results = []
     try:
         yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
-        print(COLUMNS % ('scene', 'detector', 'images', 'recall', 'false', 'switches', 'RMSE', 'worst'))
+        error_model = read_error_model(arguments.error_model) if arguments.error_model else None
+        print(COLUMNS % HEADINGS)
         for path in arguments.scenarios:
-            results += _run(path, yolov5, arguments.every)
+            results += _run(path, yolov5, error_model, arguments.every)
         if arguments.json:
             with open(arguments.json, 'w') as stream:
                 json.dump({'scenes': results}, stream, indent=1)
@@ -67,17 +89,41 @@ def main():
         sys.exit('./run bench scenes: %s' % error)
 
 
-def _run(path, yolov5, every):
-    """Run and print one scene with each detector."""
+def _parser():
+    parser = argparse.ArgumentParser(prog='./run bench scenes', description=__doc__)
+    parser.add_argument('scenarios', nargs='+', help='scenario files')
+    parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, it is left out')
+    parser.add_argument('--error-model', metavar='FILE', help='error model for the boxes of the detector `exact`, as '
+                        'simulation.launch has one (default of ./run: that of the simulated camera)')
+    parser.add_argument('--every', type=int, metavar='N',
+                        help='use one image of N (default: %s)' % ', '.join('%s %d' % item for item in EVERY.items()))
+    parser.add_argument('--json', metavar='FILE', help='also write the scores there')
+    return parser
+
+
+def _run(path, yolov5, error_model, every):
+    """Run and print one scene with each detector. Only the boxes of `exact` pass through the error model."""
     name, simulator, results = os.path.basename(path).replace('.yaml', ''), Simulator(read_scenario(path)), []
-    for detector, detect in (('depth', depth_detector(simulator)), ('yolov5', yolov5)):
+    every = EVERY if every is None else dict.fromkeys(EVERY, every)
+    for detector, detect, model in (('depth', depth_detector(simulator), None), ('yolov5', yolov5, None),
+                                    ('exact', exact_detector(simulator), error_model)):
         if detect is not None:
-            result = dict(result_of(run_scene(simulator, detect, every), detector), scene=name)
-            lengths = ['%.3f m' % result[key] if result[key] is not None else '-' for key in ('rmse_m', 'worst_m')]
-            print(COLUMNS % (name, detector, result['images'], '%.3f' % result['recall'],
-                             '%.3f' % result['false_boxes'], result['id_switches'], lengths[0], lengths[1]), flush=True)
-            results.append(result)
+            steps = run_scene(simulator, detect, every[detector], error_model=model)
+            results.append(dict(result_of(steps, detector, simulator.camera), scene=name))
+            print(COLUMNS % _row(results[-1]), flush=True)
     return results
+
+
+def _row(result):
+    """The values of a result as they are printed."""
+    texts = [result['scene'], result['detector'], result['images'], '%.3f' % result['recall'],
+             '%.3f' % result['false_boxes'], result['id_switches']]
+    texts += [_text(result[key], 'm') for key in ('rmse_m', 'worst_m')] + [result['track_ids'], result['not_visible']]
+    return tuple(texts + [_text(result['velocity_rmse_mps'], 'm/s'), _text(result['prediction_1s_m'], 'm')])
+
+
+def _text(value, unit):
+    return '-' if value is None else '%.3f %s' % (value, unit)
 
 
 if __name__ == '__main__':

@@ -5,7 +5,8 @@ from typing import List, NamedTuple
 import numpy as np
 
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.estimation import DepthImage, estimate_boxes, estimator_named
+from ros_3d_bb.error_model import corrected_boxes
+from ros_3d_bb.estimation import DepthImage, estimate_boxes, estimator_named, is_plausible
 from ros_3d_bb.evaluation.identities import Moment
 from ros_3d_bb.geometry import transform_points
 from ros_3d_bb.simulation.simulator import Frame
@@ -58,7 +59,7 @@ class DetectionScore(NamedTuple):
         return self.false / float(max(1, self.images))
 
 
-def look_at_scene(simulator, detect, every=1, estimator=estimator_named('foreground')):
+def look_at_scene(simulator, detect, every=1, estimator=estimator_named('foreground'), error_model=None):
     """Render a scene and find the people in it, image by image.
 
     Parameters
@@ -69,6 +70,8 @@ def look_at_scene(simulator, detect, every=1, estimator=estimator_named('foregro
     every : int
         Use one image of so many.
     estimator : Estimator
+    error_model : ErrorModel, optional
+        Corrects the 3D boxes and gives their covariance, as in bbox3d_node.
 
     Yields
     ------
@@ -79,8 +82,8 @@ def look_at_scene(simulator, detect, every=1, estimator=estimator_named('foregro
         boxes = np.asarray(detect(frame), float).reshape(-1, 4)
         stamp_ns = int(round(frame.time_s * NS))
         yield SceneImage(stamp_ns, frame._replace(color=None, depth_mm=None), boxes,
-                         _detections(frame, boxes, simulator.camera, estimator), _view(frame, simulator.camera),
-                         truth_at(simulator, frame, stamp_ns))
+                         _detections(frame, boxes, simulator.camera, estimator, error_model),
+                         _view(frame, simulator.camera), truth_at(simulator, frame, stamp_ns))
 
 
 def track_scene(images, trackers):
@@ -93,17 +96,20 @@ def track_scene(images, trackers):
     return steps
 
 
-def run_scene(simulator, detect, every=1, estimator=estimator_named('foreground')):
+def run_scene(simulator, detect, every=1, estimator=estimator_named('foreground'), error_model=None):
     """Run the pipeline on a scene: `look_at_scene`, and `track_scene` with our tracker. Returns a list of Step."""
-    steps, = track_scene(look_at_scene(simulator, detect, every, estimator), [Tracker()])
+    steps, = track_scene(look_at_scene(simulator, detect, every, estimator, error_model), [Tracker()])
     return steps
 
 
-def _detections(frame, boxes, camera, estimator):
+def _detections(frame, boxes, camera, estimator, error_model):
     """The 2D boxes as bbox3d_node and tracker_node take them: 3D boxes, in the map."""
     rects_px = [tuple(rect) for rect in np.rint(boxes).astype(int).tolist() if rect[0] < rect[2] and rect[1] < rect[3]]
-    found = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, camera, estimator)
-    return [detection_from_box(box, frame.poses.map_from_camera) for box in found if box is not None]
+    estimated = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, camera, estimator)
+    found = [box for box in estimated if box is not None and is_plausible(box)]
+    if error_model is not None:
+        found = corrected_boxes(found, error_model)
+    return [detection_from_box(box, frame.poses.map_from_camera) for box in found]
 
 
 def _view(frame, camera):

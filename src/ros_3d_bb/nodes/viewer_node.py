@@ -12,7 +12,7 @@ from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
 from ros_3d_bb.images import depth_from, rgb_from
 from ros_3d_bb.messages import (BOXES3D_TOPIC, boxes2d_from_message, boxes3d_from_message, camera_from_message,
-                                stamp_of, time_from)
+                                stamp_of, time_from, usable_boxes3d)
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.label import Label
@@ -125,7 +125,9 @@ class ViewerNode(object):
 
     def _on_boxes3d(self, message):
         with self._diagnostics.taking('3D boxes'), self._lock:
-            self._snapshots.add_boxes3d(stamp_of(message), arrival_clock_ns(), boxes3d_from_message(message))
+            usable, faults = usable_boxes3d(message)
+            self._diagnostics.leave_out('3D boxes', faults)
+            self._snapshots.add_boxes3d(stamp_of(message), arrival_clock_ns(), boxes3d_from_message(usable))
             self._is_said = False
 
     def _note(self, topic, lost):

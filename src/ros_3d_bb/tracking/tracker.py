@@ -21,7 +21,8 @@ from ros_3d_bb.tracking.unseen import SEEN, Look, carried, miss, others_of, sigm
 
 TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
                   ('size_m', float, 3), ('end_hits', int, 2), ('sightings', int), ('first_ns', np.int64),
-                  ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float), ('status', int), ('confirmed', bool), ('moving', bool)])
+                  ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float), ('status', int),
+                  ('confirmed', bool), ('moving', bool)])
 LATEST_NS = NS // 2  # images that come later than others by more are refused
 KNOWN_NS = 60 * NS  # a camera that sent nothing for longer, while others did, is a new one
 MOST_SKIPPED = 1000  # where no camera has an answer; the newest ones count

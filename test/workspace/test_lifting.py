@@ -1,0 +1,66 @@
+"""From 2D boxes and depth to 3D boxes, without a master: what one wrong box does to the others of its image."""
+import numpy as np
+import pytest
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
+
+from ros_3d_bb.images import fill_image
+from ros_3d_bb.lifting import Bbox3dParams, Lifter
+from ros_3d_bb.messages import boxes2d_to_message, boxes3d_to_message, time_from, usable_boxes3d
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tally import Tally
+
+HEADER = Header(stamp=time_from(1000 * NS), frame_id='camera')
+INTRINSICS = [614.7, 0, 319.2, 0, 614.8, 242.1, 0, 0, 1]
+PERSON_PX, PERSON_M = (60, 150, 160, 460), 3.0
+NEAR_PX = (230, 0, 640, 480)  # right before the camera, too near for depth: it shows the wall
+
+
+@pytest.fixture
+def tally():
+    return Tally()
+
+
+def scene(wall_m, person_m=PERSON_M):
+    """Depth (480, 640), metres: a person before a wall."""
+    depth_m = np.full((480, 640), wall_m, np.float32)
+    x1, y1, x2, y2 = PERSON_PX
+    depth_m[y1:y2, x1:x2] = person_m
+    return depth_m
+
+
+def lift(depth_m, rects_px, tally, estimator='foreground'):
+    """The 3D boxes of an image."""
+    lifter = Lifter(Bbox3dParams(estimator=estimator), tally)
+    lifter.add_camera_info(CameraInfo(header=HEADER, width=640, height=480, K=INTRINSICS), 0)
+    lifter.add_depth(fill_image(Image(header=HEADER), depth_m, '32FC1'), 0)
+    lifted, = lifter.add_boxes(boxes2d_to_message(np.array(rects_px), HEADER), 0)
+    return lifted
+
+
+@pytest.mark.parametrize('estimator', ['foreground', 'median'])
+def test_a_box_larger_than_anything_tracked_is_dropped_and_the_other_is_lifted(estimator, tally):
+    depth_m = scene(wall_m=14.0)
+    depth_m[:, 230:][np.random.RandomState(0).rand(480, 410) > 0.2] = 0  # too near to be measured
+    lifted = lift(depth_m, [PERSON_PX, NEAR_PX], tally, estimator)
+    box, = lifted.boxes
+    assert box.rect_px == PERSON_PX and box.center_m[2] == pytest.approx(PERSON_M, abs=0.1)
+    assert tally.counts['boxes of impossible size'] == 1
+    assert tally.counts['boxes lifted'] == 1 and tally.counts['boxes without depth'] == 0
+    _usable, faults = usable_boxes3d(boxes3d_to_message(lifted.boxes, lifted.header, lifted.camera))
+    assert not faults
+
+
+def test_a_box_that_is_dropped_takes_no_depth_from_the_others(tally):
+    """The person stands 0.2 m before the wall that fills the large box: in its layer of depth."""
+    lifted = lift(scene(wall_m=14.0, person_m=13.8), [(0, 0, 640, 480), PERSON_PX], tally)
+    box, = lifted.boxes
+    assert box.rect_px == PERSON_PX and tally.counts['boxes of impossible size'] == 1
+
+
+def test_the_size_of_boxes_of_any_pixels_is_checked(tally):
+    lifted = lift(scene(wall_m=5.0), [(-2 ** 31, -2 ** 31, 2 ** 31 - 1, 2 ** 31 - 1), (5, 5, 5, 9), PERSON_PX], tally,
+                  'median')
+    box, = lifted.boxes
+    assert box.rect_px == PERSON_PX
+    assert tally.counts['boxes of impossible size'] == 1 and tally.counts['boxes refused'] == 1
