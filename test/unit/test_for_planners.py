@@ -85,3 +85,21 @@ def test_tracks_that_no_planner_should_see_are_named(changed):
     check_tracks([track_at([0, 0, 1], [1, 0, 0])])
     with pytest.raises(ValueError, match='track 7 has p'):
         check_tracks([track_at([0, 0, 1], [1, 0, 0], number=7)._replace(**changed)])
+
+
+STANDS = track_at([3, 0, 0.85], [0.19, 0, 0], np.empty((0, 3)), moving=False)  # 0.19 m/s: noise of one who stands
+
+
+@given(st.floats(0, 10))
+def test_who_stands_stays_where_nothing_is_predicted(ahead_s):
+    assert (position_after(STANDS, ahead_s) == [3, 0, 0.85]).all()
+    later, = predicted_to([STANDS], ahead_s)
+    assert (later.position_m == [3, 0, 0.85]).all() and not later.velocity_mps.any()
+    beyond = STANDS._replace(prediction_m=np.array([[3.02, 0, 0.85]]))
+    assert position_after(beyond, STEP_S + ahead_s)[0] == pytest.approx(3.02, abs=1e-12)
+
+
+def test_who_stands_covers_no_ground_ahead():
+    assert footprint_points([STANDS], 0.5, 0.05)[:, 0].max() == pytest.approx(3.25)
+    walks = STANDS._replace(moving=True)
+    assert footprint_points([walks], 0.5, 0.05)[:, 0].max() == pytest.approx(3.25 + 0.5 * 0.19)

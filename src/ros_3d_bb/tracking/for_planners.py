@@ -26,8 +26,16 @@ def check_tracks(tracks):
                              % (track.id, track.prediction_step_s))
 
 
+def walking_velocity(track):
+    """The velocity (3,) of a track that moves; zero of one that does not: the rest is noise, and planners would take it
+    for a person who walks off.
+    """
+    return track.velocity_mps if track.moving else np.zeros(3)
+
+
 def position_after(track, ahead_s):
-    """Where a track will be, as its tracker predicts: straight between the predicted positions, and beyond the last.
+    """Where a track will be, as its tracker predicts: straight between the predicted positions, and beyond the last
+    with its `walking_velocity`.
 
     Parameters
     ----------
@@ -43,18 +51,13 @@ def position_after(track, ahead_s):
     times_s = track.prediction_step_s * np.arange(len(track.prediction_m) + 1)
     known_m = np.vstack((track.position_m, track.prediction_m))
     position_m = np.stack([np.interp(ahead_s, times_s, axis_m) for axis_m in known_m.T], axis=-1)
-    return position_m + np.maximum(ahead_s - times_s[-1], 0)[..., np.newaxis] * track.velocity_mps
+    return position_m + np.maximum(ahead_s - times_s[-1], 0)[..., np.newaxis] * walking_velocity(track)
 
 
 def predicted_to(tracks, ahead_s):
-    """The tracks some seconds later (see `position_after`), without their predictions.
-
-    Those who are not `moving` have no velocity: what is left of it is noise, and planners would take it for a person
-    who walks off.
-    """
-    return [track._replace(position_m=position_after(track, ahead_s), prediction_m=np.empty((0, 3)),
-                           prediction_covariance_m2=None,
-                           velocity_mps=track.velocity_mps if track.moving else np.zeros(3)) for track in tracks]
+    """The tracks some seconds later (see `position_after`) with their `walking_velocity`, without their predictions."""
+    return [track._replace(position_m=position_after(track, ahead_s), velocity_mps=walking_velocity(track),
+                           prediction_m=np.empty((0, 3)), prediction_covariance_m2=None) for track in tracks]
 
 
 def in_frame(tracks, b_from_a):
