@@ -15,7 +15,7 @@ from ros_3d_bb.nodes.transforms import Transforms
 from ros_3d_bb.nodes.transport import subscribe
 from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tracking.for_planners import check_tracks, in_frame, predicted_to
+from ros_3d_bb.tracking.for_planners import in_frame, predicted_to, usable_tracks
 
 
 class PlannerBridgeParams(NamedTuple):
@@ -117,8 +117,9 @@ class PlannerBridgeNode(object):
                              'use_sim_time' % ((now_ns - stamp_ns) / NS, self._params.timeout))
         if self._news is not None and stamp_ns < self._news.stamp_ns:
             self._transforms.go_back()
-        tracks = tracks_from_message(message)
-        check_tracks(tracks)
+        tracks, faults = usable_tracks(tracks_from_message(message))
+        for fault in faults:
+            self._diagnostics.warn('broken tracks', '%s; planners do not get it' % fault)
         return News(stamp_ns, now_ns, message.header.frame_id, tracks, self._planner_from_tracks(message.header))
 
     def _planner_frame(self, tracks_frame):

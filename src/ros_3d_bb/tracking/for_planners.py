@@ -10,20 +10,33 @@ SWATH_STEP_S = 0.1  # a person at 3 m/s is 0.3 m further on, less than a body is
 LOWEST, HIGHEST = 0.25, 0.75  # of a cylinder's height: well off the floor, and below 2 m, where costmaps stop looking
 
 
-def check_tracks(tracks):
-    """Raise ValueError where a track has a number that is not finite or absurdly large, or a size or step that is not
-    positive.
+def usable_tracks(tracks):
+    """Separate the tracks that planners can read from broken ones, so that one of those takes no others with it.
+
+    Returns
+    -------
+    usable : list of tracked.TrackedObject
+    faults : list of str
+        For each other track, what is wrong with it.
     """
-    for track in tracks:
-        values = np.concatenate([track.position_m, track.velocity_mps, track.size_m, track.prediction_m.ravel()])
-        if not ((np.abs(values) < FARTHEST_M).all() and (0 < track.size_m).all() and (track.size_m < LARGEST_M).all()):
-            shown = tuple(np.asarray(value).tolist() for value in (track.position_m, track.velocity_mps, track.size_m,
-                                                                   track.prediction_m))
-            raise ValueError('track %d has position %s, velocity %s, size %s and prediction %s; finite numbers and a '
-                             'size of more than 0 and less than 10 m expected' % ((track.id,) + shown))
-        if len(track.prediction_m) and not track.prediction_step_s > 0:
-            raise ValueError('track %d has predictions in steps of %g s; a positive step expected'
-                             % (track.id, track.prediction_step_s))
+    faults = [_fault_of(track) for track in tracks]
+    return [track for track, fault in zip(tracks, faults) if not fault], [fault for fault in faults if fault]
+
+
+def _fault_of(track):
+    """What is wrong with a track: a number that is not finite or absurdly large, a size or step that is not positive."""
+    values = np.concatenate([track.position_m, track.velocity_mps, track.size_m, track.prediction_m.ravel()])
+    if not ((np.abs(values) < FARTHEST_M).all() and (0 < track.size_m).all() and (track.size_m < LARGEST_M).all()):
+        shown = tuple(np.asarray(value).tolist() for value in (track.position_m, track.velocity_mps, track.size_m,
+                                                               track.prediction_m))
+        return ('track %d has position %s, velocity %s, size %s and prediction %s; finite numbers and a size of more '
+                'than 0 and less than 10 m expected' % ((track.id,) + shown))
+    if track.covariance is not None and not (np.abs(track.covariance) < FARTHEST_M).all():
+        return 'track %d has a covariance that is not finite' % track.id
+    if len(track.prediction_m) and not track.prediction_step_s > 0:
+        return ('track %d has predictions in steps of %g s; a positive step expected'
+                % (track.id, track.prediction_step_s))
+    return ''
 
 
 def walking_velocity(track):
