@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from ros_3d_bb.geometry import transform_from
 from ros_3d_bb.tracking.for_planners import (disc_points, footprint_points, in_frame, position_after, predicted_to,
-                                             ring_points, usable_tracks)
+                                             ring_points, rounding_m, usable_tracks)
 from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
 
 STEP_S = 0.25
@@ -134,7 +134,7 @@ def walked_to(track, ahead_s):
         left_s = max(left_s - track.prediction_step_s, 0.0)
         if share < 1:
             return here
-    return [start + (left_s * speed if track.moving else 0.0) for start, speed in zip(here, track.velocity_mps.tolist())]
+    return [start + left_s * speed * track.moving for start, speed in zip(here, track.velocity_mps.tolist())]
 
 
 @given(random_tracks(), st.floats(0, 15))
@@ -175,3 +175,16 @@ def test_a_change_of_frame_keeps_distances_and_speeds_on_large_maps(track, yaw, 
     np.testing.assert_allclose(there.position_m - here.position_m, expected, rtol=0, atol=1e-6)
     assert np.linalg.norm(here.velocity_mps) == pytest.approx(
         np.linalg.norm(track.velocity_mps) if track.moving else 0, abs=1e-9)
+
+
+@given(coordinates, coordinates)
+def test_rounding_is_the_most_that_float32_is_off(x, y):
+    """Of all places with such coordinates; the one given is off by no more."""
+    most_m = rounding_m([track_at([x, y, 0.9], [0, 0, 0])], np.eye(4))
+    assert np.abs(np.array([x, y]) - np.float32([x, y]).astype(float)).max() <= most_m
+
+
+def test_rounding_is_a_quarter_of_a_metre_in_utm_coordinates_and_none_near_the_robot():
+    track = track_at([448262.3, 5411933.2, 0.9], [0, 0, 0])
+    assert rounding_m([track], np.eye(4)) == 0.25 and rounding_m([], np.eye(4)) < 1e-6
+    assert rounding_m([track], transform_from((-448260, -5411930, 0), (0, 0, 0, 1))) < 1e-6

@@ -4,9 +4,11 @@ Positions and velocities as in `tracked.TrackedObject`; points are (n, 3), metre
 """
 import numpy as np
 
+from ros_3d_bb.geometry import transform_points
 from ros_3d_bb.tracking.tracked import FARTHEST_M, LARGEST_M
 
 SWATH_STEP_S = 0.1  # a person at 3 m/s is 0.3 m further on, less than a body is wide: the footprints overlap
+SAME_FRAME = np.eye(4)
 LOWEST, HIGHEST = 0.25, 0.75  # of a cylinder's height: well off the floor, and below 2 m, where costmaps stop looking
 
 
@@ -24,7 +26,7 @@ def usable_tracks(tracks):
 
 
 def _fault_of(track):
-    """What is wrong with a track: a number that is not finite or absurdly large, a size or step that is not positive."""
+    """What is wrong with a track: a number is not finite or absurdly large, a size or step is not positive; else ''."""
     values = np.concatenate([track.position_m, track.velocity_mps, track.size_m, track.prediction_m.ravel()])
     if not ((np.abs(values) < FARTHEST_M).all() and (0 < track.size_m).all() and (track.size_m < LARGEST_M).all()):
         shown = tuple(np.asarray(value).tolist() for value in (track.position_m, track.velocity_mps, track.size_m,
@@ -82,10 +84,16 @@ def in_frame(tracks, b_from_a):
     b_from_a : numpy.ndarray, (4, 4)
         Both frames have z up.
     """
-    return [track._replace(position_m=b_from_a[:3, :3].dot(track.position_m) + b_from_a[:3, 3],
+    return [track._replace(position_m=transform_points(b_from_a, track.position_m),
                            velocity_mps=b_from_a[:3, :3].dot(track.velocity_mps),
                            covariance=_turned(track.covariance, b_from_a[:3, :3]),
                            prediction_m=np.empty((0, 3)), prediction_covariance_m2=None) for track in tracks]
+
+
+def rounding_m(tracks, b_from_a):
+    """By how much the coordinates in frame b of tracks of frame a may be off as float32, metres."""
+    farthest_m = max([np.abs(transform_points(b_from_a, track.position_m)).max() for track in tracks], default=0.0)
+    return float(np.spacing(np.float32(farthest_m))) / 2
 
 
 def _turned(covariance, rotation):
