@@ -7,6 +7,8 @@ import genpy
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseWithCovariance, TransformStamped
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
@@ -65,7 +67,8 @@ class Bridge(object):
 @contextlib.contextmanager
 def bridge_with(outputs, **params):
     stand_ins = {optional + '.msg': package(optional) for optional in PACKAGES}
-    with mock.patch.dict(sys.modules, stand_ins), masterless(dict(params, outputs=outputs, tf_timeout=0.0)) as found:
+    with mock.patch.dict(sys.modules, stand_ins), mock.patch('threading.Thread.start'), \
+            masterless(dict(params, outputs=outputs, tf_timeout=0.0)) as found:
         yield Bridge(found)
 
 
@@ -172,3 +175,30 @@ def test_obstacles_of_a_large_map_are_warned_of_unless_the_planner_has_a_frame_n
         bridge.send_tf(START_NS, 'odom', (448262.0, 5411933.0, 0))
         bridge.send(START_NS, person(1, 448265.0, 5411934.0))
         assert ('coordinates rounded' in bridge.counts) == counted and bridge.count(TEB) == 1
+
+
+STEPS = st.lists(st.tuples(st.sampled_from(['tracks', 'tick']), st.floats(-1.5, 1.5), st.floats(-1.5, 1.5)),
+                 min_size=1, max_size=25)
+
+
+@given(STEPS)
+@settings(deadline=None, max_examples=60)
+def test_planners_keep_people_for_as_long_as_their_tracks_are_of_now_whatever_the_clock_does(steps):
+    """Against a model: the clock jumps by any time, and tracks carry stamps of the past and of the future."""
+    with bridge_with('people') as bridge:
+        arrival_ns = stamp_ns = shown_m = None
+        for what, jump_s, off_s in steps:
+            bridge.tell(bridge.now_ns + int(jump_s * NS))
+            now_ns, off_ns = bridge.now_ns, int(off_s * NS)
+            if what == 'tracks':
+                bridge.send(now_ns + off_ns, person(1, 0, 0))
+                if abs(off_ns) <= NS:
+                    arrival_ns, stamp_ns, shown_m = now_ns, now_ns + off_ns, max(-off_ns, 0) / NS
+            else:
+                bridge.tick()
+                if arrival_ns is not None and not 0 <= now_ns - arrival_ns <= NS:
+                    arrival_ns = shown_m = None
+                elif arrival_ns is not None and now_ns - arrival_ns >= NS // 10:
+                    shown_m = max(now_ns - stamp_ns, 0) / NS
+            found = bridge.newest(PEOPLE)[1] if bridge.count(PEOPLE) else []
+            assert [place.position.x for place in found] == ([] if shown_m is None else [pytest.approx(shown_m)])
