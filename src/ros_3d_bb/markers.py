@@ -45,8 +45,18 @@ class MarkerParams(NamedTuple):
     marker_lifetime: float = 2.0
 
 
+class Walk(NamedTuple):
+    """Where a track was on the floor, oldest first: [(stamp_ns, Point relative to `anchor_m`)]."""
+
+    anchor_m: np.ndarray
+    steps: list
+
+
 class MarkerWriter(object):
     """Draws tracks, one namespace for each kind of marker and the track's id as the marker's.
+
+    Points are relative to the marker's pose, which is near: RViz moves poses in float64 and points in float32, which
+    rounds to half a metre on a map in UTM coordinates.
 
     A marker is replaced in place while its track lives and deleted when it ends; where no news comes at all, RViz
     removes it after the lifetime (0: never).
@@ -59,7 +69,7 @@ class MarkerWriter(object):
 
     def __init__(self, params=MarkerParams()):
         self._drawn = set()  # (namespace, id)
-        self._histories = {}  # id: [(stamp_ns, Point)], oldest first
+        self._histories = {}  # id: Walk
         self.tune(params)
 
     def tune(self, params):
@@ -91,7 +101,7 @@ class MarkerWriter(object):
         for track in tracks:
             for namespace, shape in self._shapes:
                 marker = Marker(header=header, ns=namespace, id=track.id, lifetime=self._lifetime)
-                marker.pose.orientation.w = 1.0
+                marker.pose.position, marker.pose.orientation.w = Point(*track.position_m), 1.0
                 if shape(marker, track):
                     markers.append(marker)
         drawn = set((marker.ns, marker.id) for marker in markers)
@@ -103,17 +113,19 @@ class MarkerWriter(object):
     def _walked(self, track, now_ns):
         """Where a track was on the floor, and is; what is later than now is from before a jump in time."""
         oldest_ns = now_ns - int(self._params.marker_history * NS)
-        walked = [entry for entry in self._histories.get(track.id, ()) if oldest_ns <= entry[0] < now_ns]
+        foot_m = track.position_m + _to_foot(track)
+        before = self._histories.get(track.id, Walk(foot_m, []))
+        steps = [step for step in before.steps if oldest_ns <= step[0] < now_ns]
         spacing_s = max(HISTORY_SPACING_S, self._params.marker_history / HISTORY_POINTS)
-        if len(walked) > 1 and walked[-1][0] - walked[-2][0] < spacing_s * NS:
-            walked.pop()
-        return walked + [(now_ns, Point(*_foot(track)))]
+        if len(steps) > 1 and steps[-1][0] - steps[-2][0] < spacing_s * NS:
+            steps.pop()
+        anchor_m = before.anchor_m if steps else foot_m
+        return Walk(anchor_m, steps + [(now_ns, Point(*(foot_m - anchor_m)))])
 
     # Each shape fills in a marker and says whether there is anything to draw.
 
     def _cylinder(self, marker, track):
         marker.type, marker.color = Marker.CYLINDER, _color(self._rgb(track), 0.65 if _seen(track) else 0.2)
-        marker.pose.position = Point(*track.position_m)
         marker.scale.x, marker.scale.y, marker.scale.z = track.size_m
         return True
 
@@ -125,29 +137,28 @@ class MarkerWriter(object):
         return True
 
     def _velocity(self, marker, track):
-        end_m = track.position_m + VELOCITY_SHOWN_S * track.instant_velocity_mps
-        return _fill_arrow(marker, track, end_m, RED, VELOCITY_WIDTHS_M)
+        return _fill_arrow(marker, track, VELOCITY_SHOWN_S * track.instant_velocity_mps, RED, VELOCITY_WIDTHS_M)
 
     def _prediction(self, marker, track):
-        end_m = track.prediction_m[-1] if len(track.prediction_m) else track.position_m
-        return _fill_arrow(marker, track, end_m, GREEN, PREDICTION_WIDTHS_M)
+        way_m = track.prediction_m[-1] - track.position_m if len(track.prediction_m) else np.zeros(3)
+        return _fill_arrow(marker, track, way_m, GREEN, PREDICTION_WIDTHS_M)
 
     def _history(self, marker, track):
-        walked = self._histories[track.id]
-        if len(walked) < 2:
+        anchor_m, steps = self._histories[track.id]
+        if len(steps) < 2:
             return False
-        marker.type, marker.scale.x = Marker.LINE_STRIP, 0.05
-        rgb, now_ns, fading = self._rgb(track), walked[-1][0], 0.85 / (self._params.marker_history * NS)
+        marker.type, marker.scale.x, marker.pose.position = Marker.LINE_STRIP, 0.05, Point(*anchor_m)
+        rgb, now_ns, fading = self._rgb(track), steps[-1][0], 0.85 / (self._params.marker_history * NS)
         marker.color = _color(rgb, 0.9)  # not 1: RViz would draw the whole line opaque
-        marker.points = [point for _stamp_ns, point in walked]
-        marker.colors = [_color(rgb, round(0.9 - fading * (now_ns - stamp_ns), 2)) for stamp_ns, _point in walked]
+        marker.points = [point for _stamp_ns, point in steps]
+        marker.colors = [_color(rgb, round(0.9 - fading * (now_ns - stamp_ns), 2)) for stamp_ns, _point in steps]
         return True
 
     def _ellipse(self, marker, track):
         if track.covariance is None:
             return False
         marker.type, marker.scale.x, marker.color = Marker.LINE_STRIP, 0.03, _color(self._rgb(track), 0.9)
-        marker.points, = _ellipses(track.covariance[np.newaxis, :2, :2], _foot(track)[np.newaxis])
+        marker.points, = _ellipses(track.covariance[np.newaxis, :2, :2], _to_foot(track)[np.newaxis])
         return True
 
     def _prediction_ellipses(self, marker, track):
@@ -155,7 +166,7 @@ class MarkerWriter(object):
             return False
         stride = max(int(round(ELLIPSES_EVERY_S / track.prediction_step_s)), 1)
         shown = np.s_[stride - 1::stride]
-        feet_m = track.prediction_m[shown] - track.position_m + _foot(track)
+        feet_m = track.prediction_m[shown] - track.position_m + _to_foot(track)
         marker.type, marker.scale.x, marker.color = Marker.LINE_LIST, 0.015, _color(GREEN, 0.6)
         for outline in _ellipses(track.prediction_covariance_m2[shown, :2, :2], feet_m):
             marker.points += [point for ends in zip(outline, outline[1:]) for point in ends]
@@ -180,17 +191,17 @@ def _seen(track):
     return track.status == VISIBLE
 
 
-def _foot(track):
-    """Where a track stands, just above the floor."""
-    return track.position_m - [0, 0, track.size_m[2] / 2 - ABOVE_FLOOR_M]
+def _to_foot(track):
+    """From a track's centre to where it stands, just above the floor."""
+    return np.array([0, 0, ABOVE_FLOOR_M - track.size_m[2] / 2])
 
 
-def _fill_arrow(marker, track, end_m, rgb, widths_m):
-    """From the centre of the object to `end_m`."""
+def _fill_arrow(marker, track, way_m, rgb, widths_m):
+    """From the centre of the object, where the marker's pose is, along `way_m`."""
     marker.type, marker.color = Marker.ARROW, _color(rgb, 1.0 if _seen(track) else 0.4)
-    marker.points = [Point(*track.position_m), Point(*end_m)]
+    marker.points = [Point(), Point(*way_m)]
     marker.scale.x, marker.scale.y = widths_m
-    return np.linalg.norm(end_m - track.position_m) >= SHORTEST_ARROW_M
+    return np.linalg.norm(way_m) >= SHORTEST_ARROW_M
 
 
 def _ellipses(covariances_m2, centers_m):

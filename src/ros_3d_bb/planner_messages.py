@@ -20,11 +20,12 @@ def people_to_message(tracks, header, people_msgs):
     return people_msgs.People(header=header, people=[people_msgs.Person(
         name=str(track.id), position=Point(*track.position_m), velocity=Point(*track.velocity_mps),
         reliability=_reliability(track), tagnames=['status', 'width', 'height'],
-        tags=[STATUS_NAMES[track.status], '%.2f' % track.size_m[0], '%.2f' % track.size_m[2]]) for track in tracks])
+        tags=[STATUS_NAMES.get(track.status, 'unknown'), '%.2f' % track.size_m[0], '%.2f' % track.size_m[2]])
+        for track in tracks])
 
 
 def obstacles_to_message(tracks, header, costmap_converter):
-    """costmap_converter/ObstacleArrayMsg: one point and a radius are a circle."""
+    """costmap_converter/ObstacleArrayMsg: one point, float32, and a radius are a circle."""
     obstacles = []
     for track in tracks_to_message(tracks, header).objects:
         obstacle = costmap_converter.ObstacleMsg(header=header, id=track.id, radius=track.size.x / 2,

@@ -33,7 +33,7 @@ from ros_3d_bb.process_bag import read_params
 from ros_3d_bb.searching import DepthDetectorParams, Yolov5NodeParams
 from ros_3d_bb.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tracking.for_planners import check_tracks, footprint_points, in_frame, predicted_to
+from ros_3d_bb.tracking.for_planners import footprint_points, in_frame, predicted_to, usable_tracks
 from ros_3d_bb_annotator import legacy
 from ros_3d_bb_annotator.lengths import parse_length
 from support.masterless import on_the_wire
@@ -81,11 +81,12 @@ def _detections(source, _folder):
 
 
 def _tracks(source, _folder):
-    tracks = tracks_from_message(hostile.tracks(source, NOW_NS))
-    check_tracks(tracks)
+    tracks, faults = usable_tracks(tracks_from_message(hostile.tracks(source, NOW_NS)))
     header = source.header(NOW_NS)
     on_the_wire(tracks_to_message(in_frame(predicted_to(tracks, abs(source.gauss(0, 1))), FROM_CAMERA), header))
     on_the_wire(points_to_message(footprint_points(tracks, 0.5, 0.05), header))
+    if faults:
+        raise ValueError(faults[0])
 
 
 def _estimates(source, _folder):

@@ -8,9 +8,11 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 import rospy
 from geometry_msgs.msg import PoseWithCovariance, TransformStamped
+from sensor_msgs import point_cloud2
 from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
@@ -33,7 +35,9 @@ def now_ns():
 
 
 class Rig(object):
-    """A tracker, and a localisation that knows odom_from_map: a quarter turn to the left, 10 m along x."""
+    """A tracker, and a localisation that knows odom_from_map: a quarter turn to the left, 10 m along x. The robot is at
+    (5, 1) of odom and looks along its x.
+    """
 
     def __init__(self):
         self.tracks = publisher('ros_3d_bb/tracks', TrackedObjectArray)
@@ -43,7 +47,9 @@ class Rig(object):
         transform = TransformStamped(header=header_at(stamp_ns, 'odom'), child_frame_id='map')
         transform.transform.translation.x = 10.0
         transform.transform.rotation.z = transform.transform.rotation.w = 0.5 ** 0.5
-        self.tf.publish(TFMessage([transform]))
+        robot = TransformStamped(header=header_at(stamp_ns, 'odom'), child_frame_id='base_link')
+        robot.transform.translation.x, robot.transform.translation.y, robot.transform.rotation.w = 5.0, 1.0, 1.0
+        self.tf.publish(TFMessage([transform, robot]))
 
     def send(self, stamp_ns, *positions, **options):
         """People at positions of the map who walk along its x; number 1 is the first."""
@@ -88,15 +94,24 @@ def people_in(name, message):
     return content if isinstance(content, int) else len(content)
 
 
-def test_outputs_of_the_image_carry_its_stamp_and_frame(rig, recorders):
+def test_outputs_of_the_image_carry_its_stamp(rig, recorders):
     stamp_ns = now_ns() - LATENCY_NS
     rig.send(stamp_ns, (1.0, 2.0, 0.85))
-    for name in ('points', 'vision'):
+    for name, frame_id in (('points', 'base_link'), ('vision', 'map')):
         message, = recorders[name].wait_for(1)
-        assert message.header.frame_id == 'map' and message.header.stamp == time_from(stamp_ns)
+        assert message.header.frame_id == frame_id and message.header.stamp == time_from(stamp_ns)
         assert people_in(name, message) > 0
     place = recorders['vision'].messages[0].detections[0].bbox.center.position
     assert (place.x, place.y, place.z) == pytest.approx((1, 2, 0.85))
+
+
+def test_points_are_where_people_are_from_the_robot(rig, recorders):
+    """The person at (8, 1) of odom is 3 m ahead, and walks to the left."""
+    rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85))
+    message, = recorders['points'].wait_for(1)
+    x, y, z = np.array(list(point_cloud2.read_points(message, ('x', 'y', 'z')))).T
+    assert (x.min(), x.max(), y.min(), y.max()) == pytest.approx((2.7, 3.3, -0.3, 0.3 + 0.5 * SPEED_MPS), abs=0.01)
+    assert (z.min(), z.max()) == pytest.approx((0.425, 1.275), abs=1e-5)
 
 
 def test_outputs_for_now_carry_the_time_that_they_are_predicted_to(rig, recorders):
@@ -135,7 +150,7 @@ def test_what_planners_keep_is_sent_again_further_on_and_then_emptied_once(rig, 
     assert len(positions) > 3 and positions == sorted(positions)
     assert positions[-1] - positions[0] == pytest.approx(SPEED_MPS * (stamps[-1] - stamps[0]), abs=1e-6)
     assert {name: recorder.messages[-1].header.frame_id for name, recorder in recorders.items()} == {
-        'points': 'map', 'people': 'map', 'teb': 'odom', 'mpc': 'odom', 'vision': 'map'}
+        'points': 'base_link', 'people': 'map', 'teb': 'odom', 'mpc': 'odom', 'vision': 'map'}
     time.sleep(0.5)
     assert counts == {name: len(recorder.messages) for name, recorder in recorders.items()}
     level, sentence, _counts = diagnostics_of('planner_bridge_node')
@@ -161,26 +176,25 @@ def test_the_costmap_is_cleared_around_the_robot_at_the_stamp_of_the_tracks(rig,
 
 
 def test_without_transform_the_planner_keeps_nobody_and_the_others_go_on(rig, recorders):
-    """No transform for 2 s, after one that was there: TEB's array is emptied while tracks come."""
+    """No transform for 2 s, after one that was there: TEB's array and the points are emptied while tracks come."""
     rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85))
     recorders['teb'].wait_for(1)
     for _again in range(8):
         rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85), tf=False)
         time.sleep(0.25)
-    assert people_in('teb', recorders['teb'].messages[-1]) == 0
+    assert people_in('teb', recorders['teb'].messages[-1]) == people_in('points', recorders['points'].messages[-1]) == 0
     assert people_in('people', recorders['people'].messages[-1]) == 1
     level, sentence, counts = diagnostics_of('planner_bridge_node')
     assert level == 1 and counts['no transform'] >= 8
 
 
-def test_tracks_that_are_too_old_or_not_finite_are_refused_and_the_next_work(rig, recorders):
+def test_tracks_that_are_too_old_are_refused_and_broken_ones_dropped(rig, recorders):
     rig.send(now_ns() - 3 * NS, (1.0, 2.0, 0.85))
-    wait_until(lambda: 'a bag needs use_sim_time' in diagnostics_of('planner_bridge_node')[1], 'the reason')
-    rig.send(now_ns() - LATENCY_NS, (float('nan'), 2.0, 0.85))
-    wait_until(lambda: 'track 1 has position [nan' in diagnostics_of('planner_bridge_node')[1], 'the reason')
+    wait_until(lambda: diagnostics_of('planner_bridge_node')[2].get('tracks refused') == 1, 'a refusal')
     assert all(recorder.messages == [] for recorder in recorders.values())
-    rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85))
-    assert people_in('people', recorders['people'].wait_for(1)[0]) == 1
+    rig.send(now_ns() - LATENCY_NS, (float('nan'), 2.0, 0.85), (1.0, 2.0, 0.85))
+    assert [person.name for person in recorders['people'].wait_for(1)[0].people] == ['2']
+    assert diagnostics_of('planner_bridge_node')[2]['broken tracks'] == 1
 
 
 def bridge(name, before, *arguments):

@@ -187,8 +187,9 @@ def test_markers_are_those_of_the_thesis_and_more(rig, markers, tracks, now):
     assert (cylinder.scale.x, cylinder.scale.y, cylinder.scale.z) == pytest.approx((0.5, 0.5, 1.7))
     assert text.type == Marker.TEXT_VIEW_FACING and text.text == str(number) and text.color.g > 0.8
     assert text.pose.position.z > cylinder.pose.position.z + cylinder.scale.z / 2
-    assert drawn['history'].points[0].x == pytest.approx(2.3, abs=0.1)  # the fourth image, when the track began
-    assert drawn['history'].points[-1].x == pytest.approx(cylinder.pose.position.x)
+    walk_x = [drawn['history'].pose.position.x + point.x for point in drawn['history'].points]
+    assert walk_x[0] == pytest.approx(2.3, abs=0.1)  # the fourth image, when the track began
+    assert walk_x[-1] == pytest.approx(cylinder.pose.position.x)
     red, green = drawn['velocity'], drawn['prediction']
     assert red.type == green.type == Marker.ARROW and red.color.r > 0.8 and green.color.g > 0.8
     assert red.points[1].x - red.points[0].x == pytest.approx(1.0, abs=0.05)

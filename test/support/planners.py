@@ -20,6 +20,12 @@ def moved(points, transform):
     return np.reshape(points, (-1, 3)).dot(transform[:3, :3].T) + transform[:3, 3]
 
 
+def moved_float32(points, transform):
+    """The same as tf2_sensor_msgs moves a cloud: matrix, points and result are float32."""
+    points = np.asarray(points, np.float32).reshape(-1, 3)
+    return points.dot(transform[:3, :3].T.astype(np.float32)) + transform[:3, 3].astype(np.float32)
+
+
 class TebReplica(object):
     """teb_local_planner (Noetic): teb_local_planner_ros.cpp and obstacles.h.
 
@@ -108,7 +114,8 @@ class SocialLayerReplica(object):
 class ObstacleLayerReplica(object):
     """costmap_2d's ObstacleLayer and ObservationBuffer with observation_persistence 0.
 
-    Each source keeps its last cloud for ever, less the points outside of the heights. At an update the rays from the
+    Each source keeps its last cloud for ever, less the points outside of the heights, which count in the costmap's
+    frame. Clouds are moved there in float32. At an update the rays from the
     sensor's origin to all points of the clearing clouds are set free, and then the points of the marking clouds that
     are in range are set lethal. What no ray meets stays as it was.
 
@@ -132,7 +139,7 @@ class ObstacleLayerReplica(object):
 
     def receive(self, name, cloud):
         points = np.array(list(point_cloud2.read_points(cloud, ('x', 'y', 'z')))).reshape(-1, 3)
-        points = moved(points, self._costmap_from[cloud.header.frame_id])
+        points = moved_float32(points, self._costmap_from[cloud.header.frame_id])
         source = self._sources[name]
         inside = (points[:, 2] >= source['min_obstacle_height']) & (points[:, 2] <= source['max_obstacle_height'])
         sensor = source['sensor_frame'] or cloud.header.frame_id
@@ -146,7 +153,7 @@ class ObstacleLayerReplica(object):
         for name, (origin, points) in self._clouds.items():
             if self._sources[name]['marking']:
                 reach_m = self._sources[name]['obstacle_range']
-                x, y = self._cell(points[np.linalg.norm(points - origin, axis=1) <= reach_m])
+                x, y = self._cell(points[np.linalg.norm(points - origin, axis=1) < reach_m])
                 inside = (x >= 0) & (x < self.cells) & (y >= 0) & (y < self.cells)
                 self.grid[y[inside], x[inside]] = LETHAL
 

@@ -1,12 +1,12 @@
 """Where people are now, in which frame, and what ground they take up; all against places known beforehand."""
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb.geometry import transform_from
-from ros_3d_bb.tracking.for_planners import (check_tracks, disc_points, footprint_points, in_frame, position_after,
-                                             predicted_to, ring_points)
+from ros_3d_bb.tracking.for_planners import (disc_points, footprint_points, in_frame, position_after, predicted_to,
+                                             ring_points, rounding_m, usable_tracks)
 from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
 
 STEP_S = 0.25
@@ -79,9 +79,112 @@ def test_a_disc_has_its_outline_and_nothing_outside(radius_m, spacing_m):
 
 
 @pytest.mark.parametrize('changed', [{'position_m': np.array([np.nan, 0, 1])}, {'velocity_mps': np.full(3, np.inf)},
-                                     {'size_m': np.array([0, 0, 1.7])}, {'prediction_m': np.full((1, 3), np.nan)},
-                                     {'prediction_step_s': 0.0}])
-def test_tracks_that_no_planner_should_see_are_named(changed):
-    check_tracks([track_at([0, 0, 1], [1, 0, 0])])
-    with pytest.raises(ValueError, match='track 7 has p'):
-        check_tracks([track_at([0, 0, 1], [1, 0, 0], number=7)._replace(**changed)])
+                                     {'size_m': np.array([0, 0, 1.7])}, {'size_m': np.array([0.5, 0.5, 10.0])},
+                                     {'prediction_m': np.full((1, 3), np.nan)}, {'prediction_step_s': 0.0},
+                                     {'covariance': np.diag([1, 1, 1, 1, 1, np.nan])}])
+def test_a_broken_track_takes_no_others_with_it(changed):
+    good = [track_at([number, 0, 1], [1, 0, 0], number=number) for number in (1, 2)]
+    broken = track_at([0, 0, 1], [1, 0, 0], number=7)._replace(**changed)
+    usable, faults = usable_tracks([good[0], broken, good[1]])
+    assert [track.id for track in usable] == [1, 2] and len(faults) == 1 and 'track 7 ' in faults[0]
+    assert usable_tracks(good)[1] == []
+
+
+STANDS = track_at([3, 0, 0.85], [0.19, 0, 0], np.empty((0, 3)), moving=False)  # 0.19 m/s: noise of one who stands
+
+
+@given(st.floats(0, 10))
+def test_who_stands_stays_where_nothing_is_predicted(ahead_s):
+    assert (position_after(STANDS, ahead_s) == [3, 0, 0.85]).all()
+    later, = predicted_to([STANDS], ahead_s)
+    assert (later.position_m == [3, 0, 0.85]).all() and not later.velocity_mps.any()
+    beyond = STANDS._replace(prediction_m=np.array([[3.02, 0, 0.85]]))
+    assert position_after(beyond, STEP_S + ahead_s)[0] == pytest.approx(3.02, abs=1e-12)
+
+
+def test_who_stands_covers_no_ground_ahead():
+    assert footprint_points([STANDS], 0.5, 0.05)[:, 0].max() == pytest.approx(3.25)
+    walks = STANDS._replace(moving=True)
+    assert footprint_points([walks], 0.5, 0.05)[:, 0].max() == pytest.approx(3.25 + 0.5 * 0.19)
+
+
+coordinates = st.floats(-1e6, 1e6)
+speeds = st.floats(-3, 3)
+
+
+@st.composite
+def random_tracks(draw):
+    """A person anywhere on a large map, with any prediction or none."""
+    steps = draw(st.integers(0, 6))
+    position_m = np.array([draw(coordinates), draw(coordinates), draw(st.floats(-2, 2))])
+    ahead_m = np.array([(draw(speeds), draw(speeds), 0.0) for _step in range(steps)]).reshape(-1, 3)
+    track = track_at(position_m, (draw(speeds), draw(speeds), 0), position_m + np.cumsum(ahead_m, axis=0),
+                     draw(st.booleans()))
+    width_m = draw(st.floats(0.1, 1.5))
+    return track._replace(prediction_step_s=draw(st.floats(0.01, 2)),
+                          size_m=np.array([width_m, width_m, draw(st.floats(0.5, 2.2))]))
+
+
+def walked_to(track, ahead_s):
+    """Where a track is some time ahead, leg by leg: apart from the code, one number at a time."""
+    here, left_s = [float(value) for value in track.position_m], ahead_s
+    for goal in track.prediction_m.tolist():
+        share = min(left_s / track.prediction_step_s, 1.0)
+        here = [start + share * (end - start) for start, end in zip(here, goal)]
+        left_s = max(left_s - track.prediction_step_s, 0.0)
+        if share < 1:
+            return here
+    return [start + left_s * speed * track.moving for start, speed in zip(here, track.velocity_mps.tolist())]
+
+
+@given(random_tracks(), st.floats(0, 15))
+def test_positions_ahead_are_those_of_a_walk_leg_by_leg(track, ahead_s):
+    np.testing.assert_allclose(position_after(track, ahead_s), walked_to(track, ahead_s), rtol=0, atol=1e-6)
+
+
+def segment_distances(points, start, end):
+    """Distances (n,) of points (n, 2) from a segment."""
+    along = end - start
+    share = np.clip((points - start).dot(along) / max(along.dot(along), 1e-12), 0, 1)
+    return np.linalg.norm(points - start - share[:, None] * along, axis=1)
+
+
+@given(random_tracks(), st.floats(0, 2))
+@settings(deadline=None, max_examples=50)
+def test_footprints_are_on_the_way_and_within_the_body(track, ahead_s):
+    """No point is farther than half a body from the way walked, or above three quarters or below one of the height."""
+    points = footprint_points([track], ahead_s, 0.1)
+    times_s = sorted({0.0, ahead_s} | {min(ahead_s, track.prediction_step_s * step) for step in range(1, 7)})
+    way = np.array([walked_to(track, time_s) for time_s in times_s])[:, :2]
+    distances = np.min([segment_distances(points[:, :2], start, end) for start, end in zip(way, way[1:])]
+                       + [np.linalg.norm(points[:, :2] - way[0], axis=1)], axis=0)
+    assert distances.max() <= track.size_m[0] / 2 + 1e-6
+    heights = (points[:, 2] - track.position_m[2]) / track.size_m[2]
+    assert heights.min() == pytest.approx(-0.25, abs=1e-6) and heights.max() == pytest.approx(0.25, abs=1e-6)
+    for place in (way[0], way[-1]):
+        assert np.linalg.norm(points[:, :2] - place, axis=1).max() >= track.size_m[0] / 2 - 1e-6
+
+
+@given(random_tracks(), st.floats(-np.pi, np.pi), coordinates, coordinates, st.floats(0, 2))
+def test_a_change_of_frame_keeps_distances_and_speeds_on_large_maps(track, yaw, x, y, ahead_s):
+    """Two people of the map are as far from each other in any other frame, now and later."""
+    b_from_a = transform_from((x, y, 0.3), (0, 0, np.sin(yaw / 2), np.cos(yaw / 2)))
+    other = track._replace(position_m=track.position_m + [2, 1, 0], prediction_m=track.prediction_m + [2, 1, 0])
+    here, there = in_frame(predicted_to([track, other], ahead_s), b_from_a)
+    expected = (2 * np.cos(yaw) - np.sin(yaw), 2 * np.sin(yaw) + np.cos(yaw), 0)
+    np.testing.assert_allclose(there.position_m - here.position_m, expected, rtol=0, atol=1e-6)
+    assert np.linalg.norm(here.velocity_mps) == pytest.approx(
+        np.linalg.norm(track.velocity_mps) if track.moving else 0, abs=1e-9)
+
+
+@given(coordinates, coordinates)
+def test_rounding_is_the_most_that_float32_is_off(x, y):
+    """Of all places with such coordinates; the one given is off by no more."""
+    most_m = rounding_m([track_at([x, y, 0.9], [0, 0, 0])], np.eye(4))
+    assert np.abs(np.array([x, y]) - np.float32([x, y]).astype(float)).max() <= most_m
+
+
+def test_rounding_is_a_quarter_of_a_metre_in_utm_coordinates_and_none_near_the_robot():
+    track = track_at([448262.3, 5411933.2, 0.9], [0, 0, 0])
+    assert rounding_m([track], np.eye(4)) == 0.25 and rounding_m([], np.eye(4)) < 1e-6
+    assert rounding_m([track], transform_from((-448260, -5411930, 0), (0, 0, 0, 1))) < 1e-6

@@ -15,7 +15,7 @@ from ros_3d_bb.messages import stamp_of
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
-from ros_3d_bb.tracking.for_planners import check_tracks
+from ros_3d_bb.tracking.for_planners import usable_tracks
 from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
 from support.masterless import masterless
 
@@ -61,8 +61,8 @@ def test_tracks_of_absurd_size_get_to_no_planner():
     """A costmap's points of a person of 1000 km would be petabytes."""
     track = TrackedObject(1, np.zeros(3), np.array([1e6, 1e6, 1.7]), np.zeros(3), np.zeros(3), VISIBLE, False, 0, 0,
                           np.zeros((0, 3)), 0.25)
-    with pytest.raises(ValueError, match='less than 10 m expected'):
-        check_tracks([track])
+    usable, faults = usable_tracks([track, track._replace(id=2, size_m=np.array([0.5, 0.5, 1.7]))])
+    assert [kept.id for kept in usable] == [2] and len(faults) == 1
 
 
 def test_edges_far_outside_the_image_are_not_walked_along(monkeypatch):

@@ -1,6 +1,8 @@
 """Markers: what each kind shows; the same ones in place while a track lives, gone when it ends."""
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
@@ -44,8 +46,12 @@ def drawn(tracks, params=ALL, times=2):
     return {(marker.ns, marker.id): marker for marker in message.markers if marker.action == Marker.ADD}
 
 
-def xyz(points):
-    return np.array([(point.x, point.y, point.z) for point in points])
+def xyz(marker):
+    """The points (n, 3) of a marker in its header's frame: they are relative to its pose, which is not turned."""
+    pose = marker.pose
+    assert (pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w) == (0, 0, 0, 1)
+    return (np.array([(point.x, point.y, point.z) for point in marker.points]).reshape(-1, 3)
+            + (pose.position.x, pose.position.y, pose.position.z))
 
 
 def rgb(color):
@@ -99,8 +105,8 @@ def test_a_track_without_prediction_is_drawn():
 def test_arrows_end_where_the_object_is_after_one_and_two_seconds():
     markers = drawn([track(1, (0.5, -1.0, 0.0))])
     for namespace, end in (('velocity', (2.5, 0.0)), ('prediction', (3.0, -1.0))):
-        start, tip = markers[namespace, 1].points
-        assert (start.x, start.y, start.z) == (2.0, 1.0, 0.9) and (tip.x, tip.y) == pytest.approx(end)
+        start, tip = xyz(markers[namespace, 1])
+        assert start.tolist() == [2.0, 1.0, 0.9] and tip[:2] == pytest.approx(end)
 
 
 def test_a_tracker_without_covariance_has_no_ellipses():
@@ -112,7 +118,7 @@ def test_a_tracker_without_covariance_has_no_ellipses():
 def test_the_ellipse_has_the_axes_and_the_direction_of_the_covariance(turn):
     """The 95 % quantile of chi squared with 2 degrees of freedom is 5.991: axes of 2.448 standard deviations."""
     ellipse = drawn([track(1, variances=(0.04, 0.01), turn=turn)])['ellipse', 1]
-    around = xyz(ellipse.points) - (2.0, 1.0, 0.05)
+    around = xyz(ellipse) - (2.0, 1.0, 0.05)
     assert ellipse.type == Marker.LINE_STRIP and ellipse.pose.orientation.w == 1.0
     assert around[0] == pytest.approx(around[-1]) and np.ptp(around[:, 2]) == 0  # closed, on the floor
     assert 0 < around[0, 2] < 0.05
@@ -125,7 +131,7 @@ def test_the_ellipse_has_the_axes_and_the_direction_of_the_covariance(turn):
 def test_the_prediction_has_an_ellipse_at_each_half_second():
     """The covariance grows with each step of 0.25 s; the outlines are closed, one after the other."""
     marker = drawn([track(1, (1.0, 0.0, 0.0), variances=(0.01, 0.01))])['prediction_ellipse', 1]
-    outlines = xyz(marker.points).reshape(4, -1, 3)
+    outlines = xyz(marker).reshape(4, -1, 3)
     assert marker.type == Marker.LINE_LIST
     for second, steps, outline in zip((0.5, 1.0, 1.5, 2.0), (2, 4, 6, 8), outlines):
         radii = np.linalg.norm(outline[:, :2] - (2.0 + second, 1.0), axis=1)
@@ -135,7 +141,7 @@ def test_the_prediction_has_an_ellipse_at_each_half_second():
 
 
 def test_an_ellipse_without_width_is_drawn_as_a_line():
-    around = xyz(drawn([track(1, variances=(0.04, 0.0))])['ellipse', 1].points)
+    around = xyz(drawn([track(1, variances=(0.04, 0.0))])['ellipse', 1])
     assert np.isfinite(around).all() and around[:, 1] == pytest.approx(np.ones(len(around)))
 
 
@@ -149,7 +155,7 @@ def walked(writer, images, period_s=0.1, start_ns=SECOND_NS, number=1):
 
 def test_the_history_is_the_way_walked_and_fades_with_age():
     history = walked(MarkerWriter(MarkerParams(marker_history=4.0)), 101)
-    points, alphas = xyz(history.points), np.array([color.a for color in history.colors])
+    points, alphas = xyz(history), np.array([color.a for color in history.colors])
     assert history.type == Marker.LINE_STRIP and history.color.a < 1  # else RViz draws it opaque
     assert (points[0, 0], points[-1, 0]) == pytest.approx((6.0, 10.0)) and points[:, 1:] == pytest.approx(
         np.tile([0.0, 0.02], (len(points), 1)))
@@ -162,8 +168,8 @@ def test_the_history_is_the_way_walked_and_fades_with_age():
 def test_the_history_is_bounded_and_always_reaches_to_the_person(rate, length_s):
     history = walked(MarkerWriter(MarkerParams(marker_history=length_s)), 30 * rate, 1.0 / rate)
     assert len(history.points) <= HISTORY_POINTS + 2
-    assert history.points[-1].x == pytest.approx(30 - 1.0 / rate)
-    assert history.points[0].x == pytest.approx(max(30 - length_s, 0), abs=0.15)
+    assert xyz(history)[-1, 0] == pytest.approx(30 - 1.0 / rate)
+    assert xyz(history)[0, 0] == pytest.approx(max(30 - length_s, 0), abs=0.15)
 
 
 def test_a_history_begins_with_the_second_image_and_none_has_no_length():
@@ -256,3 +262,36 @@ def test_parameters_that_are_refused_leave_the_old_ones():
     with pytest.raises(ValueError, match='marker_color'):
         writer.tune(MarkerParams(marker_color='pink'))
     assert keys(writer.write([track(3)], header())) == [('id', 3)]
+
+
+coordinates = st.floats(-1e6, 1e6)
+
+
+def drawn_by_rviz(marker, fixed_from_header):
+    """Points (n, 3) as RViz draws them: the pose is moved in float64, the points are float32 beside it."""
+    pose = marker.pose.position
+    origin = np.float32(fixed_from_header.dot([pose.x, pose.y, pose.z, 1])[:3])
+    points = np.array([(point.x, point.y, point.z) for point in marker.points], np.float32)
+    return origin + points.dot(np.float32(fixed_from_header[:3, :3]).T)
+
+
+@given(coordinates, coordinates, st.lists(st.tuples(st.floats(-2, 2), st.floats(-2, 2)), min_size=2, max_size=6))
+@settings(deadline=None)
+def test_rviz_draws_lines_and_arrows_exactly_on_large_maps(x, y, ways):
+    """The robot's frame is RViz's fixed frame; against the same scene around the map's origin in float64."""
+    robot = np.array([x, y, 0.0])
+    fixed_from_map = np.eye(4)
+    fixed_from_map[:3, 3] = -robot
+    writer, near = MarkerWriter(ALL), MarkerWriter(ALL)
+    place = np.array([2.0, -1.0, 0.9])
+    for image, way in enumerate(ways):
+        place = place + [way[0], way[1], 0]
+        velocity = (way[0] + 3, way[1], 0.0)
+        now = header(SECOND_NS + image * NS // 2)
+        far_away, expected = (with_markers.write([track(1, velocity, position=origin + place)], now).markers
+                              for with_markers, origin in ((writer, robot), (near, np.zeros(3))))
+    assert [marker.ns for marker in far_away] == [marker.ns for marker in expected]
+    lines = [(marker, same) for marker, same in zip(far_away, expected) if marker.points]
+    assert {marker.ns for marker, _same in lines} == set(NAMESPACES) - {'cylinder', 'id'}
+    for marker, same in lines:
+        np.testing.assert_allclose(drawn_by_rviz(marker, fixed_from_map), xyz(same), rtol=0, atol=1e-4)

@@ -7,17 +7,19 @@ import sys
 import numpy as np
 import pytest
 import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
-from ros_3d_bb.geometry import transform_from
+from ros_3d_bb.geometry import transform_from, transform_points
 from ros_3d_bb.messages import time_from
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
 from ros_3d_bb.nodes.planner_outputs import outputs_from
 from ros_3d_bb.planner_messages import (detections3d_to_message, objects_to_message, obstacles_to_message,
                                         people_to_message)
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tracking.for_planners import in_frame, predicted_to
+from ros_3d_bb.tracking.for_planners import footprint_points, in_frame, predicted_to
 from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject
 from support.planner_definitions import PUBLISHED_MD5, message_class, package
 from support.planners import JackalMpcReplica, ObstacleLayerReplica, SocialLayerReplica, TebReplica
@@ -109,6 +111,25 @@ def test_objects_are_tracked_pedestrians():
     assert item.shape.dimensions == pytest.approx((1.7, 0.3)) and item.header.stamp == time_from(STAMP_NS)
 
 
+def obstacle_point(tracks, frame_id):
+    obstacle, = received(obstacles_to_message(tracks, header_in(frame_id), package('costmap_converter'))).obstacles
+    point = obstacle.polygon.points[0]
+    return np.array([point.x, point.y, point.z])
+
+
+def test_points_of_obstacles_are_float32_and_exact_only_in_a_frame_near_the_robot():
+    place = np.array([448265.3, 5411934.25, 0.85])
+    tracks = [walker(3, place, [0, 0, 0])]
+    assert np.abs(obstacle_point(tracks, 'map') - place).max() == pytest.approx(0.25)
+    np.testing.assert_allclose(obstacle_point(in_frame(tracks, UTM), 'odom'), transform_points(UTM, place), atol=1e-5)
+
+
+def test_a_status_that_is_not_known_loses_nobody():
+    person, = received(people_to_message([walker(3, [1, 2, 0.9], [0, 0, 0], status=7)], header_in('map'),
+                                         package('people_msgs'))).people
+    assert (person.tags[0], person.reliability) == ('unknown', 0.5)
+
+
 def test_the_social_layer_finds_position_and_velocity_in_its_own_frame():
     layer = SocialLayerReplica({'map': QUARTER})
     layer.receive(received(people_to_message([walker(3, [1, 2, 0.9], [1.2, 0, 0])], header_in('map'),
@@ -146,18 +167,23 @@ def people_layer():
     return {name: layer[name] for name in layer['observation_sources'].split()}
 
 
-def costmap(sources):
-    """A local costmap around the origin of odom; the robot is 1 m off its centre."""
-    robot = transform_from((1, 0, 0), (0, 0, 0.6, 0.8))
-    return ObstacleLayerReplica({'map': QUARTER, 'odom': np.eye(4), 'base_link': robot}, sources)
+LEVEL_ROBOT = transform_from((1, 0, 0), (0, 0, 0.6, 0.8))  # odom_from_base_link: 1 m off the costmap's centre
 
 
-def show(layer, sources, tracks):
-    """What the bridge publishes for tracks of odom, once; the layer is updated."""
+def costmap(sources, odom_from_robot=LEVEL_ROBOT, odom_from_map=QUARTER):
+    """A local costmap around the origin of odom."""
+    return ObstacleLayerReplica({'map': odom_from_map, 'odom': np.eye(4), 'base_link': odom_from_robot}, sources)
+
+
+def show(layer, sources, tracks, odom_from_robot=LEVEL_ROBOT, odom_from_map=QUARTER):
+    """What the bridge publishes for tracks of odom that come in the map, once; the layer is updated."""
     topics = {output.topic: output for output in outputs_from(PlannerBridgeParams())}
+    in_map = [in_frame([track], np.linalg.inv(odom_from_map))[0]._replace(prediction_m=transform_points(
+        np.linalg.inv(odom_from_map), track.prediction_m)) for track in tracks]
+    robot_from_map = np.linalg.inv(odom_from_robot).dot(odom_from_map)
     for name, source in sources.items():
         output = topics[source['topic'].replace('/planner_bridge_node/', '~')]
-        layer.receive(name, received(output.write(in_frame(tracks, np.linalg.inv(QUARTER)), header_in('map'))))
+        layer.receive(name, received(output.write(in_map, robot_from_map, header_in(output.frame))))
     layer.update()
 
 
@@ -185,13 +211,53 @@ def test_without_the_clearing_points_the_obstacle_layer_keeps_a_trail():
     assert layer.lethal()[:, 1].min() < -2.9
 
 
-@pytest.mark.parametrize('sensor_frame, marked', [('base_link', True), ('', False)])
-def test_without_the_robot_as_the_sensor_ranges_count_from_the_origin_of_the_map(sensor_frame, marked):
-    """The map's origin is 11 m from the costmap's, the person 2 m from the robot."""
+@pytest.mark.parametrize('sensor_frame', ['base_link', ''])
+def test_ranges_count_from_the_robot_whether_or_not_the_sensor_is_named(sensor_frame):
+    """The person is 2 m from the robot, and 11 m from the origin of the map."""
     sources = {'people': dict(people_layer()['people'], sensor_frame=sensor_frame, obstacle_range=5.0)}
     layer = costmap(sources)
     show(layer, sources, [walker(1, [3, 0, 0.85], [0, 0, 0])])
-    assert bool(len(layer.lethal())) == marked
+    assert len(layer.lethal())
+
+
+UTM = np.linalg.inv(transform_from((448262.3, 5411933.2, 0), (0, 0, 0.6, 0.8)))  # odom_from_map
+
+
+def tilted(roll_deg, pitch_deg, height_m):
+    """odom_from_base_link of a robot that is tilted or drives on a slope."""
+    roll, pitch = np.radians([roll_deg, pitch_deg]) / 2
+    return (transform_from((1, 0, height_m), (0, 0, 0.6, 0.8))
+            .dot(transform_from((0, 0, 0), (0, np.sin(pitch), 0, np.cos(pitch))))
+            .dot(transform_from((0, 0, 0), (np.sin(roll), 0, 0, np.cos(roll)))))
+
+
+@pytest.mark.parametrize('odom_from_map', [QUARTER, UTM])
+@pytest.mark.parametrize('odom_from_robot', [LEVEL_ROBOT, tilted(0, 12, 0), tilted(-20, 0, 0), tilted(8, -15, 0.6)])
+def test_marks_are_whole_discs_and_cleared_again_on_any_map_however_the_robot_is_tilted(odom_from_map, odom_from_robot):
+    sources = people_layer()
+    layer = costmap(sources, odom_from_robot, odom_from_map)
+    for place in ([4, 1], [-3, -2]):
+        show(layer, sources, [walker(1, place + [0.85], [0, 0, 0])], odom_from_robot, odom_from_map)
+        marks = layer.lethal()
+        distances = np.linalg.norm(marks - place, axis=1)
+        assert distances.max() < 0.3 + 0.04 and len(marks) >= 0.9 * np.pi * 0.3 ** 2 / layer.resolution ** 2
+    show(layer, sources, [], odom_from_robot, odom_from_map)
+    assert len(layer.lethal()) == 0
+
+
+@given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6), st.floats(-np.pi, np.pi), st.floats(-25, 25), st.floats(-25, 25))
+@settings(deadline=None, max_examples=30)
+def test_costmap_points_are_exact_on_large_maps(x, y, yaw, roll_deg, pitch_deg):
+    """Against float64: each point is within 0.01 mm of the cylinder's points, seen from the map."""
+    map_from_robot = transform_from((x, y, 0.2), (0, 0, np.sin(yaw / 2), np.cos(yaw / 2))).dot(
+        tilted(roll_deg, pitch_deg, 0))
+    track = walker(1, map_from_robot[:3, 3] + [3, -2, 0.65], [1, 0.5, 0])
+    points, = [output for output in outputs_from(PlannerBridgeParams()) if output.topic == '~points']
+    message = received(points.write([track], np.linalg.inv(map_from_robot), header_in(points.frame)))
+    sent = np.frombuffer(message.data, '<f4').reshape(-1, 3).astype(float)
+    in_map = transform_points(map_from_robot, sent) - track.position_m
+    np.testing.assert_allclose(in_map, footprint_points([track], 0.5, 0.05) - track.position_m, rtol=0, atol=1e-5)
+    assert message.header.frame_id == 'base_link'
 
 
 def test_the_ring_reaches_as_far_as_the_costmap_clears_and_further_than_it_marks():

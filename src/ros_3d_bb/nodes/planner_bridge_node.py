@@ -1,6 +1,6 @@
 """The node that hands tracks on to planners, as the messages that they read."""
 import threading
-from typing import NamedTuple, Optional
+from typing import Any, NamedTuple
 
 import rospy
 import tf2_ros
@@ -15,7 +15,9 @@ from ros_3d_bb.nodes.transforms import Transforms
 from ros_3d_bb.nodes.transport import subscribe
 from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tracking.for_planners import check_tracks, in_frame, predicted_to
+from ros_3d_bb.tracking.for_planners import SAME_FRAME, predicted_to, rounding_m, usable_tracks
+
+MOST_ROUNDING_M = 0.005  # of coordinates: a tenth of a cell of a usual costmap
 
 
 class PlannerBridgeParams(NamedTuple):
@@ -33,26 +35,46 @@ class PlannerBridgeParams(NamedTuple):
 
 
 class News(NamedTuple):
-    """The latest tracks, in their own frame. `planner_from_tracks` is None where there was no transform."""
+    """The latest tracks, in their own frame. `transforms`: 4x4 matrices from it to the frames of outputs, by frame;
+    without those that tf does not know.
+    """
 
     stamp_ns: int
     arrival_ns: int
     frame_id: str
     tracks: list
-    planner_from_tracks: Optional[object]
+    transforms: dict
+
+
+class Sent(NamedTuple):
+    """What was published last on a topic: when its tracks had come, and its frame (a 4x4 matrix from theirs)."""
+
+    arrival_ns: int
+    frame_id: str
+    frame_from_tracks: Any
 
 
 class PlannerTopic(object):
-    """A topic, and whether there are still people in what was sent last; `sent_ns` is when those tracks had come."""
+    """A topic. `sent` is None where its planner keeps nobody."""
 
     def __init__(self, output):
         self.output = output
-        self.sent_ns = None
+        self.sent = None
         self._publisher = rospy.Publisher(output.topic, output.kind, queue_size=2)
 
-    def send(self, tracks, stamp_ns, frame_id):
-        """Publish tracks, which may be none at all."""
-        self._publisher.publish(self.output.write(tracks, Header(stamp=time_from(stamp_ns), frame_id=frame_id)))
+    def send(self, tracks, stamp_ns, sent):
+        """Publish tracks."""
+        self._publish(tracks, stamp_ns, sent)
+        self.sent = sent
+
+    def empty(self, stamp_ns):
+        """Publish an empty array in the frame of the last one."""
+        self._publish([], stamp_ns, self.sent)
+        self.sent = None
+
+    def _publish(self, tracks, stamp_ns, sent):
+        header = Header(stamp=time_from(stamp_ns), frame_id=sent.frame_id)
+        self._publisher.publish(self.output.write(tracks, sent.frame_from_tracks, header))
 
 
 class PlannerBridgeNode(object):
@@ -66,7 +88,7 @@ class PlannerBridgeNode(object):
     ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
         Tracks.
     /tf : tf2_msgs/TFMessage
-        From the frame of the tracks to ~planner_frame.
+        From the frame of the tracks to ~robot_frame (`costmap`) and ~planner_frame (`teb`, `mpc`).
     /tf_static : tf2_msgs/TFMessage
         The same.
 
@@ -105,7 +127,7 @@ class PlannerBridgeNode(object):
             with self._lock:
                 self._news = news
                 for topic in self._topics:
-                    self._send(topic, news.arrival_ns)
+                    self._send(topic, _now_ns())
             self._diagnostics.count('tracks handed on')
             self._diagnostics.answered(message.header.stamp)
 
@@ -117,66 +139,64 @@ class PlannerBridgeNode(object):
                              'use_sim_time' % ((now_ns - stamp_ns) / NS, self._params.timeout))
         if self._news is not None and stamp_ns < self._news.stamp_ns:
             self._transforms.go_back()
-        tracks = tracks_from_message(message)
-        check_tracks(tracks)
-        return News(stamp_ns, now_ns, message.header.frame_id, tracks, self._planner_from_tracks(message.header))
+        tracks, faults = usable_tracks(tracks_from_message(message))
+        for fault in faults:
+            self._diagnostics.warn('broken tracks', '%s; planners do not get it' % fault)
+        return News(stamp_ns, now_ns, message.header.frame_id, tracks, self._transforms_at(message.header))
 
-    def _planner_frame(self, tracks_frame):
-        return self._params.planner_frame or tracks_frame
-
-    def _planner_from_tracks(self, header):
-        """The transform at the stamp; None where there is none, or none is needed."""
-        planner_frame = self._planner_frame(header.frame_id)
-        if planner_frame == header.frame_id or not any(topic.output.in_planner_frame for topic in self._topics):
-            return None
-        try:
-            return self._transforms.lookup(planner_frame, header.frame_id, header.stamp)
-        except tf2_ros.TransformException as error:
-            self._diagnostics.warn('no transform', 'no transform from %s to %s at %.3f: %s; the planner gets nothing, '
-                                   'and an empty array after ~timeout'
-                                   % (header.frame_id, planner_frame, header.stamp.to_sec(), error))
-            return None
+    def _transforms_at(self, header):
+        """The transforms to the frames of the outputs that tf knows at the stamp of the tracks, by frame."""
+        transforms = {header.frame_id: SAME_FRAME}
+        for frame in sorted(set(topic.output.frame for topic in self._topics) - {'', header.frame_id}):
+            try:
+                transforms[frame] = self._transforms.lookup(frame, header.frame_id, header.stamp)
+            except tf2_ros.TransformException as error:
+                self._diagnostics.warn('no transform', 'no transform from %s to %s at %.3f: %s; planners get nothing '
+                                       'in %s, and an empty array after ~timeout'
+                                       % (header.frame_id, frame, header.stamp.to_sec(), error, frame))
+        return transforms
 
     def _send(self, topic, now_ns):
         """Send the news to one topic, as its planner needs them; not without the transform that it needs."""
-        news, tracks, stamp_ns, frame_id = self._news, self._news.tracks, self._news.stamp_ns, self._news.frame_id
+        news, tracks, stamp_ns = self._news, self._news.tracks, self._news.stamp_ns
+        frame_id = topic.output.frame or news.frame_id
+        if frame_id not in news.transforms:
+            return
         if topic.output.to_now:
             stamp_ns = max(now_ns, news.stamp_ns)
             tracks = predicted_to(tracks, (stamp_ns - news.stamp_ns) / NS)
-        if topic.output.in_planner_frame and self._planner_frame(frame_id) != frame_id:
-            if news.planner_from_tracks is None:
-                return
-            frame_id, tracks = self._params.planner_frame, in_frame(tracks, news.planner_from_tracks)
-        topic.send(tracks, stamp_ns, frame_id)
-        topic.sent_ns = news.arrival_ns
+        if topic.output.float32:
+            self._warn_of_rounding(topic, tracks, frame_id, news.transforms[frame_id])
+        topic.send(tracks, stamp_ns, Sent(news.arrival_ns, frame_id, news.transforms[frame_id]))
+
+    def _warn_of_rounding(self, topic, tracks, frame_id, frame_from_tracks):
+        off_m = rounding_m(tracks, frame_from_tracks)
+        if off_m > MOST_ROUNDING_M:
+            self._diagnostics.warn('coordinates rounded', '%s is up to %.2g m off, as its coordinates in %s are large '
+                                   'and float32; set ~planner_frame to a frame with its origin near the robot'
+                                   % (topic.output.topic, off_m, frame_id))
 
     def _on_timer(self, _event):
         """Send again what planners take for now; empty what is out of date."""
         with self._diagnostics.refusing('outputs'), self._lock:
             now_ns = _now_ns()
             for topic in self._topics:
-                if topic.sent_ns is None:
+                if topic.sent is None:
                     continue
-                if not 0 <= now_ns - topic.sent_ns <= self._params.timeout * NS:
+                if not 0 <= now_ns - topic.sent.arrival_ns <= self._params.timeout * NS:
                     self._diagnostics.warn('outputs emptied', 'no tracks that can be handed on for %g s: %s is '
                                            'emptied, and goes on with the next ones'
                                            % (self._params.timeout, topic.output.topic))
-                    self._empty(topic, now_ns)
+                    topic.empty(now_ns)
                 elif topic.output.to_now and now_ns - self._news.arrival_ns >= self._params.resend_period * NS:
                     self._send(topic, now_ns)
-
-    def _empty(self, topic, now_ns):
-        """Send nobody, once; the next tracks make it go on."""
-        frame_id = self._news.frame_id
-        topic.send([], now_ns, self._planner_frame(frame_id) if topic.output.in_planner_frame else frame_id)
-        topic.sent_ns = None
 
     def _empty_all(self):
         """The node ends: no planner must keep the people of its last array."""
         with self._lock:
             for topic in self._topics:
-                if topic.sent_ns is not None:
-                    self._empty(topic, _now_ns())
+                if topic.sent is not None:
+                    topic.empty(_now_ns())
 
 
 def _now_ns():

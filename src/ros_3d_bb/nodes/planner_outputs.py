@@ -4,29 +4,31 @@ import importlib
 from typing import Any, Callable, NamedTuple
 
 from sensor_msgs.msg import PointCloud2
-from std_msgs.msg import Header
 
+from ros_3d_bb.geometry import transform_points
 from ros_3d_bb.params import nearest_name
 from ros_3d_bb.planner_messages import (detections3d_to_message, objects_to_message, obstacles_to_message,
                                         people_to_message, points_to_message)
-from ros_3d_bb.tracking.for_planners import footprint_points, ring_points
+from ros_3d_bb.tracking.for_planners import footprint_points, in_frame, ring_points
 
 CLEARING_SPACING_M = 0.025  # half a cell of a usual costmap: the rays from the robot leave out none
 CLEARING_HEIGHT_M = 0.5  # above the robot's frame: where costmaps look
 
 
 class Output(NamedTuple):
-    """One topic. `write(tracks, header)` makes its message.
+    """One topic. `write(tracks, frame_from_tracks, header)` makes its message from tracks in their own frame.
 
+    `frame`: that of the message's coordinates; empty: that of the tracks, for planners that transform all there is.
     `to_now`: the planner takes an array for what is now, so positions are predicted to now, and sent again while no
-    new ones come; else they are as of the image. `in_planner_frame`: the planner does not transform all there is.
+    new ones come; else they are as of the image. `float32`: coordinates in the message are.
     """
 
     topic: str
     kind: Any
     write: Callable
+    frame: str = ''
     to_now: bool = False
-    in_planner_frame: bool = False
+    float32: bool = False
 
 
 class OptionalOutput(NamedTuple):
@@ -36,15 +38,18 @@ class OptionalOutput(NamedTuple):
     package: str
     kind: str
     write: Callable
-    to_now: bool
-    in_planner_frame: bool
+    in_planner_frame: bool = False
+    to_now: bool = False
+    float32: bool = False
 
 
 OPTIONAL = {
-    'people': OptionalOutput('/people', 'people_msgs', 'People', people_to_message, True, False),
-    'teb': OptionalOutput('~obstacles', 'costmap_converter', 'ObstacleArrayMsg', obstacles_to_message, True, True),
-    'mpc': OptionalOutput('~objects', 'derived_object_msgs', 'ObjectArray', objects_to_message, True, True),
-    'vision': OptionalOutput('~detections', 'vision_msgs', 'Detection3DArray', detections3d_to_message, False, False)}
+    'people': OptionalOutput('/people', 'people_msgs', 'People', people_to_message, to_now=True),
+    'teb': OptionalOutput('~obstacles', 'costmap_converter', 'ObstacleArrayMsg', obstacles_to_message,
+                          in_planner_frame=True, to_now=True, float32=True),
+    'mpc': OptionalOutput('~objects', 'derived_object_msgs', 'ObjectArray', objects_to_message,
+                          in_planner_frame=True, to_now=True),
+    'vision': OptionalOutput('~detections', 'vision_msgs', 'Detection3DArray', detections3d_to_message)}
 NAMES = ['costmap'] + sorted(OPTIONAL)
 
 
@@ -62,11 +67,11 @@ def outputs_from(params):
         if name not in NAMES:
             raise ValueError('parameter ~outputs has %r; did you mean %s? Known: %s'
                              % (name, nearest_name(str(name), NAMES), ', '.join(NAMES)))
-    found = [_optional_output(name) for name in OPTIONAL if name in params.outputs]
+    found = [_optional_output(name, params.planner_frame) for name in OPTIONAL if name in params.outputs]
     return found + (_costmap_outputs(params) if 'costmap' in params.outputs else [])
 
 
-def _optional_output(name):
+def _optional_output(name, planner_frame):
     wanted = OPTIONAL[name]
     try:
         messages = importlib.import_module(wanted.package + '.msg')
@@ -74,26 +79,32 @@ def _optional_output(name):
         raise ValueError('output %s needs the package %s (%s): install it (rosdep key %s, on Noetic: apt install '
                          'ros-noetic-%s) or take %s out of ~outputs'
                          % (name, wanted.package, error, wanted.package, wanted.package.replace('_', '-'), name))
-    return Output(wanted.topic, getattr(messages, wanted.kind), functools.partial(_written, wanted.write, messages),
-                  wanted.to_now, wanted.in_planner_frame)
+    return Output(wanted.topic, getattr(messages, wanted.kind), functools.partial(_converted, wanted.write, messages),
+                  planner_frame if wanted.in_planner_frame else '', wanted.to_now, wanted.float32)
 
 
-def _written(write, messages, tracks, header):
-    return write(tracks, header, messages)
+def _converted(write, messages, tracks, frame_from_tracks, header):
+    return write(in_frame(tracks, frame_from_tracks), header, messages)
 
 
 def _costmap_outputs(params):
-    """What to mark in a costmap, and a ring around the robot to which it is cleared first."""
-    outputs = [Output('~points', PointCloud2, functools.partial(_footprints, params))]
+    """What to mark in a costmap, and a ring around the robot to which it is cleared first.
+
+    Both are in the robot's frame: coordinates are float32, and small there in any map. They are level in the frame of
+    the tracks, however the robot is tilted, as costmaps drop points by their height in the fixed frame.
+    """
+    outputs = [Output('~points', PointCloud2, functools.partial(_footprints, params), params.robot_frame, float32=True)]
     if params.clearing_range:
         ring_m = ring_points(params.clearing_range, CLEARING_SPACING_M) + [0, 0, CLEARING_HEIGHT_M]
-        outputs.append(Output('~clearing_points', PointCloud2, functools.partial(_ring, ring_m, params.robot_frame)))
+        outputs.append(Output('~clearing_points', PointCloud2, functools.partial(_ring, ring_m), params.robot_frame))
     return outputs
 
 
-def _footprints(params, tracks, header):
-    return points_to_message(footprint_points(tracks, params.points_prediction, params.point_spacing), header)
+def _footprints(params, tracks, robot_from_tracks, header):
+    points_m = footprint_points(tracks, params.points_prediction, params.point_spacing)
+    return points_to_message(transform_points(robot_from_tracks, points_m), header)
 
 
-def _ring(ring_m, robot_frame, _tracks, header):
-    return points_to_message(ring_m, Header(stamp=header.stamp, frame_id=robot_frame))
+def _ring(ring_m, _tracks, robot_from_tracks, header):
+    """Around the robot's origin, level in the frame of the tracks."""
+    return points_to_message(ring_m.dot(robot_from_tracks[:3, :3].T), header)

@@ -4,30 +4,53 @@ Positions and velocities as in `tracked.TrackedObject`; points are (n, 3), metre
 """
 import numpy as np
 
+from ros_3d_bb.geometry import transform_points
 from ros_3d_bb.tracking.tracked import FARTHEST_M, LARGEST_M
 
 SWATH_STEP_S = 0.1  # a person at 3 m/s is 0.3 m further on, less than a body is wide: the footprints overlap
+SAME_FRAME = np.eye(4)
 LOWEST, HIGHEST = 0.25, 0.75  # of a cylinder's height: well off the floor, and below 2 m, where costmaps stop looking
 
 
-def check_tracks(tracks):
-    """Raise ValueError where a track has a number that is not finite or absurdly large, or a size or step that is not
-    positive.
+def usable_tracks(tracks):
+    """Separate the tracks that planners can read from broken ones, so that one of those takes no others with it.
+
+    Returns
+    -------
+    usable : list of tracked.TrackedObject
+    faults : list of str
+        For each other track, what is wrong with it.
     """
-    for track in tracks:
-        values = np.concatenate([track.position_m, track.velocity_mps, track.size_m, track.prediction_m.ravel()])
-        if not ((np.abs(values) < FARTHEST_M).all() and (0 < track.size_m).all() and (track.size_m < LARGEST_M).all()):
-            shown = tuple(np.asarray(value).tolist() for value in (track.position_m, track.velocity_mps, track.size_m,
-                                                                   track.prediction_m))
-            raise ValueError('track %d has position %s, velocity %s, size %s and prediction %s; finite numbers and a '
-                             'size of more than 0 and less than 10 m expected' % ((track.id,) + shown))
-        if len(track.prediction_m) and not track.prediction_step_s > 0:
-            raise ValueError('track %d has predictions in steps of %g s; a positive step expected'
-                             % (track.id, track.prediction_step_s))
+    faults = [_fault_of(track) for track in tracks]
+    return [track for track, fault in zip(tracks, faults) if not fault], [fault for fault in faults if fault]
+
+
+def _fault_of(track):
+    """What is wrong with a track: a number is not finite or absurdly large, a size or step is not positive; else ''."""
+    values = np.concatenate([track.position_m, track.velocity_mps, track.size_m, track.prediction_m.ravel()])
+    if not ((np.abs(values) < FARTHEST_M).all() and (0 < track.size_m).all() and (track.size_m < LARGEST_M).all()):
+        shown = tuple(np.asarray(value).tolist() for value in (track.position_m, track.velocity_mps, track.size_m,
+                                                               track.prediction_m))
+        return ('track %d has position %s, velocity %s, size %s and prediction %s; finite numbers and a size of more '
+                'than 0 and less than 10 m expected' % ((track.id,) + shown))
+    if track.covariance is not None and not (np.abs(track.covariance) < FARTHEST_M).all():
+        return 'track %d has a covariance that is not finite' % track.id
+    if len(track.prediction_m) and not track.prediction_step_s > 0:
+        return ('track %d has predictions in steps of %g s; a positive step expected'
+                % (track.id, track.prediction_step_s))
+    return ''
+
+
+def walking_velocity(track):
+    """The velocity (3,) of a track that moves; zero of one that does not: the rest is noise, and planners would take it
+    for a person who walks off.
+    """
+    return track.velocity_mps if track.moving else np.zeros(3)
 
 
 def position_after(track, ahead_s):
-    """Where a track will be, as its tracker predicts: straight between the predicted positions, and beyond the last.
+    """Where a track will be, as its tracker predicts: straight between the predicted positions, and beyond the last
+    with its `walking_velocity`.
 
     Parameters
     ----------
@@ -43,18 +66,13 @@ def position_after(track, ahead_s):
     times_s = track.prediction_step_s * np.arange(len(track.prediction_m) + 1)
     known_m = np.vstack((track.position_m, track.prediction_m))
     position_m = np.stack([np.interp(ahead_s, times_s, axis_m) for axis_m in known_m.T], axis=-1)
-    return position_m + np.maximum(ahead_s - times_s[-1], 0)[..., np.newaxis] * track.velocity_mps
+    return position_m + np.maximum(ahead_s - times_s[-1], 0)[..., np.newaxis] * walking_velocity(track)
 
 
 def predicted_to(tracks, ahead_s):
-    """The tracks some seconds later (see `position_after`), without their predictions.
-
-    Those who are not `moving` have no velocity: what is left of it is noise, and planners would take it for a person
-    who walks off.
-    """
-    return [track._replace(position_m=position_after(track, ahead_s), prediction_m=np.empty((0, 3)),
-                           prediction_covariance_m2=None,
-                           velocity_mps=track.velocity_mps if track.moving else np.zeros(3)) for track in tracks]
+    """The tracks some seconds later (see `position_after`) with their `walking_velocity`, without their predictions."""
+    return [track._replace(position_m=position_after(track, ahead_s), velocity_mps=walking_velocity(track),
+                           prediction_m=np.empty((0, 3)), prediction_covariance_m2=None) for track in tracks]
 
 
 def in_frame(tracks, b_from_a):
@@ -66,10 +84,16 @@ def in_frame(tracks, b_from_a):
     b_from_a : numpy.ndarray, (4, 4)
         Both frames have z up.
     """
-    return [track._replace(position_m=b_from_a[:3, :3].dot(track.position_m) + b_from_a[:3, 3],
+    return [track._replace(position_m=transform_points(b_from_a, track.position_m),
                            velocity_mps=b_from_a[:3, :3].dot(track.velocity_mps),
                            covariance=_turned(track.covariance, b_from_a[:3, :3]),
                            prediction_m=np.empty((0, 3)), prediction_covariance_m2=None) for track in tracks]
+
+
+def rounding_m(tracks, b_from_a):
+    """By how much the coordinates in frame b of tracks of frame a may be off as float32, metres."""
+    farthest_m = max([np.abs(transform_points(b_from_a, track.position_m)).max() for track in tracks], default=0.0)
+    return float(np.spacing(np.float32(farthest_m))) / 2
 
 
 def _turned(covariance, rotation):

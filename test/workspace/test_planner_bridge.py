@@ -1,0 +1,204 @@
+"""planner_bridge_node without a master: broken tracks, missing transforms, clocks that jump; in frames and numbers."""
+import contextlib
+import sys
+from unittest import mock
+
+import genpy
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseWithCovariance, TransformStamped
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+from ros_3d_bb.messages import TRACKS_TOPIC, time_from
+from ros_3d_bb.msg import TrackedObject, TrackedObjectArray
+from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeNode
+from ros_3d_bb.stamped import NS
+from support.masterless import masterless
+from support.planner_definitions import package
+
+START_NS = 1000 * NS
+PACKAGES = 'people_msgs', 'costmap_converter', 'derived_object_msgs', 'vision_msgs'
+POINTS, RING, PEOPLE, TEB, MPC = '~points', '~clearing_points', '/people', '~obstacles', '~objects'
+FIELDS = {PEOPLE: 'people', TEB: 'obstacles', MPC: 'objects'}
+
+
+class Bridge(object):
+    """The node, a clock, and tf: the map's origin is in front of the robot, which looks along the map's y."""
+
+    def __init__(self, connections):
+        self._connections = connections
+        self.node = PlannerBridgeNode()
+        self.counts = self.node._diagnostics.counts
+        self.tell(START_NS)
+
+    def tell(self, now_ns):
+        self.now_ns, self._connections.now = now_ns, time_from(now_ns)
+
+    def tick(self):
+        for timer in self._connections.timers:
+            timer(None)
+
+    def send_tf(self, stamp_ns, child, translation):
+        """The pose of a frame in the map; it is turned by a quarter to the left."""
+        transform = TransformStamped(header=Header(stamp=time_from(stamp_ns), frame_id='map'), child_frame_id=child)
+        place, turn = transform.transform.translation, transform.transform.rotation
+        place.x, place.y, place.z = translation
+        turn.z = turn.w = 0.5 ** 0.5
+        self._connections.send('/tf', TFMessage([transform]))
+
+    def send(self, stamp_ns, *tracks):
+        self._connections.send(TRACKS_TOPIC, TrackedObjectArray(header=Header(stamp=time_from(stamp_ns),
+                                                                              frame_id='map'), objects=list(tracks)))
+
+    def count(self, topic):
+        return self._connections.publishers[topic].count
+
+    def newest(self, topic):
+        """Frame and content of the last message: points (n, 3), or objects."""
+        message = self._connections.publishers[topic].newest
+        if topic in FIELDS:
+            return message.header.frame_id, getattr(message, FIELDS[topic])
+        return message.header.frame_id, np.frombuffer(message.data, '<f4').reshape(-1, 3)
+
+
+@contextlib.contextmanager
+def bridge_with(outputs, **params):
+    stand_ins = {optional + '.msg': package(optional) for optional in PACKAGES}
+    with mock.patch.dict(sys.modules, stand_ins), mock.patch('threading.Thread.start'), \
+            masterless(dict(params, outputs=outputs, tf_timeout=0.0)) as found:
+        yield Bridge(found)
+
+
+def person(number, x, y, moving=True, speed=1.0, steps=1):
+    """Somebody who walks along x of the map."""
+    track = TrackedObject(id=number, moving=moving, prediction_step=genpy.Duration(2))
+    place = track.pose.pose.position
+    place.x, place.y, place.z = x, y, 0.85
+    track.size.x = track.size.y = 0.6
+    track.size.z = 1.7
+    track.twist.twist.linear.x = speed
+    for step in range(1, steps + 1):
+        pose = PoseWithCovariance()
+        pose.pose.position.x, pose.pose.position.y, pose.pose.position.z = x + 2 * step * speed, y, 0.85
+        track.prediction.append(pose)
+    return track
+
+
+def test_a_broken_track_is_dropped_and_counted_and_the_others_are_handed_on():
+    with bridge_with('people, costmap') as bridge:
+        bridge.send_tf(START_NS, 'base_link', (0, 0, 0))
+        bridge.send(START_NS, person(1, 2, 0), person(2, float('nan'), 0), person(3, 4, 0))
+        assert [found.name for found in bridge.newest(PEOPLE)[1]] == ['1', '3']
+        assert len(bridge.newest(POINTS)[1])
+        assert (bridge.counts['broken tracks'], bridge.counts['tracks handed on']) == (1, 1)
+
+
+def test_costmap_points_are_in_the_robots_frame():
+    """The robot is at (0, -3) of the map and looks along y: the person at (0, 0) is 3 m ahead and walks right."""
+    with bridge_with('costmap') as bridge:
+        bridge.send_tf(START_NS, 'base_link', (0, -3, 0.1))
+        bridge.send(START_NS, person(1, 0, 0))
+        frame_id, points = bridge.newest(POINTS)
+        assert frame_id == bridge.newest(RING)[0] == 'base_link'
+        assert (points[:, 0].min(), points[:, 0].max()) == pytest.approx((2.7, 3.3), abs=0.01)
+        assert (points[:, 1].min(), points[:, 1].max()) == pytest.approx((-0.3 - 0.5, 0.3), abs=0.01)
+        assert (points[:, 2].min(), points[:, 2].max()) == pytest.approx((0.425 - 0.1, 1.275 - 0.1), abs=1e-5)
+
+
+def test_an_output_waits_for_the_transform_of_its_own_frame_only():
+    with bridge_with('costmap, people, teb', planner_frame='odom') as bridge:
+        bridge.send_tf(START_NS, 'odom', (0, 0, 0))
+        bridge.send(START_NS, person(1, 2, 0))
+        assert [bridge.count(topic) for topic in (POINTS, RING, PEOPLE, TEB)] == [0, 0, 1, 1]
+        assert bridge.counts['no transform'] == 1
+        bridge.send_tf(START_NS + NS // 10, 'base_link', (0, 0, 0))
+        bridge.tell(START_NS + NS // 10)
+        bridge.send(START_NS + NS // 10, person(1, 2, 0))
+        assert [bridge.count(topic) for topic in (POINTS, RING, PEOPLE, TEB)] == [1, 1, 2, 1]
+        assert bridge.counts['no transform'] == 2
+
+
+def test_without_transform_each_output_is_emptied_once_in_the_frame_of_its_last_array():
+    with bridge_with('costmap, people') as bridge:
+        bridge.send_tf(START_NS, 'base_link', (0, 0, 0))
+        bridge.send(START_NS, person(1, 2, 0))
+        for step in range(1, 15):
+            bridge.tell(START_NS + step * NS // 10)
+            bridge.send(bridge.now_ns, person(1, 2, 0))
+            bridge.tick()
+        assert bridge.count(POINTS) == bridge.count(RING) == 2 and bridge.counts['outputs emptied'] == 2
+        frame_id, points = bridge.newest(POINTS)
+        assert frame_id == 'base_link' and len(points) == 0 and len(bridge.newest(RING)[1]) > 2000
+        assert len(bridge.newest(PEOPLE)[1]) == 1
+
+
+def test_positions_are_predicted_to_when_they_are_sent_also_where_the_stamp_is_ahead_of_the_clock():
+    with bridge_with('people') as bridge:
+        for ahead_ns, expected_m in ((NS // 5, 0.0), (0, 0.0), (-NS // 2, 0.5)):
+            bridge.send(bridge.now_ns + ahead_ns, person(1, 0, 0))
+            assert bridge.newest(PEOPLE)[1][0].position.x == pytest.approx(expected_m)
+
+
+@pytest.mark.parametrize('jump_s', [-100.0, -0.5, 1.5, 100.0])
+def test_a_jump_of_the_clock_empties_every_output_and_the_next_tracks_are_handed_on(jump_s):
+    with bridge_with('people, costmap') as bridge:
+        bridge.send_tf(START_NS, 'base_link', (0, 0, 0))
+        bridge.send(START_NS, person(1, 2, 0))
+        bridge.tell(START_NS + int(jump_s * NS))
+        bridge.tick()
+        bridge.tick()
+        assert len(bridge.newest(POINTS)[1]) == len(bridge.newest(PEOPLE)[1]) == 0
+        assert (bridge.count(POINTS), bridge.count(PEOPLE)) == (2, 2)
+        for _again in range(2):  # the first after a jump back finds transforms of the time before
+            bridge.send_tf(bridge.now_ns, 'base_link', (0, 0, 0))
+            bridge.send(bridge.now_ns, person(1, 2, 0))
+        assert len(bridge.newest(POINTS)[1]) and len(bridge.newest(PEOPLE)[1]) == 1
+
+
+def test_who_stands_is_not_pushed_while_arrays_are_sent_again():
+    with bridge_with('people, mpc') as bridge:
+        bridge.send(START_NS, person(1, 3, 0, moving=False, speed=0.19, steps=0))
+        for step in range(1, 9):
+            bridge.tell(START_NS + step * NS // 10)
+            bridge.tick()
+        found = bridge.newest(PEOPLE)[1][0]
+        assert bridge.count(PEOPLE) == 9 and (found.position.x, found.velocity.x) == (3, 0)
+        assert bridge.newest(MPC)[1][0].pose.position.x == 3
+
+
+@pytest.mark.parametrize('planner_frame, counted', [('', True), ('odom', False)])
+def test_obstacles_of_a_large_map_are_warned_of_unless_the_planner_has_a_frame_near_them(planner_frame, counted):
+    with bridge_with('teb', planner_frame=planner_frame) as bridge:
+        bridge.send_tf(START_NS, 'odom', (448262.0, 5411933.0, 0))
+        bridge.send(START_NS, person(1, 448265.0, 5411934.0))
+        assert ('coordinates rounded' in bridge.counts) == counted and bridge.count(TEB) == 1
+
+
+STEPS = st.lists(st.tuples(st.sampled_from(['tracks', 'tick']), st.floats(-1.5, 1.5), st.floats(-1.5, 1.5)),
+                 min_size=1, max_size=25)
+
+
+@given(STEPS)
+@settings(deadline=None, max_examples=60)
+def test_planners_keep_people_for_as_long_as_their_tracks_are_of_now_whatever_the_clock_does(steps):
+    """Against a model: the clock jumps by any time, and tracks carry stamps of the past and of the future."""
+    with bridge_with('people') as bridge:
+        arrival_ns = stamp_ns = shown_m = None
+        for what, jump_s, off_s in steps:
+            bridge.tell(bridge.now_ns + int(jump_s * NS))
+            now_ns, off_ns = bridge.now_ns, int(off_s * NS)
+            if what == 'tracks':
+                bridge.send(now_ns + off_ns, person(1, 0, 0))
+                if abs(off_ns) <= NS:
+                    arrival_ns, stamp_ns, shown_m = now_ns, now_ns + off_ns, max(-off_ns, 0) / NS
+            else:
+                bridge.tick()
+                if arrival_ns is not None and not 0 <= now_ns - arrival_ns <= NS:
+                    arrival_ns = shown_m = None
+                elif arrival_ns is not None and now_ns - arrival_ns >= NS // 10:
+                    shown_m = max(now_ns - stamp_ns, 0) / NS
+            found = bridge.newest(PEOPLE)[1] if bridge.count(PEOPLE) else []
+            assert [place.position.x for place in found] == ([] if shown_m is None else [pytest.approx(shown_m)])
