@@ -178,3 +178,18 @@ def test_every_image_is_answered_where_no_camera_info_carries_a_stamp(rig_of, no
     for image in range(5):
         rig.send(INFO_TOPIC, stamped(0))
         assert image == 0 or rig.has_answered(), image
+
+
+@pytest.mark.parametrize('node', ['tracker_node', 'depth_detector_node', 'planner_bridge_node'])
+@pytest.mark.parametrize('ahead_ns', [5 * NS, HOUR_NS])
+def test_one_transform_of_the_future_costs_two_images(rig_of, node, ahead_ns):
+    """tf2 refuses all that is 10 s older than the newest."""
+    rig = rig_of(node)
+    for _image in range(5):
+        rig.send()
+    _send_transforms(rig._connections, rig._now_ns + ahead_ns)
+    answered = []
+    for _image in range(10):
+        rig.send()
+        answered.append(rig.has_answered())
+    assert all(answered[2:]), answered
