@@ -8,6 +8,7 @@ import numpy as np
 import tf2_ros
 from std_msgs.msg import Header
 
+from ros_3d_bb.camera_clocks import JUMP_NS, CameraClocks, RecentStamps
 from ros_3d_bb.images import depth_from
 from ros_3d_bb.messages import camera_from_message, detections_from_message, stamp_of, time_from, usable_boxes3d
 from ros_3d_bb.params import check_not_negative, nearest_name
@@ -16,12 +17,11 @@ from ros_3d_bb.tracking.measuring import NoiseParams
 from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.thesis import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.tracked import View
-from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
+from ros_3d_bb.tracking.tracker import LATEST_NS, Tracker, TrackerParams
 from ros_3d_bb.tracking.visibility import depths_towards
 
 TRACKING_PARAMS = ThesisTrackerParams, TrackerParams, NoiseParams, PredictionParams
 TRACKERS = {'thesis': (ThesisTracker, slice(0, 1)), 'kalman': (Tracker, slice(1, 4))}  # with their part of those
-JUMP_NS = NS  # stamps of a camera that go back by more are a jump in time, by less a late message
 ON_THE_WAY_NS = 2 * NS  # so long after one cameras may send images of the time before; who goes on has another clock
 NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/\w+)*$')
 
@@ -93,9 +93,10 @@ class Follower(object):
         self._params, self._tally, self._transforms = params, tally, transforms
         self._tracker = _trackers_of(tracking)[params.tracker]
         self._images_lock, self._tracks_lock = threading.Lock(), threading.Lock()
+        self._clocks, self._recent = CameraClocks(), RecentStamps(LATEST_NS)
         self._newest_ns = {}  # by camera, of the images that were taken
         self._before_ns, self._jump = {}, _Jump()  # the newest before it, of cameras that may not have jumped yet
-        self._frames = {}  # and the cameras that have them
+        self._frames = {}  # by camera
         self._intrinsics = {}
         self._depths = {camera: StampedCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
 
@@ -131,7 +132,8 @@ class Follower(object):
         Returns
         -------
         Followed or None
-            None where there is no transform for it, or where it is of the time before a jump back.
+            None where there is no transform for it, where it is of the time before a jump back, or where its stamp
+            is ahead of those of other cameras.
 
         Raises
         ------
@@ -185,7 +187,9 @@ class Follower(object):
             if jumps != self._jump.number:
                 self._leave_out(stamp_ns, camera)
                 return None
+            self._recent.check(stamp_ns, camera)
             tracks = self._tracker.update(stamp_ns, detections, self._view(stamp_ns, located))
+            self._recent.add(stamp_ns, camera)
             self._newest_ns[camera] = max(stamp_ns, self._newest_ns.get(camera, stamp_ns))
             newest_ns = max(self._newest_ns.values())
         self._tally.count('images tracked')
@@ -208,9 +212,16 @@ class Follower(object):
         return View(located.fixed_from_camera, camera, name, depth_at)
 
     def _is_of_this_time(self, stamp_ns, now_ns, camera):
-        """Whether boxes are none of the time before a jump back; where they are the first after one, follow it."""
-        newest_ns = self._newest_ns.get(camera)
-        if newest_ns is not None and stamp_ns < newest_ns - JUMP_NS:
+        """Whether boxes are neither ahead of other cameras nor of the time before a jump back; where they are the first
+        after one, follow it.
+        """
+        other = self._clocks.accept(stamp_ns, now_ns, camera, is_trusted=camera in self._before_ns)
+        if other is not None:
+            self._tally.warn('images ahead of other cameras', 'boxes of %s at %.3f are left out: their stamp is more '
+                             'than %.0f s ahead of those of %s; such boxes are taken when that camera follows or ends'
+                             % (camera, stamp_ns / NS, JUMP_NS / NS, other))
+            return False
+        if self._is_jump_back(stamp_ns, now_ns, camera):
             self._go_back(stamp_ns, now_ns, camera)
         if camera not in self._before_ns:
             return True
@@ -222,16 +233,26 @@ class Follower(object):
         del self._before_ns[camera]
         return True
 
+    def _is_jump_back(self, stamp_ns, now_ns, camera):
+        """Whether the stamps of a camera went back, or only cameras that have ended are ahead of it."""
+        ahead = [other for other, newest_ns in self._newest_ns.items() if stamp_ns < newest_ns - JUMP_NS]
+        return camera in ahead or bool(ahead) and not any(self._clocks.is_alive(other, now_ns) for other in ahead)
+
     def _go_back(self, stamp_ns, now_ns, camera):
         """Forget tracks and transforms, as the stamps of a camera went back: a bag looped, or somebody sought in it.
 
-        Images of other cameras may still be on their way from the time before.
+        Images of other cameras may still be on their way from the time before, unless they have ended.
         """
         self._tally.note('jumps back in time', 'time went back from %.3f to %.3f: tracks and transforms of the '
-                         'time before are forgotten' % (self._newest_ns.pop(camera) / NS, stamp_ns / NS))
+                         'time before are forgotten' % (max(self._newest_ns.values()) / NS, stamp_ns / NS))
         self._tracker.reset()
         self._transforms.go_back()
-        self._before_ns.update(self._newest_ns)
+        self._newest_ns.pop(camera, None)
+        for other, newest_ns in self._newest_ns.items():
+            if self._clocks.is_alive(other, now_ns):
+                self._before_ns[other] = newest_ns
+            else:
+                self._clocks.forget(other)
         self._newest_ns = {}
         self._jump = _Jump(self._jump.number + 1, stamp_ns, now_ns)
 
@@ -244,10 +265,10 @@ class Follower(object):
 
     def _check_frame(self, frame_id, camera):
         """Say so where two cameras have one frame: tf then takes them to be in one place."""
-        cameras = self._frames.setdefault(frame_id, [])
-        if camera in cameras:
+        if self._frames.get(camera) == frame_id:
             return
-        cameras.append(camera)
+        self._frames[camera] = frame_id
+        cameras = [other for other in self.cameras if self._frames.get(other) == frame_id]
         if len(cameras) > 1:
             self._tally.note('cameras with one frame', 'the boxes of %s are all in the frame %s: they are taken for '
                              'those of cameras in one place; each camera needs a frame of its own'

@@ -9,7 +9,7 @@ from ros_3d_bb.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.estimation import DepthImage, check_rect, estimate_boxes, estimator_named, is_plausible
 from ros_3d_bb.geometry import Camera
 from ros_3d_bb.images import depth_from
-from ros_3d_bb.messages import boxes2d_from_message, camera_from_message, stamp_of, time_from
+from ros_3d_bb.messages import boxes2d_from_message, camera_from_message, stamp_if_any, stamp_of, time_from
 from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.stamped import NS, Pairing
 from ros_3d_bb.tracking.tracked import LARGEST_M
@@ -86,7 +86,7 @@ class Lifter(object):
     def add_camera_info(self, message, now_ns):
         """Take a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
         camera = camera_from_message(message)
-        return self._lifted(self._pairing.add_camera(message.header.stamp.to_nsec(), now_ns, camera))
+        return self._lifted(self._pairing.add_camera(stamp_if_any(message), now_ns, camera))
 
     def add_depth(self, message, now_ns):
         """Take a depth image. Raises ValueError where it carries no stamp."""

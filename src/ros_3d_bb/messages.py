@@ -54,6 +54,11 @@ def stamp_of(message):
     return stamp_ns
 
 
+def stamp_if_any(message):
+    """As `stamp_of`, but None where the stamp is zero: for what holds at any time, such as a CameraInfo."""
+    return stamp_of(message) if message.header.stamp else None
+
+
 def check_transforms(message):
     """Raise ValueError where a transform in a tf2_msgs/TFMessage has a stamp beyond what tf2 can reckon with: it would
     end the process.

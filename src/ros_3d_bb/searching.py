@@ -12,7 +12,7 @@ from ros_3d_bb.detection.yolov5 import Yolov5
 from ros_3d_bb.diagnosis.camera_faults import units_fault
 from ros_3d_bb.geometry import transform_from
 from ros_3d_bb.images import depth_from, rgb_from
-from ros_3d_bb.messages import camera_from_message, stamp_of
+from ros_3d_bb.messages import camera_from_message, stamp_if_any, stamp_of
 from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.stamped import NS, Pairing
 
@@ -106,7 +106,7 @@ class DepthSearch(object):
     def add_camera_info(self, message, now_ns):
         """Take a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
         camera = camera_from_message(message)
-        return self._ready(self._pairing.add_camera(message.header.stamp.to_nsec(), now_ns, camera))
+        return self._ready(self._pairing.add_camera(stamp_if_any(message), now_ns, camera))
 
     def add_depth(self, message, now_ns):
         """Take a depth image. Raises ValueError where it carries no stamp."""

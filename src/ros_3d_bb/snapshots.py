@@ -46,7 +46,7 @@ class Snapshots(object):
         return self._keep(self._pairing.add_depth(stamp_ns, now_ns, depth), now_ns)
 
     def add_camera(self, stamp_ns, now_ns, camera):
-        """Take the camera of an image. Returns as `add_color`."""
+        """Take the camera of an image, as `Pairing.add_camera`. Returns as `add_color`."""
         return self._keep(self._pairing.add_camera(stamp_ns, now_ns, camera), now_ns)
 
     def add_boxes2d(self, stamp_ns, now_ns, boxes):

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 NS = 1000000000  # nanoseconds in a second
 MAX_WAITING = 100  # boxes that wait at once; more than any camera sends in a second
+MAX_RATE_HZ = 100  # by stamps; of a topic whose stamps are closer, a cache keeps the newest messages only
 
 
 def arrival_clock_ns():
@@ -21,11 +22,15 @@ class Stamped(NamedTuple):
 
 
 class StampedCache(object):
-    """The latest values of one topic, as far back as `length_ns` before the newest."""
+    """The latest values of one topic, as far back as `length_ns` before the newest.
+
+    Their number is bounded, whatever the stamps are: a driver whose clock hangs, or a frozen /clock, must not fill the
+    memory. The bound is a count, as arrival times say nothing where a bag is played slowly.
+    """
 
     def __init__(self, length_ns):
         self._length_ns = length_ns
-        self._entries = collections.deque()
+        self._entries = collections.deque(maxlen=length_ns * MAX_RATE_HZ // NS + 1)
 
     def __len__(self):
         return len(self._entries)
@@ -43,7 +48,7 @@ class StampedCache(object):
         """Keep a value.
 
         One topic brings its stamps in order; where one goes back, time did (a bag looped, somebody sought in it), and
-        the values of the time before are forgotten.
+        the values of the time before are forgotten. Of values with equal stamps the newest is kept.
 
         Returns
         -------
@@ -53,6 +58,8 @@ class StampedCache(object):
         went_back = bool(self._entries) and stamp_ns < self.newest_ns
         if went_back:
             self.clear()
+        elif stamp_ns == self.newest_ns:
+            self._entries.pop()
         self._entries.append(Stamped(stamp_ns, arrival_ns, value))
         while self._entries[0].stamp_ns < stamp_ns - self._length_ns:
             self._entries.popleft()
@@ -89,7 +96,7 @@ class Pairing(object):
     Boxes come later than their depth image by the time the detector takes. Those that come first wait for it, and for
     its camera; where that is lost, the one nearest in time serves once the next image shows that it will not come.
     Boxes without a stamp are paired by their arrival: with the depth image that came nearest to `assumed_delay_ns`
-    before them.
+    before them. A camera without a stamp serves any image: what it says of the lens does not change with time.
 
     Each `add_` returns what it settled, a list of (Frame, boxes) in the order in which the boxes came; (None, boxes)
     where the image did not come in time, or was lost.
@@ -107,6 +114,7 @@ class Pairing(object):
     def __init__(self, length_ns, tolerance_ns, assumed_delay_ns):
         self._length_ns, self._tolerance_ns, self.assumed_delay_ns = length_ns, tolerance_ns, assumed_delay_ns
         self._depths, self._cameras = StampedCache(length_ns), StampedCache(length_ns)
+        self._plain_camera = None  # without a stamp; None where the newest one has a stamp
         self._waiting = []
         self._end_before_ns = 0  # the last stamp before time went back
         self._forgotten = 0
@@ -119,7 +127,7 @@ class Pairing(object):
     @property
     def has_camera(self):
         """Whether any camera has come."""
-        return len(self._cameras) > 0
+        return len(self._cameras) > 0 or self._plain_camera is not None
 
     def add_depth(self, stamp_ns, now_ns, depth):
         """Take a depth image; where its stamp goes back, everything of the time before is forgotten."""
@@ -133,8 +141,13 @@ class Pairing(object):
         return self._settled(now_ns)
 
     def add_camera(self, stamp_ns, now_ns, camera):
-        """Take the camera of an image."""
-        self._cameras.add(stamp_ns, now_ns, camera)
+        """Take the camera of an image; `stamp_ns` None where it carries no stamp: it then replaces all others."""
+        if stamp_ns is None:
+            self._cameras.clear()
+            self._plain_camera = camera
+        else:
+            self._cameras.add(stamp_ns, now_ns, camera)
+            self._plain_camera = None
         return self._settled(now_ns)
 
     def add_boxes(self, stamp_ns, now_ns, boxes):
@@ -181,6 +194,8 @@ class Pairing(object):
         depth = self._depths.at(stamp_ns, self._tolerance_ns)
         if depth is None:
             return None
+        if self._plain_camera is not None:
+            return Frame(depth.stamp_ns, depth.value, self._plain_camera)
         camera = self._cameras.at(depth.stamp_ns, self._tolerance_ns)
         if camera is None and max(self._depths.newest_ns, self._cameras.newest_ns or 0) > depth.stamp_ns:
             camera = self._cameras.at(depth.stamp_ns, float('inf'))

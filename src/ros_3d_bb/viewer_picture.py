@@ -44,14 +44,18 @@ class FrameRate(object):
     def add(self, arrival_ns):
         """An image came."""
         self._arrivals_ns.append(arrival_ns)
+        self._forget_before(arrival_ns - MEASURED_NS)  # also where the rate is never asked for
 
     def at(self, now_ns):
         """Images a second of late; 0 where fewer than two came."""
-        while self._arrivals_ns and self._arrivals_ns[0] < now_ns - MEASURED_NS:
-            self._arrivals_ns.popleft()
+        self._forget_before(now_ns - MEASURED_NS)
         if len(self._arrivals_ns) < 2:
             return 0.0
         return (len(self._arrivals_ns) - 1) * NS / max(1, self._arrivals_ns[-1] - self._arrivals_ns[0])
+
+    def _forget_before(self, oldest_ns):
+        while self._arrivals_ns and self._arrivals_ns[0] < oldest_ns:
+            self._arrivals_ns.popleft()
 
 
 def compose(view, panel_width_px, farthest_m):

@@ -2,7 +2,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.stamped import NS, Frame, Pairing, StampedCache
+from ros_3d_bb.stamped import MAX_RATE_HZ, MAX_WAITING, NS, Frame, Pairing, StampedCache
 
 MS = NS // 1000
 PERIOD = 33 * MS
@@ -161,3 +161,84 @@ def test_the_cache_keeps_no_more_than_its_length_in_order(stamps):
 def test_an_empty_cache_has_no_answer():
     cache = StampedCache(NS)
     assert cache.newest_ns is None and cache.at(0, NS) is None and cache.arrived_at(0, NS) is None
+
+
+def test_of_equal_stamps_the_newest_value_is_kept():
+    """The clock of a driver hangs, or /clock is frozen."""
+    cache = StampedCache(NS)
+    for number in range(1000):
+        assert cache.add(NS, number, number) is False
+    assert len(cache) == 1 and cache.at(NS) == (NS, 999, 999)
+
+
+@pytest.mark.parametrize('length_ns', [0, NS // 2, NS, 10 * NS])
+def test_stamps_that_creep_keep_no_more_than_the_fastest_camera_would(length_ns):
+    cache = StampedCache(length_ns)
+    for number in range(3000):
+        cache.add(number, number, number)
+    kept = [entry.value for entry in reversed(cache)]
+    assert len(kept) == length_ns * MAX_RATE_HZ // NS + 1 and kept == list(range(2999, 2999 - len(kept), -1))
+
+
+@pytest.mark.parametrize('rate_hz,length_ns', [(90, NS), (100, 10 * NS), (30, 60 * NS)])
+def test_what_a_real_camera_sends_is_kept_for_the_whole_length(rate_hz, length_ns):
+    """However slowly it is played: nothing depends on when it arrives."""
+    cache = StampedCache(length_ns)
+    for number in range(70 * rate_hz):
+        cache.add(number * NS // rate_hz, 3600 * NS * number, number)
+    oldest = [entry for entry in reversed(cache)][-1]
+    assert cache.newest_ns - oldest.stamp_ns > length_ns - NS // rate_hz
+
+
+def held_by(pairing):
+    return len(pairing._depths), len(pairing._cameras), len(pairing._waiting)
+
+
+@given(st.lists(st.tuples(st.sampled_from(['depth', 'camera', 'boxes']),
+                          st.sampled_from([0, 0, 1, 2, MS, PERIOD, -1, -PERIOD, 3600 * NS, -3600 * NS])),
+                min_size=200, max_size=600))
+def test_a_pairing_holds_a_bounded_number_whatever_the_stamps_are(steps):
+    """Stamps stand still, creep, leap and go back."""
+    pairing, stamp_ns = Pairing(NS // 10, 5 * MS, 0), 10000 * NS
+    for number, (kind, step_ns) in enumerate(steps):
+        stamp_ns = max(1, stamp_ns + step_ns)
+        getattr(pairing, 'add_' + kind)(stamp_ns, number, number)
+        depths, cameras, waiting = held_by(pairing)
+        assert max(depths, cameras) <= 11 and waiting <= MAX_WAITING
+
+
+@pytest.mark.parametrize('kind', ['depth', 'camera', 'boxes'])
+def test_one_stamp_of_the_future_costs_what_is_on_its_way(kind):
+    """An hour ahead, while the detector takes 0.2 s: at most these six images and the wrong one are lost."""
+    pairing, settled = Pairing(NS, 5 * MS, 0), []
+    for number in range(120):
+        for other, late in (('camera', 0), ('depth', 0), ('boxes', 6)):
+            sent = number - late
+            ahead_ns = 3600 * NS if other == kind and sent == 60 else 0
+            settled += getattr(pairing, 'add_' + other)(sent * PERIOD + 9 * NS + ahead_ns, number * PERIOD, sent)
+    answered = [boxes for frame, boxes in settled if frame is not None and frame.depth == boxes]
+    lost = set(range(114)) - set(answered)
+    expected = {'depth': set(range(54, 61)), 'camera': set(), 'boxes': {60}}
+    assert lost == expected[kind]
+
+
+def test_a_camera_without_a_stamp_serves_any_image_at_once():
+    pairing = Pairing(NS, 5 * MS, 0)
+    for number in range(1000):
+        assert pairing.add_camera(None, number, 'plain') == []
+    assert pairing.has_camera and held_by(pairing) == (0, 0, 0)
+    pairing.add_depth(PERIOD, 0, 'one')
+    assert pairing.add_boxes(PERIOD, 0, 'boxes') == [(Frame(PERIOD, 'one', 'plain'), 'boxes')]
+    pairing.add_depth(3600 * NS, 1, 'later')
+    pairing.add_depth(2 * PERIOD, 2, 'after time went back')
+    (frame, _boxes), = pairing.add_boxes(2 * PERIOD, 3, 'boxes')
+    assert frame.camera == 'plain'
+
+
+def test_the_newest_camera_counts_with_a_stamp_or_without(pairing):
+    pairing.add_camera(None, 0, 'plain')
+    pairing.add_depth(PERIOD, 1, 'one')
+    assert pairing.add_boxes(PERIOD, 1, 'boxes')[0][0].camera == 'plain'
+    pairing.add_camera(2 * PERIOD, 2, 'stamped')
+    pairing.add_depth(2 * PERIOD, 3, 'two')
+    assert pairing.add_boxes(2 * PERIOD, 3, 'boxes')[0][0].camera == 'stamped'

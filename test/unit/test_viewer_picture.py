@@ -6,7 +6,7 @@ from ros_3d_bb.estimation import Box3D, DepthImage
 from ros_3d_bb.overlay import BOX_COLOR
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.overlay import colors_of
-from ros_3d_bb.viewer_picture import WARNING_INK, FrameRate, View, box_lines, compose, text_picture
+from ros_3d_bb.viewer_picture import MEASURED_NS, WARNING_INK, FrameRate, View, box_lines, compose, text_picture
 
 BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75,
             (True,) * 4)
@@ -89,3 +89,12 @@ def test_the_frame_rate_is_that_of_the_last_images():
         rate.add(10 * NS + number * NS // 30)
     assert rate.at(11 * NS) == pytest.approx(30.0, rel=1e-6)
     assert rate.at(20 * NS) == 0
+
+
+def test_arrivals_are_forgotten_where_the_rate_is_never_asked_for():
+    """Without a window."""
+    rate = FrameRate()
+    for number in range(3000):
+        rate.add(number * NS // 30)
+    assert len(rate._arrivals_ns) <= 31 * MEASURED_NS // NS
+    assert rate.at(2999 * NS // 30) == pytest.approx(30.0)

@@ -8,6 +8,7 @@ from unittest import mock
 import genpy
 import numpy as np
 import pytest
+from std_msgs.msg import Header
 
 from fuzz import hostile
 from fuzz.nodes import TARGETS, _quiet, _send_transforms
@@ -41,6 +42,11 @@ def fields(**values):
     return change
 
 
+def stamped(stamp_ns):
+    """A change of the stamp of this message alone; those of one image share their header."""
+    return lambda message: setattr(message, 'header', Header(stamp=time_from(stamp_ns), frame_id='camera'))
+
+
 def truncated(message):
     message.data = message.data[:100]
 
@@ -61,7 +67,8 @@ IMAGES = [(fields(step=1), 'image data is too short'), (truncated, 'image data i
           (fields(encoding='9UC7'), "has encoding '9UC7'; expected one of"),
           (fields(header__stamp=genpy.Time()), 'carries no stamp (zero)')]
 CAMERAS = [(intrinsics(0, 0.0), 'fx=0 fy=60'), (intrinsics(4, float('nan')), 'fy=nan'),
-           (fields(width=0, height=0), 'camera size 0 x 0 is not positive')]
+           (fields(width=0, height=0), 'camera size 0 x 0 is not positive'), (stamped(0), None),
+           (stamped(START_NS + HOUR_NS), None), (stamped(START_NS - 900 * NS), None)]
 CASES = [('bbox3d_node', BOXES_TOPIC) + case for case in (
     (boxes2d(26, 8, 38), '3 numbers; a multiple of 4 expected'),
     (boxes2d(38, 44, 26, 8), '(38, 44, 26, 8) is empty or reversed'), (boxes2d(26, 8, 26, 8), 'is empty or reversed'),
@@ -79,6 +86,10 @@ CASES += [(node, COLOR_TOPIC) + case for node in ('yolov5_node', 'depth_detector
                                 (fields(header__stamp=time_from(START_NS - 900 * NS)), None)]]
 CASES += [(node, INFO_TOPIC) + case for node in ('bbox3d_node', 'depth_detector_node', 'tracker_node', 'viewer_node')
           for case in CAMERAS]
+CASES += [(node, topic, stamped(START_NS + offset_ns), None) for offset_ns in (HOUR_NS, -900 * NS) for node, topic in (
+    ('bbox3d_node', DEPTH_TOPIC), ('depth_detector_node', DEPTH_TOPIC), ('depth_detector_node', COLOR_TOPIC),
+    ('tracker_node', DEPTH_TOPIC), ('viewer_node', DEPTH_TOPIC), ('viewer_node', COLOR_TOPIC),
+    ('viewer_node', BOXES3D_TOPIC))]
 CASES += [(node, INFO_TOPIC, fields(width=32, height=24), 'aligned') for node in ('bbox3d_node', 'depth_detector_node')]
 CASES += [('bbox3d_node', INFO_TOPIC, intrinsics(0, 90.0), None)]
 CASES += [('tracker_node', BOXES3D_TOPIC) + case for case in (
@@ -159,3 +170,27 @@ def test_a_bad_message_is_said_and_the_next_good_one_works(rig_of, node, topic, 
     assert reason is None or any(reason in sentence for sentence in rig.said), rig.said
     rig.send()
     assert rig.has_answered()
+
+
+@pytest.mark.parametrize('node', ['bbox3d_node', 'depth_detector_node', 'tracker_node', 'viewer_node'])
+def test_every_image_is_answered_where_no_camera_info_carries_a_stamp(rig_of, node):
+    """Intrinsics do not change with time; the image is not kept waiting for the next one."""
+    rig = rig_of(node)
+    for image in range(5):
+        rig.send(INFO_TOPIC, stamped(0))
+        assert image == 0 or rig.has_answered(), image
+
+
+@pytest.mark.parametrize('node', ['tracker_node', 'depth_detector_node', 'planner_bridge_node'])
+@pytest.mark.parametrize('ahead_ns', [5 * NS, HOUR_NS])
+def test_one_transform_of_the_future_costs_two_images(rig_of, node, ahead_ns):
+    """tf2 refuses all that is 10 s older than the newest."""
+    rig = rig_of(node)
+    for _image in range(5):
+        rig.send()
+    _send_transforms(rig._connections, rig._now_ns + ahead_ns)
+    answered = []
+    for _image in range(10):
+        rig.send()
+        answered.append(rig.has_answered())
+    assert all(answered[2:]), answered

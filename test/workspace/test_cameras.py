@@ -95,7 +95,7 @@ def test_a_wrong_stamp_in_a_bag_keeps_the_other_camera_out_for_two_seconds_of_th
             if topic.startswith('/front/') and elapsed_s > 0.7:
                 if elapsed_s > 0.9:
                     continue
-                set_back(message)
+                shift(message, -10)
                 last = time
             elif topic == '/left/yolo_bounding_box':
                 left.append(time)
@@ -106,14 +106,34 @@ def test_a_wrong_stamp_in_a_bag_keeps_the_other_camera_out_for_two_seconds_of_th
     assert answered and answered == [time for time in left if (time - last).to_sec() > 2]
 
 
-def set_back(message):
-    """Give a message of a camera a stamp of 10 s before."""
+def test_a_stamp_of_the_future_in_a_bag_keeps_the_other_camera_out_of_nothing(bags, tmp_path):
+    """The front camera ends with it, an hour ahead of the left one."""
+    path, left = str(tmp_path / 'in.bag'), 0
+    with rosbag.Bag(bags[0]) as bag, rosbag.Bag(path, 'w') as changed:
+        start = bag.get_start_time()
+        for topic, message, time in bag.read_messages():
+            elapsed_s = time.to_sec() - start
+            if topic.startswith('/front/') and elapsed_s > 0.7:
+                if elapsed_s > 0.9:
+                    continue
+                shift(message, 3600)
+            left += topic == '/left/yolo_bounding_box' and elapsed_s > 0.9
+            changed.write(topic, message, time)
+    tally = process_bag(path, str(tmp_path / 'out.bag'), BOTH)
+    with rosbag.Bag(str(tmp_path / 'out.bag')) as bag:
+        answered = [time for _topic, _message, time in bag.read_messages('/ros_3d_bb/tracks')
+                    if time.to_sec() - start > 0.9]
+    assert len(answered) == left > 10 and tally.counts['images ahead of other cameras'] >= 1
+
+
+def shift(message, seconds):
+    """Change the stamp of a message of a camera."""
     if hasattr(message, 'header'):
-        message.header.stamp -= rospy.Duration(10)
+        message.header.stamp += rospy.Duration(seconds)
     else:
         label = message.layout.dim[0].label
         stamp = re.search(r'stamp=(\d+)', label).group(1)
-        message.layout.dim[0].label = label.replace(stamp, str(int(stamp) - 10), 1)
+        message.layout.dim[0].label = label.replace(stamp, str(int(stamp) + seconds), 1)
 
 
 def test_the_node_publishes_what_process_bag_writes(bags):

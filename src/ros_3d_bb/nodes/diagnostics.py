@@ -1,4 +1,5 @@
 """What a node did with its input, on /diagnostics and in the log."""
+import collections
 import contextlib
 import threading
 import time
@@ -14,6 +15,7 @@ from ros_3d_bb.tally import Tally
 PERIOD_S = 1.0
 WARNING_LASTS_S = 5.0
 REMINDER_S = 30.0  # between two lines of the log about what stays wrong
+MOST_LAGS = 10000  # that wait for a report, where none can be made
 UNHEARD_S = 5.0  # without subscribers; they may be starting, too
 
 
@@ -40,7 +42,8 @@ class Diagnostics(Tally):
         super(Diagnostics, self).__init__()
         self._warning, self._warned_at = '', None
         self._logged_at, self._lasted = {}, set()
-        self._lags_ns, self._looked_s, self._heard_s = [], time.monotonic(), time.monotonic()
+        self._lags_ns = collections.deque(maxlen=MOST_LAGS)  # since the last report
+        self._looked_s, self._heard_s = time.monotonic(), time.monotonic()
         inputs = InputWatch()
         self._shown, self._checks = [inputs.values], [inputs.faults]
         self._received = Tally()
@@ -140,7 +143,7 @@ class Diagnostics(Tally):
 
     def _answers(self):
         """(name, text) of what was answered since the last report."""
-        lags_ns, self._lags_ns = self._lags_ns, []
+        lags_ns, self._lags_ns = self._lags_ns, collections.deque(maxlen=MOST_LAGS)
         now_s = time.monotonic()
         passed_s, self._looked_s = max(now_s - self._looked_s, 1e-3), now_s
         answers = [('rate', '%.1f Hz' % (len(lags_ns) / passed_s))]

@@ -10,20 +10,27 @@ from ros_3d_bb.messages import check_transforms, transform_from_message
 
 LONGEST_WAIT_S = 0.05  # without news; shutting down takes no longer
 EXPLAINED_S = 2.0  # between two looks at the whole tree for one pair of frames; each takes as long as some images
+CACHE_S = 10.0  # tf2's buffer refuses transforms that are older than the newest of their frame by more
 ASKED_S = 10.0  # so long a pair of frames is shown after it was asked for
 
 
 class _Listener(tf2_ros.TransformListener):
-    """Takes transforms, and tells who waits for them."""
+    """Takes transforms, and tells who waits for them. Calls `on_refused` where tf2 refuses one as too old."""
 
-    def __init__(self, buffer):
+    def __init__(self, buffer, on_refused):
         self.news = threading.Condition()
+        self._on_refused, self._newest_s = on_refused, {}  # by child frame
         tf2_ros.TransformListener.__init__(self, buffer, tcp_nodelay=True)
 
     def callback(self, data):
         """Of /tf."""
         if not _are_usable(data):
             return
+        for transform in data.transforms:
+            stamp_s, child = transform.header.stamp.to_sec(), transform.child_frame_id
+            if stamp_s < self._newest_s.get(child, stamp_s) - CACHE_S:
+                self._on_refused()
+            self._newest_s[child] = stamp_s
         tf2_ros.TransformListener.callback(self, data)
         self._tell()
 
@@ -54,8 +61,8 @@ class Transforms(object):
     def __init__(self, wait_s):
         self._wait_s = wait_s
         self._buffer = tf2_ros.Buffer(debug=False)
-        self._listener = _Listener(self._buffer)
         self._from_before = False
+        self._listener = _Listener(self._buffer, self.go_back)
         self._asked, self._explanations = {}, {}  # by (target, source): when; (sentence, when)
 
     def lookup(self, target_frame, source_frame, stamp):
@@ -90,7 +97,8 @@ class Transforms(object):
                 self._listener.news.wait(min(left_s, LONGEST_WAIT_S))
 
     def go_back(self):
-        """Time went back: transforms of the time before may keep new ones out of the buffer.
+        """Time went back: transforms of the time before, or a single one of the future, may keep new ones out of the
+        buffer. It is cleared when the next lookup fails.
 
         Where /clock tells the time, tf2 forgets them by itself, and clearing now would lose the new ones.
         """

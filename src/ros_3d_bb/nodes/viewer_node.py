@@ -12,7 +12,7 @@ from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
 from ros_3d_bb.images import depth_from, rgb_from
 from ros_3d_bb.messages import (BOXES3D_TOPIC, boxes2d_from_message, boxes3d_from_message, camera_from_message,
-                                stamp_of, time_from, usable_boxes3d)
+                                stamp_if_any, stamp_of, time_from, usable_boxes3d)
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.label import Label
@@ -112,7 +112,8 @@ class ViewerNode(object):
     def _on_camera_info(self, message):
         with self._diagnostics.taking('camera_info'), self._lock:
             camera = camera_from_message(message)
-            self._note(CAMERA_INFO_TOPIC, self._snapshots.add_camera(stamp_of(message), arrival_clock_ns(), camera))
+            self._note(CAMERA_INFO_TOPIC, self._snapshots.add_camera(stamp_if_any(message), arrival_clock_ns(),
+                                                                     camera))
 
     def _on_boxes2d(self, message):
         with self._diagnostics.taking('2D boxes'), self._lock:

@@ -1,0 +1,266 @@
+"""Stamps of the future from one of several cameras, without a master: what they cost the others, and for how long."""
+import collections
+
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from ros_3d_bb.camera_clocks import MOST_RECENT
+from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
+from ros_3d_bb.messages import stamp_of
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tally import Tally
+from support.two_cameras import START_NS, Transforms, boxes
+
+HOUR_NS, MS = 3600 * NS, NS // 1000
+AHEAD, REFUSED, BACK = 'images ahead of other cameras', 'boxes refused', 'jumps back in time'
+PERIODS_NS = {'front': NS // 30, 'rear': NS // 25, 'left': NS // 10}
+
+
+class Play(object):
+    """Cameras that send boxes of somebody while time passes. `answers` are (now_ns, camera, Followed or None)."""
+
+    def __init__(self, *cameras):
+        self.tally, self.transforms, self.now_ns, self.answers = Tally(), Transforms(), 0, []
+        params = TrackerNodeParams(cameras=list(cameras) if len(cameras) > 1 else [])
+        self.follower = Follower(params, [kind() for kind in TRACKING_PARAMS], self.tally, self.transforms)
+        self.cameras, self.ahead_ns, self._due_ns = set(cameras), 0, {camera: 0 for camera in cameras}
+
+    def run(self, seconds, cameras=None, count=1, lags_ns=None):
+        """Let time pass. `lags_ns`: by camera, how long its boxes take."""
+        end_ns = self.now_ns + int(seconds * NS)
+        cameras = self.cameras if cameras is None else cameras
+        self._due_ns = {camera: max(due_ns, self.now_ns) for camera, due_ns in self._due_ns.items()}
+        while True:
+            camera = min(cameras, key=lambda name: (self._due_ns[name], name), default=None)
+            if camera is None or self._due_ns[camera] >= end_ns:
+                break
+            self.now_ns = self._due_ns[camera]
+            self._due_ns[camera] += PERIODS_NS[camera]
+            self.send(camera, -(lags_ns or {}).get(camera, 0), count)
+        self.now_ns = end_ns
+        return self
+
+    def send(self, camera, ahead_ns=0, count=1):
+        """One image; how far its stamp is ahead of what is right."""
+        message = boxes(START_NS + self.now_ns + self.ahead_ns + ahead_ns, camera, count)
+        followed = None
+        with self.tally.refusing('boxes'):
+            followed = self.follower.add_boxes(message, self.now_ns, camera if self.follower.cameras != ('',) else '')
+        self.answers.append((self.now_ns, camera, followed))
+        return followed
+
+    def lost(self, camera, since_ns=0):
+        """How many images of a camera had no answer."""
+        return sum(followed is None for now_ns, name, followed in self.answers if name == camera and now_ns >= since_ns)
+
+    @property
+    def ids(self):
+        """Of the tracks in the newest answer."""
+        return [track.id for track in [followed for _now_ns, _camera, followed in self.answers if followed][-1].tracks]
+
+
+@pytest.fixture
+def play():
+    return Play('front', 'rear')
+
+
+@pytest.mark.parametrize('goes_on', [True, False])
+@pytest.mark.parametrize('ahead_ns', [HOUR_NS, 10 * NS, 3 * NS // 2])
+def test_one_stamp_of_the_future_costs_the_other_camera_nothing(play, ahead_ns, goes_on):
+    play.run(2)
+    assert play.send('rear', ahead_ns) is None
+    play.run(10, {'front', 'rear'} if goes_on else {'front'})
+    assert play.lost('front') == 0 and play.lost('rear') == 1 and play.ids == [1]
+    assert dict(play.tally.counts, **{'images tracked': 0}) == {'images tracked': 0, AHEAD: 1}
+    assert play.transforms.jumps == 0
+
+
+def test_a_clock_that_is_an_hour_ahead_from_some_time_on_is_that_of_the_camera_that_is_refused(play):
+    play.run(2)
+    for _image in range(50):
+        play.run(0.04, {'front'})
+        assert play.send('rear', HOUR_NS) is None
+    assert play.lost('front') == 0 and play.tally.counts[AHEAD] == 50 and play.ids == [1]
+
+
+def test_it_is_taken_where_the_others_have_ended(play):
+    """They are gone for a second: then it is the only one, and its time counts."""
+    play.run(2)
+    play.ahead_ns = HOUR_NS
+    play.run(3, {'rear'})
+    answered_ns = [now_ns for now_ns, camera, followed in play.answers if camera == 'rear' and followed]
+    assert min(now_ns for now_ns in answered_ns if now_ns > 2 * NS) < 3 * NS + PERIODS_NS['rear']
+
+
+def test_a_camera_that_begins_with_a_stamp_of_the_future_and_ends_blinds_the_other_for_a_second(play):
+    play.send('rear', HOUR_NS)
+    play.run(10, {'front'})
+    assert play.lost('front', NS + PERIODS_NS['front'] + 1) == 0 and play.lost('front') == 31
+    assert play.tally.counts[BACK] == 1 and len(play.ids) == 1
+    play.run(10)
+    assert play.lost('rear', play.now_ns - 10 * NS) == 0 and play.tally.counts[BACK] == 1
+
+
+@pytest.mark.parametrize('seconds', [2, 100, 3600])
+def test_somebody_seeks_forward(play, seconds):
+    """The camera that comes first loses an image, or what it sends until the other one follows."""
+    play.run(3)
+    play.ahead_ns += seconds * NS
+    play.run(3)
+    assert play.tally.counts[AHEAD] == 1 == play.lost('front') + play.lost('rear') and play.transforms.jumps == 0
+
+
+def test_somebody_seeks_forward_while_boxes_of_one_camera_are_on_their_way(play):
+    lags_ns = {'rear': NS // 5}
+    play.run(3, lags_ns=lags_ns)
+    play.ahead_ns += 100 * NS
+    play.run(0.2, {'front'})
+    for late in range(5):  # of the time before
+        play.send('rear', -100 * NS - NS // 5 + late * PERIODS_NS['rear'])
+    begun_ns = play.now_ns
+    play.run(3, lags_ns=lags_ns)
+    assert play.lost('front', begun_ns) <= 1 and play.lost('rear', begun_ns) <= 1
+
+
+@pytest.mark.parametrize('seconds', [-2, -100])
+def test_somebody_seeks_back_or_a_bag_loops(play, seconds):
+    play.run(3, count=0)
+    play.ahead_ns += seconds * NS
+    play.run(3)
+    assert play.lost('front') + play.lost('rear') == 0
+    assert play.tally.counts[BACK] == 1 and AHEAD not in play.tally.counts
+
+
+@pytest.mark.parametrize('seconds', [0.5, 1.5, 10])
+@pytest.mark.parametrize('who', [{'front'}, {'rear'}, set()])
+def test_a_pause_of_one_camera_or_both_costs_no_image(play, seconds, who):
+    """`who` goes on meanwhile."""
+    play.run(2, count=0).run(seconds, who, count=0).run(2, count=0)
+    assert play.lost('front') + play.lost('rear') == 0 and set(play.tally.counts) == {'images tracked'}
+
+
+@pytest.mark.parametrize('seconds', [1.5, 10, 100])
+def test_a_bag_that_is_paused_costs_no_image(play, seconds):
+    """Stamps stand still meanwhile."""
+    play.run(2).run(seconds, set())
+    play.ahead_ns -= int(seconds * NS)
+    play.run(2)
+    assert play.lost('front') + play.lost('rear') == 0 and play.ids == [1]
+
+
+def test_a_camera_that_starts_late_is_taken_at_once(play):
+    play.run(20, {'front'}).run(3)
+    assert play.lost('front') + play.lost('rear') == 0
+
+
+@pytest.mark.parametrize('late_ns', [600 * MS, 2 * NS])
+def test_a_camera_that_is_always_late_does_not_refuse_the_other_after_a_pause(play, late_ns):
+    lags_ns = {'rear': late_ns}
+    play.run(3, lags_ns=lags_ns).run(1.5, {'rear'}, lags_ns=lags_ns).run(3, lags_ns=lags_ns)
+    assert play.lost('front') == 0
+
+
+def test_a_camera_without_a_transform_neither_loses_nor_costs_images(play):
+    play.transforms.missing.add('rear')
+    play.run(3)
+    play.send('rear', HOUR_NS)
+    play.run(3)
+    play.transforms.missing.clear()
+    begun_ns = play.now_ns
+    play.run(3)
+    assert play.lost('front') == 0 and play.lost('rear', begun_ns) == 0
+
+
+def test_of_three_cameras_two_that_leap_wait_for_the_third():
+    play = Play('front', 'rear', 'left')
+    play.run(2)
+    play.ahead_ns += 100 * NS
+    play.run(2)
+    assert all(play.lost(camera) <= 4 for camera in play.cameras)
+    before = play.tally.counts[AHEAD]
+    play.ahead_ns += 100 * NS
+    play.run(2, {'front', 'rear'})  # it has ended
+    assert play.lost('rear', play.now_ns - NS + PERIODS_NS['rear']) == 0 and play.tally.counts[AHEAD] > before
+
+
+@pytest.mark.parametrize('ahead_ns', [HOUR_NS, 700 * MS])
+def test_a_single_camera_goes_on_after_one_stamp_of_the_future(ahead_ns):
+    """By less than a second the next images are late, and refused for no longer than that."""
+    play = Play('front')
+    play.run(2)
+    assert play.send('front', ahead_ns) is not None
+    begun_ns = play.now_ns
+    play.run(3)
+    assert AHEAD not in play.tally.counts and play.lost('front') == (0 if ahead_ns == HOUR_NS else 6)
+    assert play.tally.counts.get(BACK, 0) == (ahead_ns == HOUR_NS) and len(play.ids) == 1
+    shown = [now_ns for now_ns, _camera, followed in play.answers if followed and followed.tracks and now_ns > begun_ns]
+    assert min(shown) - begun_ns < NS // 2
+
+
+def test_stamps_that_creep_are_refused_before_they_fill_the_memory():
+    play = Play('front')
+    for number in range(1000):
+        play.send('front', ahead_ns=number)
+    assert play.tally.counts['images tracked'] == MOST_RECENT
+    assert len(play.follower._tracker._history) == MOST_RECENT and len(play.follower._tracker._ids) <= MOST_RECENT
+    play.run(2)
+    assert play.lost('front', NS) == 0
+
+
+def test_frames_of_a_camera_that_change_all_the_time_are_not_kept(play):
+    for number in range(100):
+        play.follower.add_boxes(boxes(START_NS + number * PERIODS_NS['rear'], 'frame %d' % number), 0, 'rear')
+    assert len(play.follower._frames) == 1
+
+
+GLITCHES = st.tuples(st.floats(0.5, 8.0), st.sampled_from(sorted(PERIODS_NS)),
+                     st.sampled_from([HOUR_NS, 100 * NS, 2 * NS, 1200 * MS, 900 * MS, 400 * MS]), st.booleans())
+
+
+@settings(max_examples=15)
+@given(st.integers(1, 3), st.lists(GLITCHES, max_size=6), st.lists(st.integers(0, 300), min_size=3, max_size=3))
+def test_after_a_glitch_each_camera_is_answered_within_a_second(number, glitches, lags_ms):
+    """At random times random cameras send a stamp of the future, after which some of them end."""
+    cameras = sorted(PERIODS_NS)[:number]
+    play, ended = Play(*cameras), {}
+    lags_ns = {camera: lag_ms * MS for camera, lag_ms in zip(cameras, lags_ms)}
+    for seconds, camera, ahead_ns, ends in sorted(glitches):
+        if camera not in cameras or camera in ended:
+            continue
+        play.run(seconds - play.now_ns / NS, set(cameras) - set(ended), 0, lags_ns)
+        play.send(camera, ahead_ns, 0)
+        if ends:
+            ended[camera] = play.now_ns
+    play.run(11 - play.now_ns / NS, set(cameras) - set(ended), 0, lags_ns)
+    answered_ns = collections.defaultdict(lambda: [0])
+    for now_ns, camera, followed in play.answers:
+        if followed is not None:
+            answered_ns[camera].append(now_ns)
+    for camera in cameras:
+        times_ns = answered_ns[camera] + [ended.get(camera, play.now_ns)]
+        silent_ns = max(after - before for before, after in zip(times_ns, times_ns[1:]))
+        assert silent_ns <= NS + 2 * PERIODS_NS[camera], (camera, silent_ns)
+
+
+STEPS_NS = [0, 1, MS, NS // 30, NS // 30, 400 * MS, -NS // 30, -400 * MS, 2 * NS, -2 * NS, HOUR_NS, -HOUR_NS]
+
+
+@settings(max_examples=15)
+@given(st.integers(1, 3), st.lists(st.tuples(st.sampled_from(sorted(PERIODS_NS)), st.sampled_from(STEPS_NS),
+                                             st.sampled_from([0, MS, NS // 30, 2 * NS])), min_size=50, max_size=400))
+def test_what_is_kept_is_bounded_and_a_good_second_follows_whatever_the_stamps_were(number, images):
+    cameras = sorted(PERIODS_NS)[:number]
+    play, stamps_ns = Play(*cameras), collections.Counter({camera: 5 * HOUR_NS for camera in cameras})
+    for camera, step_ns, passed_ns in images:
+        if camera not in cameras:
+            continue
+        play.now_ns += passed_ns
+        stamps_ns[camera] = max(NS, stamps_ns[camera] + step_ns)
+        play.send(camera, stamps_ns[camera] - START_NS - play.now_ns, 1)
+        tracker = play.follower._tracker
+        assert len(tracker._history) <= number * MOST_RECENT and len(tracker._ids) <= 2 * number * MOST_RECENT
+    play.run(3.5, set(cameras), 1)
+    for camera in cameras:
+        assert play.lost(camera, play.now_ns - NS) == 0
+    newest = [followed for _now_ns, _camera, followed in play.answers if followed][-1]
+    assert abs(stamp_of(newest) - START_NS - play.now_ns) < NS // 2
