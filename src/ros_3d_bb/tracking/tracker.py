@@ -32,7 +32,7 @@ TRIES_S = 0.6  # how long a track that is not confirmed yet waits to be seen aga
 UNSURE_SHARE = 0.1  # of the density of a box at its centre: a newcomer's is not higher
 TAKEN_NS = NS // 5  # nobody new begins near somebody seen so recently
 SMOOTHING = 0.1  # share of the newest sighting in size and height
-CUT_SMOOTHING = 0.02  # the same of the width where the image border cuts the box on a side
+CUT_SMOOTHING = 0.02  # the same where the image border cuts the box on a side: the head may be outside
 HEAD_SIGMAS = 2.0  # the top of a head is known this much less well than a height: the camera tilts as the robot drives
 STILL_MOVING = 0.5  # of the speed at which somebody begins to move
 
@@ -308,13 +308,14 @@ def _update_size(seen, sightings):
     Lower and upper end are smoothed apart: an end that the image border cuts off stays where it was last seen. Until
     it is seen for the first time it is where the estimator expects it.
     """
-    share = np.maximum(SMOOTHING, 1 / seen['sightings'])
     cut, hits = sightings.vertical_cuts, seen['end_hits']
-    end_share = np.where(cut, np.where(hits > 0, 0, share[:, None]), np.maximum(SMOOTHING, 1 / (hits + 1)))
+    most = np.where(sightings.cut_sideways, CUT_SMOOTHING, 1)
+    share = np.minimum(most, np.maximum(SMOOTHING, 1 / seen['sightings']))
+    end_share = np.minimum(most[:, None], np.maximum(SMOOTHING, 1 / (hits + 1)))
+    end_share = np.where(cut, np.where(hits > 0, 0, share[:, None]), end_share)
     ends_m = _ends_of(seen['z_m'], seen['size_m'])
     ends_m += end_share * (_ends_of(sightings.z_m, sightings.sizes_m) - ends_m)
-    width_share = np.where(sightings.cut_sideways, CUT_SMOOTHING, share)
-    seen['size_m'][:, :2] += width_share[:, None] * (sightings.sizes_m[:, :2] - seen['size_m'][:, :2])
+    seen['size_m'][:, :2] += share[:, None] * (sightings.sizes_m[:, :2] - seen['size_m'][:, :2])
     seen['size_m'][:, 2] = ends_m[:, 1] - ends_m[:, 0]
     seen['z_m'] = ends_m.mean(axis=1)
     seen['z_m2'] += end_share.mean(axis=1) * (sightings.z_m2 - seen['z_m2'])
