@@ -68,7 +68,7 @@ class View(NamedTuple):
         edge of its image points.
         """
         ahead = self.fixed_from_camera[:2, 2]
-        if np.hypot(*ahead) < VERTICAL:
+        if ahead.dot(ahead) < VERTICAL ** 2:
             ahead = -self.fixed_from_camera[:2, 1]
         offsets = np.asarray(positions_m)[:, :2] - self.fixed_from_camera[:2, 3]
         bearings = np.arctan2(ahead[0] * offsets[:, 1] - ahead[1] * offsets[:, 0], offsets.dot(ahead))

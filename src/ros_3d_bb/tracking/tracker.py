@@ -142,7 +142,8 @@ class Tracker(object):
 
     def objects(self):
         """The people who are published now, by id, at the stamp of the newest image."""
-        tracks, params = np.sort(self._state.tracks, order='id'), self._params
+        tracks, params = self._state.tracks, self._params
+        tracks = tracks[np.argsort(tracks['id'])]
         known = (tracks['missed_s'] <= params.missed_limit) & (sigma_of(tracks) < params.unsure_limit)
         known |= tracks['status'] == VISIBLE
         known &= (tracks['status'] != OUT_OF_VIEW) | (tracks['unseen_s'] <= params.out_of_view_limit)
@@ -297,8 +298,9 @@ def _height_cost(tracks, sightings, sigma_m):
     heights_known = seen.all(axis=1)[:, None] & ~cut.any(axis=1)
     if heights_known.all():
         return cost
-    tops_m = _ends_of(tracks['z_m'], tracks['size_m'])[:, 1:], _ends_of(sightings.z_m, sightings.sizes_m)[:, 1]
-    top_cost = np.where(seen[:, 1:] & ~cut[:, 1], ((tops_m[0] - tops_m[1]) / (HEAD_SIGMAS * sigma_m)) ** 2 / 2, 0)
+    tops_m = tracks['z_m'] + tracks['size_m'][:, 2] / 2, sightings.z_m + sightings.sizes_m[:, 2] / 2
+    top_cost = ((tops_m[0][:, None] - tops_m[1]) / (HEAD_SIGMAS * sigma_m)) ** 2 / 2
+    top_cost[~(seen[:, 1:] & ~cut[:, 1])] = 0
     return np.where(heights_known, cost, top_cost)
 
 
@@ -308,23 +310,19 @@ def _update_size(seen, sightings):
     Lower and upper end are smoothed apart: an end that the image border cuts off stays where it was last seen. Until
     it is seen for the first time it is where the estimator expects it.
     """
-    cut, hits = sightings.vertical_cuts, seen['end_hits']
-    most = np.where(sightings.cut_sideways, CUT_SMOOTHING, 1)
-    share = np.minimum(most, np.maximum(SMOOTHING, 1 / seen['sightings']))
-    end_share = np.minimum(most[:, None], np.maximum(SMOOTHING, 1 / (hits + 1)))
-    end_share = np.where(cut, np.where(hits > 0, 0, share[:, None]), end_share)
-    ends_m = _ends_of(seen['z_m'], seen['size_m'])
-    ends_m += end_share * (_ends_of(sightings.z_m, sightings.sizes_m) - ends_m)
-    seen['size_m'][:, :2] += share[:, None] * (sightings.sizes_m[:, :2] - seen['size_m'][:, :2])
-    seen['size_m'][:, 2] = ends_m[:, 1] - ends_m[:, 0]
-    seen['z_m'] = ends_m.mean(axis=1)
-    seen['z_m2'] += end_share.mean(axis=1) * (sightings.z_m2 - seen['z_m2'])
+    cut = sightings.vertical_cuts
     seen['end_hits'] += ~cut
-
-
-def _ends_of(z_m, sizes_m):
-    """Heights (n, 2) of the lower and the upper end of upright bodies, metres."""
-    return z_m[:, None] + sizes_m[:, 2:] * (-0.5, 0.5)
+    end_share = np.maximum(SMOOTHING, 1 / np.maximum(seen['end_hits'], 1))
+    end_share[cut & (seen['end_hits'] > 0)] = 0
+    share = np.maximum(SMOOTHING, 1 / seen['sightings'])
+    share[sightings.cut_sideways] = CUT_SMOOTHING
+    end_share = np.minimum(end_share, np.where(sightings.cut_sideways, CUT_SMOOTHING, 1)[:, None])
+    up_m, taller_m = sightings.z_m - seen['z_m'], sightings.sizes_m[:, 2] - seen['size_m'][:, 2]
+    lower_m, upper_m = end_share[:, 0] * (up_m - taller_m / 2), end_share[:, 1] * (up_m + taller_m / 2)
+    seen['size_m'][:, :2] += share[:, None] * (sightings.sizes_m[:, :2] - seen['size_m'][:, :2])
+    seen['size_m'][:, 2] += upper_m - lower_m
+    seen['z_m'] += (lower_m + upper_m) / 2
+    seen['z_m2'] += end_share.mean(axis=1) * (sightings.z_m2 - seen['z_m2'])
 
 
 def _order(image):

@@ -96,6 +96,8 @@ def _held_by(look, missed, before, rows, places, tracks, farthest_m):
 
 def _places(missed, tracks, view, farthest_m):
     """What a camera could see of the places of missed people."""
+    if not len(missed):
+        return np.zeros(0, int)
     hiding = tracks[tracks['confirmed'] & (tracks['missed_s'] < HIDING_S)]
     return places_in(view, positions_of(missed), missed['size_m'], positions_of(hiding), farthest_m)
 

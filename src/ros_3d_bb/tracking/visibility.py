@@ -6,7 +6,7 @@ from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
 EDGE_RAD = 0.04  # people this close to the image border are not detected reliably
 NEAREST_M = 0.45  # nor are people this close to the camera
 LEAST_IN_IMAGE = 0.2  # share of the body axis that has to be in the image for a person to be detected
-AXIS_SAMPLES = np.linspace(-0.47, 0.47, 17)  # points of the body axis that are looked for, in heights from the centre
+AXIS_SAMPLES = np.linspace(-0.48, 0.48, 11)  # points of the body axis that are looked for, in heights from the centre
 BODY_RADIUS_M = 0.27
 NEARER_M = 0.25  # who hides another person is nearer by so much
 SEEN_BESIDE = 0.2  # and leaves so much of a half width to be seen, which is too narrow for a detector
@@ -38,7 +38,7 @@ def places_in(view, positions_m, sizes_m, others_m, farthest_m):
     places[_behind_others(distances_m, bearings, *view.bearings(others_m))] = OCCLUDED
     if view.depth_at is not None:
         places[_behind_something(view, positions_m, sizes_m)] = OCCLUDED
-    places[_out_of_view(view, positions_m, sizes_m, farthest_m)] = OUT_OF_VIEW
+    places[_out_of_view(view, positions_m, sizes_m, distances_m, bearings, farthest_m)] = OUT_OF_VIEW
     return places
 
 
@@ -60,17 +60,16 @@ def share_in_image(view, positions_m, heights_m, margin_rad=0.0):
     numpy.ndarray, (n,)
         0..1. Points to which the lens distortion gives no pixel are not in the image.
     """
-    camera = view.intrinsics
-    axes_m = np.repeat(positions_m[:, None], len(AXIS_SAMPLES), axis=1)
-    axes_m[..., 2] += AXIS_SAMPLES * heights_m[:, None]
-    rotation = view.fixed_from_camera[:3, :3]  # its inverse is its transpose
-    points = (axes_m - view.fixed_from_camera[:3, 3]).dot(rotation)
+    camera, rotation = view.intrinsics, view.fixed_from_camera[:3, :3]  # its inverse is its transpose
+    centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
+    points = centers[:, None] + (AXIS_SAMPLES * heights_m[:, None])[..., None] * rotation[2]
     in_front = points[..., 2] > 0
-    pixels = camera.project(np.where(in_front[..., None], points, (0, 0, 1)))
-    margin_px = margin_rad * np.array([camera.fx, camera.fy]) - 0.5  # the border is half a pixel from the centres
+    points[..., 2][~in_front] = 1  # they have no pixel
+    size = np.array([camera.width, camera.height])
+    half_px = size / 2.0 - margin_rad * np.array([camera.fx, camera.fy])
     with np.errstate(invalid='ignore'):  # nan is outside
-        inside = (pixels >= margin_px) & (pixels <= np.array([camera.width, camera.height]) - 1 - margin_px)
-    return (in_front & inside.all(axis=-1)).mean(axis=1)
+        inside = (np.abs(camera.project(points) - (size - 1) / 2.0) <= half_px).all(axis=-1)
+    return (in_front & inside).mean(axis=1)
 
 
 def depths_towards(camera, depth, points):
@@ -98,11 +97,10 @@ def depths_towards(camera, depth, points):
     return np.where(inside & measured, depths_m, np.nan)
 
 
-def _out_of_view(view, positions_m, sizes_m, farthest_m):
+def _out_of_view(view, positions_m, sizes_m, distances_m, bearings, farthest_m):
     """Which people the camera cannot detect: too close, too far, or with too little of the body in the image."""
     above_m = np.abs(positions_m[:, 2] - view.fixed_from_camera[2, 3]) - sizes_m[:, 2] / 2
-    horizontal_m, bearings = view.bearings(positions_m)
-    distances_m = np.hypot(horizontal_m, np.maximum(above_m, 0))
+    distances_m = np.hypot(distances_m, np.maximum(above_m, 0))
     outside = (distances_m < NEAREST_M) | (distances_m > farthest_m)
     if view.intrinsics is None:
         return outside | (np.abs(bearings) > np.pi / 2)
@@ -117,7 +115,7 @@ def _behind_others(distances_m, bearings, others_m, others_bearings):
 
 def wrapped(angles):
     """Angles from -pi to pi, radians."""
-    return np.remainder(angles + np.pi, 2 * np.pi) - np.pi
+    return angles - 2 * np.pi * np.rint(angles / (2 * np.pi))
 
 
 def _half_widths(distances_m):
