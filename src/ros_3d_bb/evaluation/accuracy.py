@@ -14,6 +14,7 @@ import numpy as np
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.error_model import read_error_model, write_error_model
 from ros_3d_bb.estimation import estimate_boxes, estimator_named, truncated_edges
+from ros_3d_bb.evaluation.defaults import default_weights, scenario_path
 from ros_3d_bb.evaluation.error_fit import coverage, data_of, fit_error_model, held_out
 from ros_3d_bb.evaluation.scenes import position_errors_m
 from ros_3d_bb.measurements import read_color, read_depth, read_session
@@ -235,11 +236,12 @@ def _arguments():
     data = os.environ.get('ROS_3D_BB_DATA')
     parser.add_argument('--data', default=data and os.path.join(data, 'data', 'thesis'), metavar='DIR',
                         help='a measurement session (default: $ROS_3D_BB_DATA/data/thesis)')
-    parser.add_argument('--scenarios', nargs='+', metavar='FILE', help='simulated scenes instead of a session')
+    parser.add_argument('--scenarios', nargs='+', type=scenario_path, metavar='SCENARIO',
+                        help='simulated scenes instead of a session')
     parser.add_argument('--error-model', metavar='FILE', help='correct by this instead of by the other positions')
     parser.add_argument('--fit', metavar='FILE', help='also write the error model of all frames')
     parser.add_argument('--boxes', choices=('recorded', 'yolov5'), default='recorded', help='default: recorded')
-    parser.add_argument('--weights', help='checkpoint or export, for --boxes yolov5')
+    parser.add_argument('--weights', default=default_weights(), help='checkpoint or export, for --boxes yolov5')
     parser.add_argument('--estimator', default='foreground', metavar='NAME', help='default: foreground')
     parser.add_argument('--json', metavar='FILE', help='also write the scores there')
     for name in ('source', 'camera', 'date'):

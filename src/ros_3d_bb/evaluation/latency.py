@@ -10,6 +10,7 @@ import sys
 import tempfile
 from typing import NamedTuple
 
+from ros_3d_bb.evaluation.defaults import default_weights, scenario_path
 from ros_3d_bb.evaluation.latency_result import result_of
 from ros_3d_bb.evaluation.machine import describe_machine
 
@@ -175,9 +176,10 @@ def _arguments():
                         % ', '.join(case.name for case in CASES))
     parser.add_argument('--seconds', type=float, default=20.0, help='to measure in each case (default: 20)')
     parser.add_argument('--rate', type=float, default=30.0, metavar='HZ', help='images a second (default: 30)')
-    parser.add_argument('--weights', help='checkpoint or export of YOLOv5')
-    images = parser.add_mutually_exclusive_group(required=True)
-    images.add_argument('--scenario', help='scenario file, of which the first %d images are played' % IMAGES)
+    parser.add_argument('--weights', default=default_weights(), help='checkpoint or export of YOLOv5')
+    images = parser.add_mutually_exclusive_group()
+    images.add_argument('--scenario', type=scenario_path, default='demo', metavar='SCENARIO',
+                        help='scenario of which the first %d images are played (default: demo)' % IMAGES)
     images.add_argument('--bag', help='a bag of scenario_to_bag or session_to_bag, with --boxes')
     parser.add_argument('--json', metavar='FILE', help='also write the figures there')
     arguments = parser.parse_args()

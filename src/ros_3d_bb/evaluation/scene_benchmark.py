@@ -10,6 +10,7 @@ from ros_3d_bb.detection.depth_people import DepthPeople
 from ros_3d_bb.detection.floor import floor_from_transform
 from ros_3d_bb.error_model import read_error_model
 from ros_3d_bb.estimation import DepthImage
+from ros_3d_bb.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path, scenario_paths
 from ros_3d_bb.evaluation.identities import score
 from ros_3d_bb.evaluation.scene_tracks import is_in_image, score_tracks
 from ros_3d_bb.evaluation.scenes import LEAST_SHOWN, run_scene, score_detections
@@ -91,10 +92,12 @@ def main():
 
 def _parser():
     parser = argparse.ArgumentParser(prog='./run bench scenes', description=__doc__)
-    parser.add_argument('scenarios', nargs='+', help='scenario files')
+    parser.add_argument('scenarios', nargs='*', type=scenario_path, metavar='SCENARIO',
+                        default=scenario_paths('thesis_*', 'approach_*'),
+                        help='names in config/scenarios or files (default: thesis_*, approach_*)')
     parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, it is left out')
-    parser.add_argument('--error-model', metavar='FILE', help='error model for the boxes of the detector `exact`, as '
-                        'simulation.launch has one (default of ./run: that of the simulated camera)')
+    parser.add_argument('--error-model', default=SIMULATED_ERROR_MODEL, metavar='FILE',
+                        help='error model for the boxes of the detector `exact` (default: that of simulation.launch)')
     parser.add_argument('--every', type=int, metavar='N',
                         help='use one image of N (default: %s)' % ', '.join('%s %d' % item for item in EVERY.items()))
     parser.add_argument('--json', metavar='FILE', help='also write the scores there')

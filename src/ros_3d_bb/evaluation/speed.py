@@ -18,6 +18,7 @@ import numpy as np
 
 from ros_3d_bb.estimation import estimate_boxes, estimator_named
 from ros_3d_bb.evaluation.crowd import crowd_of, people_of
+from ros_3d_bb.evaluation.defaults import default_weights
 from ros_3d_bb.evaluation.detector_speed import detector_speed
 from ros_3d_bb.evaluation.machine import describe_machine
 from ros_3d_bb.evaluation.simulated_session import write_simulated_session
@@ -186,7 +187,8 @@ def _arguments():
     data = os.environ.get('ROS_3D_BB_DATA')
     parser.add_argument('--data', default=data and os.path.join(data, 'data', 'thesis'), metavar='DIR',
                         help='a measurement session (default: $ROS_3D_BB_DATA/data/thesis, or else a simulated one)')
-    parser.add_argument('--weights', metavar='FILE', help='a YOLOv5 checkpoint: the detector is timed as well')
+    parser.add_argument('--weights', default=default_weights(), metavar='FILE',
+                        help='a YOLOv5 checkpoint: the detector is timed as well')
     parser.add_argument('--images', type=int, default=60, help='of each number of people (default: 60)')
     parser.add_argument('--seed', type=int, default=0,
                         help='of the order of the people, and of the jitter of their boxes (default: 0)')

@@ -7,6 +7,7 @@ import json
 import os
 import sys
 
+from ros_3d_bb.evaluation.defaults import scenario_path
 from ros_3d_bb.evaluation.tracking.benchmark import BOUND, CONTESTANTS, compare, cpu_times, runs_of, table
 from ros_3d_bb.evaluation.tracking.generator import SECONDS
 from ros_3d_bb.evaluation.tracking.scenes import compare_scenes
@@ -63,7 +64,8 @@ def _arguments():
     parser.add_argument('--seconds', type=float, default=SECONDS, help='length of a run (default: %g)' % SECONDS)
     parser.add_argument('--bound', action='store_true',
                         help='also our tracker when it is told whose each detection is')
-    parser.add_argument('--scenarios', nargs='+', metavar='FILE', help='instead: the whole pipeline on rendered scenes')
+    parser.add_argument('--scenarios', nargs='+', type=scenario_path, metavar='SCENARIO',
+                        help='instead: the whole pipeline on rendered scenes')
     parser.add_argument('--weights', help='of YOLOv5, for --scenarios; without, the weight-free detector')
     parser.add_argument('--json', metavar='FILE', help='also write the scores there')
     arguments = parser.parse_args()

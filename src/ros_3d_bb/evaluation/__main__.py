@@ -1,0 +1,20 @@
+"""The benchmarks: `python3 -m ros_3d_bb.evaluation NAME [OPTION ...]`, which `./run bench` calls."""
+import importlib
+import sys
+
+MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.__main__', 'scenes': 'scene_benchmark', 'speed': 'speed',
+           'latency': 'latency'}
+
+
+def main():
+    """Run the benchmark that the first argument names."""
+    name = sys.argv[1] if len(sys.argv) > 1 else ''
+    if name not in MODULES:
+        sys.stderr.write('./run bench: unknown benchmark %r; %s expected\n' % (name, ', '.join(sorted(MODULES))))
+        return 2
+    sys.argv = ['./run bench ' + name] + sys.argv[2:]
+    return importlib.import_module('ros_3d_bb.evaluation.' + MODULES[name]).main()
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,28 @@
+"""The arguments of ./run. Nothing is installed or built."""
+import os
+import subprocess
+
+import pytest
+
+RUN = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'run')
+
+
+def run(*arguments):
+    """Exit status, standard output and standard error."""
+    result = subprocess.run(['bash', RUN] + list(arguments), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                            stderr=subprocess.PIPE, universal_newlines=True)
+    return result.returncode, result.stdout, result.stderr
+
+
+@pytest.mark.parametrize('arguments', [(), ('help',), ('--help',), ('test', '--help'), ('demo', '--help')])
+def test_help_starts_nothing(arguments):
+    status, printed, errors = run(*arguments)
+    assert status == 0 and printed.startswith('usage: ./run') and not errors
+
+
+@pytest.mark.parametrize('arguments', [
+    ('tset',), ('test', '--quick'), ('test', '--fast', 'x'), ('test', 'missing.py'), ('test', '-k'), ('build', 'x'),
+    ('lint', '--all'), ('demo', '--fast'), ('demo', 'missing'), ('demo', 'rate:=fast'), ('demo', 'weights:=missing.pt')])
+def test_unknown_arguments_are_errors(arguments):
+    status, printed, errors = run(*arguments)
+    assert status != 0 and not printed and arguments[-1] in errors

@@ -1,0 +1,55 @@
+# Sets up what ./run needs: Debian packages, a virtual environment and a catkin workspace outside the checkout.
+# Sourced by ./run, which defines here, cache, venv and workspace.
+
+apt_packages=(
+  build-essential catkin catkin-lint cmake libgeometry-msgs-dev libgl1-mesa-dri librostest-dev
+  libdynamic-reconfigure-config-init-mutex-dev libsensor-msgs-dev libstd-msgs-dev python3-diagnostic-updater
+  python3-dynamic-reconfigure python3-matplotlib python3-numpy python3-opencv python3-pyqt5 python3-rosbag
+  python3-rosgraph python3-rospkg python3-rospy python3-rostest python3-scipy python3-sensor-msgs python3-setuptools
+  python3-std-srvs python3-tf2-ros python3-venv python3-visualization-msgs python3-yaml ros-core ros-geometry-msgs
+  ros-message-generation ros-message-runtime ros-sensor-msgs ros-std-msgs rosbash rviz tf2-tools xdotool xvfb)
+
+set_up_system() {
+  command -v apt-get > /dev/null || { say "no apt-get here; taking it that ROS is installed"; return; }
+  if [ -d /opt/ros ]; then
+    say "ROS is in /opt/ros; its packages are not touched"
+    set +u; . "$(ls -d /opt/ros/*/setup.bash | tail -n 1)"; set -u
+    return
+  fi
+  local missing=()
+  for package in "${apt_packages[@]}"; do
+    dpkg-query -W -f '${Status}' "$package" 2> /dev/null | grep -q 'ok installed' || missing+=("$package")
+  done
+  [ ${#missing[@]} -eq 0 ] && return
+  local sudo=; [ "$(id -u)" -eq 0 ] || sudo=sudo
+  say "installing ${#missing[@]} Debian packages: ${missing[*]}"
+  $sudo apt-get update -q
+  $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends "${missing[@]}"
+}
+
+set_up_python() {
+  local wanted; wanted=$(cat "$here"/test/requirements*.txt | sha1sum)
+  [ "$(cat "$venv/installed" 2> /dev/null)" = "$wanted" ] && return
+  say "making a virtual environment in $venv"
+  python3 -m venv --system-site-packages "$venv"
+  "$venv/bin/pip" install --quiet --disable-pip-version-check -r "$here/test/requirements.txt"
+  "$venv/bin/pip" install --quiet --disable-pip-version-check --no-deps -r "$here/test/requirements_no_deps.txt"
+  echo "$wanted" > "$venv/installed"
+}
+
+link_into_workspace() {
+  mkdir -p "$workspace/src"
+  ln -sfn "$here" "$workspace/src/ros_3d_bb"
+}
+
+build() {
+  set_up_system
+  set_up_python
+  say "building in $workspace"
+  link_into_workspace
+  catkin_make --directory "$workspace" -DPYTHON_EXECUTABLE="$venv/bin/python3" > "$workspace/build.log" 2>&1 || {
+    cat "$workspace/build.log"; say "the build failed; its log is above"; exit 1; }
+  ln -sfn "$workspace" "$cache/workspace"  # of the checkout that was built last
+  set +u; . "$workspace/devel/setup.bash"; set -u
+  export ROS_LOG_DIR=${ROS_LOG_DIR:-$workspace/log}
+}

@@ -1,0 +1,57 @@
+# ./run test: all tests, or some of them. Sourced by ./run.
+
+run_tests() {
+  case ${1:-} in
+    '') run_all_tests ;;
+    -h|--help) help ;;
+    --fast)
+      [ $# -eq 1 ] || fail "test --fast takes no further arguments, not '$2'"
+      set_up_system
+      set_up_python
+      cd "$here"
+      "$venv/bin/python3" -m pytest -q -n 2 -m 'not slow' test/unit ;;
+    *) run_some_tests "$@" ;;
+  esac
+}
+
+run_all_tests() {
+  build
+  say "running all tests (data: ${ROS_3D_BB_DATA:-made by the tests})"
+  rm -rf "$workspace/build/test_results"
+  # Most tests wait for programs to start and to end: two at a time use that.
+  catkin_make --directory "$workspace" run_tests -j2
+  say "totals"
+  local totals status=0
+  totals=$(catkin_test_results --all "$workspace/build/test_results") || status=$?
+  echo "$totals"
+  echo "$totals" | awk '/^Summary:/ { printf "%d passed, %d failed\n", $2 - $4 - $6, $4 + $6 }'
+  return $status
+}
+
+# Test files and folders by pytest, .test files by rostest; without any, the unit and workspace tests with -k EXPR.
+run_some_tests() {
+  local paths=() expression=() path
+  while [ $# -gt 0 ]; do
+    case $1 in
+      -k) [ $# -gt 1 ] || fail "-k needs an expression"; expression=(-k "$2"); shift ;;
+      -*) fail "unknown option '$1' of test; --fast, -k EXPR or paths expected" ;;
+      *)
+        [ -e "${1%%::*}" ] || fail "there is no '$1' to test"
+        paths+=("$(realpath "${1%%::*}")${1#"${1%%::*}"}") ;;
+    esac
+    shift
+  done
+  [ ${#paths[@]} -gt 0 ] || paths=("$here/test/unit" "$here/test/workspace")
+  build
+  cd "$here"
+  local status=0 by_pytest=()
+  for path in "${paths[@]}"; do
+    case $path in
+      "$here"/test/nodes/*.test) rostest --text "$path" || status=$? ;;
+      "$here"/test/nodes/*) fail "'$path' needs a master: test its .test file" ;;
+      *) by_pytest+=("$path") ;;
+    esac
+  done
+  [ ${#by_pytest[@]} -eq 0 ] || "$venv/bin/python3" -m pytest -q "${by_pytest[@]}" "${expression[@]}" || status=$?
+  return $status
+}
