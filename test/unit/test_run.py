@@ -22,7 +22,8 @@ def test_help_starts_nothing(arguments):
 
 @pytest.mark.parametrize('arguments', [
     ('tset',), ('test', '--quick'), ('test', '--fast', 'x'), ('test', 'missing.py'), ('test', '-k'), ('build', 'x'),
-    ('lint', '--all'), ('demo', '--fast'), ('demo', 'missing'), ('demo', 'rate:=fast'), ('demo', 'weights:=missing.pt')])
+    ('lint', '--all'), ('demo', '--fast'), ('demo', 'missing'), ('demo', 'rate:=fast'),
+    ('demo', 'weights:=missing.pt')])
 def test_unknown_arguments_are_errors(arguments):
     status, printed, errors = run(*arguments)
     assert status == 2 and not printed and arguments[-1].split(':=')[-1] in errors
