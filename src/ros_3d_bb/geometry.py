@@ -10,6 +10,7 @@ import numpy as np
 
 from ros_3d_bb.distortion import checked_distortion, distort, undistort
 
+STEEP = 0.34  # sine of the angle between the optical axis and the vertical: 20 degrees
 OPTICAL_ROTATION = (-0.5, 0.5, -0.5, 0.5)  # quaternion of an optical frame that looks along the body's x (REP 103)
 
 
@@ -153,9 +154,12 @@ def upright_turns(fixed_from_camera):
     Returns
     -------
     int
-        0 for a camera held upright, 1 where the left edge of the image is up, 2 upside down, 3 for the right edge.
+        0 for a camera held upright, 1 where the left edge of the image is up, 2 upside down, 3 for the right edge. 0
+        for a camera that looks up or down within `STEEP`: there, people have no upright direction in the image.
     """
     x_up, y_up = fixed_from_camera[2, :2]
+    if np.hypot(x_up, y_up) < STEEP:
+        return 0
     if abs(x_up) > abs(y_up):
         return 3 if x_up > 0 else 1
     return 2 if y_up > 0 else 0

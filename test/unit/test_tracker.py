@@ -400,3 +400,23 @@ def test_images_that_come_late_are_done_again_with_the_new_parameters():
     number, = ids(tracker.objects())
     tracker.tune(TrackerParams(acceleration=0.5), NoiseParams(), PredictionParams())
     assert ids(tracker.update(START_NS + int(0.9 * NS) + 1, [at(3, 0)], VIEW)) == [number]
+
+
+@pytest.mark.parametrize('slope', [-0.1, 0.05, 0.1])
+@pytest.mark.parametrize('cut,height', [(['top'], 1.7), (['bottom'], 1.7), (['top', 'bottom'], 0.6)])
+def test_the_height_of_a_person_holds_on_a_slope(slope, cut, height):
+    """The person goes up or down at 1 m/s, 2 m ahead of the robot; the border cuts the box from 1 s to 6 s."""
+    def walk(time_s):
+        box = cut_by(cut, height) if 1 < time_s < 6 else at(2, 0)
+        return [box._replace(position_m=box.position_m + (time_s, 0, slope * time_s))]
+
+    def view_at(time_s):
+        transform = VIEW.fixed_from_camera.copy()
+        transform[:3, 3] += time_s, 0, slope * time_s
+        return VIEW._replace(fixed_from_camera=transform)
+    tracker, published = Tracker(), []
+    for frame in range(240):
+        published.append(tracker.update(START_NS + frame * NS // 30, walk(frame / 30), view_at(frame / 30)))
+    assert set(ids(objects)[0] for objects in published[4:]) == {1}
+    assert all(abs(objects[0].size_m[2] - 1.7) < 0.1 for objects in published[4:])
+    assert published[-1][0].position_m[2] == pytest.approx(0.85 + slope * 7.97, abs=0.05)

@@ -254,3 +254,28 @@ def test_another_stamp_leaves_the_rest_of_a_message():
         parts = restamped(message, stamp).transforms if topic == 'tf' else [restamped(message, stamp)]
         assert [part.header.stamp for part in parts] == [stamp] * len(parts)
         assert parts[-1].header.frame_id == ('odom' if topic == 'tf' else 'camera')
+
+
+@pytest.mark.parametrize('edge,center_y', [('BOTTOM', 0.35), ('TOP', -0.35)])
+def test_a_person_whom_the_border_cuts_in_portrait_is_as_wide_as_a_person(edge, center_y):
+    """The estimator has extended the box beyond the border to 1.7 m; 0.2 m of the width are seen, from y = -+0.5 m."""
+    box = BoundingBox3D(truncated=True, truncated_edges=getattr(BoundingBox3D, edge))
+    box.center.position.y, box.center.position.z, box.size.x, box.size.y = center_y, 3.0, 1.7, 1.7
+    turn = transform_from((0, 0, 0), (np.sqrt(0.5), 0, 0, np.sqrt(0.5)))  # the left edge of the image is up
+    detection, = detections_from_message(BoundingBox3DArray(boxes=[box]),
+                                         turn.dot(transform_from((0, 0, 0), (-0.5, 0.5, -0.5, 0.5))))
+    np.testing.assert_allclose(detection.size_m, (0.5, 0.5, 1.7))
+    np.testing.assert_allclose(abs(detection.position_m[1]), 0.25)
+
+
+def test_a_camera_that_looks_straight_down_keeps_one_orientation_in_spite_of_noise():
+    random, box = np.random.RandomState(0), box_of()
+    for _ in range(100):
+        roll, pitch, yaw = np.radians((0, 90, 0) + random.normal(0, 0.5, 3))
+        down = np.eye(4)
+        for axis, angle in ((2, yaw), (1, pitch), (0, roll)):
+            quaternion = np.eye(4)[axis] * np.sin(angle / 2) + np.eye(4)[3] * np.cos(angle / 2)
+            down = down.dot(transform_from((0, 0, 0), quaternion))
+        detection, = detections_from_message(BoundingBox3DArray(boxes=[box]),
+                                             down.dot(transform_from((0, 0, 0), (-0.5, 0.5, -0.5, 0.5))))
+        np.testing.assert_allclose(detection.size_m, (0.5, 0.5, 1.7))

@@ -4,11 +4,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.tracking.kalman import Measurements
+from ros_3d_bb.tracking.tracked import PERSON_WIDTH_M
 from ros_3d_bb.tracking.visibility import NEARER_M, wrapped
 
 FLOOR_M = 0.02  # nobody's centre is known better than that: people sway as they walk
 USUAL_PERIOD_S = 1 / 30.0  # of images, for the first one
-PERSON_WIDTH_M = 0.5
 PART_M = 0.3  # a box that the image border cuts and that is narrower shows only a part of the width
 MAX_SHIFT_M = 0.2
 CUT_SIGMA_M = 0.08  # what is not seen of a cut person leaves the side open by so much

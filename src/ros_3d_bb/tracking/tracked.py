@@ -8,6 +8,7 @@ from ros_3d_bb.geometry import Camera, transform_points, upright_turns
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
 LARGEST_M, FARTHEST_M = 10.0, 1e8  # nobody is wider or taller, and no map is larger
 MOST_STEPS = 1000  # of a prediction; more only cost memory
+PERSON_WIDTH_M = 0.5
 VERTICAL = 0.02  # horizontal part of the optical axis of a camera that looks straight up or down
 
 
@@ -40,13 +41,28 @@ def detection_from_box(box, fixed_from_camera):
     Detection
     """
     rotation, turns = fixed_from_camera[:3, :3], upright_turns(fixed_from_camera)
-    width_m, height_m, _depth_m = box.size_m
-    if turns % 2:
-        width_m, height_m = height_m, width_m
     covariance_m2 = None if box.covariance_m2 is None else rotation.dot(box.covariance_m2).dot(rotation.T)
+    center_m, (width_m, height_m, _depth_m) = box.center_m, box.size_m
+    if turns % 2:
+        center_m, width_m, height_m = _of_portrait(box)
     edges = box.truncated_edges[-turns:] + box.truncated_edges[:-turns]
-    return Detection(transform_points(fixed_from_camera, box.center_m), np.array([width_m, width_m, height_m]),
+    return Detection(transform_points(fixed_from_camera, center_m), np.array([width_m, width_m, height_m]),
                      covariance_m2, edges)
+
+
+def _of_portrait(box):
+    """Centre in the optical frame, width and height of a person in an image of a camera mounted in portrait.
+
+    The estimator takes the image for an upright one: where the border cuts the box at the top or the bottom, it extends
+    the box to the height of a person. Here that is the width, so the box is a person's width behind the edge in view.
+    """
+    (_left, top, _right, bottom), center_m = box.truncated_edges, np.array(box.center_m)
+    height_m, width_m, _depth_m = box.size_m
+    if top != bottom and width_m > PERSON_WIDTH_M:
+        toward_border = -1 if top else 1
+        center_m[1] += toward_border * (PERSON_WIDTH_M - width_m) / 2
+        width_m = PERSON_WIDTH_M
+    return center_m, width_m, height_m
 
 
 class View(NamedTuple):

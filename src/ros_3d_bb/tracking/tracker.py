@@ -33,6 +33,7 @@ UNSURE_SHARE = 0.1  # of the density of a box at its centre: a newcomer's is not
 TAKEN_NS = NS // 5  # nobody new begins near somebody seen so recently
 SMOOTHING = 0.1  # share of the newest sighting in size and height
 CUT_SMOOTHING = 0.02  # the same where the image border cuts the box on a side: the head may be outside
+LEAST_HEIGHT_M = 0.1
 HEAD_SIGMAS = 2.0  # the top of a head is known this much less well than a height: the camera tilts as the robot drives
 STILL_MOVING = 0.5  # of the speed at which somebody begins to move
 
@@ -307,20 +308,22 @@ def _height_cost(tracks, sightings, sigma_m):
 def _update_size(seen, sightings):
     """Smooth the size and the height of tracks by one sighting each.
 
-    Lower and upper end are smoothed apart: an end that the image border cuts off stays where it was last seen. Until
-    it is seen for the first time it is where the estimator expects it.
+    Lower and upper end are smoothed apart. An end that the image border cuts off moves with the other one, so that the
+    height stays what it was; until it is seen for the first time, it is where the estimator expects it.
     """
     cut = sightings.vertical_cuts
     seen['end_hits'] += ~cut
-    end_share = np.maximum(SMOOTHING, 1 / np.maximum(seen['end_hits'], 1))
-    end_share[cut & (seen['end_hits'] > 0)] = 0
+    held = cut & (seen['end_hits'] > 0)
+    end_share = np.where(held, 0, np.maximum(SMOOTHING, 1 / np.maximum(seen['end_hits'], 1)))
     share = np.maximum(SMOOTHING, 1 / seen['sightings'])
     share[sightings.cut_sideways] = CUT_SMOOTHING
     end_share = np.minimum(end_share, np.where(sightings.cut_sideways, CUT_SMOOTHING, 1)[:, None])
     up_m, taller_m = sightings.z_m - seen['z_m'], sightings.sizes_m[:, 2] - seen['size_m'][:, 2]
     lower_m, upper_m = end_share[:, 0] * (up_m - taller_m / 2), end_share[:, 1] * (up_m + taller_m / 2)
+    lower_m = np.where(held[:, 0], upper_m, lower_m)
+    upper_m = np.where(held[:, 1], lower_m, upper_m)
     seen['size_m'][:, :2] += share[:, None] * (sightings.sizes_m[:, :2] - seen['size_m'][:, :2])
-    seen['size_m'][:, 2] += upper_m - lower_m
+    seen['size_m'][:, 2] = np.maximum(seen['size_m'][:, 2] + upper_m - lower_m, LEAST_HEIGHT_M)
     seen['z_m'] += (lower_m + upper_m) / 2
     seen['z_m2'] += end_share.mean(axis=1) * (sightings.z_m2 - seen['z_m2'])
 
