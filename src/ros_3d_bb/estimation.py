@@ -260,19 +260,19 @@ def estimate_boxes(depth, rects_px, camera, estimator):
     list of Box3D or None
         In the order of the rectangles.
     """
-    found = {}
+    found, nearer = [None] * len(rects_px), []
     for number in near_first(rects_px):
         rect_px = rects_px[number]
-        nearer = [box for box in found.values() if is_plausible(box)]
         box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, camera, nearer)
-        if box is not None:
-            found[number] = box
-    return [found.get(number) for number in range(len(rects_px))]
+        found[number] = box
+        if box is not None and is_plausible(box):
+            nearer.append(box)
+    return found
 
 
 def is_plausible(box):
     """Whether a Box3D lies at a finite place and has the size of something that can be tracked."""
-    return bool(np.isfinite(box.center_m).all() and (box.size_m > 0).all() and (box.size_m < LARGEST_M).all())
+    return bool(np.isfinite(box.center_m.sum()) and 0 < min(box.size_m) and max(box.size_m) < LARGEST_M)
 
 
 def near_first(rects_px):
