@@ -62,14 +62,20 @@ class View(NamedTuple):
     camera: str = ''
     depth_at: Optional[Callable[[np.ndarray], np.ndarray]] = None
 
-    def bearings(self, positions_m):
-        """Distances (n,) of positions (n, 2 or 3) from the camera seen from above, and their bearings (n,): 0 straight
-        ahead, positive to the left, radians. For a camera that looks straight up or down, ahead is where the upper
-        edge of its image points.
-        """
+    @property
+    def ahead(self):
+        """Direction (2,) of the optical axis seen from above, of length 1. For a camera that looks straight up or down
+        it is where the upper edge of its image points."""
         ahead = self.fixed_from_camera[:2, 2]
         if ahead.dot(ahead) < VERTICAL ** 2:
             ahead = -self.fixed_from_camera[:2, 1]
+        return ahead / np.sqrt(ahead.dot(ahead))
+
+    def bearings(self, positions_m):
+        """Distances (n,) of positions (n, 2 or 3) from the camera seen from above, and their bearings (n,): 0 straight
+        `ahead`, positive to the left, radians.
+        """
+        ahead = self.ahead
         offsets = np.asarray(positions_m)[:, :2] - self.fixed_from_camera[:2, 3]
         bearings = np.arctan2(ahead[0] * offsets[:, 1] - ahead[1] * offsets[:, 0], offsets.dot(ahead))
         return np.hypot(offsets[:, 0], offsets[:, 1]), bearings
