@@ -4,28 +4,15 @@ import warnings
 import numpy as np
 from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.geometry import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.geometry import Camera
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.tracked import Detection, View
 from ros_3d_bb.tracking.tracker import Tracker
+from support.cylinders import mounted
 
 CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)
 START_NS, PERIOD_NS = 1000 * NS, NS // 30
 SEEDS = st.integers(0, 2 ** 32 - 1)
-
-
-def turned(axis, angle_deg):
-    """The transform of a rotation around x (0), y (1) or z (2)."""
-    half = np.radians(angle_deg) / 2
-    return transform_from((0, 0, 0), np.eye(4)[axis] * np.sin(half) + np.eye(4)[3] * np.cos(half))
-
-
-def mounted(height_m, pitch_deg=0.0, roll_deg=0.0, yaw_deg=0.0):
-    """The transform of a camera above the origin, which looks along x, then turned left, pitched down and rolled."""
-    transform = transform_from((0, 0, height_m), (0, 0, 0, 1))
-    for axis, angle_deg in ((2, yaw_deg), (1, pitch_deg), (0, roll_deg)):
-        transform = transform.dot(turned(axis, angle_deg))
-    return transform.dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
 
 
 def any_covariance(random):
