@@ -3,6 +3,7 @@ from typing import Callable, NamedTuple, Optional, Tuple
 
 import numpy as np
 
+from ros_3d_bb.body_layer import USUAL_HEIGHT_M, USUAL_WIDTH_M
 from ros_3d_bb.geometry import Camera, transform_points, upright_turns
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
@@ -40,13 +41,31 @@ def detection_from_box(box, fixed_from_camera):
     Detection
     """
     rotation, turns = fixed_from_camera[:3, :3], upright_turns(fixed_from_camera)
-    width_m, height_m, _depth_m = box.size_m
+    center_m, (width_m, height_m) = box.center_m, box.size_m[:2]
     if turns % 2:
-        width_m, height_m = height_m, width_m
+        center_m, (height_m, width_m) = _completed_in_portrait(box)
     covariance_m2 = None if box.covariance_m2 is None else rotation.dot(box.covariance_m2).dot(rotation.T)
     edges = box.truncated_edges[-turns:] + box.truncated_edges[:-turns]
-    return Detection(transform_points(fixed_from_camera, box.center_m), np.array([width_m, width_m, height_m]),
+    return Detection(transform_points(fixed_from_camera, center_m), np.array([width_m, width_m, height_m]),
                      covariance_m2, edges)
+
+
+def _completed_in_portrait(box):
+    """Centre (3,) of a box and its extents along the rows and the columns of an image in which people lie on a side.
+
+    The estimator completes a body that the image border cuts as if it stood upright in the image: to the usual width
+    along the rows and to the usual height along the columns. Here it is the other way round. The end that is seen stays
+    in place.
+    """
+    center_m, extents_m, cut = np.array(box.center_m, float), np.array(box.size_m[:2], float), box.truncated_edges
+    was_completed = np.isclose(extents_m[1], USUAL_HEIGHT_M)
+    completed_m = max(extents_m[0], USUAL_HEIGHT_M), USUAL_WIDTH_M if was_completed else extents_m[1]
+    for axis, (cut_low, cut_high) in enumerate(zip(cut[:2], cut[2:])):
+        if cut_low != cut_high:
+            missing_m = completed_m[axis] - extents_m[axis]
+            center_m[axis] += missing_m / 2 if cut_high else -missing_m / 2
+            extents_m[axis] = completed_m[axis]
+    return center_m, extents_m
 
 
 class View(NamedTuple):
