@@ -7,7 +7,8 @@ from typing import Any, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from ros_3d_bb.body_layer import BODY_HALF_DEPTH_M, edges, first_layer, trimmed_mean, whole, within
+from ros_3d_bb.body_layer import (BODY_HALF_DEPTH_M, USUAL_HEIGHT_M, USUAL_WIDTH_M, edges, first_layer, trimmed_mean,
+                                  whole, within)
 from ros_3d_bb.tracking.tracked import LARGEST_M
 
 FARTHEST_M = 100.0  # farther away no depth camera measures anything
@@ -17,7 +18,6 @@ BORDER_PX = 2
 SAMPLES_WANTED = 2000  # pixels that the foreground estimator looks at
 AXIS_BEHIND_SURFACE_M = 0.09  # mean over standing and walking bodies of the simulation, seen from all sides
 LEAST_SUPPORT = 0.1  # what carries less of the samples is no person that anything can be said about
-USUAL_WIDTH_M, USUAL_HEIGHT_M = 0.46, 1.7  # of a body that the image border cuts
 LEAST_WIDTH_M = 0.05
 
 

@@ -258,14 +258,14 @@ def test_another_stamp_leaves_the_rest_of_a_message():
 
 @pytest.mark.parametrize('edge,center_y', [('BOTTOM', 0.35), ('TOP', -0.35)])
 def test_a_person_whom_the_border_cuts_in_portrait_is_as_wide_as_a_person(edge, center_y):
-    """The estimator has extended the box beyond the border to 1.7 m; 0.2 m of the width are seen, from y = -+0.5 m."""
+    """The estimator has extended the box beyond the border to 1.7 m, from y = -+0.5 m on."""
     box = BoundingBox3D(truncated=True, truncated_edges=getattr(BoundingBox3D, edge))
     box.center.position.y, box.center.position.z, box.size.x, box.size.y = center_y, 3.0, 1.7, 1.7
     turn = transform_from((0, 0, 0), (np.sqrt(0.5), 0, 0, np.sqrt(0.5)))  # the left edge of the image is up
     detection, = detections_from_message(BoundingBox3DArray(boxes=[box]),
                                          turn.dot(transform_from((0, 0, 0), (-0.5, 0.5, -0.5, 0.5))))
-    np.testing.assert_allclose(detection.size_m, (0.5, 0.5, 1.7))
-    np.testing.assert_allclose(abs(detection.position_m[1]), 0.25)
+    np.testing.assert_allclose(detection.size_m, (0.46, 0.46, 1.7))
+    np.testing.assert_allclose(abs(detection.position_m[1]), 0.27)
 
 
 def test_a_camera_that_looks_straight_down_keeps_one_orientation_in_spite_of_noise():

@@ -4,14 +4,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.tracking.kalman import Measurements
-from ros_3d_bb.tracking.tracked import PERSON_WIDTH_M
 from ros_3d_bb.tracking.visibility import NEARER_M, wrapped
 
 FLOOR_M = 0.02  # nobody's centre is known better than that: people sway as they walk
+PERSON_WIDTH_M = 0.5
 USUAL_PERIOD_S = 1 / 30.0  # of images, for the first one
 PART_M = 0.3  # a box that the image border cuts and that is narrower shows only a part of the width
 MAX_SHIFT_M = 0.2
 CUT_SIGMA_M = 0.08  # what is not seen of a cut person leaves the side open by so much
+NEAR_M = 0.01  # a box closer to the camera is seen from no direction; it is taken to lie straight ahead
 TOUCHING_RAD = 0.03  # a nearer box hides another one if there is not more between them
 
 
@@ -105,8 +106,10 @@ def sightings_of(detections, view, elapsed_s, params):
 
 def _seen(positions_m, widths_m, view):
     distances_m, bearings = view.bearings(positions_m)
-    distances_m = np.maximum(distances_m, 0.01)
+    is_near = distances_m < NEAR_M
+    distances_m = np.maximum(distances_m, NEAR_M)
     rays = (positions_m - view.fixed_from_camera[:2, 3]) / distances_m[:, None]
+    rays[is_near] = view.ahead
     return _Seen(positions_m, rays, distances_m, bearings, np.arctan2(widths_m / 2, distances_m))
 
 

@@ -3,12 +3,12 @@ from typing import Callable, NamedTuple, Optional, Tuple
 
 import numpy as np
 
+from ros_3d_bb.body_layer import USUAL_HEIGHT_M, USUAL_WIDTH_M
 from ros_3d_bb.geometry import Camera, transform_points, upright_turns
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
 LARGEST_M, FARTHEST_M = 10.0, 1e8  # nobody is wider or taller, and no map is larger
 MOST_STEPS = 1000  # of a prediction; more only cost memory
-PERSON_WIDTH_M = 0.5
 VERTICAL = 0.02  # horizontal part of the optical axis of a camera that looks straight up or down
 
 
@@ -41,28 +41,31 @@ def detection_from_box(box, fixed_from_camera):
     Detection
     """
     rotation, turns = fixed_from_camera[:3, :3], upright_turns(fixed_from_camera)
-    covariance_m2 = None if box.covariance_m2 is None else rotation.dot(box.covariance_m2).dot(rotation.T)
-    center_m, (width_m, height_m, _depth_m) = box.center_m, box.size_m
+    center_m, (width_m, height_m) = box.center_m, box.size_m[:2]
     if turns % 2:
-        center_m, width_m, height_m = _of_portrait(box)
+        center_m, (height_m, width_m) = _completed_in_portrait(box)
+    covariance_m2 = None if box.covariance_m2 is None else rotation.dot(box.covariance_m2).dot(rotation.T)
     edges = box.truncated_edges[-turns:] + box.truncated_edges[:-turns]
     return Detection(transform_points(fixed_from_camera, center_m), np.array([width_m, width_m, height_m]),
                      covariance_m2, edges)
 
 
-def _of_portrait(box):
-    """Centre in the optical frame, width and height of a person in an image of a camera mounted in portrait.
+def _completed_in_portrait(box):
+    """Centre (3,) of a box and its extents along the rows and the columns of an image in which people lie on a side.
 
-    The estimator takes the image for an upright one: where the border cuts the box at the top or the bottom, it extends
-    the box to the height of a person. Here that is the width, so the box is a person's width behind the edge in view.
+    The estimator completes a body that the image border cuts as if it stood upright in the image: to the usual width
+    along the rows and to the usual height along the columns. Here it is the other way round. The end that is seen stays
+    in place.
     """
-    (_left, top, _right, bottom), center_m = box.truncated_edges, np.array(box.center_m)
-    height_m, width_m, _depth_m = box.size_m
-    if top != bottom and width_m > PERSON_WIDTH_M:
-        toward_border = -1 if top else 1
-        center_m[1] += toward_border * (PERSON_WIDTH_M - width_m) / 2
-        width_m = PERSON_WIDTH_M
-    return center_m, width_m, height_m
+    center_m, extents_m, cut = np.array(box.center_m, float), np.array(box.size_m[:2], float), box.truncated_edges
+    was_completed = np.isclose(extents_m[1], USUAL_HEIGHT_M)
+    completed_m = max(extents_m[0], USUAL_HEIGHT_M), USUAL_WIDTH_M if was_completed else extents_m[1]
+    for axis, (cut_low, cut_high) in enumerate(zip(cut[:2], cut[2:])):
+        if cut_low != cut_high:
+            missing_m = completed_m[axis] - extents_m[axis]
+            center_m[axis] += missing_m / 2 if cut_high else -missing_m / 2
+            extents_m[axis] = completed_m[axis]
+    return center_m, extents_m
 
 
 class View(NamedTuple):
@@ -78,14 +81,20 @@ class View(NamedTuple):
     camera: str = ''
     depth_at: Optional[Callable[[np.ndarray], np.ndarray]] = None
 
-    def bearings(self, positions_m):
-        """Distances (n,) of positions (n, 2 or 3) from the camera seen from above, and their bearings (n,): 0 straight
-        ahead, positive to the left, radians. For a camera that looks straight up or down, ahead is where the upper
-        edge of its image points.
-        """
+    @property
+    def ahead(self):
+        """Direction (2,) of the optical axis seen from above, of length 1. For a camera that looks straight up or down
+        it is where the upper edge of its image points."""
         ahead = self.fixed_from_camera[:2, 2]
         if ahead.dot(ahead) < VERTICAL ** 2:
             ahead = -self.fixed_from_camera[:2, 1]
+        return ahead / np.sqrt(ahead.dot(ahead))
+
+    def bearings(self, positions_m):
+        """Distances (n,) of positions (n, 2 or 3) from the camera seen from above, and their bearings (n,): 0 straight
+        `ahead`, positive to the left, radians.
+        """
+        ahead = self.ahead
         offsets = np.asarray(positions_m)[:, :2] - self.fixed_from_camera[:2, 3]
         bearings = np.arctan2(ahead[0] * offsets[:, 1] - ahead[1] * offsets[:, 0], offsets.dot(ahead))
         return np.hypot(offsets[:, 0], offsets[:, 1]), bearings

@@ -124,13 +124,14 @@ def _half_widths(distances_m):
 
 
 def _behind_something(view, positions_m, sizes_m):
-    """Where most of the depth measured towards a person ends well before the person."""
+    """Where most of the depth measured towards an upright body ends well before it."""
     rotation = view.fixed_from_camera[:3, :3]  # its inverse is its transpose
     centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
-    offsets = np.zeros((len(centers), ACROSS.size, 3))
-    offsets[..., 0] = ACROSS.ravel() * sizes_m[:, :1] / 2
-    offsets[..., 1] = ALONG.ravel() * sizes_m[:, 2:] / 2
-    depths_m = view.depth_at((centers[:, None] + offsets).reshape(-1, 3)).reshape(len(centers), ACROSS.size)
+    right = rotation.T.dot((view.ahead[1], -view.ahead[0], 0))
+    offsets = (sizes_m[:, :1] / 2 * ACROSS.ravel())[..., None] * right
+    offsets += (sizes_m[:, 2:] / 2 * ALONG.ravel())[..., None] * rotation[2]  # up
+    points = centers[:, None] + offsets
+    depths_m = view.depth_at(points.reshape(-1, 3)).reshape(len(centers), ACROSS.size)
     known = np.isfinite(depths_m)
-    nearer = known & (np.where(known, depths_m, 0) < centers[:, 2:] - HIDDEN_BEHIND_M)
+    nearer = known & (np.where(known, depths_m, 0) < points[..., 2] - HIDDEN_BEHIND_M)
     return nearer.sum(axis=1) > HIDDEN_SHARE * np.maximum(known.sum(axis=1), ACROSS.size / 3.0)

@@ -1,0 +1,40 @@
+"""Laws of the tracker that hold for any camera, any place on the map and any permitted covariance."""
+import warnings
+
+import numpy as np
+from hypothesis import given, settings, strategies as st
+
+from ros_3d_bb.geometry import Camera
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.tracked import Detection, View
+from ros_3d_bb.tracking.tracker import Tracker
+from support.cylinders import mounted
+
+CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)
+START_NS, PERIOD_NS = 1000 * NS, NS // 30
+SEEDS = st.integers(0, 2 ** 32 - 1)
+
+
+def any_covariance(random):
+    """A permitted covariance: standard deviations from 0.03 mm to 9 km, along the axes of the map or any others."""
+    axes = np.linalg.qr(random.normal(size=(3, 3)))[0] if random.rand() < 0.5 else np.eye(3)
+    variances_m2 = 10.0 ** np.where(random.rand(3) < 0.5, random.uniform(7, 7.9, 3), random.uniform(-9, 0, 3))
+    return axes.dot(np.diag(variances_m2)).dot(axes.T)
+
+
+@settings(max_examples=30, deadline=None)
+@given(SEEDS)
+def test_covariances_of_tracks_are_positive_definite_whatever_boxes_come(seed):
+    """Also of boxes in the place of the camera, for cameras that look anywhere, and after any pause."""
+    random, tracker, stamp_ns = np.random.RandomState(seed), Tracker(), START_NS
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        for _image in range(10):
+            stamp_ns += int(10 ** random.uniform(-4, 2) * NS)
+            places_m = random.choice([0, 1, 3, 3.01, -3], (random.randint(0, 3), 2))
+            detections = [Detection(np.append(place_m, 0.85), np.array([0.5, 0.5, 1.7]), any_covariance(random))
+                          for place_m in places_m]
+            view = View(mounted(1.0, *random.choice([0, 45, 90, 180], 3)), CAMERA)
+            tracker.update(stamp_ns, detections, view)
+            covariances = tracker._state.tracks['covariance']
+            assert np.isfinite(covariances).all() and (np.linalg.eigvalsh(covariances) > 0).all()
