@@ -16,6 +16,7 @@ from ros_3d_bb.tracking.tracked import FARTHEST_M, LARGEST_M, TrackedObject, det
 BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC = 'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'
 LATEST_NS = 2 ** 31 * NS  # differences of stamps have to fit into a duration
 EDGE_FLAGS = BoundingBox3D.LEFT, BoundingBox3D.TOP, BoundingBox3D.RIGHT, BoundingBox3D.BOTTOM
+ROUNDING = 1e-9  # of the eigenvalues of a covariance, as a share of its largest element where that is more than 1
 MAX_BOXES = 1000  # more in one image are a fault of their sender, and would stall the pipeline
 
 
@@ -220,7 +221,7 @@ def _check_box3d(box):
                          '%g m expected' % (tuple(values) + (LARGEST_M,)))
     covariance_m2 = np.array(box.position_covariance).reshape(3, 3)
     if not ((np.abs(covariance_m2) < FARTHEST_M).all()
-            and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T).min() > -1e-9):
+            and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T).min() > -ROUNDING * max(1, covariance_m2.max())):
         raise ValueError('the position_covariance %s; a finite, positive semi-definite matrix, or zeros where it is '
                          'not known, expected' % list(box.position_covariance))
 

@@ -4,9 +4,9 @@ import warnings
 import numpy as np
 from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.geometry import Camera
+from ros_3d_bb.geometry import Camera, transform_from, transform_points
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tracking.tracked import Detection, View
+from ros_3d_bb.tracking.tracked import VISIBLE, Detection, View
 from ros_3d_bb.tracking.tracker import Tracker
 from support.cylinders import mounted
 
@@ -38,3 +38,40 @@ def test_covariances_of_tracks_are_positive_definite_whatever_boxes_come(seed):
             tracker.update(stamp_ns, detections, view)
             covariances = tracker._state.tracks['covariance']
             assert np.isfinite(covariances).all() and (np.linalg.eigvalsh(covariances) > 0).all()
+
+
+@settings(max_examples=8, deadline=None)
+@given(SEEDS, st.floats(0, 0.65), st.floats(0.1, 1.0))
+def test_furniture_before_the_legs_leaves_a_person_the_id(seed, hidden_share, hidden_s):
+    """A table hides the lower part of the body for a while; the border of the image cuts nothing."""
+    random, tracker, height_m = np.random.RandomState(seed), Tracker(), 1.7
+    view, published = View(mounted(1.0), CAMERA), []
+    for image in range(90):
+        time_s = image / 30.0
+        seen_m = height_m * (1 - hidden_share if 1.5 < time_s < 1.5 + hidden_s else 1) + random.normal(0, 0.03)
+        center_m = np.array([3, 0.4 * time_s - 1, height_m - seen_m / 2]) + random.normal(0, 0.03, 3) * (1, 1, 0)
+        detection = Detection(center_m, np.array([0.5, 0.5, seen_m]), np.eye(3) * 0.04 ** 2)
+        published.append(tracker.update(START_NS + image * PERIOD_NS, [detection], view))
+    assert all([(track.id, track.status) for track in tracks] == [(1, VISIBLE)] for tracks in published[20:])
+
+
+@settings(max_examples=8, deadline=None)
+@given(SEEDS, st.floats(-5e6, 5e6), st.floats(-5e6, 5e6), st.floats(-180, 180))
+def test_tracks_are_the_same_anywhere_on_the_map(seed, x_m, y_m, yaw_deg):
+    """Moved by thousands of kilometres and turned: positions to a micrometre, IDs and status exactly."""
+    moved = transform_from((x_m, y_m, 0), (0, 0, np.sin(np.radians(yaw_deg) / 2), np.cos(np.radians(yaw_deg) / 2)))
+    near, far, random = Tracker(), Tracker(), np.random.RandomState(seed)
+    places_m = random.uniform((1, -2), (6, 2), (4, 2))
+    for image in range(40):
+        places_m += random.normal(0, 0.03, places_m.shape)
+        centers_m = np.column_stack((places_m, np.full(4, 0.85)))[random.rand(4) < 0.8]
+        tracks = []
+        for tracker, transform in ((near, np.eye(4)), (far, moved)):
+            detections = [Detection(center_m, np.array([0.5, 0.5, 1.7])) for center_m in
+                          transform_points(transform, centers_m)]
+            view = View(transform.dot(mounted(1.0)), CAMERA)
+            tracks.append(tracker.update(START_NS + image * PERIOD_NS, detections, view))
+        assert [track[:1] + track[5:9] for track in tracks[0]] == [track[:1] + track[5:9] for track in tracks[1]]
+        for here, there in zip(*tracks):
+            np.testing.assert_allclose(transform_points(moved, here.position_m), there.position_m, atol=1e-6, rtol=0)
+            np.testing.assert_allclose(moved[:3, :3].dot(here.velocity_mps), there.velocity_mps, atol=1e-6)

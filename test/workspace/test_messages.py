@@ -196,6 +196,16 @@ def test_a_3d_box_that_cannot_be_used_takes_no_other_with_it(wrong):
     assert positions_m == [-1.0, 2.0]
 
 
+@given(st.integers(0, 2 ** 32 - 1), st.floats(-6, 7.9), st.integers(1, 3))
+def test_a_covariance_of_any_size_and_rank_is_usable_and_one_with_a_negative_variance_is_not(seed, power, rank):
+    factor = np.random.RandomState(seed).normal(size=(3, rank))
+    covariance_m2 = factor.dot(factor.T) * 10 ** power / np.abs(factor.dot(factor.T)).max()
+    boxes = [box_of(covariance_m2=covariance_m2), box_of(covariance_m2=covariance_m2 - 3.1 * 10 ** power * np.eye(3))]
+    usable, faults = usable_boxes3d(BoundingBox3DArray(boxes=boxes))
+    assert [list(box.position_covariance) for box in usable.boxes] == [covariance_m2.ravel().tolist()]
+    assert len(faults) == 1
+
+
 def test_the_covariance_of_a_detection_is_turned_into_the_fixed_frame():
     """Camera looking along x of the map: its z, the range, is the map's x."""
     box = BoundingBox3D(position_covariance=np.diag([0.01, 0.04, 0.09]).ravel(), truncated=True)

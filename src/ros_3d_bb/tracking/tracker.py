@@ -35,6 +35,7 @@ SMOOTHING = 0.1  # share of the newest sighting in size and height
 CUT_SMOOTHING = 0.02  # the same where the image border cuts the box on a side: the head may be outside
 LEAST_HEIGHT_M = 0.1
 HEAD_SIGMAS = 2.0  # the top of a head is known this much less well than a height: the camera tilts as the robot drives
+HIDDEN_FEET_COST = 8.0  # of a box whose top fits but not its height: something in front hides the lower part
 STILL_MOVING = 0.5  # of the speed at which somebody begins to move
 
 
@@ -292,17 +293,15 @@ def _height_cost(tracks, sightings, sigma_m):
     """What the heights of sightings cost in the association, (n, m), as negative log likelihood.
 
     Where the image border cuts a box, or always cut those of a track, the height is not known: the top of the head is
-    compared if both have seen it, else nothing.
+    compared if both have seen it, else nothing. Furniture hides the lower part of a body and leaves the top as well.
     """
     seen, cut = tracks['end_hits'] > 0, sightings.vertical_cuts
     cost = ((tracks['size_m'][:, 2:] - sightings.sizes_m[:, 2]) / sigma_m) ** 2 / 2
-    heights_known = seen.all(axis=1)[:, None] & ~cut.any(axis=1)
-    if heights_known.all():
-        return cost
     tops_m = tracks['z_m'] + tracks['size_m'][:, 2] / 2, sightings.z_m + sightings.sizes_m[:, 2] / 2
     top_cost = ((tops_m[0][:, None] - tops_m[1]) / (HEAD_SIGMAS * sigma_m)) ** 2 / 2
     top_cost[~(seen[:, 1:] & ~cut[:, 1])] = 0
-    return np.where(heights_known, cost, top_cost)
+    heights_known = seen.all(axis=1)[:, None] & ~cut.any(axis=1)
+    return np.where(heights_known, np.minimum(cost, top_cost + HIDDEN_FEET_COST), top_cost)
 
 
 def _update_size(seen, sightings):
