@@ -177,7 +177,7 @@ def test_arrays_that_cannot_be_used_are_refused_and_the_next_works(rig, output, 
 def test_boxes_that_are_no_boxes_are_left_out_and_the_others_are_kept(rig, output, now):
     rig.send_camera(now)
     rig.send_boxes(now, [[40, 10, 20, 38], [5, 5, 5, 9], [1000, 1000, 1100, 1100], [-2 ** 31, 0, 2 ** 31 - 1, 48],
-                         [20, 10, 44, 38]])
+                         [-9, 0, 70, 48], [20, 10, 44, 38]])
     boxes = output.wait_for(1)[0].boxes
     assert [(box.roi.x_offset, box.roi.width) for box in boxes] == [(0, 64), (20, 24)]
     assert [box.truncated for box in boxes] == [True, False]
