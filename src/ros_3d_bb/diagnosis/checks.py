@@ -197,5 +197,5 @@ def _nodes(seen, is_explained):
         if level == 0:
             found.append(Finding(name, sentence))
         elif not is_explained:
-            found.append(Finding(name, '', sentence, 'see its log, and "When something is wrong" in the README'))
+            found.append(Finding(name, '', sentence, 'see its log, and "Troubleshooting" in the README'))
     return found
