@@ -5,10 +5,13 @@ image is (u - cx)/fx and (v - cy)/fy of the pixel that shows it. `distort_` take
 
 A polynomial grows up to some distance from the axis and then folds back; no lens does that, so what lies beyond was
 never calibrated. Rays there have no image, and images that only such rays would have, have no ray: both are nan.
+OpenCV inverts the models. Its fixed-point iteration diverges for images that move away from the axis more than twice as
+fast as in proportion to their rays; they have no ray either. Within the image, no real lens stretches that much.
 """
 import functools
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.polynomial import Polynomial
 
@@ -16,11 +19,13 @@ PLUMB_BOB, RATIONAL_POLYNOMIAL, EQUIDISTANT = 'plumb_bob', 'rational_polynomial'
 INVERSE_BROWN_CONRADY = 'inverse_brown_conrady'  # of librealsense
 LARGEST = 1e6  # coefficient of any lens, and more; larger ones overflow
 WIDEST = np.tan(np.radians(89))  # no flat image reaches farther from the axis
-NEWTON_STEPS = 20  # two or three do, but where a polynomial is about to fold
-TABLED = 500  # distances from the axis
-EXACT = 1e-11  # where Newton stops: 1e-8 pixels
-FOUND = 1e-10  # worse than this is no solution: 1e-7 pixels
-DIFFERENCE = 1e-7  # for derivatives
+UNTIL = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-11)  # iterations of OpenCV
+STEPS = 10  # corrections of what OpenCV returns
+STEPS_BEFORE_3_3_1 = 100  # when it iterated five times only
+EXACT = 1e-10  # where they stop: 1e-7 pixels
+FOUND = 1e-9  # worse than this is no solution: 1e-6 pixels
+ON_AXIS = 1e-8  # `cv2.fisheye` takes less for 0
+UNIT = np.eye(3)  # camera matrix of images without unit
 
 
 def checked_distortion(model, coefficients):
@@ -51,25 +56,49 @@ def checked_distortion(model, coefficients):
 
 def distort(model, coefficients, rays):
     """Images of rays, nan where there is none. Inverse of `undistort`."""
-    return MODELS[model].distort(np.asarray(rays, float), coefficients)
+    rays = np.asarray(rays, float)
+    if not rays.size:
+        return rays  # OpenCV takes no empty array
+    radius = np.hypot(rays[..., 0], rays[..., 1])
+    with np.errstate(all='ignore'):  # rays that have no image may overflow
+        images = MODELS[model].distort(rays, coefficients)
+    return np.where((radius <= _widest(model, coefficients))[..., np.newaxis], images, np.nan)
 
 
 def undistort(model, coefficients, images):
-    """Rays of images, nan where there is none. Inverse of `distort`."""
-    return MODELS[model].undistort(np.asarray(images, float), coefficients)
+    """Rays of images, nan where there is none. Inverse of `distort`.
+
+    OpenCV's solution is corrected until `distort` takes it to the images. That is one step where OpenCV is exact; its
+    own model of the lens may differ a little, and before 3.3.1 it stopped after five iterations.
+    """
+    steps = STEPS if hasattr(cv2, 'undistortPointsIter') else STEPS_BEFORE_3_3_1
+    targets = images = np.asarray(images, float)
+    if not images.size:
+        return images  # OpenCV takes no empty array
+    for _step in range(steps):
+        rays = MODELS[model].undistort(targets.reshape(-1, 1, 2), coefficients).reshape(images.shape)
+        errors = images - distort(model, coefficients, rays)
+        if not np.any(np.abs(errors) > EXACT):
+            break
+        targets = targets + errors
+    return np.where(np.abs(errors).max(axis=-1, keepdims=True) <= FOUND, rays, np.nan)
 
 
 def distort_brown(rays, coefficients):
     """Images of rays with plumb_bob (k1, k2, p1, p2, k3) or rational_polynomial (k1, k2, p1, p2, k3, k4, k5, k6).
 
+    In closed form: `cv2.projectPoints` also computes 24 derivatives of each point.
     Source: OpenCV, calib3d, "Camera Calibration and 3D Reconstruction"; REP 104.
     """
-    return _brown(_within(rays, _growth(*_radial(coefficients))), coefficients)
+    r2, bent = _bent(rays, coefficients)
+    return bent + _tangential(rays, r2, coefficients)
 
 
 def undistort_brown(images, coefficients):
-    """Rays of images. Inverse of `distort_brown`."""
-    return _solve(lambda rays: _brown(rays, coefficients), images, _growth(*_radial(coefficients)))
+    """Rays (n, 1, 2) of images (n, 1, 2). Inverse of `distort_brown`."""
+    if not hasattr(cv2, 'undistortPointsIter'):  # OpenCV before 3.3.1, as in Ubuntu 18.04
+        return cv2.undistortPoints(images, UNIT, np.array(coefficients))
+    return cv2.undistortPointsIter(images, UNIT, np.array(coefficients), None, None, UNTIL)
 
 
 def distort_inverse_brown_conrady(rays, coefficients):
@@ -79,12 +108,8 @@ def distort_inverse_brown_conrady(rays, coefficients):
     takes rays to images: librealsense aligns depth to colour with it, so that its inverse finds the measured points.
     Source: librealsense, include/librealsense2/rsutil.h (2.43 and later), rs2_project_point_to_pixel.
     """
-    return _modified_brown(_within(rays, _growth(*_radial(coefficients))), coefficients)
-
-
-def undistort_inverse_brown_conrady(images, coefficients):
-    """Rays of images. Inverse of `distort_inverse_brown_conrady`."""
-    return _solve(lambda rays: _modified_brown(rays, coefficients), images, _growth(*_radial(coefficients)))
+    r2, bent = _bent(rays, coefficients)
+    return bent + _tangential(bent, r2, coefficients)
 
 
 def distort_equidistant(rays, coefficients):
@@ -92,17 +117,16 @@ def distort_equidistant(rays, coefficients):
 
     Source: OpenCV, calib3d, "Fisheye camera model"; sensor_msgs/distortion_models.h.
     """
-    tangent = _radius(rays)
-    angles = rays * _ratio(np.arctan(tangent), tangent)
-    return _fisheye(_within(angles, _growth(coefficients, (), np.arctan(WIDEST))), coefficients)
+    return cv2.fisheye.distortPoints(rays.reshape(-1, 1, 2), UNIT, np.array(coefficients)).reshape(rays.shape)
 
 
 def undistort_equidistant(images, coefficients):
-    """Rays of images. Inverse of `distort_equidistant`."""
-    growth = _growth(coefficients, (), np.arctan(WIDEST))
-    angles = _solve(lambda angles: _fisheye(angles, coefficients), images, growth)
-    angle = _radius(angles)
-    return angles * _ratio(np.tan(angle), angle)
+    """Rays (n, 1, 2) of images (n, 1, 2). Inverse of `distort_equidistant`.
+
+    OpenCV returns 0 next to the axis, and a wrong ray for images farther from it than pi/2, which `undistort` drops.
+    """
+    next_to_axis = np.abs(images).max(axis=-1, keepdims=True) <= ON_AXIS
+    return np.where(next_to_axis, images, cv2.fisheye.undistortPoints(images, UNIT, np.array(coefficients)))
 
 
 class Model(NamedTuple):
@@ -118,19 +142,8 @@ class Model(NamedTuple):
 MODELS = {
     PLUMB_BOB: Model(4, 5, 'k1, k2, p1, p2, k3', distort_brown, undistort_brown),
     RATIONAL_POLYNOMIAL: Model(8, 8, 'k1, k2, p1, p2, k3, k4, k5, k6', distort_brown, undistort_brown),
-    INVERSE_BROWN_CONRADY: Model(5, 5, 'k1, k2, p1, p2, k3', distort_inverse_brown_conrady,
-                                 undistort_inverse_brown_conrady),
+    INVERSE_BROWN_CONRADY: Model(5, 5, 'k1, k2, p1, p2, k3', distort_inverse_brown_conrady, undistort_brown),
     EQUIDISTANT: Model(4, 4, 'k1, k2, k3, k4', distort_equidistant, undistort_equidistant)}
-
-
-def _brown(rays, coefficients):
-    r2, bent = _bent(rays, coefficients)
-    return bent + _tangential(rays, r2, coefficients)
-
-
-def _modified_brown(rays, coefficients):
-    r2, bent = _bent(rays, coefficients)
-    return bent + _tangential(bent, r2, coefficients)
 
 
 def _bent(rays, coefficients):
@@ -147,78 +160,24 @@ def _tangential(rays, r2, coefficients):
     return np.stack((2 * p1 * x * y + p2 * (r2 + 2 * x * x), 2 * p2 * x * y + p1 * (r2 + 2 * y * y)), axis=-1)
 
 
-def _fisheye(angles, coefficients):
-    k1, k2, k3, k4 = coefficients
-    a2 = (angles[..., 0] ** 2 + angles[..., 1] ** 2)[..., np.newaxis]
-    return angles * (1 + a2 * (k1 + a2 * (k2 + a2 * (k3 + a2 * k4))))
-
-
 def _radial(coefficients):
     """(k1, k2, k3) of the numerator and (k4, k5, k6) of the denominator."""
     k1, k2, _p1, _p2, k3 = coefficients[:5]
     return (k1, k2, k3), tuple(coefficients[5:]) or (0.0, 0.0, 0.0)
 
 
-class Growth(NamedTuple):
-    """How images move away from the axis, tabled: `images` (n,) grow with `distances` (n,), up to the last of them."""
-
-    distances: np.ndarray
-    images: np.ndarray
-
-
 @functools.lru_cache(maxsize=64)
-def _growth(numerator, denominator, widest=WIDEST):
-    """The growth of r (1 + n1 r^2 + ...) / (1 + d1 r^2 + ...) up to where it folds back or has a pole, or `widest`."""
+def _widest(model, coefficients):
+    """Distance of rays from the axis up to which images move away from it as well, at most `WIDEST`."""
+    if model == EQUIDISTANT:
+        return np.tan(_turning_point(coefficients, (), np.arctan(WIDEST)))
+    return _turning_point(*_radial(coefficients), WIDEST)
+
+
+def _turning_point(numerator, denominator, limit):
+    """Up to where r (1 + n1 r^2 + ...) / (1 + d1 r^2 + ...) grows: it folds back there or has a pole, or `limit`."""
     n, d, r2 = Polynomial((1,) + numerator), Polynomial((1,) + denominator), Polynomial((0, 1))
     slope = (n + 2 * r2 * n.deriv()) * d - 2 * r2 * n * d.deriv()
     roots = np.concatenate([polynomial.trim(1e-12).roots() for polynomial in (slope, d)])
     real = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0)]
-    limit = min([widest] + (np.sqrt(real) * (1 - 1e-6)).tolist())  # short of the pole
-    distances = np.tan(np.linspace(0, np.arctan(limit), TABLED))
-    return Growth(distances, distances * n(distances ** 2) / d(distances ** 2))
-
-
-def _solve(function, images, growth):
-    """Points (..., 2), as far from 0 as `growth` goes, that the function takes to the images; nan where there is none.
-
-    Newton's method with derivatives by differences, from where the radial part has its solution: a few steps, all
-    points at once.
-    """
-    distance = _radius(images)
-    points = images * _ratio(np.interp(distance, growth.images, growth.distances, right=np.nan), distance)
-    with np.errstate(all='ignore'):  # where there is no solution the steps may go anywhere
-        for _step in range(NEWTON_STEPS):
-            values = function(points)
-            error = images - values
-            if not np.any(np.abs(error) > EXACT):
-                break
-            points = points + _newton_step(function, points, values, error)
-        found = np.abs(images - function(points)).max(axis=-1) <= FOUND
-        return _within(np.where(found[..., np.newaxis], points, np.nan), growth)
-
-
-def _newton_step(function, points, values, error):
-    """By how much to move the points, so that the values of a linear function would grow by `error`."""
-    along_x = (function(points + (DIFFERENCE, 0)) - values) / DIFFERENCE
-    along_y = (function(points + (0, DIFFERENCE)) - values) / DIFFERENCE
-    step = np.stack((_cross(error, along_y), _cross(along_x, error)), axis=-1)
-    return step / _cross(along_x, along_y)[..., np.newaxis]
-
-
-def _cross(a, b):
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-
-
-def _radius(points):
-    """Distance from the axis, (..., 1)."""
-    return np.hypot(points[..., :1], points[..., 1:])
-
-
-def _within(points, growth):
-    """The points no farther from the axis than images grow, nan for the others."""
-    return np.where(_radius(points) <= growth.distances[-1], points, np.nan)
-
-
-def _ratio(numerator, denominator):
-    """numerator / denominator, 1 where the denominator is 0."""
-    return np.where(denominator > 0, numerator / np.maximum(denominator, np.finfo(float).tiny), 1)
+    return min([limit] + (np.sqrt(real) * (1 - 1e-6)).tolist())  # short of the pole

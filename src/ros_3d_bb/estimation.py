@@ -110,16 +110,16 @@ def estimate_median(samples, rect_px, camera, _nearer=()):
     Box3D or None
         None where no sample carries a depth, or the camera sees nothing there.
     """
-    depth_m = samples.depth_m[samples.valid]
-    points = camera.deproject(samples.pixels[samples.valid], depth_m)
-    points = points[~np.isnan(points[:, 0])]  # pixels that see nothing
+    across, down = camera.rays(samples.columns, samples.rows[:, np.newaxis])
+    seen = samples.valid & ~np.isnan(across)  # a pixel that sees nothing has no ray
     flat_px = _without_distortion(rect_px, camera)
-    if flat_px is None or not points.size:
+    if flat_px is None or not seen.any():
         return None
+    points = np.stack((across * samples.depth_m, down * samples.depth_m, samples.depth_m), axis=-1)[seen]
     x1, y1, x2, y2 = flat_px
     center_m = np.median(points, axis=0)
     width_m, height_m = (x2 - x1) / camera.fx * center_m[2], (y2 - y1) / camera.fy * center_m[2]
-    on_body = np.abs(depth_m - center_m[2]) <= BODY_HALF_DEPTH_M
+    on_body = np.abs(samples.depth_m[samples.valid] - center_m[2]) <= BODY_HALF_DEPTH_M
     return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px),
                  np.count_nonzero(on_body) / float(samples.valid.size), truncated_edges(rect_px, camera))
 

@@ -93,6 +93,27 @@ def test_a_realsense_that_is_called_plumb_bob_is_off_by_a_few_hundredths_of_a_pi
     assert np.abs(inverse.undistort(pixels) - believed.undistort(pixels)).max() < 0.03
 
 
+@pytest.mark.parametrize('camera', CAMERAS, ids=named)
+def test_an_opencv_without_termination_criteria_gives_the_same_rays(camera, monkeypatch):
+    """Ubuntu 18.04 has OpenCV 3.2; undistortPointsIter came with 3.3.1."""
+    pixels = every_pixel(camera, 29)
+    expected = camera.undistort(pixels)
+    monkeypatch.delattr(cv2, 'undistortPointsIter')
+    np.testing.assert_allclose(camera.undistort(pixels), expected, rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.parametrize('camera', CAMERAS[:len(LENSES)], ids=named)
+def test_no_pixels_have_no_rays(camera):
+    assert camera.deproject(np.zeros((0, 2)), np.zeros(0)).shape == camera.project(np.zeros((0, 3))).shape[:1] + (3,)
+
+
+@pytest.mark.parametrize('camera', CAMERAS[:len(LENSES)], ids=named)
+@pytest.mark.parametrize('offset_px', [0, 1e-9, 1e-6, 3e-6, 1e-5, 1e-4])
+def test_pixels_next_to_the_axis_have_a_ray(camera, offset_px):
+    pixel = np.array((camera.cx + offset_px, camera.cy - offset_px))
+    np.testing.assert_allclose(camera.project(camera.deproject(pixel, 1.0)), pixel, rtol=0, atol=1e-9)
+
+
 BENT = st.floats(-0.5, 0.5)
 SKEWED = st.floats(-0.001, 0.001)
 WAVY = st.one_of(st.tuples(st.just(PLUMB_BOB), st.tuples(BENT, BENT, SKEWED, SKEWED, BENT)),

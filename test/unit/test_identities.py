@@ -1,9 +1,15 @@
 """Tracks against the truth: numbers that are kept or change, errors, people and tracks without each other."""
+import contextlib
+import io
+
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 
 from ros_3d_bb.evaluation.identities import GATE_M, Moment, score, table
+from ros_3d_bb.evaluation.tracking.metrics import Scored, _data_of, _metrics
 from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject
 
 
@@ -41,6 +47,31 @@ def test_a_pair_is_kept_while_it_is_within_the_gate_though_another_is_nearer():
     assert score(near).false_share == 0.5
     gone = near + [Moment(NS, [at(1, 0, 0)], [at(5, GATE_M + 0.1, 0), at(6, 0.1, 0)])]
     assert score(gone).people[0].ids == [5, 6]
+
+
+@pytest.mark.needs('trackeval')
+@given(st.integers(0, 2 ** 32 - 1))
+def test_id_switches_are_those_of_trackeval(seed):
+    random = np.random.RandomState(seed)
+    images = [([at(number, *random.uniform(0, 2, 2)) for number in range(random.randint(0, 4))],
+               [at(number, *random.uniform(0, 2, 2)) for number in range(random.randint(0, 4))]) for _ in range(12)]
+    result, clear = score(moments(*images)), clear_of(images)
+    assert sum(person.switches for person in result.people) == clear['IDSW']
+    assert result.false_share * len(images) == pytest.approx(clear['CLR_FP'])
+
+
+def clear_of(images):
+    """TrackEval's CLEAR metric of images (people, tracks)."""
+    _hota, clear, _identity = _metrics()
+    data = _data_of([Scored(*(np.array([thing.id for thing in objects], int) for objects in (people, tracks)),
+                            1 - plane_distances(places(people), places(tracks)) / (2 * GATE_M))
+                     for people, tracks in images])
+    with contextlib.redirect_stdout(io.StringIO()):
+        return clear.eval_sequence(data)
+
+
+def places(objects):
+    return np.array([thing.position_m for thing in objects]).reshape(-1, 3)
 
 
 def test_nobody_there_and_nobody_tracked():

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.estimation import DepthImage, estimate_median, sample_median
+from ros_3d_bb.estimation import Box3D
 from ros_3d_bb.evaluation import speed as benchmark
 from ros_3d_bb.evaluation.crowd import JITTER_PX, crowd_of, people_of
 from ros_3d_bb.evaluation.machine import describe_machine
 from ros_3d_bb.evaluation.speed_picture import draw_speed
-from ros_3d_bb.evaluation.thesis_speed import AHEAD_S, ThesisBox, ThesisTracks, thesis_boxes
-from ros_3d_bb.geometry import Camera
-from ros_3d_bb.measurements import read_depth, read_session
+from ros_3d_bb.evaluation.tracking.original import OriginalTracker
+from ros_3d_bb.measurements import read_session
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.thesis import ThesisTracker
 from ros_3d_bb.tracking.tracked import Detection
@@ -27,20 +26,6 @@ def session(session_folder):
     return whole._replace(frames=whole.frames[::8])
 
 
-def test_the_thesis_boxes_are_those_of_the_median_estimator(session):
-    for frame in session.frames:
-        depth, rect = read_depth(frame, session), frame.boxes_px[0]
-        expected, (box,) = (estimate_median(sample_median(depth, rect), rect, session.camera),
-                            thesis_boxes(depth, [rect], session.camera))
-        np.testing.assert_allclose(box.center_m, expected.center_m, atol=1e-9)
-        np.testing.assert_allclose(box.size_m, expected.size_m, atol=1e-9)
-
-
-def test_the_thesis_has_no_box_where_no_depth_is():
-    depth = DepthImage(np.zeros((48, 64), np.uint16), 0.001)
-    assert thesis_boxes(depth, [(5, 5, 60, 40)], Camera(64, 48, 60.0, 60.0, 31.5, 23.5)) == []
-
-
 def walks(steps, random):
     """Three people who keep apart, image by image: positions (3, 3)."""
     places_m = np.array([[2.0, -2, 1], [4, 0, 1], [3, 3, 1]])
@@ -49,32 +34,23 @@ def walks(steps, random):
         yield places_m
 
 
-@given(st.integers(0, 1000), st.lists(st.lists(st.booleans(), min_size=3, max_size=3), min_size=2, max_size=12))
-def test_the_thesis_tracks_are_those_of_its_tracker(seed, seen):
-    """While nobody is nearest to the box of somebody else; how the two differ there, the module says."""
-    ours, theirs = ThesisTracker(), ThesisTracks()
-    everybody = (True, True, True)
-    for image, (places_m, shown) in enumerate(zip(walks(len(seen) + 1, np.random.RandomState(seed)),
-                                                  [everybody] + seen)):
-        shown_m, stamp_ns = places_m[np.array(shown)], image * NS // 30
-        tracks = ours.update(stamp_ns, [Detection(place_m, SIZE) for place_m in shown_m])
-        expected = {track.id: track for track in tracks}
-        ahead = theirs.update(stamp_ns, [ThesisBox(place_m, tuple(SIZE)) for place_m in shown_m], np.eye(4))
-        assert sorted(ahead) == sorted(expected)
-        for known in theirs.objects:
-            track = expected[known.number]
-            np.testing.assert_allclose(known.position_m, track.position_m)
-            np.testing.assert_allclose(known.velocity_mps, track.velocity_mps[:2], atol=1e-9)
-            ahead_m = track.position_m + AHEAD_S * track.velocity_mps
-            np.testing.assert_allclose(ahead[known.number], ahead_m[:2], atol=1e-9)
+@given(st.integers(0, 1000), st.integers(2, 12))
+def test_the_thesis_tracks_are_those_of_its_mended_tracker_while_everybody_is_seen(seed, images):
+    ours, theirs = ThesisTracker(), OriginalTracker()
+    for image, places_m in enumerate(walks(images, np.random.RandomState(seed))):
+        stamp_ns, detections = image * benchmark.PERIOD_NS, [Detection(place_m, SIZE) for place_m in places_m]
+        expected, tracks = ours.update(stamp_ns, detections), theirs.step(stamp_ns, detections)
+        assert [track.id for track in tracks] == [track.id for track in expected]
+        for track, other in zip(tracks, expected):
+            np.testing.assert_allclose(track.position_m, other.position_m)
+            np.testing.assert_allclose(track.velocity_mps, other.velocity_mps, atol=1e-9)
 
 
-def test_the_thesis_forgets_who_was_not_seen_for_a_second():
-    tracks = ThesisTracks()
-    tracks.update(0, [ThesisBox(np.array([1.0, 0, 2]), SIZE)], np.eye(4))
-    assert list(tracks.update(NS, [], np.eye(4))) == [1]
-    assert tracks.update(NS + 1, [], np.eye(4)) == {}
-    assert list(tracks.update(2 * NS, [ThesisBox(np.array([1.0, 0, 2]), SIZE)], np.eye(4))) == [2]
+def test_the_thesis_predicts_two_seconds_along_the_velocity(session):
+    algorithm = benchmark.Theirs(crowd_of(people_of(session), 1, session))
+    for image, x_m in enumerate((0.0, 0.1, 0.2)):  # of a camera that looks along x: to its right
+        ahead_m = algorithm.track(image * NS // 10, [Box3D(np.array([x_m, 0, 3.0]), SIZE, (0, 0, 9, 9), 1.0, ())])
+    np.testing.assert_allclose(ahead_m[1], (3, -0.2 - 2 * (0.2 + 0.8 * 0.2), 1), atol=1e-6)
 
 
 def test_people_of_a_crowd_have_the_depth_they_had(session):

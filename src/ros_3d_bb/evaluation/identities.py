@@ -1,18 +1,20 @@
 """Tracks against ground truth: who got which number, kept it, and how far off was the position.
 
-In each image people and the tracks that were seen in it are paired within `GATE_M` in the plane seen from above; a pair
-of before is kept as long as it is within the gate (as in CLEAR MOT, Bernardin and Stiefelhagen 2008), the rest is
-paired nearest first. What counts is what the images show: people and tracks whose status is VISIBLE.
+In each image, people and tracks within `GATE_M` in the plane seen from above are matched as by TrackEval's CLEAR metric
+(Bernardin and Stiefelhagen 2008), which robots need not have: matches of the image before are kept, as many of the
+others as possible are made, with the least sum of distances. An ID switch is a match with another track than the last
+one. What counts is what the images show: people and tracks whose status is VISIBLE.
 """
 from typing import List, NamedTuple
 
 import numpy as np
 
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tracking.association import match_greedily, plane_distances
+from ros_3d_bb.tracking.association import assign, plane_distances
 from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
 
 GATE_M = 1.0
+KEPT = 1000  # score of a match that is kept; of another one 0.5 at the gate to 1 at no distance, as in TrackEval
 LONGEST_GAP = 1.5  # in periods between images; where more is missing, a stretch ends
 
 
@@ -72,27 +74,35 @@ def score(moments):
     -------
     SceneScore
     """
-    pairs, false, last_track = [], 0, {}
+    pairs, false, matcher = [], 0, ClearMatcher()
     for moment in moments:
         seen = [track for track in moment.tracks if track.status == VISIBLE]
-        pairs.append(pairs_of(moment.truth, seen, last_track))
-        last_track.update({pair.person: pair.track for pair in pairs[-1]})
+        pairs.append(matcher.match(moment.truth, seen))
         false += len(seen) - len(pairs[-1])
     people = sorted(set(person.id for moment in moments for person in moment.truth))
     return SceneScore([_person_score(person, moments, pairs) for person in people], len(moments),
                       false / float(max(1, len(moments))))
 
 
-def pairs_of(people, tracks, before, gate_m=GATE_M):
-    """The pairs (list of Pair) of people and tracks in one image; `before`: the last track of each person, by id."""
-    if not people or not tracks:
-        return []
-    distances = plane_distances([person.position_m for person in people], [track.position_m for track in tracks])
-    near = distances <= gate_m
-    kept = [[before.get(person.id) == track.id for track in tracks] for person in people]
-    cost = np.where(np.array(kept) & near, distances - 2 * gate_m, distances)
-    return [Pair(people[row].id, tracks[column].id, tracks[column].position_m[:2] - people[row].position_m[:2])
-            for row, column in match_greedily(cost) if near[row, column]]
+class ClearMatcher(object):
+    """Matches people with tracks, image after image, at most `gate_m` apart."""
+
+    def __init__(self, gate_m=GATE_M):
+        self._gate_m, self._last_matches = gate_m, {}
+
+    def match(self, people, tracks):
+        """The pairs of the next image, a list of Pair: those that are kept, then the others, nearest first."""
+        if not people or not tracks:
+            return []
+        distances_m = plane_distances([person.position_m for person in people], [track.position_m for track in tracks])
+        near = distances_m <= self._gate_m
+        kept = np.array([[self._last_matches.get(person.id) == track.id for track in tracks] for person in people])
+        scores = np.where(near, KEPT * kept + 1 - distances_m / (2 * self._gate_m), 0)
+        matches = sorted((match for match in assign(-scores) if near[match]), key=lambda match: -scores[match])
+        pairs = [Pair(people[row].id, tracks[column].id, tracks[column].position_m[:2] - people[row].position_m[:2])
+                 for row, column in matches]
+        self._last_matches = {pair.person: pair.track for pair in pairs}
+        return pairs
 
 
 def _person_score(person, moments, pairs):

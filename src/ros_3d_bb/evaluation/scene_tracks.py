@@ -7,7 +7,7 @@ from typing import NamedTuple, Optional
 
 import numpy as np
 
-from ros_3d_bb.evaluation.identities import pairs_of
+from ros_3d_bb.evaluation.identities import ClearMatcher
 from ros_3d_bb.evaluation.scenes import LEAST_SHOWN
 from ros_3d_bb.geometry import transform_points
 from ros_3d_bb.tracking.association import plane_distances
@@ -57,17 +57,17 @@ def score_tracks(steps, camera):
     -------
     TrackScore
     """
-    track_ids, not_visible, velocity_errors, prediction_errors, last_track = set(), 0, [], [], {}
+    track_ids, not_visible, velocity_errors, prediction_errors = set(), 0, [], []
+    followed, matcher = set(), ClearMatcher(HELD_M)
     for step in steps:
         people = _people(step, camera)
         tracks = [track for track in step.moment.tracks if track.status == VISIBLE]
         near_m = plane_distances([person.position_m for person in people] or np.zeros((0, 3)),
                                  [track.position_m for track in tracks] or np.zeros((0, 3))) <= HELD_M
         track_ids.update(track.id for track, near in zip(tracks, near_m.T) if near.any())
-        not_visible += sum(person.id in last_track and not near.any() for person, near in zip(people, near_m))
-        pairs = pairs_of(people, tracks, last_track, HELD_M)
-        last_track.update({pair.person: pair.track for pair in pairs})
-        for pair in pairs:
+        not_visible += sum(person.id in followed and not near.any() for person, near in zip(people, near_m))
+        for pair in matcher.match(people, tracks):
+            followed.add(pair.person)
             person, track = _with_id(people, pair.person), _with_id(tracks, pair.track)
             velocity_errors.append(_distance(track.velocity_mps, person.velocity_mps))
             prediction_errors += _prediction_errors(track, person)

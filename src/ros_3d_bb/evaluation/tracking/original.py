@@ -36,7 +36,7 @@ class _Track(object):
     def __init__(self, track_id, stamp_ns, detection):
         self.id, self.first_ns = track_id, stamp_ns
         self.position_m = detection.position_m
-        self.average = None
+        self.average_step_m = self.velocity_mps = None
         self.move(stamp_ns, detection)
 
     def move(self, stamp_ns, detection):
@@ -44,25 +44,34 @@ class _Track(object):
         self.position_m, self.size_m = detection.position_m, detection.size_m
         self.seen_ns, self.missed = stamp_ns, 0
 
+    def filter_velocity(self, rate_hz):
+        """Average the step to the newest position, which is repeated while the track is not matched."""
+        average_m = self.average_step_m
+        self.average_step_m = self.step_m if average_m is None else ALPHA * self.step_m + (1 - ALPHA) * average_m
+        self.velocity_mps = self.average_step_m * rate_hz
+
 
 class OriginalTracker(object):
     """Tracks objects from image to image; takes images as `as_it_arrived` gives them."""
 
     def __init__(self):
-        self._tracks, self._last_id, self._now_ns = [], 0, None
+        self._tracks, self._last_id, self._now_ns, self._rate_hz = [], 0, None, USUAL_RATE_HZ
 
     def update(self, stamp_ns, detections, view=None):
         """Take the detections of one image, as `ThesisTracker.update`. Returns a list of TrackedObject."""
-        rate_hz = USUAL_RATE_HZ if self._now_ns is None else NS / (stamp_ns - self._now_ns)
+        return [self._published(track) for track in self.step(stamp_ns, detections)]
+
+    def step(self, stamp_ns, detections):
+        """The algorithm without its output. Returns the tracks, with `id`, `position_m` and `velocity_mps`."""
+        self._rate_hz = USUAL_RATE_HZ if self._now_ns is None else NS / (stamp_ns - self._now_ns)
         self._now_ns = stamp_ns
         try:
             self._match(detections)
         except IndexError:
             return []
         for track in self._tracks:
-            track.average = (track.step_m if track.average is None
-                             else ALPHA * track.step_m + (1 - ALPHA) * track.average)
-        return [self._published(track, rate_hz) for track in self._tracks]
+            track.filter_velocity(self._rate_hz)
+        return self._tracks
 
     def _match(self, detections):
         if not detections:
@@ -88,14 +97,17 @@ class OriginalTracker(object):
 
         Returns {(row, column): distance}.
         """
-        matched_m = {}
+        matched_m, taken = {}, set()
         if not len(distances_m):
             return matched_m
-        nearest = np.argmin(distances_m, axis=1)
-        for row in np.argsort(distances_m.min(axis=1)):
-            if nearest[row] not in set(column for _row, column in matched_m):
-                self._tracks[row].move(self._now_ns, detections[nearest[row]])
-                matched_m[row, nearest[row]] = distances_m[row, nearest[row]]
+        nearest_m = distances_m.min(axis=1)
+        rows = np.argsort(nearest_m)
+        columns = distances_m.argmin(axis=1)[rows]
+        for row, column, distance_m in zip(rows.tolist(), columns.tolist(), nearest_m[rows].tolist()):
+            if column not in taken:
+                taken.add(column)
+                self._tracks[row].move(self._now_ns, detections[column])
+                matched_m[row, column] = distance_m
         return matched_m
 
     def _miss(self, track):
@@ -103,10 +115,10 @@ class OriginalTracker(object):
         if track.missed >= LONGEST_MISSED:
             self._tracks.remove(track)
 
-    def _published(self, track, rate_hz):
-        velocity_mps = track.average * rate_hz
+    def _published(self, track):
+        velocity_mps = track.velocity_mps
         times_s = PREDICTION_STEP_S * np.arange(1, PREDICTIONS + 1)
-        return TrackedObject(track.id, track.position_m, track.size_m, velocity_mps, track.step_m * rate_hz,
+        return TrackedObject(track.id, track.position_m, track.size_m, velocity_mps, track.step_m * self._rate_hz,
                              VISIBLE if track.seen_ns == self._now_ns else OCCLUDED,
                              bool(np.linalg.norm(velocity_mps) >= MOVING_MPS), track.first_ns, track.seen_ns,
                              track.position_m + times_s[:, np.newaxis] * velocity_mps, PREDICTION_STEP_S)
