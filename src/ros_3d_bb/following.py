@@ -17,7 +17,8 @@ from ros_3d_bb.tracking.measuring import NoiseParams
 from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.thesis import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.tracked import View
-from ros_3d_bb.tracking.tracker import LATEST_NS, Tracker, TrackerParams
+from ros_3d_bb.tracking.out_of_sequence import LATEST_NS
+from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.visibility import depths_towards
 
 TRACKING_PARAMS = ThesisTrackerParams, TrackerParams, NoiseParams, PredictionParams

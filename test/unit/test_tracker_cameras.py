@@ -234,7 +234,7 @@ def test_a_late_image_of_one_camera_leaves_what_another_one_could_not_answer():
         images.insert(1 if late else 0, (START_NS + int(1.05 * NS), [], LEFT))
         tracker.skip(START_NS + int(1.13 * NS), 'front')
         play(tracker, images)
-        return tracker._state.tracks['missed_s']
+        return tracker._buffer.state.tracks['missed_s']
     np.testing.assert_allclose(missed_s(late=False), [0.02], rtol=1e-6)
     np.testing.assert_array_equal(missed_s(late=True), missed_s(late=False))
 
@@ -265,7 +265,7 @@ def test_neither_does_it_where_images_have_no_answer(arrivals, pause_s, cameras,
     random.shuffle(arrivals)
     shuffled = play_them(arrivals)
     assert ids(shuffled.objects()) == ids(in_time.objects())
-    assert shuffled._state.tracks.tobytes() == in_time._state.tracks.tobytes()
+    assert shuffled._buffer.state.tracks.tobytes() == in_time._buffer.state.tracks.tobytes()
 
 
 @settings(max_examples=14)
@@ -294,4 +294,4 @@ def test_whatever_comes_in_whatever_order_numbers_are_given_once(given_images):
         objects = tracker.update(stamp_ns, [found for bearing in bearings for found in shown(view, around(bearing))],
                                  view)
         assert ids(objects) == sorted(set(ids(objects)))
-        assert len(set(tracker._state.tracks['id'].tolist())) == len(tracker._state.tracks)
+        assert len(set(tracker._buffer.state.tracks['id'].tolist())) == len(tracker._buffer.state.tracks)

@@ -36,7 +36,7 @@ def test_covariances_of_tracks_are_positive_definite_whatever_boxes_come(seed):
                           for place_m in places_m]
             view = View(mounted(1.0, *random.choice([0, 45, 90, 180], 3)), CAMERA)
             tracker.update(stamp_ns, detections, view)
-            covariances = tracker._state.tracks['covariance']
+            covariances = tracker._buffer.state.tracks['covariance']
             assert np.isfinite(covariances).all() and (np.linalg.eigvalsh(covariances) > 0).all()
 
 

@@ -202,7 +202,8 @@ def test_stamps_that_creep_are_refused_before_they_fill_the_memory():
     for number in range(1000):
         play.send('front', ahead_ns=number)
     assert play.tally.counts['images tracked'] == MOST_RECENT
-    assert len(play.follower._tracker._history) == MOST_RECENT and len(play.follower._tracker._ids) <= MOST_RECENT
+    buffer = play.follower._tracker._buffer
+    assert len(buffer._history) == MOST_RECENT and len(buffer._ids) <= MOST_RECENT
     play.run(2)
     assert play.lost('front', NS) == 0
 
@@ -258,7 +259,8 @@ def test_what_is_kept_is_bounded_and_a_good_second_follows_whatever_the_stamps_w
         stamps_ns[camera] = max(NS, stamps_ns[camera] + step_ns)
         play.send(camera, stamps_ns[camera] - START_NS - play.now_ns, 1)
         tracker = play.follower._tracker
-        assert len(tracker._history) <= number * MOST_RECENT and len(tracker._ids) <= 2 * number * MOST_RECENT
+        buffer = tracker._buffer
+        assert len(buffer._history) <= number * MOST_RECENT and len(buffer._ids) <= 2 * number * MOST_RECENT
     play.run(3.5, set(cameras), 1)
     for camera in cameras:
         assert play.lost(camera, play.now_ns - NS) == 0

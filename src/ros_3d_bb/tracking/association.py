@@ -2,6 +2,67 @@
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking import kalman
+
+RECENT_NS = 7 * NS // 10  # tracks matched so recently are associated before those that were missed for longer
+UNSURE_SHARE = 0.1  # the density of new targets is at most this share of that of a detection at its centre
+HEAD_SIGMAS = 2.0  # the top of a head is known this much less well than a height: the camera tilts as the robot drives
+HIDDEN_FEET_COST = 8.0  # of a box whose top fits but not its height: something in front hides the lower part
+
+
+def associate(tracks, batch, stamp_ns, params, outliers):
+    """Assign detections to tracks: recently matched ones first, then those missed for longer, then tentative ones.
+
+    A pair is allowed only if the track explains the detection better than a new target does.
+
+    Parameters
+    ----------
+    tracks : numpy.ndarray of track.TRACK, (n,)
+        Predicted to the stamp.
+    batch : measuring.Sightings
+        m measurements.
+    stamp_ns : int
+    params : tracker.TrackerParams
+    outliers : kalman.Outliers
+
+    Returns
+    -------
+    rows, columns : numpy.ndarray of int, (k,)
+        Pairs of a track and a measurement.
+    """
+    cost = kalman.unlikeliness(tracks['mean'], tracks['covariance'], batch.ground, outliers)
+    cost += _height_cost(tracks, batch, params.height_sigma)
+    # An uncertain detection hardly tells a track from a new target; the track then gets it.
+    largest_density = 1 / (2 * np.pi * np.sqrt(np.linalg.det(batch.ground.noise_m2)))
+    density = np.minimum(params.newcomer_density, UNSURE_SHARE * largest_density)
+    cost[cost >= -2 * np.log(2 * np.pi * density)] = np.inf
+    is_missed = stamp_ns - tracks['last_ns'] >= RECENT_NS
+    priority = np.where(tracks['confirmed'], is_missed.astype(int), 2)
+    pairs, free = [], np.arange(cost.shape[1])
+    for rank in range(3):
+        rows = np.flatnonzero(priority == rank)
+        if len(rows) and len(free):
+            matches = assign(cost[np.ix_(rows, free)])
+            pairs += [(rows[row], free[column]) for row, column in matches]
+            free = np.delete(free, [column for _row, column in matches])
+    return np.array(pairs, int).reshape(-1, 2).T
+
+
+def _height_cost(tracks, batch, sigma_m):
+    """What the heights of batch cost in the association, (n, m), as negative log likelihood.
+
+    Where the image border cuts a box, or always cut those of a track, the height is not known: the top of the head is
+    compared if both have seen it, else nothing. Furniture hides the lower part of a body and leaves the top as well.
+    """
+    seen, cut = tracks['end_hits'] > 0, batch.vertical_cuts
+    cost = ((tracks['size_m'][:, 2:] - batch.sizes_m[:, 2]) / sigma_m) ** 2 / 2
+    tops_m = tracks['z_m'] + tracks['size_m'][:, 2] / 2, batch.z_m + batch.sizes_m[:, 2] / 2
+    top_cost = ((tops_m[0][:, None] - tops_m[1]) / (HEAD_SIGMAS * sigma_m)) ** 2 / 2
+    top_cost[~(seen[:, 1:] & ~cut[:, 1])] = 0
+    heights_known = seen.all(axis=1)[:, None] & ~cut.any(axis=1)
+    return np.where(heights_known, np.minimum(cost, top_cost + HIDDEN_FEET_COST), top_cost)
+
 
 def match_greedily(distances):
     """Pair rows with columns, nearest pair first, each at most once (thesis 3.6).

@@ -1,0 +1,102 @@
+"""Tracks as one structured array, and what detections change in it. Fixed frame, metres, nanoseconds."""
+import numpy as np
+
+from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking import kalman
+from ros_3d_bb.tracking.tracked import VISIBLE
+
+# `hits` counts the detections of a track, `end_hits` those that showed the lower and the upper end of the body.
+# `unseen_s` is the time since the last detection, `missed_s` the part of it for which it should have been detected.
+TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
+                  ('size_m', float, 3), ('end_hits', int, 2), ('hits', int), ('first_ns', np.int64),
+                  ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float), ('status', int),
+                  ('confirmed', bool), ('moving', bool)])
+RECENTLY_MATCHED_NS = NS // 5  # no new target starts near a track that was matched so recently
+SMOOTHING = 0.1  # share of the newest detection in size and height
+CUT_SMOOTHING = 0.02  # the same where the image border cuts the box on a side: the head may be outside
+LEAST_HEIGHT_M = 0.1
+STILL_MOVING = 0.5  # share of the speed at which a track starts to move below which it stops
+
+
+def update_matched(tracks, rows, batch, stamp_ns, params, outliers):
+    """Update the tracks in `rows`, in place, with one detection each.
+
+    Parameters
+    ----------
+    tracks : numpy.ndarray of TRACK, (n,)
+        Predicted to the stamp.
+    rows : numpy.ndarray of int, (m,)
+    batch : measuring.Sightings
+        m measurements.
+    stamp_ns : int
+    params : tracker.TrackerParams
+    outliers : kalman.Outliers
+    """
+    matched = tracks[rows]
+    matched['mean'], matched['covariance'] = kalman.update(matched['mean'], matched['covariance'], batch.ground,
+                                                           outliers)
+    matched['hits'] += 1
+    matched['last_ns'], matched['unseen_s'], matched['missed_s'], matched['status'] = stamp_ns, 0, 0, VISIBLE
+    is_old_enough = stamp_ns - matched['first_ns'] >= params.min_age * NS
+    matched['confirmed'] |= is_old_enough & (matched['hits'] >= params.min_sightings)
+    speed_mps = np.linalg.norm(matched['mean'][:, 2:], axis=1)
+    matched['moving'] = speed_mps >= params.moving_speed * np.where(matched['moving'], STILL_MOVING, 1)
+    _update_size(matched, batch)
+    tracks[rows] = matched
+
+
+def new_targets(tracks, batch, stamp_ns, params):
+    """Tracks of measurements that belong to no track and are no second detection of one.
+
+    Parameters
+    ----------
+    tracks : numpy.ndarray of TRACK, (n,)
+    batch : measuring.Sightings
+        m measurements.
+    stamp_ns : int
+    params : tracker.TrackerParams
+
+    Returns
+    -------
+    new : numpy.ndarray of TRACK, (k,)
+        Without IDs.
+    kept : list of int
+        The k measurements that they come from.
+    """
+    new = np.zeros(len(batch.z_m), TRACK)
+    new['mean'][:, :2] = batch.ground.positions_m
+    new['covariance'][:, :2, :2] = batch.ground.noise_m2
+    new['covariance'][:, [2, 3], [2, 3]] = params.initial_speed ** 2
+    new['size_m'], new['z_m'], new['z_m2'] = batch.sizes_m, batch.z_m, batch.z_m2
+    new['end_hits'] = ~batch.vertical_cuts
+    new['hits'], new['first_ns'], new['last_ns'] = 1, stamp_ns, stamp_ns
+    occupied_m = tracks['mean'][stamp_ns - tracks['last_ns'] < RECENTLY_MATCHED_NS, :2]
+    kept = []
+    for row, position_m in enumerate(new['mean'][:, :2]):
+        others_m = np.concatenate((occupied_m, new['mean'][kept, :2]))
+        if (np.linalg.norm(others_m - position_m, axis=1) >= params.duplicate_distance).all():
+            kept.append(row)
+    return new[kept], kept
+
+
+def _update_size(matched, batch):
+    """Smooth the size and the height of tracks by one detection each.
+
+    Lower and upper end are smoothed apart. An end that the image border cuts off moves with the other one, so that the
+    height stays what it was; until it is seen for the first time, it is where the estimator expects it.
+    """
+    cut = batch.vertical_cuts
+    matched['end_hits'] += ~cut
+    held = cut & (matched['end_hits'] > 0)
+    end_share = np.where(held, 0, np.maximum(SMOOTHING, 1 / np.maximum(matched['end_hits'], 1)))
+    share = np.maximum(SMOOTHING, 1 / matched['hits'])
+    share[batch.cut_sideways] = CUT_SMOOTHING
+    end_share = np.minimum(end_share, np.where(batch.cut_sideways, CUT_SMOOTHING, 1)[:, None])
+    up_m, taller_m = batch.z_m - matched['z_m'], batch.sizes_m[:, 2] - matched['size_m'][:, 2]
+    lower_m, upper_m = end_share[:, 0] * (up_m - taller_m / 2), end_share[:, 1] * (up_m + taller_m / 2)
+    lower_m = np.where(held[:, 0], upper_m, lower_m)
+    upper_m = np.where(held[:, 1], lower_m, upper_m)
+    matched['size_m'][:, :2] += share[:, None] * (batch.sizes_m[:, :2] - matched['size_m'][:, :2])
+    matched['size_m'][:, 2] = np.maximum(matched['size_m'][:, 2] + upper_m - lower_m, LEAST_HEIGHT_M)
+    matched['z_m'] += (lower_m + upper_m) / 2
+    matched['z_m2'] += end_share.mean(axis=1) * (batch.z_m2 - matched['z_m2'])
