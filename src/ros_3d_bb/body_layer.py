@@ -8,6 +8,7 @@ import numpy as np
 BODY_HALF_DEPTH_M = 0.35
 TRUNK_HALF_DEPTH_M = 0.25  # without arms and legs: a wall close behind must not draw the median
 BIN_M, LAYER_BINS = 0.05, 5  # a layer is the depth in so many bins of a histogram
+MEDIANS = 4  # of the layer, and of the trunk around the median before
 FIRST_LAYER_SHARE = 0.5  # the nearest layer with this share of the strongest one's weight is the person
 EDGE_PERCENT = 5  # of the pixels of the layer are looked past on the left and on the right: arms, flying pixels
 
@@ -31,10 +32,12 @@ def first_layer(depths_m, weights, in_order_m):
     best = first + np.argmax(histogram[first:first + LAYER_BINS])
     nearest, farthest = ((in_order_m - in_order_m[0]) / BIN_M).searchsorted(
         (best - LAYER_BINS // 2, best + LAYER_BINS // 2 + 1))
-    layer_m = _median(in_order_m[nearest:farthest])
-    for _ in range(3):
-        layer_m = _median(within(in_order_m, layer_m, TRUNK_HALF_DEPTH_M))
-    return layer_m
+    trunk_m = in_order_m[nearest:farthest]
+    for _ in range(MEDIANS):
+        last = len(trunk_m) - 1
+        median_m = (trunk_m[last // 2] + trunk_m[last - last // 2]) / 2
+        trunk_m = within(in_order_m, median_m, TRUNK_HALF_DEPTH_M)
+    return median_m
 
 
 def within(in_order_m, middle_m, half_m):
@@ -67,8 +70,3 @@ def whole(low, high, cut_low, cut_high, usual):
     if cut_low and not cut_high:
         return low - missing, high
     return low, high + (missing if cut_high and not cut_low else 0.0)
-
-
-def _median(in_order_m):
-    last = len(in_order_m) - 1
-    return (in_order_m[last // 2] + in_order_m[last - last // 2]) / 2
