@@ -8,7 +8,7 @@ import numpy as np
 BODY_HALF_DEPTH_M = 0.35
 TRUNK_HALF_DEPTH_M = 0.25  # without arms and legs: a wall close behind must not draw the median
 BIN_M, LAYER_BINS = 0.05, 5  # a layer is the depth in so many bins of a histogram
-MEDIANS = 4  # of the layer, and of the trunk around the median before
+MEDIANS = 3  # of the trunk, at most: each is that of what is around the one before
 FIRST_LAYER_SHARE = 0.5  # the nearest layer with this share of the strongest one's weight is the person
 EDGE_PERCENT = 5  # of the pixels of the layer are looked past on the left and on the right: arms, flying pixels
 
@@ -32,11 +32,11 @@ def first_layer(depths_m, weights, in_order_m):
     best = first + np.argmax(histogram[first:first + LAYER_BINS])
     nearest, farthest = ((in_order_m - in_order_m[0]) / BIN_M).searchsorted(
         (best - LAYER_BINS // 2, best + LAYER_BINS // 2 + 1))
-    trunk_m = in_order_m[nearest:farthest]
+    median_m = _median(in_order_m[nearest:farthest])
     for _ in range(MEDIANS):
-        last = len(trunk_m) - 1
-        median_m = (trunk_m[last // 2] + trunk_m[last - last // 2]) / 2
-        trunk_m = within(in_order_m, median_m, TRUNK_HALF_DEPTH_M)
+        before_m, median_m = median_m, _median(within(in_order_m, median_m, TRUNK_HALF_DEPTH_M))
+        if median_m == before_m:
+            break
     return median_m
 
 
@@ -70,3 +70,8 @@ def whole(low, high, cut_low, cut_high, usual):
     if cut_low and not cut_high:
         return low - missing, high
     return low, high + (missing if cut_high and not cut_low else 0.0)
+
+
+def _median(in_order_m):
+    last = len(in_order_m) - 1
+    return (in_order_m[last // 2] + in_order_m[last - last // 2]) / 2

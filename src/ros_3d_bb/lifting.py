@@ -131,9 +131,9 @@ class Lifter(object):
         if (width, height) != (camera.width, camera.height):
             raise ValueError('%s; depth must be aligned to colour: %s' % (size_fault(camera, width, height), ALIGN))
         rects_px = self._usable_rects(boxes2d)
-        estimates = [box for box in estimate_boxes(depth, rects_px, camera, self._estimator) if box is not None]
+        estimates = estimate_boxes(depth, rects_px, camera, self._estimator)
         boxes3d = self._plausible(estimates)
-        counts = {'boxes lifted': len(boxes3d), 'boxes without depth': len(rects_px) - len(estimates)}
+        counts = {'boxes lifted': len(boxes3d), 'boxes without depth': estimates.count(None)}
         if self._error_model is not None and boxes3d:
             boxes3d = corrected_boxes(boxes3d, self._error_model)
             outside_m = self._error_model.distance_outside([box.center_m for box in boxes3d])
@@ -156,9 +156,11 @@ class Lifter(object):
         return usable_px
 
     def _plausible(self, estimates):
-        """The 3D boxes that have the size of something that can be tracked."""
+        """The 3D boxes, without None, that have the size of something that can be tracked."""
         plausible = []
         for box in estimates:
+            if box is None:
+                continue
             if is_plausible(box):
                 plausible.append(box)
                 continue

@@ -9,8 +9,14 @@ PERIOD = 33 * MS
 
 
 class Recorder(object):
-    """A synchronizer and what its callbacks got: `frames` of (boxes, depth, camera), where depth and camera are None for
-    lost boxes, and `forgotten` boxes of the time before.
+    """A synchronizer and what its callbacks got.
+
+    Attributes
+    ----------
+    frames : list of (boxes, depth, camera)
+        Depth and camera are None for lost boxes.
+    forgotten : list
+        Boxes of the time before.
     """
 
     def __init__(self, length_ns=NS, tolerance_ns=5 * MS, assumed_delay_ns=0):
