@@ -8,6 +8,7 @@ import numpy as np
 BODY_HALF_DEPTH_M = 0.35
 TRUNK_HALF_DEPTH_M = 0.25  # without arms and legs: a wall close behind must not draw the median
 BIN_M, LAYER_BINS = 0.05, 5  # a layer is the depth in so many bins of a histogram
+MEDIANS = 3  # of the trunk, at most: each is that of what is around the one before
 FIRST_LAYER_SHARE = 0.5  # the nearest layer with this share of the strongest one's weight is the person
 USUAL_WIDTH_M, USUAL_HEIGHT_M = 0.46, 1.7  # of a body that the image border cuts
 EDGE_PERCENT = 5  # of the pixels of the layer are looked past on the left and on the right: arms, flying pixels
@@ -32,10 +33,12 @@ def first_layer(depths_m, weights, in_order_m):
     best = first + np.argmax(histogram[first:first + LAYER_BINS])
     nearest, farthest = ((in_order_m - in_order_m[0]) / BIN_M).searchsorted(
         (best - LAYER_BINS // 2, best + LAYER_BINS // 2 + 1))
-    layer_m = _median(in_order_m[nearest:farthest])
-    for _ in range(3):
-        layer_m = _median(within(in_order_m, layer_m, TRUNK_HALF_DEPTH_M))
-    return layer_m
+    median_m = _median(in_order_m[nearest:farthest])
+    for _ in range(MEDIANS):
+        before_m, median_m = median_m, _median(within(in_order_m, median_m, TRUNK_HALF_DEPTH_M))
+        if median_m == before_m:
+            break
+    return median_m
 
 
 def within(in_order_m, middle_m, half_m):

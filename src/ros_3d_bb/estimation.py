@@ -93,13 +93,13 @@ def sample_median(depth, rect_px, stride_px=20):
     ValueError
         If the rectangle is empty or reversed.
     """
-    x1, y1, x2, y2 = (int(edge) for edge in rect_px)
+    x1, y1, x2, y2 = map(int, rect_px)
     check_rect((x1, y1, x2, y2))
     height, width = depth.values.shape
-    ticks = _ticks(x1, x2, width, stride_px), _ticks(y1, y2, height, stride_px)
-    columns, rows = (slice(those.start, those.stop, those.step) for those in ticks)
-    return Samples(*(np.arange(those.start, those.stop, those.step) for those in ticks), depth.values[rows, columns],
-                   depth.scale_m, *depth.at(columns, rows))
+    columns, rows = _ticks(x1, x2, width, stride_px), _ticks(y1, y2, height, stride_px)
+    depth_m, valid = depth.at(columns, rows)
+    return Samples(np.arange(width)[columns], np.arange(height)[rows], depth.values[rows, columns], depth.scale_m,
+                   depth_m, valid)
 
 
 def estimate_median(samples, rect_px, camera, _nearer=()):
@@ -137,9 +137,11 @@ def sample_foreground(depth, rect_px):
         If the rectangle is empty or reversed.
     """
     height, width = depth.values.shape
-    columns, rows = (min(max(rect_px[axis + 2], 0), size) - min(max(rect_px[axis], 0), size)
-                     for axis, size in enumerate((width, height)))
-    return sample_median(depth, rect_px, max(1, int(np.sqrt(max(0, columns) * max(0, rows) / SAMPLES_WANTED))))
+    x1, y1, x2, y2 = rect_px
+    visible_columns = min(max(x2, 0), width) - min(max(x1, 0), width)
+    visible_rows = min(max(y2, 0), height) - min(max(y1, 0), height)
+    visible_px = max(0, visible_columns) * max(0, visible_rows)
+    return sample_median(depth, rect_px, max(1, int(np.sqrt(visible_px / SAMPLES_WANTED))))
 
 
 def estimate_foreground(samples, rect_px, camera, nearer=()):
@@ -164,10 +166,13 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
         None where no sample carries a depth, or less than `LEAST_SUPPORT` of them are in a layer of their own, or the
         camera sees nothing there.
     """
-    across, _down = camera.rays(samples.columns, samples.rows[:, np.newaxis])
-    own = samples.valid & ~np.isnan(across)  # a pixel that sees nothing has no ray
-    _leave_out(own, samples, rect_px, nearer)
-    flat_px = _without_distortion(rect_px, camera)
+    flat_px, columns_px, own = rect_px, samples.columns, samples.valid
+    if camera.distortion_model:
+        flat_px = _without_distortion(rect_px, camera)
+        columns_px = camera.undistort(samples.pixels)[..., 0]
+        own = own & ~np.isnan(columns_px)  # the pixels that see something
+    if nearer:
+        own = _mask_occluders(own, samples, rect_px, nearer)
     if flat_px is None or not own.any():
         return None
     x1, y1, x2, y2 = rect_px
@@ -179,9 +184,11 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     if support < LEAST_SUPPORT:
         return None
     on_body = own & (np.abs(samples.depth_m - layer_m) <= BODY_HALF_DEPTH_M)
-    left_m, right_m = edges((across * samples.depth_m)[on_body])
+    across_m = (columns_px - camera.cx) / camera.fx * samples.depth_m
+    left_m, right_m = edges(across_m[on_body])
     layer_m = trimmed_mean(body_m)
-    top_m, bottom_m = ((edge - camera.cy) / camera.fy * layer_m for edge in flat_px[1::2])
+    _left_px, top_px, _right_px, bottom_px = flat_px
+    top_m, bottom_m = (top_px - camera.cy) / camera.fy * layer_m, (bottom_px - camera.cy) / camera.fy * layer_m
     cut_left, cut_top, cut_right, cut_bottom = cut = truncated_edges(rect_px, camera)
     left_m, right_m = whole(left_m, right_m, cut_left, cut_right, USUAL_WIDTH_M)
     top_m, bottom_m = whole(top_m, bottom_m, cut_top, cut_bottom, USUAL_HEIGHT_M)
@@ -206,14 +213,16 @@ def _without_distortion(rect_px, camera):
     return None if np.isnan(flat_px).any() else flat_px
 
 
-def _leave_out(own, samples, rect_px, boxes):
-    """Take out of `own` (h, w) the samples that lie in the rectangle and in the layer of depth of one of the boxes."""
+def _mask_occluders(own, samples, rect_px, boxes):
+    """The samples of `own` (h, w) without those in the rectangle and the layer of depth of one of the boxes."""
+    own = own.copy()
     left, top, right, bottom = rect_px
     for box in boxes:
         x1, y1, x2, y2 = box.rect_px
         if x1 < right and x2 > left and y1 < bottom and y2 > top:
             part = (slice(*samples.rows.searchsorted((y1, y2))), slice(*samples.columns.searchsorted((x1, x2))))
             own[part] &= np.abs(samples.depth_m[part] - box.center_m[2]) > BODY_HALF_DEPTH_M
+    return own
 
 
 class Estimator(NamedTuple):
@@ -260,14 +269,15 @@ def estimate_boxes(depth, rects_px, camera, estimator):
     list of Box3D or None
         In the order of the rectangles.
     """
-    found, nearer = [None] * len(rects_px), []
+    boxes, nearer = [None] * len(rects_px), []
     for number in near_first(rects_px):
         rect_px = rects_px[number]
-        box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, camera, nearer)
-        found[number] = box
+        samples = estimator.sample(depth, rect_px)
+        box = estimator.estimate(samples, rect_px, camera, nearer)
+        boxes[number] = box
         if box is not None and is_plausible(box):
             nearer.append(box)
-    return found
+    return boxes
 
 
 def is_plausible(box):
@@ -295,8 +305,8 @@ def truncated_edges(rect_px, camera):
 
 
 def _ticks(low, high, limit, stride):
-    """Range of multiples of stride centred in low..high, those in 0..limit; exact for ints of any size."""
+    """Slice of multiples of stride centred in low..high, those in 0..limit; exact for ints of any size."""
     count = -(-(high - low) // stride)
     first = low + (high - low - (count - 1) * stride - 1) // 2
     first += max(0, -(first // stride)) * stride
-    return range(first, max(first, min(high, limit)), stride) if first < limit else range(0)
+    return slice(first, max(first, min(high, limit)), stride) if first < limit else slice(0, 0)

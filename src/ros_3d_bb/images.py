@@ -13,6 +13,10 @@ LAYOUTS = {'rgb8': ('u1', 3), 'bgr8': ('u1', 3), 'rgba8': ('u1', 4), 'bgra8': ('
 COLOR_ENCODINGS = ('rgb8', 'bgr8', 'rgba8', 'bgra8', 'mono8', '8UC1', '8UC3')
 # REP 118: depth is millimetres in 16UC1 (Gazebo and some drivers call it mono16) and metres in 32FC1.
 DEPTH_SCALES = {'16UC1': 0.001, 'mono16': 0.001, '32FC1': 1.0}
+# Units of depth are judged by the median of a grid of pixels.
+GRID = 16  # rows and columns of the grid
+LEAST_SAMPLES = 8  # fewer valid pixels say nothing
+NEAREST_M, FARTHEST_M = 0.1, 100.0  # no depth camera of people measures outside
 
 
 def array_from(message):
@@ -81,6 +85,41 @@ def depth_from(message, scale_m=None):
         raise ValueError('depth image has encoding %r; expected one of %s'
                          % (message.encoding, ', '.join(DEPTH_SCALES)))
     return DepthImage(array_from(message), scale_m or DEPTH_SCALES[message.encoding])
+
+
+def checked_depth_from(message, scale_m=None):
+    """As `depth_from`, for what is measured in the image: raises ValueError also if it seems to have other units."""
+    depth = depth_from(message, scale_m)
+    fault = units_fault(depth)
+    if fault:
+        raise ValueError(fault)
+    return depth
+
+
+def units_fault(depth):
+    """Whether a depth image counts in other units than it is read in, by where most of a few hundred pixels lie.
+
+    Parameters
+    ----------
+    depth : estimation.DepthImage
+
+    Returns
+    -------
+    str
+        A sentence, empty where nothing is wrong.
+    """
+    values = depth.values[::max(1, depth.values.shape[0] // GRID), ::max(1, depth.values.shape[1] // GRID)]
+    valid = values[np.isfinite(values) & (values > 0)]
+    if valid.size < LEAST_SAMPLES:
+        return ''
+    median_m = float(np.median(valid)) * depth.scale_m
+    if NEAREST_M <= median_m <= FARTHEST_M:
+        return ''
+    integers = depth.values.dtype.kind == 'u'
+    unit = 'metres' if median_m < NEAREST_M else 'millimetres'
+    return ('the depth image has the wrong unit: half of its pixels are nearer than %.3g m; it seems to hold %s in a '
+            '%s, which has to hold %s (REP 118), or set depth_scale'
+            % (median_m, unit, '16UC1' if integers else '32FC1', 'millimetres' if integers else 'metres'))
 
 
 def fill_image(message, pixels, encoding):

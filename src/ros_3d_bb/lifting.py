@@ -1,14 +1,13 @@
-"""From 2D boxes, depth images and camera_info to 3D boxes: what bbox3d_node and process_bag do with messages."""
+"""From 2D boxes, depth images and camera_info to 3D boxes: the stage that bbox3d_node and process_bag share."""
 from typing import NamedTuple
 
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
-from ros_3d_bb.diagnosis.camera_faults import ALIGN, size_fault, units_fault
+from ros_3d_bb.diagnosis.camera_faults import ALIGN, size_fault
 from ros_3d_bb.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.estimation import DepthImage, check_rect, estimate_boxes, estimator_named, is_plausible
-from ros_3d_bb.geometry import Camera
-from ros_3d_bb.images import depth_from
+from ros_3d_bb.images import checked_depth_from
 from ros_3d_bb.messages import boxes2d_from_message, camera_from_message, stamp_if_any, stamp_of, time_from
 from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.stamped import NS, Pairing
@@ -30,26 +29,28 @@ class Bbox3dParams(NamedTuple):
 
 
 class Lifted(NamedTuple):
-    """The 3D boxes (`estimation.Box3D`) of one image, its header, its depth image and its camera."""
+    """The 3D boxes (`estimation.Box3D`) of one image, its header and its depth image."""
 
     header: Header
     depth: DepthImage
-    camera: Camera
     boxes: list
 
 
 class Lifter(object):
-    """Lift arrays of 2D boxes into the camera's optical frame, each with the depth image of its own stamp.
+    """Pairs arrays of 2D boxes with depth and camera of their stamp, and estimates their 3D boxes.
 
-    Each `add_` takes a message and when it arrived (integer nanoseconds, see `stamped.Pairing`), and returns what it
-    settled, a list of Lifted. What is refused goes to the tally.
+    Each `add_` validates a message and hands it to the synchronizer, with its arrival (integer nanoseconds, see
+    `stamped.Pairing`). `on_frame` then gets the boxes of one image with their depth and camera, for `estimate`. What is
+    rejected is counted by the tally.
 
     Parameters
     ----------
     params : Bbox3dParams
     tally : tally.Tally
+    on_frame : callable
+        Called with `messages.Boxes2D`, sensor_msgs/Image and `geometry.Camera` of one stamp.
     depth_topic, info_topic : str
-        Where depth images and camera_info come from, for sentences about those that do not.
+        Where depth images and camera_info come from, for messages about missing ones.
 
     Raises
     ------
@@ -57,17 +58,17 @@ class Lifter(object):
         If a parameter makes no sense, or the error model cannot be used.
     """
 
-    def __init__(self, params, tally, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
+    def __init__(self, params, tally, on_frame, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
         _check(params)
         self._tally, self._depth_topic, self._info_topic = tally, depth_topic, info_topic
         self._error_model = error_model_of(params)
-        self._pairing = Pairing(*(int(seconds * NS) for seconds in (
-            params.cache_length, params.stamp_tolerance, params.assumed_delay)))
+        cache_ns, tolerance_ns = int(params.cache_length * NS), int(params.stamp_tolerance * NS)
+        self._sync = Pairing(cache_ns, tolerance_ns, int(params.assumed_delay * NS), on_frame, self._on_lost)
         self._said_plain = False
         self.tune(params)
 
     def tune(self, params):
-        """Lift the next boxes with another estimator, stride or assumed delay.
+        """Use another estimator, stride or assumed delay from the next boxes on.
 
         Raises ValueError, and keeps the old ones, where they make no sense.
         """
@@ -76,7 +77,7 @@ class Lifter(object):
         if self._error_model is not None:
             self._error_model.check_estimator(params.estimator)
         self._params, self._estimator = params, estimator
-        self._pairing.assumed_delay_ns = int(params.assumed_delay * NS)
+        self._sync.assumed_delay_ns = int(params.assumed_delay * NS)
 
     @property
     def sample(self):
@@ -84,16 +85,16 @@ class Lifter(object):
         return self._estimator.sample
 
     def add_camera_info(self, message, now_ns):
-        """Take a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
+        """Add a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
         camera = camera_from_message(message)
-        return self._lifted(self._pairing.add_camera(stamp_if_any(message), now_ns, camera))
+        self._sync.add_camera(stamp_if_any(message), now_ns, camera)
 
     def add_depth(self, message, now_ns):
-        """Take a depth image. Raises ValueError where it carries no stamp."""
-        return self._lifted(self._pairing.add_depth(stamp_of(message), now_ns, message))
+        """Add a depth image. Raises ValueError where it carries no stamp."""
+        self._sync.add_depth(stamp_of(message), now_ns, message)
 
     def add_boxes(self, message, now_ns):
-        """Take an Int32MultiArray of 2D boxes. Raises ValueError where it is none."""
+        """Add an Int32MultiArray of 2D boxes. Raises ValueError where it is none."""
         boxes = boxes2d_from_message(message)
         if boxes.stamp_ns is None and not self._said_plain:
             self._said_plain = True
@@ -101,75 +102,87 @@ class Lifter(object):
                              'depth image that came nearest to %.3f s before it (~assumed_delay)'
                              % self._params.assumed_delay)
         self._tally.count('arrays of 2D boxes')
-        return self._lifted(self._pairing.add_boxes(boxes.stamp_ns, now_ns, boxes))
+        self._sync.add_boxes(boxes.stamp_ns, now_ns, boxes)
 
     def end(self):
-        """Nothing more will come. Says so of the boxes that still wait for their depth image."""
-        self._lifted(self._pairing.end())
+        """Nothing more will come. Reports the boxes that still wait for their depth image."""
+        self._sync.end()
 
-    def _lifted(self, pairs):
-        lifted = []
-        self._tally.count_some('2D boxes of a time before', self._pairing.take_forgotten())
-        for frame, boxes in pairs:
-            with self._tally.refusing('2D boxes'):
-                depth = self._depth_of(frame, boxes)
-                found = self._boxes3d(depth, [tuple(rect) for rect in boxes.boxes.tolist()], frame.camera)
-                header = Header(stamp=time_from(frame.stamp_ns if boxes.stamp_ns is None else boxes.stamp_ns),
-                                frame_id=self._params.frame_id or frame.depth.header.frame_id)
-                lifted.append(Lifted(header, depth, frame.camera, found))
-                self._tally.count('images lifted')
-        return lifted
+    def estimate(self, boxes2d, depth_msg, camera):
+        """The 3D boxes of one image: of the 2D boxes that are usable, show depth of their own and give a plausible box.
 
-    def _boxes3d(self, depth, rects_px, camera):
-        """The 3D boxes of rectangles that are usable, show depth of their own and give a plausible box."""
-        usable = [rect_px for rect_px in rects_px if self._is_usable(rect_px)]
-        estimated = [box for box in estimate_boxes(depth, usable, camera, self._estimator) if box is not None]
-        boxes = [box for box in estimated if self._is_plausible(box)]
-        self._tally.count('boxes lifted', len(boxes))
-        self._tally.count('boxes without depth', len(usable) - len(estimated))
-        if self._error_model is None or not boxes:
-            return boxes
-        boxes = corrected_boxes(boxes, self._error_model)
-        outside_m = self._error_model.distance_outside([box.center_m for box in boxes])
-        self._tally.count('boxes outside of the measured range', int((outside_m > 0).sum()))
-        return boxes
+        Parameters
+        ----------
+        boxes2d : messages.Boxes2D
+        depth_msg : sensor_msgs.msg.Image
+        camera : geometry.Camera
 
-    def _is_usable(self, rect_px):
-        try:
-            check_rect(rect_px)
-            return True
-        except ValueError as error:
-            self._tally.warn('boxes refused', '2D %s; the others in this image are used' % error)
-            return False
+        Returns
+        -------
+        Lifted
 
-    def _is_plausible(self, box):
-        if is_plausible(box):
-            return True
-        self._tally.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and %.3g m '
-                         'high at %.3g m; less than %g m expected; the others in this image are used'
-                         % (tuple(box.rect_px) + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
-        return False
+        Raises
+        ------
+        ValueError
+            If the depth image cannot be read, or cannot belong to the camera.
+        """
+        depth = checked_depth_from(depth_msg, self._params.depth_scale)
+        height, width = depth.values.shape
+        if (width, height) != (camera.width, camera.height):
+            raise ValueError('%s; depth must be aligned to colour: %s' % (size_fault(camera, width, height), ALIGN))
+        rects_px = self._usable_rects(boxes2d)
+        estimates = estimate_boxes(depth, rects_px, camera, self._estimator)
+        boxes3d = self._plausible(estimates)
+        counts = {'boxes lifted': len(boxes3d), 'boxes without depth': estimates.count(None)}
+        if self._error_model is not None and boxes3d:
+            boxes3d = corrected_boxes(boxes3d, self._error_model)
+            outside_m = self._error_model.distance_outside([box.center_m for box in boxes3d])
+            counts['boxes outside of the measured range'] = int((outside_m > 0).sum())
+        counts['images lifted'] = 1
+        self._tally.count_all(counts)
+        stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
+        frame_id = self._params.frame_id or depth_msg.header.frame_id
+        return Lifted(Header(stamp=stamp, frame_id=frame_id), depth, boxes3d)
 
-    def _depth_of(self, frame, boxes):
-        """The depth image of a frame. Raises ValueError where there is none, or it cannot belong to the camera."""
-        if frame is None:
+    def _usable_rects(self, boxes2d):
+        """The rectangles (x1, y1, x2, y2) that are neither empty nor reversed."""
+        usable_px = []
+        for rect_px in map(tuple, boxes2d.boxes.tolist()):
+            try:
+                check_rect(rect_px)
+                usable_px.append(rect_px)
+            except ValueError as error:
+                self._tally.warn('boxes refused', '2D %s; the others in this image are used' % error)
+        return usable_px
+
+    def _plausible(self, estimates):
+        """The 3D boxes, without None, that have the size of something that can be tracked."""
+        plausible = []
+        for box in estimates:
+            if box is None:
+                continue
+            if is_plausible(box):
+                plausible.append(box)
+                continue
+            self._tally.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
+                             '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
+                             % (tuple(box.rect_px) + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
+        return plausible
+
+    def _on_lost(self, boxes2d, of_time_before):
+        if of_time_before:
+            self._tally.count('2D boxes of a time before')
+            return
+        with self._tally.refusing('2D boxes'):
             self._tally.count('arrays without a depth image')
-            raise ValueError(self._why_no_frame(boxes))
-        depth = depth_from(frame.depth, self._params.depth_scale)
-        fault = units_fault(depth)
-        if fault:
-            raise ValueError(fault)
-        fault = size_fault(frame.camera, *depth.values.shape[::-1])
-        if fault:
-            raise ValueError('%s; depth must be aligned to colour: %s' % (fault, ALIGN))
-        return depth
+            raise ValueError(self._why_no_frame(boxes2d))
 
     def _why_no_frame(self, boxes):
         """What did not come, and on which topic it was expected."""
-        newest_ns, kept_s = self._pairing.newest_ns, self._params.cache_length
+        newest_ns, kept_s = self._sync.newest_ns, self._params.cache_length
         if newest_ns is None:
             return 'no depth image has come on %s' % self._depth_topic
-        if not self._pairing.has_camera:
+        if not self._sync.has_camera:
             return 'no camera_info has come on %s' % self._info_topic
         if boxes.stamp_ns is None:
             return 'no depth image has come on %s within %.1f s' % (self._depth_topic, kept_s)

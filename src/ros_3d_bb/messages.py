@@ -3,7 +3,7 @@ from typing import NamedTuple, Optional
 
 import genpy
 import numpy as np
-from geometry_msgs.msg import PoseWithCovariance
+from geometry_msgs.msg import Point, PoseWithCovariance, Vector3
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb import msg
@@ -101,7 +101,10 @@ def boxes2d_from_message(message):
         raise ValueError('%d 2D boxes in one image; at most %d expected' % (len(message.data) // 4, MAX_BOXES))
     boxes = np.array(message.data, np.int64).reshape(-1, 4)
     label = message.layout.dim[0].label if message.layout.dim else ''
-    fields = dict(field.partition('=')[::2] for field in label.split(';', 2))
+    fields = {}
+    for field in label.split(';', 2):
+        name, _equals, value = field.partition('=')
+        fields[name] = value
     if 'stamp' not in fields:
         return Boxes2D(boxes, None, '')
     secs, _dot, nsecs = fields['stamp'].partition('.')
@@ -154,15 +157,17 @@ def boxes3d_to_message(boxes, header, camera):
 
 
 def _box3d_to_message(box, camera):
-    message = BoundingBox3D(support=box.support, truncated=box.truncated)
-    message.truncated_edges = sum(flag for flag, cut in zip(EDGE_FLAGS, box.truncated_edges) if cut)
-    _set_xyz(message.center.position, box.center_m)
+    message = BoundingBox3D(support=box.support, truncated=any(box.truncated_edges))
+    for flag, is_cut in zip(EDGE_FLAGS, box.truncated_edges):
+        message.truncated_edges |= flag if is_cut else 0
+    message.center.position = Point(*map(float, box.center_m))
     message.center.orientation.w = 1.0
-    _set_xyz(message.size, box.size_m)
+    message.size = Vector3(*map(float, box.size_m))
     if box.covariance_m2 is not None:
         message.position_covariance = np.ravel(box.covariance_m2).tolist()
-    x1, x2 = (min(max(edge, 0), camera.width) for edge in box.rect_px[::2])
-    y1, y2 = (min(max(edge, 0), camera.height) for edge in box.rect_px[1::2])
+    x1, y1, x2, y2 = box.rect_px
+    x1, x2 = min(max(x1, 0), camera.width), min(max(x2, 0), camera.width)
+    y1, y2 = min(max(y1, 0), camera.height), min(max(y2, 0), camera.height)
     message.roi.x_offset, message.roi.width = x1, x2 - x1
     message.roi.y_offset, message.roi.height = y1, y2 - y1
     return message

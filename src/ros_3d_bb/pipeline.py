@@ -1,5 +1,6 @@
 """The whole pipeline as one object: detector, 3D boxes and tracks, message by message, without ROS around it."""
 import contextlib
+import functools
 from typing import NamedTuple, Optional, Tuple
 
 from sensor_msgs.msg import CameraInfo, Image
@@ -65,37 +66,46 @@ class Pipeline(object):
         self._tally = tally
         follower, marker_params, *tracking = settings.tracker
         self._follower, self._markers = Follower(follower, tracking, tally, transforms), MarkerWriter(marker_params)
-        self._lifters = {camera: Lifter(settings.bbox3d[0], tally, settings.name(DEPTH_TOPIC, camera),
-                                        settings.name(INFO_TOPIC, camera)) for camera in settings.cameras}
+        self._lifters = {camera: Lifter(settings.bbox3d[0], tally, functools.partial(self._on_frame, camera),
+                                        settings.name(DEPTH_TOPIC, camera), settings.name(INFO_TOPIC, camera))
+                         for camera in settings.cameras}
         self._searches, self._publish_empty = {}, settings.yolov5[0].publish_empty
         if settings.detector == 'depth':
             params, people = settings.depth
-            self._searches = {camera: DepthSearch(params, people, tally, transforms if params.floor_frame else None)
-                              for camera in settings.cameras}
+            transforms = transforms if params.floor_frame else None
+            self._searches = {camera: DepthSearch(params, people, tally, functools.partial(self._on_images, camera),
+                                                  transforms) for camera in settings.cameras}
             self._publish_empty = params.publish_empty
+        self._now_ns, self._outputs = 0, []  # of the message that is being processed
 
     def take(self, topic, message, now_ns, camera=''):
         """Take a message of a topic of the nodes, recorded at a time. Returns [(topic, message), ...]."""
+        self._now_ns, self._outputs = now_ns, []
+        search, lifter = self._searches.get(camera), self._lifters[camera]
+        with_camera, with_depth = self._follower.looks
         if topic == INFO_TOPIC:
-            with_camera, _depth = self._follower.looks
             if with_camera:
                 self._follower.add_camera_info(message, camera)
-            return self._taken('add_camera_info', message, now_ns, camera)
-        if topic == DEPTH_TOPIC:
-            if self._follower.looks[1]:
+            if search is not None:
+                search.add_camera_info(message, now_ns)
+            lifter.add_camera_info(message, now_ns)
+        elif topic == DEPTH_TOPIC:
+            if with_depth:
                 self._follower.add_depth(message, now_ns, camera)
-            return self._taken('add_depth', message, now_ns, camera)
-        if topic == COLOR_TOPIC:
-            return self._searched(self._searches[camera].add_color(message, now_ns), now_ns, camera)
-        return self._followed(self._lifters[camera].add_boxes(message, now_ns), now_ns, camera)
+            if search is not None:
+                search.add_depth(message, now_ns)
+            lifter.add_depth(message, now_ns)
+        elif topic == COLOR_TOPIC:
+            search.add_color(message, now_ns)
+        else:
+            lifter.add_boxes(message, now_ns)
+        return self._outputs
 
     def found(self, header, found, now_ns, camera=''):
         """Take what a detector found in the image of a header. Returns as `take`."""
-        if not len(found.boxes) and not self._publish_empty:
-            return []
-        message = boxes2d_to_message(found.boxes, header)
-        return [(topic_of(camera, BOXES_TOPIC), message)] + self._followed(
-            self._lifters[camera].add_boxes(message, now_ns), now_ns, camera)
+        self._now_ns, self._outputs = now_ns, []
+        self._on_detections(camera, header, found)
+        return self._outputs
 
     @contextlib.contextmanager
     def searching(self):
@@ -111,29 +121,34 @@ class Pipeline(object):
         for part in list(self._searches.values()) + list(self._lifters.values()):
             part.end()
 
-    def _taken(self, add, message, now_ns, camera):
-        outputs = []
-        if self._searches:
-            outputs += self._searched(getattr(self._searches[camera], add)(message, now_ns), now_ns, camera)
-        return outputs + self._followed(getattr(self._lifters[camera], add)(message, now_ns), now_ns, camera)
+    def _on_images(self, camera, color_msg, depth_msg, camera_model):
+        """As depth_detector_node: detect people in the images of one stamp."""
+        with self.searching():
+            found = self._searches[camera].search(color_msg, depth_msg, camera_model)
+            if found is not None:
+                _image, detections = found
+                self._on_detections(camera, color_msg.header, detections)
 
-    def _searched(self, pairs, now_ns, camera):
-        outputs = []
-        for pair in pairs:
-            with self.searching():
-                found = self._searches[camera].search(pair)
-                if found is not None:
-                    outputs += self.found(pair[1].header, found[1], now_ns, camera)
-        return outputs
+    def _on_detections(self, camera, header, detections):
+        """As the detector nodes: publish 2D boxes."""
+        if not len(detections.boxes) and not self._publish_empty:
+            return
+        message = boxes2d_to_message(detections.boxes, header)
+        self._outputs.append((topic_of(camera, BOXES_TOPIC), message))
+        self._lifters[camera].add_boxes(message, self._now_ns)
 
-    def _followed(self, images, now_ns, camera):
-        outputs = []
-        for lifted in images:
-            boxes = boxes3d_to_message(lifted.boxes, lifted.header, lifted.camera)
-            outputs.append((topic_of(camera, BOXES3D_TOPIC), boxes))
-            with self._tally.refusing('3D boxes'):
-                followed = self._follower.add_boxes(boxes, now_ns, camera)
-                if followed is not None:
-                    outputs.append((TRACKS_TOPIC, tracks_to_message(followed.tracks, followed.header)))
-                    outputs.append((MARKERS_TOPIC, self._markers.write(followed.tracks, followed.header)))
-        return outputs
+    def _on_frame(self, camera, boxes2d, depth_msg, camera_model):
+        """As bbox3d_node: publish the 3D boxes of one image."""
+        with self._tally.refusing('2D boxes'):
+            header, _depth, boxes3d = self._lifters[camera].estimate(boxes2d, depth_msg, camera_model)
+            message = boxes3d_to_message(boxes3d, header, camera_model)
+            self._outputs.append((topic_of(camera, BOXES3D_TOPIC), message))
+            self._on_boxes3d(camera, message)
+
+    def _on_boxes3d(self, camera, message):
+        """As tracker_node: publish tracks and markers."""
+        with self._tally.refusing('3D boxes'):
+            followed = self._follower.add_boxes(message, self._now_ns, camera)
+            if followed is not None:
+                self._outputs.append((TRACKS_TOPIC, tracks_to_message(followed.tracks, followed.header)))
+                self._outputs.append((MARKERS_TOPIC, self._markers.write(followed.tracks, followed.header)))

@@ -9,9 +9,8 @@ from ros_3d_bb.detection.depth_people import DepthPeople
 from ros_3d_bb.detection.floor import floor_from_transform
 from ros_3d_bb.detection.runtime import open_runtime
 from ros_3d_bb.detection.yolov5 import Yolov5
-from ros_3d_bb.diagnosis.camera_faults import units_fault
 from ros_3d_bb.geometry import transform_from
-from ros_3d_bb.images import depth_from, rgb_from
+from ros_3d_bb.images import checked_depth_from, rgb_from
 from ros_3d_bb.messages import camera_from_message, stamp_if_any, stamp_of
 from ros_3d_bb.params import check_not_negative
 from ros_3d_bb.stamped import NS, Pairing
@@ -68,15 +67,18 @@ def search_color(detector, message):
 
 
 class DepthSearch(object):
-    """Look for people in colour images, each with the depth image of its own stamp.
+    """Pairs colour images with depth and camera of their stamp, and detects people in them.
 
-    Each `add_` takes a message and when it arrived, and returns what is ready to be searched, a list for `search`.
+    Each `add_` validates a message and hands it to the synchronizer, with its arrival (integer nanoseconds, see
+    `stamped.Pairing`). `on_frame` then gets a colour image with its depth and camera, for `search`.
 
     Parameters
     ----------
     params : DepthDetectorParams
     people : DepthPeopleParams
     tally : tally.Tally
+    on_frame : callable
+        Called with two sensor_msgs/Image, colour and depth, and a `geometry.Camera` of one stamp.
     transforms
         As for `following.Follower`; None where no frame of the floor is given.
 
@@ -88,11 +90,11 @@ class DepthSearch(object):
 
     names = ('person',)
 
-    def __init__(self, params, people, tally, transforms):
+    def __init__(self, params, people, tally, on_frame, transforms):
         _check(params)
         self._params, self._tally, self._transforms = params, tally, transforms
         self._detector = DepthPeople(people)
-        self._pairing = Pairing(CACHE_NS, int(params.stamp_tolerance * NS), 0)
+        self._sync = Pairing(CACHE_NS, int(params.stamp_tolerance * NS), 0, on_frame, self._on_lost)
 
     def tune(self, params, people):
         """Search the next images with another floor height and other people.
@@ -104,51 +106,46 @@ class DepthSearch(object):
         self._params = params
 
     def add_camera_info(self, message, now_ns):
-        """Take a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
+        """Add a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
         camera = camera_from_message(message)
-        return self._ready(self._pairing.add_camera(stamp_if_any(message), now_ns, camera))
+        self._sync.add_camera(stamp_if_any(message), now_ns, camera)
 
     def add_depth(self, message, now_ns):
-        """Take a depth image. Raises ValueError where it carries no stamp."""
-        return self._ready(self._pairing.add_depth(stamp_of(message), now_ns, message))
+        """Add a depth image. Raises ValueError where it carries no stamp."""
+        self._sync.add_depth(stamp_of(message), now_ns, message)
 
     def add_color(self, message, now_ns):
-        """Take a colour image. Raises ValueError where it carries no stamp."""
-        return self._ready(self._pairing.add_boxes(stamp_of(message), now_ns, message))
+        """Add a colour image. Raises ValueError where it carries no stamp."""
+        self._sync.add_boxes(stamp_of(message), now_ns, message)
 
     def end(self):
-        """Nothing more will come. Says so of the colour images that still wait for their depth image."""
-        self._ready(self._pairing.end())
+        """Nothing more will come. Reports the colour images that still wait for their depth image."""
+        self._sync.end()
 
-    def _ready(self, pairs):
-        self._tally.count_some('colour images of a time before', self._pairing.take_forgotten())
-        for frame, color in pairs:
-            if frame is None:
-                self._tally.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f '
-                                 'of the colour image came; waiting for the next' % (stamp_of(color) / NS))
-        return [pair for pair in pairs if pair[0] is not None]
+    def _on_lost(self, color_msg, of_time_before):
+        if of_time_before:
+            self._tally.count('colour images of a time before')
+            return
+        self._tally.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f of the '
+                         'colour image came; waiting for the next' % (stamp_of(color_msg) / NS))
 
-    def search(self, pair):
-        """Find people in what `add_` returned.
+    def search(self, color_msg, depth_msg, camera):
+        """Find people in a frame.
 
         Returns
         -------
         (numpy.ndarray, ros_3d_bb.detection.boxes.Detections) or None
-            The image, RGB, and who is in it. None while no floor is known.
+            The image, RGB, and the people in it. None while no floor is known.
 
         Raises
         ------
         ValueError
             If the images cannot be used.
         """
-        frame, color = pair
-        image = rgb_from(color)
-        camera_frame = self._params.frame_id or color.header.frame_id
-        depth = depth_from(frame.depth)
-        fault = units_fault(depth)
-        if fault:
-            raise ValueError(fault)
-        found = self._detector.detect(image, depth, frame.camera, self._floor(camera_frame))
+        image = rgb_from(color_msg)
+        camera_frame = self._params.frame_id or color_msg.header.frame_id
+        depth = checked_depth_from(depth_msg)
+        found = self._detector.detect(image, depth, camera, self._floor(camera_frame))
         if found is None:
             self._tally.warn('images without floor', 'no floor is known from tf nor seen in the depth image: nobody is '
                              'looked for; waiting for the next image')

@@ -29,25 +29,28 @@ class Snapshots(object):
         How long images are kept for the boxes that come for them.
     tolerance_ns : int
         By how much the stamps of colour and depth image may differ.
+    on_lost : callable
+        Called with the stamp of a colour image whose depth image or camera did not arrive.
     """
 
-    def __init__(self, length_ns, tolerance_ns):
+    def __init__(self, length_ns, tolerance_ns, on_lost):
         self._length_ns = length_ns
-        self._pairing = Pairing(length_ns, tolerance_ns, 0)
+        self._sync = Pairing(length_ns, tolerance_ns, 0, self._on_frame, self._on_lost_color)
+        self._report_lost = on_lost
         self._images, self._boxes2d, self._boxes3d = (StampedCache(length_ns) for _part in range(3))
         self._first_ns = None
 
     def add_color(self, stamp_ns, now_ns, color):
-        """Take a colour image. Returns the stamps of those whose depth image or camera did not come."""
-        return self._keep(self._pairing.add_boxes(stamp_ns, now_ns, (stamp_ns, color)), now_ns)
+        """Take a colour image."""
+        self._sync.add_boxes(stamp_ns, now_ns, (stamp_ns, color))
 
     def add_depth(self, stamp_ns, now_ns, depth):
-        """Take a depth image. Returns as `add_color`."""
-        return self._keep(self._pairing.add_depth(stamp_ns, now_ns, depth), now_ns)
+        """Take a depth image."""
+        self._sync.add_depth(stamp_ns, now_ns, depth)
 
     def add_camera(self, stamp_ns, now_ns, camera):
-        """Take the camera of an image, as `Pairing.add_camera`. Returns as `add_color`."""
-        return self._keep(self._pairing.add_camera(stamp_ns, now_ns, camera), now_ns)
+        """Take the camera of an image, as `Pairing.add_camera`."""
+        self._sync.add_camera(stamp_ns, now_ns, camera)
 
     def add_boxes2d(self, stamp_ns, now_ns, boxes):
         """Take the 2D boxes of an image."""
@@ -73,24 +76,25 @@ class Snapshots(object):
         return self._first_ns is None or self._images.newest_ns - self._first_ns < self._length_ns
 
     def _snapshot(self, entry):
-        frame, color = entry.value
+        color, depth, camera = entry.value
         boxes2d, boxes3d = (cache.at(entry.stamp_ns) for cache in (self._boxes2d, self._boxes3d))
-        return Snapshot(entry.stamp_ns, color, frame.depth, frame.camera, boxes2d and boxes2d.value,
+        return Snapshot(entry.stamp_ns, color, depth, camera, boxes2d and boxes2d.value,
                         boxes3d and boxes3d.value)
 
-    def _keep(self, pairs, now_ns):
-        lost = []
-        for frame, (stamp_ns, color) in pairs:
-            if frame is None:
-                lost.append(stamp_ns)
-                continue
-            if self._images.add(stamp_ns, now_ns, (frame, color)):
-                self._boxes2d.clear()
-                self._boxes3d.clear()
-                self._first_ns = stamp_ns
-            if self._first_ns is None:
-                self._first_ns = stamp_ns
-        return lost
+    def _on_frame(self, stamped_color, depth, camera):
+        """Keep the images and the camera of one stamp."""
+        stamp_ns, color = stamped_color
+        went_back = self._images.add(stamp_ns, 0, (color, depth, camera))  # its arrival does not matter
+        if went_back:
+            self._boxes2d.clear()
+            self._boxes3d.clear()
+        if went_back or self._first_ns is None:
+            self._first_ns = stamp_ns
+
+    def _on_lost_color(self, stamped_color, of_time_before):
+        if not of_time_before:
+            stamp_ns, _color = stamped_color
+            self._report_lost(stamp_ns)
 
 
 def _boxes_in(snapshot):

@@ -1,6 +1,7 @@
 """What became of each input is counted, whoever counts at the same time."""
 import sys
 import threading
+from unittest import mock
 
 import pytest
 
@@ -25,12 +26,37 @@ def test_events_are_counted_in_the_order_in_which_they_came_up():
     assert list(tally.counts.items()) == [('images', 4), ('refused', 2)] and tally.sentences == {'refused': 'why'}
 
 
-def test_what_did_not_happen_is_not_shown():
+def test_events_of_one_message_are_counted_at_once():
     tally = Tally()
-    tally.count_some('jumps', 0)
+    tally.count('boxes')
+    tally.count_all({'images': 1, 'boxes': 3, 'boxes without depth': 0})
+    assert list(tally.counts.items()) == [('boxes', 4), ('images', 1), ('boxes without depth', 0)]
+
+
+def test_a_message_is_counted_as_received_whether_it_is_refused_or_not():
+    tally = Tally()
+    with tally.taking('boxes'):
+        pass
+    with tally.taking('boxes'):
+        raise ValueError('3 numbers')
+    assert tally.received == {'boxes': 2} and tally.counts == {'boxes refused': 1}
+
+
+def test_other_errors_are_raised_unless_they_are_harmless():
+    tally = Tally()
+    with pytest.raises(ZeroDivisionError), tally.refusing('boxes'):
+        raise ZeroDivisionError
+    tally.is_harmless = lambda error: isinstance(error, ZeroDivisionError)
+    with tally.refusing('boxes'):
+        raise ZeroDivisionError
     assert not tally.counts
-    tally.count_some('jumps', 2)
-    assert tally.counts == {'jumps': 2}
+
+
+def test_the_latency_of_a_result_is_the_age_of_its_stamp():
+    now, stamp = mock.Mock(to_nsec=lambda: 12500), mock.Mock(to_nsec=lambda: 11700)
+    tally = Tally(clock=lambda: now)
+    tally.answered(stamp)
+    assert list(tally.lags_ns) == [800]
 
 
 def test_an_input_that_is_refused_is_counted_and_the_next_is_taken():

@@ -28,7 +28,7 @@ def test_the_shipped_models_are_for_their_estimators(name, estimator):
 
 def test_an_estimator_that_the_model_is_not_for_is_refused_later_too():
     path = os.path.join(FOLDER, 'thesis.yaml')
-    lifter = Lifter(params(path, 'median'), Tally())
+    lifter = Lifter(params(path, 'median'), Tally(), None)
     sample = lifter.sample
     with pytest.raises(ValueError, match='is for the estimator median, not foreground'):
         lifter.tune(params(path, 'foreground'))

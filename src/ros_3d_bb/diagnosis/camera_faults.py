@@ -1,38 +1,7 @@
-"""Depth that is not aligned to colour, and depth in other units than its encoding says."""
-import numpy as np
-
-GRID = 16  # as many rows and columns of a depth image are looked at
-LEAST_SAMPLES = 8  # fewer valid pixels say nothing
-NEAREST_M, FARTHEST_M = 0.1, 100.0  # no depth camera of people measures outside
+"""Depth that is not aligned to colour."""
 SAME_PX = 1.0  # intrinsics that differ by less are the same: half a pixel is 1 cm at 6 m
 ALIGN = ('start the camera with realsense.launch, or realsense2_camera with align_depth:=true, and take '
          'camera/aligned_depth_to_color/image_raw')
-
-
-def units_fault(depth):
-    """Whether a depth image counts in other units than it is read in, by where most of a few hundred pixels lie.
-
-    Parameters
-    ----------
-    depth : estimation.DepthImage
-
-    Returns
-    -------
-    str
-        A sentence, empty where nothing is wrong.
-    """
-    values = depth.values[::max(1, depth.values.shape[0] // GRID), ::max(1, depth.values.shape[1] // GRID)]
-    valid = values[np.isfinite(values) & (values > 0)]
-    if valid.size < LEAST_SAMPLES:
-        return ''
-    median_m = float(np.median(valid)) * depth.scale_m
-    if NEAREST_M <= median_m <= FARTHEST_M:
-        return ''
-    integers = depth.values.dtype.kind == 'u'
-    unit = 'metres' if median_m < NEAREST_M else 'millimetres'
-    return ('the depth image has the wrong unit: half of its pixels are nearer than %.3g m; it seems to hold %s in a '
-            '%s, which has to hold %s (REP 118), or set depth_scale'
-            % (median_m, unit, '16UC1' if integers else '32FC1', 'millimetres' if integers else 'metres'))
 
 
 def size_fault(color, width, height):

@@ -1,4 +1,4 @@
-"""The node that lifts 2D boxes into space with the depth image they belong to."""
+"""The node that estimates 3D boxes from 2D boxes and the depth image of the same stamp."""
 import threading
 
 import rospy
@@ -42,7 +42,7 @@ class Bbox3dNode(object):
     def __init__(self):
         params, = read_params(Bbox3dParams)
         self._diagnostics = Diagnostics()
-        self._lifter = Lifter(params, self._diagnostics, rospy.resolve_name(DEPTH_TOPIC),
+        self._lifter = Lifter(params, self._diagnostics, self._on_frame, rospy.resolve_name(DEPTH_TOPIC),
                               rospy.resolve_name(INFO_TOPICS[0]))
         self._lock = threading.Lock()
         self._boxes_pub = rospy.Publisher(BOXES3D_TOPIC, BoundingBox3DArray, queue_size=10)
@@ -64,22 +64,24 @@ class Bbox3dNode(object):
     def _on_camera_info(self, message):
         self._alignment.color = message
         with self._diagnostics.taking('camera_info'), self._lock:
-            self._publish(self._lifter.add_camera_info(message, arrival_clock_ns()))
+            self._lifter.add_camera_info(message, arrival_clock_ns())
 
     def _on_depth(self, message):
         self._alignment.depth_frame = message.header.frame_id
         with self._diagnostics.taking('depth images'), self._lock:
-            self._publish(self._lifter.add_depth(message, arrival_clock_ns()))
+            self._lifter.add_depth(message, arrival_clock_ns())
 
     def _on_boxes(self, message):
         with self._diagnostics.taking('2D boxes'), self._lock:
-            self._publish(self._lifter.add_boxes(message, arrival_clock_ns()))
+            self._lifter.add_boxes(message, arrival_clock_ns())
 
-    def _publish(self, images):
-        for lifted in images:
-            self._boxes_pub.publish(boxes3d_to_message(lifted.boxes, lifted.header, lifted.camera))
-            self._diagnostics.answered(lifted.header.stamp)
-            self._images.publish(lifted.header, lifted.depth, lifted.boxes)
+    def _on_frame(self, boxes2d, depth_msg, camera):
+        """Publish the 3D boxes of one image: 2D boxes, depth image and camera of one stamp have arrived."""
+        with self._diagnostics.refusing('2D boxes'):
+            header, depth, boxes3d = self._lifter.estimate(boxes2d, depth_msg, camera)
+            self._boxes_pub.publish(boxes3d_to_message(boxes3d, header, camera))
+            self._diagnostics.answered(header.stamp)
+            self._images.publish(header, depth, boxes3d)
 
 
 def main():

@@ -42,7 +42,7 @@ class DepthDetectorNode(object):
         transforms = Transforms(wait_s=0) if params.floor_frame else None
         if transforms is not None:
             self._diagnostics.show('tf age', transforms.age)
-        self._search = DepthSearch(params, people, self._diagnostics, transforms)
+        self._search = DepthSearch(params, people, self._diagnostics, self._on_frame, transforms)
         self._lock, self._searching = threading.Lock(), threading.Lock()
         self._output = BoxesOutput(params.publish_empty)
         self._worker = NewestWorker(self._work, self._on_error)
@@ -59,35 +59,36 @@ class DepthDetectorNode(object):
 
     def _on_camera_info(self, message):
         with self._diagnostics.taking('camera_info'), self._lock:
-            self._offer(self._search.add_camera_info(message, arrival_clock_ns()))
+            self._search.add_camera_info(message, arrival_clock_ns())
 
     def _on_depth(self, message):
         with self._diagnostics.taking('depth images'), self._lock:
-            self._offer(self._search.add_depth(message, arrival_clock_ns()))
+            self._search.add_depth(message, arrival_clock_ns())
 
     def _on_color(self, message):
         with self._diagnostics.taking('colour images'), self._lock:
-            self._offer(self._search.add_color(message, arrival_clock_ns()))
+            self._search.add_color(message, arrival_clock_ns())
 
-    def _offer(self, pairs):
-        """Hand colour images on whose depth image has come."""
-        for pair in pairs:
-            if not self._switch.on:
-                self._diagnostics.count('images while paused')
-                continue
-            self._switch.offered()
-            if self._worker.offer(pair):
-                self._diagnostics.count('images skipped for a newer one')
+    def _on_frame(self, color_msg, depth_msg, camera):
+        """Hand the images and the camera of one stamp to the worker."""
+        if not self._switch.on:
+            self._diagnostics.count('images while paused')
+            return
+        self._switch.offered()
+        if self._worker.offer((color_msg, depth_msg, camera)):
+            self._diagnostics.count('images skipped for a newer one')
 
-    def _work(self, pair):
+    def _work(self, frame):
         with self._diagnostics.refusing('images'), self._switch.searching(), self._searching:
             if not self._switch.on:  # it may have been paused meanwhile
                 self._diagnostics.count('images while paused')
                 return
-            found = self._search.search(pair)
+            color_msg, depth_msg, camera = frame
+            found = self._search.search(color_msg, depth_msg, camera)
             if found is not None:
-                self._output.publish(pair[1].header, *found, names=self._search.names)
-                self._diagnostics.answered(pair[1].header.stamp)
+                image, detections = found
+                self._output.publish(color_msg.header, image, detections, names=self._search.names)
+                self._diagnostics.answered(color_msg.header.stamp)
 
     def _on_error(self, error):
         self._diagnostics.warn('searches failed', 'the detector failed: %s; waiting for the next image' % error)

@@ -1,6 +1,5 @@
 """What a node did with its input, on /diagnostics and in the log."""
 import collections
-import contextlib
 import threading
 import time
 
@@ -10,12 +9,11 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from ros_3d_bb.nodes.input_watch import InputWatch, unheard
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tally import Tally
+from ros_3d_bb.tally import MOST_LAGS, Tally
 
 PERIOD_S = 1.0
 WARNING_LASTS_S = 5.0
 REMINDER_S = 30.0  # between two lines of the log about what stays wrong
-MOST_LAGS = 10000  # that wait for a report, where none can be made
 UNHEARD_S = 5.0  # without subscribers; they may be starting, too
 
 
@@ -39,14 +37,12 @@ class Diagnostics(Tally):
     """
 
     def __init__(self):
-        super(Diagnostics, self).__init__()
+        super(Diagnostics, self).__init__(clock=rospy.get_rostime)
         self._warning, self._warned_at = '', None
         self._logged_at, self._lasted = {}, set()
-        self._lags_ns = collections.deque(maxlen=MOST_LAGS)  # since the last report
         self._looked_s, self._heard_s = time.monotonic(), time.monotonic()
         inputs = InputWatch()
         self._shown, self._checks = [inputs.values], [inputs.faults]
-        self._received = Tally()
         self._updater = diagnostic_updater.Updater()
         self._updater.setHardwareID('none')
         self._updater.add('pipeline', self._report)
@@ -65,10 +61,6 @@ class Diagnostics(Tally):
         self._warning, self._warned_at = sentence, time.monotonic()
         self._log(event, sentence, WARNING_LASTS_S)
 
-    def answered(self, stamp):
-        """An image of a stamp was answered: its result is published, or it has none. Makes a rate and a latency."""
-        self._lags_ns.append(rospy.get_rostime().to_nsec() - stamp.to_nsec())
-
     def show(self, name, text):
         """Add a value to what is published: `text()` is asked for it once a second."""
         self._shown.append(lambda: [(name, text())])
@@ -77,22 +69,9 @@ class Diagnostics(Tally):
         """Ask `faults()` once a second what is wrong now: (event, sentence) pairs."""
         self._checks.append(faults)
 
-    @contextlib.contextmanager
-    def taking(self, inputs):
-        """Around a callback: counts its message as received, so that one sees whether each got an outcome."""
-        self._received.count(inputs)
-        with self.refusing(inputs):
-            yield
-
-    @contextlib.contextmanager
-    def refusing(self, inputs):
-        """Around what a callback does with its input: a ValueError there refuses that one, and the node goes on."""
-        try:
-            with super(Diagnostics, self).refusing(inputs):
-                yield
-        except rospy.ROSException:
-            if not is_ending():
-                raise
+    def is_harmless(self, error):
+        """rospy closes publishers under callbacks that still run when it shuts down."""
+        return isinstance(error, rospy.ROSException) and is_ending()
 
     def _report(self, status):
         recent = self._warned_at is not None and time.monotonic() - self._warned_at < WARNING_LASTS_S
@@ -115,7 +94,7 @@ class Diagnostics(Tally):
     def told(self):
         """What is published of the input: (event, how often), and (inputs received, how many)."""
         return list(self.counts.items()) + [('%s received' % inputs, amount)
-                                            for inputs, amount in list(self._received.counts.items())]
+                                            for inputs, amount in list(self.received.items())]
 
     def _lasting(self):
         """The sentences about what is wrong now; each is logged when it begins, and now and then."""
@@ -143,7 +122,7 @@ class Diagnostics(Tally):
 
     def _answers(self):
         """(name, text) of what was answered since the last report."""
-        lags_ns, self._lags_ns = self._lags_ns, collections.deque(maxlen=MOST_LAGS)
+        lags_ns, self.lags_ns = self.lags_ns, collections.deque(maxlen=MOST_LAGS)
         now_s = time.monotonic()
         passed_s, self._looked_s = max(now_s - self._looked_s, 1e-3), now_s
         answers = [('rate', '%.1f Hz' % (len(lags_ns) / passed_s))]

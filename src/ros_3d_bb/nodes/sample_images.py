@@ -44,17 +44,13 @@ class SampleImages(object):
         self._sample, self._depth_range_m = sample, depth_range_m
 
     def publish(self, header, depth, boxes):
-        """Publish the images of one set of 3D boxes, as far as somebody subscribes.
+        """Publish the images of one set of 3D boxes that have subscribers.
 
-        A colour image that cannot be shown is refused here: it must not keep back the next 3D boxes.
+        A colour image that cannot be shown is rejected here: it must not keep back the next 3D boxes.
         """
-        wanted = bool(self._raw_pub.get_num_connections() or self._color_pub.get_num_connections())
-        if wanted != (self._subscriber is not None):
-            self._follower.offer(wanted)
-        with self._diagnostics.refusing('colour images'):
-            self._publish(header, depth, boxes)
-
-    def _publish(self, header, depth, boxes):
+        needs_raw, needs_color = self._raw_pub.get_num_connections() > 0, self._color_pub.get_num_connections() > 0
+        if (needs_raw or needs_color) != (self._subscriber is not None):
+            self._follower.offer(needs_raw or needs_color)
         if self._depth_pub.get_num_connections():
             grey = visible_depth(depth, self._depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))
@@ -62,14 +58,17 @@ class SampleImages(object):
         color = colors.at(header.stamp.to_nsec()) if colors is not None else None
         if color is None:
             return
-        if self._raw_pub.get_num_connections():
+        if needs_raw:
             self._raw_pub.publish(color.value)
-        if self._color_pub.get_num_connections():
-            self._color_pub.publish(fill_image(Image(header=header), self._drawn(color.value, depth, boxes), 'rgb8'))
+        if needs_color:
+            with self._diagnostics.refusing('colour images'):
+                drawn = self._drawn(color.value, depth, boxes)
+                self._color_pub.publish(fill_image(Image(header=header), drawn, 'rgb8'))
 
     def _drawn(self, color_message, depth, boxes):
-        image = draw_boxes(rgb_from(color_message).copy(), [box.rect_px for box in boxes],
-                           ['%.2f m' % box.center_m[2] for box in boxes])
+        image = rgb_from(color_message).copy()
+        for box in boxes:
+            draw_boxes(image, [box.rect_px], ['%.2f m' % box.center_m[2]])
         for box in boxes:
             draw_samples(image, box.rect_px, self._sample(depth, box.rect_px))
         return image

@@ -86,7 +86,8 @@ class ViewerNode(object):
         self._params, = read_params(ViewerParams)
         _check(self._params)
         self._window = _window() if self._params.window else None
-        self._snapshots = Snapshots(int(self._params.cache_length * NS), int(self._params.stamp_tolerance * NS))
+        self._snapshots = Snapshots(int(self._params.cache_length * NS), int(self._params.stamp_tolerance * NS),
+                                    self._on_lost)
         self._lock, self._capture_lock = threading.Lock(), threading.Lock()
         self._rate, self._came, self._answer = FrameRate(), set(), ''
         self._captured_ns, self._is_said, self._is_paused = None, False, False
@@ -102,18 +103,20 @@ class ViewerNode(object):
         with self._diagnostics.taking('colour images'), self._lock:
             color, now_ns = Color(rgb_from(message), message.header.frame_id), arrival_clock_ns()
             self._rate.add(now_ns)
-            self._note(COLOR_TOPIC, self._snapshots.add_color(stamp_of(message), now_ns, color))
+            self._snapshots.add_color(stamp_of(message), now_ns, color)
+            self._note(COLOR_TOPIC)
 
     def _on_depth(self, message):
         with self._diagnostics.taking('depth images'), self._lock:
             depth = depth_from(message, self._params.depth_scale)
-            self._note(DEPTH_TOPIC, self._snapshots.add_depth(stamp_of(message), arrival_clock_ns(), depth))
+            self._snapshots.add_depth(stamp_of(message), arrival_clock_ns(), depth)
+            self._note(DEPTH_TOPIC)
 
     def _on_camera_info(self, message):
         with self._diagnostics.taking('camera_info'), self._lock:
             camera = camera_from_message(message)
-            self._note(CAMERA_INFO_TOPIC, self._snapshots.add_camera(stamp_if_any(message), arrival_clock_ns(),
-                                                                     camera))
+            self._snapshots.add_camera(stamp_if_any(message), arrival_clock_ns(), camera)
+            self._note(CAMERA_INFO_TOPIC)
 
     def _on_boxes2d(self, message):
         with self._diagnostics.taking('2D boxes'), self._lock:
@@ -131,13 +134,15 @@ class ViewerNode(object):
             self._snapshots.add_boxes3d(stamp_of(message), arrival_clock_ns(), boxes3d_from_message(usable))
             self._is_said = False
 
-    def _note(self, topic, lost):
-        """Something came on a topic, after which some colour images are known to stay without depth."""
+    def _note(self, topic):
+        """A message of the camera arrived on a topic."""
         self._came.add(topic)
         self._diagnostics.count('messages of the camera')
-        for stamp_ns in lost:
-            self._diagnostics.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f '
-                                   'of the colour image came; waiting for the next' % (stamp_ns / NS))
+
+    def _on_lost(self, stamp_ns):
+        """A colour image stays without depth."""
+        self._diagnostics.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f '
+                               'of the colour image came; waiting for the next' % (stamp_ns / NS))
 
     def capture(self):
         """Append what is newest to the session.
