@@ -1,9 +1,8 @@
-"""Write the pages of the nodes (doc/nodes) and of the launch files (doc/launch_files.md) from the code.
+"""Write the pages of the nodes (doc/nodes), of the launch files (doc/launch_files.md), and config/*.yaml from the code.
 
 `./run doc` does it; in a sourced workspace: python3 doc/node_pages.py
-Of a node come the docstrings of its class and of the classes in ros_3d_bb.nodes that it uses, the parameters that it
-reads with the comments in config/*.yaml, and what its launch file sets. Whoever adds a topic, a parameter or an
-argument describes it there, never here.
+Sources are the docstrings of a node's class and of the classes in ros_3d_bb.nodes that it uses, the tables of its
+parameters (`ros_3d_bb.params.Param`), and its launch file. A topic, a parameter or an argument is described there.
 """
 import ast
 import glob
@@ -12,13 +11,17 @@ import inspect
 import os
 import re
 import sys
+import textwrap
 import xml.etree.ElementTree as ElementTree
 from typing import NamedTuple
 
-from ros_3d_bb.live_parameters import parameters_in
+from ros_3d_bb.params import SET_BY_LAUNCH, table_of
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 MADE = '<!-- Made by doc/node_pages.py from the code. Change that, and run: ./run doc -->'
+MADE_CONFIG = 'Made by ./run doc from the table in the code.'
+LIVE = (' Those marked Live can be changed while the node runs,\n# as with rqt_reconfigure; the range is that of its '
+        'sliders.')
 SECTIONS = 'Subscribes', 'Publishes', 'Services', 'Calls'
 SERVICES = 'Services', 'Calls'
 
@@ -42,12 +45,13 @@ class Node(NamedTuple):
 
 
 class Parameter(NamedTuple):
-    """One parameter; `group` is the heading in the YAML file that it stands below, '' without one."""
+    """One parameter; `default` as in YAML, `facts` as of `Param`, `group`: heading in the YAML file, '' without one."""
 
     name: str
     kind: str
     default: str
     meaning: str
+    facts: str
     group: str
 
 
@@ -112,45 +116,60 @@ def parameter_types(node_class):
 
 
 def parameters_of(node):
-    """The parameters of a node: those of its YAML file in that order, then those that launch files set.
+    """The parameters of a node by section; those that launch files set come last.
 
     Raises
     ------
     ValueError
-        If nobody says what one is for.
+        If a parameter is not described.
     """
-    kinds = parameter_types(node.node_class)
-    described = yaml_parameters(re.findall(r'config/\w+\.yaml', inspect.getdoc(node.node_class)))
-    known = {name: (kind, name) for kind in kinds for name in kind._fields}
-    named = [name for name in described if name in known] + [name for name in known if name not in described]
-    return [_parameter(node, *known[name], described=described) for name in named]
+    table = table_of(parameter_types(node.node_class))
+    sections = [param.section for param in table.values()]
+    return [_parameter(node, name, param) for name, param in sorted(table.items(), key=lambda item: (
+        item[1].section == SET_BY_LAUNCH, sections.index(item[1].section)))]
 
 
-def _parameter(node, kind, name, described):
-    default, type_name = kind._field_defaults[name], kind.__annotations__[name].__name__
-    if name in described:
-        meaning, shown, group = described[name]
-        return Parameter(name, type_name, shown, meaning, group)
-    in_type = re.search(r'`%s`:? ([^;]+)' % name, inspect.getdoc(kind))
-    meaning = launch_meaning(node.name, name) or (in_type and _one_line(in_type.group(1)).rstrip('.') + '.')
-    if not meaning:
-        raise ValueError('%s: nothing says what the parameter %s is for: neither config/*.yaml, nor the doc= of an '
-                         'argument, nor %s' % (node.name, name, kind.__name__))
-    shown = ', '.join(default) if isinstance(default, tuple) else str(default).lower() if (
-        isinstance(default, bool)) else str(default)
-    return Parameter(name, type_name, shown or 'empty', meaning, 'Set by launch files')
+def _parameter(node, name, param):
+    meaning = launch_meaning(node.name, name) if param.section == SET_BY_LAUNCH else None
+    if not (meaning or param.text):
+        raise ValueError('%s: neither the table of the parameter %s nor the doc= of an argument describes it'
+                         % (node.name, name))
+    return Parameter(name, type(param.default).__name__.replace('tuple', 'list'), as_yaml(param.default),
+                     *((meaning, '') if meaning else (param.text, param.facts)), param.section)
 
 
-def yaml_parameters(paths):
-    """{name: (meaning, default, group)} of YAML files, by their comments."""
-    found = {}
-    for path in paths:
-        with open(os.path.join(ROOT, path), encoding='utf-8') as stream:
-            for parameter in parameters_in(stream.read()):
-                meaning, _word, default = parameter.description.rpartition(' Default: ')
-                live = '' if parameter.live is None else ' Live%s.' % (parameter.live and ': ' + parameter.live)
-                found[parameter.name] = meaning + live, default.rstrip('.'), parameter.section
-    return found
+def as_yaml(value):
+    """A default as it is written in a file in config/."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return '[%s]' % ', '.join(value) if isinstance(value, tuple) else str(value) or "''"
+
+
+def config_files():
+    """{path: text} of the parameter files of nodes."""
+    return {path: config_file(node) for node in nodes() for path in config_paths(node)}
+
+
+def config_paths(node):
+    """The files in config/ that the docstring of a node names: one or none."""
+    return re.findall(r'config/\w+\.yaml', inspect.getdoc(node.node_class))
+
+
+def config_file(node):
+    """The file in config/ with the parameters of a node that launch files do not set, YAML."""
+    given = [parameter for parameter in parameters_of(node) if parameter.group != SET_BY_LAUNCH]
+    lines, group = ['# Parameters of %s. %s' % (node.name, MADE_CONFIG), '# Numbers are 0 or more where the comment '
+                    'allows no others.' + LIVE * any('Live' in parameter.facts for parameter in given), ''], ''
+    for parameter in given:
+        if parameter.group != group:
+            group = parameter.group
+            lines += ['', '# --- ' + group]
+        facts = ('Default: %s. %s' % (parameter.default, parameter.facts)).strip()
+        whole = '%s %s' % (parameter.meaning, facts)
+        for text in [whole] if len(whole) <= 118 else [parameter.meaning, facts]:
+            lines += ['# ' + line for line in textwrap.wrap(text, 118, break_on_hyphens=False)]
+        lines.append('%s: %s' % (parameter.name, parameter.default))
+    return '\n'.join(lines) + '\n'
 
 
 def launch_files():
@@ -202,7 +221,8 @@ def node_page(node):
             parts += ['### ' + group[0].upper() + group[1:]] if group else []
             rows = []
             parts.append(rows)
-        rows.append((_code('~' + parameter.name), parameter.kind, parameter.default, parameter.meaning))
+        rows.append((_code('~' + parameter.name), parameter.kind, parameter.default,
+                     (parameter.meaning + ' ' + parameter.facts).strip()))
     return _page(_table(('parameter', 'type', 'default', ''), part) if isinstance(part, list) else part
                  for part in parts)
 
@@ -226,9 +246,9 @@ def launch_page():
 
 
 def pages():
-    """{path below doc/: text} of all pages."""
-    made = {os.path.join('nodes', node.name + '.md'): node_page(node) for node in nodes()}
-    return dict(made, **{os.path.join('nodes', 'index.md'): nodes_page(), 'launch_files.md': launch_page()})
+    """{path: text} of all pages and of the files in config/."""
+    made = {'doc/nodes/%s.md' % node.name: node_page(node) for node in nodes()}
+    return dict(made, **config_files(), **{'doc/nodes/index.md': nodes_page(), 'doc/launch_files.md': launch_page()})
 
 
 def _page(parts):
@@ -254,11 +274,9 @@ def _one_line(text):
 
 
 def main():
-    """Write the pages."""
+    """Write the pages and the files."""
     for path, text in pages().items():
-        path = os.path.join(ROOT, 'doc', path)
-        os.makedirs(os.path.dirname(path), exist_ok=True)
-        with open(path, 'w', encoding='utf-8') as stream:
+        with open(os.path.join(ROOT, path), 'w', encoding='utf-8') as stream:
             stream.write(text)
 
 
