@@ -64,7 +64,7 @@ class Lifter(object):
     Raises
     ------
     ValueError
-        If a parameter makes no sense, or the error model cannot be used.
+        If the error model cannot be used.
     """
 
     def __init__(self, params, tally, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):

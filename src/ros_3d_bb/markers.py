@@ -70,11 +70,6 @@ class MarkerWriter(object):
 
     A marker is replaced in place while its track lives and deleted when it ends; where no news comes at all, RViz
     removes it after the lifetime (0: never).
-
-    Raises
-    ------
-    ValueError
-        If a parameter makes no sense; names it.
     """
 
     def __init__(self, params=MarkerParams()):
@@ -83,7 +78,7 @@ class MarkerWriter(object):
         self.tune(params)
 
     def tune(self, params):
-        """Draw the next tracks with other parameters. Raises ValueError as at the start, and changes nothing."""
+        """Draw the next tracks with other parameters."""
         self._params = params
         self._lifetime = genpy.Duration.from_sec(params.marker_lifetime)
         shapes = {CYLINDER: self._cylinder, ID: self._number, VELOCITY: self._velocity, PREDICTION: self._prediction,

@@ -108,6 +108,18 @@ def test_defaults_are_allowed_and_within_the_range_of_their_slider(name):
 
 
 @pytest.mark.parametrize('name', sorted(NODES))
+def test_values_outside_of_the_table_are_rejected(name):
+    kinds = node_pages.parameter_types(NODES[name].node_class)
+    for key, param in table_of(kinds).items():
+        low, high = param.limits
+        outside = {bool: (), int: (low - 1, int(high) + 1), float: (low - 1e-7, high * 1.001, float('nan')),
+                   str: ('nonsense',) * bool(param.choices), tuple: (['nonsense'],) * bool(param.choices)}
+        for value in outside[type(param.default)]:
+            with pytest.raises(ValueError, match='parameter ~%s (is|has)' % key):
+                params_from({key: value}, *kinds)
+
+
+@pytest.mark.parametrize('name', sorted(NODES))
 def test_parameters_are_live_only_where_a_node_takes_changes(name):
     module = sys.modules[NODES[name].node_class.__module__]
     is_live = any(param.live for param in table_of(node_pages.parameter_types(NODES[name].node_class)).values())
