@@ -3,7 +3,6 @@ import ast
 import glob
 import os
 import re
-import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 
@@ -79,12 +78,6 @@ def test_what_the_tests_import_is_declared_or_in_their_requirements():
             if TEST_KEYS.get(name, KEYS.get(name) or name) not in known and name not in required] == []
     programs = declared('test_depend') - set(TEST_KEYS.values()) - names
     assert programs == {'rosbash', 'rosservice', 'rostest', 'xdotool', 'xvfb'}
-
-
-@pytest.mark.needs('vermin')
-def test_the_robot_needs_no_more_than_python_3_6():
-    subprocess.check_call([sys.executable, '-c', 'from vermin import main; main()', '--no-tips', '--target=3.6-',
-                           '--violations'] + python_files())
 
 
 def test_nothing_names_a_machine_or_stamps_with_now():
