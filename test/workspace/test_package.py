@@ -19,7 +19,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 # rosdep keys of what is no ROS package; None: optional, imported where it is used, with an error that says so.
 KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-torch', 'onnxruntime': None,
         'yaml': 'python3-yaml', 'matplotlib': 'python3-matplotlib', 'scipy': 'python3-scipy',
-        'rospkg': 'python3-rospkg', 'norfair': None, 'trackeval': None, 'pyrealsense2': None,
+        'norfair': None, 'trackeval': None, 'pyrealsense2': None,
         'PyQt5': None}  # comes with python_qt_binding, and serves where that is not
 TEST_KEYS = {'pytest': 'python3-pytest', 'hypothesis': 'python3-hypothesis',
              'catkin_pkg': 'python3-catkin-pkg-modules'}
