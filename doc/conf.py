@@ -1,4 +1,7 @@
-"""Sphinx: these pages as a site. `./run doc` builds it; nothing is fetched from a network, now or when it is read."""
+"""Sphinx: the README, doc/ and config/ as a site. `./run doc` builds it; nothing is fetched from a network.
+
+The root of the repository is the folder of the sources, so that Sphinx checks every link between pages, and to files.
+"""
 import glob
 import os
 import re
@@ -6,13 +9,16 @@ import re
 from docutils import nodes
 from latex2mathml.converter import convert
 
-HERE = os.path.dirname(os.path.abspath(__file__))
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 FIRST = ['architecture', 'frames_and_time', 'error_model', 'tracking', 'session', 'decisions', 'glossary',
          'launch_files']
-OUTSIDE = re.compile(r'\[([^\]]*)\]\((?:\.\./)+[^)\s]*\.md(?:#[^)\s]*)?\)')  # pages that are not on the site
+LINK = re.compile(r'\[([^\]]*)\]\(([^)\s#]+)\)')
 
 project = 'ros_3d_bb'
 author = 'ros_3d_bb developers'
+root_doc = 'doc/index'
+source_suffix = {'.md': 'markdown'}
+include_patterns = ['README.md', 'doc/**', 'config/**']
 extensions = ['myst_parser']
 myst_enable_extensions = ['dollarmath']
 highlight_language = 'none'
@@ -28,17 +34,22 @@ html_math_renderer = 'mathml'
 
 def _names(folder):
     """The pages in a folder, as Sphinx names them."""
-    names = [os.path.relpath(path, HERE)[:-len('.md')] for path in glob.glob(os.path.join(HERE, folder, '*.md'))]
+    paths = glob.glob(os.path.join(ROOT, folder, '*.md'), recursive=True)
+    names = [os.path.relpath(path, ROOT)[:-len('.md')] for path in paths]
     return sorted(names, key=lambda name: (not name.endswith('index'), name))
 
 
 def _prepare(_app, name, source):
-    """Tell Sphinx the order of the pages, and keep only the words of links to pages that are not on the site."""
-    source[0] = OUTSIDE.sub(r'\1', source[0])
-    if name == 'index':
-        others = [other for other in _names('') if other not in FIRST + ['index']]
-        for caption, names in (('How it works', FIRST), ('More', others), ('Nodes', _names('nodes'))):
-            source[0] += '\n```{toctree}\n:hidden:\n:caption: %s\n\n%s\n```\n' % (caption, '\n'.join(names))
+    """Tell Sphinx the order of the pages, and keep only the words of links to folders, which no site has."""
+    here = os.path.dirname(os.path.join(ROOT, name))
+    source[0] = LINK.sub(
+        lambda link: link.group(1) if os.path.isdir(os.path.join(here, link.group(2))) else link.group(), source[0])
+    if name == root_doc:
+        first = ['doc/' + page for page in FIRST]
+        others = [other for other in _names('doc') + _names('config/**') if other not in first + [root_doc]]
+        for caption, names in (('How it works', ['README'] + first), ('More', others), ('Nodes', _names('doc/nodes'))):
+            pages = '\n'.join('/' + page for page in names)
+            source[0] += '\n```{toctree}\n:hidden:\n:caption: %s\n\n%s\n```\n' % (caption, pages)
 
 
 def _write_inline(self, node):

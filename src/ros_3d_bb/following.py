@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 from ros_3d_bb.camera_clocks import JUMP_NS, CameraClocks, RecentStamps
 from ros_3d_bb.images import depth_from
 from ros_3d_bb.messages import camera_from_message, detections_from_message, stamp_of, time_from, usable_boxes3d
-from ros_3d_bb.params import check_not_negative, nearest_name
+from ros_3d_bb.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.stamped import NS, StampedCache
 from ros_3d_bb.tracking.measuring import NoiseParams
 from ros_3d_bb.tracking.prediction import PredictionParams
@@ -27,18 +27,22 @@ ON_THE_WAY_NS = 2 * NS  # so long after one cameras may send images of the time 
 NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/\w+)*$')
 
 
+@parameters()
 class TrackerNodeParams(NamedTuple):
-    """See config/tracker.yaml."""
+    """Parameters of tracker_node beside those of the trackers and of the markers."""
 
-    tracker: str = 'kalman'
-    target_frame: str = 'map'
-    cameras: list = ()
-    camera_frame: str = ''
-    use_depth: bool = True
-    depth_scale: float = 0.0
-    depth_cache_length: float = 1.0
-    stamp_tolerance: float = 0.005
-    tf_timeout: float = 0.2
+    tracker: str = Param(
+        'kalman', 'Tracking algorithm. kalman: a Kalman filter for each person, which weighs boxes by their '
+        'covariance, models outliers and occlusion, and re-identifies people after it. thesis: greedy nearest '
+        'neighbour, averaged velocity and straight prediction, for comparison.', choices=('kalman', 'thesis'))
+    target_frame: str = Param('map')
+    cameras: list = Param(())
+    camera_frame: str = Param('')
+    use_depth: bool = Param(True, 'Whether depth images are used to find out that a person is occluded.')
+    depth_scale: float = DEPTH_SCALE
+    depth_cache_length: float = Param(1.0, 'How long depth images are kept for the boxes of the same stamp.', 's')
+    stamp_tolerance: float = STAMP_TOLERANCE
+    tf_timeout: float = Param(0.2, 'How long to wait for the transform at the stamp of the boxes.', 's')
 
 
 class Located(NamedTuple):
@@ -282,13 +286,8 @@ def _trackers_of(tracking):
 
 
 def _check(params):
-    if params.tracker not in TRACKERS:
-        raise ValueError('parameter ~tracker is %r; did you mean %s? Known: %s'
-                         % (params.tracker, nearest_name(params.tracker, sorted(TRACKERS)),
-                            ', '.join(sorted(TRACKERS))))
     if not params.target_frame:
         raise ValueError('parameter ~target_frame is empty; map or odom expected')
-    check_not_negative(params, 'tf_timeout', 'depth_scale', 'depth_cache_length', 'stamp_tolerance')
     for camera in params.cameras:
         if not (isinstance(camera, str) and NAMESPACE.match(camera)) or list(params.cameras).count(camera) > 1:
             raise ValueError('parameter ~cameras is %s; different namespaces expected, such as front, rear'

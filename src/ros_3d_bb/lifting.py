@@ -9,23 +9,33 @@ from ros_3d_bb.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.estimation import DepthImage, check_rect, estimate_boxes, estimator_named, is_plausible
 from ros_3d_bb.images import checked_depth_from
 from ros_3d_bb.messages import boxes2d_from_message, camera_from_message, stamp_if_any, stamp_of, time_from
-from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.params import DEPTH_SCALE, LARGEST, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.stamped import NS, Pairing
 from ros_3d_bb.tracking.tracked import LARGEST_M
 
 
+@parameters()
 class Bbox3dParams(NamedTuple):
-    """See config/bbox3d.yaml."""
+    """Parameters of bbox3d_node."""
 
-    estimator: str = 'foreground'
-    stride: int = 20
-    error_model: str = ''
-    depth_scale: float = 0.0
-    frame_id: str = ''
-    cache_length: float = 1.0
-    stamp_tolerance: float = 0.005
-    assumed_delay: float = 0.05
-    depth_image_range: float = 6.0
+    estimator: str = Param(
+        'foreground', 'How a position is estimated from the depth in a box. foreground: from the nearest layer of '
+        'depth that is large enough to be the person, whatever is behind them. median: as in the thesis, the median '
+        'of the sampled points along each axis, background included.', choices=('foreground', 'median'), live=True)
+    stride: int = Param(
+        20, 'Distance between the depth samples of the estimator median; 20 in the thesis.', 'pixels',
+        limits=(1, LARGEST), live=(1, 100))
+    error_model: str = Param('')
+    depth_scale: float = DEPTH_SCALE
+    frame_id: str = Param('')
+    cache_length: float = Param(
+        1.0, 'How long depth images wait for their boxes, and boxes for their depth image. More than the detector '
+        'ever takes.', 's')
+    stamp_tolerance: float = STAMP_TOLERANCE
+    assumed_delay: float = Param(
+        0.05, 'Processing time of the detector, used where its boxes carry no stamp.', 's', live=(0, 1))
+    depth_image_range: float = Param(
+        6.0, 'Depth that is black in the grey image on ros_3d_bb/depth.', 'm', live=(1, 20))
 
 
 class Lifted(NamedTuple):
@@ -55,11 +65,10 @@ class Lifter(object):
     Raises
     ------
     ValueError
-        If a parameter makes no sense, or the error model cannot be used.
+        If the error model cannot be used.
     """
 
     def __init__(self, params, tally, on_frame, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
-        _check(params)
         self._tally, self._depth_topic, self._info_topic = tally, depth_topic, info_topic
         self._error_model = error_model_of(params)
         cache_ns, tolerance_ns = int(params.cache_length * NS), int(params.stamp_tolerance * NS)
@@ -72,7 +81,6 @@ class Lifter(object):
 
         Raises ValueError, and keeps the old ones, where they make no sense.
         """
-        _check(params)
         estimator = estimator_named(params.estimator, params.stride)
         if self._error_model is not None:
             self._error_model.check_estimator(params.estimator)
@@ -191,10 +199,6 @@ class Lifter(object):
                 '(~cache_length)%s' % (boxes.stamp_ns / NS, self._depth_topic, newest_ns / NS, kept_s,
                                        ': the boxes are %.1f s too old; the detector is slower than that'
                                        % (late_s - kept_s) if late_s > kept_s else ''))
-
-
-def _check(params):
-    check_not_negative(params, 'depth_scale', 'cache_length', 'stamp_tolerance', 'assumed_delay', 'depth_image_range')
 
 
 def error_model_of(params):

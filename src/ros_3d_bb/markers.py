@@ -8,7 +8,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_3d_bb.params import check_not_negative, nearest_name
+from ros_3d_bb.params import Param, parameters
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
 
@@ -36,13 +36,23 @@ ABOVE_FLOOR_M = 0.02  # lines on the floor would flicker in its grid
 HISTORY_POINTS, HISTORY_SPACING_S = 100, 0.1  # at most so many, and not closer than that
 
 
+@parameters('what RViz shows')
 class MarkerParams(NamedTuple):
-    """See config/tracker.yaml."""
+    """Which markers tracker_node publishes, and how they look."""
 
-    marker_namespaces: list = NAMESPACES[:-1]
-    marker_color: str = 'id'
-    marker_history: float = 4.0
-    marker_lifetime: float = 2.0
+    marker_namespaces: list = Param(
+        NAMESPACES[:-1], 'Kinds of markers, each in a namespace of its own that RViz switches on and off. cylinder; '
+        'id: the track ID, followed by a question mark while the person is not detected; velocity: red, to the '
+        'position in 1 s; prediction: green, to the last predicted position; history: the path walked, fading; '
+        'ellipse: contains the position with a probability of 95 %; prediction_ellipse: the same at each half second '
+        'ahead.', choices=NAMESPACES, live=True)
+    marker_color: str = Param(
+        'id', 'Colour of cylinders, history and ellipses. id: one of ten colours by track ID, which shows ID '
+        'switches; status: blue for visible, amber for occluded, grey for out of view; thesis: blue. Undetected '
+        'people are paler.', choices=tuple(COLORS), live=True)
+    marker_history: float = Param(4.0, 'Length of the history; 0: none.', 's', live=(0, 30))
+    marker_lifetime: float = Param(
+        2.0, 'RViz removes markers that are not updated for this long; 0: never.', 's', live=(0, 10))
 
 
 class Walk(NamedTuple):
@@ -60,11 +70,6 @@ class MarkerWriter(object):
 
     A marker is replaced in place while its track lives and deleted when it ends; where no news comes at all, RViz
     removes it after the lifetime (0: never).
-
-    Raises
-    ------
-    ValueError
-        If a parameter makes no sense; names it.
     """
 
     def __init__(self, params=MarkerParams()):
@@ -73,8 +78,7 @@ class MarkerWriter(object):
         self.tune(params)
 
     def tune(self, params):
-        """Draw the next tracks with other parameters. Raises ValueError as at the start, and changes nothing."""
-        check_params(params)
+        """Draw the next tracks with other parameters."""
         self._params = params
         self._lifetime = genpy.Duration.from_sec(params.marker_lifetime)
         shapes = {CYLINDER: self._cylinder, ID: self._number, VELOCITY: self._velocity, PREDICTION: self._prediction,
@@ -174,17 +178,6 @@ class MarkerWriter(object):
 
     def _rgb(self, track):
         return COLORS[self._params.marker_color](track)
-
-
-def check_params(params):
-    """Raise ValueError, naming the parameter, where one makes no sense."""
-    check_not_negative(params, 'marker_lifetime', 'marker_history')
-    if params.marker_color not in COLORS:
-        raise ValueError('parameter ~marker_color is %r; %s expected' % (params.marker_color, ', '.join(COLORS)))
-    for name in params.marker_namespaces:
-        if name not in NAMESPACES:
-            raise ValueError('parameter ~marker_namespaces has %r; did you mean %s? Known: %s'
-                             % (name, nearest_name(str(name), NAMESPACES), ', '.join(NAMESPACES)))
 
 
 def _seen(track):

@@ -11,7 +11,7 @@ import numpy as np
 from ros_3d_bb.distortion import EQUIDISTANT, INVERSE_BROWN_CONRADY, PLUMB_BOB
 from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.geometry import OPTICAL_ROTATION, Camera, transform_from
-from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.params import Param, parameters
 from ros_3d_bb.stamped import NS
 
 POLL_MS = 100
@@ -28,18 +28,21 @@ class CameraLost(Exception):
     """There is no such camera, or it sends nothing any more. It may come back."""
 
 
+@parameters()
 class RealSenseParams(NamedTuple):
-    """See config/realsense.yaml and launch/realsense_node.launch."""
+    """The camera or recording, and its images."""
 
-    serial: str = ''
-    width: int = 640
-    height: int = 480
-    fps: int = 30
-    filters: list = ()
-    exposure: float = 0.0
-    file: str = ''
-    real_time: bool = True
-    repeat: bool = False
+    serial: str = Param('')
+    width: int = Param(640, limits=(1, 10000))
+    height: int = Param(480, limits=(1, 10000))
+    fps: int = Param(30, limits=(1, 10000))
+    filters: list = Param((), choices=FILTERS)
+    exposure: float = Param(0.0)
+    file: str = Param('')
+    real_time: bool = Param(
+        True, 'Whether a recording is played at the speed at which it was recorded, without the images for which the '
+        'machine is too slow. Else it is played as fast as it can be read.')
+    repeat: bool = Param(False)
 
 
 class Pair(NamedTuple):
@@ -191,14 +194,7 @@ def librealsense():
 
 
 def check_params(params):
-    """Raise ValueError where a parameter cannot be meant."""
-    check_not_negative(params, 'exposure')
-    for name in ('width', 'height', 'fps'):
-        if not 0 < getattr(params, name) <= 10000:
-            raise ValueError('parameter ~%s is %d; more than 0 expected' % (name, getattr(params, name)))
-    unknown = [name for name in params.filters if name not in FILTERS]
-    if unknown:
-        raise ValueError('parameter ~filters has %r; any of %s expected' % (unknown[0], ', '.join(FILTERS)))
+    """Raise ValueError where there is no such recording."""
     if params.file and not (os.path.isabs(params.file) and os.path.isfile(params.file)):
         raise ValueError('parameter ~file is %r; the absolute path of a recording expected' % params.file)
 

@@ -12,30 +12,34 @@ from ros_3d_bb.detection.yolov5 import Yolov5
 from ros_3d_bb.geometry import transform_from
 from ros_3d_bb.images import checked_depth_from, rgb_from
 from ros_3d_bb.messages import camera_from_message, stamp_if_any, stamp_of
-from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.params import ENABLED, PUBLISH_EMPTY, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.stamped import NS, Pairing
 
 CACHE_NS = NS  # how long images wait for each other
 NEWEST = genpy.Time(0)  # what tf takes it for
 
 
+@parameters()
 class Yolov5NodeParams(NamedTuple):
-    """See config/yolov5.yaml."""
+    """Parameters of yolov5_node beside those of the network and its runtime."""
 
-    weights: str = ''
-    enabled: bool = True
-    publish_empty: bool = True
+    weights: str = Param('')
+    enabled: bool = ENABLED
+    publish_empty: bool = PUBLISH_EMPTY
 
 
+@parameters()
 class DepthDetectorParams(NamedTuple):
-    """See config/depth_detector.yaml."""
+    """Parameters of depth_detector_node beside those of the detector."""
 
-    floor_frame: str = 'base_link'
-    floor_height: float = -0.065
-    frame_id: str = ''
-    stamp_tolerance: float = 0.005
-    enabled: bool = True
-    publish_empty: bool = True
+    floor_frame: str = Param('base_link')
+    floor_height: float = Param(
+        -0.065, 'Height of the floor in floor_frame. The default fits base_link of a Jackal.', 'm',
+        limits=(-10000, 10000), live=(-1, 1))
+    frame_id: str = Param('')
+    stamp_tolerance: float = STAMP_TOLERANCE
+    enabled: bool = ENABLED
+    publish_empty: bool = PUBLISH_EMPTY
 
 
 def opened_yolov5(weights, detection, running, warn):
@@ -91,7 +95,6 @@ class DepthSearch(object):
     names = ('person',)
 
     def __init__(self, params, people, tally, on_frame, transforms):
-        _check(params)
         self._params, self._tally, self._transforms = params, tally, transforms
         self._detector = DepthPeople(people)
         self._sync = Pairing(CACHE_NS, int(params.stamp_tolerance * NS), 0, on_frame, self._on_lost)
@@ -101,7 +104,6 @@ class DepthSearch(object):
 
         Raises ValueError, and keeps the old ones, where they make no sense.
         """
-        _check(params)
         self._detector.tune(people)
         self._params = params
 
@@ -168,9 +170,3 @@ class DepthSearch(object):
             return None
         base_from_floor = transform_from((0, 0, self._params.floor_height), (0, 0, 0, 1))
         return floor_from_transform(camera_from_base.dot(base_from_floor))
-
-
-def _check(params):
-    check_not_negative(params, 'stamp_tolerance')
-    if not abs(params.floor_height) < 1e6:
-        raise ValueError('parameter ~floor_height is %g; metres in ~floor_frame expected' % params.floor_height)

@@ -1,25 +1,33 @@
-"""Parameters: defaults, types, and unknown keys with the nearest known one."""
+"""Parameters: defaults, types, limits, and unknown keys with the nearest known one."""
 from typing import NamedTuple
 
 import pytest
 
-from ros_3d_bb.params import check_not_negative, params_from
+from ros_3d_bb.params import SET_BY_LAUNCH, Param, params_from, parameters, table_of
 
 
+RATE = Param(30.0, 'Rate of the images.', 'Hz', limits=(0.5, 60), live=(1, 60), section='both')
+
+
+@parameters()
 class Camera(NamedTuple):
-    rate: float = 30.0
-    frame: str = 'camera'
-    enabled: bool = True
+    rate: float = RATE
+    frame: str = Param('camera')
+    enabled: bool = Param(True, 'Whether it runs.')
+    color: str = Param('rgb', 'Order of colours.', choices=('rgb', 'bgr'))
 
 
+@parameters('filter')
 class Filter(NamedTuple):
-    stride: int = 20
-    classes: list = ('person',)
+    rate: float = RATE
+    stride: int = Param(20, 'Step.', section='sampling')
+    classes: list = Param(('person',), 'What to find.')
+    shapes: list = Param(('a',), 'What is drawn.', choices=('a', 'b'))
 
 
 def test_what_is_not_given_keeps_its_default():
     assert params_from({}, Camera, Filter) == [Camera(), Filter()]
-    assert params_from({'rate': 5.0, 'stride': 3}, Camera, Filter) == [Camera(rate=5.0), Filter(stride=3)]
+    assert params_from({'rate': 5.0, 'stride': 3}, Camera, Filter) == [Camera(rate=5.0), Filter(rate=5.0, stride=3)]
 
 
 @pytest.mark.parametrize('given,field,value', [
@@ -50,8 +58,31 @@ def test_unknown_keys_name_the_nearest_known_one():
         params_from({'strid': 5}, Camera, Filter)
 
 
-@pytest.mark.parametrize('rate', [-0.1, float('nan'), float('inf'), 1e6])
-def test_numbers_that_make_no_sense_are_named(rate):
-    check_not_negative(Camera(rate=0.0), 'rate')
-    with pytest.raises(ValueError, match='parameter ~rate is .*; 0 or more expected'):
-        check_not_negative(Camera(rate=rate), 'rate')
+@pytest.mark.parametrize('given', [
+    {'rate': 0.4}, {'rate': 60.1}, {'rate': float('nan')}, {'rate': float('inf')}, {'stride': -1},
+    {'stride': 10 ** 9}, {'color': 'RGB'}, {'shapes': ['a', 'c']}])
+def test_values_that_are_not_allowed_are_named(given):
+    (name, _value), = given.items()
+    with pytest.raises(ValueError, match='parameter ~%s ' % name):
+        params_from(given, Camera, Filter)
+
+
+@pytest.mark.parametrize('given', [{'rate': 0.5}, {'rate': 60}, {'stride': 0}, {'color': 'bgr'}, {'shapes': []}])
+def test_limits_and_choices_are_allowed(given):
+    (name, value), = given.items()
+    assert any(getattr(params, name, None) == value for params in params_from(given, Camera, Filter))
+
+
+def test_a_table_has_a_row_for_each_name_with_its_section():
+    table = table_of([Camera, Filter])
+    assert [(name, param.section) for name, param in table.items()] == [
+        ('rate', 'both'), ('frame', SET_BY_LAUNCH), ('enabled', ''), ('color', ''), ('stride', 'sampling'),
+        ('classes', 'filter'), ('shapes', 'filter')]
+
+
+@pytest.mark.parametrize('param, facts', [
+    (Param(True, 'Text.'), ''), (Param(1.0, 'Text.', 'm'), 'Unit: m.'),
+    (RATE, 'Unit: Hz. Allowed: 0.5 to 60. Live: 1 to 60.'), (Param(1, 'Text.', limits=(1, 1e6)), 'Allowed: 1 or more.'),
+    (Param('a', 'Text.', choices=('a', 'b'), live=True), 'Allowed: one of a, b. Live.')])
+def test_facts_are_what_the_text_does_not_tell(param, facts):
+    assert param.facts == facts

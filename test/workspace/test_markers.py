@@ -231,17 +231,6 @@ def test_who_is_not_seen_is_paler_and_has_a_question_mark(status, coloring):
         assert 0.1 < unseen[namespace, 3].color.a < seen[namespace, 3].color.a / 2
 
 
-@pytest.mark.parametrize('params, said', [
-    (MarkerParams(marker_color='ID'), "~marker_color is 'ID'; id, status, thesis"),
-    (MarkerParams(marker_namespaces=['cylinder', 'elipse']), "'elipse'; did you mean ellipse"),
-    (MarkerParams(marker_history=-1.0), '~marker_history is -1'),
-    (MarkerParams(marker_lifetime=float('nan')), '~marker_lifetime is nan')])
-def test_parameters_that_make_no_sense_are_refused(params, said):
-    with pytest.raises(ValueError) as error:
-        MarkerWriter(params)
-    assert said in str(error.value)
-
-
 def test_nobody_has_no_markers():
     assert MarkerWriter().write([], header()).markers == []
 
@@ -255,13 +244,6 @@ def test_other_parameters_work_from_the_next_image_on_and_what_is_not_drawn_any_
     assert sorted(keys(markers)) == [('cylinder', 3), ('history', 3)]
     assert keys(markers, Marker.DELETE) == [('id', 3)]
     assert all(marker.lifetime.to_sec() == 0.5 for marker in markers.markers if marker.action == Marker.ADD)
-
-
-def test_parameters_that_are_refused_leave_the_old_ones():
-    writer = MarkerWriter(MarkerParams(marker_namespaces=['id']))
-    with pytest.raises(ValueError, match='marker_color'):
-        writer.tune(MarkerParams(marker_color='pink'))
-    assert keys(writer.write([track(3)], header())) == [('id', 3)]
 
 
 coordinates = st.floats(-1e6, 1e6)

@@ -14,6 +14,7 @@ from ros_3d_bb.nodes.realsense_node import RealSenseNode
 from ros_3d_bb.nodes.replay_node import ReplayNode
 from ros_3d_bb.nodes.simulator_node import SimulatorNode
 from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.thesis import ThesisTrackerParams
 from support.masterless import masterless
 from support.planner_definitions import package
 from support.pages import DOC, ROOT, node_pages
@@ -58,13 +59,13 @@ def test_there_are_pages_of_all_nodes():
 
 
 @pytest.mark.parametrize('path', sorted(node_pages.pages()))
-def test_pages_are_those_that_are_made_of_the_code(path):
-    with open(os.path.join(DOC, path), encoding='utf-8') as stream:
+def test_pages_and_parameter_files_are_those_that_are_made_of_the_code(path):
+    with open(os.path.join(ROOT, path), encoding='utf-8') as stream:
         assert stream.read() == node_pages.pages()[path], 'out of date: ./run doc makes it anew'
 
 
 def test_no_page_is_left_of_a_node_that_is_gone():
-    made = set(os.path.basename(path) for path in node_pages.pages() if path.startswith('nodes'))
+    made = set(os.path.basename(path) for path in node_pages.pages() if path.startswith('doc/nodes'))
     assert set(os.listdir(os.path.join(DOC, 'nodes'))) == made
 
 
@@ -91,8 +92,8 @@ def test_parameters_are_those_of_the_node_each_with_its_default_and_what_it_is_f
     assert len(parameters) == sum(
         len(set(kind._fields)) for kind in node_pages.parameter_types(NODES['tracker_node'].node_class)) - 3  # shared
     assert parameters['alpha'] == node_pages.Parameter(
-        'alpha', 'float', "0.2 (the thesis' package)", 'Weight of the newest velocity in the average, more than 0 and '
-        'at most 1: higher reacts faster and is noisier. Live: 0.01 to 1.', 'thesis')
+        'alpha', 'float', '0.2', ThesisTrackerParams.PARAMS['alpha'].text, 'Allowed: 1e-06 to 1. Live: 0.01 to 1.',
+        'thesis')
     assert parameters['target_frame'].default == 'map'
     assert parameters['target_frame'].meaning.endswith('(`frame_world:=`)')
 
@@ -100,5 +101,5 @@ def test_parameters_are_those_of_the_node_each_with_its_default_and_what_it_is_f
 def test_a_parameter_that_nobody_describes_is_an_error():
     node = NODES['tracker_node']
     with mock.patch.object(node_pages, 'launch_meaning', lambda _node, _parameter: None):
-        with pytest.raises(ValueError, match='nothing says what the parameter target_frame is for'):
+        with pytest.raises(ValueError, match='target_frame'):
             node_pages.parameters_of(node)

@@ -3,7 +3,6 @@ import ast
 import glob
 import os
 import re
-import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 
@@ -11,45 +10,23 @@ import pytest
 import roslaunch
 import yaml
 
-from ros_3d_bb.detection.bodies import DepthPeopleParams
-from ros_3d_bb.detection.runtime import RuntimeParams
-from ros_3d_bb.detection.yolov5 import DetectionParams
-from ros_3d_bb.following import TRACKING_PARAMS, TrackerNodeParams
-from ros_3d_bb.lifting import Bbox3dParams
-from ros_3d_bb.live_parameters import description_of, parameters_in
-from ros_3d_bb.markers import NAMESPACES, MarkerParams
-from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
-from ros_3d_bb.nodes.realsense_node import RealSenseNodeParams
-from ros_3d_bb.nodes.simulator_node import SimulatorParams
-from ros_3d_bb.nodes.viewer_node import ViewerParams
-from ros_3d_bb.params import params_from
-from ros_3d_bb.realsense import RealSenseParams
-from ros_3d_bb.searching import DepthDetectorParams, Yolov5NodeParams
+from ros_3d_bb.markers import NAMESPACES
+from ros_3d_bb.params import check, params_from, table_of
+from support.pages import node_pages
 from support.standard_library import STANDARD_LIBRARY, TEST_STANDARD_LIBRARY
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 # rosdep keys of what is no ROS package; None: optional, imported where it is used, with an error that says so.
 KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-torch', 'onnxruntime': None,
         'yaml': 'python3-yaml', 'matplotlib': 'python3-matplotlib', 'scipy': 'python3-scipy',
-        'rospkg': 'python3-rospkg', 'norfair': None, 'trackeval': None, 'pyrealsense2': None,
+        'norfair': None, 'trackeval': None, 'pyrealsense2': None,
         'PyQt5': None}  # comes with python_qt_binding, and serves where that is not
 TEST_KEYS = {'pytest': 'python3-pytest', 'hypothesis': 'python3-hypothesis',
              'catkin_pkg': 'python3-catkin-pkg-modules'}
 # What Melodic's own Python packages need on Python 3.
 FOR_MELODIC = {'python3-gnupg', 'python3-pycryptodome'}
 FOR_DEBIAN = {'tf2_tools'}  # which has programs of tf2_ros there
-CONFIGS = {'yolov5.yaml': (Yolov5NodeParams, DetectionParams, RuntimeParams), 'bbox3d.yaml': (Bbox3dParams,),
-           'tracker.yaml': (TrackerNodeParams, MarkerParams) + TRACKING_PARAMS, 'simulator.yaml': (SimulatorParams,),
-           'planner_bridge.yaml': (PlannerBridgeParams,), 'realsense.yaml': (RealSenseNodeParams, RealSenseParams),
-           'depth_detector.yaml': (DepthDetectorParams, DepthPeopleParams), 'viewer.yaml': (ViewerParams,)}
-SET_BY_LAUNCH = {'yolov5.yaml': {'weights', 'device'}, 'bbox3d.yaml': {'frame_id', 'error_model'},
-                 'tracker.yaml': {'target_frame', 'cameras', 'camera_frame'}, 'simulator.yaml': {'scenario'},
-                 'planner_bridge.yaml': {'outputs', 'planner_frame', 'robot_frame'},
-                 'realsense.yaml': {'frame_prefix', 'publish_clock', 'serial', 'width', 'height', 'fps', 'filters',
-                                    'exposure', 'file', 'repeat'},
-                 'depth_detector.yaml': {'floor_frame', 'frame_id'},
-                 'viewer.yaml': {'session', 'label', 'window', 'frame_id'}}
-TUNED = {'yolov5.yaml', 'bbox3d.yaml', 'tracker.yaml', 'depth_detector.yaml'}  # whose nodes have a `Tuning`
+NODES = {node.name: node for node in node_pages.nodes()}
 REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag', 'session:=/some/session', 'record:=/some/record.json']
 
 
@@ -103,12 +80,6 @@ def test_what_the_tests_import_is_declared_or_in_their_requirements():
     assert programs == {'rosbash', 'rosservice', 'rostest', 'xdotool', 'xvfb'}
 
 
-@pytest.mark.needs('vermin')
-def test_the_robot_needs_no_more_than_python_3_6():
-    subprocess.check_call([sys.executable, '-c', 'from vermin import main; main()', '--no-tips', '--target=3.6-',
-                           '--violations'] + python_files())
-
-
 def test_nothing_names_a_machine_or_stamps_with_now():
     for path in python_files() + glob.glob(inside('launch', '*')) + (
             glob.glob(inside('config', '**', '*.yaml'), recursive=True) + glob.glob(inside('urdf', '*'))
@@ -118,40 +89,45 @@ def test_nothing_names_a_machine_or_stamps_with_now():
         assert not re.search(r'(^|[\s"\'=])/(work|home|root)/|\.\./shared|Time\.now\(\)', text), path
 
 
-@pytest.mark.parametrize('name', sorted(CONFIGS))
-def test_parameter_files_hold_every_parameter_with_its_default(name):
-    with open(inside('config', name)) as stream:
-        text = stream.read()
-    given = yaml.safe_load(text)
-    expected = {key: value for kind in CONFIGS[name] for key, value in kind()._asdict().items()}
-    assert set(given) == set(expected) - SET_BY_LAUNCH[name]
-    for key, value in given.items():
-        assert value == (list(expected[key]) if isinstance(expected[key], tuple) else expected[key])
-    params_from(given, *CONFIGS[name])
+@pytest.mark.parametrize('name', sorted(NODES))
+def test_defaults_are_allowed_and_within_the_range_of_their_slider(name):
+    kinds = node_pages.parameter_types(NODES[name].node_class)
+    for kind in kinds:
+        check(kind())
+    for key, param in table_of(kinds).items():
+        if param.live and isinstance(param.default, (int, float)) and not isinstance(param.default, bool):
+            assert param.limits[0] <= param.live[0] <= param.default <= param.live[1] <= param.limits[1], key
+            assert param.live[0] < param.live[1], key
 
 
-@pytest.mark.parametrize('name', sorted(CONFIGS))
-def test_parameters_have_a_comment_with_the_default(name):
-    with open(inside('config', name)) as stream:
-        text = stream.read()
-    comment = ''
-    for line in filter(None, text.splitlines()):
-        if line.startswith('#'):
-            comment += line
-            continue
-        key, value = line.split(': ')
-        assert re.search(r'Default: %s' % re.escape(value.replace("''", 'empty')), comment), key
-        comment = ''
+@pytest.mark.parametrize('name', sorted(NODES))
+def test_values_outside_of_the_table_are_rejected(name):
+    kinds = node_pages.parameter_types(NODES[name].node_class)
+    for key, param in table_of(kinds).items():
+        low, high = param.limits
+        outside = {bool: (), int: (low - 1, int(high) + 1), float: (low - 1e-7, high * 1.001, float('nan')),
+                   str: ('nonsense',) * bool(param.choices), tuple: (['nonsense'],) * bool(param.choices)}
+        for value in outside[type(param.default)]:
+            with pytest.raises(ValueError, match='parameter ~%s (is|has)' % key):
+                params_from({key: value}, *kinds)
 
 
-@pytest.mark.parametrize('name', sorted(CONFIGS))
-def test_parameters_are_live_only_where_a_node_listens_and_their_defaults_are_within_the_limits(name):
-    with open(inside('config', name)) as stream:
-        live = [parameter for parameter in parameters_in(stream.read()) if parameter.live is not None]
-    assert bool(live) == (name in TUNED)
-    least, largest, defaults = description_of(live, CONFIGS[name])[1:]
-    for key, value in defaults.items():
-        assert isinstance(value, str) or least[key] <= value <= largest[key] != least[key], key
+@pytest.mark.parametrize('name', sorted(NODES))
+def test_parameters_are_live_only_where_a_node_takes_changes(name):
+    module = sys.modules[NODES[name].node_class.__module__]
+    is_live = any(param.live for param in table_of(node_pages.parameter_types(NODES[name].node_class)).values())
+    assert is_live == hasattr(module, 'Tuning')
+
+
+@pytest.mark.parametrize('path, node', sorted(
+    (path, node.name) for node in NODES.values() for path in node_pages.config_paths(node)))
+def test_parameter_files_are_read_as_the_defaults(path, node):
+    kinds = node_pages.parameter_types(NODES[node].node_class)
+    with open(inside(path)) as stream:
+        given = yaml.safe_load(stream)
+    assert given and [kind._asdict() for kind in params_from(given, *kinds)] == [
+        {key: list(value) if key in given and isinstance(value, tuple) else value
+         for key, value in kind()._asdict().items()} for kind in kinds]
 
 
 # These need packages that are not on every machine; tests of their own load them with stand-ins.
@@ -175,7 +151,8 @@ def test_launch_files_set_no_parameter_that_the_node_does_not_know(name):
     loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
     loader.load(inside('launch', name), config, argv=REQUIRED_ARGUMENTS, verbose=False)
     given = {key.split('/', 2)[2]: parameter.value for key, parameter in config.params.items()}
-    params_from(given, *CONFIGS[name.replace('_node', '').replace('.launch', '.yaml')])
+    node = NODES[name.replace('_node', '').replace('.launch', '_node')]
+    params_from(given, *node_pages.parameter_types(node.node_class))
 
 
 @pytest.mark.parametrize('arguments, outputs', [([], None), (['planner:=teb, people', 'planner_frame:=odom'],

@@ -1,4 +1,4 @@
-"""What the README and the pages in doc/ say of the package is so: names, links, the nodes' own sentences.
+"""What the README and the pages in doc/ say of the package is so: names, the nodes' own sentences.
 
 The blocks of code are run by test_readme_tools.py, test_readme_graphs.py and test_readme_campaign.py.
 """
@@ -111,23 +111,6 @@ def test_the_nodes_say_what_the_table_of_symptoms_has_them_say(sentences):
     assert len(said) > 10
     for sentence in said:
         assert any(sentence in text for text in sentences), sentence
-
-
-@pytest.mark.parametrize('page', NAMED)
-def test_links_lead_somewhere(page):
-    for target in re.findall(r'\]\(([^)]+)\)', prose_of(page)):
-        path, _hash, anchor = target.partition('#')
-        if '://' in target:
-            continue
-        path = os.path.normpath(os.path.join(os.path.dirname(page), path)) if path else page
-        assert os.path.exists(os.path.join(ROOT, path)), target
-        assert not anchor or anchor in anchors_of(path), target
-
-
-def anchors_of(page):
-    """Of its headings, as GitHub makes them."""
-    return [re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-')
-            for heading in re.findall(r'^#+ (.*)$', prose_of(page), re.MULTILINE)]
 
 
 @pytest.mark.parametrize('page', NAMED)

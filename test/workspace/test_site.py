@@ -6,22 +6,22 @@ import sys
 
 import pytest
 
-from support.pages import DOC
+from support.pages import DOC, ROOT
 
 
 @pytest.fixture(scope='module')
 def site(tmp_path_factory):
-    """The folder of the site; a link without a target, or a page that nobody links, is an error."""
+    """The folder of the pages of doc/; a link without a target, or a page that is not linked, is an error."""
     folder = tmp_path_factory.mktemp('site')
     subprocess.check_call([sys.executable, '-m', 'sphinx', '-W', '--keep-going', '-n', '-q', '-b', 'html',
-                           '-d', str(folder / 'trees'), DOC, str(folder / 'html')])
-    return folder / 'html'
+                           '-d', str(folder / 'trees'), '-c', DOC, ROOT, str(folder / 'html')])
+    return folder / 'html' / 'doc'
 
 
 def test_the_site_has_every_page_and_what_they_link(site):
     for path in DOC_PAGES:
         assert (site / (path[:-len('.md')] + '.html')).exists()
-    assert (site / '_images' / 'architecture.svg').exists()
+    assert (site.parent / '_images' / 'architecture.svg').exists()
 
 
 def test_formulas_need_no_script(site):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.params import Param, parameters
 
 MIN_CELLS = 20  # smaller blobs are no use: a person 6 m away has some 300
 HEADROOM_M = 0.15  # two people side by side have a valley this deep between their heads
@@ -16,25 +16,37 @@ HIP_M = 0.95  # where the image ends below, the two legs of one person have a va
 TWO_LAYERS = 0.7  # share of the variance between two layers of depth; 0.64 for noise, 0.75 for a slanted wall
 
 
+@parameters()
 class DepthPeopleParams(NamedTuple):
-    """What counts as a person; see config/depth_detector.yaml. A person cut by the image border may be smaller."""
+    """What counts as a person. A person cut by the image border may be smaller."""
 
-    min_depth: float = 0.4  # nearest and farthest person
-    max_depth: float = 6.5
-    cell_angle: float = 0.0065  # grid of depth pixels that are looked at; 4 pixels of a RealSense at 640x480
-    floor_margin: float = 0.12  # what is lower is floor
-    max_height: float = 2.15  # what is higher is ceiling
-    depth_step: float = 0.08  # a step of depth_step + depth_step_growth * depth**2 parts two surfaces
-    depth_step_growth: float = 0.006
-    min_width: float = 0.2
-    max_width: float = 1.15
-    max_thickness: float = 0.9  # along the line of sight: a long stride
-    min_top: float = 1.25  # crown above the floor
-    max_top: float = 2.1
-    max_bottom: float = 0.8  # lowest part seen above the floor: legs may be hidden
-    min_visible: float = 0.9  # height of the visible part
-    min_visible_cut: float = 0.5  # the same where the image ends below the head
-    min_score: float = 0.7  # of shape and HOG together, 0 to 1
+    min_depth: float = Param(0.4, 'Nearest person, along the optical axis.', 'm', live=(0, 3))
+    max_depth: float = Param(
+        6.5, 'Farthest person. Farther away a person is too few pixels and too much noise.', 'm', live=(1, 15))
+    cell_angle: float = Param(
+        0.0065, 'Grid of the depth pixels that are used: 4 pixels of a RealSense at 640x480.', 'rad',
+        limits=(1e-6, 0.05), live=(0.001, 0.05))
+    floor_margin: float = Param(0.12, 'What is lower than this above the floor is floor.', 'm', live=(0, 0.5))
+    max_height: float = Param(2.15, 'What is higher is ceiling.', 'm', live=(1.5, 3))
+    depth_step: float = Param(
+        0.08, 'A step in depth of depth_step + depth_step_growth * depth^2 separates two surfaces.', 'm',
+        live=(0.01, 0.5))
+    depth_step_growth: float = Param(
+        0.006, 'The part of that step that grows as the error of stereo does.', '1/m', live=(0, 0.05))
+    min_width: float = Param(0.2, 'Smallest width of a person.', 'm', live=(0, 0.6))
+    max_width: float = Param(1.15, 'Largest width: arms stretched out.', 'm', live=(0.6, 2))
+    max_thickness: float = Param(0.9, 'Largest extent along the line of sight: a long stride.', 'm', live=(0.3, 2))
+    min_top: float = Param(
+        1.25, 'Smallest height of the top of the head above the floor. Children and people who sit are lower.', 'm',
+        live=(0.5, 1.8))
+    max_top: float = Param(2.1, 'Largest height of the top of the head.', 'm', live=(1.8, 2.5))
+    max_bottom: float = Param(
+        0.8, 'Largest height of the lowest visible part above the floor: legs may be hidden.', 'm', live=(0, 1.5))
+    min_visible: float = Param(0.9, 'Smallest height of the visible part.', 'm', live=(0, 1.7))
+    min_visible_cut: float = Param(0.5, 'The same where the image ends below the head.', 'm', live=(0, 1.7))
+    min_score: float = Param(
+        0.7, 'Smallest score, 0 to 1, of shape and HOG together. Lower values detect more people and more that is '
+        'none.', live=(0, 1))
 
 
 class Grid(NamedTuple):
@@ -79,10 +91,7 @@ class Shape(NamedTuple):
 
 
 def check_params(params):
-    """Raise ValueError, naming the value, where a parameter makes no sense."""
-    check_not_negative(params, *params._fields)
-    if not 0 < params.cell_angle <= 0.05:
-        raise ValueError('cell_angle is %g; more than 0 and at most 0.05 expected' % params.cell_angle)
+    """Raise ValueError, naming the values, where two parameters contradict each other."""
     for name in ('depth', 'width', 'top'):
         low, high = getattr(params, 'min_%s' % name), getattr(params, 'max_%s' % name)
         if not low < high:

@@ -13,18 +13,27 @@ from typing import NamedTuple
 from ros_3d_bb.detection.checkpoint import WeightsError
 from ros_3d_bb.detection.exports import export_folder, exported_runtime
 from ros_3d_bb.detection.onnx_runtime import OnnxRuntime, OnnxUnusable
+from ros_3d_bb.params import Param, parameters
 
 RUNTIMES = ('auto', 'onnxruntime', 'torch')
 MAX_THREADS = 4  # taken by itself; the networks that a robot's CPU can run gain little from more
 
 
+@parameters()
 class RuntimeParams(NamedTuple):
-    """What runs the network, and where; see config/yolov5.yaml."""
+    """What runs the network, and where."""
 
-    runtime: str = 'auto'
-    device: str = 'auto'
-    threads: int = 0
-    export_folder: str = ''
+    runtime: str = Param(
+        'auto', 'What runs the network. ONNX Runtime takes half of the time of torch on a CPU; only torch runs on a '
+        'GPU (device:=), in half precision. auto: torch on a GPU, else ONNX Runtime, or torch where that is not '
+        'installed. A checkpoint (.pt) is exported to ONNX once, see export_folder.', choices=RUNTIMES)
+    device: str = Param('auto')
+    threads: int = Param(
+        0, 'CPU threads of the network. 0: as many as this machine has cores, at most 4.', limits=(0, 1024))
+    export_folder: str = Param(
+        '', 'Folder for checkpoints exported to ONNX (four bytes for each weight), named by the SHA-256 of the '
+        'checkpoint. It is created if missing and may be deleted at any time. Empty: ~/.cache/ros_3d_bb/onnx, or '
+        'below XDG_CACHE_HOME or ROS_3D_BB_CACHE where set.')
 
 
 def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
@@ -121,12 +130,8 @@ def checked_threads(params):
     ValueError
         If a parameter makes no sense.
     """
-    if params.runtime not in RUNTIMES:
-        raise ValueError('runtime is %r; one of %s expected' % (params.runtime, ', '.join(RUNTIMES)))
     if params.runtime == 'onnxruntime' and params.device not in ('auto', 'cpu'):
         raise ValueError('runtime onnxruntime works on the CPU, and device is %r; use runtime torch' % params.device)
-    if not 0 <= params.threads <= 1024:
-        raise ValueError('threads is %d; 1 or more expected, or 0 for as many as there are cores' % params.threads)
     return params.threads or min(physical_cores(), MAX_THREADS)
 
 

@@ -8,20 +8,29 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.detection.boxes import Detections, suppressed
+from ros_3d_bb.params import LARGEST, Param, parameters
 
 GREY = (114, 114, 114)  # the colour around letterboxed images that YOLOv5 is trained with
 LARGEST_INPUT_PX = 4096  # more takes more memory than a machine has
 MAX_CANDIDATES = 5000  # the best so many go into the suppression; more come only of a useless confidence
 
 
+@parameters()
 class DetectionParams(NamedTuple):
-    """What counts as a detection; see config/yolov5.yaml."""
+    """What counts as a detection."""
 
-    classes: list = ('person',)
-    confidence: float = 0.25
-    iou: float = 0.45
-    max_det: int = 100
-    image_size: int = 640
+    classes: list = Param(('person',), 'Classes to detect: names or numbers of the model.', live=True)
+    confidence: float = Param(
+        0.25, 'Smallest score (objectness times class score) of a detection.', limits=(0, 1), live=(0, 1))
+    iou: float = Param(
+        0.45, 'Two boxes of a class that overlap by more than this (intersection over union) are one object.',
+        limits=(0, 1), live=(0, 1))
+    max_det: int = Param(
+        100, 'Largest number of detections in an image; the best ones are kept.', limits=(1, LARGEST), live=(1, 300))
+    image_size: int = Param(
+        640, "Longer side of the network's input, rounded up to its stride (32, P6 models 64). Smaller is faster and "
+        'misses people farther away. Exports with a fixed size ignore it.', 'pixels', limits=(1, LARGEST_INPUT_PX),
+        live=(160, 1280))
 
 
 class Letterbox(NamedTuple):
@@ -94,17 +103,9 @@ class Yolov5(object):
 
 
 def check_params(params):
-    """Raise ValueError, naming the value, where a threshold or a size makes no sense."""
+    """Raise ValueError where there is nothing to detect."""
     if not params.classes:
         raise ValueError('classes is empty; at least one class expected, such as person')
-    for name in ('confidence', 'iou'):
-        if not 0 <= getattr(params, name) <= 1:
-            raise ValueError('%s is %g; 0 to 1 expected' % (name, getattr(params, name)))
-    for name in ('max_det', 'image_size'):
-        if getattr(params, name) < 1:
-            raise ValueError('%s is %d; at least 1 expected' % (name, getattr(params, name)))
-    if params.image_size > LARGEST_INPUT_PX:
-        raise ValueError('image_size is %d; at most %d expected' % (params.image_size, LARGEST_INPUT_PX))
 
 
 def class_number(entry, names):

@@ -54,7 +54,7 @@ class Bbox3dNode(object):
         subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
         subscribe(BOXES_TOPIC, Int32MultiArray, self._on_boxes)
-        self._tuning = Tuning('bbox3d.yaml', [params], self._tune)
+        self._tuning = Tuning([params], self._tune)
 
     def _tune(self, params):
         with self._lock:

@@ -51,7 +51,7 @@ class DepthDetectorNode(object):
         subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
         subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(COLOR_TOPIC, Image, self._on_color)
-        self._tuning = Tuning('depth_detector.yaml', [params, people], self._tune)
+        self._tuning = Tuning([params, people], self._tune)
 
     def _tune(self, params, people):
         with self._searching:

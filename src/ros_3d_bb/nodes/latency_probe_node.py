@@ -16,6 +16,7 @@ from ros_3d_bb.messages import BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.params import Param, parameters
 
 START_TIMEOUT_S = 120.0  # a detector may have to export its network first
 SAMPLE_S = 1.0
@@ -24,12 +25,13 @@ STAGES = (('boxes_2d', BOXES_TOPIC, Int32MultiArray), ('boxes_3d', 'ros_3d_bb/bb
           ('tracks', TRACKS_TOPIC, TrackedObjectArray), ('markers', 'visualization_marker_array', MarkerArray))
 
 
+@parameters()
 class LatencyProbeParams(NamedTuple):
-    """`record`: the file to write; `seconds` to measure, after the first markers and `warm_up` seconds more."""
+    """Parameters of latency_probe_node."""
 
-    record: str = ''
-    seconds: float = 20.0
-    warm_up: float = 3.0
+    record: str = Param('')
+    seconds: float = Param(20.0)
+    warm_up: float = Param(3.0)
 
 
 class LatencyProbeNode(object):

@@ -13,25 +13,36 @@ from ros_3d_bb.nodes.planner_outputs import outputs_from
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
 from ros_3d_bb.nodes.transport import subscribe
-from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.params import LARGEST, Param, parameters
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.for_planners import SAME_FRAME, predicted_to, rounding_m, usable_tracks
 
 MOST_ROUNDING_M = 0.005  # of coordinates: a tenth of a cell of a usual costmap
 
 
+@parameters()
 class PlannerBridgeParams(NamedTuple):
-    """See config/planner_bridge.yaml."""
+    """Parameters of planner_bridge_node."""
 
-    outputs: list = ('costmap',)
-    planner_frame: str = ''
-    robot_frame: str = 'base_link'
-    timeout: float = 1.0
-    resend_period: float = 0.1
-    tf_timeout: float = 0.2
-    points_prediction: float = 0.5
-    point_spacing: float = 0.05
-    clearing_range: float = 10.0
+    outputs: list = Param(('costmap',))
+    planner_frame: str = Param('')
+    robot_frame: str = Param('base_link')
+    timeout: float = Param(
+        1.0, 'Tracks that are older than this on arrival are rejected. After this time without tracks all outputs are '
+        'emptied, once. More than the pipeline takes from image to tracks.', 's', limits=(0.001, LARGEST))
+    resend_period: float = Param(
+        0.1, 'After this time without new tracks, outputs that planners take for the present are predicted to now and '
+        'sent again.', 's', limits=(0.001, LARGEST))
+    tf_timeout: float = Param(0.2, 'How long to wait for each transform at the stamp of the tracks.', 's')
+    points_prediction: float = Param(
+        0.5, 'How far ahead costmaps are marked with predicted footprints; 0: current positions only. The costmap '
+        'does not know when people will be there, so long times block free ways.', 's')
+    point_spacing: float = Param(
+        0.05, 'Distance between the points of a footprint; at most a cell of the costmap.', 'm',
+        limits=(0.001, LARGEST))
+    clearing_range: float = Param(
+        10.0, 'Radius of the ring of points around the robot up to which the costmap is cleared before people are '
+        'marked; 0: no ring. At least the raytrace_range of the costmap.', 'm')
 
 
 class News(NamedTuple):
@@ -205,10 +216,6 @@ def _now_ns():
 
 
 def _check(params):
-    check_not_negative(params, 'tf_timeout', 'points_prediction', 'clearing_range')
-    for name in ('timeout', 'resend_period', 'point_spacing'):
-        if not 0.001 <= getattr(params, name) < 1e6:
-            raise ValueError('parameter ~%s is %g; 0.001 or more expected' % (name, getattr(params, name)))
     if not params.robot_frame:
         raise ValueError('parameter ~robot_frame is empty; base_link or the like expected')
 

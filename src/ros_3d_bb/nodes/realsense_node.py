@@ -16,7 +16,7 @@ from ros_3d_bb.messages import time_from
 from ros_3d_bb.nodes.diagnostics import Diagnostics, is_ending
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.subscribers import wait_for_subscribers
-from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.params import SET_BY_LAUNCH, WAIT_FOR_SUBSCRIBERS, Param, parameters
 from ros_3d_bb.realsense import (CameraLost, RealSense, RealSenseParams, check_params, frame_links, librealsense,
                                  optical_frame)
 from ros_3d_bb.stamped import NS
@@ -26,12 +26,14 @@ CLOSING_S = 5.0  # at most
 START_NS = NS  # the time that is told until the first image of a recording says another
 
 
+@parameters()
 class RealSenseNodeParams(NamedTuple):
-    """See config/realsense.yaml. `publish_clock`: whether this node tells the time, that of a recording."""
+    """Parameters of realsense_node beside those of the camera."""
 
-    frame_prefix: str = 'camera'
-    publish_clock: bool = False
-    wait_for_subscribers: int = 0
+    frame_prefix: str = Param('camera')
+    publish_clock: bool = Param(
+        False, 'Whether this node publishes the time of a recording on /clock.', section=SET_BY_LAUNCH)
+    wait_for_subscribers: int = WAIT_FOR_SUBSCRIBERS
 
 
 class RealSenseNode(object):
@@ -57,7 +59,6 @@ class RealSenseNode(object):
 
     def __init__(self):
         self._params, self._camera_params = read_params(RealSenseNodeParams, RealSenseParams)
-        check_not_negative(self._params, 'wait_for_subscribers')
         check_params(self._camera_params)
         librealsense()
         self._diagnostics = Diagnostics()

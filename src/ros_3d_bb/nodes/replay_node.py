@@ -12,14 +12,16 @@ from ros_3d_bb.camera_messages import TYPES
 from ros_3d_bb.messages import BOXES_TOPIC, restamped
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.params import SET_BY_LAUNCH, Param, parameters
 
 
+@parameters()
 class ReplayParams(NamedTuple):
-    """`bag`: path; `rate`: images a second; `boxes`: whether to send the 2D boxes in the bag, too."""
+    """Parameters of replay_node."""
 
-    bag: str = ''
-    rate: float = 30.0
-    boxes: bool = False
+    bag: str = Param('')
+    rate: float = Param(30.0, limits=(0.001, 1000))
+    boxes: bool = Param(False, 'Whether the 2D boxes in the bag are published, too.', section=SET_BY_LAUNCH)
 
 
 class ReplayNode(object):
@@ -45,8 +47,6 @@ class ReplayNode(object):
 
     def __init__(self):
         self._params, = read_params(ReplayParams)
-        if not 0 < self._params.rate <= 1000:
-            raise ValueError('parameter ~rate is %g; more than 0 expected' % self._params.rate)
         types = dict(TYPES, **({BOXES_TOPIC: Int32MultiArray} if self._params.boxes else {}))
         self._images = images_in(self._params.bag, types)
         self._diagnostics = Diagnostics()

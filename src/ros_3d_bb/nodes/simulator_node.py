@@ -13,7 +13,7 @@ from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics, is_ending
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.subscribers import wait_for_subscribers
-from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.params import WAIT_FOR_SUBSCRIBERS, Param, parameters
 from ros_3d_bb.simulation.scenario import overridden, read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulator_messages import START_NS, TRUTH_TOPIC, simulated_messages
@@ -24,16 +24,22 @@ PAUSE_NS = 3 * NS  # between two rounds of a scene, so that the people of one ar
 PROGRESS_S = 1.0  # between two lines of the log
 
 
+@parameters()
 class SimulatorParams(NamedTuple):
     """See config/simulator.yaml."""
 
-    scenario: str = ''
-    rate: float = 0.0
-    seed: int = -1
-    publish_clock: bool = False
-    speed: float = 1.0
-    repeat: bool = True
-    wait_for_subscribers: int = 0
+    scenario: str = Param('')
+    rate: float = Param(0.0, 'Rate of the images; 0: that of the scenario.', 'Hz')
+    seed: int = Param(
+        -1, 'Seed of the noise and of the appearance of people, for the same images in every run; -1: that of the '
+        'scenario.', limits=(-1, 2 ** 32 - 1))
+    publish_clock: bool = Param(
+        False, 'Whether this node publishes the time on /clock (set /use_sim_time too). Then stamps are the same in '
+        'every run, and time waits where the machine is too slow. Else stamps are the time of the machine, and images '
+        'are left out.')
+    speed: float = Param(1.0, 'Speed of the published time; 1: real time.', limits=(0.001, 1000))
+    repeat: bool = Param(True, 'Whether the scene starts again 3 s after its end. Else the node ends.')
+    wait_for_subscribers: int = WAIT_FOR_SUBSCRIBERS
 
 
 class SimulatorNode(object):
@@ -142,9 +148,6 @@ def _scenario(params):
     if not params.scenario:
         raise ValueError('no scenario given; set ~scenario (launch argument scenario:=) to the path of a file such as '
                          'those in config/scenarios')
-    check_not_negative(params, 'wait_for_subscribers')
-    if not 0 < params.speed <= 1000:
-        raise ValueError('parameter ~speed is %g; more than 0 expected' % params.speed)
     if params.speed != 1 and not params.publish_clock:
         raise ValueError('parameter ~speed is %g; only where this node tells the time (~publish_clock) can it go '
                          'faster or slower' % params.speed)

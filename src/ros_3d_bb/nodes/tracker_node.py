@@ -8,7 +8,7 @@ from visualization_msgs.msg import MarkerArray
 
 from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS, topic_of
 from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
-from ros_3d_bb.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter, check_params
+from ros_3d_bb.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 from ros_3d_bb.messages import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_message
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
@@ -62,10 +62,9 @@ class TrackerNode(object):
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
         for camera in self._follower.cameras:
             self._subscribe(camera)
-        self._tuning = Tuning('tracker.yaml', given, self._tune)
+        self._tuning = Tuning(given, self._tune)
 
     def _tune(self, _params, marker_params, *tracking):
-        check_params(marker_params)
         with self._lock:
             self._follower.tune(tracking)
             self._markers.tune(marker_params)

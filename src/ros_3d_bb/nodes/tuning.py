@@ -1,30 +1,25 @@
 """Parameters that are changed while a node runs, by the tools of dynamic_reconfigure."""
-import os
 import threading
 
-import rospkg
 import rospy
 from dynamic_reconfigure.encoding import decode_config, encode_config, encode_description, get_tree
 from dynamic_reconfigure.msg import Config, ConfigDescription
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
-from ros_3d_bb.live_parameters import description_of, parameters_in, plain_values
+from ros_3d_bb.live_parameters import description_of, live_in, plain_values
 from ros_3d_bb.nodes.registration import on_new_master
 from ros_3d_bb.params import params_from
 
 
 class Tuning(object):
-    """Lets people change those parameters of a node that its file in config/ marks as live (see `live_parameters`).
+    """Takes changes of those parameters of a node that its table marks as live (see `ros_3d_bb.params.Param`).
 
-    What dynamic_reconfigure generates code for is made at the start here, of that file and the node's types, and a
-    value that makes no sense is refused with all that came with it, where dynamic_reconfigure's own server would put
-    another in its place. The answer to such a request is what stays in force: an error would end rqt_reconfigure's
-    thread.
+    The description that dynamic_reconfigure generates code for is made from that table. A request with a value that is
+    not allowed is rejected as a whole, where dynamic_reconfigure's own server would clamp the value. The response has
+    the values in force: an error would end rqt_reconfigure's thread.
 
     Parameters
     ----------
-    file : str
-        Name of the parameter file in config/.
     params : list of NamedTuple
         All parameters of the node, as `startup.read_params` returned them.
     take : callable
@@ -43,12 +38,11 @@ class Tuning(object):
         Changes parameters that are marked Live, as rqt_reconfigure does.
     """
 
-    def __init__(self, file, params, take):
+    def __init__(self, params, take):
         self._params, self._take, self._lock = list(params), take, threading.Lock()
-        with open(os.path.join(rospkg.RosPack().get_path('ros_3d_bb'), 'config', file), encoding='utf-8') as stream:
-            live = [parameter for parameter in parameters_in(stream.read()) if parameter.live is not None]
-        self._names = [parameter.name for parameter in live]
-        description = encode_description(description_of(live, [type(each) for each in params]))
+        kinds = [type(each) for each in params]
+        self._names = list(live_in(kinds))
+        description = encode_description(description_of(kinds))
         self._groups = get_tree(description)
         self._descriptions_pub, self._updates_pub = (
             rospy.Publisher('~parameter_' + name, kind, queue_size=1, latch=True)

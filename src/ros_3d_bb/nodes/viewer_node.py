@@ -18,7 +18,7 @@ from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.label import Label
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
-from ros_3d_bb.params import check_not_negative
+from ros_3d_bb.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.recording import Measurement, append
 from ros_3d_bb.snapshots import Snapshots
 from ros_3d_bb.stamped import NS, arrival_clock_ns
@@ -31,19 +31,23 @@ ENABLE_SERVICE = 'detector/enable'
 KEYS = 'keys: s saves, p pauses the detector, q quits'
 
 
+@parameters()
 class ViewerParams(NamedTuple):
-    """See config/viewer.yaml."""
+    """Parameters of viewer_node."""
 
-    session: str = ''
-    label: str = ''
-    window: bool = True
-    frame_id: str = ''
-    depth_scale: float = 0.0
-    cache_length: float = 1.0
-    stamp_tolerance: float = 0.005
-    window_rate: float = 15.0
-    panel_width: int = 480
-    depth_image_range: float = 6.0
+    session: str = Param('')
+    label: str = Param('')
+    window: bool = Param(True)
+    frame_id: str = Param('')
+    depth_scale: float = DEPTH_SCALE
+    cache_length: float = Param(
+        1.0, 'How long images wait for their boxes. Where boxes take longer, the images are shown and stored without.',
+        's')
+    stamp_tolerance: float = STAMP_TOLERANCE
+    window_rate: float = Param(
+        15.0, 'Largest rate at which the window is drawn; it is drawn for new images only.', 'Hz', limits=(0.1, 10000))
+    panel_width: int = Param(480, 'Width of each of the three images in the window.', 'pixels', limits=(80, 10000))
+    depth_image_range: float = Param(6.0, 'Depth at the far end of the colours.', 'm', limits=(0.1, 10000))
 
 
 class Color(NamedTuple):
@@ -267,12 +271,8 @@ class ViewerNode(object):
 
 def _check(params):
     """Raise ValueError where a parameter cannot be meant."""
-    check_not_negative(params, 'depth_scale', 'cache_length', 'stamp_tolerance')
     if params.session and not os.path.isabs(params.session):
         raise ValueError('parameter ~session is %r; an absolute path expected' % params.session)
-    for name, least in (('window_rate', 0.1), ('panel_width', 80), ('depth_image_range', 0.1)):
-        if not least <= getattr(params, name) <= 10000:
-            raise ValueError('parameter ~%s is %g; %g or more expected' % (name, getattr(params, name), least))
 
 
 def _window():

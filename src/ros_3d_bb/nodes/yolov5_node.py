@@ -37,7 +37,7 @@ class Yolov5Node(object):
         subscribe(COLOR_TOPIC, Image, self._on_image, 1)
         rospy.loginfo('looking for %s with %s on %s', ', '.join(map(str, detection.classes)), params.weights,
                       self._detector.description)
-        self._tuning = Tuning('yolov5.yaml', given, self._tune)
+        self._tuning = Tuning(given, self._tune)
 
     def _tune(self, _params, detection, _running):
         self._detector = self._detector.tuned(detection)  # an image is searched with the one or the other

@@ -3,6 +3,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.params import Param, parameters
 from ros_3d_bb.tracking.kalman import Measurements
 from ros_3d_bb.tracking.visibility import NEARER_M, wrapped
 
@@ -14,14 +15,17 @@ MAX_SHIFT_M = 0.2
 CUT_SIGMA_M = 0.08  # what is not seen of a cut person leaves the side open by so much
 NEAR_M = 0.01  # a box closer to the camera is seen from no direction; it is taken to lie straight ahead
 TOUCHING_RAD = 0.03  # a nearer box hides another one if there is not more between them
+BOX_ERRORS = 'kalman: errors of boxes (their covariance comes from the error model of bbox3d_node)'
 
 
+@parameters(BOX_ERRORS)
 class NoiseParams(NamedTuple):
-    """How boxes err: see config/tracker.yaml."""
+    """Errors of the positions of boxes."""
 
-    noise_unknown: float = 0.1
-    noise_correlated: float = 0.035
-    noise_correlation_time: float = 0.15
+    noise_unknown: float = Param(0.1, 'Standard deviation of boxes without a covariance.', 'm', live=(0, 1))
+    noise_correlated: float = Param(
+        0.035, 'Up to this standard deviation, errors are correlated from image to image.', 'm', live=(0, 0.3))
+    noise_correlation_time: float = Param(0.15, 'How long they are correlated.', 's', live=(0, 1))
 
 
 class Sightings(NamedTuple):

@@ -3,17 +3,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.tracking.tracked import TrackedObject, prediction_times_s
+from ros_3d_bb.params import Param, parameters
+from ros_3d_bb.tracking.tracked import PREDICTION_STEP, PREDICTION_TIME, TrackedObject, prediction_times_s
 
 
+@parameters('kalman: how certain predictions are')
 class PredictionParams(NamedTuple):
-    """See config/tracker.yaml."""
+    """Parameters of the prediction of tracks."""
 
-    prediction_time: float = 2.0
-    prediction_step: float = 0.25
-    prediction_acceleration: float = 0.03
-    standing_speed: float = 0.15
-    position_bias: float = 0.05
+    prediction_time: float = PREDICTION_TIME
+    prediction_step: float = PREDICTION_STEP
+    prediction_acceleration: float = Param(
+        0.03, 'How much more people turn than the filter models: density of a white acceleration.', 'm²/s³',
+        live=(0, 1))
+    standing_speed: float = Param(
+        0.15, 'A velocity much lower than this is not extrapolated: it is mostly noise.', 'm/s', live=(0, 1))
+    position_bias: float = Param(
+        0.05, 'Standard deviation added for errors that stay the same for seconds.', 'm', live=(0, 0.5))
 
 
 def objects_of(tracks, params):

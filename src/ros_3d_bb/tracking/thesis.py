@@ -9,19 +9,26 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.params import Param, parameters
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.association import match_greedily, plane_distances
-from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject, check_steps, prediction_times_s
+from ros_3d_bb.tracking.tracked import (
+    MOVING_SPEED, OCCLUDED, PREDICTION_STEP, PREDICTION_TIME, VISIBLE, TrackedObject, check_steps, prediction_times_s)
 
 
+@parameters('thesis')
 class ThesisTrackerParams(NamedTuple):
-    """`alpha` weighs the newest velocity, 0..1; `moving_speed` in m/s; the rest in seconds."""
+    """Parameters of the thesis' tracker."""
 
-    alpha: float = 0.2
-    disappearance_limit: float = 1.0
-    prediction_time: float = 2.0
-    prediction_step: float = 0.25
-    moving_speed: float = 0.2
+    alpha: float = Param(
+        0.2, 'Weight of the newest velocity in the average: higher reacts faster and is noisier. The default is that '
+        "of the thesis' package.", limits=(1e-6, 1), live=(0.01, 1))
+    disappearance_limit: float = Param(
+        1.0, "A track that is not matched for this long is deleted; 30 frames in the thesis' package.", 's',
+        live=(0, 10))
+    prediction_time: float = PREDICTION_TIME
+    prediction_step: float = PREDICTION_STEP
+    moving_speed: float = MOVING_SPEED
 
 
 class _Track(object):
@@ -63,7 +70,7 @@ class ThesisTracker(object):
 
     def tune(self, params):
         """Go on with other parameters and the same tracks. Raises ValueError as at the start, and changes nothing."""
-        _check(params)
+        check_steps(params.prediction_time, params.prediction_step)
         self._params = params
 
     def update(self, stamp_ns, detections, view=None):
@@ -129,12 +136,3 @@ class ThesisTracker(object):
             OCCLUDED if track.unseen_ns else VISIBLE, bool(np.linalg.norm(track.velocity_mps) >= params.moving_speed),
             track.first_seen_ns, track.last_seen_ns, track.position_m + times_s[:, None] * track.velocity_mps,
             params.prediction_step)
-
-
-def _check(params):
-    if not 0 < params.alpha <= 1:
-        raise ValueError('alpha is %g; more than 0 and at most 1 expected' % params.alpha)
-    for name in ('disappearance_limit', 'prediction_time', 'moving_speed'):
-        if not getattr(params, name) >= 0:
-            raise ValueError('%s is %g; 0 or more expected' % (name, getattr(params, name)))
-    check_steps(params.prediction_time, params.prediction_step)

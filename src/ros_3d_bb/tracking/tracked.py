@@ -5,11 +5,20 @@ import numpy as np
 
 from ros_3d_bb.body_layer import USUAL_HEIGHT_M, USUAL_WIDTH_M
 from ros_3d_bb.geometry import Camera, transform_points, upright_turns
+from ros_3d_bb.params import Param
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
 LARGEST_M, FARTHEST_M = 10.0, 1e8  # nobody is wider or taller, and no map is larger
 MOST_STEPS = 1000  # of a prediction; more only cost memory
 VERTICAL = 0.02  # horizontal part of the optical axis of a camera that looks straight up or down
+# Parameters of both trackers.
+_BOTH = 'both trackers'
+PREDICTION_TIME = Param(
+    2.0, 'How far ahead positions are predicted; 2 in the thesis.', 's', live=(0, 10), section=_BOTH)
+PREDICTION_STEP = Param(0.25, 'Time between predicted positions.', 's', live=(0.05, 1), section=_BOTH)
+MOVING_SPEED = Param(
+    0.2, 'A person counts as moving from this speed on. The kalman tracker then counts it as moving down to half of '
+    'it.', 'm/s', live=(0, 1), section=_BOTH)
 
 
 class Detection(NamedTuple):

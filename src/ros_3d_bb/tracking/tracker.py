@@ -10,40 +10,63 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.params import LARGEST, Param, parameters
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking import kalman
 from ros_3d_bb.tracking.association import associate, remaining
-from ros_3d_bb.tracking.measuring import NoiseParams, sightings_of
+from ros_3d_bb.tracking.measuring import BOX_ERRORS, NoiseParams, sightings_of
 from ros_3d_bb.tracking.out_of_sequence import Image, Matches, OutOfSequenceBuffer
 from ros_3d_bb.tracking.prediction import PredictionParams, objects_of
 from ros_3d_bb.tracking.track import TRACK, new_targets, update_matched
-from ros_3d_bb.tracking.tracked import OUT_OF_VIEW, VISIBLE, check_steps
+from ros_3d_bb.tracking.tracked import MOVING_SPEED, OUT_OF_VIEW, VISIBLE, check_steps
 from ros_3d_bb.tracking.unseen import SEEN, Look, carried, miss, others_of, sigma_of
 
 KNOWN_NS = 60 * NS  # a camera that sent nothing for longer, while others did, is a new one
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped
 TENTATIVE_TIMEOUT_S = 0.6  # how long a track that is not confirmed yet is kept without a detection
+# Sections of the parameters.
+MOTION, ASSOCIATION = 'kalman: how people move', 'kalman: association of boxes with tracks'
 
 
+@parameters('kalman: life of a track')
 class TrackerParams(NamedTuple):
-    """See config/tracker.yaml."""
+    """Parameters of the Kalman tracker."""
 
-    acceleration: float = 0.08
-    initial_speed: float = 0.8
-    outlier_share: float = 0.1
-    outlier_offset: float = 0.45
-    outlier_spread: float = 0.3
-    newcomer_density: float = 0.12
-    duplicate_distance: float = 0.35
-    height_sigma: float = 0.06
-    min_sightings: int = 4
-    min_age: float = 0.1
-    missed_limit: float = 0.35
-    out_of_view_limit: float = 1.0
-    unsure_limit: float = 0.5
-    memory: float = 4.0
-    max_range: float = 8.0
-    moving_speed: float = 0.2
+    acceleration: float = Param(
+        0.08, 'How much the velocity of a walking person varies: density of a white acceleration.', 'm²/s³',
+        live=(0, 2), section=MOTION)
+    initial_speed: float = Param(
+        0.8, 'Speed of a new target: standard deviation along each axis.', 'm/s', live=(0, 3), section=MOTION)
+    outlier_share: float = Param(
+        0.1, 'Share of boxes whose depth is partly that of the background.', limits=(0, 0.999), live=(0, 0.9),
+        section=BOX_ERRORS)
+    outlier_offset: float = Param(
+        0.45, 'How far behind the person their depth is: mean.', 'm', live=(0, 2), section=BOX_ERRORS)
+    outlier_spread: float = Param(
+        0.3, 'How far behind the person their depth is: standard deviation.', 'm', live=(0, 2), section=BOX_ERRORS)
+    newcomer_density: float = Param(
+        0.12, 'Density of new targets and false detections. A box that no track explains better than this starts a '
+        'new track.', '1/m²', limits=(1e-9, LARGEST), live=(0.001, 1), section=ASSOCIATION)
+    duplicate_distance: float = Param(
+        0.35, 'No track starts closer than this to a recently matched one.', 'm', live=(0, 1), section=ASSOCIATION)
+    height_sigma: float = Param(
+        0.06, "Standard deviation of the height of a person's boxes.", 'm', limits=(1e-6, LARGEST), live=(0.01, 0.5),
+        section=ASSOCIATION)
+    min_sightings: int = Param(4, 'A track is published after at least this many detections.', live=(1, 20))
+    min_age: float = Param(0.1, 'A track is published at this age at the earliest.', 's', live=(0, 2))
+    missed_limit: float = Param(
+        0.35, 'How long a track stays published while a camera should detect the person and does not.', 's',
+        live=(0, 5))
+    out_of_view_limit: float = Param(
+        1.0, 'How long a track stays published while the person is out of view of all cameras.', 's', live=(0, 10))
+    unsure_limit: float = Param(
+        0.5, 'A track stays published during occlusion up to this standard deviation of its position.', 'm',
+        live=(0, 2))
+    memory: float = Param(4.0, 'A person who reappears within this time keeps the track ID.', 's', live=(0, 30))
+    max_range: float = Param(
+        8.0, 'Range of the detector: people who are farther from the camera are not expected to be detected.', 'm',
+        live=(1, 20))
+    moving_speed: float = MOVING_SPEED
 
 
 class _State(NamedTuple):
@@ -75,8 +98,6 @@ class Tracker(object):
 
     def tune(self, params, noise, prediction):
         """Go on with other parameters and the same tracks. Raises ValueError as at the start, and changes nothing."""
-        for kind in (params, noise, prediction):
-            _check(kind)
         check_steps(prediction.prediction_time, prediction.prediction_step)
         self._params, self._noise, self._prediction = params, noise, prediction
         self._outliers = kalman.Outliers(params.outlier_share, params.outlier_offset, params.outlier_spread)
@@ -165,13 +186,3 @@ class Tracker(object):
         """Which tracks are kept, (n,); tentative ones only for a moment."""
         limit_s = np.where(tracks['confirmed'], self._params.memory, TENTATIVE_TIMEOUT_S)
         return (tracks['unseen_s'] < limit_s) & (sigma_of(tracks) < MAX_POSITION_STD_M)
-
-
-def _check(params):
-    for name, value in params._asdict().items():
-        if not 0 <= value < 1e6:
-            raise ValueError('%s is %g; 0 or more expected' % (name, value))
-        if name in ('newcomer_density', 'height_sigma') and not value > 0:
-            raise ValueError('%s is %g; more than 0 expected' % (name, value))
-        if name == 'outlier_share' and not value < 1:
-            raise ValueError('%s is %g; less than 1 expected' % (name, value))
