@@ -9,7 +9,7 @@ LATEST_NS = NS // 2  # images that are older than the newest by more are refused
 MOST_SKIPPED = 1000  # images without an answer that are remembered
 
 
-class Image(NamedTuple):
+class DetectedImage(NamedTuple):
     """The detections of one image, and what its camera saw."""
 
     stamp_ns: int

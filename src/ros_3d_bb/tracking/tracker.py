@@ -15,7 +15,7 @@ from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking import kalman
 from ros_3d_bb.tracking.association import associate, remaining
 from ros_3d_bb.tracking.measuring import BOX_ERRORS, NoiseParams, sightings_of
-from ros_3d_bb.tracking.out_of_sequence import Image, Matches, OutOfSequenceBuffer
+from ros_3d_bb.tracking.out_of_sequence import DetectedImage, Matches, OutOfSequenceBuffer
 from ros_3d_bb.tracking.prediction import PredictionParams, objects_of
 from ros_3d_bb.tracking.track import TRACK, new_targets, update_matched
 from ros_3d_bb.tracking.tracked import MOVING_SPEED, OUT_OF_VIEW, VISIBLE, check_steps
@@ -130,7 +130,7 @@ class Tracker(object):
         ValueError
             If the image comes too late, or a second time; nothing changes then.
         """
-        self._buffer.insert(Image(stamp_ns, tuple(detections), view))
+        self._buffer.insert(DetectedImage(stamp_ns, tuple(detections), view))
         return self.objects()
 
     def objects(self):
@@ -156,11 +156,11 @@ class Tracker(object):
         places = miss(tracks, state.tracks, missed, view, others, observed_s, params.max_range)
 
         kept = self._is_kept(tracks)
-        tracks, unmatched = tracks[kept], remaining(len(image.detections), columns)
+        tracks, unmatched_columns = tracks[kept], remaining(len(image.detections), columns)
         new = np.zeros(0, TRACK)
-        if len(unmatched):
-            new, started = new_targets(tracks, batch.taken(unmatched), stamp_ns, params)
-            new['id'] = [id_of(column) for column in unmatched[started].tolist()]
+        if len(unmatched_columns):
+            new, started = new_targets(tracks, batch.taken(unmatched_columns), stamp_ns, params)
+            new['id'] = [id_of(column) for column in unmatched_columns[started].tolist()]
             tracks = np.concatenate((tracks, new))
 
         looks = carried(others, kept, len(new))
