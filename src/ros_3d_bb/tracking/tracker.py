@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.stamped import MAX_RATE_HZ, NS
 from ros_3d_bb.tracking import kalman
 from ros_3d_bb.tracking.association import assign, remaining
 from ros_3d_bb.tracking.measuring import NoiseParams, sightings_of
@@ -24,6 +24,7 @@ TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4))
                   ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float), ('status', int),
                   ('confirmed', bool), ('moving', bool)])
 LATEST_NS = NS // 2  # images that come later than others by more are refused
+MOST_KEPT = LATEST_NS * MAX_RATE_HZ // NS  # images of one camera, to take late ones in
 KNOWN_NS = 60 * NS  # a camera that sent nothing for longer, while others did, is a new one
 MOST_SKIPPED = 1000  # where no camera has an answer; the newest ones count
 RECENT_NS = 7 * NS // 10  # who was seen so recently comes before those who were away
@@ -150,11 +151,15 @@ class Tracker(object):
         return objects_of(tracks[tracks['confirmed'] & known], self._prediction)
 
     def _check_stamp(self, stamp_ns, camera):
-        if any(image.stamp_ns == stamp_ns and image.view.camera == camera for _state, image in self._history):
+        stamps_ns = [image.stamp_ns for _state, image in self._history if image.view.camera == camera]
+        if stamp_ns in stamps_ns:
             raise ValueError('stamp %.9f of camera %r comes a second time' % (stamp_ns / NS, camera))
         if self._state.now_ns is not None and stamp_ns < self._state.now_ns - LATEST_NS:
             raise ValueError('stamp %.9f is %.3f s before the latest, more than %.1f s late'
                              % (stamp_ns / NS, (self._state.now_ns - stamp_ns) / NS, LATEST_NS / NS))
+        if len(stamps_ns) >= MOST_KEPT and stamp_ns <= stamps_ns[0] + LATEST_NS:
+            raise ValueError('stamp %.9f is within %.1f s of those of %d images of camera %r; its stamps stand still'
+                             % (stamp_ns / NS, LATEST_NS / NS, MOST_KEPT, camera))
 
     def _taken_back(self, stamp_ns, camera):
         """Undo the images after a stamp, and of the same one those of cameras with a later name; returns them, oldest
