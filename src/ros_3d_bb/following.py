@@ -224,8 +224,9 @@ class Follower(object):
         """Warn that boxes are not of the time of the camera that is right."""
         newest_ns = max(self._newest_ns.values(), default=stamp_ns)
         event = 'images ahead of other cameras' if stamp_ns > newest_ns else 'images of the time before'
-        self._tally.warn(event, 'boxes of %s at %.3f are left out: their stamp is %.3f s from that of the newest tracked '
-                         'image, and %s has the right time; such boxes are tracked if that camera follows or ends' % (camera, stamp_ns / NS, (stamp_ns - newest_ns) / NS, right))
+        self._tally.warn(event, 'boxes of %s at %.3f are left out: their stamp is %.3f s from the newest one, '
+                         'and %s has the right time; such boxes are tracked if that camera follows or ends'
+                         % (camera, stamp_ns / NS, (stamp_ns - newest_ns) / NS, right))
 
     def _check_frame(self, frame_id, camera):
         """Say so where two cameras have one frame: tf then takes them to be in one place."""

@@ -86,3 +86,11 @@ def test_each_image_of_a_healthy_camera_is_tracked_again(fault, ahead_ns, when, 
     play.run(4, count=0)
     for camera in play.cameras - {'rear'}:
         assert play.lost(camera, begun_ns + RECOVERY_NS) == 0 < len(play.answers)
+
+
+@pytest.mark.parametrize('fault,ahead_ns', [(stays_ahead, -6 * NS // 5), (stays_ahead, -3 * NS), (hangs, 0)])
+def test_a_camera_that_lags_or_hangs_ends_no_track_while_the_other_pauses(fault, ahead_ns):
+    play = Play('front', 'rear')
+    play.faults['rear'] = fault(play, ahead_ns)
+    play.run(3).run(1.5, {'rear'}, count=0).run(1)
+    assert play.lost('front') == 0 == play.transforms.jumps and play.ids == [1]
