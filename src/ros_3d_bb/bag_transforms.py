@@ -4,9 +4,7 @@ import collections
 import tf2_ros
 
 from ros_3d_bb.messages import check_transforms, transform_from_message
-from ros_3d_bb.stamped import NS
-
-JUMP_NS = NS  # transforms that go back by more are of a new time
+from ros_3d_bb.stamped import JUMP_NS
 
 
 class BagTransforms(object):

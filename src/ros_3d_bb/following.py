@@ -8,22 +8,20 @@ import numpy as np
 import tf2_ros
 from std_msgs.msg import Header
 
-from ros_3d_bb.camera_clocks import JUMP_NS, CameraClocks, RecentStamps
+from ros_3d_bb.camera_clocks import LONGEST_LAG_NS, CameraClocks
 from ros_3d_bb.images import depth_from
 from ros_3d_bb.messages import camera_from_message, detections_from_message, stamp_of, time_from, usable_boxes3d
 from ros_3d_bb.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
-from ros_3d_bb.stamped import NS, StampedCache
+from ros_3d_bb.stamped import JUMP_NS, NS, StampedCache
 from ros_3d_bb.tracking.measuring import NoiseParams
 from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.thesis import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.tracked import View
-from ros_3d_bb.tracking.out_of_sequence import LATEST_NS
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.visibility import depths_towards
 
 TRACKING_PARAMS = ThesisTrackerParams, TrackerParams, NoiseParams, PredictionParams
 TRACKERS = {'thesis': (ThesisTracker, slice(0, 1)), 'kalman': (Tracker, slice(1, 4))}  # with their part of those
-ON_THE_WAY_NS = 2 * NS  # so long after one cameras may send images of the time before; who goes on has another clock
 NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/\w+)*$')
 
 
@@ -54,14 +52,6 @@ class Located(NamedTuple):
     camera: str
     fixed_from_camera: np.ndarray
     jumps: int
-
-
-class _Jump(NamedTuple):
-    """How often time has gone back, and of the last time: the first stamp after it, and when that arrived."""
-
-    number: int = 0
-    stamp_ns: int = 0
-    arrival_ns: int = 0
 
 
 class Followed(NamedTuple):
@@ -98,9 +88,9 @@ class Follower(object):
         self._params, self._tally, self._transforms = params, tally, transforms
         self._tracker = _trackers_of(tracking)[params.tracker]
         self._images_lock, self._tracks_lock = threading.Lock(), threading.Lock()
-        self._clocks, self._recent = CameraClocks(), RecentStamps(LATEST_NS)
-        self._newest_ns = {}  # by camera, of the images that were taken
-        self._before_ns, self._jump = {}, _Jump()  # the newest before it, of cameras that may not have jumped yet
+        self._clocks = CameraClocks()
+        self._newest_ns = {}  # by camera, of the images that were tracked
+        self._jumps = 0  # how often time has gone back
         self._frames = {}  # by camera
         self._intrinsics = {}
         self._depths = {camera: StampedCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
@@ -137,8 +127,7 @@ class Follower(object):
         Returns
         -------
         Followed or None
-            None where there is no transform for it, where it is of the time before a jump back, or where its stamp
-            is ahead of those of other cameras.
+            None where there is no transform for it, or where its stamp is not of the time of the other cameras.
 
         Raises
         ------
@@ -159,15 +148,19 @@ class Follower(object):
         stamp_ns = stamp_of(message)
         frame_id = self._params.camera_frame or message.header.frame_id
         with self._tracks_lock:
-            if not self._is_of_this_time(stamp_ns, now_ns, camera):
+            right = self._clocks.accept(stamp_ns, now_ns, camera)
+            if right is not None:
+                self._leave_out(stamp_ns, camera, right)
                 return None
-            jumps = self._jump.number
+            if self._is_jump_back(stamp_ns, now_ns, camera):
+                self._go_back(stamp_ns)
+            jumps = self._jumps
         try:
             return Located(message, camera, self._transforms.lookup(self._params.target_frame, frame_id,
                                                                     message.header.stamp), jumps)
         except tf2_ros.TransformException as error:
             with self._tracks_lock:
-                if jumps == self._jump.number:
+                if jumps == self._jumps:
                     self._tracker.skip(stamp_ns, camera or message.header.frame_id)
             self._tally.warn('no transform', 'no transform from %s to %s at %.3f: %s; tracks are kept as they are'
                              % (frame_id, self._params.target_frame, stamp_ns / NS, error))
@@ -187,14 +180,18 @@ class Follower(object):
             self._check_frame(message.header.frame_id, camera)
         usable, faults = usable_boxes3d(message)
         self._tally.leave_out('3D boxes', faults)
+        if faults and not usable.boxes:  # not the same as an image without people
+            with self._tracks_lock:
+                self._tracker.skip(stamp_ns, camera or message.header.frame_id)
+            raise ValueError('none of their %d boxes can be used; tracks are kept as they are' % len(faults))
         detections = detections_from_message(usable, fixed_from_camera)
         with self._tracks_lock:
-            if jumps != self._jump.number:
-                self._leave_out(stamp_ns, camera)
+            if jumps != self._jumps:
+                self._tally.warn('images of the time before', 'boxes at %.3f are left out: time went back while their '
+                                 'transform was waited for' % (stamp_ns / NS))
                 return None
-            self._recent.check(stamp_ns, camera)
             tracks = self._tracker.update(stamp_ns, detections, self._view(stamp_ns, located))
-            self._recent.add(stamp_ns, camera)
+            self._clocks.track(camera)
             self._newest_ns[camera] = max(stamp_ns, self._newest_ns.get(camera, stamp_ns))
             newest_ns = max(self._newest_ns.values())
         self._tally.count('images tracked')
@@ -216,57 +213,28 @@ class Follower(object):
                     depth_at = functools.partial(depths_towards, camera, depth)
         return View(located.fixed_from_camera, camera, name, depth_at)
 
-    def _is_of_this_time(self, stamp_ns, now_ns, camera):
-        """Whether boxes are neither ahead of other cameras nor of the time before a jump back; where they are the first
-        after one, follow it.
-        """
-        other = self._clocks.accept(stamp_ns, now_ns, camera, is_trusted=camera in self._before_ns)
-        if other is not None:
-            self._tally.warn('images ahead of other cameras', 'boxes of %s at %.3f are left out: their stamp is more '
-                             'than %.0f s ahead of those of %s; such boxes are taken when that camera follows or ends'
-                             % (camera, stamp_ns / NS, JUMP_NS / NS, other))
-            return False
-        if self._is_jump_back(stamp_ns, now_ns, camera):
-            self._go_back(stamp_ns, now_ns, camera)
-        if camera not in self._before_ns:
-            return True
-        latest_ns = max(self._newest_ns.values(), default=self._jump.stamp_ns)
-        is_before = stamp_ns > max(self._before_ns[camera] - JUMP_NS, latest_ns + JUMP_NS)
-        if is_before and now_ns - self._jump.arrival_ns < ON_THE_WAY_NS:
-            self._leave_out(stamp_ns, camera)
-            return False
-        del self._before_ns[camera]
-        return True
-
     def _is_jump_back(self, stamp_ns, now_ns, camera):
-        """Whether the stamps of a camera went back, or only cameras that have ended are ahead of it."""
-        ahead = [other for other, newest_ns in self._newest_ns.items() if stamp_ns < newest_ns - JUMP_NS]
-        return camera in ahead or bool(ahead) and not any(self._clocks.is_alive(other, now_ns) for other in ahead)
+        """Whether time went back with an image that was accepted; not where a camera lags behind one that has ended."""
+        ahead = {other: newest_ns for other, newest_ns in self._newest_ns.items() if stamp_ns < newest_ns - JUMP_NS}
+        return (camera in ahead or any(self._clocks.is_tracked(other, now_ns) for other in ahead)
+                or stamp_ns < max(ahead.values(), default=stamp_ns) - LONGEST_LAG_NS)
 
-    def _go_back(self, stamp_ns, now_ns, camera):
-        """Forget tracks and transforms, as the stamps of a camera went back: a bag looped, or somebody sought in it.
-
-        Images of other cameras may still be on their way from the time before, unless they have ended.
-        """
+    def _go_back(self, stamp_ns):
+        """Forget tracks and transforms: a bag looped, or somebody sought in it."""
         self._tally.note('jumps back in time', 'time went back from %.3f to %.3f: tracks and transforms of the '
                          'time before are forgotten' % (max(self._newest_ns.values()) / NS, stamp_ns / NS))
         self._tracker.reset()
         self._transforms.go_back()
-        self._newest_ns.pop(camera, None)
-        for other, newest_ns in self._newest_ns.items():
-            if self._clocks.is_alive(other, now_ns):
-                self._before_ns[other] = newest_ns
-            else:
-                self._clocks.forget(other)
         self._newest_ns = {}
-        self._jump = _Jump(self._jump.number + 1, stamp_ns, now_ns)
+        self._jumps += 1
 
-    def _leave_out(self, stamp_ns, camera):
-        """Say that boxes are of the time before."""
-        self._tally.warn('images of the time before', 'boxes%s at %.3f are taken for those of the time before stamps '
-                         'went back to %.3f, and left out; after %.0f s such boxes are taken again'
-                         % (' of ' + camera if camera else '', stamp_ns / NS, self._jump.stamp_ns / NS,
-                            ON_THE_WAY_NS / NS))
+    def _leave_out(self, stamp_ns, camera, right):
+        """Warn that boxes are not of the time of the camera that is right."""
+        newest_ns = max(self._newest_ns.values(), default=stamp_ns)
+        event = 'images ahead of other cameras' if stamp_ns > newest_ns else 'images of the time before'
+        self._tally.warn(event, 'boxes of %s at %.3f are left out: their stamp is %.3f s from the newest one, '
+                         'and %s has the right time; such boxes are tracked if that camera follows or ends'
+                         % (camera, stamp_ns / NS, (stamp_ns - newest_ns) / NS, right))
 
     def _check_frame(self, frame_id, camera):
         """Say so where two cameras have one frame: tf then takes them to be in one place."""

@@ -5,7 +5,8 @@ from typing import Any, NamedTuple
 
 NS = 1000000000  # nanoseconds in a second
 MAX_WAITING = 100  # boxes that wait at once; more than any camera sends in a second
-MAX_RATE_HZ = 100  # by stamps; of a topic whose stamps are closer, a cache keeps the newest messages only
+MAX_RATE_HZ = 300  # by stamps; no camera is faster. Closer stamps stand still, and not all of their images are kept
+JUMP_NS = NS  # stamps that are earlier or later than expected by more show a jump in time
 
 
 def arrival_clock_ns():

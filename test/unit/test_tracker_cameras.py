@@ -9,6 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.geometry import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.stamped import NS
+from ros_3d_bb.tracking.out_of_sequence import LATEST_NS, MOST_KEPT
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
 from ros_3d_bb.tracking.tracker import Tracker
 
@@ -295,3 +296,15 @@ def test_whatever_comes_in_whatever_order_numbers_are_given_once(given_images):
                                  view)
         assert ids(objects) == sorted(set(ids(objects)))
         assert len(set(tracker._buffer.state.tracks['id'].tolist())) == len(tracker._buffer.state.tracks)
+
+
+def test_stamps_of_a_camera_that_hardly_advance_are_refused_until_they_do():
+    """All images of the last moment are kept, to take late ones in."""
+    tracker = Tracker()
+    for number in range(MOST_KEPT):
+        tracker.update(NS + number, [], FRONT)
+    for _again in range(2):
+        with pytest.raises(ValueError, match='%d images of camera' % MOST_KEPT):
+            tracker.update(NS + MOST_KEPT, [], FRONT)
+    tracker.update(NS, [], LEFT)
+    tracker.update(NS + LATEST_NS + 1, [], FRONT)

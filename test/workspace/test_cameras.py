@@ -85,7 +85,7 @@ def test_a_camera_that_a_bag_does_not_have_is_named(bags, tmp_path):
         process_bag(bags[0], str(tmp_path / 'out.bag'), with_tracker(BOTH, cameras=['front', 'rear']))
 
 
-def test_a_wrong_stamp_in_a_bag_keeps_the_other_camera_out_for_two_seconds_of_the_bag(bags, tmp_path):
+def test_a_stamp_of_the_past_in_a_bag_keeps_the_other_camera_out_of_nothing(bags, tmp_path):
     """The front camera ends with it, 0.7 s after the beginning."""
     path, last, left = str(tmp_path / 'in.bag'), None, []
     with rosbag.Bag(bags[0]) as bag, rosbag.Bag(path, 'w') as changed:
@@ -103,7 +103,7 @@ def test_a_wrong_stamp_in_a_bag_keeps_the_other_camera_out_for_two_seconds_of_th
     process_bag(path, str(tmp_path / 'out.bag'), BOTH)
     with rosbag.Bag(str(tmp_path / 'out.bag')) as bag:
         answered = [time for _topic, _message, time in bag.read_messages('/ros_3d_bb/tracks') if time > last]
-    assert answered and answered == [time for time in left if (time - last).to_sec() > 2]
+    assert answered and answered == [time for time in left if time > last]
 
 
 def test_a_stamp_of_the_future_in_a_bag_keeps_the_other_camera_out_of_nothing(bags, tmp_path):
@@ -169,8 +169,8 @@ def test_a_camera_that_is_far_behind_the_other_is_no_jump_in_time(rig):
     """By 1.5 s: its images are refused, and the tracks go on."""
     for number in range(30):
         followed = rig.send(START_NS + number * PERIOD_NS, 'front')
-        with pytest.raises(ValueError, match='late'):
-            rig.send(START_NS + (number - 15) * PERIOD_NS, 'rear')
+        assert rig.send(START_NS + (number - 15) * PERIOD_NS, 'rear') is None
+    assert rig.tally.counts['images of the time before'] == 30
     assert not rig.transforms.jumps and [track.id for track in followed.tracks] == [1]
 
 

@@ -4,59 +4,13 @@ import collections
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.camera_clocks import MOST_RECENT
-from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.messages import stamp_of
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.tally import Tally
-from support.two_cameras import START_NS, Transforms, boxes
+from ros_3d_bb.tracking.out_of_sequence import MOST_KEPT
+from support.two_cameras import PERIODS_NS, START_NS, Play
 
 HOUR_NS, MS = 3600 * NS, NS // 1000
-AHEAD, REFUSED, BACK = 'images ahead of other cameras', 'boxes refused', 'jumps back in time'
-PERIODS_NS = {'front': NS // 30, 'rear': NS // 25, 'left': NS // 10}
-
-
-class Play(object):
-    """Cameras that send boxes of somebody while time passes. `answers` are (now_ns, camera, Followed or None)."""
-
-    def __init__(self, *cameras):
-        self.tally, self.transforms, self.now_ns, self.answers = Tally(), Transforms(), 0, []
-        params = TrackerNodeParams(cameras=list(cameras) if len(cameras) > 1 else [])
-        self.follower = Follower(params, [kind() for kind in TRACKING_PARAMS], self.tally, self.transforms)
-        self.cameras, self.ahead_ns, self._due_ns = set(cameras), 0, {camera: 0 for camera in cameras}
-
-    def run(self, seconds, cameras=None, count=1, lags_ns=None):
-        """Let time pass. `lags_ns`: by camera, how long its boxes take."""
-        end_ns = self.now_ns + int(seconds * NS)
-        cameras = self.cameras if cameras is None else cameras
-        self._due_ns = {camera: max(due_ns, self.now_ns) for camera, due_ns in self._due_ns.items()}
-        while True:
-            camera = min(cameras, key=lambda name: (self._due_ns[name], name), default=None)
-            if camera is None or self._due_ns[camera] >= end_ns:
-                break
-            self.now_ns = self._due_ns[camera]
-            self._due_ns[camera] += PERIODS_NS[camera]
-            self.send(camera, -(lags_ns or {}).get(camera, 0), count)
-        self.now_ns = end_ns
-        return self
-
-    def send(self, camera, ahead_ns=0, count=1):
-        """One image; how far its stamp is ahead of what is right."""
-        message = boxes(START_NS + self.now_ns + self.ahead_ns + ahead_ns, camera, count)
-        followed = None
-        with self.tally.refusing('boxes'):
-            followed = self.follower.add_boxes(message, self.now_ns, camera if self.follower.cameras != ('',) else '')
-        self.answers.append((self.now_ns, camera, followed))
-        return followed
-
-    def lost(self, camera, since_ns=0):
-        """How many images of a camera had no answer."""
-        return sum(followed is None for now_ns, name, followed in self.answers if name == camera and now_ns >= since_ns)
-
-    @property
-    def ids(self):
-        """Of the tracks in the newest answer."""
-        return [track.id for track in [followed for _now_ns, _camera, followed in self.answers if followed][-1].tracks]
+AHEAD, BEFORE, BACK = 'images ahead of other cameras', 'images of the time before', 'jumps back in time'
 
 
 @pytest.fixture
@@ -127,8 +81,8 @@ def test_somebody_seeks_back_or_a_bag_loops(play, seconds):
     play.run(3, count=0)
     play.ahead_ns += seconds * NS
     play.run(3)
-    assert play.lost('front') + play.lost('rear') == 0
-    assert play.tally.counts[BACK] == 1 and AHEAD not in play.tally.counts
+    assert play.lost('front') + play.lost('rear') == play.tally.counts[BEFORE] == 1
+    assert play.tally.counts[BACK] == play.transforms.jumps == 1 and AHEAD not in play.tally.counts
 
 
 @pytest.mark.parametrize('seconds', [0.5, 1.5, 10])
@@ -201,17 +155,9 @@ def test_stamps_that_creep_are_refused_before_they_fill_the_memory():
     play = Play('front')
     for number in range(1000):
         play.send('front', ahead_ns=number)
-    assert play.tally.counts['images tracked'] == MOST_RECENT
-    buffer = play.follower._tracker._buffer
-    assert len(buffer._history) == MOST_RECENT and len(buffer._ids) <= MOST_RECENT
+    assert play.tally.counts['images tracked'] == MOST_KEPT
     play.run(2)
     assert play.lost('front', NS) == 0
-
-
-def test_frames_of_a_camera_that_change_all_the_time_are_not_kept(play):
-    for number in range(100):
-        play.follower.add_boxes(boxes(START_NS + number * PERIODS_NS['rear'], 'frame %d' % number), 0, 'rear')
-    assert len(play.follower._frames) == 1
 
 
 GLITCHES = st.tuples(st.floats(0.5, 8.0), st.sampled_from(sorted(PERIODS_NS)),
@@ -249,7 +195,7 @@ STEPS_NS = [0, 1, MS, NS // 30, NS // 30, 400 * MS, -NS // 30, -400 * MS, 2 * NS
 @settings(max_examples=15)
 @given(st.integers(1, 3), st.lists(st.tuples(st.sampled_from(sorted(PERIODS_NS)), st.sampled_from(STEPS_NS),
                                              st.sampled_from([0, MS, NS // 30, 2 * NS])), min_size=50, max_size=400))
-def test_what_is_kept_is_bounded_and_a_good_second_follows_whatever_the_stamps_were(number, images):
+def test_a_good_second_follows_whatever_the_stamps_were(number, images):
     cameras = sorted(PERIODS_NS)[:number]
     play, stamps_ns = Play(*cameras), collections.Counter({camera: 5 * HOUR_NS for camera in cameras})
     for camera, step_ns, passed_ns in images:
@@ -258,9 +204,6 @@ def test_what_is_kept_is_bounded_and_a_good_second_follows_whatever_the_stamps_w
         play.now_ns += passed_ns
         stamps_ns[camera] = max(NS, stamps_ns[camera] + step_ns)
         play.send(camera, stamps_ns[camera] - START_NS - play.now_ns, 1)
-        tracker = play.follower._tracker
-        buffer = tracker._buffer
-        assert len(buffer._history) <= number * MOST_RECENT and len(buffer._ids) <= 2 * number * MOST_RECENT
     play.run(3.5, set(cameras), 1)
     for camera in cameras:
         assert play.lost(camera, play.now_ns - NS) == 0

@@ -6,6 +6,7 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import TransformStamped
 from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.nodes import transforms as module
 from ros_3d_bb.nodes.transforms import Transforms
@@ -24,8 +25,8 @@ def transforms():
         yield made
 
 
-def link(parent, child):
-    made = TransformStamped(header=Header(frame_id=parent, stamp=STAMP), child_frame_id=child)
+def link(parent, child, stamp=STAMP):
+    made = TransformStamped(header=Header(frame_id=parent, stamp=stamp), child_frame_id=child)
     made.transform.rotation.w = 1.0
     return made
 
@@ -61,3 +62,20 @@ def test_while_one_camera_is_explained_transforms_are_taken_and_others_found(tra
         return 'gone', ''
     monkeypatch.setattr(module, 'why_missing', slow)
     assert why_not(transforms, 'front') == 'gone' and len(looked) == 1
+
+
+def test_a_transform_of_the_future_blocks_its_frame_for_two_lookups_whatever_else_is_found():
+    """Lookups of the front camera succeed meanwhile."""
+    with masterless() as connections:
+        transforms, missed = Transforms(wait_s=0.0), []
+        for number in range(50):
+            stamp = STAMP + rospy.Duration(number * 0.1)
+            if number == 20:
+                connections.send('/tf', TFMessage([link('map', 'rear', stamp + rospy.Duration(3600))]))
+            connections.send('/tf', TFMessage([link('map', camera, stamp) for camera in CAMERAS]))
+            for camera in CAMERAS:
+                try:
+                    transforms.lookup('map', camera, stamp)
+                except tf2_ros.TransformException:
+                    missed.append((number, camera))
+    assert missed == [(20, 'rear')]

@@ -15,12 +15,19 @@ ASKED_S = 10.0  # so long a pair of frames is shown after it was asked for
 
 
 class _Listener(tf2_ros.TransformListener):
-    """Takes transforms, and tells who waits for them. Calls `on_refused` where tf2 refuses one as too old."""
+    """Takes transforms, and notifies the threads that wait for them.
 
-    def __init__(self, buffer, on_refused):
+    `has_refused` becomes true where a transform is too old for tf2, beside the newest of its frame.
+    """
+
+    def __init__(self, buffer):
         self.news = threading.Condition()
-        self._on_refused, self._newest_s = on_refused, {}  # by child frame
+        self.clear()
         tf2_ros.TransformListener.__init__(self, buffer, tcp_nodelay=True)
+
+    def clear(self):
+        """The buffer was cleared."""
+        self.has_refused, self._newest_s = False, {}  # by child frame
 
     def callback(self, data):
         """Of /tf."""
@@ -28,9 +35,8 @@ class _Listener(tf2_ros.TransformListener):
             return
         for transform in data.transforms:
             stamp_s, child = transform.header.stamp.to_sec(), transform.child_frame_id
-            if stamp_s < self._newest_s.get(child, stamp_s) - CACHE_S:
-                self._on_refused()
-            self._newest_s[child] = stamp_s
+            newest_s = self._newest_s[child] = max(stamp_s, self._newest_s.get(child, stamp_s))
+            self.has_refused |= stamp_s < newest_s - CACHE_S
         tf2_ros.TransformListener.callback(self, data)
         self._tell()
 
@@ -62,7 +68,7 @@ class Transforms(object):
         self._wait_s = wait_s
         self._buffer = tf2_ros.Buffer(debug=False)
         self._from_before = False
-        self._listener = _Listener(self._buffer, self.go_back)
+        self._listener = _Listener(self._buffer)
         self._asked, self._explanations = {}, {}  # by (target, source): when; (sentence, when)
 
     def lookup(self, target_frame, source_frame, stamp):
@@ -97,8 +103,8 @@ class Transforms(object):
                 self._listener.news.wait(min(left_s, LONGEST_WAIT_S))
 
     def go_back(self):
-        """Time went back: transforms of the time before, or a single one of the future, may keep new ones out of the
-        buffer. It is cleared when the next lookup fails.
+        """Time went back: transforms of the time before may keep new ones out of the buffer. It is cleared if the next
+        lookup fails.
 
         Where /clock tells the time, tf2 forgets them by itself, and clearing now would lose the new ones.
         """
@@ -134,6 +140,7 @@ class Transforms(object):
         return recent[asked][0]
 
     def _forget_time_before(self):
-        if self._from_before:
+        if self._from_before or self._listener.has_refused:
             self._buffer.clear()
+            self._listener.clear()
             self._from_before = False

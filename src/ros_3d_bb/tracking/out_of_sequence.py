@@ -2,10 +2,11 @@
 import collections
 from typing import NamedTuple
 
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.stamped import MAX_RATE_HZ, NS
 from ros_3d_bb.tracking.tracked import View
 
 LATEST_NS = NS // 2  # images that are older than the newest by more are refused
+MOST_KEPT = LATEST_NS * MAX_RATE_HZ // NS  # images of one camera
 MOST_SKIPPED = 1000  # images without an answer that are remembered
 
 
@@ -69,11 +70,15 @@ class OutOfSequenceBuffer(object):
 
     def _check(self, image):
         stamp_ns, now_ns = image.stamp_ns, self.state.now_ns
-        if any(other.order == image.order for _state, other in self._history):
+        stamps_ns = [other.stamp_ns for _state, other in self._history if other.view.camera == image.view.camera]
+        if stamp_ns in stamps_ns:
             raise ValueError('stamp %.9f of camera %r comes a second time' % (stamp_ns / NS, image.view.camera))
         if now_ns is not None and stamp_ns < now_ns - LATEST_NS:
             raise ValueError('stamp %.9f is %.3f s before the latest, more than %.1f s late'
                              % (stamp_ns / NS, (now_ns - stamp_ns) / NS, LATEST_NS / NS))
+        if len(stamps_ns) >= MOST_KEPT and stamp_ns <= stamps_ns[0] + LATEST_NS:
+            raise ValueError('stamp %.9f is within %.1f s of those of %d images of camera %r; its stamps stand still'
+                             % (stamp_ns / NS, LATEST_NS / NS, MOST_KEPT, image.view.camera))
 
     def _rewind(self, order):
         """Go back to the state before the images that come after `order`; returns those, oldest first."""
