@@ -122,10 +122,12 @@ def test_a_box_that_cannot_be_used_takes_no_other_with_it(follower, tally):
     assert '3D boxes refused' not in tally.counts
 
 
-def test_an_image_all_of_whose_boxes_are_left_out_is_one_without_people(follower, tally):
-    """The track goes on without a detection, as it does where the detector finds nothing."""
+def test_an_image_none_of_whose_boxes_can_be_used_does_not_age_tracks(follower, tally):
+    """It does not say that there are no people. The track is still published after a second of such images."""
     stamp_ns, before = stand(follower)
-    after = follower.add_boxes(boxes(stamp_ns + NS // 30, z=float('nan')), 0)
-    assert after.header.stamp == time_from(stamp_ns + NS // 30)
-    assert [(track.id, track.last_seen_ns) for track in after.tracks] == [(before.tracks[0].id, stamp_ns)]
-    assert tally.counts['3D boxes left out'] == 1
+    for number in range(1, 31):
+        with pytest.raises(ValueError, match='none'):
+            follower.add_boxes(boxes(stamp_ns + number * NS // 30, z=float('nan')), 0)
+    after = follower.add_boxes(boxes(stamp_ns + 31 * NS // 30), 0)
+    assert [track.id for track in after.tracks] == [before.tracks[0].id]
+    assert tally.counts['3D boxes left out'] == 30
