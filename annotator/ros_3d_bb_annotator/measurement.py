@@ -2,7 +2,7 @@
 import os
 from typing import NamedTuple, Optional, Tuple
 
-from ros_3d_bb.measurements import Detection, SessionError, frame_of, refusing
+from ros_3d_bb.measurements import Detection, SessionError, frame_of, session_errors
 
 NEW, ANNOTATED, REJECTED = 'new', 'annotated', 'rejected'
 # The depth of the old form, which is stretched: under this name nobody takes it for distances.
@@ -77,7 +77,7 @@ def measurement_of(folder, entry, files):
     if isinstance(entry, dict) and entry.get('unreadable'):
         return _broken(entry, str(entry['unreadable']))
     try:
-        with refusing('frames.json'):
+        with session_errors('frames.json'):
             frame = frame_of(folder, _with_depth(entry))
     except SessionError as error:
         return _broken(entry, str(error))

@@ -4,10 +4,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.overlay import colors_of, visible_depth
+from ros_3d_bb.overlay import colorize_depth, depth_to_grey
 from ros_3d_bb_annotator.qt import QtGui
 
-KEPT = 7  # measurements: the one looked at and its neighbours
+CACHE_SIZE = 7  # measurements: the one looked at and its neighbours
 FARTHEST_PERCENT = 90  # beyond is the end of the room; it may all be blue
 RANGES_M = (1, 2, 3, 4, 6, 8, 10, 15, 20, 40)
 
@@ -28,37 +28,37 @@ class PictureCache(object):
     """The pictures of the measurements of a document, the last few kept."""
 
     def __init__(self, document):
-        self._document, self._kept = document, collections.OrderedDict()
+        self._document, self._cache = document, collections.OrderedDict()
 
     def of(self, number):
         """The Pictures of a measurement."""
-        if number in self._kept:
-            self._kept.move_to_end(number)
+        if number in self._cache:
+            self._cache.move_to_end(number)
         else:
-            self._kept[number] = self._read(number)
-        while len(self._kept) > KEPT:
-            self._kept.popitem(last=False)
-        return self._kept[number]
+            self._cache[number] = self._read(number)
+        while len(self._cache) > CACHE_SIZE:
+            self._cache.popitem(last=False)
+        return self._cache[number]
 
     def read_ahead(self, number):
         """Read the pictures of a measurement, where they are not there. Returns whether they were not."""
-        if number in self._kept:
+        if number in self._cache:
             return False
         self.of(number)
         return True
 
     def forget(self):
         """Read everything again; the files may have changed."""
-        self._kept.clear()
+        self._cache.clear()
 
     def _read(self, number):
-        color, color_problem = _tried(self._document.color, number)
+        color, color_problem = _read_or_error(self._document.color, number)
         if self._document.is_old_form:
-            depth, (picture, depth_problem) = None, _tried(self._document.stretched_depth, number)
-            shown = None if picture is None else grey_picture(picture)
+            depth, (picture, depth_problem) = None, _read_or_error(self._document.stretched_depth, number)
+            shown = None if picture is None else grey_image(picture)
         else:
-            depth, depth_problem = _tried(self._document.depth, number)
-            shown = None if depth is None else colors_of(visible_depth(depth, farthest_of(depth)))
+            depth, depth_problem = _read_or_error(self._document.depth, number)
+            shown = None if depth is None else colorize_depth(depth_to_grey(depth, farthest_of(depth)))
         return Pictures(None if color is None else image_of(color), color_problem,
                         None if shown is None else image_of(shown), depth_problem,
                         depth, 0.0 if depth is None else farthest_of(depth))
@@ -74,7 +74,7 @@ def farthest_of(depth):
     return next((range_m for range_m in RANGES_M if range_m >= far_m), RANGES_M[-1])
 
 
-def grey_picture(values):
+def grey_image(values):
     """A picture (height, width), uint8 or uint16, in no unit, as (height, width, 3), uint8, RGB."""
     grey = values if values.dtype == np.uint8 else (values // 256).astype(np.uint8)
     return np.repeat(grey[..., None], 3, axis=2)
@@ -83,7 +83,7 @@ def grey_picture(values):
 def depth_scale():
     """The colours of depth from far (top) to near (bottom), a QImage."""
     grey = np.linspace(1, 255, 255).astype(np.uint8)[:, None]
-    return image_of(colors_of(grey))
+    return image_of(colorize_depth(grey))
 
 
 def image_of(rgb):
@@ -93,7 +93,7 @@ def image_of(rgb):
     return QtGui.QImage(rgb.data, width, height, 3 * width, QtGui.QImage.Format_RGB888).copy()
 
 
-def _tried(read, number):
+def _read_or_error(read, number):
     try:
         return read(number), ''
     except (ValueError, OSError) as error:
