@@ -35,7 +35,7 @@ class Document(object):
         Metres per unit of depth.
     grid : tuple of Mark
     is_old_form : bool
-        Whether the session has the old format of the thesis, whose depth is stretched and does not permit new estimates.
+        Whether the session has the old format of the thesis, whose stretched depth does not permit new estimates.
     notes : tuple of str
         Messages to the user on data that cannot be recovered.
     """
@@ -88,7 +88,7 @@ class Document(object):
         return read_depth(self._usable(index), self._session)
 
     def stretched_depth(self, index):
-        """Read the depth image (height, width) of a measurement in the old format, without unit. Raises SessionError."""
+        """Read the unitless depth image (height, width) of a measurement in the old format. Raises SessionError."""
         return legacy.read_stretched(self._usable(index).depth_path)
 
     def estimated(self, index, box_px):
