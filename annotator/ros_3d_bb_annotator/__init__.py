@@ -1,1 +1,1 @@
-"""The annotator: ground truth for measurement sessions. Needs no ROS; only the windows need Qt."""
+"""Annotator of ground truth in measurement sessions. Works without ROS; only the windows need Qt."""

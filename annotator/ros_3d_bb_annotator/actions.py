@@ -1,12 +1,13 @@
-"""All that the window can do, with its keys: the menus, and the overview of them."""
+"""Actions of the window with their keyboard shortcuts: menus, and the overview of keys."""
 from typing import NamedTuple, Tuple
 
 from ros_3d_bb_annotator.qt import QtGui, QtWidgets
 
 
 class Action(NamedTuple):
-    """`name` is the method of the window that does it, `keys` its shortcuts, `checked` what it starts as, None where
-    it is nothing to be switched on and off."""
+    """Menu entry: `name` of the method that it calls, `text`, and shortcuts `keys`. `checked` is the initial state of a
+    checkable action, and None otherwise.
+    """
 
     name: str
     text: str
@@ -75,7 +76,7 @@ OTHER_KEYS = (
 
 
 def build_menus(window):
-    """Fill the menu bar of a window; returns {name: QAction}."""
+    """Fill the menu bar of a window. Returns {name: QAction}."""
     actions = {}
     for title, entries in MENUS:
         menu = window.menuBar().addMenu(title)
@@ -95,7 +96,7 @@ def build_menus(window):
 
 
 def keys_dialog(parent):
-    """The overview of all keys, a dialog."""
+    """Create a dialog with the overview of keys."""
     dialog = QtWidgets.QDialog(parent)
     dialog.setWindowTitle('Keys')
     dialog.resize(620, 640)
@@ -110,7 +111,7 @@ def keys_dialog(parent):
 
 
 def overview():
-    """The overview of all keys as HTML, made of what the menus hold."""
+    """Overview of keys as HTML, generated from the menus."""
     sections = [(title.replace('&', ''), [(', '.join(entry.keys), entry.text.replace('&', '').rstrip('…'))
                                           for entry in entries if entry != LINE])
                 for title, entries in MENUS] + list(OTHER_KEYS)

@@ -1,4 +1,4 @@
-"""The noise analysis of a session, its figures and error model in a folder beside it. Needs scipy and matplotlib."""
+"""Noise analysis of a session. The figures and the error model are written to a folder. Needs scipy and matplotlib."""
 import os
 import pathlib
 from typing import NamedTuple, Tuple
@@ -17,8 +17,8 @@ RECORDED = 'recorded'
 
 
 class Analysed(NamedTuple):
-    """Where the results are, and what they are: `text` has the mean error and the spread of both axes, `no_model` says
-    why there is no cross-validated error model, empty where there is one.
+    """Results of an analysis. `text` contains mean error and spread of both axes. `no_model` is the reason why there is
+    no cross-validated error model, or empty.
     """
 
     folder: str
@@ -29,16 +29,16 @@ class Analysed(NamedTuple):
 
 
 def analyse(document, folder=None, estimator=None):
-    """Analyse the errors of a document's annotated measurements, and write report, figures and error model.
+    """Analyse the errors of the annotated measurements of a document. Writes report, figures and error model.
 
     Parameters
     ----------
     document : Document
     folder : str, optional
-        Where to write; `analysis` in the session where not given.
+        Folder for the results; by default `analysis` in the folder of the session.
     estimator : str, optional
-        'foreground', 'median', or 'recorded' for the stored estimates. The default is that of bbox3d_node; of the old
-        form, whose depth is lost, 'recorded'.
+        'foreground', 'median', or 'recorded' for the stored estimates. The default is that of bbox3d_node, or
+        'recorded' for the old format, which has no depth.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def analyse(document, folder=None, estimator=None):
     Raises
     ------
     ValueError
-        If there is too little to analyse, or an image cannot be read.
+        If there are too few measurements, or an image cannot be read.
     OSError
         If the results cannot be written.
     """
@@ -64,7 +64,7 @@ def analyse(document, folder=None, estimator=None):
 
 
 def _recorded(document, estimator):
-    """The stored estimates of a document of the old form; nobody knows who is cut by the edge of the image."""
+    """Stored estimates of a document of the old format, which does not tell which people are truncated."""
     if estimator != RECORDED:
         raise TableError('%s: its depth is lost, so only the recorded estimates can be analysed, not those of %r'
                          % (document.folder, estimator))

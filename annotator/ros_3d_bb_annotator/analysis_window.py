@@ -1,4 +1,4 @@
-"""The figures of the noise analysis, in a window."""
+"""Window with the figures of the noise analysis."""
 import os
 
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets
@@ -11,7 +11,7 @@ TITLES = {
 
 
 class FigureArea(QtWidgets.QScrollArea):
-    """Shows a picture as wide as there is room, at most as wide as it is."""
+    """Shows an image, scaled down to the available width if necessary."""
 
     def __init__(self, parent=None):
         super(FigureArea, self).__init__(parent)
@@ -23,7 +23,7 @@ class FigureArea(QtWidgets.QScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarAlwaysOff)
 
     def show_picture(self, path):
-        """Show the picture in a file."""
+        """Show the image of a file."""
         self._full = QtGui.QPixmap(path)
         self._fit()
 

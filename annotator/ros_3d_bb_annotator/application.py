@@ -1,4 +1,4 @@
-"""The annotator as a program with a window."""
+"""Annotator application with a window."""
 import signal
 import sys
 
@@ -9,17 +9,17 @@ WAKE_MS = 250
 
 
 def make_application():
-    """The QApplication of this process, made where there is none."""
+    """Return the QApplication of this process. It is created if there is none."""
     application = QtWidgets.QApplication.instance()
     if application is None:
         application = QtWidgets.QApplication(sys.argv[:1])
         application.setApplicationName('ros_3d_bb annotator')
-        application.setStyle('Fusion')  # the same everywhere
+        application.setStyle('Fusion')  # same appearance on all platforms
     return application
 
 
 def run_window(folder=None):
-    """Show the window, with the session in `folder` where one is given, until it is closed.
+    """Show the window, optionally with the session in `folder`, until it is closed.
 
     Returns
     -------
@@ -28,7 +28,7 @@ def run_window(folder=None):
     """
     application = make_application()
     signal.signal(signal.SIGINT, lambda _number, _frame: application.closeAllWindows())
-    wake = QtCore.QTimer(interval=WAKE_MS)  # Python sees signals only between its own instructions
+    wake = QtCore.QTimer(interval=WAKE_MS)  # Python handles signals only while it executes bytecode
     wake.timeout.connect(lambda: None)
     wake.start()
     window = AnnotatorWindow()

@@ -8,7 +8,7 @@ from ros_3d_bb_annotator.validation import leftovers_of, problems_of
 
 
 def main(arguments=None):
-    """The command `annotator`. Returns the exit status: 1 where something is wrong with the session."""
+    """Run the command `annotator`. Returns the exit status, 1 if the session cannot be used or has problems."""
     arguments = _arguments(arguments)
     if not (arguments.export or arguments.analyse or arguments.validate):
         return _show(arguments.session)
@@ -32,8 +32,8 @@ def _show(folder):
     try:
         from ros_3d_bb_annotator.application import run_window  # scripts need no Qt
     except ImportError as error:
-        print('annotator: the window cannot be opened (%s); install PyQt5, or see annotator --help for what works '
-              'without it' % error, file=sys.stderr)
+        print('annotator: the window cannot be opened (%s); install PyQt5, or see annotator --help for commands that '
+              'work without it' % error, file=sys.stderr)
         return 1
     return run_window(folder)
 
@@ -54,8 +54,8 @@ def _validate(document):
         count += 1
     leftovers = leftovers_of(document)
     if leftovers:
-        print('annotator: note: no measurement names %s; a program that was killed may have left that, and where none '
-              'runs it can be deleted' % ', '.join(leftovers), file=sys.stderr)
+        print('annotator: note: no measurement refers to %s; these files may be left from a killed program, and can be '
+              'deleted if no program uses the session' % ', '.join(leftovers), file=sys.stderr)
     done, total = document.progress
     found = '%d problem%s' % (count, '' if count == 1 else 's') if count else 'nothing wrong'
     print('%s: %d measurements, %d annotated or rejected, %s' % (document.folder, total, done, found))
@@ -64,17 +64,17 @@ def _validate(document):
 
 def _arguments(arguments):
     parser = argparse.ArgumentParser(prog='annotator', description=__doc__)
-    parser.add_argument('session', nargs='?', metavar='SESSION', help="folder of a measurement session, also of the "
-                        "thesis' old form")
+    parser.add_argument('session', nargs='?', metavar='SESSION', help="folder of a measurement session; the old "
+                        "format of the thesis is supported")
     actions = parser.add_mutually_exclusive_group()
-    actions.add_argument('--export', metavar='FILE.csv', help="write the annotated measurements as a table of the "
-                         "thesis' form, millimetres")
+    actions.add_argument('--export', metavar='FILE.csv', help='write the annotated measurements as a table in '
+                         'the format of the thesis, in millimetres')
     actions.add_argument('--analyse', action='store_true', help='noise analysis: report, figures and error model')
-    actions.add_argument('--validate', action='store_true', help='list what is wrong with the session; exit with 1 if '
-                         'anything is')
-    parser.add_argument('--out', metavar='DIR', help='where --analyse writes (default: SESSION/analysis)')
-    parser.add_argument('--estimator', choices=('foreground', 'median', 'recorded'), help='what --analyse takes: '
-                        'estimates made anew, or those stored (default: foreground; of the old form recorded)')
+    actions.add_argument('--validate', action='store_true', help='list the problems of the session; exit with 1 if '
+                         'there are any')
+    parser.add_argument('--out', metavar='DIR', help='output folder of --analyse (default: SESSION/analysis)')
+    parser.add_argument('--estimator', choices=('foreground', 'median', 'recorded'), help='input of --analyse: new '
+                        'estimates, or the recorded ones (default: foreground; recorded for the old format)')
     parsed = parser.parse_args(arguments)
     if (parsed.export or parsed.analyse or parsed.validate) and not parsed.session:
         parser.error('a SESSION expected')

@@ -1,4 +1,4 @@
-"""Questions and messages in windows of their own."""
+"""Dialogs with questions and messages."""
 from ros_3d_bb_annotator.marks_dialog import MarksDialog
 from ros_3d_bb_annotator.qt import QtWidgets
 
@@ -6,7 +6,7 @@ REASONS = ('', 'not on the mark', 'person cut by the border', 'person hidden', '
 
 
 def show_error(parent, what, error):
-    """Say what did not work, and why."""
+    """Show an error message: what failed, and why."""
     box = QtWidgets.QMessageBox(QtWidgets.QMessageBox.Critical, what, '<b>%s</b>' % what,
                                 QtWidgets.QMessageBox.Ok, parent)
     box.setInformativeText(str(error))
@@ -21,6 +21,6 @@ def ask_reason(parent, name):
 
 
 def ask_marks(parent, marks):
-    """The marks on the floor as edited, None where that was called off."""
+    """Let the user edit the marks on the floor. Returns the new marks, or None if the dialog is cancelled."""
     dialog = MarksDialog(marks, parent)
     return dialog.marks if dialog.exec_() == QtWidgets.QDialog.Accepted else None

@@ -1,4 +1,4 @@
-"""What was typed but not yet entered, kept in a file beside the session, so that a crash does not lose it."""
+"""Text that was typed but not entered. It is saved in a file in the session's folder, so that it survives a crash."""
 import contextlib
 import json
 import os
@@ -9,20 +9,18 @@ FILE_NAME = '.annotator_draft.json'
 
 
 class Drafts(object):
-    """The drafts of a session: for the id of a measurement, its fields and their text. The file is there as long as
-    there are any.
-    """
+    """Drafts of a session: the text of each field by ID of the measurement. The file exists while there are drafts."""
 
     def __init__(self, folder):
         self._path = os.path.join(folder, FILE_NAME)
         self._fields = _read(self._path)
 
     def of(self, name):
-        """The fields {name: text} of a measurement; empty where there are none."""
+        """Draft of a measurement, {name of a field: text}; {} if there is none."""
         return dict(self._fields.get(name, {}))
 
     def set(self, name, fields):
-        """Keep the fields of a measurement; none, or only empty ones, remove its draft. Raises OSError."""
+        """Save the draft of a measurement. If all fields are empty, the draft is removed. Raises OSError."""
         fields = {key: text for key, text in fields.items() if text}
         if fields == self._fields.get(name, {}):
             return
@@ -37,7 +35,7 @@ class Drafts(object):
 
 
 def _read(path):
-    """The drafts of a file; none where it cannot be read, as there is nothing to be saved in it then."""
+    """Read the drafts in a file; {} if it cannot be read."""
     try:
         with open(path, encoding='utf-8') as stream:
             content = json.load(stream)

@@ -1,4 +1,4 @@
-"""Edits of frames.json: what changes in an entry, and what takes the change back. Lengths there are millimetres."""
+"""Edits of entries of frames.json, and their inverses. Lengths in the file are in millimetres."""
 import copy
 from typing import Any, Dict, NamedTuple, Optional
 
@@ -8,12 +8,12 @@ from ros_3d_bb.measurements import SessionError
 from ros_3d_bb.recording import box_entry
 from ros_3d_bb_annotator.measurement import Mark
 
-DIGITS = 3  # micrometres: no rounding that anybody sees, and no 1229.9999999999998
+DIGITS = 3  # micrometres: negligible rounding that avoids values such as 1229.9999999999998
 
 
 class Edit(NamedTuple):
-    """New values of fields, None for those to be removed, in the entry number `index` with the id `id`; in the
-    description itself where `index` is None.
+    """New values of fields, None to remove a field. The edit applies to the entry `index` with the ID `id`, or to the
+    description itself if `index` is None.
     """
 
     index: Optional[int]
@@ -22,7 +22,7 @@ class Edit(NamedTuple):
 
 
 def entry_at(frames, edit):
-    """The entry that an edit means, which another program may have moved. Raises SessionError where it is gone."""
+    """Entry of an edit, which another program may have moved. Raises SessionError if it was removed."""
     for entry in frames[edit.index:edit.index + 1] + frames:
         if isinstance(entry, dict) and str(entry.get('id', '')) == edit.id:
             return entry
@@ -30,7 +30,7 @@ def entry_at(frames, edit):
 
 
 def changed(entry, edit):
-    """Change an entry in place; returns the edit that undoes it."""
+    """Apply an edit to an entry in place. Returns the inverse edit."""
     before = {key: copy.deepcopy(entry.get(key)) for key in edit.changes}
     for key, value in edit.changes.items():
         if value is None:
@@ -41,7 +41,7 @@ def changed(entry, edit):
 
 
 def detections_with(entry, box_px, box):
-    """The detections of an entry, and one more with a box drawn by hand and its estimate (Box3D or None)."""
+    """Detections of an entry, with an additional box drawn by hand and its estimate (Box3D or None)."""
     detections = [dict(detection) for detection in entry.get('detections') or ()]
     if not detections:
         recorded = {'box': entry.get('box'), 'estimate_mm': entry.get('estimate_mm', entry.get('original_mm'))}
@@ -51,8 +51,8 @@ def detections_with(entry, box_px, box):
 
 
 def changes_with_estimate(entry, number, box):
-    """The changes that give the detection of a number in an entry its estimate, a Box3D."""
-    if not entry.get('detections'):  # its only box is in the entry itself
+    """Changes that add the estimate, a Box3D, to a detection of an entry."""
+    if not entry.get('detections'):  # the fields of the only detection are in the entry
         return {'estimate_mm': box_entry(box)['estimate_mm']}
     detections = [dict(detection) for detection in entry['detections']]
     detections[number].update(box_entry(box))
@@ -60,21 +60,21 @@ def changes_with_estimate(entry, number, box):
 
 
 def grid_of(content):
-    """The marks of a description. Raises KeyError, TypeError or ValueError."""
+    """Marks of a description. Raises KeyError, TypeError or ValueError."""
     marks = [Mark(str(entry['name']), float(entry['x']) / 1000, float(entry['z']) / 1000)
              for entry in content.get('grid', ())]
     for mark in marks:
         if not np.isfinite(mark[1:]).all():
-            raise ValueError('mark %s of the grid has no finite position' % mark.name)
+            raise ValueError('mark %s of the grid is at (%g, %g) m; finite numbers expected' % mark)
     return tuple(marks)
 
 
 def grid_entry(mark):
-    """A mark as it is stored."""
+    """Mark in the format of the file."""
     return {'name': mark.name, 'x': millimetres(mark.x_m), 'z': millimetres(mark.z_m)}
 
 
 def millimetres(value_m):
-    """Metres as a number of millimetres for the file, an int where it is whole."""
+    """Convert metres to millimetres for the file; int if the value is an integer."""
     value_mm = round(1000 * float(value_m), DIGITS)
     return int(value_mm) if value_mm == int(value_mm) else value_mm

@@ -1,4 +1,4 @@
-"""The table of a session in the form of the thesis' author: whole millimetres, error is measured minus true."""
+"""Table of a session in the format of the thesis: integer millimetres, errors are measured minus true values."""
 import csv
 import io
 import os
@@ -11,17 +11,17 @@ COLUMNS = ('X measured', 'X true', 'Z measured', 'Z true', 'X error', 'X absolut
 
 
 def rows_of(document):
-    """The rows of the annotated measurements with an estimate, ints in millimetres, sorted by what was measured.
+    """Rows of the annotated measurements with an estimate, ints in millimetres, sorted by the measured values.
 
-    Rejected measurements are left out. The author's own table has each row only once, as it was made of a dictionary;
-    here equal measurements are as many rows as they are.
+    Rejected measurements are excluded. Equal measurements give equal rows, which the table of the thesis contains only
+    once.
     """
     return sorted(_row(measurement) for measurement in document.measurements
                   if measurement.state == ANNOTATED and measurement.estimate_m is not None)
 
 
 def export(document, path):
-    """Write the table as CSV; the file holds all of it, or what it held before.
+    """Write the table to a CSV file atomically.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The floor in front of the camera from above, with its marks (thesis Fig. 5.1): click one to set the truth."""
+"""Top view of the floor in front of the camera with its marks (thesis Fig. 5.1). A click on a mark sets the truth."""
 import math
 from typing import Any, NamedTuple, Optional, Tuple
 
@@ -11,14 +11,15 @@ GROUND, LINES, CAMERA, TEXT = (QtGui.QColor(*color) for color in (
 SIGHT, MARK, POINTED = QtGui.QColor(60, 120, 200, 22), QtGui.QColor(245, 150, 40), QtGui.QColor(70, 170, 240)
 TRUTH, ESTIMATE = QtGui.QColor(30, 140, 60), QtGui.QColor(200, 30, 60)
 MARGIN_PX, REACH_PX = 22, 16
-MARK_PX, NAME_PX = (4, 8), (9, 13)  # least and most: radius of a mark, height of its name
+MARK_PX, NAME_PX = (4, 8), (9, 13)  # minimum and maximum: radius of a mark, height of its name
 STEPS_M = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 ARROWS = {Qt.Key_Left: (-1, 0), Qt.Key_Right: (1, 0), Qt.Key_Up: (0, 1), Qt.Key_Down: (0, -1)}
 
 
 class FloorScene(NamedTuple):
-    """What is on the floor: `marks` (see `measurement.Mark`), the (x, z) in metres of truth and estimate, None where
-    there is none, and the tangents of the camera's field of view to the left and to the right."""
+    """Content of the floor: `marks` (see `measurement.Mark`), the positions (x, z) of truth and estimate in metres or
+    None, and the tangents of the left and right limits of the camera's field of view.
+    """
 
     marks: Tuple[Any, ...]
     truth_m: Optional[Tuple[float, float]]
@@ -30,9 +31,9 @@ EMPTY = FloorScene((), None, None, (0.0, 0.0))
 
 
 class GridView(QtWidgets.QWidget):
-    """The floor. `mark_chosen` gives the Mark that was clicked, or that the keyboard took.
+    """Top view of the floor. `mark_chosen` is emitted with a Mark that is selected by mouse or keyboard.
 
-    Arrows go from mark to mark, Enter or Space takes it.
+    Arrow keys move between marks; Enter and Space select a mark.
     """
 
     mark_chosen = Signal(object)
@@ -56,21 +57,21 @@ class GridView(QtWidgets.QWidget):
         self.update()
 
     def place_of(self, x_m, z_m):
-        """Where a point of the floor is in this widget, QPointF."""
+        """Position (QPointF) of a point of the floor in this widget."""
         left_m, right_m, far_m = self._extent()
         scale = min((self.width() - 2 * MARGIN_PX) / (right_m - left_m), (self.height() - 2 * MARGIN_PX) / far_m)
         return QtCore.QPointF(self.width() / 2 + (x_m - (left_m + right_m) / 2) * scale,
                               self.height() - MARGIN_PX - z_m * scale)
 
     def _apart_px(self):
-        """How far apart the nearest two marks are on the screen; many pixels where there are not two."""
+        """Minimum distance between marks on the screen; 1000 if there are fewer than two marks."""
         places = np.array([(place.x(), place.y()) for place in (
             self.place_of(mark.x_m, mark.z_m) for mark in self._scene.marks)]).reshape(-1, 2)
         apart = np.hypot(*np.moveaxis(places[:, None] - places[None], -1, 0))
         return float(apart[apart > 0].min()) if (apart > 0).any() else 1000.0
 
     def _extent(self):
-        """Left, right and far end of the floor to be shown, metres: whole steps around all that is on it."""
+        """Left, right and far limit of the visible floor in metres, with a margin around its content."""
         points = [(mark.x_m, mark.z_m) for mark in self._scene.marks]
         points += [point for point in (self._scene.truth_m, self._scene.estimate_m) if point is not None]
         side_m = max([0.75] + [abs(x_m) + 0.25 for x_m, _z_m in points])
@@ -98,7 +99,7 @@ class GridView(QtWidgets.QWidget):
     def _paint_floor(self, painter):
         left_m, right_m, far_m = self._extent()
         _set_height(painter, NAME_PX[1])
-        far_m *= 1.5  # the lines go on behind the farthest mark
+        far_m *= 1.5  # lines extend beyond the farthest mark
         step_m = next((step for step in STEPS_M if max(right_m - left_m, far_m) / step <= 9), STEPS_M[-1])
         for number in range(math.ceil(4 * left_m / step_m), math.floor(4 * right_m / step_m) + 1):
             self._paint_line(painter, (number * step_m, 0), (number * step_m, far_m))
@@ -179,14 +180,14 @@ class GridView(QtWidgets.QWidget):
         self.update()
 
     def _mark_at(self, position):
-        """The mark nearest to a place in this widget, None where none is near."""
+        """Mark nearest to a position in this widget, or None if there is none within REACH_PX."""
         ways = [((self.place_of(mark.x_m, mark.z_m) - position).manhattanLength(), number)
                 for number, mark in enumerate(self._scene.marks)]
         distance, number = min(ways) if ways else (REACH_PX + 1, 0)
         return self._scene.marks[number] if distance <= REACH_PX else None
 
     def _next_mark(self, way):
-        """The mark to go to from the one pointed at, by an arrow (right, ahead): near, and not far to the side."""
+        """Next mark in the direction of an arrow key (right, ahead). Lateral distance counts three times."""
         if self._pointed is None:
             return min(self._scene.marks, key=lambda mark: (mark.z_m, abs(mark.x_m)))
         best, here = (float('inf'), self._pointed), self._pointed

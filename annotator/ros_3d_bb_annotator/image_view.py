@@ -1,19 +1,19 @@
-"""A view of an image with boxes, samples and a cursor; several are linked by one SharedView."""
+"""View of an image with boxes, samples and a cursor. Several views are linked by a SharedView."""
 from ros_3d_bb_annotator import marking
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
 BACKGROUND = QtGui.QColor(38, 40, 44)
 WHEEL_STEP = 1.2
 CURSOR_STEP_PX, PAN_STEP_PX = 10, 40
-CLICK_PX = 4  # on the screen: a press that moves less is a click
+CLICK_PX = 4  # maximum movement of a click on the screen
 ARROWS = {Qt.Key_Left: (-1, 0), Qt.Key_Right: (1, 0), Qt.Key_Up: (0, -1), Qt.Key_Down: (0, 1)}
 
 
 class ImageView(QtWidgets.QWidget):
-    """One image: `image` is it, or None, and `message` says why. `box_chosen` gives the number of a box clicked.
+    """View of one image. If `image` is None, `message` is the reason. `box_chosen` is emitted with the index of a box.
 
-    Wheel: zoom; drag: move; click: choose the box; Shift and drag, or drag while drawing: draw a box. Arrows move the
-    cursor by 10 pixels (Ctrl: 1), Shift and arrows what is shown, Space sets the corners of a box, Escape drops it.
+    Wheel: zoom; drag: pan; click: select a box; Shift and drag, or drag while drawing: draw a box. Arrow keys move the
+    cursor by 10 pixels (Ctrl: 1), Shift and arrow keys pan, Space sets the corners of a box, Escape cancels it.
     """
 
     box_chosen = Signal(int)
@@ -33,20 +33,20 @@ class ImageView(QtWidgets.QWidget):
         return QtCore.QSize(640, 480)
 
     def show_image(self, image, scene, message='', legend=None):
-        """Show a QImage with what is marked in it (`marking.Scene`), or None and why there is no image.
+        """Show a QImage and its overlay (`marking.Scene`), or a message if the image is None.
 
-        `legend` is (QImage, text at its top, text at its bottom) of a scale of colours, or None.
+        `legend` is the colour scale (QImage, text at the top, text at the bottom), or None.
         """
         self.image, self.message, self._scene, self._legend = image, message, scene, legend
         self.update()
 
     def show_scene(self, scene):
-        """Change what is marked in the image."""
+        """Change the overlay."""
         self._scene = scene
         self.update()
 
     def to_image(self, position):
-        """The point (x, y) of the image at a position (QPointF) of this widget. Inverse of `transform`."""
+        """Convert a position (QPointF) in this widget to image coordinates (x, y). Inverse of `transform`."""
         inverse, _ok = self.transform().inverted()
         point = inverse.map(position)
         return point.x(), point.y()
@@ -136,6 +136,6 @@ class ImageView(QtWidgets.QWidget):
         return tuple(int(value // 1) for value in self.to_image(event.localPos()))
 
     def _point_near(self, event):
-        """The cursor at the mouse, or at the border of the image where the mouse is outside of it."""
+        """Move the cursor to the mouse position, clipped to the image."""
         self._shared.point_at(*(min(max(value, 0), size - 1)
                                 for value, size in zip(self._pixel(event), self._shared.size)))

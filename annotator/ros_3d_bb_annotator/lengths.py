@@ -1,4 +1,4 @@
-"""Lengths as people type them."""
+"""Parser of lengths with units."""
 import re
 
 from ros_3d_bb.estimation import FARTHEST_M
@@ -7,29 +7,29 @@ METRES = {'m': 1.0, 'cm': 0.01, 'mm': 0.001}
 
 
 def parse_length(text, unit):
-    """Metres of a length such as '1230', '1230 mm', '1.23 m' or '1,23'.
+    """Parse a length such as '1230', '1230 mm', '1.23 m' or '1,23'. Returns metres.
 
     Parameters
     ----------
     text : str
         With a decimal point or comma.
     unit : str
-        'mm', 'cm' or 'm': meant where the text names none.
+        Default unit: 'mm', 'cm' or 'm'.
 
     Raises
     ------
     ValueError
-        If it is no length, could be meant in two ways, or is farther than any depth camera sees.
+        If the text is not a length, is ambiguous, or exceeds the range of depth cameras.
     """
     match = re.match(r'\s*([+\-\u2212]?)(\d+(?:[.,]\d*)?|[.,]\d+)\s*(mm|cm|m)?\s*$', text, re.ASCII)
     if match is None:
-        raise ValueError('%.40r is not a length; one such as 1230, 1230 mm or 1.23 m expected' % text)
+        raise ValueError('%.40r is not a length; a length such as 1230, 1230 mm or 1.23 m expected' % text)
     sign, number, unit = match.group(1), match.group(2), match.group(3) or unit
     if unit == 'mm' and re.match(r'[1-9]\d{0,2},[0-9]{3}$', number):
         raise ValueError('%.40r could be %s mm or %s mm; write it without the comma'
                          % (text, number.replace(',', ''), number.replace(',', '.')))
     metres = float(number.replace(',', '.')) * METRES[unit]
     if metres > FARTHEST_M:
-        raise ValueError('%.40r is %g m; at most %g m expected. Is it meant in millimetres?'
+        raise ValueError('%.40r is %g m; at most %g m expected. Check the unit'
                          % (text, metres, FARTHEST_M))
     return round(-metres if sign in ('-', '\u2212') else metres, 6) + 0.0  # no -0.0

@@ -1,4 +1,4 @@
-"""The window: the list of measurements, what is shown of one, and all that can be done with it."""
+"""Main window: list of measurements, view of the current measurement, and actions."""
 import functools
 
 from ros_3d_bb_annotator import dialogs
@@ -17,7 +17,7 @@ NEIGHBOURS = (1, -1)
 
 
 class AnnotatorWindow(QtWidgets.QMainWindow):
-    """The annotator's main window; `actions` are its QActions by the name of the method that they call."""
+    """Main window of the annotator. `actions` are its QActions by the name of the method that they call."""
 
     def __init__(self, parent=None):
         super(AnnotatorWindow, self).__init__(parent)
@@ -31,11 +31,11 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self._ahead = QtCore.QTimer(self, singleShot=True, interval=0)
         self._ahead.timeout.connect(self._read_ahead)
         self._refresh = QtCore.QTimer(self, interval=REFRESH_MS)
-        self._refresh.timeout.connect(self._take_in)
+        self._refresh.timeout.connect(self._refresh_document)
         self._show_state()
 
     def handler(self, name):
-        """What the action of a name does: a method of the window, of its edits or of its view."""
+        """Method that an action calls: a method of the window, of its edits or of its view."""
         if name.startswith('choose_'):
             return functools.partial(self.edits.choose_person, int(name.split('_')[1]) - 1)
         return next(getattr(owner, name) for owner in (self, self.edits, self.pane.shared) if hasattr(owner, name))
@@ -49,7 +49,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
             self.open_session(folder)
 
     def open_session(self, folder):
-        """Open the session in a folder, or say in a message why not. Returns whether it is open."""
+        """Open the session in a folder, or show an error message. Returns whether it is open."""
         self.keep_typed()
         try:
             document = Document.open(folder)
@@ -63,39 +63,39 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.setWindowTitle('%s – %s' % (document.folder, TITLE))
         self._show_state()
         if document.measurements:
-            self.show_measurement(self._new_after(-1) or 0)
+            self.show_measurement(self._next_new(-1) or 0)
             self.pane.truth.begin()
         self._refresh.start()
         return True
 
     def reload(self):
-        """Take in what other programs did to the session, and read images again."""
+        """Read changes of the session by other programs, and reload the images."""
         if self.document is not None:
             self.pane.read_again()
             self._refresh.start()
-            self._take_in()
+            self._refresh_document()
             if self.current is not None:
                 self.keep_typed()
                 self.show_measurement(self.current)
 
-    def _take_in(self):
-        """Show what other programs did to the session."""
+    def _refresh_document(self):
+        """Show changes of the session by other programs."""
         before = self.document.measurements
         try:
             if not self.document.refresh():
                 return
         except (ValueError, OSError) as error:
-            self._refresh.stop()  # one message, not one every two seconds; reload looks again
+            self._refresh.stop()  # one message instead of one every two seconds; reload restarts it
             dialogs.show_error(self, 'The session has changed and cannot be read', error)
             return
         count = len(self.document.measurements)
         changed = self.current is None or self.current >= count or (
             self.document.measurements[self.current] is not before[self.current])
         if self.current is not None and self.current >= count:
-            self.current = None  # somebody took it out of the session
+            self.current = None  # another program removed the measurement
         self.after_edit()
         if changed and count:
-            self.show_measurement(self._new_after(-1) or 0 if self.current is None else self.current)
+            self.show_measurement(self._next_new(-1) or 0 if self.current is None else self.current)
 
     def ask_export(self):
         """Ask for a file and write the table of errors to it."""
@@ -108,10 +108,10 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
             self.keep_typed()
             self.results.analyse(self.document)
 
-    # --- going from one measurement to another
+    # --- navigation
 
     def show_measurement(self, number):
-        """Show a measurement; what was typed for the one before is kept."""
+        """Show a measurement. The text typed for the previous one is saved."""
         changed = number != self.current
         if changed:
             self.keep_typed()
@@ -129,7 +129,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
             self._go_to(self.current + 1)
 
     def previous(self):
-        """Show the measurement before."""
+        """Show the previous measurement."""
         if self.current is not None:
             self._go_to(self.current - 1)
 
@@ -145,51 +145,51 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         """Show the next measurement that is neither annotated nor rejected."""
         if self.document is None:
             return
-        number = self._new_after(-1 if self.current is None else self.current)
+        number = self._next_new(-1 if self.current is None else self.current)
         if number is None:
-            self.statusBar().showMessage('Nothing is new any more: %d of %d are done' % self.document.progress)
+            self.statusBar().showMessage('No new measurements: %d of %d are done' % self.document.progress)
         else:
             self._go_to(number)
 
     def go_to_list(self):
-        """Give the keyboard to the list."""
+        """Set the keyboard focus to the list."""
         self.list.table.setFocus()
 
     def go_to_image(self):
-        """Give the keyboard to the colour image."""
+        """Set the keyboard focus to the colour image."""
         self.pane.color_view.setFocus()
 
     def go_to_truth(self):
-        """Give the keyboard to the fields of the truth."""
+        """Set the keyboard focus to the fields of the truth."""
         self.pane.truth.begin()
 
     def go_to_floor(self):
-        """Give the keyboard to the floor."""
+        """Set the keyboard focus to the floor."""
         self.pane.floor.setFocus()
 
     def start_drawing(self):
-        """Let a box be drawn, by dragging or by cursor and Space; once more: do not."""
+        """Start to draw a box by dragging or by cursor and Space, or stop it."""
         if self.current is not None:
             self.pane.shared.start_drawing(not self.pane.shared.drawing)
             self.pane.color_view.setFocus()
 
     def switch_unit(self):
-        """Millimetres instead of metres, or metres instead of millimetres."""
+        """Switch between millimetres and metres."""
         self.pane.truth.switch_unit()
 
     def show_keys(self):
         """Show the overview of all keys."""
         keys_dialog(self).exec_()
 
-    # --- what the parts do
+    # --- calls by the parts of the window
 
     def keep_typed(self):
-        """Keep what is typed for the measurement that is shown, now."""
+        """Save the text that was typed for the current measurement."""
         if self.current is not None:
             self.pane.truth.flush()
 
     def after_edit(self):
-        """Show what the document holds now."""
+        """Update the window from the document."""
         self.list.update_rows()
         self._show_state()
 
@@ -203,14 +203,14 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         if self.document is not None and 0 <= number < len(self.document.measurements):
             self.show_measurement(number)
 
-    def _new_after(self, number):
-        """The next measurement that is new, from the start again after the last one; None where none is."""
+    def _next_new(self, number):
+        """Index of the next new measurement, continuing at the start after the last one; None if there is none."""
         measurements = self.document.measurements
         order = list(range(number + 1, len(measurements))) + list(range(number + 1))
         return next((place for place in order if measurements[place].state == NEW), None)
 
     def _read_ahead(self):
-        """Read the images beside those that are shown, one measurement each time that nothing else is to be done."""
+        """Read the images of neighbouring measurements, one measurement per idle event."""
         for step in NEIGHBOURS:
             number = self.current + step
             if 0 <= number < len(self.document.measurements) and self.pane.read_ahead(number):

@@ -1,4 +1,4 @@
-"""Paint what is marked in an image: boxes, samples, cursor, caption. Boxes and pixels are in image coordinates."""
+"""Painting of overlays: boxes, samples, cursor, caption. Boxes and pixels are in image coordinates."""
 from typing import Any, NamedTuple, Optional, Tuple
 
 import numpy as np
@@ -13,7 +13,7 @@ SAMPLE_PX, SAMPLES_APART_PX = 3, 9  # on the screen
 
 
 class MarkedBox(NamedTuple):
-    """The box (x1, y1, x2, y2) of detection `number`, with its label; `by_hand` where somebody drew it."""
+    """Box (x1, y1, x2, y2) of the detection `number` with its label. `by_hand`: a user drew it."""
 
     number: int
     rect_px: Tuple[int, int, int, int]
@@ -22,8 +22,7 @@ class MarkedBox(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """What is marked in an image: boxes, the number of the one that is the person's or None, and the samples of each
-    box whose samples are shown, estimation.Samples.
+    """Overlay of an image: boxes, the index of the person's box or None, and the visible samples (estimation.Samples).
     """
 
     boxes: Tuple[MarkedBox, ...]
@@ -31,7 +30,7 @@ class Scene(NamedTuple):
     samples: Tuple[Any, ...]
 
     def box_at(self, x, y):
-        """The number of the smallest box that holds a point of the image; None where there is none."""
+        """Index of the smallest box that contains a point of the image, or None."""
         inside = [((x2 - x1) * (y2 - y1), number) for number, (x1, y1, x2, y2), _label, _by_hand in self.boxes
                   if x1 <= x < x2 and y1 <= y < y2]
         return min(inside)[1] if inside else None
@@ -54,7 +53,7 @@ def paint_scene(painter, transform, scene):
 
 
 def paint_cursor(painter, transform, shared):
-    """Paint the cross-hair of a SharedView, and the box being drawn."""
+    """Paint the crosshair of a SharedView, and the box that is being drawn."""
     band = shared.rubber_band()
     if band is not None:
         _paint_box(painter, transform, band, DRAWN, (2, Qt.SolidLine))
@@ -69,7 +68,7 @@ def paint_cursor(painter, transform, shared):
 
 
 def paint_frame(painter, rect, name, legend, focused):
-    """Paint the name of the view, its scale of colours, and a frame where it has the keyboard."""
+    """Paint the name of the view, its colour scale, and a frame if it has the keyboard focus."""
     _paint_label(painter, QtCore.QPointF(rect.left(), rect.bottom() + 1), name, CAPTION)  # labels of boxes are on top
     if legend is not None:
         scale, top, bottom = legend
@@ -86,7 +85,7 @@ def paint_frame(painter, rect, name, legend, focused):
 
 
 def paint_message(painter, rect, message):
-    """Paint why there is no image."""
+    """Paint a message instead of an image."""
     painter.setPen(Qt.white)
     option = QtGui.QTextOption(Qt.AlignCenter)
     option.setWrapMode(QtGui.QTextOption.WrapAtWordBoundaryOrAnywhere)  # paths have no spaces
@@ -94,7 +93,7 @@ def paint_message(painter, rect, message):
 
 
 def _paint_samples(painter, transform, samples):
-    """Paint the samples of a box: all of them where they are far enough apart on the screen, else each n-th."""
+    """Paint the samples of a box, or every n-th if they are too close to each other on the screen."""
     shown = _thinned(samples.rows, transform.m11()), _thinned(samples.columns, transform.m11())
     pixels, valid = samples.pixels[shown], samples.valid[shown]
     for kind, color in ((valid, VALID_COLOR), (~valid, INVALID_COLOR)):
@@ -104,7 +103,7 @@ def _paint_samples(painter, transform, samples):
 
 
 def _thinned(ticks, scale):
-    """Which ticks (n,) of a grid to show, a slice, so that they are `SAMPLES_APART_PX` apart on the screen."""
+    """Slice of the ticks (n,) of a grid that are at least `SAMPLES_APART_PX` apart on the screen."""
     if ticks.size < 2:
         return slice(None)
     every = int(np.ceil(SAMPLES_APART_PX / ((ticks[1] - ticks[0]) * scale)))
@@ -122,7 +121,7 @@ def _paint_box(painter, transform, box_px, color, stroke):
 
 
 def _paint_label(painter, corner, text, color, inside=False, ends=False):
-    """A text on a filled ground: above its lower left corner, or `inside` a view below its upper left corner.
+    """Paint text on a filled background above the lower left corner, or with `inside` below the upper left corner.
 
     With `ends` the corner is the right one.
     """

@@ -1,4 +1,4 @@
-"""Edit the marks on the floor."""
+"""Dialog to edit the marks on the floor."""
 from ros_3d_bb_annotator.measurement import Mark
 from ros_3d_bb_annotator.qt import QtCore, QtWidgets
 
@@ -6,7 +6,7 @@ HEADER = ('name', 'X [mm]', 'Z [mm]')
 
 
 class MarksDialog(QtWidgets.QDialog):
-    """A table of marks, in millimetres; `marks` are those that were accepted."""
+    """Table of marks in millimetres. `marks` are the accepted ones."""
 
     def __init__(self, marks, parent=None):
         super(MarksDialog, self).__init__(parent)
@@ -42,18 +42,18 @@ class MarksDialog(QtWidgets.QDialog):
         return row
 
     def add_empty(self):
-        """Add a row and go on with it."""
+        """Add a row and select it."""
         self._add(('', '', ''))
         self.table.setCurrentCell(self.table.rowCount() - 1, 0)
         self.table.setFocus()
 
     def remove_current(self):
-        """Remove the row that the cursor is in."""
+        """Remove the selected row."""
         if self.table.currentRow() >= 0:
             self.table.removeRow(self.table.currentRow())
 
     def accept(self):
-        """Close if every row is a mark; else say which is not."""
+        """Close the dialog if every row is a mark. Otherwise name the invalid row."""
         try:
             self.marks = self._read()
         except ValueError as error:
@@ -68,7 +68,7 @@ class MarksDialog(QtWidgets.QDialog):
             self.table.setItem(row, column, QtWidgets.QTableWidgetItem(text))
 
     def _read(self):
-        """The rows as marks, empty ones left out. Raises ValueError."""
+        """Convert the rows to marks without empty rows. Raises ValueError."""
         marks = []
         for row in range(self.table.rowCount()):
             name, x_mm, z_mm = (self.table.item(row, column).text().strip() for column in range(len(HEADER)))
@@ -81,7 +81,7 @@ class MarksDialog(QtWidgets.QDialog):
 
 
 def _metres(text, where):
-    value_mm, understood = QtCore.QLocale.c().toDouble(text)
-    if not understood:
+    value_mm, is_number = QtCore.QLocale.c().toDouble(text)
+    if not is_number:
         raise ValueError('%s: %r is not a length in millimetres' % (where, text))
     return value_mm / 1000

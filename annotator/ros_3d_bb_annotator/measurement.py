@@ -1,16 +1,16 @@
-"""What the annotator shows of one measurement."""
+"""One measurement in the annotator."""
 import os
 from typing import NamedTuple, Optional, Tuple
 
-from ros_3d_bb.measurements import Detection, SessionError, frame_of, refusing
+from ros_3d_bb.measurements import Detection, SessionError, frame_of, session_errors
 
 NEW, ANNOTATED, REJECTED = 'new', 'annotated', 'rejected'
-# The depth of the old form, which is stretched: under this name nobody takes it for distances.
+# Field of the stretched depth of the old format. Its name differs from that of depth in metric units.
 STRETCHED_DEPTH = 'stretched_depth'
 
 
 class Mark(NamedTuple):
-    """A marked position on the floor, metres right of and in front of the camera (its optical X and Z)."""
+    """Marked position on the floor in the camera's optical frame: X to the right, Z forward, in metres."""
 
     name: str
     x_m: float
@@ -18,9 +18,9 @@ class Mark(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """One measurement. `person` is the number of the detection whose truth is given, None where nobody was detected;
-    `truth_m` is (x, y, z) in the optical frame, y None where not given; `rejected` the reason; `problem` says what is
-    wrong with it, None where nothing is. `stamp_text` is '<secs>.<nsecs>' or empty.
+    """One measurement. `person` is the index of the detection that the truth belongs to, or None without detections;
+    `truth_m` is (x, y, z) in the optical frame, where y may be None; `rejected` is the reason for rejection or None;
+    `problem` is the fault of an invalid measurement or None. `stamp_text` is '<secs>.<nsecs>' or empty.
     """
 
     id: str
@@ -43,12 +43,12 @@ class Measurement(NamedTuple):
 
     @property
     def estimate_m(self):
-        """The stored position (3,) of the person, or None."""
+        """Stored position (3,) of the person, or None."""
         return None if self.person is None else self.detections[self.person].estimate_m
 
 
 class FileNames(object):
-    """Which files there are, by one look into each folder."""
+    """Set of existing files, which lists each folder once."""
 
     def __init__(self):
         self._names = {}
@@ -64,28 +64,28 @@ class FileNames(object):
 
 
 def measurement_of(folder, entry, files):
-    """The Measurement of an entry of frames.json; one that cannot be understood has a `problem`.
+    """Measurement of an entry of frames.json. An invalid entry gives a measurement with a `problem`.
 
     Parameters
     ----------
     folder : str
-        Of the session.
+        Folder of the session.
     entry : object
-        Of "frames", whatever it is.
+        Any entry of "frames".
     files : FileNames
     """
     if isinstance(entry, dict) and entry.get('unreadable'):
         return _broken(entry, str(entry['unreadable']))
     try:
-        with refusing('frames.json'):
+        with session_errors('frames.json'):
             frame = frame_of(folder, _with_depth(entry))
     except SessionError as error:
         return _broken(entry, str(error))
-    lost = [os.path.relpath(path, folder) for path in (frame.color_path, frame.depth_path) if path not in files]
+    missing = [os.path.relpath(path, folder) for path in (frame.color_path, frame.depth_path) if path not in files]
     truth_m = None if frame.truth_m is None else (float(frame.truth_m[0]), frame.truth_y_m, float(frame.truth_m[1]))
     return Measurement(frame.id, frame.color_path, frame.depth_path, str(entry.get('stamp') or ''), frame.label,
                        frame.detections, frame.person if frame.detections else None, truth_m, frame.rejected,
-                       'there is no file %s' % ' and no file '.join(lost) if lost else None)
+                       'there is no file %s' % ' and no file '.join(missing) if missing else None)
 
 
 def _with_depth(entry):

@@ -1,4 +1,4 @@
-"""The list of measurements with their states, as Qt's model and a view that filters it."""
+"""List of measurements with their states: a Qt model, and a view with a filter."""
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
 COLUMNS = ('measurement', 'state', 'error')
@@ -9,7 +9,7 @@ STATES = ('new', 'annotated', 'rejected')
 
 
 class MeasurementModel(QtCore.QAbstractTableModel):
-    """The measurements of a document, a row each; nothing is computed before it is shown."""
+    """Model with one row per measurement of a document. Cells are computed when they are shown."""
 
     def __init__(self, parent=None):
         super(MeasurementModel, self).__init__(parent)
@@ -22,7 +22,7 @@ class MeasurementModel(QtCore.QAbstractTableModel):
         self.endResetModel()
 
     def update_rows(self):
-        """Show what the document holds now."""
+        """Update the rows from the document."""
         if len(self._document.measurements) != self._count:
             self.show_document(self._document)
         elif self._count:
@@ -61,18 +61,18 @@ class MeasurementModel(QtCore.QAbstractTableModel):
 
 
 class StateFilter(QtCore.QSortFilterProxyModel):
-    """Of the measurements those in one state, or all."""
+    """Filter of measurements by state."""
 
     def __init__(self, parent=None):
         super(StateFilter, self).__init__(parent)
         self._state, self._states = None, ()
 
     def show_states(self, states):
-        """Say the states of all measurements, before the model tells of a change."""
+        """Set the states of all measurements. Call it before the model emits a change."""
         self._states = states
 
     def show_only(self, state):
-        """Show one state only; None: all."""
+        """Show measurements in one state, or all for None."""
         self._state = state
         self.invalidateFilter()
 
@@ -81,7 +81,7 @@ class StateFilter(QtCore.QSortFilterProxyModel):
 
 
 class MeasurementList(QtWidgets.QWidget):
-    """The list and its filter. `chosen` gives the number of the measurement that somebody goes to."""
+    """List with a filter. `chosen` is emitted with the index of the measurement that the user selects."""
 
     chosen = Signal(int)
 
@@ -109,13 +109,13 @@ class MeasurementList(QtWidgets.QWidget):
         self._name_counts()
 
     def update_rows(self):
-        """Show what became of the measurements."""
+        """Update the list from the document."""
         self._filter.show_states([measurement.state for measurement in self._document.measurements])
         self._model.update_rows()
         self._name_counts()
 
     def mark_current(self, number):
-        """Show which measurement is looked at; does not emit `chosen`."""
+        """Select the current measurement without emitting `chosen`."""
         index = self._filter.mapFromSource(self._model.index(number, 0))
         self._marking = True
         if index.isValid():
@@ -132,9 +132,9 @@ class MeasurementList(QtWidgets.QWidget):
         table.setTabKeyNavigation(False)
         table.setShowGrid(False)
         table.setWordWrap(False)
-        table.setTextElideMode(Qt.ElideMiddle)  # names made of times differ at their end
+        table.setTextElideMode(Qt.ElideMiddle)  # names that contain times differ at the end
         table.verticalHeader().hide()
-        table.verticalHeader().setSectionResizeMode(QtWidgets.QHeaderView.Fixed)  # sizes no row before it is seen
+        table.verticalHeader().setSectionResizeMode(QtWidgets.QHeaderView.Fixed)  # no sizes of invisible rows
         table.verticalHeader().setDefaultSectionSize(table.fontMetrics().height() + 6)
         table.horizontalHeader().setSectionResizeMode(0, QtWidgets.QHeaderView.Stretch)
         for column, text in ((1, 'annotated'), (2, '00000 mm')):

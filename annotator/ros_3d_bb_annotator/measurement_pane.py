@@ -1,4 +1,4 @@
-"""All that is shown of one measurement: its images, the people in it, its truth and its place on the floor."""
+"""View of one measurement: images, people, truth, and position on the floor."""
 from ros_3d_bb_annotator.grid_view import FloorScene, GridView
 from ros_3d_bb_annotator.image_view import ImageView
 from ros_3d_bb_annotator.pictures import PictureCache, depth_scale
@@ -12,8 +12,8 @@ HEADER = '<span style="font-size: large"><b>%s</b></span> &nbsp; <b style="color
 
 
 class MeasurementPane(QtWidgets.QWidget):
-    """Shows one measurement of a document. `person_chosen` gives the number of a detection; `truth` (a TruthPanel),
-    `floor` (a GridView) and `shared` (a SharedView) have the signals of what else somebody does.
+    """View of one measurement of a document. `person_chosen` is emitted with the index of a detection. `truth` (a
+    TruthPanel), `floor` (a GridView) and `shared` (a SharedView) have the signals for other user actions.
     """
 
     person_chosen = Signal(int)
@@ -38,19 +38,19 @@ class MeasurementPane(QtWidgets.QWidget):
         self.truth.previewed.connect(self._show_floor)
 
     def set_usable(self, usable):
-        """Say whether there is a measurement to be worked on."""
+        """Enable the widgets if there is a current measurement."""
         for widget in (self.color_view, self.depth_view, self.people, self.truth, self.floor):
             widget.setEnabled(usable)
 
     def show_document(self, document):
-        """Take the measurements of a document; none is shown yet."""
+        """Set the document. No measurement is shown yet."""
         self._document, self._pictures, self._shown = document, PictureCache(document), None
-        self.header.setText('This session holds no measurements yet.')
+        self.header.setText('This session contains no measurements yet.')
         self.banner.setText('<br>'.join(_escaped(note) for note in document.notes))
         self.banner.setVisible(bool(document.notes))
 
     def show_measurement(self, number):
-        """Show a measurement, or what became of it."""
+        """Show a measurement, also if it has changed."""
         self._measurement = measurement = self._document.measurements[number]
         self._shown = pictures = self._pictures.of(number)
         self._show_header(measurement)
@@ -67,15 +67,15 @@ class MeasurementPane(QtWidgets.QWidget):
         self._show_readout()
 
     def read_ahead(self, number):
-        """Read the images of a measurement that may be looked at next. Returns whether that was still to be done."""
+        """Read the images of a measurement in advance. Returns whether they were not in the cache."""
         return self._pictures.read_ahead(number)
 
     def read_again(self):
-        """Forget images that were read; their files may have changed."""
+        """Clear the cache of images, because files may have changed."""
         self._pictures.forget()
 
     def show_samples(self, shown):
-        """Say whether the samples are shown."""
+        """Show or hide the samples."""
         self._samples_shown = shown
         if self._measurement is not None:
             scene = self._scene()
@@ -108,7 +108,7 @@ class MeasurementPane(QtWidgets.QWidget):
         self.readout.setText(readout_text(self.shared.cursor, depth, camera))
 
     def _show_floor(self, truth_m):
-        """The floor with the truth (x, z) as it is typed, None where it is not."""
+        """Show the floor with the typed truth (x, z), or without truth for None."""
         self.floor.show_scene(FloorScene(self._document.grid, truth_m, floor_of(self._measurement.estimate_m),
                                          sight_of(self._document.camera)))
 
@@ -142,7 +142,7 @@ class MeasurementPane(QtWidgets.QWidget):
 
 
 def sight_of(camera):
-    """Tangents of a camera's field of view to the left and to the right; of an unknown one, none."""
+    """Tangents of the left and right limits of a camera's field of view; (0, 0) for an unknown camera."""
     if camera is None:
         return 0.0, 0.0
     return -camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx

@@ -1,20 +1,21 @@
-"""The images of measurements as Qt paints them, read when they are looked at."""
+"""Images of measurements as QImages, with a cache."""
 import collections
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.overlay import colors_of, visible_depth
+from ros_3d_bb.overlay import colorize_depth, depth_to_grey
 from ros_3d_bb_annotator.qt import QtGui
 
-KEPT = 7  # measurements: the one looked at and its neighbours
-FARTHEST_PERCENT = 90  # beyond is the end of the room; it may all be blue
+CACHE_SIZE = 7  # number of measurements: the current one and its neighbours
+FARTHEST_PERCENT = 90  # farther surfaces, the end of the room, are blue
 RANGES_M = (1, 2, 3, 4, 6, 8, 10, 15, 20, 40)
 
 
 class Pictures(NamedTuple):
-    """Of one measurement: QImages of colour and depth, None where a problem says why there is none; `depth` is the
-    DepthImage or None, `farthest_m` the end of the scale of colours."""
+    """QImages of colour and depth of a measurement; None if there is a problem. `depth` is the DepthImage or None,
+    `farthest_m` the end of the colour scale.
+    """
 
     color_image: Any
     color_problem: str
@@ -25,75 +26,75 @@ class Pictures(NamedTuple):
 
 
 class PictureCache(object):
-    """The pictures of the measurements of a document, the last few kept."""
+    """Cache of the images of recently shown measurements."""
 
     def __init__(self, document):
-        self._document, self._kept = document, collections.OrderedDict()
+        self._document, self._cache = document, collections.OrderedDict()
 
     def of(self, number):
-        """The Pictures of a measurement."""
-        if number in self._kept:
-            self._kept.move_to_end(number)
+        """Pictures of a measurement."""
+        if number in self._cache:
+            self._cache.move_to_end(number)
         else:
-            self._kept[number] = self._read(number)
-        while len(self._kept) > KEPT:
-            self._kept.popitem(last=False)
-        return self._kept[number]
+            self._cache[number] = self._read(number)
+        while len(self._cache) > CACHE_SIZE:
+            self._cache.popitem(last=False)
+        return self._cache[number]
 
     def read_ahead(self, number):
-        """Read the pictures of a measurement, where they are not there. Returns whether they were not."""
-        if number in self._kept:
+        """Read the pictures of a measurement into the cache. Returns whether they were missing there."""
+        if number in self._cache:
             return False
         self.of(number)
         return True
 
     def forget(self):
-        """Read everything again; the files may have changed."""
-        self._kept.clear()
+        """Clear the cache, because files may have changed."""
+        self._cache.clear()
 
     def _read(self, number):
-        color, color_problem = _tried(self._document.color, number)
+        color, color_problem = _read_or_error(self._document.color, number)
         if self._document.is_old_form:
-            depth, (picture, depth_problem) = None, _tried(self._document.stretched_depth, number)
-            shown = None if picture is None else grey_picture(picture)
+            depth, (stretched, depth_problem) = None, _read_or_error(self._document.stretched_depth, number)
+            shown = None if stretched is None else grey_image(stretched)
         else:
-            depth, depth_problem = _tried(self._document.depth, number)
-            shown = None if depth is None else colors_of(visible_depth(depth, farthest_of(depth)))
+            depth, depth_problem = _read_or_error(self._document.depth, number)
+            shown = None if depth is None else colorize_depth(depth_to_grey(depth, farthest_of(depth)))
         return Pictures(None if color is None else image_of(color), color_problem,
                         None if shown is None else image_of(shown), depth_problem,
                         depth, 0.0 if depth is None else farthest_of(depth))
 
 
 def farthest_of(depth):
-    """The end of a scale of colours that suits a DepthImage, metres: a round number."""
-    measured = depth.values[::4, ::4].astype(float) * depth.scale_m
-    measured = measured[np.isfinite(measured) & (measured > 0)]
-    if not measured.size:
+    """End of the colour scale for a DepthImage, one of RANGES_M."""
+    depth_m = depth.values[::4, ::4].astype(float) * depth.scale_m
+    depth_m = depth_m[np.isfinite(depth_m) & (depth_m > 0)]
+    if not depth_m.size:
         return RANGES_M[-1]
-    far_m = np.percentile(measured, FARTHEST_PERCENT)
+    far_m = np.percentile(depth_m, FARTHEST_PERCENT)
     return next((range_m for range_m in RANGES_M if range_m >= far_m), RANGES_M[-1])
 
 
-def grey_picture(values):
-    """A picture (height, width), uint8 or uint16, in no unit, as (height, width, 3), uint8, RGB."""
+def grey_image(values):
+    """Convert an image (height, width), uint8 or uint16, to RGB, (height, width, 3), uint8."""
     grey = values if values.dtype == np.uint8 else (values // 256).astype(np.uint8)
     return np.repeat(grey[..., None], 3, axis=2)
 
 
 def depth_scale():
-    """The colours of depth from far (top) to near (bottom), a QImage."""
+    """QImage of the colour scale of depth, from far (top) to near (bottom)."""
     grey = np.linspace(1, 255, 255).astype(np.uint8)[:, None]
-    return image_of(colors_of(grey))
+    return image_of(colorize_depth(grey))
 
 
 def image_of(rgb):
-    """A QImage of (height, width, 3), uint8, RGB."""
+    """Convert an image (height, width, 3), uint8, RGB, to a QImage."""
     rgb = np.ascontiguousarray(rgb)
     height, width = rgb.shape[:2]
     return QtGui.QImage(rgb.data, width, height, 3 * width, QtGui.QImage.Format_RGB888).copy()
 
 
-def _tried(read, number):
+def _read_or_error(read, number):
     try:
         return read(number), ''
     except (ValueError, OSError) as error:

@@ -1,4 +1,4 @@
-"""Qt 5 from where it is: through python_qt_binding on a machine with ROS, as plain PyQt5 without."""
+"""Qt 5 from python_qt_binding, which comes with ROS, or from PyQt5."""
 try:
     from python_qt_binding import QtCore, QtGui, QtWidgets
 except ImportError:

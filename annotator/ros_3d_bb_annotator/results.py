@@ -1,4 +1,4 @@
-"""Export and noise analysis from the window; the analysis runs in a thread of its own."""
+"""Export and noise analysis from the window. The analysis runs in a separate thread."""
 import os
 
 from ros_3d_bb_annotator import dialogs
@@ -8,7 +8,7 @@ from ros_3d_bb_annotator.qt import Qt, QtCore, QtWidgets
 
 
 class Work(QtCore.QThread):
-    """Calls `work()` in a thread; afterwards `result` is what it returned, or `error` what it raised."""
+    """Calls `work()` in a thread. Afterwards `result` is its return value, or `error` its exception."""
 
     def __init__(self, work, parent=None):
         super(Work, self).__init__(parent)
@@ -17,12 +17,12 @@ class Work(QtCore.QThread):
     def run(self):
         try:
             self.result = self._work()
-        except Exception as error:  # whatever a library raises is for the one who waits for it
+        except Exception as error:  # reported by the thread that waits
             self.error = error
 
 
 class Results(QtCore.QObject):
-    """What is made of a document, for a window. `figures` is the AnalysisWindow that was shown last."""
+    """Exports and analyses a document for a window. `figures` is the last AnalysisWindow."""
 
     def __init__(self, window):
         super(Results, self).__init__(window)
@@ -36,17 +36,17 @@ class Results(QtCore.QObject):
             self.export(document, path)
 
     def export(self, document, path):
-        """Write the table of errors to a file, or say in a message why not."""
+        """Write the table of errors to a file, or show an error message."""
         try:
             count = export(document, path)
         except (ValueError, OSError) as error:
-            dialogs.show_error(self._window, 'The table is not written', error)
+            dialogs.show_error(self._window, 'The table was not written', error)
             return
-        self._window.statusBar().showMessage('%d measurements are in %s' % (count, path))
+        self._window.statusBar().showMessage('%d measurements written to %s' % (count, path))
 
     def analyse(self, document):
-        """Run the noise analysis of a document and show its figures; nothing is edited meanwhile."""
-        waiting = QtWidgets.QProgressDialog('The noise analysis runs; it takes some seconds.', '', 0, 0, self._window)
+        """Run the noise analysis of a document and show its figures. Editing is blocked meanwhile."""
+        waiting = QtWidgets.QProgressDialog('The noise analysis takes some seconds.', '', 0, 0, self._window)
         waiting.setWindowTitle('Noise analysis')
         waiting.setCancelButton(None)
         waiting.setWindowModality(Qt.WindowModal)
@@ -57,7 +57,7 @@ class Results(QtCore.QObject):
         self._work.start()
 
     def wait(self):
-        """Wait for an analysis that is running: Qt must not go before its threads."""
+        """Wait for a running analysis, because threads must end before Qt is destroyed."""
         if self._work is not None:
             self._work.wait()
 
@@ -72,5 +72,5 @@ class Results(QtCore.QObject):
 
 
 def _analysed(document):
-    from ros_3d_bb_annotator.analysis import analyse  # scipy and matplotlib take a second, and are not always there
+    from ros_3d_bb_annotator.analysis import analyse  # optional scipy and matplotlib take a second
     return analyse(document)

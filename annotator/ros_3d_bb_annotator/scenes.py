@@ -1,11 +1,11 @@
-"""What is to be seen of a measurement, in words and as marks."""
+"""Texts and overlays of a measurement."""
 from ros_3d_bb.estimation import estimator_named
 from ros_3d_bb_annotator.document import ESTIMATOR
 from ros_3d_bb_annotator.marking import MarkedBox, Scene
 
 
 def scene_of(measurement, depth):
-    """The Scene of a measurement; with a DepthImage also what the estimator looks at in each box."""
+    """Overlay of a measurement. With a DepthImage it contains the samples of the estimator in each box."""
     boxes = tuple(MarkedBox(number, detection.box_px, _label_of(number, detection), detection.by_hand)
                   for number, detection in enumerate(measurement.detections) if detection.box_px is not None)
     sample = estimator_named(ESTIMATOR).sample
@@ -16,7 +16,7 @@ def scene_of(measurement, depth):
 
 
 def detection_text(number, detection):
-    """A detection in two lines."""
+    """Description of a detection in two lines."""
     position = 'no estimate' if detection.estimate_m is None else (
         'X %s  Z %.3f m' % (signed(detection.estimate_m[0]), detection.estimate_m[2]))
     details = (detection.support is not None and 'support %.0f %%' % (100 * detection.support),
@@ -25,7 +25,8 @@ def detection_text(number, detection):
 
 
 def readout_text(cursor, depth, camera):
-    """Pixel, depth and position that the cursor (u, v) points at; `depth` a DepthImage or None, `camera` or None."""
+    """Text with pixel, depth and position at the cursor (u, v). `depth` is a DepthImage or None, `camera` may be None.
+    """
     if cursor is None:
         return 'Point at the image: pixel, depth, X Y Z'
     text = 'pixel (%d, %d)' % cursor
@@ -34,20 +35,20 @@ def readout_text(cursor, depth, camera):
     height, width = depth.values.shape
     if not (0 <= cursor[0] < width and 0 <= cursor[1] < height):
         return text
-    depth_m, measured = depth.at(*cursor)
-    if not measured:
+    depth_m, valid = depth.at(*cursor)
+    if not valid:
         return text + '    no depth there'
     x_m, y_m, z_m = camera.deproject(cursor, depth_m).tolist()
     return text + '    depth %.3f m    X %s  Y %s  Z %.3f m' % (depth_m, signed(x_m), signed(y_m), z_m)
 
 
 def floor_of(position_m):
-    """The (x, z) of a position (3,) or None."""
+    """(x, z) of a position (3,), or None."""
     return None if position_m is None else (float(position_m[0]), float(position_m[2]))
 
 
 def signed(value_m):
-    """Metres with their sign, and a minus as wide as the plus."""
+    """Format metres with a sign, with a minus sign as wide as the plus sign."""
     return ('%+.3f' % value_m).replace('-', '−')
 
 

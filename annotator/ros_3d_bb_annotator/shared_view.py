@@ -1,18 +1,18 @@
-"""What the views of one measurement share: the part of the image that is shown, the cursor and a box being drawn."""
+"""Shared state of the views of a measurement: visible part of the image, cursor, and box that is being drawn."""
 from ros_3d_bb_annotator.qt import QtCore, Signal
 
-LEAST_ZOOM, MOST_ZOOM, ZOOM_STEP = 1.0, 40.0, 1.4
-LEAST_BOX_PX = 4  # smaller is a slip of the hand
+MIN_ZOOM, MAX_ZOOM, ZOOM_STEP = 1.0, 40.0, 1.4
+MIN_BOX_PX = 4  # smaller boxes are ignored
 
 
 class SharedView(QtCore.QObject):
-    """The state behind linked views of images of one size.
+    """State of linked views of images of one size.
 
-    Image coordinates are continuous: pixel (u, v) covers u..u+1 and v..v+1. `zoom` is 1 where the whole image fits
-    the view, `center` what is in the middle of the view, as shares 0..1 of width and height. `cursor` is a pixel
-    (u, v) or None, `corner` the first corner of a box being drawn or None. Signals: `changed` whenever a view has to
-    be drawn again, `pointed` when the cursor moved, `drawing_changed` when boxes begin or cease to be drawn,
-    `box_drawn` with (x1, y1, x2, y2) in pixels.
+    Image coordinates are continuous: pixel (u, v) covers u..u+1 and v..v+1. `zoom` is 1 if the whole image fits the
+    view. `center` is the point in the centre of the view as shares 0..1 of width and height. `cursor` is a pixel (u, v)
+    or None, `corner` the first corner of a box that is being drawn, or None. Signals: `changed` if views must be
+    repainted, `pointed` if the cursor moved, `drawing_changed` if drawing starts or stops, `box_drawn` with
+    (x1, y1, x2, y2) in pixels.
     """
 
     changed = Signal()
@@ -23,19 +23,19 @@ class SharedView(QtCore.QObject):
     def __init__(self, parent=None):
         super(SharedView, self).__init__(parent)
         self.size = (640, 480)
-        self.zoom, self.center = LEAST_ZOOM, (0.5, 0.5)
+        self.zoom, self.center = MIN_ZOOM, (0.5, 0.5)
         self.cursor, self.corner, self.drawing = None, None, False
 
     def show_size(self, width, height):
-        """Say how large the images are, in pixels; zoom and position stay where they fit."""
+        """Set the size of the images in pixels. Zoom and position are kept."""
         self.size = (width, height)
         if self.cursor is not None and not self._is_inside(self.cursor):
             self.cursor = None
 
     def zoom_by(self, factor, anchor=None):
-        """Zoom so that the point `anchor` of the image (x, y), by default the middle of the view, stays in place."""
+        """Zoom around the point `anchor` (x, y) of the image, by default the centre of the view."""
         shares = self.center if anchor is None else tuple(value / size for value, size in zip(anchor, self.size))
-        zoom = min(max(self.zoom * factor, LEAST_ZOOM), MOST_ZOOM)
+        zoom = min(max(self.zoom * factor, MIN_ZOOM), MAX_ZOOM)
         self.center = tuple(share + (center - share) * self.zoom / zoom for share, center in zip(shares, self.center))
         self.zoom = zoom
         self._stay_inside()
@@ -49,23 +49,23 @@ class SharedView(QtCore.QObject):
         self.zoom_by(1 / ZOOM_STEP, self.cursor)
 
     def pan_by(self, x_px, y_px):
-        """Move what is shown by pixels of the image."""
+        """Move the visible part by pixels of the image."""
         self.center = (self.center[0] + x_px / self.size[0], self.center[1] + y_px / self.size[1])
         self._stay_inside()
 
     def fit(self):
         """Show the whole image."""
-        self.zoom, self.center = LEAST_ZOOM, (0.5, 0.5)
+        self.zoom, self.center = MIN_ZOOM, (0.5, 0.5)
         self.changed.emit()
 
     def point_at(self, u, v):
-        """Put the cursor on a pixel; outside of the image there is none."""
+        """Move the cursor to a pixel, or remove it if the pixel is outside the image."""
         self.cursor = (int(u), int(v)) if self._is_inside((u, v)) else None
         self.pointed.emit()
         self.changed.emit()
 
     def step(self, columns, rows):
-        """Move the cursor; it starts in the middle of what is shown, and what is shown follows it."""
+        """Move the cursor, which starts in the centre of the visible part. The visible part follows the cursor."""
         start = self.cursor or tuple(int(share * size) for share, size in zip(self.center, self.size))
         self.point_at(*(min(max(value + move, 0), size - 1)
                         for value, move, size in zip(start, (columns, rows), self.size)))
@@ -75,7 +75,7 @@ class SharedView(QtCore.QObject):
         self._stay_inside()
 
     def start_drawing(self, drawing=True):
-        """Say whether a plain drag draws a box."""
+        """Set whether dragging draws a box."""
         changed, self.drawing = drawing != self.drawing, drawing
         if not drawing:
             self.corner = None
@@ -84,7 +84,7 @@ class SharedView(QtCore.QObject):
         self.changed.emit()
 
     def set_corner(self):
-        """The first corner at the cursor, or where there is one already, the second: the box is done."""
+        """Set the first corner at the cursor, or the second one, which completes the box."""
         if self.cursor is None:
             self.step(0, 0)
         if self.corner is None:
@@ -93,15 +93,15 @@ class SharedView(QtCore.QObject):
             return
         box_px = self.rubber_band()
         self.cancel()
-        if min(box_px[2] - box_px[0], box_px[3] - box_px[1]) >= LEAST_BOX_PX:
+        if min(box_px[2] - box_px[0], box_px[3] - box_px[1]) >= MIN_BOX_PX:
             self.box_drawn.emit(box_px)
 
     def cancel(self):
-        """Drop the box being drawn."""
+        """Cancel the box that is being drawn."""
         self.start_drawing(False)
 
     def rubber_band(self):
-        """The box being drawn, (x1, y1, x2, y2), which holds the pixels of both corners; None where there is none."""
+        """Box that is being drawn, (x1, y1, x2, y2), including the pixels of both corners, or None."""
         if self.corner is None or self.cursor is None:
             return None
         (u1, v1), (u2, v2) = self.corner, self.cursor

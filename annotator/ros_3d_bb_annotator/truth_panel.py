@@ -1,4 +1,4 @@
-"""The fields for the truth of one measurement, with the error that follows from what is typed."""
+"""Fields for the truth of a measurement, and the resulting error."""
 import math
 
 from ros_3d_bb_annotator.lengths import METRES, parse_length
@@ -6,12 +6,12 @@ from ros_3d_bb_annotator.qt import QtCore, QtGui, QtWidgets, Signal
 
 FIELDS = (('x', '&X, right of the camera'), ('z', '&Z, ahead of it'), ('y', '&Y, below it (optional)'))
 UNITS = ('mm', 'm')
-TYPING_MS = 300  # what is typed is kept when nothing more comes for so long
+TYPING_MS = 300  # typed text is saved after a pause of this length
 WRONG, PLAIN = 'color: #b00020', ''
 
 
 class LengthEdit(QtWidgets.QLineEdit):
-    """A line to type into, which leaves undo and redo to the program where it has nothing to undo itself."""
+    """Line edit that leaves undo and redo to the application if it has nothing to undo itself."""
 
     def event(self, event):
         if event.type() == QtCore.QEvent.ShortcutOverride and (
@@ -23,9 +23,8 @@ class LengthEdit(QtWidgets.QLineEdit):
 
 
 class TruthPanel(QtWidgets.QGroupBox):
-    """Signals: `entered` with (x_m, z_m, y_m or None) when Enter is pressed on a complete position; `typed` with the
-    text of the fields, to be kept; `previewed` with the (x_m, z_m) that the fields hold now, None where they hold
-    none.
+    """Panel of the truth. Signals: `entered` with (x_m, z_m, y_m or None) when Enter is pressed on a complete position;
+    `typed` with the text of the fields to be saved; `previewed` with the current (x_m, z_m), or None if incomplete.
     """
 
     entered = Signal(float, float, object)
@@ -48,7 +47,7 @@ class TruthPanel(QtWidgets.QGroupBox):
         self.unit_box.activated.connect(self._on_unit)
 
     def show_truth(self, truth_m, estimate_m, draft):
-        """Show the (x, y, z) of a measurement or None, or what was typed for it; `estimate_m` (3,) or None."""
+        """Show the truth (x, y, z) of a measurement or None, or its draft. `estimate_m` is (3,) or None."""
         self._timer.stop()
         self._estimate_m = estimate_m
         unit = draft.get('unit', self.unit_box.currentText())
@@ -57,24 +56,24 @@ class TruthPanel(QtWidgets.QGroupBox):
         shown = dict(self._stored, **draft)
         for name, field in self.fields.items():
             field.setText(shown[name])
-        self._say('typed before, not entered yet: Enter enters it' if draft else '')
+        self._say('typed, but not saved as truth yet: press Enter' if draft else '')
         self._show_error()
 
     def texts(self):
-        """What the fields hold: {name: text}."""
+        """Text of the fields and the unit: {name: text}."""
         return dict({name: field.text() for name, field in self.fields.items()}, unit=self.unit_box.currentText())
 
     def begin(self):
-        """Give the keyboard to the first field."""
+        """Set the keyboard focus to the first field."""
         self.fields['x'].setFocus()
         self.fields['x'].selectAll()
 
     def has_keyboard(self):
-        """Whether a field has the keyboard."""
+        """Whether a field has the keyboard focus."""
         return any(field.hasFocus() for field in self.fields.values())
 
     def flush(self):
-        """Tell now what is typed, where that was being waited for."""
+        """Emit `typed` immediately instead of after a pause."""
         if self._timer.isActive():
             self._timer.stop()
         texts = self.texts()
@@ -82,16 +81,16 @@ class TruthPanel(QtWidgets.QGroupBox):
         self.typed.emit(texts if edited and any(texts[name] for name in self.fields) else {})
 
     def switch_unit(self):
-        """Go from millimetres to metres or back; complete lengths are written anew."""
+        """Switch between millimetres and metres. Complete lengths are converted."""
         self.unit_box.setCurrentIndex(1 - self.unit_box.currentIndex())
         self._on_unit()
 
     def show_problem(self, text):
-        """Say what is wrong with what was typed."""
+        """Show what is wrong with the input."""
         self._say(text, WRONG)
 
     def read(self):
-        """(x_m, z_m, y_m or None) of the fields. Raises ValueError that names the field."""
+        """Return (x_m, z_m, y_m or None). Raises ValueError with the name of the invalid field."""
         values_m = {}
         for name, field in self.fields.items():
             if name == 'y' and not field.text().strip():
@@ -120,14 +119,14 @@ class TruthPanel(QtWidgets.QGroupBox):
         self._timer.start()
 
     def _on_unit(self, _index=None):
-        """Write what was typed in the unit that was meant in the one that is meant now."""
+        """Convert the fields from the previous unit to the current unit."""
         unit = self.unit_box.currentText()
         other = UNITS[1 - UNITS.index(unit)]
         for name, field in self.fields.items():
             try:
                 length_m = parse_length(field.text(), other)
             except ValueError:
-                continue  # half typed: left as it is
+                continue  # incomplete text is kept
             field.setText(_text_of(length_m, unit))
         self._show_error()
         self._timer.start()
@@ -159,7 +158,7 @@ class TruthPanel(QtWidgets.QGroupBox):
 
 
 def error_text(error_m):
-    """Errors (x, z) in metres as people read them; None where there is none."""
+    """Text of errors (x, z) in metres, or of None."""
     if error_m is None:
         return 'Error: –'
     return 'Error: <b>X %s mm, Z %s mm</b>, %.0f mm on the floor' % (
@@ -167,7 +166,7 @@ def error_text(error_m):
 
 
 def signed_mm(value_m):
-    """Metres as millimetres with their sign: +12, −3."""
+    """Format metres as signed millimetres: +12, −3."""
     return ('%+.0f' % (1000 * value_m)).replace('-', '−')
 
 

@@ -1,16 +1,16 @@
-"""Whether a session is sound: every image readable, every box inside, every estimate and truth plausible."""
+"""Validation of sessions: readable images, boxes inside the image, plausible estimates and truth."""
 import collections
 import os
 
 from ros_3d_bb.measurements import SessionError, read_description
 from ros_3d_bb_annotator.measurement import ANNOTATED, REJECTED
 
-FARTHEST_OFF_M = 1.0  # an estimate farther off the truth is of somebody else, or the truth of another place
-HALF_PERSON_M = 0.5  # the image border may cut the person whose axis is just outside it
+MAX_ERROR_M = 1.0  # a larger error means that the estimate is of another person, or the truth of another place
+HALF_PERSON_M = 0.5  # the body of a person whose axis is just outside the image may be visible
 
 
 def problems_of(document):
-    """Yield what is wrong with a document, a line of text each; rejected measurements are not looked at."""
+    """Yield the problems of a document as lines of text. Rejected measurements are skipped."""
     counts = collections.Counter(measurement.id for measurement in document.measurements)
     for name in sorted(name for name, count in counts.items() if count > 1):
         yield '%s: %d measurements have this id' % (name, counts[name])
@@ -21,17 +21,17 @@ def problems_of(document):
 
 
 def leftovers_of(document):
-    """Files in a document's folders that no measurement names, as a killed program leaves: paths there, sorted."""
+    """Sorted relative paths of files that no measurement refers to, such as those left by a killed program."""
     if document.is_old_form:
         return []
     folder = document.folder
-    found = [name for name in os.listdir(folder) if name.startswith('.') and name.endswith('.tmp')]
+    files = [name for name in os.listdir(folder) if name.startswith('.') and name.endswith('.tmp')]
     for kind in ('color', 'depth'):
         if os.path.isdir(os.path.join(folder, kind)):
-            found += [os.path.join(kind, name) for name in os.listdir(os.path.join(folder, kind))]
-    # read after the files were listed: a viewer may have added some to the session meanwhile
+            files += [os.path.join(kind, name) for name in os.listdir(os.path.join(folder, kind))]
+    # read after the files are listed, because a viewer may add measurements concurrently
     entries = [entry for entry in read_description(folder)['frames'] if isinstance(entry, dict)]
-    return sorted(set(found) - set(os.path.normpath(str(entry.get(kind, ''))) for entry in entries
+    return sorted(set(files) - set(os.path.normpath(str(entry.get(kind, ''))) for entry in entries
                                    for kind in ('color', 'depth')))
 
 
@@ -64,18 +64,18 @@ def _is_inside(box_px, camera):
 
 
 def _estimate_problems(document, index):
-    """Whether the person's estimate can be made again from the images."""
+    """Problems of the person's box: it is missing, or it cannot be estimated from the images."""
     measurement = document.measurements[index]
     box_px = None if measurement.person is None else measurement.detections[measurement.person].box_px
     if box_px is None:
-        return ['nobody is detected in it, and no box drawn'] if measurement.state == ANNOTATED else []
+        return ['no person is detected, and no box is drawn'] if measurement.state == ANNOTATED else []
     if document.estimated(index, box_px) is None:
-        return ['no estimate can be made of box (%d, %d, %d, %d): too little depth' % box_px]
+        return ['box (%d, %d, %d, %d) has not enough depth for an estimate' % box_px]
     return []
 
 
 def _truth_problems(document, index):
-    """Whether the truth is a place that the camera sees, and not far off the estimate."""
+    """Problems of the truth: it is outside the field of view, or far from the estimate."""
     truth_m, errors_m, problems = document.measurements[index].truth_m, document.errors(index), []
     if truth_m is None:
         return problems
@@ -88,6 +88,6 @@ def _truth_problems(document, index):
         if not left_m - HALF_PERSON_M <= x_m <= right_m + HALF_PERSON_M:
             problems.append('truth x is %g m, outside the image, which shows %.2f to %.2f m at %g m'
                             % (x_m, left_m, right_m, z_m))
-    if errors_m is not None and errors_m[2] > FARTHEST_OFF_M:
+    if errors_m is not None and errors_m[2] > MAX_ERROR_M:
         problems.append('truth and estimate are %.2f m apart' % errors_m[2])
     return problems

@@ -1,7 +1,7 @@
-"""Read bags that somebody else may have made, message by message, and no more of them than is needed.
+"""Safe reader of bags from untrusted sources.
 
-rosbag makes Python code of each message definition in a bag and runs it. Here no definition of a bag is used: messages
-of a known type are read by the installed class, all others stay bytes.
+rosbag generates and executes Python code from each message definition in a bag. This reader does not use the
+definitions: messages of known types are deserialized by the installed class, all others remain bytes.
 """
 from typing import Any, NamedTuple
 
@@ -14,11 +14,11 @@ from ros_3d_bb.params import nearest_name
 
 
 class BagError(ValueError):
-    """A bag that cannot be used: says which, and why."""
+    """Bag that cannot be used. The message names the bag and the reason."""
 
 
 class Raw(NamedTuple):
-    """One message as it is in a bag, and the connection that it came by; `time` is when it was recorded."""
+    """Serialized message and the header of its connection. `time` is the time of recording."""
 
     topic: str
     datatype: str
@@ -29,28 +29,29 @@ class Raw(NamedTuple):
 
 
 class Unread(object):
-    """Takes the place of the class that rosbag would make of a definition in a bag."""
+    """Replaces the class that rosbag would generate from a definition in a bag."""
 
     _md5sum, _full_text = '*', ''
 
 
 class BagReader(object):
-    """An open bag; to be used as a context. Raises BagError where it cannot be opened."""
+    """Open bag, a context manager. Raises BagError if the bag cannot be opened."""
 
     def __init__(self, path):
         self._path = path
         try:
             self._bag = rosbag.Bag(path)
             if self._bag.version != 200:
-                raise ValueError('version %s of the format; 2.0 expected' % self._bag.version)
+                raise ValueError('its format has the version %s; 200 (2.0) expected' % self._bag.version)
             self._types = {connection.topic: connection.datatype for connection in self._bag._get_connections()}
             self._unread = (set(connection.md5sum for connection in self._bag._get_connections())
                             - set(rosbag.bag._message_types))
             rosbag.bag._message_types.update((md5sum, Unread) for md5sum in self._unread)
         except rosbag.ROSBagUnindexedException:
-            raise BagError('%s has no index, as its recording was cut off; mend it with: rosbag reindex' % path)
-        except Exception as error:  # a damaged file can raise anything; it all means the same
-            raise BagError('%s is no bag that can be read (%s)' % (path, cause(error)))
+            raise BagError('%s has no index, because its recording was interrupted; repair it with: rosbag reindex'
+                           % path)
+        except Exception as error:  # a damaged file can raise any exception
+            raise BagError('%s is not a readable bag (%s)' % (path, cause(error)))
 
     def __enter__(self):
         return self
@@ -62,27 +63,27 @@ class BagReader(object):
 
     @property
     def span_ns(self):
-        """When the first and the last message were recorded, integer nanoseconds; 0 and 0 in an empty bag."""
+        """Times of recording of the first and the last message in nanoseconds; (0, 0) for an empty bag."""
         if not self._bag.get_message_count():
             return 0, 0
         return tuple(int(1e9 * time_s) for time_s in (self._bag.get_start_time(), self._bag.get_end_time()))
 
     @property
     def topics(self):
-        """{name: type} of the topics in it."""
+        """{name: type} of the topics in the bag."""
         return dict(self._types)
 
     def check_topic(self, topic, kind):
-        """Raise BagError where a bag does not have a topic of messages of a class; name what it has instead."""
+        """Raise BagError if a bag has no such topic of a message class. The error names topics of this type."""
         if self._types.get(topic) == kind._type:
             return
         others = sorted(name for name, datatype in self._types.items() if datatype == kind._type)
         raise BagError('%s has no %s on %s; %s' % (
-            self._path, kind._type, topic, 'did you mean %s? Name it with --remap. Of that type it has: %s'
-            % (nearest_name(topic, others), ', '.join(others)) if others else 'it has none of that type'))
+            self._path, kind._type, topic, 'did you mean %s? Remap it with --remap. Topics of this type: %s'
+            % (nearest_name(topic, others), ', '.join(others)) if others else 'it has no topic of this type'))
 
     def messages(self, topics=None):
-        """Yield the messages (Raw) of all or of some topics in the order of their recording. Raises BagError."""
+        """Yield the messages (Raw) of all or some topics in the order of recording. Raises BagError."""
         entries = self._bag.read_messages(topics, raw=True, return_connection_header=True)
         while True:
             try:
@@ -98,11 +99,11 @@ class BagReader(object):
 
 
 def message_in(raw, kind):
-    """The message of a class in a Raw. Raises ValueError where it is of another type, or damaged."""
+    """Deserialize a Raw as a message class. Raises ValueError if its type differs, or it is damaged."""
     if (raw.datatype, raw.md5sum) != (kind._type, kind._md5sum):
         raise ValueError('%s has messages of type %s (%s); %s (%s) expected'
                          % (raw.topic, raw.datatype, raw.md5sum, kind._type, kind._md5sum))
     try:
         return kind().deserialize(raw.data)
-    except Exception as error:  # genpy's own errors, struct's, and those of text that is no UTF-8
+    except Exception as error:  # errors of genpy, struct, and UTF-8 decoding
         raise ValueError('a message on %s is damaged (%s)' % (raw.topic, cause(error)))

@@ -15,18 +15,18 @@ from ros_3d_bb.camera_messages import CameraFrame, messages_of, topic_of
 from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.measurements import SessionError, read_color, read_depth, read_session
 from ros_3d_bb.messages import BOXES_TOPIC, boxes2d_to_message, time_from
-from ros_3d_bb.simulation.scenario import ScenarioError, overridden, read_scenario
+from ros_3d_bb.simulation.scenario import ScenarioError, with_overrides, read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulator_messages import START_NS, frame_id_of, simulated_messages
 from ros_3d_bb.stamped import NS
 
-PARTIAL = '.active'  # as rosbag record calls what is not complete yet
-MOUNT_M = (0.17, 0.0, 0.20)  # camera on a Jackal, metres forward, left and up of base_link (thesis 3.5.1)
+PARTIAL = '.active'  # suffix of incomplete bags, as of rosbag record
+MOUNT_M = (0.17, 0.0, 0.20)  # position of the camera of a Jackal in base_link: forward, left, up (thesis 3.5.1)
 
 
 class SessionBagOptions(NamedTuple):
-    """How a session is written: frames per second; the camera in base_link (x forward, y left, z up), metres, looking
-    straight ahead; whether the session's 2D boxes go to yolo_bounding_box.
+    """Options for bags of sessions: frames per second; position of the forward-facing camera in base_link (x forward, y
+    left, z up); whether the 2D boxes of the session are written to yolo_bounding_box.
     """
 
     rate_hz: float = 30.0
@@ -35,7 +35,7 @@ class SessionBagOptions(NamedTuple):
 
 
 def write_bag(images, path, compression='lz4'):
-    """Write what each image brings as a bag: beside its place, and moved there when it is complete.
+    """Write the messages of images to a bag. The bag has a temporary name until it is complete.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def write_bag(images, path, compression='lz4'):
     Returns
     -------
     int
-        Number of images written. If `images` raises, no bag is left.
+        Number of images. If `images` raises an exception, no bag remains.
     """
     count = 0
     with new_bag(path, compression) as bag:
@@ -60,7 +60,7 @@ def write_bag(images, path, compression='lz4'):
 
 @contextlib.contextmanager
 def new_bag(path, compression):
-    """An open rosbag.Bag to be written: beside its place, and moved there when the block ends without an error."""
+    """Open a rosbag.Bag for writing. It has a temporary name until the block ends without an error."""
     partial = path + PARTIAL
     try:
         with rosbag.Bag(partial, 'w', compression=compression) as bag:
@@ -71,13 +71,13 @@ def new_bag(path, compression):
 
 
 def remove_partial(path):
-    """Remove what was written of a bag that did not become complete, if there is any."""
+    """Remove the temporary file of an incomplete bag, if there is one."""
     if os.path.exists(path + PARTIAL):
         os.remove(path + PARTIAL)
 
 
 def images_in(path, topics):
-    """The messages of a bag on some topics, image by image: [[(topic, message), ...], ...], topics without a slash.
+    """Messages of a bag on some topics, by image: [[(topic, message), ...], ...], topics without a leading slash.
 
     Raises
     ------
@@ -94,15 +94,15 @@ def images_in(path, topics):
     for stamp_ns, messages in images.items():
         missing = set(topics) - set(topic for topic, _message in messages)
         if missing:
-            raise ValueError('the image at %.3f in the bag %s has no %s; a bag of scenario_to_bag or session_to_bag '
-                             'expected' % (stamp_ns / NS, path, ', '.join(sorted(missing))))
+            raise ValueError('the image at %.3f in the bag %s has no %s; a bag written by scenario_to_bag or '
+                             'session_to_bag expected' % (stamp_ns / NS, path, ', '.join(sorted(missing))))
     if not images:
-        raise ValueError('the bag %s holds none of %s' % (path, ', '.join(sorted(topics))))
+        raise ValueError('the bag %s has no messages on %s' % (path, ', '.join(sorted(topics))))
     return list(images.values())
 
 
 def session_images(session, options=SessionBagOptions()):
-    """Yield the images of a measurement session for `write_bag`. Raises SessionError where one cannot be read."""
+    """Yield the images of a measurement session for `write_bag`. Raises SessionError if one cannot be read."""
     chain = [('map', 'odom', np.eye(4)), ('odom', 'base_link', np.eye(4)),
              ('base_link', session.frame_id, transform_from(options.mount_m, OPTICAL_ROTATION))]
     for number, frame in enumerate(session.frames):
@@ -116,7 +116,7 @@ def session_images(session, options=SessionBagOptions()):
 
 
 def scenario_images(scenario, with_boxes=False):
-    """Yield the images of a scenario for `write_bag`, with the ground truth; `with_boxes` with its 2D boxes, too."""
+    """Yield the images of a scenario for `write_bag`, with ground truth and optionally with its 2D boxes."""
     simulator = Simulator(scenario)
     for number in range(simulator.frame_count):
         frame = simulator.frame(number)
@@ -131,14 +131,15 @@ def scenario_images(scenario, with_boxes=False):
 
 
 def session_to_bag():
-    """The command `session_to_bag`: a measurement session as a bag, as if a Jackal with the camera stood in the map."""
+    """The command `session_to_bag`: convert a measurement session to a bag of a camera on a stationary Jackal."""
     parser = _parser('session_to_bag', session_to_bag.__doc__)
     parser.add_argument('session', help='folder of a measurement session, with frames.json')
-    parser.add_argument('bag', help='the bag to write')
+    parser.add_argument('bag', help='bag to write')
     parser.add_argument('--rate', type=float, default=30.0, metavar='HZ', help='frames per second (default: 30)')
     parser.add_argument('--mount', type=float, nargs=3, default=MOUNT_M, metavar=('X', 'Y', 'Z'),
-                        help='camera in base_link, metres forward, left, up (default: 0.17 0 0.20, a Jackal)')
-    parser.add_argument('--boxes', action='store_true', help="also write the session's 2D boxes to yolo_bounding_box")
+                        help='position of the camera in base_link, metres forward, left, up (default: 0.17 0 0.20, a '
+                             'Jackal)')
+    parser.add_argument('--boxes', action='store_true', help='also write the 2D boxes to yolo_bounding_box')
     arguments = parser.parse_args()
     if not arguments.rate > 0:
         parser.error('--rate %g: more than 0 expected' % arguments.rate)
@@ -147,21 +148,21 @@ def session_to_bag():
 
 
 def scenario_to_bag():
-    """The command `scenario_to_bag`: a simulated scene as a bag, with ground truth."""
+    """The command `scenario_to_bag`: render a scenario to a bag with ground truth."""
     parser = _parser('scenario_to_bag', scenario_to_bag.__doc__)
     parser.add_argument('scenario', help='scenario file (YAML), see config/scenarios')
-    parser.add_argument('bag', help='the bag to write')
+    parser.add_argument('bag', help='bag to write')
     parser.add_argument('--rate', type=float, metavar='HZ', help="images per second (default: the scenario's)")
-    parser.add_argument('--seed', type=int, help="of the noise and the people's looks (default: the scenario's)")
-    parser.add_argument('--images', type=int, metavar='N', help='only so many from the start (default: all)')
+    parser.add_argument('--seed', type=int, help="seed of noise and people's appearance (default: the scenario's)")
+    parser.add_argument('--images', type=int, metavar='N', help='number of images, from the start (default: all)')
     parser.add_argument('--boxes', action='store_true', help='also write the true 2D boxes to yolo_bounding_box')
     arguments = parser.parse_args()
 
     if arguments.images is not None and arguments.images < 1:
-        parser.error('--images %d: 1 or more expected' % arguments.images)
+        parser.error('--images %d: at least 1 expected' % arguments.images)
 
     def images():
-        scenario = overridden(read_scenario(arguments.scenario), arguments.rate, arguments.seed)
+        scenario = with_overrides(read_scenario(arguments.scenario), arguments.rate, arguments.seed)
         return itertools.islice(scenario_images(scenario, arguments.boxes), arguments.images)
     _write(parser, arguments, images)
 

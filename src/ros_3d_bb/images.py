@@ -1,7 +1,7 @@
-"""Between sensor_msgs/Image and numpy, without copying where the layout allows it.
+"""Conversion between sensor_msgs/Image and numpy, without copies if the layout allows it.
 
-Done here rather than with cv_bridge: its Python 3 build does not exist on Melodic, and it trusts the message's size.
-The functions take and fill any object with the fields of sensor_msgs/Image and import no ROS.
+cv_bridge is not used, because it has no Python 3 build on Melodic and does not check the size of the data. The
+functions accept any object with the fields of sensor_msgs/Image and do not import ROS.
 """
 import numpy as np
 
@@ -11,7 +11,7 @@ from ros_3d_bb.estimation import DepthImage
 LAYOUTS = {'rgb8': ('u1', 3), 'bgr8': ('u1', 3), 'rgba8': ('u1', 4), 'bgra8': ('u1', 4), 'mono8': ('u1', 1),
            '8UC1': ('u1', 1), '8UC3': ('u1', 3), '16UC1': ('u2', 1), 'mono16': ('u2', 1), '32FC1': ('f4', 1)}
 COLOR_ENCODINGS = ('rgb8', 'bgr8', 'rgba8', 'bgra8', 'mono8', '8UC1', '8UC3')
-# REP 118: depth is millimetres in 16UC1 (Gazebo and some drivers call it mono16) and metres in 32FC1.
+# REP 118: depth is in millimetres in 16UC1 (mono16 in Gazebo and some drivers) and in metres in 32FC1.
 DEPTH_SCALES = {'16UC1': 0.001, 'mono16': 0.001, '32FC1': 1.0}
 # Units of depth are judged by the median of a grid of pixels.
 GRID = 16  # rows and columns of the grid
@@ -20,7 +20,7 @@ NEAREST_M, FARTHEST_M = 0.1, 100.0  # no depth camera of people measures outside
 
 
 def array_from(message):
-    """The pixels of an image message, a read-only view of its data with its own row step and byte order.
+    """Pixels of an image message as a read-only view of its data, with its row step and byte order.
 
     Returns
     -------
@@ -29,7 +29,7 @@ def array_from(message):
     Raises
     ------
     ValueError
-        If the encoding is unknown, the size zero, or the data shorter than the size says.
+        If the encoding is unknown, the size is zero, or the data are shorter than the size requires.
     """
     if message.encoding not in LAYOUTS:
         raise ValueError('image encoding %r is unknown; expected one of %s' % (message.encoding, ', '.join(LAYOUTS)))
@@ -48,12 +48,12 @@ def array_from(message):
 
 
 def rgb_from(message):
-    """The pixels of a colour image message as RGB, (height, width, 3), uint8; a view where the encoding allows it.
+    """Pixels of a colour image message as RGB, (height, width, 3), uint8; a view if the encoding allows it.
 
     Raises
     ------
     ValueError
-        As `array_from`, and if the encoding is not a colour or grey one.
+        See `array_from`; also if the encoding is not colour or grey.
     """
     if message.encoding not in COLOR_ENCODINGS:
         raise ValueError('colour image has encoding %r; expected one of %s'
@@ -65,12 +65,13 @@ def rgb_from(message):
 
 
 def depth_from(message, scale_m=None):
-    """The depth image in an image message.
+    """Depth image of an image message.
 
     Parameters
     ----------
+    message : sensor_msgs.msg.Image
     scale_m : float, optional
-        Metres per unit, where the camera does not follow REP 118 (16UC1: millimetres, 32FC1: metres).
+        Metres per unit of a camera that does not follow REP 118 (16UC1: millimetres, 32FC1: metres).
 
     Returns
     -------
@@ -79,7 +80,7 @@ def depth_from(message, scale_m=None):
     Raises
     ------
     ValueError
-        As `array_from`, and if the encoding is not one of depth.
+        See `array_from`; also if the encoding is not a depth encoding.
     """
     if message.encoding not in DEPTH_SCALES:
         raise ValueError('depth image has encoding %r; expected one of %s'
@@ -123,12 +124,12 @@ def units_fault(depth):
 
 
 def fill_image(message, pixels, encoding):
-    """Put pixels (height, width[, channels]) into an image message; its header is left alone. Returns the message.
+    """Write pixels (height, width[, channels]) to an image message, except for its header. Returns the message.
 
     Raises
     ------
     ValueError
-        If the pixels do not have the encoding's type and channels.
+        If the pixels do not have the type and channels of the encoding.
     """
     kind, channels = LAYOUTS[encoding]
     if pixels.dtype.newbyteorder('=') != np.dtype(kind) or pixels.shape[2:] != ((channels,) if channels > 1 else ()):

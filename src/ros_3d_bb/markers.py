@@ -1,4 +1,4 @@
-"""Tracks as RViz markers: the thesis' cylinders and arrows (Fig. 4.1), and what is known beyond them."""
+"""RViz markers of tracks: cylinders and arrows as in Fig. 4.1 of the thesis, histories, and ellipses of covariances."""
 import functools
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ CYLINDER, ID, VELOCITY, PREDICTION, HISTORY, ELLIPSE, PREDICTION_ELLIPSE = NAMES
     'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse', 'prediction_ellipse')
 BLUE, GREEN, RED = (0.1, 0.3, 1.0), (0.1, 0.9, 0.2), (0.95, 0.1, 0.1)
 AMBER, GREY, WHITE = (1.0, 0.65, 0.1), (0.65, 0.65, 0.65), (0.95, 0.95, 0.95)
-# Neighbours differ most. None is red, green or grey: those are the arrows', and of what is not seen.
+# Neighbours differ most. None is red, green or grey, because arrows and tracks that are not visible have these colours.
 PALETTE = ((0.15, 0.4, 1.0), (1.0, 0.6, 0.1), (0.9, 0.35, 0.9), (0.1, 0.8, 0.85), (0.95, 0.9, 0.25),
            (0.55, 0.3, 0.95), (1.0, 0.6, 0.65), (0.6, 0.8, 1.0), (0.7, 0.45, 0.2), (0.75, 0.65, 1.0))
 STATUS_COLORS = {VISIBLE: BLUE, OCCLUDED: AMBER, OUT_OF_VIEW: GREY}
@@ -25,15 +25,15 @@ COLORS = {'id': lambda track: PALETTE[(track.id - 1) % len(PALETTE)],
           'status': lambda track: STATUS_COLORS[track.status],
           'thesis': lambda _track: BLUE}
 TEXT_COLORS = {'id': WHITE, 'status': WHITE, 'thesis': GREEN}
-VELOCITY_SHOWN_S = 1.0  # the velocity arrow ends where the object would be after so long
-SHORTEST_ARROW_M = 0.05  # RViz cannot orient an arrow without length
-# Shaft and head. Where both point the same way, the thin one looks out of the tip of the thick one.
+VELOCITY_SHOWN_S = 1.0  # the velocity arrow ends at the position after this time
+MIN_ARROW_M = 0.05  # RViz cannot orient an arrow without length
+# Diameters of shaft and head. If both arrows have the same direction, the tip of the thin one remains visible.
 VELOCITY_WIDTHS_M, PREDICTION_WIDTHS_M = (0.07, 0.14), (0.04, 0.11)
-CHI2_95 = 5.991  # squared axes of the ellipse in standard deviations: 95 % of chi squared with 2 degrees of freedom
+CHI2_95 = 5.991  # 95 % quantile of chi squared with 2 degrees of freedom: squared semi-axes in standard deviations
 CIRCLE = np.array([(np.cos(angle), np.sin(angle)) for angle in np.linspace(0, 2 * np.pi, 25)])
-ELLIPSES_EVERY_S = 0.5  # of the prediction
-ABOVE_FLOOR_M = 0.02  # lines on the floor would flicker in its grid
-HISTORY_POINTS, HISTORY_SPACING_S = 100, 0.1  # at most so many, and not closer than that
+ELLIPSES_EVERY_S = 0.5  # along the prediction
+FLOOR_OFFSET_M = 0.02  # avoids flickering of lines in the plane of RViz's grid
+HISTORY_POINTS, HISTORY_SPACING_S = 100, 0.1  # maximum number, minimum distance
 
 
 @parameters('what RViz shows')
@@ -55,26 +55,26 @@ class MarkerParams(NamedTuple):
         2.0, 'RViz removes markers that are not updated for this long; 0: never.', 's', live=(0, 10))
 
 
-class Walk(NamedTuple):
-    """Where a track was on the floor, oldest first: [(stamp_ns, Point relative to `anchor_m`)]."""
+class PathHistory(NamedTuple):
+    """Path of a track on the floor, oldest first: [(stamp_ns, Point relative to `anchor_m`)]."""
 
     anchor_m: np.ndarray
     steps: list
 
 
 class MarkerWriter(object):
-    """Draws tracks, one namespace for each kind of marker and the track's id as the marker's.
+    """Converts tracks to markers, with one namespace per kind of marker. The ID of a marker is that of its track.
 
-    Points are relative to the marker's pose, which is near: RViz moves poses in float64 and points in float32, which
-    rounds to half a metre on a map in UTM coordinates.
+    Points are relative to the pose of the marker, which is close to them. RViz transforms poses in float64 but points
+    in float32, which would be rounded to half a metre on a map in UTM coordinates.
 
-    A marker is replaced in place while its track lives and deleted when it ends; where no news comes at all, RViz
-    removes it after the lifetime (0: never).
+    A marker is updated while its track exists, and deleted when the track ends. Without new messages RViz removes it
+    after its lifetime (0: never).
     """
 
     def __init__(self, params=MarkerParams()):
         self._drawn = set()  # (namespace, id)
-        self._histories = {}  # id: Walk
+        self._histories = {}  # {track ID: PathHistory}
         self.tune(params)
 
     def tune(self, params):
@@ -87,20 +87,20 @@ class MarkerWriter(object):
                         if namespace in params.marker_namespaces]
 
     def write(self, tracks, header):
-        """The markers for one image.
+        """Create the markers of the tracks of one image.
 
         Parameters
         ----------
         tracks : list of tracked.TrackedObject
         header : std_msgs.msg.Header
-            Stamp of the image and fixed frame.
+            Stamp of the image, and fixed frame.
 
         Returns
         -------
         visualization_msgs.msg.MarkerArray
         """
         now_ns = header.stamp.to_nsec()
-        self._histories = {track.id: self._walked(track, now_ns) for track in tracks}
+        self._histories = {track.id: self._extended_history(track, now_ns) for track in tracks}
         markers = []
         for track in tracks:
             for namespace, shape in self._shapes:
@@ -114,38 +114,38 @@ class MarkerWriter(object):
         self._drawn = drawn
         return MarkerArray(markers=markers)
 
-    def _walked(self, track, now_ns):
-        """Where a track was on the floor, and is; what is later than now is from before a jump in time."""
+    def _extended_history(self, track, now_ns):
+        """History of a track with its current position, without steps that a jump back in time makes future ones."""
         oldest_ns = now_ns - int(self._params.marker_history * NS)
         foot_m = track.position_m + _to_foot(track)
-        before = self._histories.get(track.id, Walk(foot_m, []))
+        before = self._histories.get(track.id, PathHistory(foot_m, []))
         steps = [step for step in before.steps if oldest_ns <= step[0] < now_ns]
         spacing_s = max(HISTORY_SPACING_S, self._params.marker_history / HISTORY_POINTS)
         if len(steps) > 1 and steps[-1][0] - steps[-2][0] < spacing_s * NS:
             steps.pop()
         anchor_m = before.anchor_m if steps else foot_m
-        return Walk(anchor_m, steps + [(now_ns, Point(*(foot_m - anchor_m)))])
+        return PathHistory(anchor_m, steps + [(now_ns, Point(*(foot_m - anchor_m)))])
 
-    # Each shape fills in a marker and says whether there is anything to draw.
+    # Each shape fills in a marker and returns whether there is anything to draw.
 
     def _cylinder(self, marker, track):
-        marker.type, marker.color = Marker.CYLINDER, _color(self._rgb(track), 0.65 if _seen(track) else 0.2)
+        marker.type, marker.color = Marker.CYLINDER, _color(self._rgb(track), 0.65 if _is_visible(track) else 0.2)
         marker.scale.x, marker.scale.y, marker.scale.z = track.size_m
         return True
 
     def _number(self, marker, track):
         marker.type, marker.scale.z = Marker.TEXT_VIEW_FACING, 0.35
         marker.pose.position = Point(*(track.position_m + [0, 0, track.size_m[2] / 2 + 0.2]))
-        marker.text = '%d' % track.id if _seen(track) else '%d?' % track.id
-        marker.color = _color(TEXT_COLORS[self._params.marker_color] if _seen(track) else GREY, 1.0)
+        marker.text = '%d' % track.id if _is_visible(track) else '%d?' % track.id
+        marker.color = _color(TEXT_COLORS[self._params.marker_color] if _is_visible(track) else GREY, 1.0)
         return True
 
     def _velocity(self, marker, track):
         return _fill_arrow(marker, track, VELOCITY_SHOWN_S * track.instant_velocity_mps, RED, VELOCITY_WIDTHS_M)
 
     def _prediction(self, marker, track):
-        way_m = track.prediction_m[-1] - track.position_m if len(track.prediction_m) else np.zeros(3)
-        return _fill_arrow(marker, track, way_m, GREEN, PREDICTION_WIDTHS_M)
+        offset_m = track.prediction_m[-1] - track.position_m if len(track.prediction_m) else np.zeros(3)
+        return _fill_arrow(marker, track, offset_m, GREEN, PREDICTION_WIDTHS_M)
 
     def _history(self, marker, track):
         anchor_m, steps = self._histories[track.id]
@@ -180,25 +180,25 @@ class MarkerWriter(object):
         return COLORS[self._params.marker_color](track)
 
 
-def _seen(track):
+def _is_visible(track):
     return track.status == VISIBLE
 
 
 def _to_foot(track):
-    """From a track's centre to where it stands, just above the floor."""
-    return np.array([0, 0, ABOVE_FLOOR_M - track.size_m[2] / 2])
+    """Vector from the centre of a track to its foot, just above the floor."""
+    return np.array([0, 0, FLOOR_OFFSET_M - track.size_m[2] / 2])
 
 
-def _fill_arrow(marker, track, way_m, rgb, widths_m):
-    """From the centre of the object, where the marker's pose is, along `way_m`."""
-    marker.type, marker.color = Marker.ARROW, _color(rgb, 1.0 if _seen(track) else 0.4)
-    marker.points = [Point(), Point(*way_m)]
+def _fill_arrow(marker, track, offset_m, rgb, widths_m):
+    """Make the marker an arrow from the centre of the track along `offset_m`."""
+    marker.type, marker.color = Marker.ARROW, _color(rgb, 1.0 if _is_visible(track) else 0.4)
+    marker.points = [Point(), Point(*offset_m)]
     marker.scale.x, marker.scale.y = widths_m
-    return np.linalg.norm(way_m) >= SHORTEST_ARROW_M
+    return np.linalg.norm(offset_m) >= MIN_ARROW_M
 
 
 def _ellipses(covariances_m2, centers_m):
-    """Outlines, closed, of the ellipses that hold 95 % of planar covariances (n, 2, 2), around centres (n, 3).
+    """Closed outlines of the 95 % confidence ellipses of planar covariances (n, 2, 2) at centres (n, 3).
 
     Returns
     -------
@@ -206,12 +206,12 @@ def _ellipses(covariances_m2, centers_m):
     """
     variances_m2, axes = np.linalg.eigh(covariances_m2)
     semi_axes_m = np.sqrt(CHI2_95 * np.maximum(variances_m2, 0))
-    around_m = np.matmul(CIRCLE * semi_axes_m[:, np.newaxis], axes.transpose(0, 2, 1))
-    outlines_m = (around_m + centers_m[:, np.newaxis, :2]).tolist()
+    offsets_m = np.matmul(CIRCLE * semi_axes_m[:, np.newaxis], axes.transpose(0, 2, 1))
+    outlines_m = (offsets_m + centers_m[:, np.newaxis, :2]).tolist()
     return [[Point(x, y, z) for x, y in outline_m] for outline_m, z in zip(outlines_m, centers_m[:, 2].tolist())]
 
 
 @functools.lru_cache(maxsize=None)
 def _color(rgb, alpha):
-    """Markers share their colours: there are few, and nobody changes them."""
+    """Colour message. Markers share these messages, which must not be modified."""
     return ColorRGBA(*(rgb + (alpha,)))

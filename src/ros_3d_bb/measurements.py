@@ -1,8 +1,8 @@
-"""Read a measurement session: a folder of colour and depth images with boxes, estimates and ground truth.
+"""Reader of measurement sessions: folders of colour and depth images with boxes, estimates and ground truth.
 
-The folder holds `frames.json` with the camera (its lens distortion as k1, k2, p1, p2, k3 of plumb_bob, unless it names
-another model) and the frames, colour as 8-bit PNG and depth as 16-bit PNG in units of the camera's depth_scale, never
-normalised. Lengths in the file are millimetres, here metres. doc/session.md describes all of it.
+The folder contains `frames.json` with the camera (lens distortion as k1, k2, p1, p2, k3 of plumb_bob, unless it names
+another model) and the frames, colour images as 8-bit PNG, and depth images as 16-bit PNG in units of the camera's
+depth_scale. Lengths are in millimetres in the file and in metres here. doc/session.md describes the format.
 """
 import contextlib
 import json
@@ -19,17 +19,16 @@ from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.geometry import Camera
 from ros_3d_bb.session_file import FILE_NAME
 
-SAME_PERSON_IOU = 0.3  # half of a body is what a detector may have seen of it; two people seldom overlap so much
+SAME_PERSON_IOU = 0.3  # low, because a detector may find half of a body; boxes of two people seldom overlap so much
 
 
 class SessionError(ValueError):
-    """A measurement session that cannot be read: says which file, what is wrong and what was expected."""
+    """Measurement session that cannot be read. The message names the file, the fault, and what was expected."""
 
 
 class Detection(NamedTuple):
-    """A person that was found in an image: `box_px` (x1, y1, x2, y2), `estimate_m` (x, y, z) in the optical frame,
-    `size_m` (width, height), `support` and `truncated` as in estimation.Box3D; None where not stored. `by_hand`:
-    somebody drew the box.
+    """Person in an image: `box_px` (x1, y1, x2, y2), `estimate_m` (x, y, z) in the optical frame, `size_m` (width,
+    height), `support` and `truncated` as in estimation.Box3D; None if not stored. `by_hand`: a user drew the box.
     """
 
     box_px: Optional[Tuple[int, int, int, int]]
@@ -41,9 +40,9 @@ class Detection(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """One measurement. `person` is the number of the detection whose truth is given; `truth_m` (x, z) and `truth_y_m`
-    are in the optical frame; None where not annotated. `rejected` says why it is not to be used, `stamp_ns` when the
-    image was taken, where stored.
+    """One measurement. `person` is the index of the detection that the ground truth belongs to; `truth_m` (x, z) and
+    `truth_y_m` are in the optical frame; None if not annotated. `rejected` is the reason why the measurement is
+    excluded, or None. `stamp_ns` is the stamp of the image, or None if not stored.
     """
 
     id: str
@@ -59,25 +58,25 @@ class Frame(NamedTuple):
 
     @property
     def boxes_px(self):
-        """The 2D boxes of the people, that of the person first; none where that is not stored.
+        """2D boxes of the people, beginning with the annotated person; empty if the box of that person is not stored.
 
-        One of the person that was drawn by hand replaces the others of the same person.
+        A box drawn by hand replaces detected boxes of the same person.
         """
         if not self.detections or self.detections[self.person].box_px is None:
             return ()
         person = self.detections[self.person]
         others_px = tuple(detection.box_px for number, detection in enumerate(self.detections)
                           if number != self.person and detection.box_px is not None)
-        return (person.box_px,) + (others_than(person.box_px, others_px) if person.by_hand else others_px)
+        return (person.box_px,) + (boxes_of_others(person.box_px, others_px) if person.by_hand else others_px)
 
     @property
     def estimate_m(self):
-        """The stored position (3,) of the person, or None."""
+        """Stored position (3,) of the annotated person, or None."""
         return self.detections[self.person].estimate_m if self.detections else None
 
 
 class Session(NamedTuple):
-    """A measurement session: camera, metres per depth unit, camera frame."""
+    """Measurement session: camera, metres per depth unit, camera frame, and measurements."""
 
     camera: Camera
     depth_scale_m: float
@@ -86,23 +85,23 @@ class Session(NamedTuple):
 
 
 def read_session(folder):
-    """Read the `frames.json` of a session, without the rejected frames; images are read by `read_color`, `read_depth`.
+    """Read the `frames.json` of a session, without rejected frames. `read_color` and `read_depth` read the images.
 
     Raises
     ------
     SessionError
-        If the folder holds no session, or a field is missing or wrong.
+        If the folder is not a session, or a field is missing or invalid.
     """
     content, path = read_description(folder), os.path.join(str(folder), FILE_NAME)
-    with refusing(path):
+    with session_errors(path):
         return Session(*camera_of(content), tuple(_used_frames(str(folder), content['frames'], path)))
 
 
 def read_description(folder):
-    """The content of `frames.json` of a folder, a dictionary whose fields are not checked. Raises SessionError."""
+    """Content of the `frames.json` of a folder as a dictionary, whose fields are not checked. Raises SessionError."""
     path = os.path.join(str(folder), FILE_NAME)
     try:
-        with refusing(path), open(path, encoding='utf-8') as stream:
+        with session_errors(path), open(path, encoding='utf-8') as stream:
             content = json.load(stream)
     except OSError as error:
         raise SessionError('%s: not a measurement session (%s); expected a folder with frames.json, color/ and depth/'
@@ -113,8 +112,8 @@ def read_description(folder):
 
 
 @contextlib.contextmanager
-def refusing(where):
-    """Make a SessionError, whose text begins with `where`, of what reading a wrong description raises."""
+def session_errors(where):
+    """Convert exceptions from reading an invalid description to a SessionError, whose text starts with `where`."""
     try:
         yield
     except SessionError:
@@ -126,7 +125,7 @@ def refusing(where):
 
 
 def camera_of(content):
-    """(Camera, metres per depth unit, camera frame) of a description. What it raises, see `refusing`."""
+    """(Camera, metres per depth unit, camera frame) of a description. For exceptions see `session_errors`."""
     camera = content['camera']
     if not 0 < float(camera['depth_scale']) < 1:
         raise ValueError('depth_scale is %s; metres per unit expected, such as 0.001' % camera['depth_scale'])
@@ -136,17 +135,17 @@ def camera_of(content):
 
 
 def frame_of(folder, entry):
-    """The Frame of an entry of a description. What it raises, see `refusing`."""
+    """Frame of an entry of a description. For exceptions see `session_errors`."""
     if not isinstance(entry, dict):
-        raise ValueError('%.60r is no measurement' % (entry,))
-    # a session of one box a frame has its fields in the frame itself
-    described = entry.get('detections') or ([entry] if {'box', 'estimate_mm', 'original_mm'} & set(entry) else [])
+        raise ValueError('a measurement is %.60r; an object expected' % (entry,))
+    # sessions with one box per frame store the fields of the detection in the frame
+    detections = entry.get('detections') or ([entry] if {'box', 'estimate_mm', 'original_mm'} & set(entry) else [])
     person, truth_mm, stamp = int(entry.get('person', 0)), entry.get('truth_mm'), entry.get('stamp')
-    if not 0 <= person < max(1, len(described)):
-        raise ValueError('person is %d, where there are %d detections' % (person, len(described)))
+    if not 0 <= person < max(1, len(detections)):
+        raise ValueError('person is %d, but there are %d detections' % (person, len(detections)))
     return Frame(
         str(entry['id']), os.path.join(folder, entry['color']), os.path.join(folder, entry['depth']),
-        tuple(_detection_from(detection) for detection in described), person,
+        tuple(_detection_from(detection) for detection in detections), person,
         None if truth_mm is None else _numbers([truth_mm['x'], truth_mm['z']], 2) / 1000,
         None if truth_mm is None or truth_mm.get('y') is None else _numbers([truth_mm['y']], 1)[0] / 1000,
         None if not entry.get('rejected') else str(entry['rejected']), None if stamp is None else _stamp_ns_from(stamp),
@@ -154,47 +153,51 @@ def frame_of(folder, entry):
 
 
 def read_color(frame, camera):
-    """The colour image of a frame, (height, width, 3), uint8, RGB; of any size without camera. Raises SessionError."""
+    """Read the colour image of a frame, (height, width, 3), uint8, RGB. If `camera` is None, any size is accepted.
+
+    Raises SessionError.
+    """
     image = read_image(frame.color_path, camera)
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
-        raise SessionError('%s: an 8-bit colour image was expected' % frame.color_path)
+        raise SessionError('%s: 8-bit colour image expected' % frame.color_path)
     return image[..., ::-1]
 
 
 def read_depth(frame, session):
-    """The depth image of a frame. Raises SessionError."""
+    """Read the depth image of a frame. Raises SessionError."""
     image = read_image(frame.depth_path, session.camera)
     if image.dtype != np.uint16 or image.ndim != 2:
-        raise SessionError('%s: a 16-bit depth image with one channel was expected; depth stored with 8 bits has lost '
-                           'its scale' % frame.depth_path)
+        raise SessionError('%s: 16-bit depth image with one channel expected; 8-bit images have no depth scale'
+                           % frame.depth_path)
     return DepthImage(image, session.depth_scale_m)
 
 
 def read_image(path, camera=None):
-    """Any image as it is stored, (height, width, ...). Raises SessionError, also where it has not the camera's size."""
+    """Read an image (height, width, ...) as it is stored. Raises SessionError, also if its size is not the camera's."""
     try:
         image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
-    except cv2.error:  # more pixels than OpenCV reads
+    except cv2.error:  # more pixels than OpenCV accepts
         image = None
     if image is None:
         raise SessionError('%s: missing, or not an image' % path)
     if camera is not None and image.shape[:2] != (camera.height, camera.width):
-        raise SessionError('%s: %d x %d pixels, where the camera has %d x %d'
+        raise SessionError('%s: %d x %d pixels, but the camera has %d x %d'
                            % (path, image.shape[1], image.shape[0], camera.width, camera.height))
     return image
 
 
-def others_than(box_px, boxes_px):
-    """Those of some 2D boxes that overlap another one too little to be of the same person; a tuple."""
+def boxes_of_others(box_px, boxes_px):
+    """Select the 2D boxes that do not belong to the person of `box_px`, as they overlap it by at most SAME_PERSON_IOU.
+    """
     overlaps = iou(box_px, boxes_px)
-    return tuple(other for other, overlap in zip(boxes_px, overlaps) if overlap <= SAME_PERSON_IOU)
+    return tuple(other_px for other_px, overlap in zip(boxes_px, overlaps) if overlap <= SAME_PERSON_IOU)
 
 
 def _used_frames(folder, entries, path):
-    """Yield the Frames of the entries that are not rejected. Raises SessionError, which says what number."""
+    """Yield the Frames of entries that are not rejected. Raises SessionError with the number of an invalid entry."""
     for number, entry in enumerate(entries, 1):
         if not (isinstance(entry, dict) and entry.get('rejected')):
-            with refusing('%s, measurement number %d' % (path, number)):
+            with session_errors('%s, measurement number %d' % (path, number)):
                 yield frame_of(folder, entry)
 
 
@@ -209,7 +212,7 @@ def _detection_from(entry):
 
 
 def _stamp_ns_from(text):
-    """Nanoseconds of '<secs>.<nsecs, 9 digits>'. Raises ValueError."""
+    """Parse '<secs>.<nsecs, 9 digits>' to nanoseconds. Raises ValueError."""
     match = re.match(r'([0-9]{1,12})\.([0-9]{9})$', str(text))
     if match is None:
         raise ValueError('stamp is %.40r; seconds, a point and nine digits of nanoseconds expected' % (text,))
@@ -217,8 +220,8 @@ def _stamp_ns_from(text):
 
 
 def _numbers(values, count):
-    """`count` numbers as an array. Raises ValueError."""
+    """Convert `count` numbers to an array. Raises ValueError."""
     numbers = np.array(values, float)
     if numbers.shape != (count,) or not np.isfinite(numbers).all():
-        raise ValueError('%s is not %d numbers' % (str(values)[:100], count))
+        raise ValueError('%s are not %d finite numbers' % (str(values)[:100], count))
     return numbers

@@ -1,38 +1,38 @@
-"""Draw what the pipeline saw into images. Images are (height, width, 3), uint8, RGB, and drawn on in place."""
+"""Overlays of the pipeline's results on images. Images are (height, width, 3), uint8, RGB, and modified in place."""
 import cv2
 import numpy as np
 
 BOX_COLOR, TEXT_COLOR = (40, 220, 60), (0, 0, 0)
-OUTSIDE_PX = 4  # where an edge is drawn that nobody sees
+OUTSIDE_PX = 4  # edges outside the image are drawn at this distance from it
 VALID_COLOR, INVALID_COLOR, CORNER_COLOR = (255, 0, 0), (0, 0, 255), (160, 32, 240)
 
 
 def draw_boxes(image, boxes, labels):
-    """Draw 2D boxes (n, 4) with a label each, which may be empty. Returns the image."""
+    """Draw 2D boxes (n, 4) with labels, which may be empty. Returns the image."""
     height, width = image.shape[:2]
-    # OpenCV walks along all of an edge, also where that is outside: an edge of 2^31 pixels takes it a tenth of a second
-    seen = np.clip(np.reshape(boxes, (-1, 4)), -OUTSIDE_PX, [width + OUTSIDE_PX, height + OUTSIDE_PX] * 2)
-    for box, label in zip(np.rint(seen).astype(int).tolist(), labels):
+    # OpenCV also iterates over the parts of edges outside the image: an edge of 2^31 pixels takes a tenth of a second.
+    clipped = np.clip(np.reshape(boxes, (-1, 4)), -OUTSIDE_PX, [width + OUTSIDE_PX, height + OUTSIDE_PX] * 2)
+    for box, label in zip(np.rint(clipped).astype(int).tolist(), labels):
         cv2.rectangle(image, tuple(box[:2]), tuple(box[2:]), BOX_COLOR, 2)
         if not label:
             continue
-        (across, above), below = cv2.getTextSize(label, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)
-        top = max(box[1], above + below)  # inside the image, where the box begins above it
-        cv2.rectangle(image, (box[0], top - above - below), (box[0] + across, top), BOX_COLOR, cv2.FILLED)
-        cv2.putText(image, label, (box[0], top - below // 2 - 1), cv2.FONT_HERSHEY_SIMPLEX, 0.5, TEXT_COLOR, 1,
+        (text_width, text_height), baseline = cv2.getTextSize(label, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)
+        top = max(box[1], text_height + baseline)  # inside the image, even if the box starts above it
+        cv2.rectangle(image, (box[0], top - text_height - baseline), (box[0] + text_width, top), BOX_COLOR, cv2.FILLED)
+        cv2.putText(image, label, (box[0], top - baseline // 2 - 1), cv2.FONT_HERSHEY_SIMPLEX, 0.5, TEXT_COLOR, 1,
                     cv2.LINE_AA)
     return image
 
 
 def draw_caption(image, text):
-    """Write a line into the upper left corner. Returns the image."""
+    """Draw a line of text in the upper left corner. Returns the image."""
     return cv2.putText(image, text, (8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.8, TEXT_COLOR, 2, cv2.LINE_AA)
 
 
 def draw_samples(image, rect_px, samples):
-    """Draw the depth samples of a box as in the thesis' Fig. 3.5. Returns the image.
+    """Draw the depth samples of a box as in Fig. 3.5 of the thesis. Returns the image.
 
-    Red: depth measured; blue: no depth there; purple: the box's corners.
+    Red: valid depth; blue: no depth; purple: corners of the box.
     """
     height, width = image.shape[:2]
     x1, y1, x2, y2 = np.clip(rect_px, 0, [width, height] * 2).tolist()
@@ -43,16 +43,19 @@ def draw_samples(image, rect_px, samples):
     return image
 
 
-def visible_depth(depth, farthest_m):
-    """A depth image to look at: (height, width), uint8, from near (bright) to `farthest_m` (dark); 0 is no depth."""
+def depth_to_grey(depth, farthest_m):
+    """Convert a depth image to grey levels (height, width), uint8.
+
+    Depth from 0 to `farthest_m` is mapped to 255 to 1; 0 means no depth.
+    """
     depth_m = depth.values.astype(np.float32) * np.float32(depth.scale_m)
-    measured = np.isfinite(depth_m) & (depth_m > 0)
-    grey = 255 - 254 * np.clip(np.where(measured, depth_m, 0) / farthest_m, 0, 1)
-    return np.where(measured, grey, 0).astype(np.uint8)
+    valid = np.isfinite(depth_m) & (depth_m > 0)
+    grey = 255 - 254 * np.clip(np.where(valid, depth_m, 0) / farthest_m, 0, 1)
+    return np.where(valid, grey, 0).astype(np.uint8)
 
 
-def colors_of(grey):
-    """Colours of a depth image as `visible_depth` makes it: near is red, far blue, not measured black."""
+def colorize_depth(grey):
+    """Convert the output of `depth_to_grey` to colours: near is red, far is blue, no depth is black."""
     colors = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_JET)[..., ::-1])
     colors[grey == 0] = 0
     return colors

@@ -1,6 +1,6 @@
-"""A RealSense camera, or a recording of one, read with librealsense's own Python package.
+"""Driver of RealSense cameras and of their recordings, based on librealsense's Python package `pyrealsense2`.
 
-`pyrealsense2` is imported where it is needed: only who reads a camera with this module must have it.
+The package is optional: it is imported when a camera is opened.
 """
 import os
 import time
@@ -15,17 +15,17 @@ from ros_3d_bb.params import Param, parameters
 from ros_3d_bb.stamped import NS
 
 POLL_MS = 100
-LOST_S = 5.0  # without images a camera that is plugged in is taken for lost
-EXPOSURE_UNIT_S = 1e-4  # of the colour sensor's exposure
-# librealsense projects with both of the Brown-Conrady models that have an adjective by the same formulas.
+LOST_S = 5.0  # a camera that sends no images for this time is considered lost
+EXPOSURE_UNIT_S = 1e-4  # unit of the colour sensor's exposure
+# librealsense uses the same projection for the modified and the inverse Brown-Conrady model.
 DISTORTIONS = {'none': ('', 0), 'brown_conrady': (PLUMB_BOB, 5), 'modified_brown_conrady': (INVERSE_BROWN_CONRADY, 5),
                'inverse_brown_conrady': (INVERSE_BROWN_CONRADY, 5), 'kannala_brandt4': (EQUIDISTANT, 4)}
-# In the order in which librealsense recommends to use them.
+# In the order that librealsense recommends.
 FILTERS = ('decimation', 'disparity', 'spatial', 'temporal', 'hole_filling')
 
 
 class CameraLost(Exception):
-    """There is no such camera, or it sends nothing any more. It may come back."""
+    """The camera is not connected, or sends no images. It may become available again."""
 
 
 @parameters()
@@ -46,7 +46,7 @@ class RealSenseParams(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """What a camera saw at a time: `color` (h, w, 3) uint8 RGB, and `depth` with the same pixels."""
+    """Images of one time: `color` (h, w, 3), uint8, RGB, and `depth` aligned to it."""
 
     stamp_ns: int
     color: np.ndarray
@@ -54,20 +54,20 @@ class Pair(NamedTuple):
 
 
 class Stamps(object):
-    """From librealsense's timestamps to nanoseconds since 1970.
+    """Conversion of librealsense's timestamps to nanoseconds since 1970.
 
-    They count from 1970 already where librealsense knows the time ("global time", or time of arrival). A camera without
-    metadata gives its own clock instead, which starts anywhere, and starts again after 71 minutes: then the first image
-    has the time at which it came, and the others are as much later as the camera says.
+    Timestamps in global time or in time of arrival already count from 1970. A camera without metadata uses its own
+    clock instead, which has an arbitrary origin and overflows after 71 minutes. In this case the first image gets its
+    time of arrival, and the camera's clock gives the intervals to the following images.
     """
 
     def __init__(self):
         self._offset_ns, self._last_ns = None, None
 
     def stamp_ns(self, timestamp_ms, is_camera_clock, now_ns):
-        """The stamp of an image that came at `now_ns`."""
-        whole_ms = int(timestamp_ms)
-        time_ns = whole_ms * (NS // 1000) + int(round((timestamp_ms - whole_ms) * NS / 1000))
+        """Stamp of an image that arrived at `now_ns`."""
+        integer_ms = int(timestamp_ms)
+        time_ns = integer_ms * (NS // 1000) + int(round((timestamp_ms - integer_ms) * NS / 1000))
         if not is_camera_clock:
             return time_ns
         if self._last_ns is None or time_ns < self._last_ns:
@@ -77,41 +77,42 @@ class Stamps(object):
 
 
 class RealSense(object):
-    """An open camera, or a recording (`file`) of one; depth is aligned to colour. To be closed.
+    """Open camera, or recording (`file`) of a camera, with depth aligned to colour. Call `close` after use.
 
     Attributes
     ----------
     camera : Camera
-        Intrinsics of the colour stream, and so of the aligned depth.
+        Intrinsics of the colour stream and of the aligned depth.
     link_from_color : numpy.ndarray, (4, 4)
-        From the colour camera's body frame to that of the depth camera, which is the camera's `_link`: x ahead, z up.
+        Transform from the body frame of the colour camera to that of the depth camera, which is the camera's `_link`; x
+        points forward, z up.
     is_over : bool
         Whether a recording that is not repeated has ended.
 
     Raises
     ------
     CameraLost
-        If no such camera is plugged in.
+        If no such camera is connected.
     ValueError
-        If pyrealsense2 is missing, a parameter cannot be meant, or the recording cannot be played.
+        If pyrealsense2 is not installed, a parameter is invalid, or the recording cannot be played.
     """
 
     def __init__(self, params):
         check_params(params)
         self._rs = librealsense()
-        self._stamps, self.is_over, self._heard_s = Stamps(), False, time.monotonic()
+        self._stamps, self.is_over, self._last_image_s = Stamps(), False, time.monotonic()
         self._align, self._filters = self._rs.align(self._rs.stream.color), _filters(self._rs, params.filters)
         self._pipeline = self._rs.pipeline()
         try:
             config = _config(self._rs, params)
-            # Set up before it starts: a recording would lose its first images.
+            # Options are set before the start; otherwise a recording would lose its first images.
             device = config.resolve(self._rs.pipeline_wrapper(self._pipeline)).get_device()
             self._playback = device.as_playback() if params.file else None
             self._set_up(device, params)
             profile = self._pipeline.start(config)
             color, depth = (profile.get_stream(stream).as_video_stream_profile()
                             for stream in (self._rs.stream.color, self._rs.stream.depth))
-            # A float of librealsense is 0.0010000000474974513 where 0.001 is meant.
+            # librealsense stores 0.001 as the float 0.0010000000474974513.
             self._depth_scale_m = float('%.6g' % device.first_depth_sensor().get_depth_scale())
             self.link_from_color = link_from_color(color.get_extrinsics_to(depth))
         except RuntimeError as error:
@@ -123,35 +124,35 @@ class RealSense(object):
         self.camera = camera_from_intrinsics(color.get_intrinsics())
 
     def read(self):
-        """The next pair of images, or None where none has come for a moment.
+        """Return the next pair of images, or None if no images arrive within POLL_MS.
 
         Raises
         ------
         CameraLost
-            If none have come for `LOST_S`: the camera is unplugged, or hangs.
+            If no images have arrived for `LOST_S`: the camera is unplugged, or hangs.
         ValueError
-            If there is no pair in what came; the next may be better.
+            If the images are incomplete. Later images may be complete.
         """
         try:
-            came, frames = self._pipeline.try_wait_for_frames(POLL_MS)
+            has_frames, frames = self._pipeline.try_wait_for_frames(POLL_MS)
         except RuntimeError as error:
             raise CameraLost('the RealSense failed: %s' % error)
         now_s = time.monotonic()
-        if came:
-            self._heard_s = now_s
+        if has_frames:
+            self._last_image_s = now_s
             return self._pair(frames)
         if self._playback is not None:
             self.is_over = self._playback.current_status() == self._rs.playback_status.stopped
-        elif now_s - self._heard_s > LOST_S:
+        elif now_s - self._last_image_s > LOST_S:
             raise CameraLost('the RealSense has sent no images for %.0f s' % LOST_S)
         return None
 
     def close(self):
-        """Stop the camera, or the recording."""
+        """Stop the camera or the recording."""
         try:
             self._pipeline.stop()
         except RuntimeError:
-            pass  # it is gone already
+            pass  # the camera is already disconnected
 
     def _pair(self, frames):
         try:
@@ -161,7 +162,7 @@ class RealSense(object):
                 frames = a_filter.process(frames).as_frameset()
             frames = self._align.process(frames)
             color, depth = frames.get_color_frame(), frames.get_depth_frame()
-            # One stamp for both, that of depth, of which positions are made.
+            # Both images get the stamp of depth, because depth determines positions.
             own_clock = depth.get_frame_timestamp_domain() == self._rs.timestamp_domain.hardware_clock
             stamp_ns = self._stamps.stamp_ns(depth.get_timestamp(), own_clock, int(time.time() * NS))
             return Pair(stamp_ns, rgb_of(np.array(color.get_data()), color.get_profile().format().name),
@@ -170,7 +171,7 @@ class RealSense(object):
             raise ValueError('librealsense could not align depth to colour: %s' % error)
 
     def _set_up(self, device, params):
-        """Options of the sensors; what a camera does not have is left alone."""
+        """Set the options of the sensors. Options that a camera does not have are skipped."""
         if self._playback is not None:
             self._playback.set_real_time(params.real_time)
             return
@@ -178,13 +179,13 @@ class RealSense(object):
         for sensor in device.query_sensors():
             _set(sensor, option.global_time_enabled, 1)
         _set(color, option.enable_auto_exposure, 0 if params.exposure else 1)
-        _set(color, option.auto_exposure_priority, 0)  # the rate stays where it is dark
+        _set(color, option.auto_exposure_priority, 0)  # keeps the rate constant in the dark
         if params.exposure:
             _set(color, option.exposure, round(params.exposure / EXPOSURE_UNIT_S))
 
 
 def librealsense():
-    """The package pyrealsense2. Raises ValueError where it is missing."""
+    """Import the package pyrealsense2. Raises ValueError if it is not installed."""
     try:
         import pyrealsense2
     except ImportError as error:
@@ -200,7 +201,7 @@ def check_params(params):
 
 
 def camera_from_intrinsics(intrinsics):
-    """The Camera of librealsense's intrinsics. Raises ValueError where its distortion model is not known."""
+    """Convert librealsense's intrinsics to a Camera. Raises ValueError if the distortion model is unknown."""
     name = intrinsics.model.name
     if name not in DISTORTIONS:
         raise ValueError('distortion model of the RealSense is %s; one of %s expected' % (name, ', '.join(DISTORTIONS)))
@@ -210,7 +211,7 @@ def camera_from_intrinsics(intrinsics):
 
 
 def link_from_color(extrinsics):
-    """The (4, 4) transform between the body frames, of librealsense's extrinsics between the optical ones.
+    """Transform (4, 4) between the body frames from librealsense's extrinsics between the optical frames.
 
     Parameters
     ----------
@@ -225,12 +226,12 @@ def link_from_color(extrinsics):
 
 
 def frame_links(prefix, link_from_color_body):
-    """The frames of a camera as realsense2_camera has them: (parent, child, parent_from_child), ...
+    """Frames of a camera with the names of realsense2_camera: ((parent, child, parent_from_child), ...).
 
     Parameters
     ----------
     prefix : str
-        `camera` makes camera_link, camera_color_frame, camera_color_optical_frame, and the same for depth.
+        For `camera` the frames are camera_link, camera_color_frame, camera_color_optical_frame, and the same for depth.
     link_from_color_body : numpy.ndarray, (4, 4)
     """
     links, body_from_optical = [], transform_from((0, 0, 0), OPTICAL_ROTATION)
@@ -242,12 +243,13 @@ def frame_links(prefix, link_from_color_body):
 
 
 def optical_frame(prefix, stream):
-    """The name of the optical frame of a stream: color or depth."""
+    """Name of the optical frame of a stream, color or depth."""
     return '%s_%s_optical_frame' % (prefix, stream)
 
 
 def rgb_of(pixels, format_name):
-    """Pixels (h, w, 3) as RGB. Raises ValueError where a recording has others than librealsense can have made so."""
+    """Convert pixels (h, w, 3) to RGB. Raises ValueError for formats that librealsense does not convert to RGB or BGR.
+    """
     if format_name == 'bgr8':
         return pixels[..., ::-1]
     if format_name != 'rgb8':
@@ -258,7 +260,7 @@ def rgb_of(pixels, format_name):
 def _config(rs, params):
     config = rs.config()
     if params.file:
-        config.enable_device_from_file(params.file, params.repeat)  # with all streams that are in it
+        config.enable_device_from_file(params.file, params.repeat)  # enables all streams in the file
         return config
     if params.serial:
         config.enable_device(params.serial)
@@ -268,10 +270,10 @@ def _config(rs, params):
 
 
 def _filters(rs, names):
-    """Filters of depth in their order; between the two ends of `disparity` they work on disparity."""
-    made = {'decimation': rs.decimation_filter, 'spatial': rs.spatial_filter, 'temporal': rs.temporal_filter,
-            'hole_filling': rs.hole_filling_filter, 'disparity': lambda: rs.disparity_transform(True)}
-    filters = [made[name]() for name in FILTERS if name in names]
+    """Depth filters in the recommended order. With `disparity`, spatial and temporal filters work on disparity."""
+    factories = {'decimation': rs.decimation_filter, 'spatial': rs.spatial_filter, 'temporal': rs.temporal_filter,
+                 'hole_filling': rs.hole_filling_filter, 'disparity': lambda: rs.disparity_transform(True)}
+    filters = [factories[name]() for name in FILTERS if name in names]
     if 'disparity' in names:
         filters.insert(len(filters) - ('hole_filling' in names), rs.disparity_transform(False))
     return filters

@@ -1,7 +1,7 @@
-"""Append measurements to a measurement session, as `measurements` reads them; each as a whole or not at all.
+"""Writer of measurement sessions. Measurements are appended atomically; `measurements` reads them.
 
-The images come first, so that frames.json never names one that is not there. Lengths in the file are millimetres, here
-metres.
+Images are written before frames.json, so that frames.json never refers to a missing image. Lengths are in millimetres
+in the file and in metres here.
 """
 import os
 import re
@@ -17,16 +17,29 @@ from ros_3d_bb.session_file import FILE_NAME, changing, write_whole
 from ros_3d_bb.stamped import NS
 
 MILLIMETRE = 0.001
-FARTHEST_MM = 65535  # that 16 bits hold
-OWN_ID = re.compile(r'(\d+)_\d+_\d{9}$')
+MAX_DEPTH_MM = 65535  # of 16 bits
+ID_FORMAT = re.compile(r'(\d+)_\d+_\d{9}$')
 
 
 class Measurement(NamedTuple):
-    """What is stored of one image.
+    """One measurement to be stored.
 
-    `color` (height, width, 3), uint8, RGB; `depth` in pixels of the colour image; `frame_id` of the camera; `stamp_ns`
-    integer nanoseconds; `rects_px` the 2D boxes (x1, y1, x2, y2); `boxes` the 3D boxes made of them, of which some may
-    be missing; `label` of whoever takes the measurement, may be empty.
+    Attributes
+    ----------
+    color : numpy.ndarray, (height, width, 3), uint8
+        RGB.
+    depth : DepthImage
+        Aligned to colour.
+    camera : Camera
+    frame_id : str
+        Frame of the camera.
+    stamp_ns : int
+    rects_px : tuple of (x1, y1, x2, y2)
+        2D boxes.
+    boxes : tuple of Box3D
+        3D boxes that were estimated from the 2D boxes; some may be missing.
+    label : str
+        Name given by the user; may be empty.
     """
 
     color: np.ndarray
@@ -40,16 +53,16 @@ class Measurement(NamedTuple):
 
 
 class Appended(NamedTuple):
-    """The id of a new measurement, and how many there are now in its session."""
+    """ID of a new measurement, and the number of measurements in its session."""
 
     id: str
     count: int
 
 
 def append(folder, measurement):
-    """Append a measurement to the session in a folder, which is made where there is none.
+    """Append a measurement to the session in a folder. The folder is created if it does not exist.
 
-    Its id is a number one above the largest there, and the stamp; nothing is ever overwritten.
+    The ID consists of the next free number and the stamp. Nothing is overwritten.
 
     Returns
     -------
@@ -58,10 +71,10 @@ def append(folder, measurement):
     Raises
     ------
     ValueError
-        If the folder holds something else than a session, or one of another camera, or the measurement cannot be
-        stored. The session is then as it was.
+        If the folder is not a session, the session is of another camera, or the measurement cannot be stored. The
+        session is unchanged.
     OSError
-        If it cannot be written. The session is then as it was.
+        If the session cannot be written. It is unchanged.
     """
     depth = stored_depth(measurement.depth)
     _check_sizes(measurement)
@@ -86,42 +99,42 @@ def append(folder, measurement):
 
 
 def stored_depth(depth):
-    """A depth image as a session holds it: 16 bits, unscaled; metres (32FC1) are rounded to millimetres.
+    """Convert a depth image to the format of sessions: 16 bits, unscaled.
 
-    What a camera that counts in whole units measured is kept as it is. Depth in metres that is not finite, not
-    positive or beyond 65.535 m becomes 0, not measured.
+    Integer depth is kept as it is. Depth in metres (32FC1) is rounded to millimetres; values that are not finite, not
+    positive or more than 65.535 m become 0, no depth.
     """
     if depth.values.dtype.kind == 'u' and depth.values.dtype.itemsize == 2:
         return DepthImage(depth.values.astype(np.uint16), depth.scale_m)
     with np.errstate(invalid='ignore', over='ignore'):
         depth_mm = np.rint(depth.values.astype(float) * (depth.scale_m / MILLIMETRE))
-        measured = (depth_mm > 0) & (depth_mm <= FARTHEST_MM)
-    return DepthImage(np.where(measured, depth_mm, 0).astype(np.uint16), MILLIMETRE)
+        valid = (depth_mm > 0) & (depth_mm <= MAX_DEPTH_MM)
+    return DepthImage(np.where(valid, depth_mm, 0).astype(np.uint16), MILLIMETRE)
 
 
 def _check_sizes(measurement):
     expected = (measurement.camera.height, measurement.camera.width)
     for name, pixels in (('colour', measurement.color), ('depth', measurement.depth.values)):
         if pixels.shape[:2] != expected:
-            raise ValueError('the %s image has %d x %d pixels, where the camera has %d x %d; depth must be aligned to '
-                             'colour' % ((name,) + pixels.shape[1::-1] + measurement.camera[:2]))
+            raise ValueError('the %s image has %d x %d pixels and the camera has %d x %d; depth aligned to colour '
+                             'expected' % ((name,) + pixels.shape[1::-1] + measurement.camera[:2]))
 
 
 def _check_camera(folder, measurement, scale_m):
-    """Raise ValueError where the session in the folder, if there is one, is of another camera."""
+    """Raise ValueError if the folder contains a session of another camera."""
     if not os.path.exists(os.path.join(folder, FILE_NAME)):
         return
     session = read_session(folder)
-    for name, stored, own in (('intrinsics', tuple(session.camera), tuple(measurement.camera)),
-                              ('depth scale', session.depth_scale_m, scale_m),
-                              ('frame', session.frame_id, measurement.frame_id)):
-        if stored != own:
-            raise ValueError('the session in %s is of another camera: its %s is %s, here it is %s; choose another '
-                             'folder' % (folder, name, stored, own))
+    for name, stored, actual in (('intrinsics', tuple(session.camera), tuple(measurement.camera)),
+                                 ('depth scale', session.depth_scale_m, scale_m),
+                                 ('frame', session.frame_id, measurement.frame_id)):
+        if stored != actual:
+            raise ValueError('the session in %s was recorded by another camera: its %s is %s, but this camera\'s is '
+                             '%s; choose another folder' % (folder, name, stored, actual))
 
 
 def _next_id(entries, stamp_ns):
-    numbers = [int(match.group(1)) for match in (OWN_ID.match(str(entry['id'])) for entry in entries) if match]
+    numbers = [int(match.group(1)) for match in (ID_FORMAT.match(str(entry['id'])) for entry in entries) if match]
     return '%05d_%d_%09d' % ((max([len(entries)] + numbers) + 1,) + divmod(stamp_ns, NS))
 
 
@@ -143,32 +156,32 @@ def _frame_entry(measurement, name):
 
 
 def _detections(measurement):
-    """One entry for each 2D box, with what is known of its 3D box, and for 3D boxes whose 2D box is not there."""
+    """Entries of the 2D boxes with their 3D boxes, and of 3D boxes whose 2D box is missing."""
     boxes, entries = list(measurement.boxes), []
     width, height = measurement.camera[:2]
     for rect_px in measurement.rects_px:
-        inside_px = tuple(np.clip(rect_px, 0, [width, height] * 2).tolist())  # as far as a message tells
-        found = next((box for box in boxes if tuple(box.rect_px) in (inside_px, tuple(rect_px))), None)
+        inside_px = tuple(np.clip(rect_px, 0, [width, height] * 2).tolist())  # 3D boxes in messages are clipped
+        match = next((box for box in boxes if tuple(box.rect_px) in (inside_px, tuple(rect_px))), None)
         entry = {'box': [int(edge) for edge in rect_px]}
-        if found is not None:
-            boxes = [box for box in boxes if box is not found]
-            entry.update(box_entry(found))
+        if match is not None:
+            boxes = [box for box in boxes if box is not match]
+            entry.update(box_entry(match))
         entries.append(entry)
     return entries + [dict(box_entry(box), box=[int(edge) for edge in box.rect_px]) for box in boxes]
 
 
 def box_entry(box):
-    """What a detection has of a Box3D, its 2D box aside. Raises ValueError where that is not finite."""
+    """Fields of a detection that describe a Box3D, without its 2D box. Raises ValueError if one is not finite."""
     values_m = np.append(box.center_m, box.size_m[:2])
     if not np.isfinite(values_m).all():
-        raise ValueError('a 3D box has centre %s and size %s; finite expected' % (box.center_m, box.size_m))
+        raise ValueError('a 3D box has centre %s and size %s; finite numbers expected' % (box.center_m, box.size_m))
     values_mm = [round(1000 * value, 3) for value in values_m.tolist()]
     return {'estimate_mm': values_mm[:3], 'size_mm': values_mm[3:], 'support': round(float(box.support), 6),
             'truncated': bool(box.truncated)}
 
 
 def _png(pixels):
-    done, data = cv2.imencode('.png', np.ascontiguousarray(pixels))
-    if not done:
+    is_encoded, data = cv2.imencode('.png', np.ascontiguousarray(pixels))
+    if not is_encoded:
         raise ValueError('an image of type %s and shape %s cannot be written as PNG' % (pixels.dtype, pixels.shape))
     return data.tobytes()

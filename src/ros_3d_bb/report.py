@@ -1,4 +1,4 @@
-"""From the bag of a scene with ground truth to a report: a picture, and a table of errors and numbers."""
+"""Report on the bag of a scene with ground truth: an image of the scene, and a table of tracking metrics."""
 import argparse
 import os
 import sys
@@ -23,8 +23,18 @@ PANELS = 6
 
 
 class Recording(NamedTuple):
-    """What a bag holds of a scene: `moments`, one for each image of it, without tracks where no answer came; how many
-    were `answered`; `boxes` (n, 4) by stamp; the robot's path (n, 2) in the map.
+    """Scene in a bag.
+
+    Attributes
+    ----------
+    moments : list of Moment
+        One per image, with an empty list of tracks if the tracker did not publish a message for the image.
+    answered : int
+        Number of images for which the tracker published a message.
+    boxes : dict
+        2D boxes (n, 4) by stamp.
+    robot : numpy.ndarray, (n, 2)
+        Path of the robot in the map.
     """
 
     moments: list
@@ -34,12 +44,12 @@ class Recording(NamedTuple):
 
 
 def read_recording(bag):
-    """Read tracks and ground truth of an open bag.
+    """Read the tracks and the ground truth in an open bag.
 
     Raises
     ------
     ValueError
-        If one of them is missing, or they are not in the same frame; says what was expected.
+        If one of them is missing, or their frames differ.
     """
     truth, tracks, boxes, links, robot = {}, {}, {}, {}, []
     boxes_topics = topics_of_cameras(bag, BOXES_TOPIC)
@@ -50,8 +60,8 @@ def read_recording(bag):
             if {(MAP_FRAME, ODOM_FRAME), (ODOM_FRAME, BASE_FRAME)} <= set(links):
                 robot.append(links[MAP_FRAME, ODOM_FRAME].dot(links[ODOM_FRAME, BASE_FRAME])[:2, 3])
         elif topic in boxes_topics:
-            found = boxes2d_from_message(message)
-            boxes[found.stamp_ns] = found.boxes
+            boxes2d = boxes2d_from_message(message)
+            boxes[boxes2d.stamp_ns] = boxes2d.boxes
         else:
             by_stamp = truth if topic == '/' + TRUTH_TOPIC else tracks
             by_stamp[stamp_of(message)] = message
@@ -60,7 +70,7 @@ def read_recording(bag):
             raise ValueError('the bag has no messages on /%s; a recorded run of simulation.launch expected' % name)
     frames = set(message.header.frame_id for by_stamp in (truth, tracks) for message in by_stamp.values())
     if len(frames) > 1:
-        raise ValueError('truth and tracks are in the frames %s; one frame expected' % ', '.join(sorted(frames)))
+        raise ValueError('truth and tracks have the frames %s; one frame expected' % ', '.join(sorted(frames)))
     moments = [Moment(stamp_ns, tracks_from_message(truth[stamp_ns]),
                       tracks_from_message(tracks[stamp_ns]) if stamp_ns in tracks else [])
                for stamp_ns in sorted(truth)]
@@ -68,13 +78,13 @@ def read_recording(bag):
 
 
 def topics_of_cameras(bag, topic):
-    """What a topic is called in an open bag: as it is for the only camera, or that of each of several."""
+    """Names of a camera topic in an open bag: one name for each camera."""
     ending = topic_of('?', topic)[1:]
     return [name for name in bag.get_type_and_topic_info().topics if name.endswith(ending)]
 
 
 def paths_of(recording):
-    """Who was where, for the view from above."""
+    """Paths of people, tracks and robot, for the top view."""
     people, tracks = {}, {}
     for moment in recording.moments:
         for person in moment.truth:
@@ -86,7 +96,7 @@ def paths_of(recording):
 
 
 def panels_of(bag, recording, count=PANELS):
-    """The colour images of moments spread over the scene, with their 2D boxes: of those that were searched, if any."""
+    """Colour images at regular intervals with their 2D boxes. Images with a message of 2D boxes are preferred."""
     stamps = [moment.stamp_ns for moment in recording.moments]
     stamps = [stamp_ns for stamp_ns in stamps if stamp_ns in recording.boxes] or stamps
     wanted = set(stamps[pick] for pick in np.linspace(0, len(stamps) - 1, count + 2)[1:-1].astype(int))
@@ -109,23 +119,23 @@ def write_report(bag_path, picture_path):
         picture = scene_picture(panels_of(bag, recording), paths_of(recording), lines)
     try:
         written = cv2.imwrite(picture_path, np.ascontiguousarray(picture[..., ::-1]))
-    except cv2.error:  # a name without an ending that it knows
+    except cv2.error:  # unknown suffix
         written = False
     if not written:
-        raise OSError('%s cannot be written; a name that ends in .png or .jpg expected' % picture_path)
+        raise OSError('%s cannot be written; a file name with the suffix .png or .jpg expected' % picture_path)
     return lines
 
 
 def main():
-    """The command `scene_report`."""
+    """Run the command `scene_report`."""
     parser = argparse.ArgumentParser(prog='scene_report', description=__doc__)
     parser.add_argument('bag', help='a bag recorded by simulation.launch record:=...')
-    parser.add_argument('picture', nargs='?', help='where to write the picture (default: beside the bag, .png)')
+    parser.add_argument('picture', nargs='?', help='image file to write (default: the name of the bag with .png)')
     arguments = parser.parse_args()
     picture = arguments.picture or os.path.splitext(arguments.bag)[0] + '.png'
     try:
         lines = write_report(arguments.bag, picture)
     except (ValueError, OSError, rosbag.ROSBagException) as error:
-        print('scene_report: %s; no report was written' % error, file=sys.stderr)
+        print('scene_report: %s: %s; no report was written' % (arguments.bag, error), file=sys.stderr)
         sys.exit(1)
     print('\n'.join(lines + ['picture: %s' % picture]))

@@ -1,4 +1,4 @@
-"""Write the frames.json of a measurement session: whole or not at all, and one program at a time."""
+"""Atomic writing of files, and locked updates of the frames.json of a measurement session."""
 import contextlib
 import fcntl
 import json
@@ -10,10 +10,10 @@ FILE_NAME = 'frames.json'
 
 @contextlib.contextmanager
 def changing(folder):
-    """Hold the description of a session and write it when the block ends without an error.
+    """Update the description of a session: it is locked, and written when the block ends without an error.
 
-    Another program that does the same waits meanwhile, so the viewer may add measurements to a session that is being
-    annotated. The file is replaced as a whole: who is killed leaves the old one or the new one.
+    Other programs wait for the lock, so the viewer can add measurements to a session that is being annotated. The file
+    is replaced atomically: after a crash it contains the old or the new content.
 
     Parameters
     ----------
@@ -23,14 +23,14 @@ def changing(folder):
     Yields
     ------
     dict
-        The content of frames.json, to be changed in place; {'frames': []} where there is none yet.
+        Content of frames.json, to be modified in place; {'frames': []} if the file does not exist.
 
     Raises
     ------
     OSError
         If the folder cannot be read or written.
     ValueError
-        If frames.json holds something else than the description of a session.
+        If frames.json is not the description of a session.
     """
     path = os.path.join(str(folder), FILE_NAME)
     with open(os.path.join(str(folder), '.lock'), 'a') as lock:
@@ -41,7 +41,7 @@ def changing(folder):
 
 
 def write_whole(path, data):
-    """Write the bytes `data` to `path`, which holds afterwards either what it held before or all of `data`."""
+    """Write the bytes `data` to `path` atomically: after an error or a crash the old content is intact."""
     descriptor, temporary = tempfile.mkstemp(dir=os.path.dirname(path), prefix='.', suffix='.tmp')
     try:
         with os.fdopen(descriptor, 'wb') as stream:
@@ -50,7 +50,7 @@ def write_whole(path, data):
             os.fsync(stream.fileno())
         mask = os.umask(0)
         os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)  # mkstemp lets nobody else read it
+        os.chmod(temporary, 0o666 & ~mask)  # mkstemp permits only the owner to read it
         os.replace(temporary, path)
     except BaseException:
         os.unlink(temporary)
@@ -58,8 +58,9 @@ def write_whole(path, data):
 
 
 def _text_of(content):
-    """A line for each field and each frame, for people to read; quick for thousands of frames, as an indented dump is
-    not. Raises ValueError for nan and inf.
+    """Format a description with one line per field and frame: readable, and faster than an indented dump.
+
+    Raises ValueError for nan and inf.
     """
     frames = ',\n'.join(' ' + json.dumps(frame, allow_nan=False) for frame in content['frames'])
     fields = ['%s: %s' % (json.dumps(str(key)), json.dumps(value, allow_nan=False))

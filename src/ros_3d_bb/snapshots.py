@@ -1,13 +1,11 @@
-"""What the camera and the pipeline say of one image, put together by its stamp."""
+"""Synchronizer of the messages of one image: colour, depth, camera, 2D boxes and 3D boxes."""
 from typing import Any, NamedTuple
 
 from ros_3d_bb.stamped import Pairing, StampedCache
 
 
 class Snapshot(NamedTuple):
-    """Colour, depth, camera, 2D boxes and 3D boxes of one stamp, as they were added; boxes that have not come are
-    None.
-    """
+    """Colour, depth, camera, 2D boxes and 3D boxes of one stamp, as they were added. Missing boxes are None."""
 
     stamp_ns: int
     color: Any
@@ -18,15 +16,15 @@ class Snapshot(NamedTuple):
 
 
 class Snapshots(object):
-    """Puts snapshots together of what comes on five topics, in any order.
+    """Combines messages of five topics, which may arrive in any order, to snapshots.
 
-    The stamps of boxes are exactly those of the colour image; depth and camera are paired as for `Pairing`. Where
-    time goes back, everything of the time before is forgotten.
+    The stamps of boxes must be equal to that of the colour image. Depth and camera are paired as in `Pairing`. If time
+    jumps back, older messages are dropped.
 
     Parameters
     ----------
     length_ns : int
-        How long images are kept for the boxes that come for them.
+        How long images are kept while their boxes have not arrived.
     tolerance_ns : int
         By how much the stamps of colour and depth image may differ.
     on_lost : callable
@@ -53,16 +51,16 @@ class Snapshots(object):
         self._sync.add_camera(stamp_ns, now_ns, camera)
 
     def add_boxes2d(self, stamp_ns, now_ns, boxes):
-        """Take the 2D boxes of an image."""
+        """Add the 2D boxes of an image."""
         self._boxes2d.add(stamp_ns, now_ns, boxes)
 
     def add_boxes3d(self, stamp_ns, now_ns, boxes):
-        """Take the 3D boxes of an image."""
+        """Add the 3D boxes of an image."""
         self._boxes3d.add(stamp_ns, now_ns, boxes)
 
     @property
     def newest(self):
-        """The newest snapshot that has all parts; where none has, that which has most; None before any image."""
+        """Newest snapshot that is complete, or else the most complete one; None before the first image."""
         best = None
         for entry in reversed(self._images):
             snapshot = self._snapshot(entry)
@@ -72,7 +70,7 @@ class Snapshots(object):
 
     @property
     def is_early(self):
-        """Whether boxes may still be on their way, as images have come for less than they may take."""
+        """Whether boxes may be missing because images have been arriving for less than `length_ns`."""
         return self._first_ns is None or self._images.newest_ns - self._first_ns < self._length_ns
 
     def _snapshot(self, entry):

@@ -1,4 +1,4 @@
-"""The picture that viewer_node shows: colour, depth and boxes of one image side by side, and lines of text below.
+"""Window content of viewer_node: colour, depth and boxes of one image side by side, and lines of text below.
 
 Images are (height, width, 3), uint8, RGB.
 """
@@ -9,22 +9,22 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.estimation import Box3D, DepthImage
-from ros_3d_bb.overlay import colors_of, draw_boxes, visible_depth
+from ros_3d_bb.overlay import colorize_depth, draw_boxes, depth_to_grey
 from ros_3d_bb.stamped import NS
 
 PAPER, INK, WARNING_INK = (32, 32, 32), (235, 235, 235), (255, 190, 60)
 FONT, FONT_SCALE, LINE_PX, MARGIN_PX = cv2.FONT_HERSHEY_SIMPLEX, 0.45, 20, 8
 BAR_WIDTH_PX, BAR_TOP_PX = 14, 16
-LEAST_TEXT_LINES = 8  # so that the window does not change its size with each person
-MEASURED_NS = 2 * NS  # the frame rate is that of the last so many nanoseconds
+MIN_TEXT_LINES = 8  # keeps the size of the window constant for a few people
+RATE_WINDOW_NS = 2 * NS  # interval for the frame rate
 TITLES = ('colour', 'depth', 'boxes')
 
 
 class View(NamedTuple):
-    """What is to be seen: an image with its boxes, and what is said about it.
+    """Content of the window: an image, its boxes, and text.
 
-    `rects_px` are the 2D boxes, `boxes` the 3D boxes; None where they have not come. `lines` are said as they are,
-    `warnings` so that they are noticed.
+    `rects_px` are the 2D boxes, `boxes` the 3D boxes; None if they have not been received. `lines` are shown as plain
+    text, `warnings` are highlighted.
     """
 
     color: np.ndarray
@@ -36,49 +36,49 @@ class View(NamedTuple):
 
 
 class FrameRate(object):
-    """How many images come in a second, by the clock that the caller gives."""
+    """Rate of images by the clock of the caller."""
 
     def __init__(self):
         self._arrivals_ns = collections.deque()
 
     def add(self, arrival_ns):
-        """An image came."""
+        """Register the arrival of an image."""
         self._arrivals_ns.append(arrival_ns)
-        self._forget_before(arrival_ns - MEASURED_NS)  # also where the rate is never asked for
+        self._drop_before(arrival_ns - RATE_WINDOW_NS)  # limits the memory if the rate is never read
 
     def at(self, now_ns):
-        """Images a second of late; 0 where fewer than two came."""
-        self._forget_before(now_ns - MEASURED_NS)
+        """Recent number of images per second; 0 if fewer than two have arrived."""
+        self._drop_before(now_ns - RATE_WINDOW_NS)
         if len(self._arrivals_ns) < 2:
             return 0.0
         return (len(self._arrivals_ns) - 1) * NS / max(1, self._arrivals_ns[-1] - self._arrivals_ns[0])
 
-    def _forget_before(self, oldest_ns):
+    def _drop_before(self, oldest_ns):
         while self._arrivals_ns and self._arrivals_ns[0] < oldest_ns:
             self._arrivals_ns.popleft()
 
 
 def compose(view, panel_width_px, farthest_m):
-    """Draw a view: three panels, each `panel_width_px` wide, depth in colours up to `farthest_m`."""
+    """Draw a view: three panels of the width `panel_width_px`, with depth colour-coded up to `farthest_m`."""
     height, width = view.color.shape[:2]
     size_px = (panel_width_px, max(1, int(round(height * panel_width_px / width))))
     color = cv2.resize(np.ascontiguousarray(view.color), size_px, interpolation=cv2.INTER_LINEAR)
-    # between the pixels of a depth image there is nothing
-    grey = cv2.resize(visible_depth(view.depth, farthest_m), size_px, interpolation=cv2.INTER_NEAREST)
-    panels = [color, draw_range_bar(colors_of(grey), farthest_m), _annotated(color.copy(), view)]
+    # depth must not be interpolated
+    grey = cv2.resize(depth_to_grey(view.depth, farthest_m), size_px, interpolation=cv2.INTER_NEAREST)
+    panels = [color, draw_range_bar(colorize_depth(grey), farthest_m), _annotated(color.copy(), view)]
     for panel, title in zip(panels, TITLES):
-        _write(panel, title, (MARGIN_PX, panel.shape[0] - MARGIN_PX))  # labels of boxes are on top
+        _write(panel, title, (MARGIN_PX, panel.shape[0] - MARGIN_PX))  # labels of boxes are at the top
     row = np.concatenate(panels, axis=1)
     lines = view.lines + box_lines(view.boxes or ())
-    return np.concatenate((row, text_picture(lines, view.warnings, row.shape[1])))
+    return np.concatenate((row, text_image(lines, view.warnings, row.shape[1])))
 
 
 def draw_range_bar(image, farthest_m):
-    """Draw the colours of the depths along the right border, with metres. Returns the image."""
+    """Draw the colour scale of depth along the right border, labelled in metres. Returns the image."""
     height, width = image.shape[:2]
     left, right, bottom = width - MARGIN_PX - BAR_WIDTH_PX, width - MARGIN_PX, height - BAR_TOP_PX
     grey = np.rint(np.linspace(255, 1, bottom - BAR_TOP_PX)).astype(np.uint8)
-    image[BAR_TOP_PX:bottom, left:right] = colors_of(np.repeat(grey[:, None], BAR_WIDTH_PX, axis=1))
+    image[BAR_TOP_PX:bottom, left:right] = colorize_depth(np.repeat(grey[:, None], BAR_WIDTH_PX, axis=1))
     for metres in range(0, int(farthest_m) + 1, max(1, int(farthest_m) // 6)):
         row = BAR_TOP_PX + int(round(metres / farthest_m * (bottom - BAR_TOP_PX)))
         cv2.line(image, (left - 4, row), (left, row), INK, 1)
@@ -89,34 +89,34 @@ def draw_range_bar(image, farthest_m):
 
 
 def box_lines(boxes):
-    """One line for each 3D box: number as in the picture, position in the camera's optical frame, width and height."""
+    """One line per 3D box: number as in the image, position in the camera's optical frame, width and height."""
     return tuple('%d: x %+.2f  y %+.2f  z %.2f m,  %.2f m wide, %.2f m high%s'
                  % ((number,) + tuple(box.center_m) + tuple(box.size_m[:2]) + (', cut' if box.truncated else '',))
                  for number, box in enumerate(boxes, 1))
 
 
 def _annotated(panel, view):
-    """Draw the 3D boxes by number and distance, and the 2D boxes for which there is none. Returns the panel."""
+    """Draw 3D boxes with number and distance, and 2D boxes without a 3D box. Returns the panel."""
     boxes = view.boxes or ()
-    lifted = set(tuple(box.rect_px) for box in boxes)
+    located = set(tuple(box.rect_px) for box in boxes)
     height, width = view.color.shape[:2]
     inside_px = np.clip(np.reshape(view.rects_px or (), (-1, 4)).astype(int), 0, [width, height] * 2).tolist()
-    others = [rect_px for rect_px in inside_px if tuple(rect_px) not in lifted]
-    rects_px = np.array([box.rect_px for box in boxes] + others, float).reshape(-1, 4)
+    without_position = [rect_px for rect_px in inside_px if tuple(rect_px) not in located]
+    rects_px = np.array([box.rect_px for box in boxes] + without_position, float).reshape(-1, 4)
     labels = ['%d: %.2f m' % (number, box.center_m[2]) for number, box in enumerate(boxes, 1)]
-    return draw_boxes(panel, rects_px * (panel.shape[1] / width), labels + ['no position'] * len(others))
+    return draw_boxes(panel, rects_px * (panel.shape[1] / width), labels + ['no position'] * len(without_position))
 
 
-def text_picture(lines, warnings, width_px):
-    """Lines of text, then warnings, as an image of a width."""
+def text_image(lines, warnings, width_px):
+    """Image of lines of text, followed by warnings."""
     rows = [(line, INK) for line in lines] + [(line, WARNING_INK) for line in warnings]
-    image = np.full((LINE_PX * max(LEAST_TEXT_LINES, len(rows)) + 2 * MARGIN_PX, width_px, 3), PAPER, np.uint8)
+    image = np.full((LINE_PX * max(MIN_TEXT_LINES, len(rows)) + 2 * MARGIN_PX, width_px, 3), PAPER, np.uint8)
     for number, (line, color) in enumerate(rows, 1):
         cv2.putText(image, line, (MARGIN_PX, LINE_PX * number), FONT, FONT_SCALE, color, 1, cv2.LINE_AA)
     return image
 
 
 def _write(image, text, place_px):
-    """Write with a dark rim, to be read on any ground."""
+    """Draw text with a dark outline, which is readable on any background."""
     for ink, thickness in (((0, 0, 0), 3), (INK, 1)):
         cv2.putText(image, text, place_px, FONT, FONT_SCALE, ink, thickness, cv2.LINE_AA)

@@ -1,4 +1,4 @@
-"""A window on the screen, by OpenCV. All of it in the main thread, as the toolkits below want it."""
+"""OpenCV window. All calls must be made from the main thread, as the GUI toolkits require."""
 import os
 import subprocess
 import sys
@@ -6,21 +6,21 @@ import sys
 import cv2
 import numpy as np
 
-FLAGS = 0x10  # WINDOW_GUI_NORMAL, which old versions do not name: no toolbar; to be resized, with its proportions
+FLAGS = 0x10  # WINDOW_GUI_NORMAL, which old versions do not define: no toolbar, resizable with fixed aspect ratio
 NO_KEY = 255
 
 
 class WindowError(ValueError):
-    """No window can be opened; says why."""
+    """A window cannot be opened."""
 
 
 class Window(object):
-    """A window that shows pictures and takes keys.
+    """Window that shows images and reads keys.
 
     Raises
     ------
     WindowError
-        If there is no display, or this OpenCV has no windows.
+        If there is no display, or OpenCV was built without a GUI.
     """
 
     def __init__(self, title):
@@ -29,25 +29,25 @@ class Window(object):
         try:
             cv2.namedWindow(title, cv2.WINDOW_NORMAL | FLAGS)
         except cv2.error as error:
-            raise WindowError('OpenCV opens no window: %s' % str(error).strip())
+            raise WindowError('OpenCV cannot open a window: %s' % str(error).strip())
         self._size_px = None
 
     @property
     def is_closed(self):
-        """Whether somebody closed it."""
+        """Whether the user has closed the window."""
         return self._size_px is not None and cv2.getWindowProperty(self._title, cv2.WND_PROP_VISIBLE) < 1
 
     def show(self, picture):
-        """Show an RGB picture; the window takes its size."""
+        """Show an RGB image and resize the window to its size."""
         if picture.shape != self._size_px:
             self._size_px = picture.shape
             cv2.resizeWindow(self._title, picture.shape[1], picture.shape[0])
         cv2.imshow(self._title, np.ascontiguousarray(picture[..., ::-1]))
 
     def key(self, wait_ms):
-        """The key that is pressed within a time, as a character; '' where none is.
+        """Wait for a key up to `wait_ms`. Returns its character, or '' if no key is pressed.
 
-        Of several that came since the last call, OpenCV's Qt windows give the last one and drop the others.
+        If several keys were pressed since the last call, OpenCV's Qt windows return the last one and drop the others.
         """
         code = cv2.waitKey(wait_ms) & 0xff
         return '' if code == NO_KEY else chr(code)
@@ -55,13 +55,13 @@ class Window(object):
     def close(self):
         """Close the window."""
         cv2.destroyAllWindows()
-        cv2.waitKey(1)  # the toolkit closes it only now
+        cv2.waitKey(1)  # the toolkit closes the window in its event loop
 
 
 def check_display():
-    """Raise WindowError where no window can be opened.
+    """Raise WindowError if no window can be opened.
 
-    Tried in a process of its own: where the display does not answer, OpenCV's toolkit ends the process.
+    The check runs in a separate process, because OpenCV's toolkit aborts the process if the display does not respond.
     """
     if not (os.environ.get('DISPLAY') or os.environ.get('WAYLAND_DISPLAY')):
         raise WindowError('there is no display (DISPLAY is not set)')

@@ -12,10 +12,10 @@ import yaml
 
 from fuzz import hostile
 from ros_3d_bb.detection.bodies import DepthPeopleParams
-from ros_3d_bb.detection.boxes import suppressed
+from ros_3d_bb.detection.boxes import non_maximum_suppression
 from ros_3d_bb.detection.checkpoint import read_checkpoint
-from ros_3d_bb.detection.predictions import decoded_heads
-from ros_3d_bb.detection.yolov5 import decoded
+from ros_3d_bb.detection.predictions import decode_heads
+from ros_3d_bb.detection.yolov5 import filter_predictions
 from ros_3d_bb.error_model import read_error_model
 from ros_3d_bb.estimation import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.following import TRACKING_PARAMS, TrackerNodeParams
@@ -103,13 +103,14 @@ def _estimates(source, _folder):
 
 def _predictions(source, _folder):
     rows = np.array([[source.number() for _column in range(7)] for _row in range(source.choice((0, 1, 5)))])
-    found = suppressed(decoded(rows.reshape(-1, 7).astype(np.float32), 0.25, [0, 1]), 0.45, 100)
-    assert np.isfinite(found.boxes).all()
+    candidates = filter_predictions(rows.reshape(-1, 7).astype(np.float32), 0.25, [0, 1])
+    detections = non_maximum_suppression(candidates, 0.45, 100)
+    assert np.isfinite(detections.boxes).all()
 
 
 def _heads(source, _folder):
     head = np.frombuffer(source.bytes_of(4 * 3 * 2 * 2 * 7), '<f4').reshape(1, 3, 2, 2, 7)
-    decoded_heads([head.transpose(0, 1, 4, 2, 3).reshape(1, 21, 2, 2)], np.ones((1, 3, 2), np.float32), [32], 0.25)
+    decode_heads([head.transpose(0, 1, 4, 2, 3).reshape(1, 21, 2, 2)], np.ones((1, 3, 2), np.float32), [32], 0.25)
 
 
 def _params(source, _folder):
@@ -210,8 +211,8 @@ FUNCTIONS = {
     'boxes2d_from_message, boxes2d_to_message': Function(_boxes2d, 6),
     'boxes3d_from_message, boxes3d_to_message': Function(_boxes3d, 3),
     'usable_boxes3d, detections_from_message': Function(_detections, 4), 'tracks, planners': Function(_tracks, 3),
-    'estimate_boxes': Function(_estimates, 2), 'decoded, suppressed': Function(_predictions, 3),
-    'decoded_heads': Function(_heads, 2), 'params_from': Function(_params, 15),
+    'estimate_boxes': Function(_estimates, 2), 'filter_predictions, non_maximum_suppression': Function(_predictions, 3),
+    'decode_heads': Function(_heads, 2), 'params_from': Function(_params, 15),
     'parse_length': Function(lambda source, _folder: parse_length(
         _mutated(source, b'1,230.5 mm').decode('utf-8', 'replace'), source.choice(('mm', 'm'))), 10),
     'scenario_from': Function(_scenario, 2),

@@ -1,4 +1,4 @@
-"""The annotator in scripts: export, analysis and validation without a window, without Qt, in a plain clone."""
+"""Annotator on the command line: export, analysis and validation without a window, Qt and ROS."""
 import json
 import os
 import subprocess
@@ -19,7 +19,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 
 @pytest.fixture
 def folder(tmp_path):
-    """A session with truth, 0.1 m off the estimates."""
+    """Session whose truth differs from the estimates by 0.1 m."""
     write_small_session(str(tmp_path))
     change_json(str(tmp_path), lambda content: [entry.update(truth_mm={'x': -466.5, 'z': 2100})
                                                 for entry in content['frames']])
@@ -32,7 +32,7 @@ def test_export(folder, capsys):
     assert capsys.readouterr().out == '%s: 4 measurements\n' % path
 
 
-def test_analysis_beside_the_session_and_elsewhere(tmp_path, capsys):
+def test_the_output_folder_of_the_analysis_can_be_chosen(tmp_path, capsys):
     session = write_synthetic_session(str(tmp_path / 'session'))
     assert main(['--analyse', session]) == 0
     assert main(['--analyse', session, '--out', str(tmp_path / 'out'), '--estimator', 'recorded']) == 0
@@ -57,8 +57,8 @@ def test_a_sound_session_is_valid(session_folder, capsys):
     (lambda entry: entry.update(truth_mm={'x': -466.5, 'z': 3600}), 'apart'),
     (lambda entry: entry.update(truth_mm={'x': 2000, 'z': 2000}), 'outside the image'),
     (lambda entry: entry.update(truth_mm={'x': 0, 'z': -2000}), 'truth z is -2 m'),
-    (lambda entry: entry.update(detections=[]), 'nobody is detected')])
-def test_what_is_wrong_is_listed(folder, capsys, break_it, problem):
+    (lambda entry: entry.update(detections=[]), 'no person')])
+def test_problems_are_listed(folder, capsys, break_it, problem):
     change_json(folder, lambda content: break_it(content['frames'][1]))
     assert main(['--validate', folder]) == 1
     lines = capsys.readouterr().out.splitlines()
@@ -66,23 +66,23 @@ def test_what_is_wrong_is_listed(folder, capsys, break_it, problem):
     assert lines[-1].endswith((' 1 problem', ' 2 problems'))
 
 
-def test_an_estimate_that_cannot_be_made_again_is_listed(folder, capsys):
+def test_a_box_without_depth_is_listed(folder, capsys):
     cv2.imwrite(os.path.join(folder, 'depth', 'm1.png'), np.zeros((48, 64), np.uint16))
     assert main(['--validate', folder]) == 1
-    assert 'no estimate can be made' in capsys.readouterr().out
+    assert 'depth for an estimate' in capsys.readouterr().out
 
 
-def test_what_a_killed_program_left_is_named(folder, capsys):
+def test_leftover_files_are_named(folder, capsys):
     assert main(['--validate', folder]) == 0 and capsys.readouterr().err == ''
     for name in ('color/m9.png', 'depth/.a1.tmp', '.b2.tmp', 'notes.txt'):
         with open(os.path.join(folder, name), 'w'):
             pass
     change_json(folder, lambda content: content['frames'][0].update(color='./color/m0.png'))
     assert main(['--validate', folder]) == 0
-    assert 'no measurement names .b2.tmp, color/m9.png, depth/.a1.tmp;' in capsys.readouterr().err
+    assert ' .b2.tmp, color/m9.png, depth/.a1.tmp;' in capsys.readouterr().err
 
 
-def test_notes_on_the_old_form_and_errors_go_to_the_screen(tmp_path, capsys):
+def test_notes_and_errors_are_printed_to_stderr(tmp_path, capsys):
     old = write_old_session(str(tmp_path / 'old'))
     assert main(['--validate', old]) == 0
     assert 'cannot be recovered' in capsys.readouterr().err
@@ -95,13 +95,13 @@ def test_notes_on_the_old_form_and_errors_go_to_the_screen(tmp_path, capsys):
 
 @pytest.mark.parametrize('arguments', [['--validate'], ['--export', 'a.csv'], ['--analyse', '--validate', 'x'],
                                        ['--out', 'x', 'y'], ['--analyse', 'x', '--estimator', 'mean']])
-def test_arguments_that_do_not_fit_are_refused(arguments, capsys):
+def test_incompatible_arguments_are_rejected(arguments, capsys):
     with pytest.raises(SystemExit) as error:
         main(arguments)
     assert error.value.code == 2 and 'usage: annotator' in capsys.readouterr().err
 
 
-def test_a_plain_clone_without_ros_and_qt_runs_it(folder, tmp_path):
+def test_a_clone_works_without_ros_and_qt(folder, tmp_path):
     # modules that cannot be imported stand for those that are not installed
     (tmp_path / 'sitecustomize.py').write_text(
         'import sys\nfor name in ("rospy", "PyQt5", "python_qt_binding", "catkin_pkg", "torch"):\n'

@@ -1,4 +1,4 @@
-"""Whenever the annotator is killed, all that it had entered is in the session, and what was typed comes back."""
+"""A killed annotator loses no entered truth and no typed text."""
 import multiprocessing
 import os
 import signal
@@ -19,7 +19,7 @@ TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
 def write_session(folder):
-    """A session of measurements that share their images: here only the description matters."""
+    """Session of measurements that share their images, because only the description is tested."""
     write_small_session(folder, count=1)
     change_json(folder, lambda content: content.update(
         frames=[dict(content['frames'][0], id='m%d' % number) for number in range(COUNT)]))
@@ -27,7 +27,7 @@ def write_session(folder):
 
 
 def saved_in(document):
-    """The numbers of the annotated measurements, after it is checked that they hold what was typed for them."""
+    """Indices of the annotated measurements, after a check that they contain the typed truth."""
     saved = set(index for index in range(COUNT) if document.measurements[index].state == 'annotated')
     for index in saved:
         x_m, _y_m, z_m = document.measurements[index].truth_m
@@ -36,7 +36,7 @@ def saved_in(document):
 
 
 def _annotate(folder, reports):
-    """Annotate what is not annotated yet; reports what is typed, and what is entered."""
+    """Annotate new measurements, and report typed and entered ones."""
     document = Document.open(folder)
     for index, measurement in enumerate(document.measurements):
         if measurement.state == 'new':
@@ -47,7 +47,7 @@ def _annotate(folder, reports):
 
 
 def _run_and_kill(folder, random):
-    """What a process reported until it was killed at a random moment: sets of numbers."""
+    """Reports of a process until it is killed at a random time: sets of indices."""
     receiver, sender = multiprocessing.Pipe(duplex=False)
     process = multiprocessing.get_context('fork').Process(target=_annotate, args=(folder, sender))
     process.start()
@@ -83,8 +83,8 @@ def test_kill_at_any_moment_loses_at_most_what_is_being_typed(tmp_path):
 
 
 def _type_and_kill(folder, to_wait_for, wait_s):
-    """The numbers that a window of its own process reported as entered, until it was killed a time after so many
-    reports; with fewer reports it ends by itself.
+    """Indices that a window in another process reported as entered, until it was killed `wait_s` after `to_wait_for`
+    reports. With fewer reports it ends by itself.
     """
     environment = dict(os.environ, PYTHONPATH=os.pathsep.join([TESTS] + sys.path), QT_QPA_PLATFORM='offscreen')
     process = subprocess.Popen([sys.executable, '-m', 'support.typist', folder], env=environment,

@@ -1,4 +1,4 @@
-"""The table of a session in the thesis' form. With ROS_3D_BB_DATA it must be the thesis' author's own numbers."""
+"""Table of a session in the format of the thesis. With ROS_3D_BB_DATA it contains the numbers of the thesis."""
 import csv
 import os
 
@@ -19,7 +19,7 @@ def read_rows(path):
     return header, [tuple(int(cell) for cell in row) for row in rows]
 
 
-def test_the_sessions_measurements_are_in_the_table_with_the_authors_numbers(session_folder, tmp_path):
+def test_the_table_of_the_session_contains_the_numbers_of_the_thesis(session_folder, tmp_path):
     path = str(tmp_path / 'table.csv')
     document = Document.open(session_folder)
     assert export(document, path) == len(document.measurements)
@@ -43,7 +43,7 @@ def test_the_noise_analysis_reads_the_table(session_folder, tmp_path):
     assert len(read_table(str(tmp_path / 'table.csv'), 'X').complete().truth_m) == len(document.measurements)
 
 
-def test_whole_millimetres_and_measured_minus_true(tmp_path):
+def test_values_are_integer_millimetres_and_errors_measured_minus_true(tmp_path):
     document = Document.open(write_small_session(str(tmp_path)))
     document.set_truth(0, -0.5, 2.1004)
     document.set_truth(1, -0.5, 2.1004)
@@ -54,7 +54,7 @@ def test_whole_millimetres_and_measured_minus_true(tmp_path):
         '-466,-500,2000,2100,34,34,-100,100\n700,-500,3000,2100,1200,1200,900,900\n')
 
 
-def test_new_and_rejected_measurements_and_those_without_estimate_are_left_out(tmp_path):
+def test_only_annotated_measurements_with_an_estimate_are_exported(tmp_path):
     document = Document.open(write_small_session(str(tmp_path)))
     for index in range(3):
         document.set_truth(index, 0.0, 2.0)
@@ -64,11 +64,11 @@ def test_new_and_rejected_measurements_and_those_without_estimate_are_left_out(t
     assert len(rows_of(document)) == 1
 
 
-def test_nothing_to_export_or_nowhere_to_write_is_said(tmp_path):
+def test_an_empty_table_or_an_unwritable_file_raises_an_error(tmp_path):
     document = Document.open(write_small_session(str(tmp_path)))
-    with pytest.raises(SessionError, match='nothing to export'):
+    with pytest.raises(SessionError, match=str(tmp_path)):
         export(document, str(tmp_path / 'table.csv'))
     document.set_truth(0, 0.0, 2.0)
-    with pytest.raises(SessionError, match='cannot be written'):
+    with pytest.raises(SessionError, match=str(tmp_path)):
         export(document, str(tmp_path / 'missing' / 'table.csv'))
     assert not os.path.exists(str(tmp_path / 'table.csv'))

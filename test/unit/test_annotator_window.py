@@ -1,4 +1,4 @@
-"""Annotating in the window, by key presses and clicks: what a person does is in the session afterwards."""
+"""Annotation in the window by key presses and clicks, which are saved in the session."""
 import os
 
 import cv2
@@ -51,7 +51,7 @@ def test_the_error_is_shown_while_the_truth_is_typed(drive):
 @pytest.mark.parametrize('x, z, problem, field', [
     ('12e', '2000', "X: '12e' is not a length", 'x'), ('100', '', 'Z: a length is missing', 'z'),
     ('100', '-5', 'truth z is -0.005 m', None), ('100', '2000000', 'at most 100 m expected', 'z')])
-def test_what_is_no_truth_is_refused_beside_the_fields(drive, x, z, problem, field):
+def test_invalid_truth_is_reported_next_to_the_fields(drive, x, z, problem, field):
     drive.press(x, Qt.Key_Tab, z, Qt.Key_Return)
     truth = drive.window.pane.truth
     assert problem in truth.hint_label.text() and drive.window.current == 0
@@ -118,7 +118,7 @@ def test_a_box_is_drawn_by_the_keyboard(drive, folder):
     assert not drive.window.pane.shared.drawing
 
 
-def test_escape_drops_a_box_and_a_slip_is_no_box(drive):
+def test_escape_cancels_a_box_and_tiny_boxes_are_ignored(drive):
     view = drive.window.pane.color_view
     drive.press(Qt.Key_F3, Qt.Key_Space, Qt.Key_Right, Qt.Key_Escape, Qt.Key_Down)
     drive.drag(view, place_in(view, 20.5, 20.5), place_in(view, 22.5, 22.5), SHIFT)
@@ -144,7 +144,7 @@ def test_the_cursor_reads_pixel_depth_and_position(drive):
     assert drive.window.pane.readout.text() == ('pixel (23, 24)    depth 2.000 m    X −0.300  Y +0.000  Z 2.000 m')
 
 
-def test_the_cursor_reads_holes_as_holes(drive, folder):
+def test_the_readout_reports_missing_depth(drive, folder):
     cv2.imwrite(os.path.join(folder, 'depth', 'm0.png'), np.zeros((48, 64), np.uint16))
     drive.press(Qt.Key_F5, Qt.Key_F3, Qt.Key_Left)
     assert drive.window.pane.readout.text().endswith('no depth there')
@@ -173,7 +173,7 @@ def test_marks_are_taken_and_edited_by_the_keyboard(drive, folder):
     assert Document.open(folder).grid == (Mark('A1', -0.5, 2.0),)
 
 
-def test_marks_that_are_none_are_refused(drive, folder):
+def test_invalid_marks_are_rejected(drive, folder):
     def enter_nonsense(dialog):
         dialog.add_empty()
         for column, text in enumerate(('B1', '__import__("os")', '2000')):
@@ -189,12 +189,12 @@ def test_same_as_the_last_one(drive, folder):
     assert [measurement.truth_m for measurement in opened(folder)] == [(0.1, None, 2.0)] * 3 + [None]
 
 
-def test_same_as_the_last_one_without_one_says_so(drive):
+def test_same_as_last_without_annotations_is_reported(drive):
     drive.press((Qt.Key_L, CONTROL))
-    assert 'nothing is annotated yet' in drive.window.pane.truth.hint_label.text()
+    assert drive.measurement(0).id in drive.window.pane.truth.hint_label.text()
 
 
-def test_reject_asks_for_a_reason_and_restore_takes_it_back(drive, folder):
+def test_reject_asks_for_a_reason_and_restore_undoes_it(drive, folder):
     def give_reason(dialog):
         box = dialog.findChild(QtWidgets.QComboBox)
         box.setEditText('moved')
@@ -207,7 +207,7 @@ def test_reject_asks_for_a_reason_and_restore_takes_it_back(drive, folder):
     assert opened(folder)[0].state == 'new' and drive.window.last_entry.text() == ''
 
 
-def test_a_rejection_that_is_called_off_changes_nothing(drive):
+def test_a_cancelled_rejection_changes_nothing(drive):
     drive.answer(lambda dialog: dialog.reject(), lambda: drive.press((Qt.Key_R, CONTROL)))
     assert drive.measurement(0).state == 'new' and drive.window.current == 0
 
@@ -223,7 +223,7 @@ def test_undo_and_redo_show_where_they_were(drive, folder):
     assert not drive.window.actions['redo'].isEnabled()
 
 
-def test_undo_in_a_field_takes_back_typing_first(drive, folder):
+def test_undo_in_a_field_undoes_typing_first(drive, folder):
     drive.press('100', Qt.Key_Tab, '2000', Qt.Key_Return, '7', (Qt.Key_Z, CONTROL))
     assert drive.window.pane.truth.fields['x'].text() == '' and opened(folder)[0].state == 'annotated'
     drive.press((Qt.Key_Z, CONTROL))

@@ -1,4 +1,4 @@
-"""The floor in a depth image: found where it is, whatever the camera's height and tilt, and not made up."""
+"""Ground plane: fitted at any height and tilt of the camera, and None if no floor is visible."""
 import numpy as np
 from hypothesis import given, settings, strategies as st
 
@@ -12,12 +12,12 @@ RAYS = CAMERA.deproject(np.stack((U, V), axis=-1), np.ones(U.shape))
 
 
 def floor_of(pitch, roll, height_m):
-    """The floor of a camera that looks down by `pitch` and leans by `roll`, radians."""
+    """Floor of a camera that is pitched down by `pitch` and rolled by `roll`, in radians."""
     return Floor(np.array([np.sin(roll), -np.cos(roll) * np.cos(pitch), -np.cos(roll) * np.sin(pitch)]), height_m)
 
 
 def depth_of(floor, wall_m=5.0, noise=0.0):
-    """What a camera sees of a plane and of a wall behind it; noise as stereo has it, a share of depth squared."""
+    """Depth image of a plane and a wall behind it, with noise of `noise` * depth**2."""
     slope = RAYS.dot(floor.normal)
     plane_m = np.where(slope < -1e-6, -floor.offset_m / np.minimum(slope, -1e-6), np.inf)
     depth_m = np.minimum(plane_m, wall_m)
@@ -26,10 +26,10 @@ def depth_of(floor, wall_m=5.0, noise=0.0):
 
 @settings(max_examples=60)
 @given(st.floats(-0.1, 0.43), st.floats(-0.3, 0.3), st.floats(0.15, 2.0), st.booleans())
-def test_is_found_at_any_height_and_tilt(pitch, roll, height_m, in_millimetres):
+def test_the_floor_is_fitted_at_any_height_and_tilt(pitch, roll, height_m, in_millimetres):
     truth = floor_of(pitch, roll, height_m)
     if np.mean(depth_of(truth) < 4.9) < 0.15 or -truth.normal[1] < np.cos(np.radians(25)):
-        return  # hardly any floor in view, or tilted more than promised
+        return  # hardly any floor in view, or a larger tilt than supported
     depth_m = depth_of(truth, noise=0.002)
     depth = DepthImage((depth_m * 1000).astype(np.uint16), 0.001) if in_millimetres else DepthImage(depth_m, 1.0)
     floor = fit_floor(depth, CAMERA)
@@ -37,13 +37,13 @@ def test_is_found_at_any_height_and_tilt(pitch, roll, height_m, in_millimetres):
     assert np.degrees(np.arccos(min(1, floor.normal.dot(truth.normal)))) < 1
 
 
-def test_same_image_gives_same_floor():
+def test_the_same_image_gives_the_same_floor():
     depth = DepthImage(depth_of(floor_of(0.1, 0, 1), noise=0.003), 1.0)
     np.testing.assert_array_equal(fit_floor(depth, CAMERA).normal, fit_floor(depth, CAMERA).normal)
 
 
-def test_a_table_is_no_floor():
-    """It covers more of the image than the floor, but there is something below it."""
+def test_a_table_is_not_taken_for_the_floor():
+    """The table covers more of the image than the floor, but there are points below it."""
     floor, table = floor_of(0.3, 0, 1.2), floor_of(0.3, 0, 0.5)
     depth_m = depth_of(floor)
     on_table = (depth_of(table) < 2) & (np.abs(U - 160) < 110)
@@ -52,15 +52,15 @@ def test_a_table_is_no_floor():
     assert abs(fit_floor(DepthImage(depth_m, 1.0), CAMERA).offset_m - 1.2) < 0.02
 
 
-def test_no_floor_is_no_answer():
+def test_the_result_is_none_without_a_floor():
     for depth_m in (np.zeros(U.shape), np.full(U.shape, np.nan), np.full(U.shape, 2.0), 1 + U / 300.0,
                     depth_of(floor_of(0.2, 0, 3.5))):
         assert fit_floor(DepthImage(depth_m, 1.0), CAMERA) is None
 
 
 @given(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.floats(0.2, 2))
-def test_transform_gives_the_height_of_every_point(pitch, yaw, height_m):
-    """A transform from base_link to the optical frame: x forward, y left, z up, the camera pitched and turned."""
+def test_heights_agree_with_the_transform(pitch, yaw, height_m):
+    """base_link has x forward, y left, z up; the camera is pitched and turned."""
     turned = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
     pitched = np.array([[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]])
     optical = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
@@ -73,7 +73,7 @@ def test_transform_gives_the_height_of_every_point(pitch, yaw, height_m):
     assert abs(floor.offset_m - height_m) < 1e-9
 
 
-def test_row_is_where_the_floor_is_seen():
+def test_row_is_the_projection_of_the_floor():
     floor = floor_of(0.2, 0.1, 0.8)
     row = floor.row(CAMERA, 100.0, 2.5)
     assert abs(floor.height(CAMERA.deproject([100.0, row], 2.5))) < 1e-9

@@ -1,4 +1,4 @@
-"""Image messages of every layout, and those that do not hold what they say."""
+"""Image messages of every layout, and messages whose data do not match their fields."""
 import types
 
 import numpy as np
@@ -9,7 +9,7 @@ from ros_3d_bb.images import array_from, depth_from, fill_image, rgb_from
 
 
 def message_of(pixels, encoding, padding=0, big_endian=False):
-    """An image message, duck-typed, with padding bytes after each row."""
+    """Duck-typed image message with padding bytes after each row."""
     pixels = pixels.astype(pixels.dtype.newbyteorder('>' if big_endian else '<'))
     rows = [row.tobytes() + b'\xee' * padding for row in pixels]
     return types.SimpleNamespace(height=pixels.shape[0], width=pixels.shape[1], encoding=encoding,
@@ -32,14 +32,14 @@ def test_depth_scale_can_be_given():
 
 @pytest.mark.parametrize('encoding,channels', [('rgb8', [0, 1, 2]), ('bgr8', [2, 1, 0]), ('rgba8', [0, 1, 2]),
                                                ('bgra8', [2, 1, 0]), ('mono8', [0, 0, 0])])
-def test_colours_come_out_as_rgb(encoding, channels):
+def test_colours_are_converted_to_rgb(encoding, channels):
     depth = 1 if encoding == 'mono8' else 4 if 'a' in encoding else 3
     pixels = np.random.RandomState(0).randint(0, 256, (4, 5, depth)).astype(np.uint8)
     rgb = rgb_from(message_of(pixels[..., 0] if depth == 1 else pixels, encoding, padding=3))
     np.testing.assert_array_equal(rgb, pixels[..., channels])
 
 
-def test_views_are_not_copies():
+def test_pixels_are_views_of_the_data():
     message = message_of(np.zeros((4, 5), np.uint16), '16UC1')
     message.data = bytearray(message.data)
     view = array_from(message)
@@ -47,18 +47,18 @@ def test_views_are_not_copies():
     assert view[0, 0] == 7
 
 
-@pytest.mark.parametrize('change,reason', [
+@pytest.mark.parametrize('change,named', [
     ({'encoding': 'yuv422'}, 'yuv422'), ({'encoding': ''}, 'unknown'), ({'width': 0}, 'empty'),
     ({'height': 0}, 'empty'), ({'step': 1}, 'too short'), ({'data': b'\0'}, 'too short'), ({'height': 99}, 'too short'),
     ({'width': 99}, 'too short')])
-def test_images_that_cannot_be_are_refused(change, reason):
+def test_invalid_images_are_rejected(change, named):
     message = message_of(np.zeros((4, 5), np.uint16), '16UC1')
     vars(message).update(change)
-    with pytest.raises(ValueError, match=reason):
+    with pytest.raises(ValueError, match=named):
         array_from(message)
 
 
-def test_colour_is_no_depth_and_depth_no_colour():
+def test_colour_is_rejected_as_depth_and_depth_as_colour():
     with pytest.raises(ValueError, match="'rgb8'"):
         depth_from(message_of(np.zeros((2, 2, 3), np.uint8), 'rgb8'))
     with pytest.raises(ValueError, match="'16UC1'"):
@@ -69,11 +69,11 @@ def test_colour_is_no_depth_and_depth_no_colour():
                                              ('16UC1', np.arange(8, dtype=np.uint16).reshape(2, 4)),
                                              ('mono8', np.arange(8, dtype=np.uint8).reshape(2, 4)),
                                              ('rgb8', np.arange(24, dtype=np.uint8).reshape(2, 4, 3)[..., ::-1])])
-def test_filling_undoes_reading(encoding, pixels):
+def test_fill_image_inverts_array_from(encoding, pixels):
     message = fill_image(types.SimpleNamespace(), pixels, encoding)
     np.testing.assert_array_equal(array_from(message), pixels)
 
 
-def test_filling_with_the_wrong_type_is_refused():
+def test_fill_image_rejects_pixels_of_the_wrong_type():
     with pytest.raises(ValueError, match='mono8'):
         fill_image(types.SimpleNamespace(), np.zeros((2, 2), float), 'mono8')

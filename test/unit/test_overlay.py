@@ -1,8 +1,8 @@
-"""Drawing: where it is asked for, inside the image, and nowhere else."""
+"""Image overlays are drawn at the right place, and only inside the image."""
 import numpy as np
 
 from ros_3d_bb.estimation import DepthImage, sample_median
-from ros_3d_bb.overlay import BOX_COLOR, INVALID_COLOR, VALID_COLOR, draw_boxes, draw_samples, visible_depth
+from ros_3d_bb.overlay import BOX_COLOR, INVALID_COLOR, VALID_COLOR, draw_boxes, draw_samples, depth_to_grey
 
 
 def test_boxes_are_drawn_with_their_edges():
@@ -10,7 +10,7 @@ def test_boxes_are_drawn_with_their_edges():
     assert image[60, 20].tolist() == list(BOX_COLOR) and image[60, 40].tolist() == [0, 0, 0]
 
 
-def test_boxes_outside_the_image_do_no_harm():
+def test_boxes_outside_the_image_are_clipped():
     boxes = np.array([(-500.0, -10.0, 5000.0, 3.0), (10.0, 0.0, 20.0, 2.0)])
     assert draw_boxes(np.zeros((50, 50, 3), np.uint8), boxes, ['a', 'b']).any()
 
@@ -25,8 +25,8 @@ def test_samples_show_where_depth_was_measured():
         assert image[v, u].tolist() == list(VALID_COLOR if valid else INVALID_COLOR)
 
 
-def test_near_is_bright_far_is_dark_and_nothing_is_black():
-    grey = visible_depth(DepthImage(np.array([[0, 500, 3000, 9000]], np.uint16), 0.001), 6.0)[0]
+def test_near_depth_is_bright_far_depth_is_dark_and_no_depth_is_black():
+    grey = depth_to_grey(DepthImage(np.array([[0, 500, 3000, 9000]], np.uint16), 0.001), 6.0)[0]
     assert grey[0] == 0 and grey[1] > grey[2] > grey[3] > 0
     unknown = DepthImage(np.array([[np.nan, np.inf, -1]], np.float32), 1.0)
-    assert visible_depth(unknown, 6.0)[0].tolist() == [0, 0, 0]
+    assert depth_to_grey(unknown, 6.0)[0].tolist() == [0, 0, 0]

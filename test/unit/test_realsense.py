@@ -1,4 +1,4 @@
-"""realsense.py on what librealsense itself records, aligns and plays; no camera is needed."""
+"""RealSense driver on recordings that librealsense records, aligns and plays; no camera is needed."""
 import sys
 
 import numpy as np
@@ -32,14 +32,14 @@ def pairs_of(camera, count):
 
 @pytest.fixture(scope='module')
 def played(recording):
-    """The camera of a recording that was played as fast as it is read, and all of its pairs."""
+    """Camera of a recording that is played as fast as it is read, and all of its pairs of images."""
     camera = RealSense(RealSenseParams(file=recording, real_time=False))
     pairs = pairs_of(camera, FRAMES + 1)
     camera.close()
     return camera, pairs
 
 
-def test_every_image_of_a_recording_comes_as_it_was_with_its_stamp(played):
+def test_all_images_of_a_recording_are_read_with_their_stamps(played):
     camera, pairs = played
     assert camera.is_over and len(pairs) == FRAMES
     for number, pair in enumerate(pairs):
@@ -55,8 +55,8 @@ def test_the_camera_is_that_of_the_colour_stream(played):
                                COLOR_CAMERA[2:6] + COLOR_CAMERA.distortion, rtol=1e-6)
 
 
-def test_depth_is_aligned_to_where_our_geometry_projects_it(played):
-    """Each depth pixel, as a point, seen by the colour camera: the nearest point of all that fall on a pixel counts."""
+def test_aligned_depth_agrees_with_our_projection(played):
+    """All points of the depth image are projected to the colour camera. In each pixel the nearest point is expected."""
     _camera, pairs = played
     aligned, raw = pairs[0].depth.values, sloping_depth()
     v, u = np.mgrid[:DEPTH_CAMERA.height, :DEPTH_CAMERA.width]
@@ -66,12 +66,12 @@ def test_depth_is_aligned_to_where_our_geometry_projects_it(played):
         inside = ((pixels >= 1) & (pixels < np.array(aligned.shape[::-1]) - 1)).all(axis=-1)
     columns, rows = np.rint(pixels[inside]).astype(int).T
     difference_m = (aligned[rows, columns].astype(float) - raw[inside]) * 0.001
-    hidden = difference_m < -0.3  # by the board, from where the colour camera is
+    hidden = difference_m < -0.3  # hidden by the board from the colour camera
     assert inside.mean() > 0.3 and hidden.mean() < 0.02
     assert np.abs(difference_m[~hidden]).max() < 0.008  # the nearer one of two depth pixels, of a wall that recedes
 
 
-def test_the_edge_of_a_near_thing_lies_where_it_is_seen_in_colour(played):
+def test_edges_of_near_objects_agree_in_colour_and_depth(played):
     _camera, pairs = played
     corners = DEPTH_CAMERA.deproject([(279.5, 240), (359.5, 240)], 0.8)
     left, right = COLOR_CAMERA.project(transform_points(np.linalg.inv(DEPTH_FROM_COLOR), corners))[:, 0]
@@ -80,7 +80,7 @@ def test_the_edge_of_a_near_thing_lies_where_it_is_seen_in_colour(played):
     assert abs(near[0] - (left + 0.5)) < 1.5 and abs(near[-1] - (right - 0.5)) < 1.5
 
 
-def test_points_of_colour_and_depth_meet_in_the_frames_that_are_published(played):
+def test_points_of_colour_and_depth_agree_in_the_published_frames(played):
     camera, _pairs = played
     links = {child: (parent, matrix) for parent, child, matrix in frame_links('front', camera.link_from_color)}
     assert set(links) == {'front_color_frame', 'front_color_optical_frame', 'front_depth_frame',
@@ -110,7 +110,7 @@ def test_a_repeated_recording_starts_again(recording):
 
 @pytest.mark.parametrize('filters', [['spatial'], ['disparity', 'spatial'], ['decimation'],
                                      ['disparity', 'spatial', 'temporal', 'hole_filling']])
-def test_filters_leave_depth_what_it_is_and_aligned(recording, played, filters):
+def test_filtered_depth_is_correct_and_aligned(recording, played, filters):
     camera = RealSense(RealSenseParams(file=recording, real_time=False, filters=filters))
     pair = pairs_of(camera, 1)[0]
     camera.close()
@@ -120,7 +120,7 @@ def test_filters_leave_depth_what_it_is_and_aligned(recording, played, filters):
     assert np.median(np.abs(after - before)[both]) <= 8
 
 
-def test_other_units_of_depth_are_told(tmp_path):
+def test_the_depth_unit_is_read(tmp_path):
     path = write_recording(str(tmp_path / ('fine' + SUFFIX)), [colored(0)] * 2, [sloping_depth(0.0001)] * 2, 0.0001)
     camera = RealSense(RealSenseParams(file=path, real_time=False))
     depth = pairs_of(camera, 1)[0].depth
@@ -128,7 +128,7 @@ def test_other_units_of_depth_are_told(tmp_path):
     assert depth.scale_m == 0.0001 and 0.79 < depth.values[244, 320] * depth.scale_m < 0.81
 
 
-def test_stamps_of_a_camera_without_metadata_begin_with_the_time_and_go_on_by_its_own_clock(tmp_path):
+def test_stamps_without_metadata_start_at_arrival_and_follow_the_cameras_clock(tmp_path):
     path = write_recording(str(tmp_path / ('old' + SUFFIX)), [colored(0)] * 3, [sloping_depth()] * 3, clock='camera',
                            start_ms=5000.0)
     camera = RealSense(RealSenseParams(file=path, real_time=False))
@@ -138,7 +138,7 @@ def test_stamps_of_a_camera_without_metadata_begin_with_the_time_and_go_on_by_it
     np.testing.assert_allclose(np.diff(stamps), STEP_MS * 1e6, atol=10)
 
 
-def test_a_camera_clock_that_starts_again_does_not_take_time_back():
+def test_stamps_do_not_jump_back_when_the_cameras_clock_restarts():
     stamps = Stamps()
     given = [(4294967.0, 100), (4294967.2, 100.2), (0.1, 100.3), (0.3, 100.5)]
     made = [stamps.stamp_ns(1000 * seconds, True, int(now_s * NS)) for seconds, now_s in given]
@@ -147,7 +147,7 @@ def test_a_camera_clock_that_starts_again_does_not_take_time_back():
 
 @pytest.fixture
 def camera_that_ends(recording, monkeypatch):
-    """The recording, taken for a camera: when it ends, that camera is unplugged."""
+    """The recording is used as a camera that is unplugged when the recording ends."""
     def config_of(_rs, _params):
         config = rs.config()
         config.enable_device_from_file(recording, False)
@@ -159,54 +159,55 @@ def camera_that_ends(recording, monkeypatch):
     camera.close()
 
 
-def test_a_camera_that_sends_nothing_any_more_is_lost(camera_that_ends):
-    with pytest.raises(CameraLost, match='no images for 0 s'):
+def test_a_camera_that_stops_sending_is_lost(camera_that_ends):
+    with pytest.raises(CameraLost):
         for _attempt in range(100):
             camera_that_ends.read()
 
 
-def test_a_camera_that_is_not_there_may_come():
-    with pytest.raises(CameraLost, match='serial number 123 with 640 x 480 pixels at 30 Hz'):
+def test_a_missing_camera_is_lost():
+    with pytest.raises(CameraLost, match='123 .*640 x 480 .*30 Hz'):
         RealSense(RealSenseParams(serial='123'))
 
 
 @pytest.mark.parametrize('name, model, kept', [
     ('none', '', 0), ('brown_conrady', 'plumb_bob', 5), ('inverse_brown_conrady', 'inverse_brown_conrady', 5),
     ('modified_brown_conrady', 'inverse_brown_conrady', 5), ('kannala_brandt4', 'equidistant', 4)])
-def test_distortion_has_the_name_of_the_same_formulas(name, model, kept):
-    given = intrinsics_of(COLOR_CAMERA, getattr(rs.distortion, name))
-    camera = camera_from_intrinsics(given)
+def test_distortion_models_are_mapped_to_equal_formulas(name, model, kept):
+    intrinsics = intrinsics_of(COLOR_CAMERA, getattr(rs.distortion, name))
+    camera = camera_from_intrinsics(intrinsics)
     assert camera.distortion_model == model and len(camera.distortion) == kept
     for point in ([0.3, -0.2, 1.5], [-0.5, 0.3, 1.0]):
-        np.testing.assert_allclose(camera.project(point), rs.rs2_project_point_to_pixel(given, point), atol=0.01)
+        np.testing.assert_allclose(camera.project(point), rs.rs2_project_point_to_pixel(intrinsics, point),
+                                   atol=0.01)
 
 
-def test_a_distortion_that_nobody_knows_is_refused():
+def test_an_unknown_distortion_model_is_rejected():
     with pytest.raises(ValueError, match='ftheta'):
         camera_from_intrinsics(intrinsics_of(COLOR_CAMERA, rs.distortion.ftheta))
 
 
-def test_colour_comes_as_rgb_or_is_refused():
+def test_colour_is_converted_to_rgb_or_rejected():
     pixels = np.arange(12, dtype=np.uint8).reshape(2, 2, 3)
     assert rgb_of(pixels, 'bgr8')[0, 0].tolist() == [2, 1, 0] and rgb_of(pixels, 'rgb8') is pixels
     with pytest.raises(ValueError, match='yuyv'):
         rgb_of(pixels, 'yuyv')
 
 
-@pytest.mark.parametrize('params, complaint', [
+@pytest.mark.parametrize('params, named', [
     (RealSenseParams(file='here.bag'), "'here.bag'"), (RealSenseParams(file='/nowhere/there.bag'), 'there.bag')])
-def test_what_cannot_be_meant_is_refused(params, complaint):
-    with pytest.raises(ValueError, match=complaint):
+def test_invalid_parameters_are_rejected(params, named):
+    with pytest.raises(ValueError, match=named):
         check_params(params)
 
 
-def test_a_file_that_is_no_recording_is_refused(tmp_path):
+def test_a_file_that_is_not_a_recording_is_rejected(tmp_path):
     (tmp_path / 'a.bag').write_text('#ROSBAG V2.0\n')
-    with pytest.raises(ValueError, match='a.bag cannot be played'):
+    with pytest.raises(ValueError, match='a.bag'):
         RealSense(RealSenseParams(file=str(tmp_path / 'a.bag')))
 
 
-def test_without_librealsense_it_is_said_what_to_install(monkeypatch):
+def test_without_librealsense_the_error_names_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, 'pyrealsense2', None)
     with pytest.raises(ValueError, match='pip3 install pyrealsense2.*driver:=realsense2_camera'):
         realsense.librealsense()

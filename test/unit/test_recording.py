@@ -1,4 +1,4 @@
-"""Measurements are appended whole or not at all, and read back as they were."""
+"""Writer of measurement sessions: measurements are appended atomically, and read back unchanged."""
 import json
 import multiprocessing
 import os
@@ -38,7 +38,7 @@ def description(folder):
 
 
 def content_of(folder):
-    """Every file in a folder but the lock, {path: bytes}."""
+    """{path: bytes} of all files in a folder except for the lock."""
     found = {}
     for place, _folders, names in os.walk(folder):
         for name in set(names) - {'.lock'}:
@@ -49,11 +49,11 @@ def content_of(folder):
 
 @pytest.fixture
 def folder(tmp_path):
-    """Of a session that is not there yet."""
+    """Folder of a session that does not exist yet."""
     return str(tmp_path / 'a campaign' / 'session')
 
 
-def test_what_is_appended_is_read_back(folder):
+def test_measurements_are_read_back(folder):
     sent = [measurement(0), measurement(1, label='A1, arms up')]
     done = [append(folder, one) for one in sent]
     session = read_session(folder)
@@ -75,14 +75,14 @@ def test_what_is_appended_is_read_back(folder):
 @pytest.mark.parametrize('model, distortion', [
     ('', ()), ('plumb_bob', (0.1, 0, 0, 0, 0)), ('equidistant', (0.0,) * 4), ('inverse_brown_conrady', (0.1,) * 5),
     ('rational_polynomial', (0.1, -0.2, 0.001, 0.002, 0.03, 0.1, 0.2, 0.3))])
-def test_the_lens_is_read_back(folder, model, distortion):
+def test_the_lens_model_is_read_back(folder, model, distortion):
     camera = CAMERA._replace(distortion_model=model, distortion=distortion)
-    for number in range(2):  # the second one finds it to be the same
+    for number in range(2):  # the second one compares the camera with the stored one
         append(folder, measurement(number, camera=camera))
     assert read_session(folder).camera == camera
 
 
-def test_the_description_says_what_is_known(folder):
+def test_the_description_contains_all_fields(folder):
     append(folder, measurement(label='A1'))
     entry, = description(folder)['frames']
     assert entry == {
@@ -92,8 +92,8 @@ def test_the_description_says_what_is_known(folder):
                         'support': 0.75, 'truncated': True}]}
 
 
-def test_each_2d_box_gets_the_3d_box_that_was_made_of_it(folder):
-    """The second person has no depth; the first box leaves the image, and its 3D box says so only inside of it."""
+def test_each_2d_box_is_joined_with_its_3d_box(folder):
+    """The second person has no depth. The first box extends outside the image; the 2D box of its 3D box is clipped."""
     rects_px = ((-5, 3, 12, 60), (20, 3, 30, 40), (40, 3, 60, 40))
     boxes = tuple(BOX._replace(rect_px=rect_px, center_m=np.array([0.0, 0.0, z]))
                   for rect_px, z in (((40, 3, 60, 40), 3.0), ((0, 3, 12, 48), 1.0), ((1, 1, 9, 9), 4.0)))
@@ -109,7 +109,7 @@ def test_without_boxes_the_images_are_stored(folder):
     assert frame.boxes_px == () and description(folder)['frames'][0]['detections'] == []
 
 
-def test_ids_sort_in_the_order_of_the_measurements_whatever_was_taken_out(folder):
+def test_ids_are_ascending_after_measurements_were_removed(folder):
     first = append(folder, measurement(0)).id
     second = append(folder, measurement(1)).id
     with session_file.changing(folder) as content:
@@ -118,7 +118,7 @@ def test_ids_sort_in_the_order_of_the_measurements_whatever_was_taken_out(folder
     assert first < second < third and len({first, second, third}) == 3
 
 
-def test_the_same_image_twice_overwrites_nothing(folder):
+def test_appending_an_image_twice_overwrites_nothing(folder):
     first, second = (append(folder, measurement(0)) for _time in range(2))
     assert first.id != second.id and len(read_session(folder).frames) == 2
 
@@ -128,7 +128,7 @@ def _append_many(folder, first):
         append(folder, measurement(number))
 
 
-def test_two_programs_lose_nothing_of_each_other(folder):
+def test_concurrent_measurements_are_not_lost(folder):
     others = [multiprocessing.Process(target=_append_many, args=(folder, first)) for first in (0, 100)]
     for other in others:
         other.start()
@@ -140,17 +140,17 @@ def test_two_programs_lose_nothing_of_each_other(folder):
         read_color(frame, session.camera)
 
 
-def _append_on_and_on(folder, first, reports):
+def _append_repeatedly(folder, first, reports):
     for number in range(first, 1000):
         append(folder, measurement(number))
         reports.send(number)
 
 
-def test_kill_at_any_moment_leaves_whole_measurements(folder):
+def test_a_killed_process_leaves_complete_measurements(folder):
     random, count, kills = np.random.RandomState(4), 0, 6
     for _kill in range(kills):
         receiver, sender = multiprocessing.Pipe(duplex=False)
-        process = multiprocessing.get_context('fork').Process(target=_append_on_and_on, args=(folder, count, sender))
+        process = multiprocessing.get_context('fork').Process(target=_append_repeatedly, args=(folder, count, sender))
         process.start()
         sender.close()
         for _report in range(1 + random.randint(3)):
@@ -171,31 +171,31 @@ def test_kill_at_any_moment_leaves_whole_measurements(folder):
         np.testing.assert_array_equal(read_depth(frame, session).values, measurement(number).depth.values)
 
 
-@pytest.mark.parametrize('changes, said', [
-    ({'camera': CAMERA._replace(fx=60.5)}, 'intrinsics'), ({'frame_id': 'another'}, "frame is optical, here it is ano"),
-    ({'depth': DepthImage(np.zeros((48, 64), np.uint16), 0.0001)}, 'depth scale is 0.001, here it is 0.0001')])
-def test_another_camera_is_refused(folder, changes, said):
+@pytest.mark.parametrize('changes, named', [
+    ({'camera': CAMERA._replace(fx=60.5)}, 'intrinsics .*60.5'), ({'frame_id': 'another'}, 'frame .*optical.*another'),
+    ({'depth': DepthImage(np.zeros((48, 64), np.uint16), 0.0001)}, 'depth scale .*0.001.*0.0001')])
+def test_measurements_of_another_camera_are_rejected(folder, changes, named):
     append(folder, measurement(0))
     before = content_of(folder)
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=named):
         append(folder, measurement(1, **changes))
     assert content_of(folder) == before
 
 
-@pytest.mark.parametrize('changes, said', [
-    ({'color': np.zeros((50, 64, 3), np.uint8)}, 'colour image has 64 x 50 pixels'),
-    ({'depth': DepthImage(np.zeros((24, 32), np.uint16), 0.001)}, 'depth must be aligned to colour'),
-    ({'boxes': (BOX._replace(center_m=np.full(3, np.nan)),)}, 'finite expected')])
-def test_what_cannot_be_stored_is_refused(folder, changes, said):
+@pytest.mark.parametrize('changes, named', [
+    ({'color': np.zeros((50, 64, 3), np.uint8)}, 'colour .*64 x 50'),
+    ({'depth': DepthImage(np.zeros((24, 32), np.uint16), 0.001)}, 'depth .*32 x 24'),
+    ({'boxes': (BOX._replace(center_m=np.full(3, np.nan)),)}, 'nan')])
+def test_invalid_measurements_are_rejected(folder, changes, named):
     append(folder, measurement(0))
     before = content_of(folder)
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=named):
         append(folder, measurement(1, **changes))
     assert content_of(folder) == before
 
 
 @pytest.mark.parametrize('text', ['[]', '{"frames": []', '{"frames": [{"id": 1}], "camera": {}}'])
-def test_what_is_no_session_is_refused_and_kept(tmp_path, text):
+def test_invalid_sessions_are_rejected_and_kept(tmp_path, text):
     (tmp_path / 'frames.json').write_text(text)
     with pytest.raises(ValueError):
         append(str(tmp_path), measurement())
@@ -203,7 +203,7 @@ def test_what_is_no_session_is_refused_and_kept(tmp_path, text):
 
 
 @pytest.mark.parametrize('full_at', ['color', 'depth', 'frames.json'])
-def test_a_full_disk_leaves_the_session_as_it_was(folder, monkeypatch, full_at):
+def test_a_full_disk_does_not_change_the_session(folder, monkeypatch, full_at):
     append(folder, measurement(0))
     before, write_whole = content_of(folder), session_file.write_whole
 
@@ -219,7 +219,7 @@ def test_a_full_disk_leaves_the_session_as_it_was(folder, monkeypatch, full_at):
     assert content_of(folder) == before
 
 
-def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
+def test_a_folder_that_cannot_be_created_raises_an_error(tmp_path):
     (tmp_path / 'file').write_text('')
     with pytest.raises(OSError):
         append(str(tmp_path / 'file' / 'session'), measurement())
@@ -236,7 +236,7 @@ def test_depth_in_metres_is_stored_in_millimetres(folder):
 
 
 @given(st.lists(st.integers(0, 65535), min_size=1), st.sampled_from(['<u2', '>u2']), st.sampled_from([0.001, 0.00025]))
-def test_depth_in_units_of_the_camera_is_kept_as_it_is(values, kind, scale_m):
+def test_integer_depth_is_stored_unchanged(values, kind, scale_m):
     depth = stored_depth(DepthImage(np.array([values], kind), scale_m))
     assert depth.values.dtype == np.uint16 and depth.values[0].tolist() == values and depth.scale_m == scale_m
 

@@ -1,4 +1,4 @@
-"""Whatever runs the network: the same predictions, and one clear error for what cannot be run."""
+"""Inference backends: equal predictions, and errors for files and parameters that cannot be used."""
 import json
 import sys
 import types
@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from ros_3d_bb.detection.checkpoint import WeightsError
-from ros_3d_bb.detection import runtime as seam
+from ros_3d_bb.detection import runtime as backends
 from ros_3d_bb.detection import torch_runtime
 from ros_3d_bb.detection.exports import export
 from ros_3d_bb.detection.onnx_runtime import session_of
@@ -33,7 +33,7 @@ def image_of(height=96, width=128):
 
 
 def predicted(network, image):
-    """All predictions of a network of ours."""
+    """All predictions of a network in torch."""
     return torch_runtime.run(network, image).numpy()
 
 
@@ -64,7 +64,7 @@ def test_raw_output_agrees_with_the_official_code(official_output, runtime):
 @pytest.mark.parametrize('runtime', RUNTIMES)
 @pytest.mark.parametrize('release,model', [('6.0', 'n'), ('5.0', 's')])
 def test_raw_output_agrees_with_plain_numpy(tmp_path, release, model, runtime):
-    """Focus and SPP of release 5.0 too, of which there is no recorded output."""
+    """Includes Focus and SPP of release 5.0, for which no output of the official code is recorded."""
     path, cases = made(str(tmp_path / 'random.pt'), layout(release, model))
     run = open_runtime(path, RuntimeParams(runtime, 'cpu', 1))
     for image, rows, values in cases:
@@ -73,8 +73,8 @@ def test_raw_output_agrees_with_plain_numpy(tmp_path, release, model, runtime):
 
 
 @needs_onnx
-def test_every_runtime_finds_the_same_in_a_measurement_session(session_folder, official_output):
-    """Boxes within 1 px and scores within 0.01, at both of the sizes that are measured."""
+def test_detections_in_a_measurement_session_do_not_depend_on_the_runtime(session_folder, official_output):
+    """Boxes within 1 px and scores within 0.01, at the two sizes that are measured."""
     session = read_session(session_folder)
     for size in (640, 512):
         detectors = [Yolov5(open_runtime(official_output[0], params), DetectionParams(image_size=size, confidence=0.2))
@@ -87,23 +87,23 @@ def test_every_runtime_finds_the_same_in_a_measurement_session(session_folder, o
 
 
 @pytest.mark.parametrize('params', BOTH)
-def test_only_predictions_above_the_least_objectness_come_back(tmp_path, params):
+def test_only_predictions_above_the_minimum_objectness_are_returned(tmp_path, params):
     path = str(tmp_path / 'random.pt')
     write_checkpoint(path, layout('6.0', 'n'))
     run = open_runtime(path, params)
     everything = run(image_of(), -1)
     levels = np.sort(everything[:, 4])
-    least = levels[np.diff(levels).argmax()] + np.diff(levels).max() / 2  # where rounding decides nothing
-    np.testing.assert_array_equal(run(image_of(), least), everything[everything[:, 4] > least])
+    limit = levels[np.diff(levels).argmax()] + np.diff(levels).max() / 2  # in the widest gap: rounding has no effect
+    np.testing.assert_array_equal(run(image_of(), limit), everything[everything[:, 4] > limit])
     assert run(image_of(), 1.0).shape == (0, 85)
 
 
 @pytest.mark.parametrize('params', BOTH)
-def test_anchors_kept_twice_as_in_release_5_are_read_once(tmp_path, params):
+def test_the_second_copy_of_anchors_in_release_5_is_ignored(tmp_path, params):
     path = str(tmp_path / 'five.pt')
     network = write_checkpoint(path, layout('5.0', 's'), anchor_grid=True)
-    found = open_runtime(path, params)(image_of(64, 64), -1)
-    np.testing.assert_allclose(found, predicted(network, image_of(64, 64)), atol=1e-3, rtol=1e-4)
+    rows = open_runtime(path, params)(image_of(64, 64), -1)
+    np.testing.assert_allclose(rows, predicted(network, image_of(64, 64)), atol=1e-3, rtol=1e-4)
 
 
 @needs_onnx
@@ -111,8 +111,8 @@ def test_anchors_kept_twice_as_in_release_5_are_read_once(tmp_path, params):
 def test_every_activation_is_exported(tmp_path, activation):
     path = str(tmp_path / 'other.pt')
     network = write_checkpoint(path, dict(layout('6.0', 'n', 3), activation=activation))
-    found = open_runtime(path, ON_ONNX)(image_of(), -1)
-    np.testing.assert_allclose(found, predicted(network, image_of()), atol=1e-3, rtol=1e-4)
+    rows = open_runtime(path, ON_ONNX)(image_of(), -1)
+    np.testing.assert_allclose(rows, predicted(network, image_of()), atol=1e-3, rtol=1e-4)
 
 
 @needs_onnx
@@ -125,8 +125,8 @@ def test_four_scales_are_exported(tmp_path):
 
 
 @needs_onnx
-def test_views_need_no_copy_by_the_caller(tmp_path):
-    """Images that came as bgr8, with rows longer than the image, or that cannot be written to."""
+def test_images_may_be_views(tmp_path):
+    """Images with reversed channels (bgr8), with padded rows, or read-only ones."""
     path = str(tmp_path / 'random.pt')
     write_checkpoint(path, layout('6.0', 'n', 3))
     whole = np.ascontiguousarray(np.pad(image_of(), ((0, 0), (0, 7), (0, 0)), 'edge')[..., ::-1])
@@ -137,10 +137,10 @@ def test_views_need_no_copy_by_the_caller(tmp_path):
         np.testing.assert_array_equal(run(view, -1), run(image_of(), -1))
 
 
-def test_weights_that_do_not_fit_their_layout_are_refused(tmp_path):
+def test_weights_that_do_not_match_their_layout_are_rejected(tmp_path):
     path = str(tmp_path / 'wrong.pt')
     write_checkpoint(path, layout('6.0', 'n'), yaml=layout('6.0', 's'))
-    with pytest.raises(WeightsError, match='wrong.pt: the network cannot be rebuilt .* expected the checkpoint'):
+    with pytest.raises(WeightsError, match='wrong.pt.*yaml'):
         open_runtime(path)
 
 
@@ -166,28 +166,28 @@ def test_torchscript_exports_give_the_same_predictions(tmp_path):
     np.testing.assert_allclose(runtime(image_of(), -1), predicted(network, image_of()), atol=1e-3, rtol=1e-4)
 
 
-def test_torchscript_runs_only_by_its_name(tmp_path):
-    """It is a program, and a checkpoint must never be one."""
+def test_torchscript_is_loaded_only_by_its_suffix(tmp_path):
+    """TorchScript is a program, but loading a checkpoint must never execute code."""
     assert open_runtime(write_red_detector(str(tmp_path / 'red.torchscript.pt'))).names[0] == 'person'
-    with pytest.raises(WeightsError, match='must end in .torchscript'):
+    with pytest.raises(WeightsError, match=r'\.torchscript'):
         open_runtime(write_red_detector(str(tmp_path / 'red.pt')))
 
 
 @pytest.mark.parametrize('edit', [
-    lambda given: given['head'].__setitem__(-2, [-1, 1, 'C3', [1024, False]]) or given['backbone'].pop(),
-    lambda given: given['backbone'].__setitem__(0, [-1, 1, 'Conv', [64, 6, 0, 2]]),
-    lambda given: given['backbone'].__setitem__(1, [-1, 0, 'Conv', [128, 3, 2]]),
-    lambda given: given['head'].__setitem__(2, [[-1, 4], 1, 'Concat', [1]])])
-def test_layouts_that_cannot_run_are_refused_when_the_file_is_opened(tmp_path, edit):
-    path, given = str(tmp_path / 'odd.pt'), layout('6.0', 'n')
-    edit(given)
-    write_checkpoint(path, layout('6.0', 'n'), yaml=given)
-    with pytest.raises(WeightsError, match='cannot be rebuilt'):
+    lambda rows: rows['head'].__setitem__(-2, [-1, 1, 'C3', [1024, False]]) or rows['backbone'].pop(),
+    lambda rows: rows['backbone'].__setitem__(0, [-1, 1, 'Conv', [64, 6, 0, 2]]),
+    lambda rows: rows['backbone'].__setitem__(1, [-1, 0, 'Conv', [128, 3, 2]]),
+    lambda rows: rows['head'].__setitem__(2, [[-1, 4], 1, 'Concat', [1]])])
+def test_layouts_that_cannot_run_are_rejected_when_the_file_is_opened(tmp_path, edit):
+    path, rows = str(tmp_path / 'odd.pt'), layout('6.0', 'n')
+    edit(rows)
+    write_checkpoint(path, layout('6.0', 'n'), yaml=rows)
+    with pytest.raises(WeightsError, match='odd.pt.*yaml'):
         open_runtime(path)
 
 
 class NotADetector(torch.nn.Module):
-    """A classifier: its output has the wrong shape."""
+    """A classifier, whose output has the wrong shape."""
 
     def forward(self, images):
         return images.mean(dim=3).mean(dim=2)
@@ -195,7 +195,7 @@ class NotADetector(torch.nn.Module):
 
 @pytest.mark.parametrize('suffix', [pytest.param('onnx', marks=needs_onnx), 'torchscript'])
 @pytest.mark.parametrize('kind', ['missing', 'damaged', 'other'])
-def test_exports_that_cannot_be_run_are_refused(tmp_path, suffix, kind):
+def test_exports_that_cannot_be_run_are_rejected(tmp_path, suffix, kind):
     path = str(tmp_path / ('model.' + suffix))
     if kind == 'damaged':
         with open(path, 'wb') as stream:
@@ -204,18 +204,18 @@ def test_exports_that_cannot_be_run_are_refused(tmp_path, suffix, kind):
         torch.jit.script(NotADetector()).save(path)
     elif kind == 'other':
         exported_onnx(path, NotADetector(), (64, 64), {})
-    with pytest.raises(WeightsError, match='weights %s: not a YOLOv5 .* export .*expected' % path):
+    with pytest.raises(WeightsError, match=path):
         open_runtime(path)
 
 
-def test_onnx_without_onnx_runtime_says_what_to_install(tmp_path, monkeypatch):
+def test_without_onnx_runtime_the_error_names_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, 'onnxruntime', None)
     with pytest.raises(WeightsError, match='pip3 install onnxruntime'):
         open_runtime(str(tmp_path / 'model.onnx'))
 
 
 @needs_onnx
-def test_names_in_an_export_are_never_run(tmp_path):
+def test_class_names_in_an_export_are_not_executed(tmp_path):
     victim = tmp_path / 'touched'
     path = exported_onnx(str(tmp_path / 'model.onnx'), random_network(layout('6.0', 'n', 3)), (64, 64),
                          {'names': "__import__('os').system('touch %s')" % victim})
@@ -242,47 +242,47 @@ def test_parameters_that_make_no_sense_are_named(params, reason):
 
 
 @pytest.mark.parametrize('name,runtime', [('a.onnx', 'torch'), ('a.torchscript', 'onnxruntime')])
-def test_a_runtime_that_cannot_run_a_file_says_which_can(name, runtime):
-    with pytest.raises(ValueError, match='runtime %s cannot run %s; use auto' % (runtime, name)):
+def test_a_runtime_that_cannot_run_a_file_is_rejected(name, runtime):
+    with pytest.raises(ValueError, match='runtime %s.* %s.* auto' % (runtime, name)):
         open_runtime(name, RuntimeParams(runtime=runtime))
 
 
-def test_an_export_for_the_cpu_does_not_pretend_to_run_on_a_gpu():
-    with pytest.raises(ValueError, match="device is 'cuda', and a.onnx runs on the CPU"):
+def test_an_onnx_export_on_a_gpu_is_rejected():
+    with pytest.raises(ValueError, match="device .*'cuda'.* a.onnx"):
         open_runtime('a.onnx', RuntimeParams(device='cuda'))
 
 
 @needs_onnx
-def test_on_a_cpu_a_checkpoint_runs_on_onnx_runtime_with_the_threads_asked_for(official_output):
+def test_on_a_cpu_a_checkpoint_runs_in_onnx_runtime_with_the_requested_threads(official_output):
     assert open_runtime(official_output[0], RuntimeParams(threads=3)).description == 'ONNX Runtime, 3 threads'
     assert open_runtime(official_output[0], ON_TORCH).description == 'torch on the CPU, 1 thread'
     assert torch.get_num_threads() == 1
 
 
 @needs_onnx
-def test_threads_are_those_of_the_machine_but_not_many(monkeypatch, official_output):
+def test_the_default_number_of_threads_is_limited(monkeypatch, official_output):
     assert physical_cores() >= 1
-    monkeypatch.setattr(seam, 'physical_cores', lambda: 64)
+    monkeypatch.setattr(backends, 'physical_cores', lambda: 64)
     assert open_runtime(official_output[0], RuntimeParams(device='cpu')).description == 'ONNX Runtime, 4 threads'
 
 
 @needs_onnx
-def test_waiting_threads_leave_the_cores_to_others(official_output):
-    """ONNX Runtime's threads spin by default."""
+def test_waiting_threads_do_not_spin(official_output):
+    """Threads of ONNX Runtime spin by default."""
     options = session_of(export(official_output[0], 'any'), 2).get_session_options()
     assert options.get_session_config_entry('session.intra_op.allow_spinning') == '0'
     assert options.intra_op_num_threads == 2
 
 
 class Gpu(object):
-    """Stands in for torch.device('cuda')."""
+    """Replaces torch.device('cuda')."""
 
     type = 'cuda'
 
 
 def test_a_gpu_is_used_by_torch_in_half_precision(monkeypatch, official_output):
     calls = []
-    monkeypatch.setattr(seam, 'gpu_count', lambda: 1)
+    monkeypatch.setattr(backends, 'gpu_count', lambda: 1)
     monkeypatch.setattr(torch_runtime, 'torch_device', lambda name: Gpu())
     monkeypatch.setattr(torch_runtime.Network, 'to', lambda network, device: calls.append(device.type) or network)
     runtime = open_runtime(official_output[0])
@@ -291,26 +291,26 @@ def test_a_gpu_is_used_by_torch_in_half_precision(monkeypatch, official_output):
 
 
 @needs_onnx
-def test_a_gpu_that_torch_cannot_use_changes_nothing(monkeypatch, official_output):
-    monkeypatch.setattr(seam, 'gpu_count', lambda: 1)
+def test_onnx_runtime_is_used_if_torch_cannot_use_the_gpu(monkeypatch, official_output):
+    monkeypatch.setattr(backends, 'gpu_count', lambda: 1)
     monkeypatch.setattr(torch.cuda, 'is_available', lambda: False)
     assert open_runtime(official_output[0]).description.startswith('ONNX Runtime')
 
 
-@pytest.mark.needs('torch.export')  # as torch 2 has, which convolves such numbers on a CPU
-def test_half_precision_finds_the_same_boxes(official_output):
-    """Half the numbers' length on the CPU, as on a GPU: within 1 px and 0.01 of the recorded predictions."""
+@pytest.mark.needs('torch.export')  # torch 2 supports convolutions in half precision on a CPU
+def test_half_precision_gives_the_same_boxes(official_output):
+    """Within 1 px and 0.01 of the recorded predictions. Runs on the CPU."""
     path, cases = official_output
     network = torch_runtime.network_of(path)[0].half()
     for image, rows, values in cases:
-        found = torch_runtime.run(network, image).numpy()[rows]
+        output = torch_runtime.run(network, image).numpy()[rows]
         likely = values[:, 4] > 0.2
-        assert found.dtype == np.float32 and likely.any()
-        assert np.abs(found - values)[likely, :4].max() <= 1
-        assert np.abs(found - values)[likely, 4:].max() <= 0.01
+        assert output.dtype == np.float32 and likely.any()
+        assert np.abs(output - values)[likely, :4].max() <= 1
+        assert np.abs(output - values)[likely, 4:].max() <= 0.01
 
 
-def test_drivers_without_a_gpu_count_none(monkeypatch):
+def test_gpu_count_is_0_for_a_driver_without_gpus(monkeypatch):
     for driver in (types.SimpleNamespace(cuInit=lambda flags: 100), types.SimpleNamespace()):
-        monkeypatch.setattr(seam.ctypes, 'CDLL', lambda name: driver)
-        assert seam.gpu_count() == 0
+        monkeypatch.setattr(backends.ctypes, 'CDLL', lambda name: driver)
+        assert backends.gpu_count() == 0

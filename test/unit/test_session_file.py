@@ -1,4 +1,4 @@
-"""The description of a session is written whole, by one program at a time."""
+"""Locked updates of the description of a session, and atomic writes."""
 import json
 import multiprocessing
 import os
@@ -15,13 +15,13 @@ def _add_many(folder, name, count):
             content['frames'].append({'id': '%s-%d' % (name, number)})
 
 
-def test_a_new_session_is_begun(tmp_path):
+def test_a_missing_description_is_created(tmp_path):
     with changing(str(tmp_path)) as content:
         content['frames'].append({'id': 'a'})
     assert json.loads((tmp_path / 'frames.json').read_text()) == {'frames': [{'id': 'a'}]}
 
 
-def test_two_programs_lose_nothing_of_each_other(tmp_path):
+def test_concurrent_updates_are_not_lost(tmp_path):
     others = [multiprocessing.Process(target=_add_many, args=(str(tmp_path), name, 20)) for name in 'ab']
     for other in others:
         other.start()
@@ -31,7 +31,7 @@ def test_two_programs_lose_nothing_of_each_other(tmp_path):
     assert sorted(ids) == sorted('%s-%d' % (name, number) for name in 'ab' for number in range(20))
 
 
-def test_an_error_leaves_the_file_as_it_was(tmp_path):
+def test_an_error_does_not_change_the_file(tmp_path):
     _add_many(str(tmp_path), 'a', 1)
     before = (tmp_path / 'frames.json').read_bytes()
     with pytest.raises(RuntimeError), changing(str(tmp_path)) as content:
@@ -42,14 +42,14 @@ def test_an_error_leaves_the_file_as_it_was(tmp_path):
     assert (tmp_path / 'frames.json').read_bytes() == before
 
 
-def test_nothing_is_left_beside_a_file_that_could_not_be_written(tmp_path):
+def test_a_failed_write_leaves_no_temporary_file(tmp_path):
     (tmp_path / 'folder').mkdir()
     with pytest.raises(OSError):
         write_whole(str(tmp_path / 'folder'), b'data')
     assert os.listdir(str(tmp_path)) == ['folder']
 
 
-def test_the_file_has_the_rights_of_the_users_mask(tmp_path):
+def test_the_file_mode_follows_the_umask(tmp_path):
     mask = os.umask(0o027)
     try:
         write_whole(str(tmp_path / 'file'), b'data')
@@ -59,7 +59,7 @@ def test_the_file_has_the_rights_of_the_users_mask(tmp_path):
 
 
 @pytest.mark.parametrize('text', ['[]', '{"frames": 3}', '{"frames"'])
-def test_what_is_no_session_is_refused_and_kept(tmp_path, text):
+def test_invalid_descriptions_are_rejected_and_kept(tmp_path, text):
     (tmp_path / 'frames.json').write_text(text)
     with pytest.raises(ValueError), changing(str(tmp_path)):
         pass

@@ -1,4 +1,4 @@
-"""Sessions of the simulated camera: people are where the truth says."""
+"""Simulated measurement sessions agree with their ground truth."""
 import numpy as np
 import pytest
 
@@ -7,7 +7,7 @@ from ros_3d_bb.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb.measurements import read_session
 
 
-def test_people_are_measured_where_the_truth_says(tmp_path):
+def test_measured_positions_agree_with_the_truth(tmp_path):
     session = read_session(write_simulated_session(str(tmp_path), (3.0,), (0.0, 0.2), repetitions=2))
     assert [frame.truth_m.tolist() for frame in session.frames] == [[0, 3], [0, 3], [0.6, 3], [0.6, 3]]
     measured = read_session_measurements(str(tmp_path), 'foreground')

@@ -1,4 +1,4 @@
-"""Postures and people: joints that hold together, feet on the floor, and bodies of the size asked for."""
+"""Body model: connected joints, feet on the floor, and bodies of the requested size."""
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,7 +13,7 @@ from support.meshes import assert_closed
 postures = st.builds(Posture, st.floats(-3, 3), st.floats(0, 1), st.floats(0, 1))
 builds = st.tuples(st.floats(1.4, 2.1), st.floats(.9, 1.4), st.floats(0, 1), st.booleans(), st.booleans()).map(
     lambda values: Build(*values))
-TOUCHING_M = .015  # a sole this near to the floor touches it
+TOUCHING_M = .015  # a sole at less height touches the floor
 
 
 @pytest.fixture(scope='module')
@@ -22,12 +22,12 @@ def body():
 
 
 def joint(posture, bone, name):
-    """Where a bone takes a joint of the standing body."""
+    """Position of a joint that is attached to a bone, in a posture."""
     return bone_transforms(posture)[BONES.index(bone)].dot(np.append(JOINTS_M[name], 1))
 
 
 def shoe(body, side):
-    """Numbers of the vertices of a shoe; `side` 1 is the left one."""
+    """Indices of the vertices of a shoe; `side` 1 is the left one."""
     standing = body.posed()
     used = standing.faces[(standing.colors == body.build.shoes).all(axis=1)]
     return np.array([number for number in np.unique(used) if standing.vertices[number, 1] * side > 0])
@@ -43,13 +43,13 @@ def test_bones_move_rigidly(posture):
 
 @given(postures)
 @settings(max_examples=50)
-def test_bones_hold_together_at_their_joints(posture):
+def test_bones_are_connected_at_their_joints(posture):
     for bone, parent in PARENTS[1:]:
         np.testing.assert_allclose(joint(posture, bone, bone), joint(posture, parent, bone), atol=1e-12)
 
 
-def test_a_standing_body_has_hardly_bent_bones():
-    """Only the elbows bend a little."""
+def test_joints_of_a_standing_body_are_nearly_straight():
+    """Only the elbows are slightly bent."""
     turned = {bone: np.arccos((np.trace(transform[:, :3]) - 1) / 2)
               for bone, transform in zip(BONES, bone_transforms(Posture(phase=.3)))}
     assert {bone for bone, angle in turned.items() if angle > .05} == {'forearm_l', 'forearm_r'}
@@ -58,7 +58,7 @@ def test_a_standing_body_has_hardly_bent_bones():
 
 @given(st.floats(-2, 2), st.floats(0, 1), st.floats(0, 1))
 @settings(max_examples=50)
-def test_half_a_cycle_later_left_and_right_change_places(phase, swing, crouch):
+def test_left_and_right_are_exchanged_after_half_a_cycle(phase, swing, crouch):
     now, later = Posture(phase, swing, crouch), Posture(phase + .5, swing, crouch)
     for name in ('forearm_l', 'shin_l', 'foot_l'):
         mirrored = joint(later, name[:-1] + 'r', name[:-1] + 'r') * (1, -1, 1)
@@ -67,7 +67,7 @@ def test_half_a_cycle_later_left_and_right_change_places(phase, swing, crouch):
 
 @given(postures)
 @settings(max_examples=30)
-def test_the_gait_repeats_after_a_cycle_and_is_continuous(posture):
+def test_the_gait_is_periodic_and_continuous(posture):
     after = [bone_transforms(posture._replace(phase=posture.phase + shift)) for shift in (0, 1e-4, 1)]
     np.testing.assert_allclose(after[0], after[2], atol=1e-9)
     assert np.abs(after[1] - after[0]).max() < .005
@@ -75,48 +75,49 @@ def test_the_gait_repeats_after_a_cycle_and_is_continuous(posture):
 
 @given(st.floats(0, 1))
 def test_crouching_keeps_feet_and_body_over_the_origin(body, crouch):
-    """Within what the docstring says: the feet go to and fro below the body while it goes down."""
+    """Within 12 cm, as documented: the feet move back and forth while the body is lowered."""
     ankles = [joint(Posture(crouch=crouch), 'foot_' + side, 'foot_' + side) for side in 'lr']
     assert np.abs(np.mean(ankles, axis=0)[:2]).max() < .12
     assert np.abs(body.posed(Posture(crouch=crouch)).vertices.mean(axis=0)[:2]).max() < .1
 
 
 @pytest.mark.parametrize('swing,slip_m', [(1, .03), (.8, .025), (.5, .015)])
-def test_the_ankle_hardly_slides_while_the_foot_carries(swing, slip_m):
-    """Measured: 26 mm at full swing, while the foot rolls from heel to toe and 0.59 m pass over it."""
+def test_the_ankle_hardly_slides_during_stance(swing, slip_m):
+    """Measured: 26 mm at full swing, while the foot rolls from heel to toe and the body moves by 0.59 m."""
     phases = np.linspace(0, STANCE, 51)
     ankle_x = [joint(Posture(phase, swing), 'foot_l', 'foot_l')[0] for phase in phases]
     on_floor = ankle_x + phases * stride_m(TABLE_HEIGHT_M, swing)
     assert np.ptp(on_floor) < slip_m
-    assert on_floor[0] == pytest.approx(on_floor[-1], abs=1e-9)  # so that it does not drift over many steps
+    assert on_floor[0] == pytest.approx(on_floor[-1], abs=1e-9)  # no drift over many steps
 
 
 def sole_heights_and_slips(body, swing, phases, step=.01):
-    """Of the left shoe: its height above the floor, and the speed of what touches it as a share of the body's."""
-    left, found = shoe(body, 1), []
+    """Height of the left shoe above the floor, and slip speed of its parts on the floor relative to the body's speed.
+    """
+    left, rows = shoe(body, 1), []
     for phase in phases:
         before, after = (body.posed(Posture(phase + shift, swing)).vertices[left] for shift in (0, step))
         touching = (before[:, 2] < TOUCHING_M) & (after[:, 2] < TOUCHING_M)
         speed = (after - before)[touching, 0].mean() / step if touching.any() else -stride_m(TABLE_HEIGHT_M, swing)
-        found.append((before[:, 2].min(), 1 + speed / stride_m(TABLE_HEIGHT_M, swing)))
-    return np.array(found).T
+        rows.append((before[:, 2].min(), 1 + speed / stride_m(TABLE_HEIGHT_M, swing)))
+    return np.array(rows).T
 
 
 @pytest.mark.parametrize('swing', [.6, .8, 1])
-def test_the_foot_that_carries_is_on_the_floor_and_does_not_slide(body, swing):
-    """Measured: up to 3 cm above it just after heel strike, and up to 0.22 of the body's speed, 0.08 on average."""
+def test_the_stance_foot_is_on_the_floor_and_does_not_slide(body, swing):
+    """Measured: height up to 3 cm just after heel strike, slip up to 0.22 of the body's speed, 0.08 on average."""
     heights_m, slips = sole_heights_and_slips(body, swing, np.arange(.02, STANCE - .02, .02))
     assert heights_m.max() < .035 and np.mean(heights_m < TOUCHING_M) > .5
     assert np.abs(slips).max() < .3 and abs(slips.mean()) < .15
 
 
-def test_the_foot_that_swings_is_off_the_floor(body):
-    """At full swing; of slow people it nearly drags."""
+def test_the_swinging_foot_is_above_the_floor(body):
+    """At full swing; slow people nearly drag their feet."""
     heights_m, _slips = sole_heights_and_slips(body, 1, np.arange(.6, .92, .02))
     assert heights_m.min() > .02
 
 
-def test_stride_grows_with_height_and_swing_and_is_human():
+def test_stride_grows_with_height_and_swing_and_is_realistic():
     assert stride_m(1.75) == pytest.approx(1.2, abs=.1)
     assert stride_m(2 * 1.75) == pytest.approx(2 * stride_m(1.75))
     strides = [stride_m(1.75, swing) for swing in (0, .25, .5, .75, 1)]
@@ -126,7 +127,7 @@ def test_stride_grows_with_height_and_swing_and_is_human():
 @given(builds)
 @settings(max_examples=20)
 def test_a_standing_body_has_the_height_of_its_build(build):
-    """Within 3 mm: the hair."""
+    """Within 4 mm, because of the hair."""
     vertices = Body(build, np.random.RandomState(0)).posed().vertices
     assert vertices[:, 2].min() == 0
     assert vertices[:, 2].max() == pytest.approx(build.height_m, abs=.004)
@@ -140,7 +141,7 @@ def test_the_lowest_point_is_on_the_floor_and_the_head_no_higher_than_standing(b
     assert vertices[:, 2].max() < body.build.height_m + .02
 
 
-def test_the_more_one_crouches_the_lower_is_the_head(body):
+def test_the_head_is_lowered_by_crouching(body):
     tops = [body.posed(Posture(crouch=crouch)).vertices[:, 2].max() for crouch in np.linspace(0, 1, 11)]
     assert (np.diff(tops) < 0).all()
     assert 1.0 < tops[-1] < 1.3
@@ -153,8 +154,7 @@ def test_a_walking_body_bobs_by_centimetres(body):
 
 @given(builds)
 @settings(max_examples=10)
-def test_skin_hangs_on_bones_by_weights_that_sum_to_one(build):
-    """Else a move of all bones would tear the body: move it by a posture's rigid part."""
+def test_skinning_weights_sum_to_one(build):
     body = Body(build, np.random.RandomState(0))
     np.testing.assert_allclose(body._weights.sum(axis=1), 1, atol=1e-6)
     assert body._weights.min() >= 0
@@ -162,11 +162,11 @@ def test_skin_hangs_on_bones_by_weights_that_sum_to_one(build):
 
 @given(builds)
 @settings(max_examples=10)
-def test_a_body_is_closed_parts_of_a_human_volume(build):
+def test_a_body_consists_of_closed_parts_and_has_a_realistic_volume(build):
     mesh = Body(build, np.random.RandomState(0)).posed()
     assert_closed(mesh.faces)
-    litres_of_a_slim_one = 85 * (build.height_m / 1.75) ** 3
-    assert .8 < volume(mesh.vertices, mesh.faces) * 1000 / (litres_of_a_slim_one * build.girth ** 2) < 1.3
+    slim_litres = 85 * (build.height_m / 1.75) ** 3
+    assert .8 < volume(mesh.vertices, mesh.faces) * 1000 / (slim_litres * build.girth ** 2) < 1.3
 
 
 @given(postures)
@@ -179,7 +179,7 @@ def test_postures_keep_the_volume_and_unit_normals(body, posture):
 
 @given(builds)
 @settings(max_examples=20)
-def test_the_width_encloses_the_shoulders_and_leaves_the_hands_out(build):
+def test_the_width_includes_the_shoulders_and_excludes_the_hands(build):
     body = Body(build, np.random.RandomState(0))
     vertices = body.posed().vertices / build.height_m * TABLE_HEIGHT_M
     shoulders = vertices[vertices[:, 2] > JOINTS_M['arm_l'][2] - .005]
@@ -210,7 +210,7 @@ def test_clothes_and_hair_are_those_of_the_build():
     assert skin[2] > skin[0]
 
 
-def test_taking_a_posture_leaves_no_trace(body):
+def test_posed_does_not_change_the_body(body):
     before = body.posed().vertices.copy()
     body.posed(Posture(.3, 1, .5)).moved((1, 2, 0), 1)
     np.testing.assert_array_equal(body.posed().vertices, before)

@@ -1,4 +1,4 @@
-"""Surfaces: closed, wound outward, and of the volume that geometry says."""
+"""Meshes: closed, wound outwards, and of the right volume."""
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,7 +13,7 @@ angles = st.floats(-7, 7)
 
 
 def tube(length, depth, width, exponent=2.0, sides=64, rings=3):
-    """A straight tube along z with half axes `depth` (x) and `width` (y)."""
+    """Straight tube along z with half axes `depth` (x) and `width` (y)."""
     z, zero = np.linspace(0, length, rings), np.zeros(rings)
     return loft(np.c_[zero, zero, z], np.c_[zero + depth, zero, zero], np.c_[zero, zero + width, zero], exponent, sides)
 
@@ -33,21 +33,21 @@ def test_an_elliptic_tube_has_the_volume_of_its_inscribed_polygon(length, depth,
 
 @given(st.integers(2, 12).map(lambda half: 2 * half), st.integers(2, 6), st.floats(1.5, 6))
 @settings(max_examples=30)
-def test_a_tube_is_closed_and_wound_outward(sides, rings, exponent):
+def test_a_tube_is_closed_and_wound_outwards(sides, rings, exponent):
     vertices, faces = tube(1.0, .3, .5, exponent, sides, rings)
     assert len(vertices) == sides * rings
     assert_closed(faces)
     assert volume(vertices, faces) > 0
 
 
-def test_a_tube_whose_rings_run_down_is_wound_outward_too():
+def test_a_tube_with_descending_rings_is_wound_outwards():
     axes = np.c_[[1, 1], [0, 0], [0, 0]], np.c_[[0, 0], [1, 1], [0, 0]]
     up, down = loft([(0, 0, 0), (0, 0, 2)], *axes, 2, 32), loft([(0, 0, 2), (0, 0, 0)], *axes, 2, 32)
     assert volume(*up) == pytest.approx(volume(*down)) and volume(*up) > 0
     assert volume(up[0], up[1][:, ::-1]) == pytest.approx(-volume(*up))
 
 
-def test_the_exponent_of_a_tube_leads_from_an_ellipse_to_a_rectangle():
+def test_the_cross_section_approaches_a_rectangle_with_growing_exponent():
     volumes = [volume(*tube(1.0, .5, .5, exponent, 64)) for exponent in (2, 3, 6, 50)]
     assert (np.diff(volumes) > 0).all() and volumes[0] < np.pi / 4 and .9 < volumes[-1] <= 1
 
@@ -71,7 +71,7 @@ def test_a_box_has_its_size_and_stands_on_the_floor(size):
 
 @given(st.tuples(metres, metres, metres))
 @settings(max_examples=20)
-def test_faces_of_a_box_are_small_and_look_the_way_their_normals_do(size):
+def test_faces_of_a_box_are_small_and_agree_with_their_normals(size):
     mesh = crate(size)
     corners = mesh.vertices[mesh.faces]
     assert np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max() <= CELL_M + 1e-6
@@ -81,7 +81,7 @@ def test_faces_of_a_box_are_small_and_look_the_way_their_normals_do(size):
     assert (((corners.mean(axis=1) - (0, 0, size[2] / 2)) * normals).sum(axis=1) > 0).all()
 
 
-def test_a_box_has_its_colour_and_is_mottled_the_same_way_each_time():
+def test_a_box_has_its_colour_and_repeatable_mottling():
     mesh = crate()
     assert mesh.colors.dtype == np.uint8 and (mesh.colors == (10, 20, 30)).all() and len(mesh.colors) == len(mesh.faces)
     assert .8 < mesh.tone.min() < mesh.tone.max() < 1.2
@@ -90,7 +90,7 @@ def test_a_box_has_its_colour_and_is_mottled_the_same_way_each_time():
 
 @given(places, angles)
 @settings(max_examples=30)
-def test_moving_turns_counter_clockwise_from_above_and_shifts(position, heading):
+def test_moved_rotates_counter_clockwise_and_translates(position, heading):
     mesh = crate()
     moved = mesh.moved(position, heading)
     c, s = np.cos(heading), np.sin(heading)
@@ -102,7 +102,7 @@ def test_moving_turns_counter_clockwise_from_above_and_shifts(position, heading)
 
 @given(places, angles)
 @settings(max_examples=20)
-def test_moving_there_and_back_changes_nothing(position, heading):
+def test_the_inverse_of_moved_restores_the_mesh(position, heading):
     mesh = crate()
     back = mesh.moved(position, heading).moved(-np.array(position), 0).moved((0, 0, 0), -heading)
     np.testing.assert_allclose(back.vertices, mesh.vertices, atol=1e-5)

@@ -1,4 +1,4 @@
-"""Where people and the robot are: what the moves ask for, smoothly."""
+"""Motion of people and of the robot: agreement with the moves, and smoothness."""
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -42,8 +42,8 @@ def test_velocity_is_the_derivative_of_position(start, person_moves, time_s):
 
 @given(points, moves, times)
 @settings(max_examples=100)
-def test_nobody_starts_stops_turns_or_crouches_at_once(start, person_moves, time_s):
-    """Walking at up to 2 m/s; the largest turn in no time is that of facing another way: half a turn."""
+def test_velocity_heading_and_crouch_are_continuous(start, person_moves, time_s):
+    """The speed is up to 2 m/s; the largest instantaneous turn in the moves is half a turn."""
     motion, step_s = walker(*person_moves, start=start), .01
     now, later = motion.at(time_s), motion.at(time_s + step_s)
     assert np.linalg.norm(later.velocity_mps - now.velocity_mps) <= 4 / SMOOTHING_S * step_s + 1e-9
@@ -54,7 +54,7 @@ def test_nobody_starts_stops_turns_or_crouches_at_once(start, person_moves, time
 
 @given(points, moves)
 @settings(max_examples=50)
-def test_everyone_ends_where_the_moves_say_and_stays(start, person_moves):
+def test_people_stay_at_the_end_of_their_last_move(start, person_moves):
     motion = walker(*person_moves, start=start)
     end = ([start] + [move.to for move in person_moves if move.to])[-1]
     for time_s in (150, 1000):
@@ -65,7 +65,7 @@ def test_everyone_ends_where_the_moves_say_and_stays(start, person_moves):
 
 @given(points, st.floats(-3, 3), st.floats(0, 1))
 @settings(max_examples=20)
-def test_who_has_no_moves_stands_as_they_started(start, facing, crouch):
+def test_a_person_without_moves_keeps_the_start_state(start, facing, crouch):
     motion = walker(start=start, facing=facing, crouch=crouch)
     for time_s in (-5, 0, .1, 99):
         state = motion.at(time_s)
@@ -85,7 +85,7 @@ def test_a_straight_walk_has_its_speed_and_heading(speed, direction):
     assert angle_between(state.heading_rad, direction) < 1e-9
 
 
-def test_a_walk_takes_as_long_as_its_length_and_speed_say():
+def test_the_duration_of_a_walk_is_distance_by_speed():
     motion = walker(Move(wait=2.0), Move(to=(3, 0), speed=1.5))
     assert speed_of(motion.at(2 - SMOOTHING_S / 2)) == 0 and speed_of(motion.at(2)) == pytest.approx(.75)
     assert motion.at(3).position_m[0] == pytest.approx(1.5)
@@ -94,8 +94,8 @@ def test_a_walk_takes_as_long_as_its_length_and_speed_say():
 
 @given(st.floats(.3, 2))
 @settings(max_examples=20)
-def test_legs_make_a_stride_for_each_cycle(speed):
-    """So that the feet do not slide."""
+def test_each_gait_cycle_covers_one_stride(speed):
+    """Otherwise the feet would slide."""
     motion = walker(Move(to=(20, 0), speed=speed))
     start, end = motion.at(2), motion.at(4)
     assert end.posture.swing == pytest.approx(start.posture.swing)
@@ -103,20 +103,20 @@ def test_legs_make_a_stride_for_each_cycle(speed):
     assert cycles * stride_m(HEIGHT_M, start.posture.swing) == pytest.approx(2 * speed)
 
 
-def test_faster_people_swing_more():
+def test_swing_grows_with_speed():
     swings = [walker(Move(to=(20, 0), speed=speed)).at(2).posture.swing for speed in (.3, .6, 1.0, 1.3, 2.0)]
     assert (np.diff(swings[:4]) > .1).all() and swings[3:] == pytest.approx([1, 1])
 
 
 @given(st.floats(-7, 7), st.floats(-3, 3), st.floats(-3, 3), st.floats(0, 1))
 @settings(max_examples=50)
-def test_people_look_where_they_walk(facing, first, second, share):
-    """Two legs of 3 m: on each, but for the corner."""
+def test_people_face_the_direction_of_walking(facing, first, second, share):
+    """On two sections of 3 m, except near the corner."""
     corner = 3 * np.array([np.cos(first), np.sin(first)])
     end = corner + 3 * np.array([np.cos(second), np.sin(second)])
     motion = walker(Move(to=tuple(corner), speed=1.0), Move(to=tuple(end), speed=1.0), facing=facing)
-    for began_s, direction in ((0, first), (3, second)):
-        state = motion.at(began_s + SMOOTHING_S / 2 + share * (3 - SMOOTHING_S))
+    for start_s, direction in ((0, first), (3, second)):
+        state = motion.at(start_s + SMOOTHING_S / 2 + share * (3 - SMOOTHING_S))
         assert angle_between(state.heading_rad, direction) < 1e-9
         assert angle_between(np.arctan2(*state.velocity_mps[::-1]), direction) < 1e-6
 
@@ -133,17 +133,17 @@ def test_repeated_moves_are_periodic():
 
 
 @pytest.mark.parametrize('person_moves', [(), (Move(wait=0.0),), (Move(to=(0.0, 0.0)),)])
-def test_repeating_what_takes_no_time_comes_to_an_end(person_moves):
+def test_repeated_moves_without_duration_terminate(person_moves):
     np.testing.assert_array_equal(walker(*person_moves, repeat=True).at(9).position_m, (0, 0))
 
 
-def test_who_waits_may_face_another_way_and_crouch():
+def test_waiting_people_may_turn_and_crouch():
     motion = walker(Move(wait=2.0), Move(wait=2.0, facing=1.0, crouch=.7), Move(wait=2.0))
     assert [motion.at(time_s).heading_rad for time_s in (1, 3, 5)] == pytest.approx([0, 1, 1])
     assert [motion.at(time_s).posture.crouch for time_s in (1, 3, 5)] == pytest.approx([0, .7, 0])
 
 
-def test_facing_and_walking_turn_the_short_way():
+def test_facing_and_walking_turn_by_the_smaller_angle():
     motion = walker(Move(wait=2.0, facing=-3.0), Move(to=(1, 1), speed=1.0), facing=3.0)
     headings = [motion.at(time_s).heading_rad for time_s in np.arange(0, 1.5, .05)]
     assert 2.99 < min(headings) and max(headings) == pytest.approx(2 * np.pi - 3)
@@ -180,21 +180,21 @@ def chase():
 def test_a_following_robot_keeps_its_distance(chase):
     distances_m = [np.linalg.norm(robot.position_m - person.position_m) for robot, person in chase]
     assert min(distances_m) > 1.9
-    assert max(distances_m[100:]) < 2.4  # while the person walks on: some cm per m/s behind, and in the bend
+    assert max(distances_m[100:]) < 2.4  # while the person walks: lag of some cm per m/s, and the bend
     assert distances_m[-1] == pytest.approx(2, abs=.01)
 
 
-def test_a_following_robot_looks_at_the_person(chase):
+def test_a_following_robot_faces_the_person(chase):
     angles = [angle_between(robot.heading_rad, np.arctan2(*(person.position_m - robot.position_m)[::-1]))
               for robot, person in chase]
     assert angles[0] > 1 and max(angles[40:]) < .1 and angles[-1] < .01
 
 
-def test_a_following_robot_does_not_drive_while_it_looks_away(chase):
+def test_a_following_robot_does_not_drive_while_it_faces_away(chase):
     assert max(speed_of(robot) for robot, _person in chase[:7]) == 0 < speed_of(chase[20][0])
 
 
-def test_a_following_robot_is_no_faster_than_asked(chase):
+def test_a_following_robot_keeps_its_limits_of_speed_and_rate(chase):
     states = [robot for robot, _person in chase]
     assert max(speed_of(state) for state in states) <= 1.2 + 1e-9
     turned = np.abs(np.diff([state.heading_rad for state in states]))

@@ -1,4 +1,4 @@
-"""What the renderer draws, against rays cast by the book; and the colour sensor's noise."""
+"""Renderer compared with ray casting, and noise of the colour sensor."""
 import cv2
 import numpy as np
 import pytest
@@ -16,11 +16,11 @@ from ros_3d_bb.simulation.room import FLOOR, Room
 BOUNDS, HEIGHT = (-3.0, 9.0, -4.0, 4.0), 2.8
 CAMERA = Camera(160, 120, 153.7, 153.7, 79.8, 60.5)
 cameras = st.sampled_from([CAMERA, Camera(161, 119, 140, 150, 70, 66), Camera(99, 133, 80, 90, 49, 60)])
-FORWARD = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])  # an optical frame that looks along x
+FORWARD = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])  # optical frame of a camera that faces x
 
 
 def pose(position, yaw=0.0, pitch=0.0, roll=0.0):
-    """World from camera; it looks along x where all angles are 0."""
+    """Transform from the camera to the world. The camera faces x if all angles are 0."""
     cy, sy, cp, sp, cr, sr = (f(angle) for angle in (yaw, pitch, roll) for f in (np.cos, np.sin))
     turn = (np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]]).dot([[cp, 0, -sp], [0, 1, 0], [sp, 0, cp]])
             .dot([[1, 0, 0], [0, cr, -sr], [0, sr, cr]]))
@@ -52,13 +52,13 @@ def draw(room, meshes, camera=CAMERA, world_from_camera=pose((0, 0, 1.2)), shado
 
 
 def rays(camera, world_from_camera):
-    """Direction, in the world, in which depth along the optical axis grows by 1, of each pixel: (h, w, 3)."""
+    """Rays (h, w, 3) of the pixels in the world, of length 1 along the optical axis."""
     u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
     return camera.deproject(np.stack([u, v], axis=-1), np.ones(u.shape)).dot(world_from_camera[:3, :3].T)
 
 
 def depths_in(low, high, origin, directions):
-    """Depths at which rays enter and leave a box that is parallel to the axes, and the axis that they enter along."""
+    """Depths at which rays enter and leave an axis-aligned box, and the axis of the face through which they enter."""
     with np.errstate(divide='ignore', invalid='ignore'):
         ends = np.stack([(low - origin) / directions, (high - origin) / directions])
     entries = ends.min(axis=0)
@@ -66,13 +66,13 @@ def depths_in(low, high, origin, directions):
 
 
 def everywhere(mask):
-    """Where a mask holds in all pixels around."""
+    """Pixels whose neighbourhood lies within a mask."""
     return cv2.erode(mask.astype(np.uint8), np.ones((5, 5)), borderType=cv2.BORDER_REPLICATE) > 0
 
 
 @given(poses, cameras)
 @settings(max_examples=40)
-def test_depth_of_floor_ceiling_and_walls_is_that_of_rays(room, world_from_camera, camera):
+def test_depth_of_floor_ceiling_and_walls_agrees_with_ray_casting(room, world_from_camera, camera):
     _color, inverse_depth, surfaces = room.draw(camera, world_from_camera)
     low, high = np.array(BOUNDS[::2] + (0.0,)), np.array(BOUNDS[1::2] + (HEIGHT,))
     origin, directions = world_from_camera[:3, 3], rays(camera, world_from_camera)
@@ -125,7 +125,7 @@ def test_a_mark_on_a_surface_is_seen_where_it_projects_to(surface, spot, yaw, pi
     np.testing.assert_allclose(found, CAMERA.project(camera_from_world.dot(spot + (1,))[:3]), atol=.8)
 
 
-def test_the_nearest_object_wins_in_any_order(room):
+def test_the_nearest_object_is_visible_in_any_order(room):
     near, far = crate((.2, .6, 1.0), (2, 0, 0)), crate((.2, 2.0, 2.0), (4, 0, 0), color=(40, 200, 40))
     one, other = draw(room, [near, far]), draw(room, [far, near])
     np.testing.assert_array_equal(one.color, other.color)
@@ -147,32 +147,32 @@ def test_the_nearer_part_of_an_object_hides_the_farther_one(room, order):
     assert np.mean(one.color != two.color) < .01
 
 
-def test_objects_say_whose_depth_each_pixel_has(room, person):
+def test_objects_identify_the_object_of_each_pixel(room, person):
     meshes = [person.moved((3, -.5, 0), 2.0), crate((.5, .5, 1), (2.5, .3, 0)), person.moved((4, .2, 0), 0.0)]
-    drawn, empty = draw(room, meshes), draw(room, [])
+    rendering, empty = draw(room, meshes), draw(room, [])
     alone = [draw(room, [mesh]) for mesh in meshes]
     layers = np.stack([empty.inverse_depth] + [single.inverse_depth for single in alone])
-    np.testing.assert_array_equal(drawn.inverse_depth, layers.max(axis=0))
-    np.testing.assert_array_equal(drawn.inverse_depth, np.choose(drawn.objects, layers))
-    np.testing.assert_array_equal(drawn.color[drawn.objects == 0], empty.color[drawn.objects == 0])
+    np.testing.assert_array_equal(rendering.inverse_depth, layers.max(axis=0))
+    np.testing.assert_array_equal(rendering.inverse_depth, np.choose(rendering.objects, layers))
+    np.testing.assert_array_equal(rendering.color[rendering.objects == 0], empty.color[rendering.objects == 0])
     for number, single in enumerate(alone, 1):
-        mine = drawn.objects == number
-        np.testing.assert_array_equal(drawn.color[mine], single.color[mine])
-        assert drawn.areas[number - 1] == single.areas[0] >= mine.sum() > 0
+        mask = rendering.objects == number
+        np.testing.assert_array_equal(rendering.color[mask], single.color[mask])
+        assert rendering.areas[number - 1] == single.areas[0] >= mask.sum() > 0
 
 
-def test_the_area_is_what_is_seen_of_who_stands_alone(room, person):
-    drawn = draw(room, [person.moved((4, 0, 0), 3.0)])
-    assert drawn.areas[0] == pytest.approx((drawn.objects == 1).sum(), rel=.01)  # but for soles in the floor
+def test_the_area_is_that_of_the_object_alone(room, person):
+    rendering = draw(room, [person.moved((4, 0, 0), 3.0)])
+    assert rendering.areas[0] == pytest.approx((rendering.objects == 1).sum(), rel=.01)  # except for soles in the floor
     width_px, height_px = .5 * CAMERA.fx / 4, 1.75 * CAMERA.fy / 4
-    assert .4 < drawn.areas[0] / (width_px * height_px) < 1
-    assert drawn.inside == [1]
+    assert .4 < rendering.areas[0] / (width_px * height_px) < 1
+    assert rendering.inside == [1]
 
 
 @given(st.sampled_from(['left', 'right', 'top', 'bottom']), st.floats(.15, .85))
 @settings(max_examples=20)
 def test_inside_is_the_share_in_the_image(room, side, share):
-    """A square plate that the border of the image cuts, from either side."""
+    """A square plate is cut by one border of the image."""
     depth, size = 2.0, .8
     plate = crate((.01, size, size), (depth + .005, 0, 1.2 - size / 2))
     size_px = size / depth * CAMERA.fx
@@ -181,21 +181,21 @@ def test_inside_is_the_share_in_the_image(room, side, share):
         cx = {'left': size_px * (share - .5) - .5, 'right': 159.5 - size_px * (share - .5)}[side]
     else:
         cy = {'top': size_px * (share - .5) - .5, 'bottom': 119.5 - size_px * (share - .5)}[side]
-    drawn = draw(room, [plate], CAMERA._replace(cx=cx, cy=cy))
-    assert drawn.inside[0] == pytest.approx(share, abs=.26)  # by whole faces, half of the plate each
-    assert drawn.areas[0] == pytest.approx(share * size_px ** 2, abs=1.5 * size_px)  # a column of pixels
+    rendering = draw(room, [plate], CAMERA._replace(cx=cx, cy=cy))
+    assert rendering.inside[0] == pytest.approx(share, abs=.26)  # each face is half of the plate
+    assert rendering.areas[0] == pytest.approx(share * size_px ** 2, abs=1.5 * size_px)  # a column of pixels
 
 
 @pytest.mark.parametrize('cx', [-.5, 159.5])
 def test_half_a_person_at_the_border_is_half_inside(room, person, cx):
-    drawn = draw(room, [person.moved((3, 0, 0), np.pi)], CAMERA._replace(cx=cx))
-    assert drawn.inside[0] == pytest.approx(.5, abs=.03)
+    rendering = draw(room, [person.moved((3, 0, 0), np.pi)], CAMERA._replace(cx=cx))
+    assert rendering.inside[0] == pytest.approx(.5, abs=.03)
 
 
 @given(st.floats(0, .25))
 @settings(max_examples=20)
-def test_the_hidden_share_is_that_behind_the_edge_of_a_pillar(room, person, edge_m):
-    """The pillar's left edge projects to a known column: what is seen is the person left of it."""
+def test_the_visible_part_ends_at_the_edge_of_a_pillar(room, person, edge_m):
+    """The left edge of the pillar projects to a known column; the person is visible to the left of it."""
     camera = Camera(320, 240, 307.4, 307.4, 159.6, 121)
     body = person.moved((4, 0, 0), 2.5)
     pillar = crate((.2, 1.0, 2.8), (2.1, edge_m / 2 - .5, 0))  # its front is at 2 m, half as far as the person
@@ -207,27 +207,27 @@ def test_the_hidden_share_is_that_behind_the_edge_of_a_pillar(room, person, edge
     assert both.areas[0] == alone.areas[0] and both.inside[0] == 1
 
 
-def test_nothing_behind_the_camera_is_drawn(room, person):
+def test_objects_behind_the_camera_are_not_drawn(room, person):
     behind = [person.moved((-1.5, y, 0), 0) for y in (-.5, 0, .5)] + [crate((1, 1, 2), (-2, 0, 0))]
-    drawn, empty = draw(room, behind), draw(room, [])
-    np.testing.assert_array_equal(drawn.color, empty.color)
-    assert not drawn.objects.any() and drawn.areas == [0] * 4 and drawn.inside == [0] * 4
+    rendering, empty = draw(room, behind), draw(room, [])
+    np.testing.assert_array_equal(rendering.color, empty.color)
+    assert not rendering.objects.any() and rendering.areas == [0] * 4 and rendering.inside == [0] * 4
 
 
-def test_who_is_out_of_the_image_is_not_drawn(room, person):
-    drawn = draw(room, [person.moved((2, 3.5, 0), 0)])
-    assert not drawn.objects.any() and drawn.areas == [0] and drawn.inside == [0]
+def test_objects_outside_the_image_are_not_drawn(room, person):
+    rendering = draw(room, [person.moved((2, 3.5, 0), 0)])
+    assert not rendering.objects.any() and rendering.areas == [0] and rendering.inside == [0]
 
 
 @given(st.floats(-.3, .4))
 @settings(max_examples=20)
-def test_what_surrounds_or_touches_the_camera_does_no_harm(room, person, x):
-    drawn = draw(room, [person.moved((x, 0, 0), 0), crate((1, 1, 2), (x, 0, 0))])
-    assert np.isfinite(drawn.inverse_depth).all() and drawn.inverse_depth.max() <= 10.01
-    assert all(0 <= inside <= 1 for inside in drawn.inside)
+def test_objects_around_the_camera_give_finite_depth(room, person, x):
+    rendering = draw(room, [person.moved((x, 0, 0), 0), crate((1, 1, 2), (x, 0, 0))])
+    assert np.isfinite(rendering.inverse_depth).all() and rendering.inverse_depth.max() <= 10.01
+    assert all(0 <= inside <= 1 for inside in rendering.inside)
 
 
-def test_meshes_and_rooms_are_left_as_they_were(room, person):
+def test_rendering_does_not_change_meshes_and_rooms(room, person):
     meshes = [person.moved((3, 0, 0), 1), crate((1, 1, 1), (4, 1, 0))]
     before = [[part.copy() for part in mesh] for mesh in meshes]
     first, second = draw(room, meshes), draw(room, meshes)
@@ -240,12 +240,12 @@ def test_meshes_and_rooms_are_left_as_they_were(room, person):
 
 @pytest.mark.parametrize('camera', [Camera(1, 1, 30, 30, 0, 0), Camera(3, 50, 40, 40, 1, 25),
                                     Camera(333, 7, 300, 300, 166, 3)])
-def test_images_of_any_size_can_be_drawn(room, person, camera):
-    drawn = draw(room, [person.moved((2, 0, 0), 0)], camera, shadows=[(2, 0, .3)])
-    assert drawn.color.shape == (camera.height, camera.width, 3) and drawn.objects[camera.height // 2].any()
+def test_images_of_any_size_can_be_rendered(room, person, camera):
+    rendering = draw(room, [person.moved((2, 0, 0), 0)], camera, shadows=[(2, 0, .3)])
+    assert rendering.color.shape == (camera.height, camera.width, 3) and rendering.objects[camera.height // 2].any()
 
 
-def test_a_larger_camera_sees_the_same_scene(room, person):
+def test_the_scene_does_not_depend_on_the_resolution(room, person):
     body = person.moved((3, .2, 0), 1)
     small, large = (draw(room, [body], camera).objects for camera in (
         CAMERA, Camera(480, 360, 3 * 153.7, 3 * 153.7, 3 * 79.8 + 1, 3 * 60.5 + 1)))
@@ -262,17 +262,17 @@ def test_shadows_darken_the_floor_around_the_feet_only(room):
     np.testing.assert_array_equal(lit.inverse_depth, shaded.inverse_depth)
 
 
-def test_shadows_lie_on_the_floor_and_not_on_walls(room):
+def test_shadows_do_not_fall_on_walls(room):
     lit, shaded = draw(room, []), draw(room, [], shadows=[(8.9, 0, .5)])
     _color, _inverse_depth, surfaces = room.draw(CAMERA, pose((0, 0, 1.2)))
     np.testing.assert_array_equal(shaded.color[surfaces != FLOOR], lit.color[surfaces != FLOOR])
     assert (shaded.color != lit.color).any()
 
 
-def test_things_are_lit_from_above(room):
-    drawn = draw(room, [crate((1, 1, .5), (4, 0, 0), color=(100, 100, 100))])
-    top, front = drawn.color[88, 75:85].mean(), drawn.color[100, 75:85].mean()
-    assert drawn.objects[88, 80] == drawn.objects[100, 80] == 1 and front * 1.2 < top < 110
+def test_objects_are_lit_from_above(room):
+    rendering = draw(room, [crate((1, 1, .5), (4, 0, 0), color=(100, 100, 100))])
+    top, front = rendering.color[88, 75:85].mean(), rendering.color[100, 75:85].mean()
+    assert rendering.objects[88, 80] == rendering.objects[100, 80] == 1 and front * 1.2 < top < 110
 
 
 @pytest.mark.parametrize('height', [1.0, 1.4, 2.4])
@@ -283,14 +283,14 @@ def test_rooms_may_be_low_and_small(height):
         assert color.mean() > 50 and inverse_depth.min() >= 1 / 7.
 
 
-def test_rooms_of_another_seed_look_different(room):
+def test_rooms_depend_on_the_seed(room):
     images = [Room(BOUNDS, HEIGHT, np.random.RandomState(seed)).draw(CAMERA, pose((0, 0, 1.2)))[0]
               for seed in (3, 3, 4)]
     np.testing.assert_array_equal(images[0], images[1])
     assert np.mean(images[0] != images[2]) > .3
 
 
-def test_mottles_have_mean_zero_and_deviation_one():
+def test_mottle_has_mean_0_and_standard_deviation_1():
     shade = textures.mottle(128, np.random.RandomState(0))
     assert shade.shape == (128, 128) and abs(shade.mean()) < 1e-5 and shade.std() == pytest.approx(1, abs=1e-5)
 
@@ -299,34 +299,34 @@ GREY = np.full((120, 160, 3), 120, np.uint8)
 
 
 @pytest.mark.parametrize('sigma', [0, 1, 2.2, 5])
-def test_colour_noise_has_the_sigma_asked_for_and_no_bias(sigma):
+def test_colour_noise_has_the_given_sigma_and_no_bias(sigma):
     sensor = ColorSensor(CAMERA, 1, sigma)
-    noise = np.stack([sensor.take(GREY, number) for number in range(10)]) - 120.
+    noise = np.stack([sensor.capture(GREY, number) for number in range(10)]) - 120.
     assert noise.std() == pytest.approx(np.hypot(sigma, 12 ** -.5) if sigma else 0, rel=.03)
     assert abs(noise.mean()) < .1
 
 
-def test_colour_noise_is_a_function_of_seed_and_number_alone():
+def test_colour_noise_depends_on_seed_and_number_only():
     one, other = ColorSensor(CAMERA, 5, 2.0), ColorSensor(CAMERA, 5, 2.0)
-    forth = [one.take(GREY, number) for number in range(6)]
-    back = [other.take(GREY, number) for number in reversed(range(6))][::-1]
-    np.testing.assert_array_equal(forth, back)
-    assert len({image.tobytes() for image in forth}) == 6
-    assert ColorSensor(CAMERA, 6, 2.0).take(GREY, 0).tobytes() != forth[0].tobytes()
+    forward = [one.capture(GREY, number) for number in range(6)]
+    backward = [other.capture(GREY, number) for number in reversed(range(6))][::-1]
+    np.testing.assert_array_equal(forward, backward)
+    assert len({image.tobytes() for image in forward}) == 6
+    assert ColorSensor(CAMERA, 6, 2.0).capture(GREY, 0).tobytes() != forward[0].tobytes()
     assert (GREY == 120).all()
 
 
 def test_colour_noise_of_frames_is_independent():
     sensor = ColorSensor(CAMERA, 2, 3.0)
-    correlation = np.corrcoef([sensor.take(GREY, number).ravel() for number in range(8)]) - np.eye(8)
+    correlation = np.corrcoef([sensor.capture(GREY, number).ravel() for number in range(8)]) - np.eye(8)
     assert np.abs(correlation).max() < .05
 
 
-def test_the_colour_sensor_blurs_a_little_and_saturates():
+def test_the_colour_sensor_blurs_slightly_and_saturates():
     image = np.zeros((120, 160, 3), np.uint8)
     image[:, 80:] = 255
-    taken = ColorSensor(CAMERA, 0, 0).take(image, 0)
-    assert taken[:, :79].max() == 0 and taken[:, 81:].min() == 255
-    assert 10 < taken[60, 79, 0] < 100 and 155 < taken[60, 80, 0] < 245
-    noisy = ColorSensor(CAMERA, 0, 5).take(image, 0)
+    captured = ColorSensor(CAMERA, 0, 0).capture(image, 0)
+    assert captured[:, :79].max() == 0 and captured[:, 81:].min() == 255
+    assert 10 < captured[60, 79, 0] < 100 and 155 < captured[60, 80, 0] < 245
+    noisy = ColorSensor(CAMERA, 0, 5).capture(image, 0)
     assert noisy[:, :79].max() < 40 and noisy[:, 81:].min() > 215  # no wrap-around

@@ -1,4 +1,4 @@
-"""Frames of a scenario, and the ground truth in them."""
+"""Simulator: frames of a scenario, and their ground truth."""
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -17,7 +17,7 @@ START_NS = 1600000000 * 10 ** 9
 
 
 def scene(*people, **others):
-    """A scenario without noise, 3 s long."""
+    """Scenario of 3 s without noise."""
     values = dict(duration=3.0, rate=10.0, seed=4, depth_noise=False, color_noise=0.0, people=people)
     return Scenario(**dict(values, **others))
 
@@ -26,34 +26,34 @@ def frame_of(*people, **others):
     return Simulator(scene(*people, **others), CAMERA).frame(0)
 
 
-def seen(frame):
-    """Numbers of the people with a 2D box."""
+def visible_ids(frame):
+    """IDs of the people who have a 2D box."""
     return [person.id for person in frame.people if person.box_px is not None]
 
 
 @pytest.fixture(scope='module')
 def pillar():
-    """A person who walks behind a pillar: the simulator and a frame every 0.2 s."""
+    """Simulator of a person who walks behind a pillar, and a frame every 0.2 s."""
     simulator = Simulator(scene(PILLAR_WALK, room=HALL, duration=4.0), CAMERA)
     return simulator, [simulator.frame(number) for number in range(0, simulator.frame_count, 2)]
 
 
-def test_a_frame_is_a_function_of_scenario_and_number_alone():
+def test_a_frame_depends_on_scenario_and_number_only():
     noisy = scene(Person((3, 0), moves=(Move(to=(5, 1)),)), depth_noise=True, color_noise=2.0, room=HALL)
-    forth, back = Simulator(noisy, CAMERA), Simulator(noisy, CAMERA)
+    forward, backward = Simulator(noisy, CAMERA), Simulator(noisy, CAMERA)
     numbers = (0, 5, 9)
-    one = {number: forth.frame(number) for number in numbers}
+    frames = {number: forward.frame(number) for number in numbers}
     for number in reversed(numbers):
-        other = back.frame(number)
-        assert other.color.tobytes() == one[number].color.tobytes()
-        assert other.depth_mm.tobytes() == one[number].depth_mm.tobytes()
-        assert str(other.people) == str(one[number].people)
+        other = backward.frame(number)
+        assert other.color.tobytes() == frames[number].color.tobytes()
+        assert other.depth_mm.tobytes() == frames[number].depth_mm.tobytes()
+        assert str(other.people) == str(frames[number].people)
     different = Simulator(noisy._replace(seed=5), CAMERA).frame(5)
-    assert different.color.tobytes() != one[5].color.tobytes()
-    assert different.depth_mm.tobytes() != one[5].depth_mm.tobytes()
+    assert different.color.tobytes() != frames[5].color.tobytes()
+    assert different.depth_mm.tobytes() != frames[5].depth_mm.tobytes()
 
 
-def test_frames_have_the_form_that_the_camera_has():
+def test_frames_have_the_format_of_the_camera():
     frame = Simulator(scene(Person((3, 0)))).frame(3)
     assert frame.color.shape == (480, 640, 3) and frame.color.dtype == np.uint8
     assert frame.depth_mm.shape == (480, 640) and frame.depth_mm.dtype == np.uint16
@@ -68,33 +68,33 @@ def test_frames_fill_the_duration_at_the_rate(duration, rate, count):
     assert [simulator.time_s(number) for number in (0, count)] == [0, count / float(rate)]
 
 
-def test_several_cameras_take_turns_and_look_where_they_are_mounted():
-    """One ahead, one to the left by 90 degrees, 2 m above the floor and down; a person in front of each."""
+def test_several_cameras_take_turns_at_their_mounts():
+    """One faces forward, the other left and down from 2 m above the floor; a person is in front of each."""
     robot = Robot(pose=(1.0, 0.0, 0.0), cameras=(Mount('front'), Mount('side', (0.0, 0.3, 1.9), np.pi / 2, -0.4)))
     simulator = Simulator(scene(Person((4.0, 0.0)), Person((1.0, 3.0)), robot=robot), CAMERA)
     assert (simulator.cameras, simulator.rate, simulator.frame_count) == (['front', 'side'], 20.0, 60)
     frames = [simulator.frame(number) for number in (0, 1, 2)]
     assert [(frame.camera, frame.time_s) for frame in frames] == [('front', 0.0), ('side', 0.05), ('front', 0.1)]
-    assert [seen(frame) for frame in frames] == [[1], [2], [1]]
+    assert [visible_ids(frame) for frame in frames] == [[1], [2], [1]]
     side = frames[1].poses.map_from_camera
     np.testing.assert_allclose(side[:3, 3], (1.0, 0.3, 1.965), atol=1e-9)
     np.testing.assert_allclose(side[:3, 2], (0, np.cos(0.4), -np.sin(0.4)), atol=1e-9)
 
 
 @pytest.fixture(scope='module')
-def simulator_of_nobody():
+def empty_simulator():
     return Simulator(scene(), CAMERA)
 
 
 def test_without_noise_depth_is_exact():
-    """The wall ahead is at x = 9 m; the camera 0.17 m before the robot, 0.265 m above the floor."""
+    """The wall is at x = 9 m; the camera is 0.17 m in front of the robot's centre, 0.265 m above the floor."""
     depth_mm = frame_of().depth_mm
     assert depth_mm[60, 80] == 8830
     for v in (80, 110):
         assert depth_mm[v, 80] == pytest.approx(.265 / (v - CAMERA.cy) * CAMERA.fy * 1000, abs=1)
 
 
-def test_with_noise_depth_is_that_of_a_d435():
+def test_with_noise_depth_has_the_errors_of_a_d435():
     noisy, exact = (frame_of(Person((2.5, 0)), depth_noise=noise).depth_mm.astype(float) for noise in (True, False))
     assert (noisy == 0).any() and not (exact == 0).any()
     errors = (noisy / exact - 1)[noisy > 0]
@@ -103,10 +103,11 @@ def test_with_noise_depth_is_that_of_a_d435():
 
 @given(st.floats(2.5, 7), st.floats(-2, 2), st.floats(-3, 3))
 @settings(max_examples=12)
-def test_the_box_encloses_exactly_what_the_person_changes(simulator_of_nobody, x, y, facing):
-    """In the depth image, against the empty room; a row of soles that is nearer by less than 1 mm may be missing."""
+def test_the_box_encloses_the_pixels_of_the_person(empty_simulator, x, y, facing):
+    """Pixels whose depth differs from the empty room. Soles may differ by less than 1 mm, so one row may be missing.
+    """
     frame = frame_of(Person((x, y), facing=facing))
-    changed, (truth,) = frame.depth_mm != simulator_of_nobody.frame(0).depth_mm, frame.people
+    changed, (truth,) = frame.depth_mm != empty_simulator.frame(0).depth_mm, frame.people
     if truth.box_px is None:
         assert not changed.any()
         return
@@ -115,18 +116,18 @@ def test_the_box_encloses_exactly_what_the_person_changes(simulator_of_nobody, x
     assert (x1, y1, x2) == (columns[0], rows[0], columns[-1] + 1) and 0 <= y2 - rows[-1] - 1 <= 1
 
 
-def test_who_stands_alone_in_view_is_visible_and_nothing_hides_them():
+def test_a_person_alone_in_view_is_completely_visible():
     truth, = frame_of(Person((5.0, 0.5))).people
     assert truth.visible == pytest.approx(1, abs=.03) and truth.hidden == pytest.approx(0, abs=.03)
 
 
 @pytest.mark.parametrize('start', [(-2.0, 0.0), (1.0, 3.5), (-1.0, -1.0)])
-def test_who_is_behind_the_camera_or_beside_the_image_is_not_visible(start):
+def test_a_person_outside_the_image_is_not_visible(start):
     truth, = frame_of(Person(start)).people
     assert (truth.visible, truth.hidden, truth.box_px) == (0, 0, None)
 
 
-def test_truth_has_the_place_and_size_of_the_body():
+def test_truth_has_the_position_and_size_of_the_body():
     simulator = Simulator(scene(Person((5.0, 1.0), height=1.8, girth=1.0), Person((5.0, -1.0), height=1.8, crouch=1.0)),
                           CAMERA)
     standing, crouching = simulator.frame(0).people
@@ -139,7 +140,7 @@ def test_truth_has_the_place_and_size_of_the_body():
 
 @given(st.floats(-2, 0), st.floats(-1, 1), st.floats(-.3, .3), st.floats(-.1, .2), st.floats(2.5, 6), st.floats(-1, 1))
 @settings(max_examples=12)
-def test_the_camera_sees_people_where_the_poses_say(x, y, yaw, pitch, ahead, beside):
+def test_images_agree_with_the_poses(x, y, yaw, pitch, ahead, beside):
     robot = Robot((x, y, yaw), pitch=pitch, mount=(.2, .1, .6), odometry_drift=(.1, -.05, .02))
     frame = Simulator(scene(Person((ahead, beside)), robot=robot), CAMERA).frame(20)
     truth, = frame.people
@@ -153,7 +154,7 @@ def test_the_camera_sees_people_where_the_poses_say(x, y, yaw, pitch, ahead, bes
     assert frame.depth_mm[int(round(v)), int(round(u))] / 1000. == pytest.approx(point[2], abs=.25)
 
 
-def test_poses_are_rigid_and_the_camera_is_where_it_is_mounted():
+def test_poses_are_rigid_and_agree_with_the_mount():
     robot = Robot((1.0, 2.0, np.pi / 2), mount=(.2, .1, .5), base_height=.1, pitch=.3)
     poses = Simulator(scene(robot=robot), CAMERA).poses_at(0)
     for matrix in poses + (poses.map_from_camera,):
@@ -161,11 +162,11 @@ def test_poses_are_rigid_and_the_camera_is_where_it_is_mounted():
         np.testing.assert_array_equal(matrix[3], (0, 0, 0, 1))
     camera = poses.map_from_camera
     np.testing.assert_allclose(camera[:3, 3], (.9, 2.2, .6), atol=1e-12)
-    np.testing.assert_allclose(camera[:3, 2], (0, np.cos(.3), np.sin(.3)), atol=1e-12)  # looks along y, tilted up
+    np.testing.assert_allclose(camera[:3, 2], (0, np.cos(.3), np.sin(.3)), atol=1e-12)  # faces y, tilted up
     np.testing.assert_allclose(camera[:3, 0], (1, 0, 0), atol=1e-12)
 
 
-def test_odometry_drifts_in_odom_and_not_in_the_map():
+def test_drift_changes_the_pose_in_odom_and_not_in_the_map():
     robot = Robot((1.0, 0.0, 0.3), (Move(to=(3.0, 1.0), speed=.5),))
     still, drifting = (Simulator(scene(robot=robot._replace(odometry_drift=drift)), CAMERA).poses_at(2.5)
                        for drift in ((0, 0, 0), (.02, .01, -.03)))
@@ -180,21 +181,21 @@ def test_the_robot_follows_a_person():
     walker = Person((2.5, 0), moves=(Move(to=(7, 0), speed=.8),))
     simulator = Simulator(scene(walker, robot=robot, duration=5.0), CAMERA)
     assert simulator.poses_at(5).odom_from_base[0, 3] > 3
-    assert seen(simulator.frame(40)) == [1]
+    assert visible_ids(simulator.frame(40)) == [1]
 
 
-def test_looks_are_drawn_by_the_seed_unless_they_are_given():
+def test_the_appearance_is_random_by_the_seed_unless_specified():
     looks = {seed: [body.build for body in Simulator(scene(*[Person((5, y)) for y in (-1, 0, 1)], seed=seed),
                                                      CAMERA)._bodies] for seed in (1, 2)}
     assert looks[1] != looks[2] and len({build.shirt for build in looks[1]}) == 3
-    given_look = Person((5, 0), height=1.6, girth=1.2, hips=.5, long_hair=True, short_sleeves=False, skin=(1, 2, 3),
-                        hair=(4, 5, 6), shirt=(7, 8, 9), trousers=(10, 11, 12))
-    build = Simulator(scene(given_look), CAMERA)._bodies[0].build
+    specified = Person((5, 0), height=1.6, girth=1.2, hips=.5, long_hair=True, short_sleeves=False, skin=(1, 2, 3),
+                       hair=(4, 5, 6), shirt=(7, 8, 9), trousers=(10, 11, 12))
+    build = Simulator(scene(specified), CAMERA)._bodies[0].build
     assert build._replace(shoes=None) == (1.6, 1.2, .5, True, False, (1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12),
                                           None)
 
 
-def test_who_walks_behind_a_pillar_is_hidden_and_comes_out_again(pillar):
+def test_a_person_behind_a_pillar_is_occluded(pillar):
     simulator, frames = pillar
     status = [truth_at(simulator, frame, START_NS)[0].status for frame in frames]
     hidden = [frame.people[0].hidden for frame in frames]
@@ -205,21 +206,21 @@ def test_who_walks_behind_a_pillar_is_hidden_and_comes_out_again(pillar):
     for frame, value in zip(frames, status):
         person = frame.people[0]
         assert (value == OCCLUDED) == (person.hidden > .75)
-        assert person.visible == pytest.approx(1 - person.hidden, abs=.01)  # the image cuts nobody
+        assert person.visible == pytest.approx(1 - person.hidden, abs=.01)  # completely inside the image
 
 
 @pytest.mark.parametrize('start,status', [((4.0, 0.0), VISIBLE), ((4.0, 2.6), OUT_OF_VIEW), ((-2.0, 0.0), OUT_OF_VIEW)])
-def test_status_tells_who_is_out_of_view(start, status):
+def test_the_status_of_people_outside_the_image_is_out_of_view(start, status):
     simulator = Simulator(scene(Person(start)), CAMERA)
     assert truth_at(simulator, simulator.frame(0), START_NS)[0].status == status
 
 
-def test_someone_nearer_hides_someone_farther_and_not_the_other_way_round():
+def test_a_near_person_hides_a_far_person():
     near, far = frame_of(Person((3.0, 0.0), height=1.9), Person((6.0, 0.0), height=1.6)).people
     assert near.hidden < .05 and far.hidden > .6
 
 
-def test_the_predicted_truth_is_where_people_are_later(pillar):
+def test_predictions_of_the_truth_are_the_future_positions(pillar):
     simulator, frames = pillar
     track, = truth_at(simulator, frames[3], START_NS)
     assert track.prediction_step_s == PREDICTION_STEP_S and len(track.prediction_m) * PREDICTION_STEP_S == 2.0
@@ -229,7 +230,7 @@ def test_the_predicted_truth_is_where_people_are_later(pillar):
     np.testing.assert_allclose(track.prediction_m[3, :2], frames[8].people[0].position_m[:2])  # one second later
 
 
-def test_true_tracks_say_what_the_frame_does(pillar):
+def test_true_tracks_agree_with_the_frame(pillar):
     simulator, frames = pillar
     frame = frames[6]
     track, = truth_at(simulator, frame, START_NS)
@@ -242,14 +243,14 @@ def test_true_tracks_say_what_the_frame_does(pillar):
     assert (track.first_seen_ns, track.last_seen_ns) == (START_NS - 1200000000, START_NS)
 
 
-def test_who_stands_does_not_move():
+def test_a_standing_person_is_not_moving():
     simulator = Simulator(scene(Person((4.0, 0.0))), CAMERA)
     track, = truth_at(simulator, simulator.frame(5), START_NS)
     assert not track.moving and not track.velocity_mps.any()
     np.testing.assert_allclose(track.prediction_m, [track.position_m] * 8)
 
 
-def test_an_empty_room_has_no_truth(simulator_of_nobody):
-    frame = simulator_of_nobody.frame(0)
-    assert frame.people == [] and truth_at(simulator_of_nobody, frame, START_NS) == []
-    assert simulator_of_nobody.positions_at(1.0).shape == (0, 2)
+def test_an_empty_room_has_no_truth(empty_simulator):
+    frame = empty_simulator.frame(0)
+    assert frame.people == [] and truth_at(empty_simulator, frame, START_NS) == []
+    assert empty_simulator.positions_at(1.0).shape == (0, 2)

@@ -1,4 +1,4 @@
-"""Snapshots: what belongs to one image comes together, whatever the order and however slow the detector is."""
+"""Snapshots combine the messages of one image for any order of arrival and any delay of the detector."""
 import itertools
 
 import pytest
@@ -33,7 +33,7 @@ def parts_of(snapshot):
 
 
 @pytest.mark.parametrize('order', itertools.permutations(PARTS))
-def test_parts_come_together_in_any_order(order):
+def test_parts_are_combined_in_any_order(order):
     snapshots = made()
     assert snapshots.newest is None
     send(snapshots, 7, order)
@@ -41,7 +41,7 @@ def test_parts_come_together_in_any_order(order):
 
 
 @given(st.integers(0, 29), st.integers(0, 5))
-def test_the_newest_with_all_parts_is_kept_while_the_detector_works(delay_2d, more_delay_3d):
+def test_the_newest_complete_snapshot_is_kept_while_the_detector_works(delay_2d, more_delay_3d):
     delay_3d = min(29, delay_2d + more_delay_3d)
     snapshots = made()
     for number in range(60):
@@ -52,21 +52,21 @@ def test_the_newest_with_all_parts_is_kept_while_the_detector_works(delay_2d, mo
     assert parts_of(snapshots.newest) == (59 - delay_3d,) * 5
 
 
-def test_a_detector_that_leaves_images_out_is_shown_with_those_that_it_took():
+def test_images_without_detections_are_skipped():
     snapshots = made()
     for number in range(50):
         send(snapshots, number, PARTS if number % 10 == 5 else PARTS[:3])
     assert parts_of(snapshots.newest) == (45,) * 5
 
 
-def test_boxes_of_another_stamp_are_not_taken():
+def test_boxes_of_another_stamp_are_ignored():
     snapshots = made()
     send(snapshots, 1, PARTS[:3])
     snapshots.add_boxes3d(PERIOD + 1, 0, 'other')
     assert snapshots.newest.boxes3d is None
 
 
-def test_without_boxes_the_newest_images_are_there_once_none_can_be_on_their_way():
+def test_without_boxes_the_newest_images_are_returned_after_the_delay():
     snapshots = made()
     assert snapshots.is_early
     for number in range(40):
@@ -75,25 +75,25 @@ def test_without_boxes_the_newest_images_are_there_once_none_can_be_on_their_way
     assert parts_of(snapshots.newest) == (39, 39, 39, None, None)
 
 
-def test_boxes_that_stay_away_are_not_those_of_an_old_image():
+def test_missing_boxes_are_not_replaced_by_those_of_an_old_image():
     snapshots = made()
     for number in range(80):
         send(snapshots, number, PARTS if number < 10 else PARTS[:3])
     assert parts_of(snapshots.newest) == (79, 79, 79, None, None) and not snapshots.is_early
 
 
-def test_a_colour_image_without_depth_is_named():
+def test_the_stamp_of_a_colour_image_without_depth_is_returned():
     snapshots = made()
     lost = [stamp for number in range(5) for stamp in
             send(snapshots, number, [part for part in PARTS if number != 2 or part != 'depth'])]
     assert lost == [2 * PERIOD] and parts_of(snapshots.newest) == (4,) * 5
 
 
-def test_time_that_goes_back_forgets_what_was():
+def test_older_messages_are_dropped_when_time_jumps_back():
     snapshots = made()
     for number in range(100, 140):
         send(snapshots, number)
-    assert send(snapshots, 2) == [2 * PERIOD]  # nothing tells it from one that came too late
+    assert send(snapshots, 2) == [2 * PERIOD]  # it cannot be distinguished from a late image
     send(snapshots, 3, PARTS[:3])
     assert parts_of(snapshots.newest) == (3, 3, 3, None, None) and snapshots.is_early
     send(snapshots, 3, PARTS[3:])

@@ -1,12 +1,12 @@
-"""The picture of the viewer: what is where, whatever is missing."""
+"""Window content of the viewer, with all or some of the inputs."""
 import numpy as np
 import pytest
 
 from ros_3d_bb.estimation import Box3D, DepthImage
 from ros_3d_bb.overlay import BOX_COLOR
 from ros_3d_bb.stamped import NS
-from ros_3d_bb.overlay import colors_of
-from ros_3d_bb.viewer_picture import MEASURED_NS, WARNING_INK, FrameRate, View, box_lines, compose, text_picture
+from ros_3d_bb.overlay import colorize_depth
+from ros_3d_bb.viewer_picture import RATE_WINDOW_NS, WARNING_INK, FrameRate, View, box_lines, compose, text_image
 
 BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75,
             (True,) * 4)
@@ -21,13 +21,13 @@ def view(**changes):
 
 
 @pytest.mark.parametrize('width_px', [160, 320, 640])
-def test_three_panels_stand_side_by_side(width_px):
+def test_three_panels_are_side_by_side(width_px):
     picture = compose(view(), width_px, 6.0)
     height_px = width_px * 3 // 4
     assert picture.dtype == np.uint8 and picture.shape[1] == 3 * width_px and picture.shape[0] > height_px
     row, column = int(height_px * 0.95), int(width_px * 0.5)
     assert picture[row, column].tolist() == picture[row, column + 2 * width_px].tolist() == [10, 20, 30]
-    depth = colors_of(np.full((1, 1), 255 - int(254 * 1.5 / 6.0), np.uint8))[0, 0].astype(int)
+    depth = colorize_depth(np.full((1, 1), 255 - int(254 * 1.5 / 6.0), np.uint8))[0, 0].astype(int)
     assert np.abs(picture[row, column + width_px] - depth).max() <= 8
 
 
@@ -38,15 +38,15 @@ def test_boxes_are_drawn_in_the_third_panel_only():
         assert not (picture[:240, 320 * panel:320 * (panel + 1)] == BOX_COLOR).all(axis=2).any()
 
 
-def test_2d_boxes_without_a_position_are_drawn_too_and_lifted_ones_once():
+def test_2d_boxes_without_a_3d_box_are_drawn_and_others_only_once():
     lifted = compose(view(), 320, 6.0)
     np.testing.assert_array_equal(lifted, compose(view(rects_px=None), 320, 6.0))
     with_other = compose(view(rects_px=((100, 40, 200, 160), (-20, 30, 60, 400))), 320, 6.0)
     assert with_other[100, 640 + 60].tolist() == list(BOX_COLOR) != lifted[100, 640 + 60].tolist()
 
 
-def test_near_is_red_far_is_blue_and_nothing_is_black():
-    near, far, nothing = colors_of(np.array([[250, 5, 0]], np.uint8))[0].astype(int)
+def test_near_depth_is_red_far_depth_is_blue_and_no_depth_is_black():
+    near, far, nothing = colorize_depth(np.array([[250, 5, 0]], np.uint8))[0].astype(int)
     assert near[0] > near[2] + 50 and far[2] > far[0] + 50 and nothing.tolist() == [0, 0, 0]
 
 
@@ -67,22 +67,22 @@ def test_boxes_may_be_missing(changes):
     assert compose(view(**changes), 320, 6.0).shape == compose(view(), 320, 6.0).shape
 
 
-def test_positions_are_said():
+def test_positions_are_shown_as_text():
     line, = box_lines((BOX,))
     assert line == '1: x +0.50  y -0.25  z 2.00 m,  0.50 m wide, 1.75 m high, cut'
 
 
 def test_warnings_are_in_another_colour():
-    plain, warned = (text_picture(('line',), warnings, 400).astype(int) for warnings in ((), ('nothing comes',)))
+    plain, warned = (text_image(('line',), warnings, 400).astype(int) for warnings in ((), ('nothing comes',)))
     has_ink = [(np.abs(picture - WARNING_INK).max(axis=2) < 60).any() for picture in (plain, warned)]
     assert has_ink == [False, True]
 
 
-def test_many_people_make_the_picture_higher():
+def test_the_height_grows_with_the_number_of_people():
     assert compose(view(boxes=(BOX,) * 30), 320, 6.0).shape[0] > compose(view(), 320, 6.0).shape[0]
 
 
-def test_the_frame_rate_is_that_of_the_last_images():
+def test_the_frame_rate_is_that_of_recent_images():
     rate = FrameRate()
     assert rate.at(NS) == 0
     for number in range(31):
@@ -91,10 +91,10 @@ def test_the_frame_rate_is_that_of_the_last_images():
     assert rate.at(20 * NS) == 0
 
 
-def test_arrivals_are_forgotten_where_the_rate_is_never_asked_for():
-    """Without a window."""
+def test_old_arrivals_are_dropped_if_the_rate_is_never_read():
+    """The memory is limited without a window, too."""
     rate = FrameRate()
     for number in range(3000):
         rate.add(number * NS // 30)
-    assert len(rate._arrivals_ns) <= 31 * MEASURED_NS // NS
+    assert len(rate._arrivals_ns) <= 31 * RATE_WINDOW_NS // NS
     assert rate.at(2999 * NS // 30) == pytest.approx(30.0)

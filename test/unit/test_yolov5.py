@@ -1,18 +1,18 @@
-"""From image to boxes: letterbox, decoding, suppression, and people in a measurement session."""
+"""YOLOv5 detector: letterbox, decoding, non-maximum suppression, and people in a measurement session."""
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from hypothesis.extra import numpy as hnp
 
-from ros_3d_bb.detection.boxes import Detections, iou, suppressed
+from ros_3d_bb.detection.boxes import Detections, iou, non_maximum_suppression
 from ros_3d_bb.detection.predictions import batch_of
 from ros_3d_bb.detection.runtime import open_runtime
-from ros_3d_bb.detection.yolov5 import DetectionParams, Yolov5, class_number, decoded, letterboxed
+from ros_3d_bb.detection.yolov5 import DetectionParams, Yolov5, class_number, filter_predictions, apply_letterbox
 from ros_3d_bb.measurements import read_color, read_session
 
 
 class FixedRuntime(object):
-    """Says the same whatever it is shown."""
+    """Returns the same predictions for every image."""
 
     names, stride, input_hw = ['person', 'cat'], 32, None
 
@@ -20,30 +20,30 @@ class FixedRuntime(object):
         self.rows = np.array(rows, np.float32).reshape(-1, 7)
         self.inputs = []
 
-    def __call__(self, image, _least):
+    def __call__(self, image, _min_objectness):
         assert image.dtype == np.uint8
         self.inputs.append(image.shape)
         return self.rows
 
 
-def test_finds_the_person_in_a_measurement_session(session_folder, weights):
+def test_detects_the_person_in_a_measurement_session(session_folder, weights):
     """In at least 107 of 110 frames at confidence 0.25, with a median IoU of at least 0.93 with the recorded boxes."""
     session = read_session(session_folder)
     detector = Yolov5(open_runtime(weights), DetectionParams(confidence=0.25))
     overlaps = []
     for frame in session.frames:
-        found = detector.detect(read_color(frame, session.camera))
-        overlaps.append(max(iou(np.array(frame.boxes_px[0], float), found.boxes), default=0))
+        detections = detector.detect(read_color(frame, session.camera))
+        overlaps.append(max(iou(np.array(frame.boxes_px[0], float), detections.boxes), default=0))
     overlaps = np.array(overlaps)
-    print('found in %d of %d frames, median IoU %.3f' % ((overlaps > 0.5).sum(), len(overlaps), np.median(overlaps)))
+    print('%d of %d frames, median IoU %.3f' % ((overlaps > 0.5).sum(), len(overlaps), np.median(overlaps)))
     assert (overlaps > 0.5).sum() >= len(overlaps) * 107 / 110
     assert np.median(overlaps) >= 0.93
 
 
 @given(st.integers(1, 900), st.integers(1, 900), st.sampled_from([None, 32, 64]))
 @settings(max_examples=60)
-def test_letterbox_and_back(height, width, stride):
-    scaled, letterbox = letterboxed(np.zeros((height, width, 3), np.uint8), (640, 640), stride)
+def test_undo_inverts_the_letterbox(height, width, stride):
+    scaled, letterbox = apply_letterbox(np.zeros((height, width, 3), np.uint8), (640, 640), stride)
     assert max(scaled.shape[:2]) == 640
     assert scaled.shape[:2] == (640, 640) if stride is None else all(n % stride == 0 for n in scaled.shape[:2])
     corner = np.array([[letterbox.left, letterbox.top, letterbox.left + width * letterbox.scale,
@@ -53,11 +53,11 @@ def test_letterbox_and_back(height, width, stride):
 
 def test_an_image_of_the_right_size_is_neither_padded_nor_copied():
     image = np.zeros((480, 640, 3), np.uint8)
-    scaled, letterbox = letterboxed(image, (640, 640), 32)
+    scaled, letterbox = apply_letterbox(image, (640, 640), 32)
     assert scaled is image and letterbox == (1.0, 0, 0)
 
 
-def test_a_batch_has_the_channels_first_and_ends_at_one():
+def test_a_batch_has_the_channels_first_and_values_up_to_1():
     image = np.zeros((4, 6, 3), np.uint8)
     image[..., 0] = 255
     batch = batch_of(image)
@@ -67,57 +67,57 @@ def test_a_batch_has_the_channels_first_and_ends_at_one():
 
 def test_views_with_reversed_channels_can_be_letterboxed():
     image = np.arange(300 * 500 * 3, dtype=np.uint8).reshape(300, 500, 3)
-    scaled, _letterbox = letterboxed(image[..., ::-1], (640, 640), 32)
-    other, _letterbox = letterboxed(image, (640, 640), 32)
+    scaled, _letterbox = apply_letterbox(image[..., ::-1], (640, 640), 32)
+    other, _letterbox = apply_letterbox(image, (640, 640), 32)
     np.testing.assert_array_equal(scaled[..., ::-1], other)
 
 
-def test_boxes_come_back_in_pixels_of_the_image_and_cut_at_its_border():
+def test_boxes_are_in_image_pixels_and_clipped_to_the_image():
     runtime = FixedRuntime([(320, 320, 320, 160, 0.9, 1, 0), (0, 320, 100, 100, 0.8, 1, 0)])
-    found = Yolov5(runtime).detect(np.zeros((360, 1280, 3), np.uint8))  # input 640x192, scale 0.5, 6 rows padded
+    detections = Yolov5(runtime).detect(np.zeros((360, 1280, 3), np.uint8))  # input 640x192, scale 0.5, 6 rows padded
     assert runtime.inputs == [(192, 640, 3)]
-    np.testing.assert_allclose(found.boxes[0], [320, 360, 960, 360])
-    np.testing.assert_allclose(found.boxes[1, 0], 0)
+    np.testing.assert_allclose(detections.boxes[0], [320, 360, 960, 360])
+    np.testing.assert_allclose(detections.boxes[1, 0], 0)
 
 
-def test_only_asked_classes_with_enough_confidence():
+def test_predictions_are_filtered_by_class_and_confidence():
     rows = np.array([(50, 50, 20, 20, 0.9, 0.9, 0.1), (50, 50, 20, 20, 0.9, 0.1, 0.95), (50, 50, 20, 20, 0.4, 0.5, 0.1),
                      (50, 50, 20, 20, np.nan, 0.5, 0.1), (np.nan, 50, 20, 20, 0.9, 0.9, 0.1)], np.float32)
-    assert decoded(rows, 0.25, [0]).scores.tolist() == pytest.approx([0.81])
-    assert decoded(rows, 0.25, [0, 1]).classes.tolist() == [1, 0]
-    assert len(decoded(rows[:0], 0.25, [0]).boxes) == 0
+    assert filter_predictions(rows, 0.25, [0]).scores.tolist() == pytest.approx([0.81])
+    assert filter_predictions(rows, 0.25, [0, 1]).classes.tolist() == [1, 0]
+    assert len(filter_predictions(rows[:0], 0.25, [0]).boxes) == 0
 
 
-def naive_suppression(found, limit, most):
-    kept = []
-    for i in range(len(found.boxes)):
-        if all(found.classes[i] != found.classes[j] or iou(found.boxes[j], found.boxes[i:i + 1])[0] <= limit
-               for j in kept):
+def naive_suppression(detections, limit, max_det):
+    boxes, classes, kept = detections.boxes, detections.classes, []
+    for i in range(len(boxes)):
+        if all(classes[i] != classes[j] or iou(boxes[j], boxes[i:i + 1])[0] <= limit for j in kept):
             kept.append(i)
-    return kept[:most]
+    return kept[:max_det]
 
 
 @given(st.integers(0, 40), st.floats(0, 1), st.integers(1, 10), st.integers(0, 1000))
-def test_suppression_keeps_what_the_definition_keeps(count, limit, most, seed):
+def test_suppression_agrees_with_a_naive_implementation(count, limit, max_det, seed):
     random = np.random.RandomState(seed)
     corner = random.uniform(0, 50, (count, 2))
-    found = Detections(np.hstack((corner, corner + random.uniform(0, 30, (count, 2)))),
-                       np.sort(random.random_sample(count))[::-1], random.randint(0, 2, count))
-    kept = suppressed(found, limit, most)
-    np.testing.assert_array_equal(kept.boxes, found.boxes[naive_suppression(found, limit, most)])
+    detections = Detections(np.hstack((corner, corner + random.uniform(0, 30, (count, 2)))),
+                            np.sort(random.random_sample(count))[::-1], random.randint(0, 2, count))
+    kept = non_maximum_suppression(detections, limit, max_det)
+    np.testing.assert_array_equal(kept.boxes, detections.boxes[naive_suppression(detections, limit, max_det)])
 
 
 @given(hnp.arrays(float, (4, 4), elements=st.floats(0, 100)))
-def test_iou_lies_between_0_and_1_and_is_1_with_itself(corners):
+def test_iou_is_between_0_and_1_and_1_for_equal_boxes(corners):
     boxes = np.hstack((np.minimum(corners[:, :2], corners[:, 2:]), np.maximum(corners[:, :2], corners[:, 2:]) + 1))
     values = iou(boxes[0], boxes)
     assert (values >= 0).all() and (values <= 1 + 1e-9).all() and values[0] == pytest.approx(1)
 
 
-def test_thousands_of_overlapping_boxes_are_suppressed_quickly_to_the_limit():
-    found = decoded(np.tile(np.array([(50, 50, 20, 20, 0.9, 0.9, 0)], np.float32), (20000, 1)), 0.25, [0])
-    assert len(found.boxes) == 5000
-    assert len(suppressed(found, 0.45, 100).boxes) == 1
+def test_the_number_of_boxes_is_limited_before_suppression():
+    rows = np.tile(np.array([(50, 50, 20, 20, 0.9, 0.9, 0)], np.float32), (20000, 1))
+    detections = filter_predictions(rows, 0.25, [0])
+    assert len(detections.boxes) == 5000
+    assert len(non_maximum_suppression(detections, 0.45, 100).boxes) == 1
 
 
 @pytest.mark.parametrize('entry,number', [('cat', 1), (1, 1), ('1', 1), ('person', 0)])
@@ -132,17 +132,17 @@ def test_parameters_that_make_no_sense_are_named(change, reason):
         Yolov5(FixedRuntime(), DetectionParams()._replace(**change))
 
 
-def test_exports_of_a_fixed_size_get_that_size_with_grey_on_both_sides():
+def test_images_for_exports_of_a_fixed_size_are_padded_with_grey():
     class Fixed(FixedRuntime):
         input_hw = (64, 128)
 
-        def __call__(self, image, _least):
+        def __call__(self, image, _min_objectness):
             assert image.shape == (64, 128, 3)
             edges = np.nonzero(image[32, :, 0] != 114)[0]
             assert (edges[0], edges[-1]) == (21, 105)  # 85 of 128 columns, 43 of them padded
             return np.array([(64, 32, 85, 64, 0.9, 1, 0)], np.float32)
-    found = Yolov5(Fixed()).detect(np.zeros((300, 400, 3), np.uint8))
-    np.testing.assert_allclose(found.boxes, [[0, 0, 400, 300]], atol=3)
+    detections = Yolov5(Fixed()).detect(np.zeros((300, 400, 3), np.uint8))
+    np.testing.assert_allclose(detections.boxes, [[0, 0, 400, 300]], atol=3)
 
 
 def test_the_input_is_rounded_up_to_the_stride():

@@ -1,4 +1,4 @@
-"""Sessions and scenarios as bags: the same pixels, the intrinsics, and a robot in the map."""
+"""Bags of sessions and scenarios: pixels, intrinsics, and transforms of a robot in the map."""
 import json
 import os
 import subprocess
@@ -65,8 +65,8 @@ def test_pixels_boxes_and_intrinsics_are_those_of_the_session(session, messages)
         assert camera_from_message(messages['/camera/color/camera_info'][number]) == session.camera
 
 
-def test_the_camera_stands_on_a_jackal_in_the_map(session, messages):
-    """0.17 m forward and 0.20 m up of base_link (thesis 3.5.1), looking ahead."""
+def test_transforms_of_a_session_are_those_of_a_jackal_in_the_map(session, messages):
+    """0.17 m in front of and 0.20 m above base_link (thesis 3.5.1), facing forward."""
     buffer = tf2_ros.BufferCore()
     for transform in messages['/tf'][3].transforms:
         buffer.set_transform(transform, 'test')
@@ -76,8 +76,8 @@ def test_the_camera_stands_on_a_jackal_in_the_map(session, messages):
     assert buffer.can_transform_core('odom', 'base_link', stamp)[0]
 
 
-def test_depth_that_is_not_in_millimetres_keeps_its_scale(session, tmp_path):
-    """A camera that counts 0.25 mm: metres in the bag, as the session says."""
+def test_depth_in_other_units_than_millimetres_keeps_its_scale(session, tmp_path):
+    """The depth unit of the camera is 0.25 mm; the depth in the bag is in metres."""
     path = str(tmp_path / 'fine.bag')
     write_bag(session_images(session._replace(depth_scale_m=0.00025, frames=session.frames[:1])), path, 'none')
     depth = depth_from(messages_in(path)['/camera/aligned_depth_to_color/image_raw'][0])
@@ -90,7 +90,7 @@ def run_tool(tool, *arguments):
                           stderr=subprocess.STDOUT, universal_newlines=True)
 
 
-def test_the_command_says_what_it_wrote(session_folder, tmp_path):
+def test_the_command_prints_the_number_of_images(session_folder, tmp_path):
     result = run_tool('session_to_bag', session_folder, str(tmp_path / 'out.bag'), '--rate', '15')
     assert result.returncode == 0 and 'out.bag: ' in result.stdout
     with rosbag.Bag(str(tmp_path / 'out.bag')) as bag:
@@ -98,7 +98,7 @@ def test_the_command_says_what_it_wrote(session_folder, tmp_path):
 
 
 @pytest.mark.parametrize('depth', ['depth/missing.png', None])
-def test_a_broken_session_leaves_no_bag_and_says_why(session_folder, tmp_path, depth):
+def test_an_invalid_session_leaves_no_bag_and_is_named(session_folder, tmp_path, depth):
     folder, bag = tmp_path / 'broken', str(tmp_path / 'out.bag')
     folder.mkdir()
     if depth:
@@ -107,7 +107,7 @@ def test_a_broken_session_leaves_no_bag_and_says_why(session_folder, tmp_path, d
         content['frames'][0]['depth'] = depth
         (folder / 'frames.json').write_text(json.dumps(content))
     result = run_tool('session_to_bag', str(folder), bag)
-    assert result.returncode == 1 and str(folder) in result.stdout and 'no bag was written' in result.stdout
+    assert result.returncode == 1 and str(folder) in result.stdout
     assert 'Traceback' not in result.stdout and os.listdir(str(tmp_path)) == ['broken']
 
 
@@ -117,7 +117,7 @@ SCENE = {'duration': 0.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves'
 
 @pytest.fixture(scope='module')
 def scene(tmp_path_factory):
-    """A simulator, and {topic: messages} of the bag of its scenario."""
+    """Simulator, and {topic: messages} of the bag of its scenario."""
     path = str(tmp_path_factory.mktemp('bag') / 'scene.bag')
     assert write_bag(scenario_images(scenario_from(SCENE)), path) == 5
     return Simulator(scenario_from(SCENE)), messages_in(path)
@@ -132,7 +132,7 @@ def test_a_scene_has_the_topics_of_a_robot_and_the_truth(scene):
     assert set(message.header.frame_id for message in messages['/ground_truth']) == {'map'}
 
 
-def test_a_scene_holds_what_the_simulator_renders(scene):
+def test_a_scene_contains_the_images_of_the_simulator(scene):
     simulator, messages = scene
     for number in (0, 4):
         frame = simulator.frame(number)
@@ -148,7 +148,7 @@ def test_a_scene_holds_what_the_simulator_renders(scene):
             np.testing.assert_allclose(getattr(written, field), getattr(person, field), atol=1e-12)
 
 
-def test_the_transforms_of_a_scene_lead_from_the_map_to_the_camera(scene):
+def test_the_transforms_of_a_scene_connect_map_and_camera(scene):
     simulator, messages = scene
     buffer = tf2_ros.BufferCore()
     for message in messages['/tf']:
@@ -166,7 +166,7 @@ def raw_messages(path):
         return [(topic, data[1], stamp) for topic, data, stamp in bag.read_messages(raw=True)]
 
 
-def test_the_same_scenario_gives_the_same_bytes_and_another_seed_others(tmp_path):
+def test_the_bag_of_a_scenario_depends_on_the_seed_only(tmp_path):
     scenario = tmp_path / 'scene.yaml'
     scenario.write_text(json.dumps(dict(SCENE, duration=0.2)))
     for name, seed in (('one', '5'), ('two', '5'), ('other', '6')):
@@ -176,7 +176,7 @@ def test_the_same_scenario_gives_the_same_bytes_and_another_seed_others(tmp_path
     assert one == two and one != other
 
 
-def test_a_scene_may_bring_its_first_images_only_and_the_true_boxes(tmp_path):
+def test_the_number_of_images_and_true_boxes_are_optional(tmp_path):
     scenario, path = tmp_path / 'scene.yaml', str(tmp_path / 'scene.bag')
     scenario.write_text(json.dumps(SCENE))
     result = run_tool('scenario_to_bag', str(scenario), path, '--images', '2', '--boxes')
@@ -190,7 +190,7 @@ def test_a_scene_may_bring_its_first_images_only_and_the_true_boxes(tmp_path):
     assert run_tool('scenario_to_bag', str(scenario), path, '--images', '0').returncode == 2
 
 
-def test_a_bag_comes_back_image_by_image(session, tmp_path):
+def test_a_bag_is_read_by_image(session, tmp_path):
     path = str(tmp_path / 'session.bag')
     write_bag(session_images(session, SessionBagOptions(with_boxes=True)), path)
     topics = {'tf', 'camera/color/image_raw', 'yolo_bounding_box'}
@@ -200,27 +200,27 @@ def test_a_bag_comes_back_image_by_image(session, tmp_path):
         assert set(topic for topic, _message in messages) == topics
         np.testing.assert_array_equal(rgb_from(dict(messages)['camera/color/image_raw']),
                                       read_color(frame, session.camera))
-    with pytest.raises(ValueError, match='has no ground_truth'):
+    with pytest.raises(ValueError, match='ground_truth'):
         images_in(path, {'tf', 'ground_truth'})
-    with pytest.raises(ValueError, match='holds none of ground_truth'):
+    with pytest.raises(ValueError, match='ground_truth'):
         images_in(path, {'ground_truth'})
-    with pytest.raises(ValueError, match='cannot be read'):
+    with pytest.raises(ValueError, match='missing.bag'):
         images_in(str(tmp_path / 'missing.bag'), topics)
 
 
-@pytest.mark.parametrize('option,complaint', [(('--rate', '0'), 'rate is 0'), (('--rate', 'nan'), 'rate is nan'),
-                                              (('--seed', '-1'), 'seed is -1')])
-def test_a_rate_or_seed_that_makes_no_sense_leaves_no_bag(tmp_path, option, complaint):
+@pytest.mark.parametrize('option,named', [(('--rate', '0'), 'rate is 0'), (('--rate', 'nan'), 'rate is nan'),
+                                          (('--seed', '-1'), 'seed is -1')])
+def test_an_invalid_rate_or_seed_leaves_no_bag(tmp_path, option, named):
     scenario = tmp_path / 'scene.yaml'
     scenario.write_text(json.dumps(SCENE))
     result = run_tool('scenario_to_bag', str(scenario), str(tmp_path / 'out.bag'), *option)
-    assert result.returncode == 1 and complaint in result.stdout and 'Traceback' not in result.stdout
+    assert result.returncode == 1 and named in result.stdout and 'Traceback' not in result.stdout
     assert os.listdir(str(tmp_path)) == ['scene.yaml']
 
 
-def test_a_broken_scenario_leaves_no_bag_and_says_why(tmp_path):
+def test_an_invalid_scenario_leaves_no_bag_and_the_key_is_named(tmp_path):
     scenario = tmp_path / 'scene.yaml'
     scenario.write_text('people:\n- {strat: [1, 2]}\n')
     result = run_tool('scenario_to_bag', str(scenario), str(tmp_path / 'out.bag'))
-    assert result.returncode == 1 and 'did you mean start' in result.stdout and 'no bag was written' in result.stdout
+    assert result.returncode == 1 and 'mean start' in result.stdout
     assert 'Traceback' not in result.stdout and os.listdir(str(tmp_path)) == ['scene.yaml']

@@ -1,4 +1,4 @@
-"""Markers: what each kind shows; the same ones in place while a track lives, gone when it ends."""
+"""Markers: content of each kind; they are updated while a track exists, and deleted when it ends."""
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -21,7 +21,7 @@ def header(stamp_ns=SECOND_NS):
 
 def track(number, velocity=(1.0, 0.0, 0.0), steps=8, variances=(0.04, 0.01), turn=0.0, status=VISIBLE,
           position=(2.0, 1.0, 0.9)):
-    """A track at (2, 1), 1.7 m high, whose covariance has these variances along axes turned by so many radians."""
+    """Track at (2, 1) of 1.7 m height, whose covariance has the `variances` along axes rotated by `turn` radians."""
     position, velocity = np.array(position), np.array(velocity)
     prediction = position + np.arange(1, steps + 1)[:, None] * 0.25 * velocity
     covariance = predicted = None
@@ -39,7 +39,7 @@ def keys(markers, action=Marker.ADD):
 
 
 def drawn(tracks, params=ALL, times=2):
-    """The last markers of a writer, by namespace and id, after so many images of the same tracks."""
+    """Last markers of a writer by namespace and ID, after several images of the same tracks."""
     writer = MarkerWriter(params)
     for image in range(times):
         message = writer.write(tracks, header(SECOND_NS + image * NS // 10))
@@ -47,7 +47,7 @@ def drawn(tracks, params=ALL, times=2):
 
 
 def xyz(marker):
-    """The points (n, 3) of a marker in its header's frame: they are relative to its pose, which is not turned."""
+    """Points (n, 3) of a marker in the frame of its header. They are relative to its pose, which is not rotated."""
     pose = marker.pose
     assert (pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w) == (0, 0, 0, 1)
     return (np.array([(point.x, point.y, point.z) for point in marker.points]).reshape(-1, 3)
@@ -67,20 +67,20 @@ def test_each_track_has_one_marker_in_each_namespace():
                for marker in markers.markers)
 
 
-def test_only_the_namespaces_asked_for_are_made():
+def test_only_the_configured_namespaces_are_drawn():
     assert set(drawn([track(1)], ALL._replace(marker_namespaces=['id', 'ellipse']))) == {('id', 1), ('ellipse', 1)}
     assert drawn([track(1)], ALL._replace(marker_namespaces=[])) == {}
     assert set(name for name, _id in drawn([track(1)], MarkerParams())) == set(NAMESPACES) - {'prediction_ellipse'}
 
 
-def test_markers_of_a_living_track_are_replaced_and_never_deleted():
+def test_markers_of_an_existing_track_are_updated_and_not_deleted():
     writer = MarkerWriter(MarkerParams(marker_lifetime=0.0))
     writer.write([track(1)], header())
     second, third = (writer.write([track(1)], header(SECOND_NS + image * NS)) for image in (1, 2))
     assert keys(second) == keys(third) and keys(third, Marker.DELETE) == []
 
 
-def test_markers_of_an_ended_track_are_deleted_once():
+def test_markers_of_a_deleted_track_are_deleted_once():
     writer = MarkerWriter(ALL)
     for image in range(2):
         writer.write([track(1), track(2)], header(SECOND_NS + image * NS))
@@ -89,7 +89,7 @@ def test_markers_of_an_ended_track_are_deleted_once():
     assert keys(writer.write([track(2)], header(SECOND_NS + 3 * NS)), Marker.DELETE) == []
 
 
-def test_an_object_that_stops_loses_its_arrows():
+def test_arrows_are_deleted_when_an_object_stops():
     writer = MarkerWriter(ALL)
     writer.write([track(1)], header())
     markers = writer.write([track(1, (0.0, 0.0, 0.0))], header(SECOND_NS + NS))
@@ -140,23 +140,23 @@ def test_the_prediction_has_an_ellipse_at_each_half_second():
         assert (outline[1:-1:2] == outline[2::2]).all()
 
 
-def test_an_ellipse_without_width_is_drawn_as_a_line():
+def test_a_degenerate_ellipse_is_a_line():
     around = xyz(drawn([track(1, variances=(0.04, 0.0))])['ellipse', 1])
     assert np.isfinite(around).all() and around[:, 1] == pytest.approx(np.ones(len(around)))
 
 
-def walked(writer, images, period_s=0.1, start_ns=SECOND_NS, number=1):
-    """The history after a walk along x at 1 m/s, one image each period."""
+def history_of(writer, images, period_s=0.1, start_ns=SECOND_NS, number=1):
+    """History after motion along x at 1 m/s, with one image per period."""
     for image in range(images):
         moment = image * period_s
         message = writer.write([track(number, position=(moment, 0.0, 0.85))], header(start_ns + int(moment * NS)))
     return {marker.ns: marker for marker in message.markers if marker.action == Marker.ADD}.get('history')
 
 
-def test_the_history_is_the_way_walked_and_fades_with_age():
-    history = walked(MarkerWriter(MarkerParams(marker_history=4.0)), 101)
+def test_the_history_is_the_path_and_fades_with_age():
+    history = history_of(MarkerWriter(MarkerParams(marker_history=4.0)), 101)
     points, alphas = xyz(history), np.array([color.a for color in history.colors])
-    assert history.type == Marker.LINE_STRIP and history.color.a < 1  # else RViz draws it opaque
+    assert history.type == Marker.LINE_STRIP and history.color.a < 1  # otherwise RViz draws it opaque
     assert (points[0, 0], points[-1, 0]) == pytest.approx((6.0, 10.0)) and points[:, 1:] == pytest.approx(
         np.tile([0.0, 0.02], (len(points), 1)))
     assert len(alphas) == len(points) and (np.diff(alphas) > 0).all()
@@ -165,32 +165,32 @@ def test_the_history_is_the_way_walked_and_fades_with_age():
 
 
 @pytest.mark.parametrize('rate, length_s', [(10, 4.0), (30, 4.0), (100, 1.0), (30, 600.0)])
-def test_the_history_is_bounded_and_always_reaches_to_the_person(rate, length_s):
-    history = walked(MarkerWriter(MarkerParams(marker_history=length_s)), 30 * rate, 1.0 / rate)
+def test_the_history_is_limited_and_ends_at_the_person(rate, length_s):
+    history = history_of(MarkerWriter(MarkerParams(marker_history=length_s)), 30 * rate, 1.0 / rate)
     assert len(history.points) <= HISTORY_POINTS + 2
     assert xyz(history)[-1, 0] == pytest.approx(30 - 1.0 / rate)
     assert xyz(history)[0, 0] == pytest.approx(max(30 - length_s, 0), abs=0.15)
 
 
-def test_a_history_begins_with_the_second_image_and_none_has_no_length():
-    assert walked(MarkerWriter(), 1) is None and walked(MarkerWriter(), 2) is not None
-    assert walked(MarkerWriter(MarkerParams(marker_history=0.0)), 50) is None
+def test_a_history_begins_with_the_second_image_and_has_a_length():
+    assert history_of(MarkerWriter(), 1) is None and history_of(MarkerWriter(), 2) is not None
+    assert history_of(MarkerWriter(MarkerParams(marker_history=0.0)), 50) is None
 
 
 def test_the_history_ends_with_its_track():
     writer = MarkerWriter()
-    walked(writer, 20)
-    walked(writer, 5, start_ns=SECOND_NS + 2 * NS, number=2)
-    assert len(walked(writer, 3, start_ns=SECOND_NS + 3 * NS).points) == 3
+    history_of(writer, 20)
+    history_of(writer, 5, start_ns=SECOND_NS + 2 * NS, number=2)
+    assert len(history_of(writer, 3, start_ns=SECOND_NS + 3 * NS).points) == 3
 
 
-def test_the_history_starts_again_where_time_jumps_back():
+def test_the_history_restarts_when_time_jumps_back():
     writer = MarkerWriter()
-    walked(writer, 20)
-    assert len(walked(writer, 3, start_ns=SECOND_NS - 100 * NS).points) == 3
+    history_of(writer, 20)
+    assert len(history_of(writer, 3, start_ns=SECOND_NS - 100 * NS).points) == 3
 
 
-def test_colors_by_id_are_always_the_same_and_those_of_neighbours_differ():
+def test_colors_by_id_are_constant_and_differ_between_neighbours():
     first, again = (drawn([track(number) for number in range(1, 12)]) for _writer in range(2))
     colors = [rgb(first['cylinder', number].color) for number in range(1, 12)]
     assert colors == [rgb(again['cylinder', number].color) for number in range(1, 12)]
@@ -198,7 +198,7 @@ def test_colors_by_id_are_always_the_same_and_those_of_neighbours_differ():
     assert all(rgb(first[namespace, 4].color) == colors[3] for namespace in ('history', 'ellipse'))
 
 
-def test_colors_of_the_palette_are_told_apart_from_each_other_and_from_the_arrows():
+def test_colors_of_the_palette_differ_from_each_other_and_from_arrows():
     markers = drawn([track(1)])
     colors = np.array(PALETTE + (rgb(markers['velocity', 1].color), rgb(markers['prediction', 1].color),
                                  rgb(drawn([track(1, status=OCCLUDED)])['id', 1].color)))
@@ -206,14 +206,14 @@ def test_colors_of_the_palette_are_told_apart_from_each_other_and_from_the_arrow
     assert distances[~np.eye(len(colors), dtype=bool)].min() > 0.2
 
 
-def test_colors_by_status_tell_who_is_seen_hidden_and_out_of_view():
+def test_colors_by_status_distinguish_visible_occluded_and_out_of_view():
     tracks = [track(number, status=status) for number, status in enumerate((VISIBLE, OCCLUDED, OUT_OF_VIEW), 1)]
     markers = drawn(tracks + [track(4)], ALL._replace(marker_color='status'))
     colors = [rgb(markers['cylinder', number].color) for number in (1, 2, 3, 4)]
     assert len(set(colors)) == 3 and colors[0] == colors[3]
 
 
-def test_the_thesis_has_blue_cylinders_and_green_numbers():
+def test_colors_of_the_thesis_are_blue_cylinders_and_green_ids():
     markers = drawn([track(number) for number in (1, 2, 3)], ALL._replace(marker_color='thesis'))
     for number in (1, 2, 3):
         assert markers['cylinder', number].color.b == 1.0 and markers['cylinder', number].color.r < 0.2
@@ -222,7 +222,7 @@ def test_the_thesis_has_blue_cylinders_and_green_numbers():
 
 @pytest.mark.parametrize('status', [OCCLUDED, OUT_OF_VIEW])
 @pytest.mark.parametrize('coloring', ['id', 'status', 'thesis'])
-def test_who_is_not_seen_is_paler_and_has_a_question_mark(status, coloring):
+def test_tracks_that_are_not_visible_are_paler_and_have_a_question_mark(status, coloring):
     params = ALL._replace(marker_color=coloring)
     seen, unseen = drawn([track(3)], params), drawn([track(3, status=status)], params)
     assert (seen['id', 3].text, unseen['id', 3].text) == ('3', '3?')
@@ -235,8 +235,8 @@ def test_nobody_has_no_markers():
     assert MarkerWriter().write([], header()).markers == []
 
 
-def test_other_parameters_work_from_the_next_image_on_and_what_is_not_drawn_any_more_goes():
-    """The history goes on: it was kept while it was not drawn, too."""
+def test_new_parameters_apply_to_the_next_image_and_unused_markers_are_deleted():
+    """The history continues, because it is recorded even while it is not drawn."""
     writer = MarkerWriter(MarkerParams(marker_namespaces=['cylinder', 'id']))
     writer.write([track(3)], header())
     writer.tune(MarkerParams(marker_namespaces=['cylinder', 'history'], marker_lifetime=0.5))
@@ -250,7 +250,7 @@ coordinates = st.floats(-1e6, 1e6)
 
 
 def drawn_by_rviz(marker, fixed_from_header):
-    """Points (n, 3) as RViz draws them: the pose is moved in float64, the points are float32 beside it."""
+    """Points (n, 3) as RViz draws them: the pose is transformed in float64, the points in float32."""
     pose = marker.pose.position
     origin = np.float32(fixed_from_header.dot([pose.x, pose.y, pose.z, 1])[:3])
     points = np.array([(point.x, point.y, point.z) for point in marker.points], np.float32)
@@ -259,14 +259,14 @@ def drawn_by_rviz(marker, fixed_from_header):
 
 @given(coordinates, coordinates, st.lists(st.tuples(st.floats(-2, 2), st.floats(-2, 2)), min_size=2, max_size=6))
 @settings(deadline=None)
-def test_rviz_draws_lines_and_arrows_exactly_on_large_maps(x, y, ways):
-    """The robot's frame is RViz's fixed frame; against the same scene around the map's origin in float64."""
+def test_rviz_draws_lines_and_arrows_exactly_on_large_maps(x, y, offsets):
+    """RViz's fixed frame is that of the robot. The reference is the same scene at the map's origin in float64."""
     robot = np.array([x, y, 0.0])
     fixed_from_map = np.eye(4)
     fixed_from_map[:3, 3] = -robot
     writer, near = MarkerWriter(ALL), MarkerWriter(ALL)
     place = np.array([2.0, -1.0, 0.9])
-    for image, way in enumerate(ways):
+    for image, way in enumerate(offsets):
         place = place + [way[0], way[1], 0]
         velocity = (way[0] + 3, way[1], 0.0)
         now = header(SECOND_NS + image * NS // 2)

@@ -1,4 +1,4 @@
-"""From the bag of a scene to its report."""
+"""Report on the bag of a scene."""
 import os
 import subprocess
 
@@ -20,7 +20,7 @@ SHIFT_M = 0.2
 
 
 def images_with_tracks(frame_id):
-    """The scene, and tracks that lie aside of the truth by `SHIFT_M` with the number 7, but for the first image."""
+    """Scene with tracks at an offset of `SHIFT_M` from the truth with the ID 7, except for the first image."""
     for number, (stamp_ns, messages) in enumerate(scenario_images(scenario_from(SCENE))):
         messages, header = list(messages), Header(stamp=time_from(stamp_ns), frame_id=frame_id)
         truth = dict(messages)['ground_truth']
@@ -39,7 +39,7 @@ def bag(tmp_path_factory):
     return path
 
 
-def test_tracks_meet_the_truth_of_their_own_stamp(bag):
+def test_tracks_are_compared_with_the_truth_of_their_stamp(bag):
     with rosbag.Bag(bag) as opened:
         recording = read_recording(opened)
     assert [moment.stamp_ns for moment in recording.moments] == [START_NS + n * NS // 10 for n in range(10)]
@@ -49,7 +49,7 @@ def test_tracks_meet_the_truth_of_their_own_stamp(bag):
     assert paths.robot.shape == (10, 2) and 0.2 < paths.robot[-1, 0] < 1.0
 
 
-def test_the_report_is_a_table_and_a_picture(bag, tmp_path):
+def test_the_report_has_a_table_and_an_image(bag, tmp_path):
     picture = str(tmp_path / 'report.png')
     lines = write_report(bag, picture)
     assert lines[1].split()[0] == '1' and '0.200 m' in lines[1] and ' 7 ' in lines[1]
@@ -57,34 +57,34 @@ def test_the_report_is_a_table_and_a_picture(bag, tmp_path):
     assert cv2.imread(picture).shape[1] == 1456
 
 
-def test_the_command_prints_it_and_puts_the_picture_beside_the_bag(bag):
+def test_the_command_prints_the_table_and_writes_the_image_next_to_the_bag(bag):
     output = subprocess.check_output(['rosrun', 'ros_3d_bb', 'scene_report', bag], universal_newlines=True)
     assert '0.200 m' in output and 'picture: %s' % bag.replace('.bag', '.png') in output
     assert os.path.exists(bag.replace('.bag', '.png'))
 
 
-def test_a_picture_that_cannot_be_written_is_said(bag, tmp_path):
-    with pytest.raises(OSError, match='a name that ends in .png'):
+def test_an_image_that_cannot_be_written_is_named(bag, tmp_path):
+    with pytest.raises(OSError, match=r'/picture .*\.png'):
         write_report(bag, str(tmp_path / 'picture'))
 
 
-@pytest.mark.parametrize('images,complaint', [
+@pytest.mark.parametrize('images,named', [
     (lambda: scenario_images(scenario_from(SCENE)), 'no messages on /ros_3d_bb/tracks'),
     (lambda: images_with_tracks('odom'), 'frames map, odom')])
-def test_a_bag_that_cannot_be_compared_is_refused(tmp_path, images, complaint):
+def test_incomparable_bags_are_rejected(tmp_path, images, named):
     path = str(tmp_path / 'other.bag')
     write_bag(images(), path)
     result = subprocess.run(['rosrun', 'ros_3d_bb', 'scene_report', path], stdout=subprocess.PIPE,
                             stderr=subprocess.STDOUT, universal_newlines=True)
-    assert result.returncode == 1 and complaint in result.stdout and 'no report was written' in result.stdout
+    assert result.returncode == 1 and named in result.stdout
     assert 'Traceback' not in result.stdout and os.listdir(str(tmp_path)) == ['other.bag']
 
 
 @pytest.mark.parametrize('content', [None, b'not a bag'])
-def test_what_is_no_bag_is_refused(tmp_path, content):
+def test_files_that_are_not_bags_are_rejected(tmp_path, content):
     path = tmp_path / 'some.bag'
     if content:
         path.write_bytes(content)
     result = subprocess.run(['rosrun', 'ros_3d_bb', 'scene_report', str(path)], stdout=subprocess.PIPE,
                             stderr=subprocess.STDOUT, universal_newlines=True)
-    assert result.returncode == 1 and 'no report was written' in result.stdout and 'Traceback' not in result.stdout
+    assert result.returncode == 1 and str(path) in result.stdout and 'Traceback' not in result.stdout

@@ -1,1 +1,1 @@
-"""2D detection with YOLOv5. Nothing here knows ROS; the only place that imports torch."""
+"""2D detection: YOLOv5 in colour images, and people in depth images. Free of ROS; only this package imports torch."""

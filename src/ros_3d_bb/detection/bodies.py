@@ -1,7 +1,7 @@
-"""What stands above the floor and has the size of a person, in a depth image.
+"""Person-sized clusters of depth pixels above the floor.
 
-Convention: blobs live on a grid of every few pixels of the depth image; a cell (row, column) of it stands for the
-pixels [step * column, step * (column + 1)) of [step * row, step * (row + 1)).
+Convention: clusters are found on a subsampled grid of the depth image. The cell (row, column) covers the pixel rows
+[step * row, step * (row + 1)) and the pixel columns [step * column, step * (column + 1)).
 """
 from typing import NamedTuple
 
@@ -10,10 +10,10 @@ import numpy as np
 
 from ros_3d_bb.params import Param, parameters
 
-MIN_CELLS = 20  # smaller blobs are no use: a person 6 m away has some 300
-HEADROOM_M = 0.15  # two people side by side have a valley this deep between their heads
-HIP_M = 0.95  # where the image ends below, the two legs of one person have a valley between them too
-TWO_LAYERS = 0.7  # share of the variance between two layers of depth; 0.64 for noise, 0.75 for a slanted wall
+MIN_CELLS = 20  # smaller clusters are ignored; a person 6 m away has about 300 cells
+HEADROOM_M = 0.15  # minimum depth of the valley between the heads of two people side by side
+HIP_M = 0.95  # lower peaks do not count: in an image cut above the hips, the legs of one person form a valley, too
+TWO_LAYERS = 0.7  # between-class share of the variance of two depth layers; 0.64 for noise, 0.75 for a slanted wall
 
 
 @parameters()
@@ -50,8 +50,18 @@ class DepthPeopleParams(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """Cells of `step` pixels, (rows, columns) float32 each, metres: depth (0: none), height above the floor, and the
-    way along the floor, `ahead_m`, which is the same from top to bottom of what stands upright before a tilted camera.
+    """Depth image sampled every `step` pixels. Arrays are (rows, columns), float32, metres.
+
+    Attributes
+    ----------
+    depth_m : numpy.ndarray
+        Depth; 0 where it is unknown.
+    height_m : numpy.ndarray
+        Height above the floor.
+    ahead_m : numpy.ndarray
+        Distance along the floor. It is constant over an upright surface, even if the camera is tilted.
+    step : int
+        Pixels per cell.
     """
 
     depth_m: np.ndarray
@@ -61,24 +71,24 @@ class Grid(NamedTuple):
 
 
 class Blob(NamedTuple):
-    """Connected cells: `mask` (rows, columns) with its first cell at (row, column) of the grid."""
+    """Connected cells: `mask` (rows, columns), whose first cell is (row, column) of the grid."""
 
     row: int
     column: int
     mask: np.ndarray
 
     def of(self, values):
-        """The blob's cells of an array of the grid, (n,)."""
+        """Values (n,) of a grid array in the cells of the blob."""
         return self.window(values)[self.mask]
 
     def window(self, values):
-        """The part of an array of the grid under the mask."""
+        """View of a grid array in the bounding rectangle of the blob, of the shape of `mask`."""
         rows, columns = self.mask.shape
         return values[self.row:self.row + rows, self.column:self.column + columns]
 
 
 class Shape(NamedTuple):
-    """Size of a blob in metres, heights above the floor, and where the image border cuts it."""
+    """Size of a blob, heights above the floor, and which image borders cut it."""
 
     depth_m: float
     width_m: float
@@ -95,7 +105,7 @@ def check_params(params):
     for name in ('depth', 'width', 'top'):
         low, high = getattr(params, 'min_%s' % name), getattr(params, 'max_%s' % name)
         if not low < high:
-            raise ValueError('min_%s is %g and max_%s is %g; the first must be less' % (name, low, name, high))
+            raise ValueError('min_%s is %g and max_%s is %g; min_%s must be smaller' % (name, low, name, high, name))
 
 
 def grid_of(depth, camera, floor, params):
@@ -113,35 +123,35 @@ def grid_of(depth, camera, floor, params):
     return Grid(depth_m, depth_m * up_per_m + np.float32(floor.offset_m), depth_m * ahead_per_m, step)
 
 
-def find_bodies(grid, camera, params):
-    """Blobs of human size: list of (Blob, Shape)."""
-    bodies = []
-    for blob in _joined(_parts(grid, camera, params), grid, camera, params):
+def find_person_clusters(grid, camera, params):
+    """Find blobs of human size. Returns a list of (Blob, Shape)."""
+    clusters = []
+    for blob in _merge_stacked(_split_blobs(grid, camera, params), grid, camera, params):
         shape = shape_of(blob, grid, camera)
         if _is_human(shape, params):
-            bodies.append((blob, shape))
-    return bodies
+            clusters.append((blob, shape))
+    return clusters
 
 
-def standing_cells(grid, params):
+def _foreground_cells(grid, params):
     """Cells between floor and ceiling that no depth step crosses, (rows, columns) bool.
 
-    Of the two cells at a step the farther is left out, so that blobs part and the nearer one keeps its outline. The
-    step grows with the square of depth, as the error of stereo does.
+    Of two cells at a depth step the farther one is removed. This separates the surfaces and keeps the outline of the
+    nearer one. The threshold grows with the square of depth, like the error of stereo.
     """
     depth_m = grid.depth_m
     cells = (depth_m > 0) & (depth_m < params.max_depth)
     cells &= (grid.height_m > params.floor_margin) & (grid.height_m < params.max_height)
     for after, before in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
-        change = depth_m[after] - depth_m[before]
-        step = params.depth_step + params.depth_step_growth * np.minimum(depth_m[after], depth_m[before]) ** 2
-        cells[after] &= change <= step
-        cells[before] &= change >= -step
+        change_m = depth_m[after] - depth_m[before]
+        max_step_m = params.depth_step + params.depth_step_growth * np.minimum(depth_m[after], depth_m[before]) ** 2
+        cells[after] &= change_m <= max_step_m
+        cells[before] &= change_m >= -max_step_m
     return cells
 
 
 def shape_of(blob, grid, camera):
-    """Size of a blob; extremes leave some percent out, as depth noise has no bounds. Returns Shape."""
+    """Measure a blob. Percentiles replace minima and maxima, because depth noise is unbounded. Returns Shape."""
     rows, columns = blob.mask.shape
     depth_m, ahead_m, height_m = (np.sort(blob.of(values)) for values in (grid.depth_m, grid.ahead_m, grid.height_m))
     last = depth_m.size - 1
@@ -162,7 +172,7 @@ def _is_human(shape, params):
 
 
 def _connected(cells, row=0, column=0):
-    """The blobs of a mask whose first cell is at (row, column)."""
+    """Yield the connected blobs of a mask whose first cell is (row, column) of the grid."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats(cells.astype(np.uint8), connectivity=4)
     for label in range(1, count):
         x, y, width, height, size = stats[label].tolist()
@@ -170,29 +180,29 @@ def _connected(cells, row=0, column=0):
             yield Blob(row + y, column + x, labels[y:y + height, x:x + width] == label)
 
 
-def _parts(grid, camera, params):
-    """Blobs, those parted that are too large for one person or have two heads."""
-    waiting = [(blob, 0) for blob in _connected(standing_cells(grid, params))]
+def _split_blobs(grid, camera, params):
+    """Foreground blobs. Blobs that have two heads or are too large for one person are split."""
+    to_split = [(blob, 0) for blob in _connected(_foreground_cells(grid, params))]
     parts = []
-    while waiting:
-        blob, splits = waiting.pop()
+    while to_split:
+        blob, splits = to_split.pop()
         shape = shape_of(blob, grid, camera)
         too_large = shape.width_m > params.max_width or shape.thickness_m > params.max_thickness
         pieces = _split_between_heads(blob, grid) if shape.width_m > 2 * params.min_width else []
         if too_large and not pieces:
             pieces = _split_in_depth(blob, grid)
         if pieces and splits < 4:
-            waiting.extend((piece, splits + 1) for piece in pieces)
+            to_split.extend((piece, splits + 1) for piece in pieces)
         elif not too_large:
             parts.append(blob)
     return parts
 
 
 def _split_in_depth(blob, grid):
-    """The nearer and the farther part, at Otsu's threshold of inverse depth, whose noise is the same everywhere.
+    """Split a blob into a nearer and a farther part by Otsu's threshold of inverse depth, whose noise is uniform.
 
-    Where there are no two layers (a wall, straight or slanted) there are no parts: those of a noisy wall are rags that
-    look like anything.
+    Returns an empty list if the blob has no two layers (such as a straight or slanted wall), because the fragments of a
+    noisy wall can have any shape.
     """
     inverse = 1 / blob.of(grid.ahead_m)
     low, high = inverse.min(), inverse.max()
@@ -207,7 +217,7 @@ def _split_in_depth(blob, grid):
 
 
 def _split_between_heads(blob, grid):
-    """Left and right of the deepest valley in the outline of a blob, where both sides rise above it by a head."""
+    """Split a blob at the deepest valley of its outline, if both sides rise above the valley by HEADROOM_M."""
     outline = np.where(blob.mask, blob.window(grid.height_m), 0).max(axis=0)
     left, right = np.maximum.accumulate(outline), np.maximum.accumulate(outline[::-1])[::-1]
     peaks = np.minimum(left, right)
@@ -221,19 +231,19 @@ def _split_between_heads(blob, grid):
     return [piece for half in halves for piece in _connected(half, blob.row, blob.column)]
 
 
-def _joined(parts, grid, camera, params):
-    """Put together what the arm of somebody in front cut apart: parts at one depth, one above the other."""
+def _merge_stacked(parts, grid, camera, params):
+    """Merge parts at one depth and above each other, such as a person behind the arm of another person."""
     parts = sorted(parts, key=lambda part: -part.mask.size)
     shapes = [shape_of(part, grid, camera) for part in parts]
-    joined = []
+    merged = []
     while parts:
         blob, shape = parts.pop(0), shapes.pop(0)
         for i in range(len(parts) - 1, -1, -1):
             if _are_stacked(blob, shape, parts[i], shapes[i], params):
                 blob = _union(blob, parts.pop(i))
                 shapes.pop(i)
-        joined.append(blob)
-    return joined
+        merged.append(blob)
+    return merged
 
 
 def _are_stacked(blob, shape, other, other_shape, params):
@@ -245,7 +255,7 @@ def _are_stacked(blob, shape, other, other_shape, params):
 
 
 def _overlap(start, length, other_start, other_length):
-    """Overlap of two ranges as a share of the shorter one; negative where there is a gap."""
+    """Overlap of two ranges relative to the shorter one; negative if there is a gap."""
     common = min(start + length, other_start + other_length) - max(start, other_start)
     return common / float(min(length, other_length))
 
@@ -254,7 +264,6 @@ def _union(blob, other):
     row, column = min(blob.row, other.row), min(blob.column, other.column)
     mask = np.zeros((max(b.row + b.mask.shape[0] for b in (blob, other)) - row,
                      max(b.column + b.mask.shape[1] for b in (blob, other)) - column), bool)
-    whole = Blob(row, column, mask)
     for part in (blob, other):
         Blob(part.row - row, part.column - column, part.mask).window(mask)[part.mask] = True
-    return whole
+    return Blob(row, column, mask)

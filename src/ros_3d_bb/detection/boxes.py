@@ -1,4 +1,4 @@
-"""2D boxes: what a detector finds, how much two overlap, and which of those that do are one object.
+"""2D boxes: the output of detectors, intersection over union, and non-maximum suppression.
 
 Convention: boxes are (x1, y1, x2, y2) in pixels, x to the right, y down, x2 and y2 exclusive.
 """
@@ -8,35 +8,42 @@ import numpy as np
 
 
 class Detections(NamedTuple):
-    """Boxes (n, 4) float pixels, scores (n,) 0..1 and class numbers (n,), best first."""
+    """Boxes (n, 4) in float pixels, scores (n,) in 0..1 and class numbers (n,), in order of decreasing score."""
 
     boxes: np.ndarray
     scores: np.ndarray
     classes: np.ndarray
 
 
-def suppressed(detections, iou_limit, max_det):
-    """Non-maximum suppression: of boxes of one class that overlap by more than `iou_limit`, the best stays.
+def non_maximum_suppression(detections, iou_limit, max_det):
+    """Remove boxes that overlap a box of the same class and a higher score by more than `iou_limit`.
 
     Parameters
     ----------
     detections : Detections
-        Best first.
+        In order of decreasing score.
+    iou_limit : float
+    max_det : int
+        Maximum number of boxes that are kept.
+
+    Returns
+    -------
+    Detections
     """
     boxes, kept = detections.boxes, []
-    alive = np.ones(len(boxes), bool)
-    while alive.any() and len(kept) < max_det:
-        best = int(alive.argmax())
+    remaining = np.ones(len(boxes), bool)
+    while remaining.any() and len(kept) < max_det:
+        best = int(remaining.argmax())
         kept.append(best)
-        rivals = alive & (detections.classes == detections.classes[best])
-        rivals[rivals] = iou(boxes[best], boxes[rivals]) > iou_limit
-        alive &= ~rivals
-        alive[best] = False
+        overlapping = remaining & (detections.classes == detections.classes[best])
+        overlapping[overlapping] = iou(boxes[best], boxes[overlapping]) > iou_limit
+        remaining &= ~overlapping
+        remaining[best] = False
     return Detections(*(column[kept] for column in detections))
 
 
 def iou(box, boxes):
-    """Intersection over union of one box (4,) with each of boxes (n, 4); 0 where both are empty."""
+    """Intersection over union of a box (4,) with each of boxes (n, 4); 0 if both are empty."""
     box, boxes = np.asarray(box, float), np.asarray(boxes, float).reshape(-1, 4)
     overlap = np.minimum(box[2:], boxes[:, 2:]) - np.maximum(box[:2], boxes[:, :2])
     intersection = np.clip(overlap, 0, None).prod(axis=1)

@@ -1,10 +1,9 @@
-"""Read official YOLOv5 checkpoints (.pt, releases 5.0 to 7.0) without running anything that is in them.
+"""Read official YOLOv5 checkpoints (.pt, releases 5.0 to 7.0) without executing code from them.
 
-A checkpoint is a pickle of a whole `models.yolo.Model` in a zip archive, beside the raw bytes of its tensors. Here
-the pickle may name only what such a file needs: containers, tensors, and classes of YOLOv5 and torch.nn, of which
-inert stand-ins are made. No class is ever imported and nothing of torch is used, so that the file decides nothing but
-numbers, names and the layout of the network. (What is left: a file can be made to keep Python's own unpickler busy for
-very long, by hashing nested tuples.)
+A checkpoint is a zip archive with the pickle of a `models.yolo.Model` and the raw bytes of its tensors. The unpickler
+of this module accepts an allow-list of names: containers, tensors, and classes of YOLOv5 and torch.nn, which become
+inert stand-ins. No class is imported and torch is not used, so a file controls only numbers, names and the layout of
+the network. Known limitation: a malicious file can keep Python's unpickler busy for very long by hashing nested tuples.
 """
 import collections
 import hashlib
@@ -15,10 +14,10 @@ from typing import Dict, List, NamedTuple
 import numpy as np
 
 EXPECTED = 'expected the checkpoint (.pt) of an official YOLOv5 detection model, release 5.0 to 7.0'
-# Modules whose classes become inert stand-ins: the model itself, and what training leaves in the file beside it.
+# Modules whose classes become inert stand-ins: the model itself, and leftovers of training in the file.
 INERT_MODULES = ('models', 'utils', 'torch.nn', 'numpy', '_codecs', 'pathlib', 'datetime')
 MAX_CLASSES, MAX_NAME = 10000, 200
-# A tensor may be larger than its numbers where it repeats them (YOLOv5's cached grids do), but not much.
+# A tensor may repeat its numbers by strides of 0, as YOLOv5's cached grids do, up to this size.
 MAX_REPEATED = 10 ** 6
 STORAGE_DTYPES = {'DoubleStorage': '<f8', 'FloatStorage': '<f4', 'HalfStorage': '<f2', 'LongStorage': '<i8',
                   'IntStorage': '<i4', 'ShortStorage': '<i2', 'CharStorage': '<i1', 'ByteStorage': '<u1',
@@ -26,11 +25,11 @@ STORAGE_DTYPES = {'DoubleStorage': '<f8', 'FloatStorage': '<f4', 'HalfStorage': 
 
 
 class WeightsError(ValueError):
-    """Weights that cannot be used: says which file, why, and what was expected."""
+    """Weights that cannot be used. The message names the file, the reason, and what was expected."""
 
 
 class Checkpoint(NamedTuple):
-    """What a checkpoint says: `layout`, its `yaml` (see `network.Network`), class `names` and `weights` by name."""
+    """Content of a checkpoint: `layout` (its `yaml`, see `network.Network`), class `names` and `weights` by name."""
 
     layout: dict
     names: List[str]
@@ -38,7 +37,7 @@ class Checkpoint(NamedTuple):
 
 
 def read_checkpoint(path):
-    """Read a checkpoint; runs no code from it and builds no class that it names.
+    """Read a checkpoint without executing code from it or instantiating classes that it names.
 
     Raises
     ------
@@ -52,14 +51,14 @@ def read_checkpoint(path):
     except FileNotFoundError:
         raise _missing(path)
     except zipfile.BadZipFile as error:
-        raise WeightsError('weights %s: truncated, or not a checkpoint at all, or one of torch before 1.6 (%s); %s'
+        raise WeightsError('weights %s: truncated, not a checkpoint, or written by torch before 1.6 (%s); %s'
                            % (path, cause(error), EXPECTED))
-    except Exception as error:  # a damaged or hostile pickle can raise anything; it all means the same
-        raise WeightsError('weights %s: refused (%s); %s' % (path, cause(error), EXPECTED))
+    except Exception as error:  # a damaged or malicious pickle can raise any exception
+        raise WeightsError('weights %s: rejected (%s); %s' % (path, cause(error), EXPECTED))
 
 
 def checkpoint_digest(path):
-    """SHA-256 of a file, in hexadecimal. Raises WeightsError where it cannot be read."""
+    """SHA-256 of a file, in hexadecimal. Raises WeightsError if the file cannot be read."""
     try:
         with open(path, 'rb') as stream:
             return hashlib.sha256(stream.read()).hexdigest()
@@ -74,12 +73,12 @@ def _missing(path):
 
 
 def cause(error):
-    """What an exception says, as one short line without control characters; its type where it says nothing."""
+    """Message of an exception as one short line without control characters, or its type if the message is empty."""
     return ascii(' '.join(str(error).split()))[1:-1][:300] or type(error).__name__
 
 
 class Inert(object):
-    """Stands in for an object of a foreign class: keeps the state that was pickled, has no behaviour."""
+    """Stand-in for an object of a foreign class. It stores the pickled state and has no behaviour."""
 
     def __new__(cls, *_args, **_kwargs):
         instance = super(Inert, cls).__new__(cls)
@@ -97,20 +96,20 @@ class _Unpickler(pickle.Unpickler):
         self._archive = archive
         pickles = [name for name in archive.namelist() if name.split('/')[1:] == ['data.pkl']]
         if len(pickles) != 1:
-            raise pickle.UnpicklingError('the archive holds no data.pkl')
+            raise pickle.UnpicklingError('the archive contains no data.pkl')
         self._folder = pickles[0].split('/')[0]
         self._storages, self._classes = {}, {}
         if self._folder + '/constants.pkl' in archive.namelist():
-            raise pickle.UnpicklingError('it is a TorchScript export; its name must end in .torchscript')
+            raise pickle.UnpicklingError('the file is a TorchScript export; its name must end in .torchscript')
         compressed = [info.filename for info in archive.infolist() if info.compress_type != zipfile.ZIP_STORED]
-        if compressed:  # torch never compresses; what unpacks to more than its file could fill the memory
+        if compressed:  # torch never compresses; decompression could exhaust the memory
             raise pickle.UnpicklingError('%s is compressed' % compressed[0])
         super(_Unpickler, self).__init__(archive.open(pickles[0]), encoding='utf-8')
 
     def find_class(self, module, name):
-        """The stand-in for a name in the pickle. Nothing is imported.
+        """Return the stand-in for a name in the pickle, without importing anything.
 
-        The functions are made anew each time, because a pickle can set attributes of what it names.
+        The functions are created on each call, because a pickle can set attributes of the objects that it names.
         """
         allowed = {('collections', 'OrderedDict'): collections.OrderedDict, ('__builtin__', 'set'): set,
                    ('builtins', 'set'): set, ('torch', 'Size'): tuple,
@@ -122,10 +121,10 @@ class _Unpickler(pickle.Unpickler):
             return STORAGE_DTYPES[name]
         if any(module == inert or module.startswith(inert + '.') for inert in INERT_MODULES):
             return self._classes.setdefault((module, name), type(name, (Inert,), {'origin': '%s.%s' % (module, name)}))
-        raise pickle.UnpicklingError('it names %s.%s, which no such checkpoint needs' % (module, name))
+        raise pickle.UnpicklingError('%s.%s is not in the allow-list' % (module, name))
 
     def persistent_load(self, reference):
-        """The numbers of one storage, a flat array over the bytes in the archive."""
+        """The numbers of one storage: a flat array that views the bytes in the archive."""
         _kind, dtype, key, _device, _count = reference
         if (dtype, key) not in self._storages:
             raw = self._archive.read('%s/data/%s' % (self._folder, key))
@@ -134,63 +133,69 @@ class _Unpickler(pickle.Unpickler):
 
 
 def _tensor(storage, offset, size, stride, *_unused):
-    """A view of a storage as read from the archive, and of nothing else; strides count elements."""
+    """View of a storage that was read from the archive. Strides count elements."""
     offset, size, stride = int(offset), [int(n) for n in size], [int(n) for n in stride]
     if type(storage) is not np.ndarray or storage.strides != (storage.itemsize,):
-        raise pickle.UnpicklingError('a tensor is made of something that is no data')
+        raise pickle.UnpicklingError('the storage of a tensor is not in the archive')
     last, count = offset, 1
     for n, step in zip(size, stride):
         last, count = last + (n - 1) * step, count * n
     if min(size + stride + [offset]) < 0 or len(size) != len(stride) or (count and last >= storage.size):
-        raise pickle.UnpicklingError('a tensor reaches outside its data')
+        raise pickle.UnpicklingError('a tensor exceeds its storage')
     if count > max(storage.size, MAX_REPEATED):
-        raise pickle.UnpicklingError('a tensor of %d numbers is made of %d' % (count, storage.size))
+        raise pickle.UnpicklingError('a tensor repeats its storage: %d elements from %d' % (count, storage.size))
     return np.lib.stride_tricks.as_strided(storage[offset:], size, [step * storage.itemsize for step in stride],
                                            writeable=False)
 
 
 def _checkpoint_from(root):
-    """Find the model in an unpickled checkpoint: the averaged one where training kept one, as YOLOv5 does."""
+    """Checkpoint of an unpickled file. As in YOLOv5, the averaged model (`ema`) is preferred if there is one."""
     model = (root.get('ema') or root.get('model')) if isinstance(root, dict) else None
     origin = getattr(model, 'origin', type(model).__name__)
     if origin not in ('models.yolo.Model', 'models.yolo.DetectionModel'):
-        raise ValueError('it holds %s, not models.yolo.Model or DetectionModel' % origin)
+        raise ValueError('the file contains %s, not models.yolo.Model or DetectionModel' % origin)
     layout = model.state.get('yaml')
     if not isinstance(layout, dict) or not isinstance(layout.get('nc'), int):
-        raise ValueError('the model carries no yaml to rebuild it from')
+        raise ValueError('the model has no yaml that describes its layers')
     if not 0 < layout['nc'] <= MAX_CLASSES:
         raise ValueError('the model has %d classes; 1 to %d expected' % (layout['nc'], MAX_CLASSES))
     tensors, activations = _walk(model)
-    written = str(layout.get('activation') or 'nn.SiLU()')[:MAX_NAME]
-    if activations - {written.partition('(')[0].rpartition('.')[2]}:
-        raise ValueError('its layers use %s, where its yaml says %s' % (', '.join(sorted(activations)), written))
+    declared = str(layout.get('activation') or 'nn.SiLU()')[:MAX_NAME]
+    if activations - {declared.partition('(')[0].rpartition('.')[2]}:
+        raise ValueError('its layers use %s, but its yaml declares %s' % (', '.join(sorted(activations)), declared))
     return Checkpoint(layout, class_names(model.state.get('names'), layout['nc']), tensors)
 
 
 def class_names(names, count):
     """Class names as a list, from the list or the {number: name} dict in a file.
 
-    Where a file carries no names, 80 classes are taken for COCO's, whose first is person; the others get numbers.
+    If a file has no names and 80 classes, the classes of COCO are assumed, whose first is person. Other classes without
+    a name are named by their number.
     """
     if isinstance(names, (list, tuple)):
         names = dict(enumerate(names))
     if not isinstance(names, dict):
         names = {0: 'person'} if count == 80 else {}
-    found = [names.get(number, names.get(str(number))) for number in range(count)]  # JSON makes strings of the numbers
+    entries = [names.get(number, names.get(str(number))) for number in range(count)]  # keys are strings in JSON
     return [name if isinstance(name, str) and len(name) <= MAX_NAME else str(number)
-            for number, name in enumerate(found)]
+            for number, name in enumerate(entries)]
 
 
 def _walk(model):
-    """All parameters and buffers below an inert module, {name: array}, named as by torch's state_dict, and the names of
-    the classes of its activations.
+    """Collect the parameters and buffers below an inert module, and the class names of its activations.
+
+    Returns
+    -------
+    tensors : dict
+        {name: array}, with the names of torch's state_dict.
+    activations : set of str
     """
-    tensors, activations, seen, to_visit = {}, set(), set(), [('', model)]
+    tensors, activations, visited, to_visit = {}, set(), set(), [('', model)]
     while to_visit:
         prefix, module = to_visit.pop()
-        if id(module) in seen:  # modules form a tree but for shared activations, which hold no weights
+        if id(module) in visited:  # modules form a tree except for shared activations, which have no weights
             continue
-        seen.add(id(module))
+        visited.add(id(module))
         if len(prefix) > MAX_NAME:
             raise ValueError('its modules are nested too deeply')
         if prefix.endswith('.act.'):

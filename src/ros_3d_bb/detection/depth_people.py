@@ -1,23 +1,23 @@
-"""Find people in an aligned depth image and a colour image, without a trained network of our own.
+"""Detect people in an aligned depth image and a colour image, without a neural network.
 
-What stands above the floor falls into blobs; a blob of human size is a person if its shape in depth and OpenCV's HOG
-people detector together say so.
+Points above the floor are clustered. A cluster of human size is classified as a person by its shape in depth and by
+OpenCV's HOG people detector.
 """
 from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from ros_3d_bb.detection.bodies import DepthPeopleParams, check_params, find_bodies, grid_of
+from ros_3d_bb.detection.bodies import DepthPeopleParams, check_params, find_person_clusters, grid_of
 from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.detection.floor import check_upright, fit_floor
-from ros_3d_bb.detection.hog import BEST_HOG, Figure, PersonHog, evidence_of, person_score, pyramid_of
+from ros_3d_bb.detection.hog import BEST_HOG, PersonHog, PersonWindow, person_score, pyramid_of, shape_features_of
 
-MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # of a person who is partly outside the image
-CLOSEST_M = 0.35  # the middles of two people are farther apart
+MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
+MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person
 
 
 class Found(NamedTuple):
-    """A person: box (x1, y1, x2, y2), score 0..1, and where they are to the right and ahead of the camera."""
+    """A detected person: box (x1, y1, x2, y2), score 0..1, and position to the right of and ahead of the camera."""
 
     box: Tuple[float, float, float, float]
     score: float
@@ -26,7 +26,7 @@ class Found(NamedTuple):
 
 
 class DepthPeople(object):
-    """A detector of people in depth and colour.
+    """Detector of people in depth and colour images.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class DepthPeople(object):
     Raises
     ------
     ValueError
-        If a parameter makes no sense, or this OpenCV has no HOG detector.
+        If a parameter is out of range, or this OpenCV has no HOG detector.
     """
 
     def __init__(self, params=DepthPeopleParams()):
@@ -43,7 +43,7 @@ class DepthPeople(object):
         self._hog, self._floor = PersonHog(), None
 
     def tune(self, params):
-        """Search the next images with other parameters. Raises ValueError as at the start, and changes nothing."""
+        """Change the parameters. If one is out of range, raise ValueError and keep the old ones."""
         check_params(params)
         self._params = params
 
@@ -57,24 +57,24 @@ class DepthPeople(object):
             Aligned to the colour image.
         camera : ros_3d_bb.geometry.Camera
         floor : ros_3d_bb.detection.floor.Floor, optional
-            Where not given, fitted to this image; where that fails, the last one that was.
+            If not given, the floor is fitted to this image. If that fails, the last fitted floor is used.
 
         Returns
         -------
         ros_3d_bb.detection.boxes.Detections or None
-            All of class 0. None while no floor was found yet: nobody knows who is there.
+            All of class 0. None if no floor is known yet.
 
         Raises
         ------
         ValueError
-            If the images or the camera differ in size, or the camera does not stand upright above the floor.
+            If the images or the camera differ in size, or the camera is not upright above the floor.
         """
         if depth.values.shape != (camera.height, camera.width):
-            raise ValueError('depth image has %d x %d pixels and the colour camera %d x %d; depth aligned to colour '
-                             'expected' % (depth.values.shape[::-1] + camera[:2]))
+            raise ValueError('the depth image has %d x %d pixels and the colour camera %d x %d; depth aligned to '
+                             'colour expected' % (depth.values.shape[::-1] + camera[:2]))
         if image.shape[:2] != depth.values.shape:
-            raise ValueError('colour image has %d x %d pixels and depth image %d x %d; depth aligned to colour expected'
-                             % (image.shape[1::-1] + depth.values.shape[::-1]))
+            raise ValueError('the colour image has %d x %d pixels and the depth image %d x %d; depth aligned to colour '
+                             'expected' % (image.shape[1::-1] + depth.values.shape[::-1]))
         if floor is None:
             floor = self._floor = fit_floor(depth, camera) or self._floor
         if floor is None:
@@ -82,22 +82,22 @@ class DepthPeople(object):
         check_upright(floor)
         grid = grid_of(depth, camera, floor, self._params)
         pyramid = pyramid_of(image)
-        found = []
-        for blob, shape in find_bodies(grid, camera, self._params):
-            evidence = evidence_of(blob.mask, blob.window(grid.ahead_m), shape.thickness_m)
-            if person_score(evidence, BEST_HOG, shape.cut_top) < self._params.min_score:
-                continue  # furniture by its shape alone: no need to look
-            hog = self._hog.score(pyramid, figure_of(blob, shape, grid, camera, floor))
-            score = person_score(evidence, hog, shape.cut_top)
+        people = []
+        for blob, shape in find_person_clusters(grid, camera, self._params):
+            features = shape_features_of(blob.mask, blob.window(grid.ahead_m), shape.thickness_m)
+            if person_score(features, BEST_HOG, shape.cut_top) < self._params.min_score:
+                continue  # rejected by its shape alone: HOG cannot raise the score enough
+            hog = self._hog.score(pyramid, person_window_of(blob, shape, grid, camera, floor))
+            score = person_score(features, hog, shape.cut_top)
             if score >= self._params.min_score:
                 box = box_of(blob, shape, grid, camera, floor)
                 x_m = ((box[0] + box[2]) / 2.0 - camera.cx) / camera.fx * shape.depth_m
-                found.append(Found(box, score, x_m, shape.depth_m))
-        return _detections(found)
+                people.append(Found(box, score, x_m, shape.depth_m))
+        return _merged_detections(people)
 
 
-def figure_of(blob, shape, grid, camera, floor):
-    """Where the whole person would be in the image whose visible part is the blob. Returns Figure."""
+def person_window_of(blob, shape, grid, camera, floor):
+    """Image region of the whole person whose visible part is the blob. Returns PersonWindow."""
     left, right = blob.column * grid.step, (blob.column + blob.mask.shape[1]) * grid.step
     middle = (left + right) / 2.0
     half = MEAN_WIDTH_M / 2 * camera.fx / shape.depth_m
@@ -105,11 +105,15 @@ def figure_of(blob, shape, grid, camera, floor):
         middle = min(middle, right - half) if blob.column == 0 else max(middle, left + half)
     soles = floor.row(camera, middle, shape.depth_m)
     height_m = shape.top_m if not shape.cut_top and shape.top_m > 1.4 else MEAN_HEIGHT_M
-    return Figure(middle, soles - height_m * camera.fy / shape.depth_m, soles)
+    return PersonWindow(middle, soles - height_m * camera.fy / shape.depth_m, soles)
 
 
 def box_of(blob, shape, grid, camera, floor):
-    """The rectangle of a person's visible part, down to the floor: its margin took away the feet. (x1, y1, x2, y2)."""
+    """Box (x1, y1, x2, y2) of the visible part of a person.
+
+    Visible feet lie within the floor margin, outside the blob. The box of a person seen nearly to the ground is
+    therefore extended to the floor.
+    """
     rows, columns = blob.mask.shape
     x1, y1, x2, y2 = (edge * grid.step for edge in (blob.column, blob.row, blob.column + columns, blob.row + rows))
     if shape.bottom_m < 0.4:
@@ -118,18 +122,18 @@ def box_of(blob, shape, grid, camera, floor):
     return x1, y1, min(x2, camera.width), min(y2, camera.height)
 
 
-def _detections(found):
-    """Detections of a list of Found, best first; what stands closer together than two people can is one of them."""
-    people = []
-    for entry in sorted(found, key=lambda entry: -_area(entry.box)):
-        near = [number for number, other in enumerate(people) if _distance_m(entry, other) < CLOSEST_M]
+def _merged_detections(people):
+    """Convert a list of Found to Detections. People closer together than MIN_DISTANCE_M are merged."""
+    merged = []
+    for person in sorted(people, key=lambda person: -_area(person.box)):
+        near = [index for index, other in enumerate(merged) if _distance_m(person, other) < MIN_DISTANCE_M]
         if near:
-            people[near[0]] = _united(people[near[0]], entry)
+            merged[near[0]] = _merge(merged[near[0]], person)
         else:
-            people.append(entry)
-    people.sort(key=lambda entry: -entry.score)
-    return Detections(np.array([entry.box for entry in people], float).reshape(-1, 4),
-                      np.array([entry.score for entry in people], float), np.zeros(len(people), int))
+            merged.append(person)
+    merged.sort(key=lambda person: -person.score)
+    return Detections(np.array([person.box for person in merged], float).reshape(-1, 4),
+                      np.array([person.score for person in merged], float), np.zeros(len(merged), int))
 
 
 def _area(box):
@@ -140,7 +144,7 @@ def _distance_m(one, other):
     return float(np.hypot(one.x_m - other.x_m, one.depth_m - other.depth_m))
 
 
-def _united(large, small):
-    """One person of whom two parts were found; the larger one knows better where they are."""
+def _merge(large, small):
+    """Merge two detected parts of one person. The position of the larger part is kept, as it is more accurate."""
     low, high = np.minimum(large.box, small.box)[:2], np.maximum(large.box, small.box)[2:]
     return large._replace(box=tuple(low) + tuple(high), score=max(large.score, small.score))

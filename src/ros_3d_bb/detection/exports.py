@@ -1,8 +1,8 @@
-"""Checkpoints exported to ONNX once, and kept in a folder.
+"""Cache of checkpoints that are exported to ONNX.
 
-A file there is named by the SHA-256 of its checkpoint and by `VERSION`; it takes images of any size. It ends in its own
-SHA-256, and holds what torch made of a reference image, which ONNX Runtime has to repeat each time that it is loaded.
-It is read as numbers and names and runs no code; torch is needed only to make it.
+A cached file is named by the SHA-256 of its checkpoint and by `VERSION`, and accepts images of any size. It ends with
+its own SHA-256, and contains the output of torch for a reference image, which ONNX Runtime must reproduce each time the
+file is loaded. Loading a cached file executes no code from it; torch is needed only to create it.
 """
 import base64
 import hashlib
@@ -16,28 +16,32 @@ from ros_3d_bb.detection.onnx_file import metadata_entry
 from ros_3d_bb.detection.onnx_runtime import INSTALL, ExportedRuntime, OnnxUnusable, reference_image
 from ros_3d_bb.session_file import write_whole
 
-VERSION = 1  # of the files; to be raised when network.py or onnx_export.py make other ones
+VERSION = 1  # of the cached files; increase it when network.py or onnx_export.py change their content
 
 
-def exported_runtime(path, folder, threads, warn):
-    """ONNX Runtime for a checkpoint, from the folder where that has it.
+def open_exported(path, folder, threads, warn):
+    """Open a checkpoint in ONNX Runtime, by its cached export if there is one.
 
     Parameters
     ----------
     path : str
         An official checkpoint (.pt).
     folder : str
-        Made if missing. Where it cannot be written, the export is kept in memory.
+        The cache. It is created if missing. If it cannot be written, the export is used from memory.
     threads : int
     warn : callable
-        Told, as a line of text, what went wrong without harm.
+        Called with one line of text for problems that are worked around.
+
+    Returns
+    -------
+    ros_3d_bb.detection.onnx_runtime.ExportedRuntime
 
     Raises
     ------
     WeightsError
         If the checkpoint cannot be used.
     OnnxUnusable
-        If ONNX Runtime is not there, or finds something else than torch does.
+        If ONNX Runtime is not installed, or its output differs from torch's.
     """
     try:
         import onnxruntime  # noqa: F401
@@ -46,53 +50,59 @@ def exported_runtime(path, folder, threads, warn):
     digest = checkpoint_digest(path)
     file_path = os.path.join(folder, '%s-%d.onnx' % (digest, VERSION))
     try:
-        return _kept(file_path, digest, threads)
+        return _open_cached(file_path, digest, threads)
     except FileNotFoundError:
         pass
     except (OSError, ValueError) as error:
-        warn('%s cannot be used (%s); it is made again' % (file_path, cause(error)))
+        warn('%s cannot be used (%s); exporting the checkpoint again' % (file_path, cause(error)))
     model = export(path, digest)
     runtime = ExportedRuntime(model, threads)
     try:
         os.makedirs(folder, mode=0o700, exist_ok=True)
-        write_whole(file_path, sealed(model))
+        write_whole(file_path, with_checksum(model))
     except OSError as error:
-        warn('the network exported to ONNX cannot be kept (%s); it will be made again at the next start' % cause(error))
+        warn('the ONNX export cannot be saved (%s); the checkpoint will be exported again at the next start'
+             % cause(error))
     return runtime
 
 
-def export_folder(given=''):
-    """Where exports are kept: the folder given, or one in the user's cache, as ./run has it."""
+def export_folder(folder=''):
+    """Absolute path of the cache: `folder`, or by default a folder in the user's cache, the same that ./run uses."""
     cache = os.environ.get('ROS_3D_BB_CACHE') or os.path.join(
         os.environ.get('XDG_CACHE_HOME') or os.path.join('~', '.cache'), 'ros_3d_bb')
-    return os.path.abspath(os.path.expanduser(given or os.path.join(cache, 'onnx')))
+    return os.path.abspath(os.path.expanduser(folder or os.path.join(cache, 'onnx')))
 
 
 def export(path, digest):
-    """A checkpoint as an ONNX model with its names, its anchors, and what torch makes of the reference image: bytes."""
-    from ros_3d_bb.detection.onnx_export import exported  # torch takes a second and 200 MB to import
+    """Export a checkpoint to ONNX, with class names, anchors, and the output of torch for the reference image.
+
+    Returns
+    -------
+    bytes
+    """
+    from ros_3d_bb.detection.onnx_export import onnx_model_of  # importing torch takes a second and 200 MB
     from ros_3d_bb.detection.torch_runtime import network_of, run
     network, names = network_of(path)
     detect, stride = network.model[-1], int(network.stride)
     reference = run(network, reference_image(stride)).numpy()
     anchors_px = detect.anchors.numpy() * np.reshape(detect.strides, (-1, 1, 1))
-    return exported(network, {'about': json.dumps({
+    return onnx_model_of(network, {'about': json.dumps({
         'checkpoint': digest, 'names': names, 'stride': stride, 'strides': detect.strides,
         'anchors_px': anchors_px.tolist(), 'reference': base64.b64encode(reference.astype('<f4').tobytes()).decode()})})
 
 
-def sealed(model):
-    """A model with its SHA-256 as a last entry of its metadata, which leaves it a model."""
+def with_checksum(model):
+    """Append the SHA-256 of a model to its metadata. The result is still a valid ONNX file."""
     return model + metadata_entry('sha256', hashlib.sha256(model).hexdigest())
 
 
-def _kept(path, digest, threads):
+def _open_cached(path, digest, threads):
     with open(path, 'rb') as stream:
         content = stream.read()
-    model = content[:-len(sealed(b''))]
-    if sealed(model) != content:
-        raise ValueError('it is damaged')
+    model = content[:-len(with_checksum(b''))]
+    if with_checksum(model) != content:
+        raise ValueError('its checksum is wrong')
     runtime = ExportedRuntime(model, threads)
     if runtime.checkpoint != digest:
-        raise ValueError('it is of another checkpoint')
+        raise ValueError('it was exported from another checkpoint')
     return runtime

@@ -1,21 +1,21 @@
-"""The floor that a depth camera sees: a plane in the camera optical frame.
+"""Ground plane in the camera optical frame.
 
-Convention: the normal points up, so height above the floor of a point p is normal . p + offset_m, and the offset is the
-height of the camera.
+Convention: the normal points up. The height of a point p above the floor is normal . p + offset_m, and the offset is
+the height of the camera.
 """
 from typing import NamedTuple
 
 import numpy as np
 
-STEP_PX = 10  # the floor is fitted to every so many pixels: about 3000 points of a 640x480 image
-HYPOTHESES = 300  # enough for a floor that fills a quarter of the image: 300 / 4**3 triples lie on it
+STEP_PX = 10  # sampling distance: about 3000 points of a 640x480 image
+HYPOTHESES = 300  # enough for a floor that fills a quarter of the image, which then contains 300 / 4**3 triples
 SCORING_POINTS = 600
 FAR_M = 6.0
-MAX_TILT_RAD = np.radians(27)  # of a floor that is looked for
-MOST_TILT_RAD = np.radians(50)  # of one that is known
+MAX_FITTED_TILT_RAD = np.radians(27)
+MAX_KNOWN_TILT_RAD = np.radians(50)  # of a floor that is known from tf
 CAMERA_HEIGHT_M = (0.12, 2.2)
-MIN_POINTS, MIN_SHARE = 60, 0.04  # of the points with depth, for a plane to be credible
-MAX_BELOW = 0.05  # share of the points
+MIN_POINTS, MIN_SHARE = 60, 0.04  # inliers of a credible plane: number, and share of the points with depth
+MAX_BELOW = 0.05  # maximum share of the points below a credible plane
 
 
 class Floor(NamedTuple):
@@ -25,53 +25,54 @@ class Floor(NamedTuple):
     offset_m: float
 
     def height(self, points):
-        """Height above the floor, metres, of points (..., 3) in the camera optical frame."""
+        """Height above the floor, in metres, of points (..., 3) in the camera optical frame."""
         return np.dot(points, self.normal) + self.offset_m
 
     def row(self, camera, column, depth_m):
-        """The row of the image, pixels, in which a column shows the floor at a depth; also outside the image."""
+        """Image row, in pixels, where a column shows the floor at a depth. It may lie outside the image."""
         x = (column - camera.cx) / camera.fx
         y = -(self.offset_m / depth_m + self.normal[0] * x + self.normal[2]) / self.normal[1]
         return y * camera.fy + camera.cy
 
 
 def floor_from_transform(camera_from_floor):
-    """The z = 0 plane of a frame as a Floor.
+    """Convert the z = 0 plane of a frame to a Floor.
 
     Parameters
     ----------
     camera_from_floor : numpy.ndarray, (4, 4)
-        Takes points of a frame whose z axis points up and whose z = 0 is the floor to the camera optical frame.
+        Transform to the camera optical frame from a frame whose z axis points up and whose z = 0 plane is the floor.
     """
     normal = camera_from_floor[:3, 2]
     return Floor(normal, -float(np.dot(normal, camera_from_floor[:3, 3])))
 
 
 def check_upright(floor):
-    """Raise ValueError where the floor is not below the camera and more or less level in its image."""
-    if not (-floor.normal[1] > np.cos(MOST_TILT_RAD) and floor.offset_m > 0):
-        raise ValueError('the floor has the normal (%.2f, %.2f, %.2f) in the camera\'s optical frame, and the camera '
-                         'is %.2f m above it; about (0, -1, 0) and more than 0 expected: is that frame an optical one, '
-                         'and does the z axis of the floor point up?' % (tuple(floor.normal) + (floor.offset_m,)))
+    """Raise ValueError if the floor is not below the camera or the camera is tilted by more than 50 degrees."""
+    if not (-floor.normal[1] > np.cos(MAX_KNOWN_TILT_RAD) and floor.offset_m > 0):
+        raise ValueError('the normal of the floor is (%.2f, %.2f, %.2f) in the camera frame, and the camera is %.2f m '
+                         'above the floor; about (0, -1, 0) and more than 0 expected. Check that the camera frame is '
+                         'an optical frame and that the z axis of the floor frame points up'
+                         % (tuple(floor.normal) + (floor.offset_m,)))
 
 
 def fit_floor(depth, camera, seed=0):
-    """Fit the floor to a depth image: RANSAC, then least squares on what lies on the plane.
+    """Fit the floor to a depth image by RANSAC and least squares on the inliers.
 
-    Works for a camera upright within 25 degrees, 0.15 m to 2 m above the floor. A plane with much below it (a table, a
-    shelf) is no floor, so what is below counts against it.
+    The camera must be 0.15 m to 2 m above the floor and tilted by less than 25 degrees. Points below a plane count
+    against it, so that tables and shelves are not taken for the floor.
 
     Parameters
     ----------
     depth : ros_3d_bb.estimation.DepthImage
     camera : ros_3d_bb.geometry.Camera
     seed : int
-        Of the random choice; the same image gives the same floor.
+        Seed of the random numbers. The same image always gives the same floor.
 
     Returns
     -------
     Floor or None
-        None where no credible floor is seen.
+        None if no credible floor is visible.
     """
     points = _points(depth, camera)
     if len(points) < MIN_POINTS:
@@ -80,16 +81,16 @@ def fit_floor(depth, camera, seed=0):
     normals, offsets = _hypotheses(points, random)
     if not len(normals):
         return None
-    some = points[random.randint(0, len(points), SCORING_POINTS)]
-    heights = some.dot(normals.T) + offsets
-    tolerance_m = _tolerance_m(some)[:, None]
-    votes = (np.abs(heights) < tolerance_m).sum(axis=0) - (heights < -2 * tolerance_m).sum(axis=0)
-    best = votes.argmax()
-    return _refined(Floor(normals[best], offsets[best]), points)
+    sample = points[random.randint(0, len(points), SCORING_POINTS)]
+    heights_m = sample.dot(normals.T) + offsets
+    tolerance_m = _tolerance_m(sample)[:, None]
+    scores = (np.abs(heights_m) < tolerance_m).sum(axis=0) - (heights_m < -2 * tolerance_m).sum(axis=0)
+    best = scores.argmax()
+    return _refine(Floor(normals[best], offsets[best]), points)
 
 
 def _points(depth, camera):
-    """Points (n, 3) on a coarse grid of the image, as far as FAR_M."""
+    """Points (n, 3) on a coarse grid of the image, up to FAR_M."""
     height, width = depth.values.shape
     u, v = np.meshgrid(np.arange(STEP_PX // 2, width, STEP_PX), np.arange(STEP_PX // 2, height, STEP_PX))
     depth_m, valid = depth.at(u, v)
@@ -98,7 +99,7 @@ def _points(depth, camera):
 
 
 def _hypotheses(points, random):
-    """Planes through three points each that could be the floor: normals (n, 3), offsets (n,)."""
+    """Candidate floor planes through three random points each: normals (n, 3), offsets (n,)."""
     a, b, c = points[random.randint(0, len(points), (3, HYPOTHESES))]
     normals = np.cross(b - a, c - a)
     lengths = np.linalg.norm(normals, axis=1)
@@ -112,17 +113,17 @@ def _hypotheses(points, random):
 
 def _is_upright(normals, offsets):
     low, high = CAMERA_HEIGHT_M
-    return (-normals[..., 1] > np.cos(MAX_TILT_RAD)) & (offsets > low) & (offsets < high)
+    return (-normals[..., 1] > np.cos(MAX_FITTED_TILT_RAD)) & (offsets > low) & (offsets < high)
 
 
 def _tolerance_m(points):
-    """How far off a plane a point of it is measured: height of a point seen at a flat angle grows worse with depth."""
+    """Maximum distance of inliers from the plane. It grows with depth, as heights at flat viewing angles do."""
     return 0.015 + 0.01 * points[:, 2]
 
 
-def _refined(floor, points):
-    """The plane that fits the points on a floor best, or None where it is not credible."""
-    for share in (1.0, 0.6, 0.4, 0.4):  # narrower, as the foot of a wall pulls the plane up
+def _refine(floor, points):
+    """Fit the plane to its inliers by least squares. Returns None if the result is not credible."""
+    for share in (1.0, 0.6, 0.4, 0.4):  # shrink the tolerance: the foot of a wall pulls the plane up
         near = points[np.abs(floor.height(points)) < share * _tolerance_m(points)]
         if len(near) < max(MIN_POINTS, MIN_SHARE * len(points)):
             return None

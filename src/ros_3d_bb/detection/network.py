@@ -1,7 +1,7 @@
-"""The YOLOv5 network, built from the `yaml` inside a checkpoint.
+"""YOLOv5 network, built from the `yaml` in a checkpoint.
 
 Architecture: YOLOv5 releases 5.0 (Focus, SPP) and 6.0 to 7.0 (Conv, SPPF), any width and depth, three or four output
-scales (P5, P6). Attributes are named as the weights in the checkpoints are, so that these load by name.
+scales (P5, P6). Attributes have the names of the weights in checkpoints, so that weights are loaded by name.
 Images are (batch, 3, height, width), RGB, 0..1; height and width multiples of `Network.stride`.
 """
 import math
@@ -11,12 +11,12 @@ from torch import nn
 
 ACTIVATIONS = {'nn.SiLU()': nn.SiLU, 'nn.ReLU()': nn.ReLU, 'nn.Hardswish()': nn.Hardswish,
                'nn.LeakyReLU(0.1)': lambda: nn.LeakyReLU(0.1)}
-# Bounds on what a layout may ask for. The largest official model, x6, has 1.4e8 parameters, 4 scales and 3 anchors.
+# Limits of a layout. The largest official model, x6, has 1.4e8 parameters, 4 scales and 3 anchors.
 MAX_LAYERS, MAX_REPEATS, MAX_KERNEL, MAX_SCALES, MAX_ANCHORS, MAX_PARAMETERS = 100, 50, 31, 5, 10, 2e8
 
 
 class Conv(nn.Module):
-    """Convolution, batch normalisation, activation; the normalisation is folded into the convolution by `fuse`."""
+    """Convolution, batch normalisation and activation. `fuse` folds the normalisation into the convolution."""
 
     def __init__(self, in_channels, out_channels, kernel=1, stride=1, padding=None):
         super(Conv, self).__init__()
@@ -29,13 +29,13 @@ class Conv(nn.Module):
         return self.act(self.bn(self.conv(x)))
 
     def fuse(self):
-        """Fold the batch normalisation into the convolution. Only for evaluation."""
+        """Fold the batch normalisation into the convolution, for evaluation only."""
         self.conv = nn.utils.fusion.fuse_conv_bn_eval(self.conv, self.bn)
         self.bn = nn.Identity()
 
 
 class Focus(nn.Module):
-    """Every second pixel in each direction becomes a channel of its own, then Conv (release 5.0)."""
+    """Space-to-depth by a factor of 2, followed by Conv (release 5.0)."""
 
     def __init__(self, in_channels, out_channels, kernel=1):
         super(Focus, self).__init__()
@@ -46,7 +46,7 @@ class Focus(nn.Module):
 
 
 class Bottleneck(nn.Module):
-    """Two convolutions with a shortcut around them."""
+    """Two convolutions with an optional shortcut."""
 
     def __init__(self, channels, shortcut):
         super(Bottleneck, self).__init__()
@@ -60,7 +60,7 @@ class Bottleneck(nn.Module):
 
 
 class C3(nn.Module):
-    """Cross stage partial block: half the channels through bottlenecks, half around them."""
+    """Cross stage partial block: half of the channels pass the bottlenecks, half bypass them."""
 
     def __init__(self, in_channels, out_channels, repeats, shortcut=True):
         super(C3, self).__init__()
@@ -75,7 +75,7 @@ class C3(nn.Module):
 
 
 class SPP(nn.Module):
-    """Spatial pyramid pooling: the input beside its maxima over windows of several sizes (release 5.0)."""
+    """Spatial pyramid pooling: the input and its maxima over windows of several sizes (release 5.0)."""
 
     def __init__(self, in_channels, out_channels, kernels=(5, 9, 13)):
         super(SPP, self).__init__()
@@ -90,7 +90,7 @@ class SPP(nn.Module):
 
 
 class SPPF(nn.Module):
-    """Spatial pyramid pooling, fast: one small window applied again and again (releases 6.0 to 7.0)."""
+    """Fast spatial pyramid pooling: one small window is applied repeatedly (releases 6.0 to 7.0)."""
 
     def __init__(self, in_channels, out_channels, kernel=5):
         super(SPPF, self).__init__()
@@ -107,16 +107,16 @@ class SPPF(nn.Module):
 
 
 class Concat(nn.Module):
-    """Several inputs, one after the other along the channels."""
+    """Concatenation of several inputs along the channels."""
 
     def forward(self, inputs):
         return torch.cat(inputs, 1)
 
 
 class Detect(nn.Module):
-    """The output layer: boxes and scores at each cell, anchor and scale.
+    """Output layer: boxes and scores of each cell, anchor and scale.
 
-    `anchors` (scales, anchors per scale, 2), width and height in cells, come with the weights.
+    `anchors` (scales, anchors per scale, 2), width and height in cells, are loaded with the weights.
     """
 
     def __init__(self, class_count, anchor_count, in_channels, strides):
@@ -127,12 +127,12 @@ class Detect(nn.Module):
         self.register_buffer('anchors', torch.zeros(len(in_channels), anchor_count, 2))
 
     def forward(self, inputs):
-        """(batch, rows, 5 + classes): x, y, width, height in pixels, objectness, class scores."""
+        """Predictions (batch, rows, 5 + classes): x, y, width, height in pixels, objectness, class scores."""
         return torch.cat([self._decode(scale, x) for scale, x in enumerate(inputs)], 1)
 
     def _decode(self, scale, x):
         stride, anchors = self.strides[scale], self.anchors[scale]
-        y = self.m[scale](x).float()  # in half precision, x and y of boxes would be whole numbers
+        y = self.m[scale](x).float()  # half precision would round x and y of boxes to whole pixels
         batch, _, height, width = y.shape
         y = y.view(batch, anchors.shape[0], self.columns, height, width).permute(0, 1, 3, 4, 2).sigmoid()
         column = torch.arange(width, device=y.device, dtype=y.dtype).view(1, 1, 1, width)
@@ -145,7 +145,7 @@ class Detect(nn.Module):
 
 
 class Network(nn.Module):
-    """A YOLOv5 detection network.
+    """YOLOv5 detection network.
 
     Parameters
     ----------
@@ -156,14 +156,14 @@ class Network(nn.Module):
     Raises
     ------
     ValueError
-        If the layout asks for a layer or a size that no YOLOv5 release has.
+        If the layout contains a layer or a size that no YOLOv5 release has.
     """
 
     def __init__(self, layout):
         super(Network, self).__init__()
         backbone, head = layout['backbone'], layout['head']
         if not (isinstance(backbone, list) and isinstance(head, list) and len(backbone) + len(head) <= MAX_LAYERS):
-            raise ValueError('the layout is no list of at most %d layers' % MAX_LAYERS)
+            raise ValueError('backbone and head are not lists of at most %d layers in total' % MAX_LAYERS)
         rows = backbone + head
         builder = _Builder(layout)
         self.model = nn.ModuleList([builder.layer(*row) for row in rows])
@@ -180,7 +180,7 @@ class Network(nn.Module):
         return x
 
     def fuse(self):
-        """Fold all batch normalisations and switch to evaluation. Returns self."""
+        """Fold all batch normalisations and switch to evaluation mode. Returns self."""
         self.eval()
         for module in self.modules():
             if isinstance(module, Conv):
@@ -189,14 +189,14 @@ class Network(nn.Module):
 
 
 class _Builder(object):
-    """Build layer after layer, keeping the channels and the stride of each."""
+    """Builds layers one by one. Stores the channels and the stride of each."""
 
     def __init__(self, layout):
         self._class_count = layout['nc']
         anchors = layout['anchors']
         self._anchor_count = len(anchors[0]) // 2 if isinstance(anchors, (list, tuple)) else int(anchors)
         if not 0 < self._anchor_count <= MAX_ANCHORS:
-            raise ValueError('%d anchors a scale; 1 to %d expected' % (self._anchor_count, MAX_ANCHORS))
+            raise ValueError('%d anchors per scale; 1 to %d expected' % (self._anchor_count, MAX_ANCHORS))
         self._width, self._depth = float(layout['width_multiple']), float(layout['depth_multiple'])
         activation = layout.get('activation') or 'nn.SiLU()'
         if not isinstance(activation, str) or activation not in ACTIVATIONS:
@@ -205,9 +205,9 @@ class _Builder(object):
         self._channels, self._strides, self._parameters = [], [], 0
 
     def layer(self, inputs, repeats, kind, arguments):
-        """The next layer; arguments as in the layout."""
+        """Build the next layer. The arguments are a row of the layout."""
         if not isinstance(kind, str) or (isinstance(inputs, list) and len(inputs) > MAX_SCALES):
-            raise ValueError('layer %d is none of YOLOv5' % len(self._channels))
+            raise ValueError('layer %d is not a YOLOv5 layer' % len(self._channels))
         first = inputs[0] if isinstance(inputs, list) else inputs
         channels = self._channels[first] if self._channels else 3
         stride = self._strides[first] if self._strides else 1
@@ -231,12 +231,12 @@ class _Builder(object):
         return layer
 
     def _block(self, kind, in_channels, repeats, arguments):
-        """A layer with weights, the channels it puts out, and the factor by which it shrinks the image."""
+        """Build a layer with weights. Returns the layer, its output channels, and its stride."""
         out_channels, rest = self._scaled(arguments[0]), arguments[1:]
         sizes = rest[0] if kind == 'SPP' and rest else rest
         if len(sizes) > 4 or not all(isinstance(n, int) and 0 <= n <= MAX_KERNEL for n in sizes):
-            raise ValueError('%s asks for kernels, strides or padding that no YOLOv5 has' % kind)
-        self._spend(kind, in_channels, out_channels, repeats, sizes)
+            raise ValueError('kernel, stride and padding of %s are not integers from 0 to %d' % (kind, MAX_KERNEL))
+        self._count_parameters(kind, in_channels, out_channels, repeats, sizes)
         make = {'Conv': Conv, 'SPP': SPP, 'SPPF': SPPF, 'Focus': Focus, 'C3': C3}[kind]
         if kind == 'C3':
             layers = [C3(in_channels, out_channels, repeats, *rest)]
@@ -249,8 +249,8 @@ class _Builder(object):
         factor = {'Conv': rest[1] if len(rest) > 1 else 1, 'Focus': 2}.get(kind, 1)
         return layers[0] if len(layers) == 1 else nn.Sequential(*layers), out_channels, factor
 
-    def _spend(self, kind, in_channels, out_channels, repeats, sizes):
-        """Count the weights of a layer before memory is taken for them."""
+    def _count_parameters(self, kind, in_channels, out_channels, repeats, sizes):
+        """Count the weights of a layer before memory is allocated. Raises ValueError above MAX_PARAMETERS."""
         window = (sizes[0] if sizes else 1) ** 2
         self._parameters += {
             'Conv': repeats * in_channels * out_channels * window,
@@ -259,13 +259,13 @@ class _Builder(object):
             'SPP': repeats * (in_channels ** 2 / 2.0 + 2.5 * in_channels * out_channels),
             'SPPF': repeats * (in_channels ** 2 / 2.0 + 2 * in_channels * out_channels)}[kind]
         if self._parameters > MAX_PARAMETERS:
-            raise ValueError('the layout asks for more than %d million parameters' % (MAX_PARAMETERS / 1e6))
+            raise ValueError('the layout has more than %d million parameters' % (MAX_PARAMETERS / 1e6))
 
     def _scaled(self, channels):
-        """Channels times the width multiple, rounded up to a multiple of 8, as YOLOv5 does."""
+        """Channels times the width multiple, rounded up to a multiple of 8 as in YOLOv5."""
         if channels == self._anchor_count * (self._class_count + 5):
             return channels
         scaled = int(math.ceil(channels * self._width / 8) * 8)
         if scaled <= 0:
-            raise ValueError('%d channels asked for' % scaled)
+            raise ValueError('a layer has %d channels; at least 1 expected' % scaled)
         return scaled

@@ -1,7 +1,7 @@
-"""A YOLOv5 network of ours as an ONNX file.
+"""Export of `ros_3d_bb.detection.network.Network` to ONNX.
 
-The file takes an image as it comes from a camera, (1, height, width, 3), uint8, RGB, of any size that is a multiple of
-the stride, and puts out the heads of the network (see `ros_3d_bb.detection.predictions`).
+The input of the model is an RGB image (1, height, width, 3), uint8, whose height and width are multiples of the stride.
+The outputs are the heads of the network (see `ros_3d_bb.detection.predictions`).
 """
 import numpy as np
 from torch import nn
@@ -10,17 +10,22 @@ from ros_3d_bb.detection import network as yolov5
 from ros_3d_bb.detection.onnx_file import FLOAT, UINT8, Graph
 
 
-def exported(network, metadata):
-    """The file as bytes.
+def onnx_model_of(network, metadata):
+    """Export a network to ONNX.
 
     Parameters
     ----------
     network : ros_3d_bb.detection.network.Network
         Fused, float32, on the CPU.
-    metadata : dict
-        Strings by strings, kept in the file.
+    metadata : dict of str to str
+        Metadata of the model.
+
+    Returns
+    -------
+    bytes
+        Content of an ONNX file.
     """
-    return _Exporter().file(network, metadata)
+    return _Exporter().model(network, metadata)
 
 
 class _Exporter(object):
@@ -28,11 +33,11 @@ class _Exporter(object):
 
     def __init__(self):
         self._graph = Graph()
-        self._pixel_scale = np.float32(1 / 255.0)  # goes into the first convolution
+        self._pixel_scale = np.float32(1 / 255.0)  # multiplied into the weights of the first convolution
         self._layers = {
             nn.Sequential: self._sequence, yolov5.Conv: self._convolution, yolov5.Bottleneck: self._bottleneck,
             yolov5.C3: self._c3, yolov5.Focus: self._focus, yolov5.SPP: self._spp, yolov5.SPPF: self._sppf,
-            yolov5.Concat: lambda _layer, inputs: self._joined(inputs), nn.Upsample: self._upsample,
+            yolov5.Concat: lambda _layer, inputs: self._concat(inputs), nn.Upsample: self._upsample,
             yolov5.Detect: lambda layer, inputs: [self._conv2d(head, x) for head, x in zip(layer.m, inputs)],
             nn.SiLU: lambda _layer, x: self._graph.node('Mul', [x, self._graph.node('Sigmoid', [x])]),
             nn.ReLU: lambda _layer, x: self._graph.node('Relu', [x]),
@@ -40,7 +45,7 @@ class _Exporter(object):
             nn.Hardswish: lambda _layer, x: self._graph.node(
                 'Mul', [x, self._graph.node('HardSigmoid', [x], alpha=1 / 6.0, beta=0.5)])}
 
-    def file(self, network, metadata):
+    def model(self, network, metadata):
         x = self._graph.node('Cast', [self._graph.node('Transpose', ['image'], perm=[0, 3, 1, 2])], to=FLOAT)
         outputs = []
         for inputs, layer in zip(network.inputs, network.model):
@@ -59,7 +64,7 @@ class _Exporter(object):
             x = self._add(layer, x)
         return x
 
-    def _joined(self, inputs):
+    def _concat(self, inputs):
         return self._graph.node('Concat', inputs, axis=1)
 
     def _convolution(self, layer, x):
@@ -76,7 +81,7 @@ class _Exporter(object):
         return self._graph.node('Add', [x, y]) if layer.shortcut else y
 
     def _c3(self, layer, x):
-        return self._add(layer.cv3, self._joined([self._add(layer.m, self._add(layer.cv1, x)),
+        return self._add(layer.cv3, self._concat([self._add(layer.m, self._add(layer.cv1, x)),
                                                   self._add(layer.cv2, x)]))
 
     def _focus(self, layer, x):
@@ -84,17 +89,17 @@ class _Exporter(object):
         parts = [self._graph.node('Slice', [x] + [self._graph.constant(np.array(values, np.int64))
                                                   for values in ([line, column], ends, axes, steps)])
                  for column in starts for line in starts]
-        return self._add(layer.conv, self._joined(parts))
+        return self._add(layer.conv, self._concat(parts))
 
     def _spp(self, layer, x):
         x = self._add(layer.cv1, x)
-        return self._add(layer.cv2, self._joined([x] + [self._pool(pool, x) for pool in layer.m]))
+        return self._add(layer.cv2, self._concat([x] + [self._pool(pool, x) for pool in layer.m]))
 
     def _sppf(self, layer, x):
         levels = [self._add(layer.cv1, x)]
         for _ in range(3):
             levels.append(self._pool(layer.m, levels[-1]))
-        return self._add(layer.cv2, self._joined(levels))
+        return self._add(layer.cv2, self._concat(levels))
 
     def _pool(self, layer, x):
         return self._graph.node('MaxPool', [x], kernel_shape=[layer.kernel_size] * 2, pads=[layer.padding] * 4)

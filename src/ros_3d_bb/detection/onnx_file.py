@@ -1,28 +1,26 @@
-"""Write ONNX files: the few messages of the format that a network needs, in protobuf's encoding.
+"""Writer of ONNX files: the subset of the format that a network needs, in protobuf encoding.
 
-Written here because neither the `onnx` package nor torch's exporters can be counted on: the one is missing on most
-robots, the others differ from release to release. Field numbers: https://github.com/onnx/onnx/blob/main/onnx/onnx.proto
+The `onnx` package is missing on most robots, and torch's exporters differ between releases, so neither is used.
+Field numbers: https://github.com/onnx/onnx/blob/main/onnx/onnx.proto
 """
 import struct
 
 import numpy as np
 
-IR_VERSION, OPSET = 7, 13  # of ONNX 1.8; ONNX Runtime reads them since 1.6
+IR_VERSION, OPSET = 7, 13  # of ONNX 1.8; supported by ONNX Runtime since 1.6
 FLOAT, UINT8 = 1, 2
 ELEMENTS = {'float32': FLOAT, 'uint8': UINT8, 'int64': 7}
 
 
 class Graph(object):
-    """A graph that grows node by node, and becomes a file.
-
-    Values are known by names; `node` returns the name of what it makes.
-    """
+    """Builder of an ONNX graph. Values are identified by names; `node` and `constant` return the name of the result."""
 
     def __init__(self):
         self._nodes, self._constants, self._count = [], [], 0
 
     def node(self, kind, inputs, **attributes):
-        """Add an operator of one output; attributes are int, float, str or lists of int. Returns the output's name."""
+        """Add an operator with one output. Attributes are int, float, str or lists of int. Returns the output's name.
+        """
         self._count += 1
         name = 'v%d' % self._count
         self._nodes.append(_fields((1, list(inputs)), (2, name), (4, kind),
@@ -38,14 +36,18 @@ class Graph(object):
         return name
 
     def model(self, inputs, outputs, metadata):
-        """The file as bytes.
+        """Serialize the graph.
 
         Parameters
         ----------
         inputs, outputs : list of (name, element, shape)
-            Element: FLOAT or UINT8. Shape: numbers, or names where any size goes.
-        metadata : dict
-            Strings by strings.
+            Element: FLOAT or UINT8. Shape: numbers, or names for dynamic dimensions.
+        metadata : dict of str to str
+
+        Returns
+        -------
+        bytes
+            Content of an ONNX file.
         """
         graph = _fields((1, self._nodes), (2, 'network'), (5, self._constants),
                         (11, [_value(*entry) for entry in inputs]), (12, [_value(*entry) for entry in outputs]))
@@ -54,12 +56,12 @@ class Graph(object):
 
 
 def metadata_entry(key, value):
-    """One entry of a file's metadata; put after the bytes of a file, it belongs to it."""
+    """One entry of the metadata of a model, as bytes. It may be appended to a serialized model."""
     return _fields((14, _fields((1, key), (2, value))))
 
 
 def _attribute(name, value):
-    """AttributeProto; the last field says which of the others holds the value."""
+    """AttributeProto; field 20 is the type of the value."""
     if isinstance(value, float):
         return _fields((1, name), (2, value), (20, 1))
     if isinstance(value, int):
@@ -76,26 +78,26 @@ def _value(name, element, shape):
 
 
 def _fields(*fields):
-    """Numbered fields one after the other; a list is a field that repeats."""
-    written = []
+    """Encode (number, value) pairs; a list is a repeated field."""
+    encoded = []
     for number, values in fields:
         for value in values if isinstance(values, list) else [values]:
             if isinstance(value, int):
-                written.append(_varint(number << 3) + _varint(value))
+                encoded.append(_varint(number << 3) + _varint(value))
             elif isinstance(value, float):
-                written.append(_varint(number << 3 | 5) + struct.pack('<f', value))
+                encoded.append(_varint(number << 3 | 5) + struct.pack('<f', value))
             else:
                 value = value.encode('utf-8') if isinstance(value, str) else value
-                written.append(_varint(number << 3 | 2) + _varint(len(value)) + value)
-    return b''.join(written)
+                encoded.append(_varint(number << 3 | 2) + _varint(len(value)) + value)
+    return b''.join(encoded)
 
 
 def _varint(number):
-    """Seven bits a byte, the lowest first; the eighth says that more follow. Negative numbers as of 64 bits."""
+    """Encode an integer as a protobuf varint; negative numbers in 64 bits."""
     number &= 2 ** 64 - 1
-    written = bytearray()
+    encoded = bytearray()
     while number > 127:
-        written.append(number & 127 | 128)
+        encoded.append(number & 127 | 128)
         number >>= 7
-    written.append(number)
-    return bytes(written)
+    encoded.append(number)
+    return bytes(encoded)

@@ -1,4 +1,4 @@
-"""Runtimes by ONNX Runtime, on the CPU. See `ros_3d_bb.detection.runtime`."""
+"""ONNX Runtime backends, on the CPU. See `ros_3d_bb.detection.runtime`."""
 import ast
 import base64
 import json
@@ -6,26 +6,26 @@ import json
 import numpy as np
 
 from ros_3d_bb.detection.checkpoint import WeightsError, cause, class_names
-from ros_3d_bb.detection.predictions import batch_of, checked_stride, decoded_heads, predictions
+from ros_3d_bb.detection.predictions import batch_of, check_stride, decode_heads, predictions
 
-# How far ONNX Runtime may be from torch. Measured with yolov5n: 3e-4 px, 1e-6.
+# Maximum difference between ONNX Runtime and torch. Measured with yolov5n: 3e-4 px, 1e-6.
 MAX_DIFFERENCE_PX, MAX_DIFFERENCE = 0.05, 1e-3
 INSTALL = 'ONNX Runtime is not installed; install it with "pip3 install onnxruntime"'
 
 
 class OnnxUnusable(ValueError):
-    """ONNX Runtime cannot run a network here: says why."""
+    """ONNX Runtime is not installed, or cannot run a network."""
 
 
 class OnnxRuntime(object):
-    """A model that YOLOv5 exported to ONNX."""
+    """Model that was exported to ONNX by YOLOv5's export.py."""
 
     def __init__(self, path, threads):
         try:
             import onnxruntime  # noqa: F401
         except ImportError:
             raise WeightsError('weights %s: %s, or use the .pt checkpoint' % (path, INSTALL))
-        self.description = said(threads)
+        self.description = description_of(threads)
         try:
             self._session = session_of(path, threads)
             entry = self._session.get_inputs()[0]
@@ -33,71 +33,72 @@ class OnnxRuntime(object):
             size = entry.shape[2:]
             self.input_hw = tuple(size) if all(isinstance(n, int) for n in size) else None
             metadata = self._session.get_modelmeta().custom_metadata_map
-            self.stride = checked_stride(metadata.get('stride', 32))
+            self.stride = check_stride(metadata.get('stride', 32))
             columns = self(np.zeros((self.input_hw or (self.stride,) * 2) + (3,), np.uint8), 0).shape[1]
-            names = ast.literal_eval(metadata.get('names', 'None'))  # literals only: runs nothing
-        except Exception as error:  # a damaged file can raise anything; it all means the same
+            names = ast.literal_eval(metadata.get('names', 'None'))  # executes no code
+        except Exception as error:  # a damaged file can raise any exception
             raise WeightsError('weights %s: not a YOLOv5 ONNX export (%s); expected the file that its export.py writes'
                                % (path, cause(error)))
         self.names = class_names(names, columns - 5)
 
-    def __call__(self, image, least):
+    def __call__(self, image, min_objectness):
         batch = batch_of(image).astype(self._dtype, copy=False)
         rows = predictions(self._session.run(None, {self._input: batch})[0])
-        return rows[rows[:, 4] > least].astype(np.float32, copy=False)
+        return rows[rows[:, 4] > min_objectness].astype(np.float32, copy=False)
 
 
 class ExportedRuntime(object):
-    """A checkpoint that `ros_3d_bb.detection.exports` made an ONNX model of.
+    """Checkpoint that was exported to ONNX by `ros_3d_bb.detection.exports`.
 
     Parameters
     ----------
     model : bytes
+        Content of the ONNX file.
     threads : int
 
     Raises
     ------
     OnnxUnusable
-        If the model is another one, or if ONNX Runtime does not make of the reference image what torch made of it.
+        If the file has another origin, or if the output for the reference image differs from torch's.
     """
 
     input_hw = None
 
     def __init__(self, model, threads):
-        self.description = said(threads)
+        self.description = description_of(threads)
         try:
             self._session = session_of(model, threads)
             about = json.loads(self._session.get_modelmeta().custom_metadata_map['about'])
             self.names, self.stride, self.checkpoint = about['names'], about['stride'], about['checkpoint']
             self._anchors_px, self._strides = np.array(about['anchors_px'], np.float32), about['strides']
             expected = np.frombuffer(base64.b64decode(about['reference']), '<f4')
-            found = self(reference_image(self.stride), -1)
-        except Exception as error:  # a foreign file can raise anything; it all means the same
+            rows = self(reference_image(self.stride), -1)
+        except Exception as error:  # a foreign file can raise any exception
             raise OnnxUnusable('ONNX Runtime cannot run the exported network (%s)' % cause(error))
-        if found.size != expected.size or not agree(found, expected.reshape(found.shape)):
-            raise OnnxUnusable('ONNX Runtime finds something else than torch')
+        if rows.size != expected.size or not are_close(rows, expected.reshape(rows.shape)):
+            raise OnnxUnusable('the output of ONNX Runtime differs from that of torch')
 
-    def __call__(self, image, least):
+    def __call__(self, image, min_objectness):
         heads = self._session.run(None, {'image': np.ascontiguousarray(image)[None]})
-        return decoded_heads(heads, self._anchors_px, self._strides, least)
+        return decode_heads(heads, self._anchors_px, self._strides, min_objectness)
 
 
 def reference_image(stride):
-    """The image that runtimes are compared at: noise, 2 strides high and 3 wide."""
+    """Noise image, 2 strides high and 3 strides wide, for the comparison of backends."""
     return np.random.RandomState(0).randint(0, 256, (2 * stride, 3 * stride, 3)).astype(np.uint8)
 
 
-def agree(rows, others):
-    """Whether two arrays of predictions are the same but for rounding; False where one is not finite."""
-    difference = np.abs(rows - others).max(axis=0)
+def are_close(rows, expected):
+    """Whether two arrays of predictions are equal within rounding errors; False if a number is not finite."""
+    difference = np.abs(rows - expected).max(axis=0)
     return bool((difference[:4] <= MAX_DIFFERENCE_PX).all() and (difference[4:] <= MAX_DIFFERENCE).all())
 
 
 def session_of(model, threads):
-    """An onnxruntime.InferenceSession of a path or of bytes.
+    """Create an onnxruntime.InferenceSession from a path or from bytes.
 
-    Threads sleep while they wait: by default they spin, which takes a core from other nodes, and with two threads on
-    one free core doubles the time.
+    Waiting threads sleep. Spinning, which is the default, takes a core from other nodes, and doubles the inference time
+    if two threads share one free core.
     """
     import onnxruntime
     options = onnxruntime.SessionOptions()
@@ -108,6 +109,6 @@ def session_of(model, threads):
     return onnxruntime.InferenceSession(model, options, providers=['CPUExecutionProvider'])
 
 
-def said(threads):
-    """The runtime in words."""
+def description_of(threads):
+    """Description of the backend for logs."""
     return 'ONNX Runtime, %d thread%s' % (threads, '' if threads == 1 else 's')

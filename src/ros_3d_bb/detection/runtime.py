@@ -1,9 +1,9 @@
-"""What runs a network: one seam, so that the detector does not know whether torch or ONNX Runtime does.
+"""Inference backends: the common interface of torch and ONNX Runtime.
 
-A runtime is called with an image (height, width, 3), uint8, RGB, and a least objectness, and returns the predictions
-above it (rows, 5 + classes), float32: x, y, width, height in pixels of the image, objectness, class scores. It has
-`names`, the class names; `stride`, of which height and width must be multiples; `input_hw`, the one (height, width)
-that it takes, or None where it takes any; and `description`, itself in words.
+A backend is called with an RGB image (height, width, 3), uint8, and a minimum objectness. It returns the predictions
+above it (rows, 5 + classes), float32: x, y, width, height in pixels of the image, objectness, class scores.
+Attributes: `names`, the class names; `stride`, of which height and width must be multiples; `input_hw`, the only
+(height, width) that it accepts, or None if it accepts any; and `description`, a text for logs.
 """
 import ctypes
 import os
@@ -11,12 +11,12 @@ import warnings
 from typing import NamedTuple
 
 from ros_3d_bb.detection.checkpoint import WeightsError
-from ros_3d_bb.detection.exports import export_folder, exported_runtime
+from ros_3d_bb.detection.exports import export_folder, open_exported
 from ros_3d_bb.detection.onnx_runtime import OnnxRuntime, OnnxUnusable
 from ros_3d_bb.params import Param, parameters
 
 RUNTIMES = ('auto', 'onnxruntime', 'torch')
-MAX_THREADS = 4  # taken by itself; the networks that a robot's CPU can run gain little from more
+MAX_THREADS = 4  # default maximum; small networks gain little from more threads
 
 
 @parameters()
@@ -37,67 +37,67 @@ class RuntimeParams(NamedTuple):
 
 
 def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
-    """The runtime for a file of weights.
+    """Load weights into the backend for their file format.
 
     Parameters
     ----------
     path : str
         An official checkpoint (.pt), or a model exported by YOLOv5 to TorchScript (.torchscript) or ONNX (.onnx).
-        A TorchScript file is a program: run only those that you trust.
+        A TorchScript file is a program: load only trusted files.
     params : RuntimeParams
     warn : callable
-        Told, as a line of text, what is not as it was meant to be but does no harm.
+        Called with one line of text for problems that are worked around.
 
     Raises
     ------
     WeightsError
-        If the file cannot be used, or needs torch where that is missing; names the file and what was expected.
+        If the file cannot be used, or needs torch and torch is not installed.
     ValueError
-        If a parameter makes no sense, the device does not exist, or the runtime asked for cannot run this file.
+        If a parameter is out of range, the device does not exist, or the requested runtime cannot run this file.
     """
-    threads = checked_threads(params)
+    threads = thread_count(params)
     try:
-        return _opened(str(path), params, threads, warn)
+        return _open_file(str(path), params, threads, warn)
     except ImportError as error:
         if error.name != 'torch':
             raise
-        raise WeightsError('weights %s: torch is not installed; install it with "pip3 install torch", or find people '
-                           'without weights (detector:=depth)' % path)
+        raise WeightsError('weights %s: torch is not installed; install it with "pip3 install torch", or use the '
+                           'detector without weights (detector:=depth)' % path)
 
 
-def _opened(path, params, threads, warn):
-    """The runtime for a kind of file. Torch, which is large and which few systems bring, is imported where needed."""
+def _open_file(path, params, threads, warn):
+    """Open a file by its suffix. Torch is large and optional, so it is imported only if it is needed."""
     if path.endswith('.onnx'):
         if params.runtime == 'torch':
             raise ValueError('runtime torch cannot run %s; use auto or onnxruntime, or the .pt checkpoint' % path)
         if params.device not in ('auto', 'cpu'):
-            raise ValueError('device is %r, and %s runs on the CPU; use the .pt checkpoint' % (params.device, path))
+            raise ValueError('device is %r, but %s runs on the CPU; use the .pt checkpoint' % (params.device, path))
         return OnnxRuntime(path, threads)
     if path.endswith(('.torchscript', '.torchscript.pt')):
         if params.runtime == 'onnxruntime':
             raise ValueError('runtime onnxruntime cannot run %s; use auto or torch, or the .pt checkpoint' % path)
         from ros_3d_bb.detection.torch_runtime import TorchScriptRuntime, torch_device
         return TorchScriptRuntime(path, torch_device(params.device), threads)
-    return _of_checkpoint(path, params, threads, warn)
+    return _open_checkpoint(path, params, threads, warn)
 
 
-def _of_checkpoint(path, params, threads, warn):
-    """ONNX Runtime on a CPU, where it is there and works: it takes half of torch's time. Torch on a GPU."""
+def _open_checkpoint(path, params, threads, warn):
+    """Open a checkpoint: in torch on a GPU; on a CPU in ONNX Runtime, which is twice as fast, and else in torch."""
     if params.runtime == 'onnxruntime' or params.runtime == 'auto' and not on_gpu(params.device):
         try:
-            return exported_runtime(path, export_folder(params.export_folder), threads, warn)
+            return open_exported(path, export_folder(params.export_folder), threads, warn)
         except OnnxUnusable as error:
             if params.runtime == 'onnxruntime':
                 raise
-            warn('%s; torch runs the network instead, which takes twice the time' % error)
+            warn('%s; using torch instead, which takes twice as long' % error)
     from ros_3d_bb.detection.torch_runtime import TorchRuntime, torch_device
     return TorchRuntime(path, torch_device(params.device), threads)
 
 
 def on_gpu(device):
-    """Whether a network for this device, 'auto' included, runs on a GPU.
+    """Whether a network runs on a GPU if `device` is set to this value, which may be 'auto'.
 
-    Torch, which takes a second and 200 MB to import, is asked only where NVIDIA's driver reports a GPU.
+    Importing torch takes a second and 200 MB, so it is imported only if NVIDIA's driver reports a GPU.
     """
     if device != 'auto':
         return not device.startswith('cpu')
@@ -105,30 +105,30 @@ def on_gpu(device):
         return False
     try:
         from ros_3d_bb.detection.torch_runtime import torch_device
-    except ImportError:  # without torch nothing runs there
+    except ImportError:  # only torch runs networks on a GPU
         return False
     return torch_device('auto').type == 'cuda'
 
 
 def gpu_count():
-    """How many GPUs NVIDIA's driver reports; 0 where there is no driver."""
+    """Number of GPUs that NVIDIA's driver reports; 0 without a driver."""
     count = ctypes.c_int(0)
     try:
         driver = ctypes.CDLL('libcuda.so.1')
         if driver.cuInit(0) == 0:
             driver.cuDeviceGetCount(ctypes.byref(count))
-    except (OSError, AttributeError):  # no driver, or none worth the name
+    except (OSError, AttributeError):  # no driver, or an incomplete one
         pass
     return count.value
 
 
-def checked_threads(params):
-    """How many threads a runtime uses: as many as asked for, or as this machine has cores, up to MAX_THREADS.
+def thread_count(params):
+    """Number of threads of a backend: the parameter, or by default the number of cores up to MAX_THREADS.
 
     Raises
     ------
     ValueError
-        If a parameter makes no sense.
+        If a parameter is out of range.
     """
     if params.runtime == 'onnxruntime' and params.device not in ('auto', 'cpu'):
         raise ValueError('runtime onnxruntime works on the CPU, and device is %r; use runtime torch' % params.device)
@@ -136,7 +136,7 @@ def checked_threads(params):
 
 
 def physical_cores():
-    """Cores that this process may use; the two hardware threads of one core are one."""
+    """Number of physical cores that this process may use."""
     cores = set()
     for number in os.sched_getaffinity(0):
         try:

@@ -6,11 +6,11 @@ import torch
 
 from ros_3d_bb.detection.checkpoint import EXPECTED, WeightsError, cause, class_names, read_checkpoint
 from ros_3d_bb.detection.network import Network
-from ros_3d_bb.detection.predictions import batch_of, checked_stride, predictions
+from ros_3d_bb.detection.predictions import batch_of, check_stride, predictions
 
 
 def torch_device(name):
-    """The torch.device of that name, checked; 'auto' takes CUDA where it works."""
+    """Return a torch.device that works; 'auto' is CUDA if available. Raises ValueError."""
     if name == 'auto':
         return torch.device('cuda' if torch.cuda.is_available() else 'cpu')
     try:
@@ -23,82 +23,89 @@ def torch_device(name):
 
 
 def network_of(path):
-    """The network of a checkpoint and its class names: (Network, list), fused, float32, on the CPU.
+    """Build the network of a checkpoint.
+
+    Returns
+    -------
+    network : ros_3d_bb.detection.network.Network
+        Fused, float32, on the CPU.
+    names : list of str
+        Class names.
 
     Raises
     ------
     WeightsError
-        If the checkpoint cannot be read, or its weights do not fit the layout inside.
+        If the checkpoint cannot be read, or its weights do not match its layout.
     """
     checkpoint = read_checkpoint(path)
     try:
         network = Network(checkpoint.layout)
         network.load_state_dict({name: torch.from_numpy(array.astype(np.float32))
                                  for name, array in checkpoint.weights.items()
-                                 if not name.endswith('.anchor_grid')})  # release 5.0 keeps the anchors twice
-        stride = checked_stride(network.stride)
+                                 if not name.endswith('.anchor_grid')})  # a second copy of the anchors in release 5.0
+        stride = check_stride(network.stride)
         run(network.fuse(), np.zeros((stride, stride, 3), np.uint8))
-    except Exception as error:  # a layout is data from outside: whatever is wrong with it, say so once
-        raise WeightsError('weights %s: the network cannot be rebuilt from the yaml inside (%s); %s'
+    except Exception as error:  # an invalid layout can raise any exception
+        raise WeightsError('weights %s: the network cannot be built from its yaml (%s); %s'
                            % (path, cause(error), EXPECTED))
     return network, checkpoint.names
 
 
 def run(network, image):
-    """All predictions of a network for an image (height, width, 3), uint8, as a tensor where the network is."""
+    """Predictions of a network for an image (height, width, 3), uint8, as a tensor on the network's device."""
     weight = next(network.parameters())
     with torch.no_grad():
         return network(torch.from_numpy(batch_of(image)).to(weight.device, weight.dtype))[0]
 
 
 class TorchRuntime(object):
-    """A network of ours with the weights of an official checkpoint; in half precision where there is a GPU."""
+    """Official checkpoint in the network of this package, in half precision on a GPU."""
 
     input_hw = None
 
     def __init__(self, path, device, threads):
         network, self.names = network_of(path)
         self.stride = int(network.stride)
-        self._network = moved(network, device)
-        self.description = said(device, threads)
+        self._network = on_device(network, device)
+        self.description = description_of(device, threads)
 
-    def __call__(self, image, least):
+    def __call__(self, image, min_objectness):
         rows = run(self._network, image)
-        return rows[rows[:, 4] > least].cpu().numpy()
+        return rows[rows[:, 4] > min_objectness].cpu().numpy()
 
 
 class TorchScriptRuntime(object):
-    """A model that YOLOv5 exported to TorchScript; it takes the one image size that it was exported for."""
+    """Model exported to TorchScript by YOLOv5's export.py. It accepts only the image size of the export."""
 
     def __init__(self, path, device, threads):
         extra = {'config.txt': ''}
-        self.description = said(device, threads)
+        self.description = description_of(device, threads)
         try:
             self._module = torch.jit.load(path, map_location=device, _extra_files=extra).eval()
             config = json.loads(extra['config.txt'] or '{}')
             self.input_hw = tuple(config.get('shape', (1, 3, 640, 640))[2:])
-            self.stride = checked_stride(config.get('stride', 32))
+            self.stride = check_stride(config.get('stride', 32))
             self._device = device
             columns = self(np.zeros(self.input_hw + (3,), np.uint8), 0).shape[1]
-        except Exception as error:  # a damaged file can raise anything; it all means the same
+        except Exception as error:  # a damaged file can raise any exception
             raise WeightsError('weights %s: not a YOLOv5 TorchScript export (%s); expected the file that its export.py '
                                'writes (release 5.0: with --grid; without --half)' % (path, cause(error)))
         self.names = class_names(config.get('names'), columns - 5)
 
-    def __call__(self, image, least):
+    def __call__(self, image, min_objectness):
         with torch.no_grad():
             output = self._module(torch.from_numpy(batch_of(image)).to(self._device))
         rows = predictions(output[0] if isinstance(output, (tuple, list)) else output)
-        return rows[rows[:, 4] > least].cpu().numpy()
+        return rows[rows[:, 4] > min_objectness].cpu().numpy()
 
 
-def moved(network, device):
-    """A network on a device, in half precision on a GPU; its predictions are decoded in single precision."""
+def on_device(network, device):
+    """Move a network to a device, in half precision on a GPU. Predictions are decoded in single precision."""
     return network.to(device).half() if device.type == 'cuda' else network
 
 
-def said(device, threads):
-    """Let torch use so many threads, and say in words what it works on."""
+def description_of(device, threads):
+    """Set the number of threads of torch. Returns a description of the backend for logs."""
     if device.type != 'cpu':
         return 'torch on %s' % device
     torch.set_num_threads(threads)

@@ -1,4 +1,4 @@
-"""Find objects in an image with YOLOv5: letterbox, network, decoding, non-maximum suppression.
+"""YOLOv5 detector: letterbox, network, decoding, non-maximum suppression.
 
 Convention: boxes are (x1, y1, x2, y2) in pixels of the image, x to the right, y down, x2 and y2 exclusive.
 """
@@ -7,12 +7,12 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ros_3d_bb.detection.boxes import Detections, suppressed
+from ros_3d_bb.detection.boxes import Detections, non_maximum_suppression
 from ros_3d_bb.params import LARGEST, Param, parameters
 
-GREY = (114, 114, 114)  # the colour around letterboxed images that YOLOv5 is trained with
-LARGEST_INPUT_PX = 4096  # more takes more memory than a machine has
-MAX_CANDIDATES = 5000  # the best so many go into the suppression; more come only of a useless confidence
+GREY = (114, 114, 114)  # padding colour of letterboxed images in the training of YOLOv5
+MAX_INPUT_PX = 4096  # larger inputs exhaust the memory
+MAX_CANDIDATES = 5000  # maximum number of boxes before suppression; a useful confidence gives fewer
 
 
 @parameters()
@@ -29,26 +29,26 @@ class DetectionParams(NamedTuple):
         100, 'Largest number of detections in an image; the best ones are kept.', limits=(1, LARGEST), live=(1, 300))
     image_size: int = Param(
         640, "Longer side of the network's input, rounded up to its stride (32, P6 models 64). Smaller is faster and "
-        'misses people farther away. Exports with a fixed size ignore it.', 'pixels', limits=(1, LARGEST_INPUT_PX),
+        'misses people farther away. Exports with a fixed size ignore it.', 'pixels', limits=(1, MAX_INPUT_PX),
         live=(160, 1280))
 
 
 class Letterbox(NamedTuple):
-    """How an image was scaled and shifted into the network's input."""
+    """Scale and shift from an image to the network's input."""
 
     scale: float
     left: int
     top: int
 
     def undo(self, boxes, image_hw):
-        """Boxes of the input as boxes of the image, cut at its border."""
+        """Convert boxes from input pixels to image pixels, clipped to the image."""
         boxes = (boxes - np.array([self.left, self.top] * 2)) / self.scale
         height, width = image_hw
         return np.clip(boxes, 0, [width, height, width, height])
 
 
 class Yolov5(object):
-    """A YOLOv5 detector.
+    """YOLOv5 detector.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Yolov5(object):
     Raises
     ------
     ValueError
-        If a class or a threshold does not exist in this model.
+        If a parameter is out of range, or the model does not have one of the classes.
     """
 
     def __init__(self, runtime, params=DetectionParams()):
@@ -70,8 +70,8 @@ class Yolov5(object):
         self._input_hw = runtime.input_hw or (size, size)
         self._stride = runtime.stride if runtime.input_hw is None else None
 
-    def tuned(self, params):
-        """Another detector with the same network. Raises ValueError as at the start."""
+    def with_params(self, params):
+        """Return a detector with the same network and other parameters. Raises ValueError like the constructor."""
         return Yolov5(self._runtime, params)
 
     @property
@@ -81,25 +81,25 @@ class Yolov5(object):
 
     @property
     def description(self):
-        """What runs the network, in words."""
+        """Description of the backend for logs."""
         return self._runtime.description
 
     def warm_up(self):
-        """Search once in nothing: the first run of a network takes several times as long as those after it."""
+        """Run the network on a black image, because the first run takes several times as long as later ones."""
         self.detect(np.zeros((480, 640, 3), np.uint8))
 
     def detect(self, image):
-        """Find objects in an RGB image (height, width, 3), uint8.
+        """Detect objects in an RGB image (height, width, 3), uint8.
 
         Returns
         -------
         Detections
         """
-        scaled, letterbox = letterboxed(image, self._input_hw, self._stride)
+        scaled, letterbox = apply_letterbox(image, self._input_hw, self._stride)
         rows = self._runtime(scaled, self._params.confidence)
-        found = suppressed(decoded(rows, self._params.confidence, self._classes), self._params.iou,
-                           self._params.max_det)
-        return found._replace(boxes=letterbox.undo(found.boxes, image.shape[:2]))
+        candidates = filter_predictions(rows, self._params.confidence, self._classes)
+        detections = non_maximum_suppression(candidates, self._params.iou, self._params.max_det)
+        return detections._replace(boxes=letterbox.undo(detections.boxes, image.shape[:2]))
 
 
 def check_params(params):
@@ -109,29 +109,29 @@ def check_params(params):
 
 
 def class_number(entry, names):
-    """The number of a class given by name or number."""
+    """Number of a class that is given by name or number. Raises ValueError if the model does not have it."""
     if entry in names:
         return names.index(entry)
     if str(entry).isdigit() and int(entry) < len(names):
         return int(entry)
-    raise ValueError('class %r is not one of this model\'s %d: %s' % (entry, len(names), ', '.join(names)))
+    raise ValueError('class %r is not among the %d classes of the model: %s' % (entry, len(names), ', '.join(names)))
 
 
-def letterboxed(image, input_hw, stride=None):
-    """Scale an image into the network's input, keeping its proportions.
+def apply_letterbox(image, input_hw, stride=None):
+    """Scale an image to the network's input and pad it, keeping the aspect ratio.
 
     Parameters
     ----------
     image : numpy.ndarray, (height, width, 3), uint8, RGB
     input_hw : (int, int)
-        Largest size of the input.
+        Maximum size of the input.
     stride : int, optional
-        Where given, the padding is cut to the next multiple of it: a 640x480 image stays 640x480.
+        If given, the image is padded to the next multiple of the stride instead of `input_hw`.
 
     Returns
     -------
     scaled : numpy.ndarray, (height, width, 3), uint8, RGB
-        The image itself where it has the size already.
+        The input itself if it already has this size.
     letterbox : Letterbox
     """
     height, width = image.shape[:2]
@@ -148,18 +148,20 @@ def letterboxed(image, input_hw, stride=None):
     return image, Letterbox(scale, left, top)
 
 
-def decoded(rows, confidence, classes):
-    """The predictions whose best class is one of `classes` with a score above `confidence`.
+def filter_predictions(rows, confidence, classes):
+    """Select the predictions whose best class is in `classes` with a score above `confidence`.
 
     Parameters
     ----------
     rows : numpy.ndarray, (n, 5 + classes)
-        x, y, width, height, objectness, class scores, as the network puts them out.
+        x, y, width, height, objectness, class scores; output of the network.
+    confidence : float
+    classes : list of int
 
     Returns
     -------
     Detections
-        Best first; boxes in pixels of the network's input.
+        In order of decreasing score, at most MAX_CANDIDATES; boxes in pixels of the network's input.
     """
     rows = rows[rows[:, 4] > confidence]
     best = rows[:, 5:].argmax(axis=1)

@@ -6,7 +6,7 @@ from ros_3d_bb.images import fill_image, rgb_from
 from ros_3d_bb.messages import stamp_of
 from ros_3d_bb.nodes.master import patient_master
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
-from ros_3d_bb.overlay import draw_boxes, draw_samples, visible_depth
+from ros_3d_bb.overlay import draw_boxes, draw_samples, depth_to_grey
 from ros_3d_bb.stamped import StampedCache
 from ros_3d_bb.worker import NewestWorker
 
@@ -52,7 +52,7 @@ class SampleImages(object):
         if (needs_raw or needs_color) != (self._subscriber is not None):
             self._follower.offer(needs_raw or needs_color)
         if self._depth_pub.get_num_connections():
-            grey = visible_depth(depth, self._depth_range_m)
+            grey = depth_to_grey(depth, self._depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))
         colors = self._colors
         color = colors.at(header.stamp.to_nsec()) if colors is not None else None

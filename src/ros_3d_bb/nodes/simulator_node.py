@@ -14,7 +14,7 @@ from ros_3d_bb.nodes.diagnostics import Diagnostics, is_ending
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.subscribers import wait_for_subscribers
 from ros_3d_bb.params import WAIT_FOR_SUBSCRIBERS, Param, parameters
-from ros_3d_bb.simulation.scenario import overridden, read_scenario
+from ros_3d_bb.simulation.scenario import read_scenario, with_overrides
 from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulator_messages import START_NS, TRUTH_TOPIC, simulated_messages
 from ros_3d_bb.stamped import NS
@@ -155,7 +155,7 @@ def _scenario(params):
         scenario = read_scenario(params.scenario)
     except OSError as error:
         raise ValueError('the scenario cannot be read: %s; an absolute path expected' % error)
-    return overridden(scenario, params.rate or None, None if params.seed < 0 else params.seed)
+    return with_overrides(scenario, params.rate or None, None if params.seed < 0 else params.seed)
 
 
 def main():

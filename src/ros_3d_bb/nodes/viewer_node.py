@@ -22,7 +22,7 @@ from ros_3d_bb.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.recording import Measurement, append
 from ros_3d_bb.snapshots import Snapshots
 from ros_3d_bb.stamped import NS, arrival_clock_ns
-from ros_3d_bb.viewer_picture import FrameRate, View, compose, text_picture
+from ros_3d_bb.viewer_picture import FrameRate, View, compose, text_image
 from ros_3d_bb.window import Window, WindowError
 
 COLOR_TOPIC, DEPTH_TOPIC = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
@@ -244,7 +244,7 @@ class ViewerNode(object):
             snapshot, is_early = self._snapshots.newest, self._snapshots.is_early
             rate_hz = self._rate.at(arrival_clock_ns())
         if snapshot is None:
-            self._window.show(text_picture((KEYS,), (self._why_nothing(),), 3 * self._params.panel_width))
+            self._window.show(text_image((KEYS,), (self._why_nothing(),), 3 * self._params.panel_width))
             return None
         label = self._label.heard()
         news = (snapshot.stamp_ns, snapshot.boxes2d, snapshot.boxes3d is None, rate_hz == 0, self._answer,

@@ -40,7 +40,7 @@ class Yolov5Node(object):
         self._tuning = Tuning(given, self._tune)
 
     def _tune(self, _params, detection, _running):
-        self._detector = self._detector.tuned(detection)  # an image is searched with the one or the other
+        self._detector = self._detector.with_params(detection)  # an image is searched with the one or the other
 
     def _on_image(self, message):
         with self._diagnostics.taking('colour images'):

@@ -1,1 +1,1 @@
-"""A simulated room with walking people, seen by a RealSense D435i on a Jackal; numpy and OpenCV only."""
+"""Simulation of a room with walking people and a RealSense D435i on a Jackal. Needs numpy and OpenCV only."""

@@ -1,7 +1,7 @@
-"""People: a body lofted around a skeleton, its clothes, and its postures.
+"""Body model of people: a surface lofted around a skeleton, clothes, and postures.
 
-Convention: the body faces +x, its left is +y, z is up, the floor is z = 0. The tables are metres for a person of
-`TABLE_HEIGHT_M`; the heights of the joints follow D. A. Winter, Biomechanics and Motor Control of Human Movement
+Convention: the body faces +x, its left is +y, z is up, the floor is z = 0. Tables are in metres for a person of
+`TABLE_HEIGHT_M`. The heights of the joints are those of D. A. Winter, Biomechanics and Motor Control of Human Movement
 (2009), fig. 4.1.
 """
 from typing import NamedTuple, Tuple
@@ -13,7 +13,7 @@ from ros_3d_bb.simulation.mesh import Mesh, loft, vertex_normals
 
 Color = Tuple[int, int, int]
 
-# Rings of the parts on the axis of the body: z, x of the centre, half depth, half width.
+# Rings of parts on the axis of the body: z, x of the centre, half depth, half width.
 HEAD = ((1.525, .03, .045, .045), (1.55, .035, .062, .058), (1.585, .02, .085, .068), (1.62, .012, .095, .073),
         (1.66, .008, .098, .075), (1.70, .0, .094, .072), (1.735, -.005, .072, .056), (1.75, -.008, .035, .03))
 NOSE = ((1.61, .105, .012, .018), (1.625, .105, .022, .016), (1.65, .105, .010, .010))
@@ -22,13 +22,13 @@ HAIR = ((1.60, -.04, .068, .077), (1.65, -.032, .078, .081), (1.69, -.022, .086,
         (1.735, -.008, .085, .066), (1.755, -.01, .045, .038))
 LONG_HAIR = ((1.44, -.058, .045, .056),) + HAIR
 SHORT_HAIR = ((1.56, -.058, .045, .056),) + HAIR
-# The trunk: half width also of a figure with narrow shoulders and wide hips.
+# Trunk; the last column is the half width of a figure with narrow shoulders and wide hips.
 TORSO = ((.905, 0, .122, .168, .176), (.95, 0, .116, .166, .172), (1.03, .005, .105, .153, .142),
          (1.12, .01, .098, .145, .128), (1.22, .005, .115, .160, .143), (1.32, 0, .120, .178, .154),
          (1.39, -.005, .103, .183, .158), (1.435, -.01, .083, .162, .140), (1.465, -.01, .063, .098, .085),
          (1.49, -.01, .053, .060, .055))
 SEAT = ((.80, 0, .085, .138, .146), (.86, 0, .096, .150, .158), (.93, 0, .094, .146, .154), (1.0, 0, .08, .13, .12))
-# Limbs follow their bones: z, shift forward, half depth, half width.
+# Limbs along their bones: z, forward shift, half depth, half width.
 SHOULDER_M = .056  # the widest ring of the sleeve
 SLEEVE_TOP = ((1.43, 0, .037, .037), (1.41, 0, .056, .056), (1.32, 0, .053, .053), (1.20, 0, .047, .047))
 SLEEVE_END = ((1.12, 0, .045, .045), (1.06, 0, .044, .044), (.97, 0, .039, .039), (.87, 0, .034, .034))
@@ -38,14 +38,14 @@ HAND = ((.89, 0, .026, .024), (.84, 0, .036, .020), (.78, 0, .042, .020), (.73, 
 LEG = ((.93, 0, .070, .070), (.87, 0, .094, .088), (.78, 0, .095, .087), (.65, 0, .084, .077), (.55, 0, .075, .070),
        (.50, .008, .073, .067), (.45, -.004, .071, .065), (.38, -.019, .073, .066), (.30, -.017, .070, .064),
        (.19, -.007, .064, .060), (.12, 0, .062, .059), (.09, .012, .066, .061))
-# A shoe lies along x: x, z of the centre, half height, half width.
+# Shoe along x: x, z of the centre, half height, half width.
 SHOE = ((-.09, .043, .024, .025), (-.065, .05, .046, .036), (-.015, .055, .052, .04), (.045, .045, .044, .044),
         (.115, .036, .034, .046), (.155, .029, .027, .036), (.18, .022, .016, .018))
 
 
 class Build(NamedTuple):
-    """How a person looks. `girth` widens the body, 1 is slim; `hips` 0..1 from wide shoulders to wide hips; colours
-    are RGB.
+    """Appearance of a person. `girth` scales the body horizontally, 1 is slim; `hips` ranges from 0 (wide shoulders) to
+    1 (wide hips); colours are RGB.
     """
 
     height_m: float = TABLE_HEIGHT_M
@@ -61,13 +61,13 @@ class Build(NamedTuple):
 
 
 class Body(object):
-    """The body of one person, which takes postures.
+    """Body of one person.
 
     Parameters
     ----------
     build : Build
     random : numpy.random.RandomState
-        For the creases of the clothes.
+        Source of the creases in the clothes.
     """
 
     def __init__(self, build, random):
@@ -88,11 +88,11 @@ class Body(object):
 
     @property
     def width_m(self):
-        """Diameter of an upright cylinder around the trunk and the shoulders; the arms hang partly outside."""
+        """Diameter of an upright cylinder around the trunk and the shoulders. Parts of the arms are outside."""
         return 2 * (JOINTS_M['arm_l'][1] + SHOULDER_M * self.build.girth) * self._scale
 
     def posed(self, posture=Posture()):
-        """The body in a posture, its lowest point on the floor.
+        """Return the body in a posture, with its lowest point on the floor.
 
         Returns
         -------
@@ -107,7 +107,7 @@ class Body(object):
 
 
 def _parts(build):
-    """Yield (vertices, faces, colour, bones) of each part; bones: [(bone, lowest z at which it alone moves it)]."""
+    """Yield (vertices, faces, colour, bones) of each part. Bones: [(bone, z above which only this bone moves it)]."""
     def trunk(rings):
         table = np.array(rings)
         return np.c_[table[:, :3], table[:, 3] + build.hips * (table[:, 4] - table[:, 3])] * [1, 1, build.girth,
@@ -138,7 +138,7 @@ def _upright(rings, sides, exponent=2.1):
 
 
 def _limb(rings, joints, sign, sides, girth):
-    """A tube along the bones between joints of the left side; `sign` -1 mirrors it to the right."""
+    """Tube along the bones between joints of the left side. A `sign` of -1 mirrors it to the right."""
     z, shift, depth, width = np.array(rings)[::-1].T
     line = np.array([JOINTS_M[name + '_l'] for name in joints])[::-1]
     x, y = (np.interp(z, line[:, 2], line[:, axis]) for axis in range(2))
@@ -155,7 +155,7 @@ def _shoe(sign):
 
 
 def _weights(vertices, bones):
-    """How much each bone moves each vertex, (n, bones): blended linearly in z between a bone and the one above."""
+    """Skinning weights (n, bones): linear in z between a bone and the bone above."""
     weights = np.zeros((len(vertices), len(BONES)))
     if len(bones) == 1:
         weights[:, BONES.index(bones[0][0])] = 1
@@ -167,7 +167,7 @@ def _weights(vertices, bones):
 
 
 def _tone(parts, random):
-    """Brightness of the vertices: creases in the clothes, shadow between the legs and in the face."""
+    """Brightness of the vertices: creases in the clothes, shadows between the legs and in the face."""
     tones = []
     for vertices, _faces, _color, bones in parts:
         tone = 1 + .06 * random.standard_normal(len(vertices)).clip(-2, 2)

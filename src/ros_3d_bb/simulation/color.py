@@ -1,21 +1,21 @@
-"""What a colour sensor makes of a rendered image: a little blur, and noise."""
+"""Model of the colour sensor: slight blur and noise."""
 import cv2
 import numpy as np
 
-SPARE_PX = 64  # the noise is this much larger than the image; each frame cuts out its part
+SPARE_PX = 64  # the noise field is this much larger than the image; each frame uses a random part of it
 FIELDS = 4
 BLUR_PX, GRAIN_PX = .65, .6
 
 
 class ColorSensor(object):
-    """Noise that is a function of the seed and the number of the frame alone.
+    """Colour sensor, whose noise depends on the seed and the number of the frame only.
 
     Parameters
     ----------
     camera : geometry.Camera
     seed : int
     sigma : float
-        Standard deviation of the noise, grey levels.
+        Standard deviation of the noise, in grey levels.
     """
 
     def __init__(self, camera, seed, sigma):
@@ -23,8 +23,8 @@ class ColorSensor(object):
         self._seed, self._shape = seed, (camera.height, camera.width)
         self._fields = [_field(random, self._shape, sigma) for _ in range(FIELDS)]
 
-    def take(self, color, number):
-        """The image (h, w, 3), uint8, that the sensor makes of a rendered one."""
+    def capture(self, color, number):
+        """Apply blur and noise to a rendered image (h, w, 3), uint8. Returns a new image."""
         random = np.random.RandomState([self._seed, number])
         field = self._fields[random.randint(FIELDS)]
         y, x = random.randint(SPARE_PX, size=2)

@@ -1,6 +1,7 @@
-"""A skeleton, and the postures of walking, standing and crouching.
+"""Skeleton, and its postures while walking, standing and crouching.
 
-Convention: as in `body`: facing +x, left +y, z up; metres for a person of `TABLE_HEIGHT_M`, angles in radians.
+Convention: as in `body`, the skeleton faces +x, its left is +y, z is up; metres for a person of `TABLE_HEIGHT_M`,
+angles in radians.
 """
 from typing import NamedTuple
 
@@ -12,28 +13,28 @@ PARENTS = (('pelvis', None), ('chest', 'pelvis'), ('head', 'chest'),
            ('foot_l', 'shin_l'), ('arm_r', 'chest'), ('forearm_r', 'arm_r'), ('thigh_r', 'pelvis'),
            ('shin_r', 'thigh_r'), ('foot_r', 'shin_r'))
 BONES = [name for name, _parent in PARENTS]
-# The joint at which each bone hangs; the hand and the fingertip hang on the forearm.
+# Proximal joint of each bone; the hand and the fingertip belong to the forearm.
 JOINTS_M = {'pelvis': (0, 0, .95), 'chest': (0, 0, 1.12), 'head': (-.01, 0, 1.50),
             'arm_l': (-.005, .175, 1.41), 'forearm_l': (-.02, .225, 1.12), 'hand_l': (.04, .243, .87),
             'fingertip_l': (.06, .241, .69), 'thigh_l': (0, .085, .93), 'shin_l': (.01, .09, .50),
             'foot_l': (-.015, .095, .09)}
 JOINTS_M.update({name[:-1] + 'r': (x, -y, z) for name, (x, y, z) in JOINTS_M.items() if name.endswith('_l')})
 
-# Flexion of hip, knee and ankle in tenths of a gait cycle from heel strike on, degrees: normal walking, read off
-# J. Perry, Gait Analysis (1992), and changed by up to 12 degrees: these shoes do not bend at the ball of the foot, and
-# would slide over the floor. The stride is 0.67 body heights.
+# Flexion of hip, knee and ankle at tenths of a gait cycle that begins with heel strike, in degrees: normal walking in
+# J. Perry, Gait Analysis (1992), changed by up to 12 degrees, because the rigid shoes of the model would slide over the
+# floor otherwise. The stride is 0.67 body heights.
 CYCLE = np.linspace(0, 1, 11)
 HIP = np.radians([24, 22, 16, 5, -5, -12, -15, 8, 26, 30, 24])
 KNEE = np.radians([5, 15, 18, 14, 9, 14, 43, 63, 49, 18, 5])
 ANKLE = np.radians([1, -3, -1, 3, 8, 16, -12, -4, 2, 2, 1])
 ARM_SWING, ELBOW = 0.42, 0.18
-STANCE = 0.5  # share of the cycle in which one foot carries the body forward
-# A deep crouch: flexion of hip, knee and ankle, and the lean of the chest.
+STANCE = 0.5  # stance phase of one foot as a share of the cycle
+# Deep crouch: flexion of hip, knee and ankle, and inclination of the chest.
 CROUCH = np.radians([105, 130, 25, 20])
 
 
 class Posture(NamedTuple):
-    """`phase` of the gait in cycles from the left heel strike on; `swing` 0 (standing) to 1 (walking); `crouch` 0 to 1.
+    """`phase` of the gait in cycles since left heel strike; `swing` from 0 (standing) to 1 (walking); `crouch` 0 to 1.
     """
 
     phase: float = 0.0
@@ -42,10 +43,10 @@ class Posture(NamedTuple):
 
 
 def bone_transforms(posture):
-    """Where a posture takes each bone: (bones, 3, 4) rigid transforms of points of the standing body.
+    """Rigid transforms (bones, 3, 4) of the bones from the standing body to a posture.
 
-    The feet of a standing body are under the origin, and those of a crouching one within 12 cm; the height above the
-    floor is left open.
+    The feet of a standing body are below the origin, those of a crouching body within 12 cm of it. The height above the
+    floor is arbitrary.
     """
     turns = _joint_turns(posture)
     transforms = {None: np.eye(4)}
@@ -62,7 +63,7 @@ def bone_transforms(posture):
 
 
 def stride_m(height_m, swing=1.0):
-    """Length of one gait cycle: what the foot on the floor moves back while it carries the body, over `STANCE`."""
+    """Length of one gait cycle: the distance that the foot moves back during stance, divided by `STANCE`."""
     def ankle_x(phase):
         foot = bone_transforms(Posture(phase, swing))[BONES.index('foot_l')]
         return foot.dot(np.append(JOINTS_M['foot_l'], 1))[0]

@@ -1,17 +1,17 @@
-"""Surfaces of quadrilaterals: tubes lofted through superellipses, and boxes.
+"""Quadrilateral meshes: tubes lofted through superellipses, and boxes.
 
-Convention: metres; faces are wound counter-clockwise seen from outside.
+Convention: metres; faces are wound counter-clockwise when seen from outside.
 """
 from typing import NamedTuple
 
 import numpy as np
 
-CELL_M = 0.5  # largest edge of a face of a box: what is partly behind the camera is dropped by whole faces
+CELL_M = 0.5  # maximum edge of a face of a box; faces that are partly behind the camera are dropped as a whole
 
 
 class Mesh(NamedTuple):
-    """`vertices` and unit `normals` (n, 3); `faces` (m, 4) vertex numbers; `colors` (m, 3) uint8 RGB of the faces;
-    `tone` (n,) brightness of the vertices, 1 unchanged.
+    """`vertices` and unit `normals` (n, 3); `faces` (m, 4), indices of vertices; `colors` (m, 3) of the faces, uint8
+    RGB; `tone` (n,), factor of brightness of the vertices.
     """
 
     vertices: np.ndarray
@@ -21,7 +21,7 @@ class Mesh(NamedTuple):
     tone: np.ndarray
 
     def moved(self, position_m, heading_rad):
-        """Turned about z (counter-clockwise from above), then shifted by (x, y, z)."""
+        """Return the mesh rotated about z (counter-clockwise seen from above), then translated by (x, y, z)."""
         c, s = np.cos(heading_rad), np.sin(heading_rad)
         turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]], np.float32)
         return self._replace(vertices=self.vertices.dot(turn) + np.asarray(position_m, np.float32),
@@ -29,14 +29,14 @@ class Mesh(NamedTuple):
 
 
 def loft(centers, forward, sideways, exponent, sides):
-    """A closed tube through rings.
+    """Closed tube through rings.
 
     Parameters
     ----------
     centers, forward, sideways : array_like, (rings, 3)
         Centre and the two half axes of each ring.
     exponent : float
-        Of the superellipse: 2 is an ellipse, more is squarer.
+        Exponent of the superellipse: 2 is an ellipse, larger values approach a rectangle.
     sides : int
         Even number of vertices in a ring.
 
@@ -60,13 +60,13 @@ def loft(centers, forward, sideways, exponent, sides):
 
 
 def volume(vertices, faces):
-    """Volume inside a closed surface; negative where its faces are wound the wrong way round."""
+    """Volume inside a closed surface; negative if its faces are wound clockwise."""
     a, b, c, d = (vertices[faces[:, corner]] for corner in range(4))
     return float(np.sum(np.cross(c - a, d - b) * (a + b + c + d)) / 24)
 
 
 def vertex_normals(vertices, faces):
-    """Unit normals (n, 3): the mean of the faces around each vertex, by area."""
+    """Unit normals (n, 3): area-weighted means of the faces around each vertex."""
     a, b, c, d = (vertices[faces[:, corner]] for corner in range(4))
     face_normals = np.cross(c - a, d - b)
     normals = np.zeros_like(vertices)
@@ -76,7 +76,7 @@ def vertex_normals(vertices, faces):
 
 
 def box(size_m, color, random):
-    """A box standing on z = 0 above the origin, (x, y, z) in size, slightly mottled. Its faces share no vertices."""
+    """Box of size (x, y, z) that stands on z = 0 at the origin, with slightly mottled sides that share no vertices."""
     parts, offset = [], 0
     for axis in range(3):
         for side in (-1, 1):
@@ -92,7 +92,7 @@ def box(size_m, color, random):
 
 
 def _side(size, axis, side):
-    """One side of a box as a grid of cells."""
+    """One side of a box as a grid of faces."""
     u, v = (axis + 1) % 3, (axis + 2) % 3
     counts = [int(np.ceil(size[a] / CELL_M)) + 1 for a in (u, v)]
     grid_u, grid_v = np.meshgrid(*[np.linspace(-size[a] / 2, size[a] / 2, n) for a, n in zip((u, v), counts)],

@@ -1,7 +1,7 @@
-"""Where people and the robot are at any time: moves of a scenario as smooth functions of time.
+"""Motion of people and of the robot: the moves of a scenario as smooth functions of time.
 
-A motion is made of knots between which everything changes evenly; what is asked for is the mean over `SMOOTHING_S`
-around the time, so that nobody starts, stops or turns at once. Convention: map frame, metres, radians, seconds.
+A motion is linear between knots. The state at a time is the mean over an interval of `SMOOTHING_S` around it, so that
+velocity and heading do not jump. Convention: map frame, metres, radians, seconds.
 """
 from typing import NamedTuple
 
@@ -10,15 +10,15 @@ import numpy as np
 from ros_3d_bb.simulation.gait import Posture, stride_m
 
 SMOOTHING_S = 0.6
-WALKING_MPS = 1.3  # speed at which legs and arms swing fully
+WALKING_MPS = 1.3  # speed at which legs and arms reach their full swing
 FOLLOW_STEP_S = 0.05
-AFTER_S = 3.0  # people go on beyond the end of the scene: the truth says where they will be
-SHORTEST_ROUND_S = 0.1  # moves that take less are not repeated
+AFTER_S = 3.0  # moves continue beyond the end of the scene, for the predictions in the ground truth
+MIN_ROUND_S = 0.1  # rounds of moves that take less time are not repeated
 COLUMNS = X, Y, HEADING, PHASE, SWING, CROUCH = range(6)
 
 
 class State(NamedTuple):
-    """`position_m` (2,), `velocity_mps` (2,), heading (counter-clockwise from x), and what the body does."""
+    """`position_m` (2,), `velocity_mps` (2,), heading (counter-clockwise from x), and posture."""
 
     position_m: np.ndarray
     velocity_mps: np.ndarray
@@ -27,14 +27,14 @@ class State(NamedTuple):
 
 
 class Motion(object):
-    """A motion through knots.
+    """Motion through knots.
 
     Parameters
     ----------
     times_s : array_like, (n,)
-        Not decreasing; two knots at the same time are a jump.
+        Times of the knots in ascending order; two knots at the same time are a jump.
     values : array_like, (n, 6)
-        Of the `COLUMNS`.
+        Values at the knots, in the order of `COLUMNS`.
     """
 
     def __init__(self, times_s, values):
@@ -45,7 +45,7 @@ class Motion(object):
         self._slopes = np.diff(self._values, axis=0) / np.where(steps_s > 0, steps_s, 1)
 
     def at(self, time_s):
-        """The state at a time, seconds from the start; before the first and after the last knot nothing moves."""
+        """State at a time since the start. Before the first and after the last knot nothing moves."""
         before, after = (self._evaluated(time_s + shift) for shift in (-SMOOTHING_S / 2, SMOOTHING_S / 2))
         mean = (after[1] - before[1]) / SMOOTHING_S
         velocity = (after[0] - before[0]) / SMOOTHING_S
@@ -53,7 +53,7 @@ class Motion(object):
                      Posture(float(mean[PHASE]), float(mean[SWING]), float(mean[CROUCH])))
 
     def _evaluated(self, time_s):
-        """Values at a time, and their integrals up to it."""
+        """Values at a time, and their integrals up to this time."""
         knot = int(np.clip(np.searchsorted(self._times_s, time_s, side='right') - 1, 0, len(self._times_s) - 1))
         beyond_s = time_s - self._times_s[knot]
         outside = knot == len(self._times_s) - 1 or beyond_s < 0
@@ -63,9 +63,9 @@ class Motion(object):
 
 
 def person_motion(person, height_m, duration_s):
-    """The motion of a person (`scenario.Person`) of a height."""
+    """Motion of a person (`scenario.Person`) of the height `height_m`."""
     knots = _Knots(person.start, person.facing, crouch=person.crouch)
-    for move in _repeated(person, knots, duration_s):
+    for move in _moves_of(person, knots, duration_s):
         if move.to is not None:
             knots.walk(move.to, move.speed, height_m)
         elif move.turn is not None:
@@ -76,11 +76,11 @@ def person_motion(person, height_m, duration_s):
 
 
 def robot_motion(robot, people, duration_s):
-    """The motion of the robot (`scenario.Robot`) among people, a list of Motion."""
+    """Motion of the robot (`scenario.Robot`). `people` is the list of the motions of people, which it may follow."""
     if robot.follow is not None:
-        return _following(robot, people[robot.follow.person - 1], duration_s)
+        return _following_motion(robot, people[robot.follow.person - 1], duration_s)
     knots = _Knots(robot.pose[:2], robot.pose[2])
-    for move in _repeated(robot, knots, duration_s):
+    for move in _moves_of(robot, knots, duration_s):
         if move.to is not None:
             knots.turn(knots.angle_to(move.to), move.rate)
             knots.walk(move.to, move.speed)
@@ -92,7 +92,7 @@ def robot_motion(robot, people, duration_s):
 
 
 class _Knots(object):
-    """Collects knots, move by move."""
+    """Builds the knots of a motion from moves."""
 
     def __init__(self, place, heading, crouch=0.0):
         self.time_s = 0.0
@@ -103,12 +103,12 @@ class _Knots(object):
         return Motion(self._times_s, self._values)
 
     def angle_to(self, place):
-        """By how much to turn to face a place, -pi to pi."""
+        """Angle between the heading and the direction to a place, -pi to pi."""
         x, y = place - self._value[:2]
         return (np.arctan2(y, x) - self._value[HEADING] + np.pi) % (2 * np.pi) - np.pi if x or y else 0.0
 
     def walk(self, place, speed_mps, height_m=None):
-        """Go straight to a place; with legs where a height is given."""
+        """Go straight to a place. The posture changes only if a body height is given."""
         place = np.array(place, float)
         distance_m = np.linalg.norm(place - self._value[:2])
         swing = min(1.0, speed_mps / WALKING_MPS) ** .5 if height_m else 0.0
@@ -138,18 +138,18 @@ class _Knots(object):
         self._values.append(self._value.copy())
 
 
-def _repeated(mover, knots, duration_s):
-    """The moves of a person or robot, again and again where it repeats them, until `AFTER_S` after the scene."""
+def _moves_of(mover, knots, duration_s):
+    """Yield the moves of a person or a robot. With `repeat`, they are repeated until `AFTER_S` after the scene."""
     while True:
-        began_s = knots.time_s
+        start_s = knots.time_s
         for move in mover.moves:
             yield move
-        if not mover.repeat or knots.time_s > duration_s + AFTER_S or knots.time_s < began_s + SHORTEST_ROUND_S:
+        if not mover.repeat or knots.time_s > duration_s + AFTER_S or knots.time_s < start_s + MIN_ROUND_S:
             return
 
 
-def _following(robot, person, duration_s):
-    """A robot that turns to a person and drives up to its distance."""
+def _following_motion(robot, person, duration_s):
+    """Motion of a robot that turns towards a person and approaches up to a distance."""
     follow, (x, y, heading) = robot.follow, robot.pose
     values, times_s = [], np.arange(0, duration_s + SMOOTHING_S, FOLLOW_STEP_S)
     for time_s in times_s:

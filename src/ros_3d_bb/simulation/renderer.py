@@ -1,7 +1,8 @@
-"""Draw a room with meshes in it: colour, inverse depth, and which object each pixel shows.
+"""Renderer of a room with meshes: colour, inverse depth, and the object in each pixel.
 
-Each object is painted from back to front into a picture of face numbers; its planes give inverse depth and brightness
-of each pixel, and the nearest object wins. Convention: as in `geometry`; inverse depth is 1/m along the optical axis.
+The faces of each object are painted from back to front into an image of face numbers. The planes of the faces give the
+inverse depth and the brightness of each pixel, and the nearest object wins. Convention: as in `geometry`; inverse depth
+is 1/m along the optical axis.
 """
 from typing import NamedTuple
 
@@ -10,18 +11,28 @@ import numpy as np
 
 from ros_3d_bb.simulation.room import FLOOR, copy_where
 
-NEAREST_M = 0.1  # faces that come nearer to the camera are not drawn
+MIN_DEPTH_M = 0.1  # faces with a vertex at less depth are not drawn
 SUBPIXEL_BITS = 4
-LIGHT = np.array([.34, .25, .9], np.float32)  # where most of it comes from; a unit vector, near enough
+LIGHT = np.array([.34, .25, .9], np.float32)  # direction of the main light, approximately a unit vector
 AMBIENT, DIFFUSE, HEADLIGHT = .52, .36, .16
 BRIGHTNESS_STEPS = 128
 SHADOW_DARKNESS, SHADOW_REDUCTION = .38, 4
 
 
 class Rendering(NamedTuple):
-    """`color` (h, w, 3) uint8 RGB; `inverse_depth` (h, w) float32; `objects` (h, w) uint8, 1 + the object's number,
-    0 is the room; `areas` the pixels of each object in the image as if it stood alone; `inside` the share 0..1 of it
-    that lies in the image.
+    """Rendered images.
+
+    Attributes
+    ----------
+    color : numpy.ndarray, (h, w, 3), uint8
+        RGB.
+    inverse_depth : numpy.ndarray, (h, w), float32
+    objects : numpy.ndarray, (h, w), uint8
+        1 + the index of the object; 0 is the room.
+    areas : list of int
+        Number of pixels of each object if it were alone in the room.
+    inside : list of float
+        Share of each object that lies inside the image, 0..1.
     """
 
     color: np.ndarray
@@ -32,7 +43,7 @@ class Rendering(NamedTuple):
 
 
 class _Layer(NamedTuple):
-    """One object alone, in the rectangle of the image that it covers."""
+    """One object without the others, in its bounding rectangle."""
 
     rows: slice
     columns: slice
@@ -42,7 +53,7 @@ class _Layer(NamedTuple):
 
 
 def render(room, meshes, shadows, camera, world_from_camera):
-    """Draw a room and the meshes in it.
+    """Render a room and the meshes in it.
 
     Parameters
     ----------
@@ -50,7 +61,7 @@ def render(room, meshes, shadows, camera, world_from_camera):
     meshes : list of Mesh
         At most 254, in world coordinates.
     shadows : list of (x, y, radius)
-        Where soft shadows lie on the floor, metres.
+        Soft shadows on the floor, in metres.
     camera : geometry.Camera
     world_from_camera : numpy.ndarray, (4, 4)
 
@@ -62,7 +73,7 @@ def render(room, meshes, shadows, camera, world_from_camera):
     _draw_shadows(color, surfaces, shadows, camera, world_from_camera)
     objects, areas, inside = np.zeros(inverse_depth.shape, np.uint8), [], []
     for number, mesh in enumerate(meshes):
-        layer = _layer(mesh, camera, world_from_camera)
+        layer = _render_layer(mesh, camera, world_from_camera)
         areas.append(0 if layer is None else cv2.countNonZero(layer.inverse_depth))
         inside.append(0.0 if layer is None else layer.inside)
         if layer is None:
@@ -75,18 +86,18 @@ def render(room, meshes, shadows, camera, world_from_camera):
     return Rendering(color, inverse_depth, objects, areas, inside)
 
 
-def _layer(mesh, camera, world_from_camera):
-    """An object alone; None where it is out of view."""
+def _render_layer(mesh, camera, world_from_camera):
+    """Render one object. Returns None if it is out of view."""
     rotation, position = (part.astype(np.float32) for part in (world_from_camera[:3, :3], world_from_camera[:3, 3]))
     points = (mesh.vertices - position).dot(rotation)
-    inverse = 1 / np.maximum(points[:, 2], np.float32(NEAREST_M))
+    inverse = 1 / np.maximum(points[:, 2], np.float32(MIN_DEPTH_M))
     pixels = np.stack([points[:, 0] * inverse * np.float32(camera.fx) + np.float32(camera.cx),
                        points[:, 1] * inverse * np.float32(camera.fy) + np.float32(camera.cy)])
     corners = pixels[:, mesh.faces.T]
-    seen, inside = _seen(corners, points[:, 2][mesh.faces.T], camera)
-    if seen.size == 0:
+    visible, inside = _visible_faces(corners, points[:, 2][mesh.faces.T], camera)
+    if visible.size == 0:
         return None
-    faces, corners = mesh.faces[seen], corners[:, :, seen]
+    faces, corners = mesh.faces[visible], corners[:, :, visible]
     low, high = corners.min(axis=(1, 2)), corners.max(axis=(1, 2))
     x0, y0 = np.maximum(low.astype(int) - 1, 0).tolist()
     x1, y1 = np.minimum(high.astype(int) + 2, (camera.width, camera.height)).tolist()
@@ -96,21 +107,27 @@ def _layer(mesh, camera, world_from_camera):
     limits = (inverse[faces].min(), inverse[faces].max()), (0, 255. / BRIGHTNESS_STEPS)
     inverse_depth, brightness = _images(numbers, planes, limits)
     brightness = (brightness * BRIGHTNESS_STEPS).astype(np.uint8)
-    colors = np.concatenate([np.zeros((1, 3), np.uint8), mesh.colors[seen]])
+    colors = np.concatenate([np.zeros((1, 3), np.uint8), mesh.colors[visible]])
     color = cv2.multiply(np.take(colors, numbers, axis=0), cv2.merge([brightness] * 3), scale=1. / BRIGHTNESS_STEPS)
     return _Layer(slice(y0, y1), slice(x0, x1), color, inverse_depth, inside)
 
 
-def _seen(corners, depth_m, camera):
-    """Numbers of the faces that look at the camera, in front of it and in the image; the share of the area of those
-    in front of it that lies in the image.
+def _visible_faces(corners, depth_m, camera):
+    """Faces of an object that can be visible in the image.
+
+    Returns
+    -------
+    faces : numpy.ndarray, (k,)
+        Indices of the faces that are turned towards the camera, in front of it, and at least partly in the image.
+    inside : float
+        Share of the area of the faces in front of the camera that lies in the image.
     """
     area = _cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    facing = (area < -.04) & (depth_m.min(axis=0) > NEAREST_M)
+    facing = (area < -.04) & (depth_m.min(axis=0) > MIN_DEPTH_M)
     low, high, center = corners.min(axis=1), corners.max(axis=1), corners.mean(axis=1)
-    seen = facing & (high >= 0).all(axis=0) & (low[0] < camera.width) & (low[1] < camera.height)
+    visible = facing & (high >= 0).all(axis=0) & (low[0] < camera.width) & (low[1] < camera.height)
     inside = facing & (center >= 0).all(axis=0) & (center[0] < camera.width) & (center[1] < camera.height)
-    return np.flatnonzero(seen), float(area[inside].sum() / min(area[facing].sum(), -1e-9))
+    return np.flatnonzero(visible), float(area[inside].sum() / min(area[facing].sum(), -1e-9))
 
 
 def _cross(a, b):
@@ -118,13 +135,13 @@ def _cross(a, b):
 
 
 def _brightness(mesh, world_from_camera):
-    """Of each vertex: light from above, and from where the camera is."""
+    """Brightness of each vertex, lit from above and from the camera."""
     lit = AMBIENT + DIFFUSE * np.maximum(mesh.normals.dot(LIGHT), -.4)
     return (lit + HEADLIGHT * np.maximum(-mesh.normals.dot(world_from_camera[:3, 2].astype(np.float32)), 0)) * mesh.tone
 
 
 def _paint_numbers(corners, nearness, shape):
-    """The number of the face, from 1, that each pixel shows (0: none); faces painted from far to near."""
+    """1 + the index of the face in each pixel, 0 for none. Faces are painted from far to near."""
     numbers = np.zeros(shape, np.int32)
     polygons = np.rint(np.clip(corners, -4000, 4000) * 2 ** SUBPIXEL_BITS).astype(np.int32).transpose(2, 1, 0)
     order = np.argsort(nearness, kind='mergesort')
@@ -134,9 +151,9 @@ def _paint_numbers(corners, nearness, shape):
 
 
 def _planes(corners, values):
-    """What varies linearly over each face in the image: (k, 3, m) coefficients a u + b v + c of values (k, 4, m).
+    """Linear approximation of values (k, 4, m) at the corners of faces: coefficients (k, 3, m) of a u + b v + c.
 
-    The gradient is that between the ends of the two diagonals, the value that of the centre.
+    The gradient is given by the differences along the two diagonals, the offset by the mean at the centre.
     """
     first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
     area = _cross(first, second)
@@ -148,7 +165,7 @@ def _planes(corners, values):
 
 
 def _images(numbers, planes, limits):
-    """Images (k, h, w) of k values, each within its limits; 0 where no face is."""
+    """Images (k, h, w) of k values, each clipped to its limits; 0 in pixels without a face."""
     covered = np.flatnonzero(numbers)
     face = np.take(numbers, covered) - 1
     v, u = (part.astype(np.float32) for part in np.divmod(covered, numbers.shape[1]))
@@ -159,14 +176,14 @@ def _images(numbers, planes, limits):
 
 
 def _draw_shadows(color, surfaces, shadows, camera, world_from_camera):
-    """Darken the floor under people, softly."""
+    """Draw soft shadows of people on the floor."""
     mask = np.zeros((camera.height // SHADOW_REDUCTION, camera.width // SHADOW_REDUCTION), np.float32)
     angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     rotation, position = world_from_camera[:3, :3], world_from_camera[:3, 3]
     for x, y, radius in shadows:
         ring = np.stack([x + radius * np.cos(angles), y + radius * np.sin(angles), np.zeros(16)], axis=-1)
         points = (ring - position).dot(rotation)
-        if points[:, 2].min() > NEAREST_M:
+        if points[:, 2].min() > MIN_DEPTH_M:
             pixels = camera.project(points) / SHADOW_REDUCTION
             cv2.fillConvexPoly(mask, np.rint(np.clip(pixels, -999, 9999)).astype(np.int32), SHADOW_DARKNESS)
     rows = np.flatnonzero(mask.any(axis=1))

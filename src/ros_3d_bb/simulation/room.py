@@ -1,4 +1,4 @@
-"""A rectangular room: six textured planes, each seen as one perspective warp of its texture."""
+"""Rectangular room of six textured planes, each drawn by one perspective warp of its texture."""
 from typing import NamedTuple
 
 import cv2
@@ -11,8 +11,8 @@ WALL_COLORS = ((210, 206, 196), (205, 200, 190), (196, 192, 180), (202, 196, 186
 
 
 class Surface(NamedTuple):
-    """A plane: outward `normal` (3,) and `distance_m`, normal . p = distance_m on it; its texture begins at `origin`
-    and runs along the unit vectors `right` and `down`, with `ppm` pixels per metre.
+    """Textured plane of the points p with normal . p = distance_m; outward `normal` (3,). The texture starts
+    at `origin`, extends along the unit vectors `right` and `down`, and has `ppm` pixels per metre.
     """
 
     normal: np.ndarray
@@ -25,7 +25,7 @@ class Surface(NamedTuple):
 
 
 class Room(object):
-    """The room x0..x1, y0..y1, 0..height, seen from inside.
+    """Room x0..x1, y0..y1, 0..height, seen from inside.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Room(object):
                                            textures.wall(length, height_m, color, random), textures.WALL_PPM))
 
     def draw(self, camera, world_from_camera):
-        """What a camera inside sees.
+        """Draw the image of a camera inside the room.
 
         Returns
         -------
@@ -67,7 +67,7 @@ class Room(object):
         for number, surface in enumerate(self._surfaces):
             a, b, c = line = _inverse_depth_of(surface, camera, world_from_camera)
             lines.append(line)
-            if c + max(0, a * camera.width) + max(0, b * camera.height) > 0:  # else all of it is behind the camera
+            if c + max(0, a * camera.width) + max(0, b * camera.height) > 0:  # otherwise it is behind the camera
                 np.add((b * np.arange(camera.height) + c).astype(np.float32)[:, None],
                        (a * np.arange(camera.width)).astype(np.float32), out=plane)
                 surfaces[cv2.compare(plane, inverse_depth, cv2.CMP_GT) > 0] = number
@@ -84,7 +84,7 @@ def _surface(normal, origin, right, down, texture, ppm):
 
 
 def _inverse_depth_of(surface, camera, world_from_camera):
-    """(a, b, c) so that a u + b v + c is the inverse depth of the plane at pixel (u, v)."""
+    """Coefficients (a, b, c) of the inverse depth a u + b v + c of a plane at pixel (u, v)."""
     rotation, position = world_from_camera[:3, :3], world_from_camera[:3, 3]
     along = rotation.T.dot(surface.normal) / (surface.distance_m - surface.normal.dot(position))
     a, b = along[0] / camera.fx, along[1] / camera.fy
@@ -107,5 +107,5 @@ def _paint(color, mask, surface, line, camera, world_from_camera):
 
 
 def copy_where(mask, source, target):
-    """Copy the pixels of an image that a mask shows into another one (OpenCV 3.2 has no cv2.copyTo)."""
+    """Copy the pixels of an image under a mask to another image (OpenCV 3.2 has no cv2.copyTo)."""
     cv2.bitwise_or(source, source, target, mask)

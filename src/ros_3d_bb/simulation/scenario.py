@@ -1,4 +1,4 @@
-"""Scenario files: a room, a robot, and people in it, as YAML. `config/scenarios/README.md` describes the form."""
+"""Scenario files: a room, a robot and people in YAML. `config/scenarios/README.md` describes the format."""
 import os
 import re
 from typing import NamedTuple, Optional, Tuple
@@ -13,11 +13,11 @@ Point = Tuple[float, float]
 
 
 class ScenarioError(ValueError):
-    """A scenario file that cannot be used; says where in it, what was expected and what is there."""
+    """Invalid scenario file. The message names the key, its value, and what was expected."""
 
 
 class Furniture(NamedTuple):
-    """A box on the floor: centre (x, y), size (x, y, z) in metres, turned by `yaw`, RGB colour."""
+    """Box on the floor: centre (x, y), size (x, y, z) in metres, rotated by `yaw`, RGB colour."""
 
     at: Point
     size: Tuple[float, float, float]
@@ -34,8 +34,8 @@ class Room(NamedTuple):
 
 
 class Move(NamedTuple):
-    """One of: go `to` a point with `speed` (m/s); `turn` by an angle with `rate` (rad/s); `wait` (s). A person who
-    waits may face a direction (`facing`, map frame) and `crouch` (0 to 1).
+    """One of: go `to` a point at `speed` (m/s); `turn` by an angle at `rate` (rad/s); `wait` (s). A waiting person may
+    face a direction (`facing`, map frame) and `crouch` (0 to 1).
     """
 
     to: Optional[Point] = None
@@ -48,7 +48,7 @@ class Move(NamedTuple):
 
 
 class Follow(NamedTuple):
-    """Keep `distance` metres behind a person (number, from 1), no faster than `speed` and turning at most at `rate`."""
+    """Follow a person (number from 1) at a `distance` in metres, with at most `speed` (m/s) and `rate` (rad/s)."""
 
     person: int
     distance: float = 2.5
@@ -57,8 +57,8 @@ class Follow(NamedTuple):
 
 
 class Mount(NamedTuple):
-    """One of several cameras: `name` is the namespace of its topics; `mount` in base_link, turned to the left by `yaw`
-    and tilted up by `pitch`.
+    """One of several cameras: `name`, the namespace of its topics; position `mount` in base_link, turned to the left by
+    `yaw` and tilted up by `pitch`.
     """
 
     name: str
@@ -68,9 +68,26 @@ class Mount(NamedTuple):
 
 
 class Robot(NamedTuple):
-    """`pose` (x, y, yaw) at the start; `mount` of the camera in base_link, tilted up by `pitch`, or several `cameras`;
-    `base_height` of base_link above the floor (Jackal: wheels of radius 0.098 m, hung 0.033 m above it);
-    `odometry_drift` (x, y, yaw) a second, of the odom frame in the map.
+    """Robot with one camera or several.
+
+    Attributes
+    ----------
+    pose : (x, y, yaw)
+        At the start.
+    moves : tuple of Move
+    repeat : bool
+    follow : Follow, optional
+    mount : (x, y, z)
+        Position of the only camera in base_link.
+    pitch : float
+        Upward tilt of the only camera.
+    cameras : tuple of Mount
+        Several cameras.
+    base_height : float
+        Height of base_link above the floor (Jackal: the wheels have a radius of 0.098 m and their axis is 0.033 m above
+        base_link).
+    odometry_drift : (x, y, yaw)
+        Drift per second of the odom frame in the map.
     """
 
     pose: Tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -85,13 +102,13 @@ class Robot(NamedTuple):
 
     @property
     def mounts(self):
-        """All cameras; the only one has no name."""
+        """All cameras. The name of an only camera is empty."""
         return self.cameras or (Mount('', self.mount, 0.0, self.pitch),)
 
 
 class Person(NamedTuple):
-    """A person: where they start and what they do, again and again with `repeat`; how they look (see `body.Build`),
-    where None by the seed.
+    """Person: start, moves, and appearance (see `body.Build`). Attributes of the appearance that are None are random by
+    the seed.
     """
 
     start: Point
@@ -111,9 +128,9 @@ class Person(NamedTuple):
 
 
 class Scenario(NamedTuple):
-    """A scene of `duration` seconds with `rate` images a second. The same `seed` gives the same images.
+    """Scene of `duration` seconds with `rate` images per second. The same `seed` gives the same images.
 
-    `depth_noise`: whether depth is that of a D435 or exact; `color_noise`: standard deviation in grey levels.
+    `depth_noise`: whether depth has the errors of a D435 or is exact; `color_noise`: standard deviation in grey levels.
     """
 
     duration: float = 12.0
@@ -135,29 +152,29 @@ FLAGS, WHOLE = {'repeat', 'long_hair', 'short_sleeves', 'depth_noise'}, {'seed',
 COLORS = {'color', 'skin', 'hair', 'shirt', 'trousers'}
 POSITIVE = {'duration', 'rate', 'height', 'speed', 'girth', 'distance', 'size'}
 FRACTIONS = {'crouch', 'hips'}
-NAME = re.compile(r'[A-Za-z]\w*$')  # of a namespace of topics
+NAME = re.compile(r'[A-Za-z]\w*$')  # a topic namespace
 
 
 def read_scenario(path):
-    """Read a scenario file. Its `room` may be the name of another file, relative to it.
+    """Read a scenario file. Its `room` may be the path of another file, relative to the scenario file.
 
     Raises
     ------
     ScenarioError
-        If it is not YAML, or holds a key or value that a scenario has not.
+        If the file is not YAML, or has an unknown key or an invalid value.
     OSError
-        If it cannot be opened.
+        If the file cannot be opened.
     """
-    content = _loaded(path)
+    content = _load(path)
     if isinstance(content, dict) and isinstance(content.get('room'), str):
-        content['room'] = _loaded(os.path.join(os.path.dirname(path), content['room']))
+        content['room'] = _load(os.path.join(os.path.dirname(path), content['room']))
     try:
         return scenario_from(content)
     except ScenarioError as error:
         raise ScenarioError('%s: %s' % (path, error))
 
 
-def _loaded(path):
+def _load(path):
     with open(path) as stream:
         try:
             content = load_yaml(stream)
@@ -167,12 +184,12 @@ def _loaded(path):
 
 
 def scenario_from(content):
-    """A scenario of the dictionary in a file. Raises ScenarioError."""
+    """Convert the content of a scenario file to a Scenario. Raises ScenarioError."""
     scenario = _record(Scenario, content, 'scenario')
     room, robot = scenario.room, scenario.robot
     if not (room.bounds[0] < room.bounds[1] and room.bounds[2] < room.bounds[3]):
         raise ScenarioError('room.bounds is %s; x0 < x1 and y0 < y1 expected' % (list(room.bounds),))
-    # The cameras have to stay inside, whichever way the robot looks.
+    # The cameras must stay inside the room at any heading of the robot.
     camera_m = max(sum(abs(part) for part in camera.mount[:2]) for camera in robot.mounts)
     _check_inside(room.bounds, 'robot', robot.pose[:2], robot.moves, camera_m)
     for number, person in enumerate(scenario.people, 1):
@@ -183,8 +200,8 @@ def scenario_from(content):
     return scenario
 
 
-def overridden(scenario, rate=None, seed=None):
-    """A scenario with another rate or seed, as far as given. Raises ScenarioError where they make no sense."""
+def with_overrides(scenario, rate=None, seed=None):
+    """Replace the rate and the seed of a scenario unless they are None. Raises ScenarioError if one is invalid."""
     given = {name: _value(name, value, name) for name, value in (('rate', rate), ('seed', seed)) if value is not None}
     return scenario._replace(**given)
 
@@ -192,12 +209,12 @@ def overridden(scenario, rate=None, seed=None):
 def _check_cameras(robot, room):
     names = [camera.name for camera in robot.cameras]
     if len(set(names)) < len(names):
-        raise ScenarioError('robot.cameras have the names %s; different ones expected' % ', '.join(names))
+        raise ScenarioError('robot.cameras have the names %s; unique names expected' % ', '.join(names))
     if robot.cameras and (robot.mount, robot.pitch) != (Robot().mount, Robot().pitch):
-        raise ScenarioError('robot has mount or pitch, and cameras, which have their own; one of both expected')
+        raise ScenarioError('robot has mount or pitch as well as cameras; only one of both is allowed')
     for camera in robot.mounts:
         if not 0 < robot.base_height + camera.mount[2] < room.height:
-            raise ScenarioError('robot.mount is %s, with robot.base_height %g, outside the room, which is %g high'
+            raise ScenarioError('robot.mount is %s with robot.base_height %g, outside the room of height %g'
                                 % (list(camera.mount), robot.base_height, room.height))
 
 
@@ -210,15 +227,17 @@ def _check_inside(bounds, name, start, moves, margin_m=0.0):
 
 def _record(kind, given, where):
     if not isinstance(given, dict):
-        raise ScenarioError('%s is %r; keys and values expected' % (where, given))
+        raise ScenarioError('%s is %r; a mapping expected' % (where, given))
     for name in given:
         if name not in kind._fields:
-            raise ScenarioError('%s has the unknown key %r; did you mean %s? Known: %s'
+            raise ScenarioError('%s has the unknown key %r; did you mean %s? Known keys: %s'
                                 % (where, name, nearest_name(str(name), kind._fields), ', '.join(kind._fields)))
     try:
         record = kind(**{name: _value(name, value, '%s.%s' % (where, name)) for name, value in given.items()})
     except TypeError:
-        raise ScenarioError('%s has only the keys %s; one of %s is missing' % (where, list(given), kind._fields))
+        required = [name for name in kind._fields if name not in kind._field_defaults]
+        raise ScenarioError('%s has the keys %s; %s expected, too' % (
+            where, list(given), ', '.join(name for name in required if name not in given)))
     if kind is Move:
         _check_move(given, where)
     return record
@@ -230,7 +249,7 @@ def _check_move(given, where):
         raise ScenarioError('%s is %s; exactly one of to, turn, wait expected' % (where, given))
     for name in given:
         if name not in MOVE_KEYS[verbs[0]]:
-            raise ScenarioError('%s is %s; %s goes with %s only'
+            raise ScenarioError('%s is %s; %s is only allowed with %s'
                                 % (where, given, name, ' or '.join(v for v in MOVE_KEYS if name in MOVE_KEYS[v])))
 
 
@@ -258,15 +277,17 @@ def _value(name, value, where):
 
 def _checked(name, number, where):
     if name in WHOLE and not (number == int(number) and 0 <= number < 2 ** 32):
-        raise ScenarioError('%s is %r; a whole number from 0 expected' % (where, number))
+        raise ScenarioError('%s is %r; an integer from 0 to 4294967295 expected' % (where, number))
     if name in POSITIVE and not number > 0:
         raise ScenarioError('%s is %g; more than 0 expected' % (where, number))
     if name in FRACTIONS and not 0 <= number <= 1:
         raise ScenarioError('%s is %g; 0 to 1 expected' % (where, number))
     if name in COLORS and not 0 <= number <= 255:
         raise ScenarioError('%s has %g; 0 to 255 expected' % (where, number))
-    if name in ('wait', 'color_noise') and not number >= 0 or name == 'rate' and number > 1000:
-        raise ScenarioError('%s is %g; 0 or more expected, and a rate of at most 1000' % (where, number))
+    if name in ('wait', 'color_noise') and not number >= 0:
+        raise ScenarioError('%s is %g; at least 0 expected' % (where, number))
+    if name == 'rate' and number > 1000:
+        raise ScenarioError('%s is %g; at most 1000 expected' % (where, number))
     return int(number) if name in WHOLE else float(number)
 
 

@@ -1,4 +1,4 @@
-"""Frames of a scenario: what the camera sees, where everything is, and who is who."""
+"""Simulator: images of a scenario, poses of the robot, and ground truth."""
 from typing import List, NamedTuple, Tuple
 
 import cv2
@@ -13,7 +13,7 @@ from ros_3d_bb.simulation.renderer import render
 from ros_3d_bb.simulation.room import Room
 from ros_3d_bb.simulation.stereo import StereoCamera
 
-D435I_COLOR = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)  # the camera of the thesis' measurements
+D435I_COLOR = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)  # camera of the measurements in the thesis
 FRONT_FROM_OPTICAL = transform_from((0, 0, 0), OPTICAL_ROTATION)
 SHADOW_RADIUS_M = 0.28
 SKINS = ((225, 180, 150), (215, 170, 140), (185, 140, 110), (230, 185, 155), (145, 105, 80))
@@ -24,12 +24,25 @@ SHOES = ((45, 40, 40), (35, 35, 35), (205, 200, 200))
 
 
 class Truth(NamedTuple):
-    """A person in one frame, in the map, metres.
+    """Ground truth of a person in one frame, in the map frame.
 
-    `id` from 1 in the order of the scenario; `position_m` (3,) the middle of the body's axis; `size_m` (3,) x = y =
-    width, z = height; `inside` the share 0..1 of the body that lies in the image, `hidden` the share of that which
-    others hide, `visible` what the image shows of the body; `box_px` (x1, y1, x2, y2) around what is seen, None where
-    nothing is.
+    Attributes
+    ----------
+    id : int
+        From 1, in the order of the scenario.
+    position_m : numpy.ndarray, (3,)
+        Centre of the body's vertical axis.
+    velocity_mps : numpy.ndarray, (3,)
+    size_m : numpy.ndarray, (3,)
+        Width, width, height.
+    visible : float
+        Share of the body that the image shows, 0..1.
+    hidden : float
+        Share of the body inside the image that other objects hide, 0..1.
+    inside : float
+        Share of the body that lies inside the image, 0..1.
+    box_px : (int, int, int, int) or None
+        Bounding box (x1, y1, x2, y2) of the visible part; None if no part is visible.
     """
 
     id: int
@@ -43,7 +56,7 @@ class Truth(NamedTuple):
 
 
 class Poses(NamedTuple):
-    """Rigid transforms (4, 4) of one moment. The camera's frame is the optical one."""
+    """Rigid transforms (4, 4) at one time. The camera frame is the optical one."""
 
     map_from_odom: np.ndarray
     odom_from_base: np.ndarray
@@ -51,13 +64,13 @@ class Poses(NamedTuple):
 
     @property
     def map_from_camera(self):
-        """The camera in the map."""
+        """Pose of the camera in the map."""
         return self.map_from_odom.dot(self.odom_from_base).dot(self.base_from_camera)
 
 
 class Frame(NamedTuple):
-    """`time_s` since the start; `color` (h, w, 3) uint8 RGB; `depth_mm` (h, w) uint16, aligned to colour, 0 is none;
-    `camera`: the name of that one of several, '' of the only one.
+    """`time_s` since the start; `color` (h, w, 3), uint8 RGB; `depth_mm` (h, w), uint16, aligned to colour, 0 means no
+    depth; `camera`, the name of the camera, or '' if there is only one.
     """
 
     number: int
@@ -70,9 +83,9 @@ class Frame(NamedTuple):
 
 
 class Simulator(object):
-    """Renders a scenario. Each frame is a function of the scenario and its number alone.
+    """Renders a scenario. A frame depends only on the scenario and the number of the frame.
 
-    Several cameras take turns, evenly spread over the period of each: the first one's frames are 0, n, 2 n, ...
+    Several cameras take turns at equal intervals: of n cameras the first one has the frames 0, n, 2 n, ...
 
     Parameters
     ----------
@@ -94,12 +107,12 @@ class Simulator(object):
 
     @property
     def cameras(self):
-        """The names of the cameras, '' of the only one."""
+        """Names of the cameras; [''] if there is only one."""
         return [mount.name for mount in self.scenario.robot.mounts]
 
     @property
     def rate(self):
-        """Frames a second, of all cameras together."""
+        """Frames per second of all cameras together."""
         return self.scenario.rate * len(self.cameras)
 
     @property
@@ -108,7 +121,7 @@ class Simulator(object):
         return int(np.ceil(self.scenario.duration * self.rate))
 
     def time_s(self, number):
-        """When a frame is taken, seconds from the start."""
+        """Time of a frame since the start."""
         return number / self.rate
 
     def frame(self, number):
@@ -123,15 +136,15 @@ class Simulator(object):
         bodies = [body.posed(state.posture).moved(np.append(state.position_m, 0), state.heading_rad)
                   for body, state in zip(self._bodies, states)]
         shadows = [(state.position_m[0], state.position_m[1], SHADOW_RADIUS_M) for state in states]
-        drawn = render(self._room, bodies + self._furniture, shadows, self.camera, poses.map_from_camera)
-        depth_mm = (self._stereo.measure(drawn.inverse_depth, number) if self._stereo is not None
-                    else np.rint(1000 / drawn.inverse_depth).clip(0, 65535).astype(np.uint16))
-        people = [self._truth(index, state, bodies[index], drawn) for index, state in enumerate(states)]
-        return Frame(number, time_s, self._color_sensor.take(drawn.color, number), depth_mm, poses, people,
+        rendering = render(self._room, bodies + self._furniture, shadows, self.camera, poses.map_from_camera)
+        depth_mm = (self._stereo.measure(rendering.inverse_depth, number) if self._stereo is not None
+                    else np.rint(1000 / rendering.inverse_depth).clip(0, 65535).astype(np.uint16))
+        people = [self._truth(index, state, bodies[index], rendering) for index, state in enumerate(states)]
+        return Frame(number, time_s, self._color_sensor.capture(rendering.color, number), depth_mm, poses, people,
                      self.cameras[turn])
 
     def poses_at(self, time_s, camera=0):
-        """Where odometry, robot and camera are at a time; `camera` is its place in the list.
+        """Poses of odometry, robot and camera at a time. `camera` is the index of the camera.
 
         Returns
         -------
@@ -149,23 +162,24 @@ class Simulator(object):
                      base_from_mount.dot(tilted).dot(FRONT_FROM_OPTICAL))
 
     def positions_at(self, time_s):
-        """Where the people stand, (n, 2) in the map; also beyond the scene's end."""
+        """Positions (n, 2) of the people in the map. The time may be after the end of the scene."""
         return np.array([motion.at(time_s).position_m for motion in self._motions]).reshape(-1, 2)
 
-    def _truth(self, index, state, body, drawn):
+    def _truth(self, index, state, body, rendering):
         height_m = float(body.vertices[:, 2].max())
         width_m = self._bodies[index].width_m
-        shown = cv2.inRange(drawn.objects, index + 1, index + 1)
-        count = cv2.countNonZero(shown)
-        x, y, width, height = cv2.boundingRect(shown)
-        hidden = 1 - count / float(drawn.areas[index]) if drawn.areas[index] else 0.0
+        visible = cv2.inRange(rendering.objects, index + 1, index + 1)
+        count = cv2.countNonZero(visible)
+        x, y, width, height = cv2.boundingRect(visible)
+        hidden = 1 - count / float(rendering.areas[index]) if rendering.areas[index] else 0.0
+        inside = rendering.inside[index]
         return Truth(index + 1, np.append(state.position_m, height_m / 2), np.append(state.velocity_mps, 0),
-                     np.array([width_m, width_m, height_m]), (1 - hidden) * drawn.inside[index], hidden,
-                     drawn.inside[index], (x, y, x + width, y + height) if count else None)
+                     np.array([width_m, width_m, height_m]), (1 - hidden) * inside, hidden, inside,
+                     (x, y, x + width, y + height) if count else None)
 
 
 def _upright(x, y, z, yaw):
-    """The transform of a place and a turn about z."""
+    """Transform (4, 4) of a translation and a rotation about z."""
     c, s = np.cos(yaw), np.sin(yaw)
     return np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, z], [0, 0, 0, 1]], float)
 
@@ -175,18 +189,17 @@ def _furniture(item, number):
 
 
 def _build(person, seed, number):
-    """How a person looks: as the scenario says, else by chance from the seed."""
+    """Appearance of a person: random by the seed, except for what the scenario specifies."""
     random = np.random.RandomState([seed, number])
 
-    def one_of(colors):
+    def choice(colors):
         return colors[random.randint(len(colors))]
 
-    shirts = np.random.RandomState(seed).permutation(len(SHIRTS))  # neighbours wear different ones
-
-    drawn = Build(random.uniform(1.58, 1.92), random.uniform(.95, 1.25), float(random.randint(2)),
-                  bool(random.randint(2)), bool(random.randint(2)), one_of(SKINS), one_of(HAIRS),
-                  SHIRTS[shirts[number % len(SHIRTS)]], one_of(TROUSERS), one_of(SHOES))
-    names = {'height': 'height_m'}
-    given = {names.get(name, name): getattr(person, name) for name in (
-        'height', 'girth', 'hips', 'long_hair', 'short_sleeves', 'skin', 'hair', 'shirt', 'trousers')}
-    return drawn._replace(**{name: value for name, value in given.items() if value is not None})
+    shirts = np.random.RandomState(seed).permutation(len(SHIRTS))  # different shirts for successive people
+    build = Build(random.uniform(1.58, 1.92), random.uniform(.95, 1.25), float(random.randint(2)),
+                  bool(random.randint(2)), bool(random.randint(2)), choice(SKINS), choice(HAIRS),
+                  SHIRTS[shirts[number % len(SHIRTS)]], choice(TROUSERS), choice(SHOES))
+    specified = {name: getattr(person, name) for name in (
+        'girth', 'hips', 'long_hair', 'short_sleeves', 'skin', 'hair', 'shirt', 'trousers')}
+    specified['height_m'] = person.height
+    return build._replace(**{name: value for name, value in specified.items() if value is not None})

@@ -1,4 +1,4 @@
-"""Procedural textures of floors, ceilings and walls, RGB uint8; `random` is a numpy.random.RandomState."""
+"""Procedural textures of floors, ceilings and walls, RGB uint8. `random` is a numpy.random.RandomState."""
 import cv2
 import numpy as np
 
@@ -8,7 +8,7 @@ WHITE, FRAME = (240, 240, 240), (70, 70, 70)
 
 
 def mottle(size_px, random, octaves=6):
-    """Random shading (size_px, size_px) of several scales, mean 0, standard deviation 1."""
+    """Random shading (size_px, size_px) of several scales, with mean 0 and standard deviation 1."""
     total = np.zeros((size_px, size_px), np.float32)
     for octave in range(octaves):
         cells = max(2, size_px >> (octaves - octave))
@@ -23,7 +23,7 @@ def floor(width_m, depth_m, random):
     tile = int(FLOOR_TILE_M * FLOOR_PPM)
     image[::tile] *= .85
     image[:, ::tile] *= .85
-    return _finished(image)
+    return _to_uint8(image)
 
 
 def ceiling(width_m, depth_m):
@@ -38,14 +38,14 @@ def ceiling(width_m, depth_m):
 
 
 def wall(length_m, height_m, color, random):
-    """A painted wall with a skirting board, doors, windows and posters; the lower edge is the floor."""
+    """Painted wall with a skirting board, doors, windows and posters. The lower edge is at the floor."""
     image = _mottled(color, length_m, height_m, WALL_PPM, 3, random)
     image[-int(.1 * WALL_PPM):] *= .55
     draws = (_draw_door, _draw_window, _draw_poster, lambda _image, _left_m, _random: 1.0)
     left_m = .8
     while left_m < length_m - 2:
         left_m += draws[random.randint(len(draws))](image, left_m, random)
-    return _finished(cv2.GaussianBlur(image, (0, 0), .7))
+    return _to_uint8(cv2.GaussianBlur(image, (0, 0), .7))
 
 
 def _draw_door(image, left_m, random):
@@ -89,5 +89,5 @@ def _mottled(color, width_m, height_m, ppm, strength, random):
     return image + strength * cv2.resize(mottle(512, random), size)[..., None]
 
 
-def _finished(image):
+def _to_uint8(image):
     return np.clip(image, 0, 255).astype(np.uint8)

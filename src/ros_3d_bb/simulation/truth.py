@@ -1,23 +1,23 @@
-"""Ground truth in the form of tracks, so that it can be published and compared."""
+"""Ground truth as tracks, to be published and compared with the tracker's output."""
 import numpy as np
 
 from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject, prediction_times_s
 
-LEAST_VISIBLE = 0.25  # share of the body that an image must show for the person to count as visible
+MIN_VISIBLE = 0.25  # minimum share of the body in the image of a person with the status VISIBLE
 MOVING_MPS = 0.05
 PREDICTION_S, PREDICTION_STEP_S = 2.0, 0.25
 
 
 def truth_at(simulator, frame, stamp_ns):
-    """The people of a frame as tracks, in the map; the prediction is where they really will be.
+    """Convert the people of a frame to tracks in the map frame. Their predictions are their actual future positions.
 
     Parameters
     ----------
     simulator : Simulator
     frame : Frame
     stamp_ns : int
-        Stamp of the frame. Each person counts as seen from the start of the scene on.
+        Stamp of the frame. The tracks are first seen at the start of the scene.
 
     Returns
     -------
@@ -33,6 +33,6 @@ def truth_at(simulator, frame, stamp_ns):
 
 
 def _status(person):
-    if person.visible >= LEAST_VISIBLE:
+    if person.visible >= MIN_VISIBLE:
         return VISIBLE
-    return OCCLUDED if person.hidden > 1 - person.inside else OUT_OF_VIEW  # whatever takes the larger part
+    return OCCLUDED if person.hidden > 1 - person.inside else OUT_OF_VIEW  # the larger share decides
