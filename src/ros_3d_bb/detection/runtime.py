@@ -130,6 +130,8 @@ def thread_count(params):
     ValueError
         If a parameter is out of range.
     """
+    if params.runtime not in RUNTIMES:
+        raise ValueError('runtime is %r; one of %s expected' % (params.runtime, ', '.join(RUNTIMES)))
     if params.runtime == 'onnxruntime' and params.device not in ('auto', 'cpu'):
         raise ValueError('runtime onnxruntime works on the CPU, and device is %r; use runtime torch' % params.device)
     return params.threads or min(physical_cores(), MAX_THREADS)
