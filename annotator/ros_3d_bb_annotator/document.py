@@ -8,10 +8,10 @@ import os
 
 import numpy as np
 
+from ros_3d_bb.core.atomic_file import FILE_NAME, changing
 from ros_3d_bb.estimation import FARTHEST_M, check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.measurements import (Session, SessionError, camera_of, boxes_of_others, read_color, read_depth,
                                     read_description, session_errors)
-from ros_3d_bb.session_file import FILE_NAME, changing
 from ros_3d_bb_annotator import legacy
 from ros_3d_bb_annotator.drafts import Drafts
 from ros_3d_bb_annotator.entries import (Edit, changed, changes_with_estimate, detections_with, entry_at, grid_of,

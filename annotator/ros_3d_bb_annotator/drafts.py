@@ -3,7 +3,7 @@ import contextlib
 import json
 import os
 
-from ros_3d_bb.session_file import write_whole
+from ros_3d_bb.core.atomic_file import write_whole
 
 FILE_NAME = '.annotator_draft.json'
 

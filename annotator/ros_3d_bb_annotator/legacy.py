@@ -9,8 +9,8 @@ matched by a regular expression; nothing in the file is executed.
 import os
 import re
 
+from ros_3d_bb.core.atomic_file import FILE_NAME
 from ros_3d_bb.measurements import SessionError, read_image
-from ros_3d_bb.session_file import FILE_NAME
 
 FORM = 'thesis'
 TEXT_NAME = 'measurements.txt'

@@ -10,11 +10,11 @@ from ros_3d_bb.bag_reading import BagError, BagReader, Raw, message_in
 from ros_3d_bb.bag_transforms import BagTransforms
 from ros_3d_bb.bags import new_bag
 from ros_3d_bb.camera_messages import COLOR_TOPIC, STATIC_TOPIC, TF_TOPIC
+from ros_3d_bb.core.event_counter import Tally
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.messages import BOXES_TOPIC
 from ros_3d_bb.pipeline import INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, Pipeline, Settings
 from ros_3d_bb.searching import opened_yolov5, search_color
-from ros_3d_bb.stamped import NS
-from ros_3d_bb.tally import Tally
 
 MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
 
@@ -129,7 +129,7 @@ def process_bag(source, target, settings=Settings(), progress=lambda share: None
 
     Returns
     -------
-    tally.Tally
+    event_counter.Tally
 
     Raises
     ------

@@ -11,8 +11,8 @@ from typing import NamedTuple, Optional
 import numpy as np
 import yaml
 
-from ros_3d_bb.params import nearest_name
-from ros_3d_bb.yaml_file import load_yaml
+from ros_3d_bb.core.params import nearest_name
+from ros_3d_bb.core.yaml_loader import load_yaml
 
 STEEPEST_BIAS = 0.5  # metres a metre; a steeper one has no safe inverse
 NEAREST_SHARE = 0.2  # of a measured range: no correction puts anybody nearer

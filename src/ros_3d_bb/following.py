@@ -8,11 +8,11 @@ import numpy as np
 import tf2_ros
 from std_msgs.msg import Header
 
-from ros_3d_bb.camera_clocks import LONGEST_LAG_NS, CameraClocks
+from ros_3d_bb.core.camera_clocks import LONGEST_LAG_NS, CameraClocks
+from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.time_sync import JUMP_NS, NS, StampedCache
 from ros_3d_bb.images import depth_from
 from ros_3d_bb.messages import camera_from_message, detections_from_message, stamp_of, time_from, usable_boxes3d
-from ros_3d_bb.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
-from ros_3d_bb.stamped import JUMP_NS, NS, StampedCache
 from ros_3d_bb.tracking.measuring import NoiseParams
 from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.thesis import ThesisTracker, ThesisTrackerParams
@@ -72,7 +72,7 @@ class Follower(object):
     params : TrackerNodeParams
     tracking : list
         One instance of each of `TRACKING_PARAMS`.
-    tally : tally.Tally
+    tally : event_counter.Tally
     transforms
         Its `lookup(target_frame, source_frame, stamp)` returns target_from_source (4, 4) or raises
         tf2_ros.TransformException; `go_back()` is called where time went back.

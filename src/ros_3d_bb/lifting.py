@@ -4,13 +4,13 @@ from typing import NamedTuple
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.core.params import DEPTH_SCALE, LARGEST, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.time_sync import NS, Pairing
 from ros_3d_bb.diagnosis.camera_faults import ALIGN, size_fault
 from ros_3d_bb.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.estimation import DepthImage, check_rect, estimate_boxes, estimator_named, is_plausible
 from ros_3d_bb.images import checked_depth_from
 from ros_3d_bb.messages import boxes2d_from_message, camera_from_message, stamp_if_any, stamp_of, time_from
-from ros_3d_bb.params import DEPTH_SCALE, LARGEST, STAMP_TOLERANCE, Param, parameters
-from ros_3d_bb.stamped import NS, Pairing
 from ros_3d_bb.tracking.tracked import LARGEST_M
 
 
@@ -50,13 +50,13 @@ class Lifter(object):
     """Pairs arrays of 2D boxes with depth and camera of their stamp, and estimates their 3D boxes.
 
     Each `add_` validates a message and hands it to the synchronizer, with its arrival (integer nanoseconds, see
-    `stamped.Pairing`). `on_frame` then gets the boxes of one image with their depth and camera, for `estimate`. What is
-    rejected is counted by the tally.
+    `time_sync.Pairing`). `on_frame` then gets the boxes of one image with their depth and camera, for `estimate`. What
+    is rejected is counted by the tally.
 
     Parameters
     ----------
     params : Bbox3dParams
-    tally : tally.Tally
+    tally : event_counter.Tally
     on_frame : callable
         Called with `messages.Boxes2D`, sensor_msgs/Image and `geometry.Camera` of one stamp.
     depth_topic, info_topic : str

@@ -2,7 +2,7 @@
 from collections import OrderedDict
 from typing import NamedTuple
 
-from ros_3d_bb.params import table_of
+from ros_3d_bb.core.params import table_of
 
 TYPES = {bool: 'bool', int: 'int', float: 'double', str: 'str', tuple: 'str'}  # the protocol knows no lists
 

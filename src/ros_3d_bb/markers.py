@@ -8,8 +8,8 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_3d_bb.params import Param, parameters
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.core.params import Param, parameters
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
 
 MARKERS_TOPIC = 'visualization_marker_array'

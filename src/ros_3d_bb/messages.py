@@ -7,10 +7,10 @@ from geometry_msgs.msg import Point, PoseWithCovariance, Vector3
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb import msg
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation import Box3D
 from ros_3d_bb.geometry import Camera, transform_from
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
-from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.tracked import FARTHEST_M, LARGEST_M, TrackedObject, detection_from_box
 
 BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC = 'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'

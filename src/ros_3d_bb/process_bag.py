@@ -14,10 +14,10 @@ import ros_3d_bb
 from ros_3d_bb.bag_processing import process_bag
 from ros_3d_bb.bag_reading import BagError
 from ros_3d_bb.bags import remove_partial
+from ros_3d_bb.core.params import params_from
+from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.detection.checkpoint import cause
-from ros_3d_bb.params import params_from
 from ros_3d_bb.pipeline import DETECTORS, Settings
-from ros_3d_bb.yaml_file import load_yaml
 
 POLL_S, BAR = 0.2, 40
 GIB = 2 ** 30

@@ -10,11 +10,11 @@ from typing import NamedTuple, Tuple
 import cv2
 import numpy as np
 
+from ros_3d_bb.core.atomic_file import FILE_NAME, changing, write_whole
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation import Box3D, DepthImage
 from ros_3d_bb.geometry import Camera
 from ros_3d_bb.measurements import read_session
-from ros_3d_bb.session_file import FILE_NAME, changing, write_whole
-from ros_3d_bb.stamped import NS
 
 MILLIMETRE = 0.001
 MAX_DEPTH_MM = 65535  # of 16 bits

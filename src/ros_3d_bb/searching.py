@@ -5,6 +5,8 @@ from typing import NamedTuple
 import genpy
 import tf2_ros
 
+from ros_3d_bb.core.params import ENABLED, PUBLISH_EMPTY, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.time_sync import NS, Pairing
 from ros_3d_bb.detection.depth_people import DepthPeople
 from ros_3d_bb.detection.floor import floor_from_transform
 from ros_3d_bb.detection.runtime import open_runtime
@@ -12,8 +14,6 @@ from ros_3d_bb.detection.yolov5 import Yolov5
 from ros_3d_bb.geometry import transform_from
 from ros_3d_bb.images import checked_depth_from, rgb_from
 from ros_3d_bb.messages import camera_from_message, stamp_if_any, stamp_of
-from ros_3d_bb.params import ENABLED, PUBLISH_EMPTY, STAMP_TOLERANCE, Param, parameters
-from ros_3d_bb.stamped import NS, Pairing
 
 CACHE_NS = NS  # how long images wait for each other
 NEWEST = genpy.Time(0)  # what tf takes it for
@@ -74,13 +74,13 @@ class DepthSearch(object):
     """Pairs colour images with depth and camera of their stamp, and detects people in them.
 
     Each `add_` validates a message and hands it to the synchronizer, with its arrival (integer nanoseconds, see
-    `stamped.Pairing`). `on_frame` then gets a colour image with its depth and camera, for `search`.
+    `time_sync.Pairing`). `on_frame` then gets a colour image with its depth and camera, for `search`.
 
     Parameters
     ----------
     params : DepthDetectorParams
     people : DepthPeopleParams
-    tally : tally.Tally
+    tally : event_counter.Tally
     on_frame : callable
         Called with two sensor_msgs/Image, colour and depth, and a `geometry.Camera` of one stamp.
     transforms

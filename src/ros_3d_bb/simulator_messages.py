@@ -2,10 +2,10 @@
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera_messages import CAMERA, TF_TOPIC, CameraFrame, messages_of, topic_of
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.messages import time_from, tracks_to_message
 from ros_3d_bb.simulation.truth import truth_at
-from ros_3d_bb.stamped import NS
 
 START_NS = 1600000000 * NS  # when scenes and bags begin: any time will do, but the same each time
 TRUTH_TOPIC = 'ground_truth'

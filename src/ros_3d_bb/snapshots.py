@@ -1,7 +1,7 @@
 """Synchronizer of the messages of one image: colour, depth, camera, 2D boxes and 3D boxes."""
 from typing import Any, NamedTuple
 
-from ros_3d_bb.stamped import Pairing, StampedCache
+from ros_3d_bb.core.time_sync import Pairing, StampedCache
 
 
 class Snapshot(NamedTuple):

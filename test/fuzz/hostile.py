@@ -7,13 +7,13 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb.camera_messages import CameraFrame, messages_of
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.distortion import MODELS
 from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.geometry import Camera
 from ros_3d_bb.images import LAYOUTS
 from ros_3d_bb.messages import time_from
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
-from ros_3d_bb.stamped import NS
 
 FLOATS = (0.0, -0.0, 1.0, -1.0, 0.5, 3.0, float('nan'), float('inf'), -float('inf'), 1e308, -1e308, 5e-324, 1e-30, 1e6)
 INT32 = (0, 1, -1, 3, 10, 47, 48, 63, 64, 65, 1000, 2 ** 31 - 1, -2 ** 31)

@@ -11,6 +11,7 @@ from tf2_msgs.msg import TFMessage
 
 from fuzz import hostile
 from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.messages import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, time_from
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
@@ -19,7 +20,6 @@ from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.nodes.viewer_node import ViewerNode
 from ros_3d_bb.nodes.yolov5_node import Yolov5Node
-from ros_3d_bb.stamped import NS
 from soak.invariants import BALANCES, WAITING, balance_of
 from soak.records import Status
 from support.masterless import masterless, on_the_wire

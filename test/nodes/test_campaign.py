@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 import rospy
 
+from ros_3d_bb.core.atomic_file import changing
 from ros_3d_bb.measurements import read_session
 from ros_3d_bb.messages import stamp_of
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
-from ros_3d_bb.session_file import changing
 from support.ros import Recorder, launched, wait_until
 from support.screen import press, start_screen
 

@@ -8,12 +8,12 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.images import depth_from, rgb_from
 from ros_3d_bb.messages import camera_from_message, transform_from_message
 from ros_3d_bb.nodes import realsense_node
 from ros_3d_bb.realsense import CameraLost, Pair
-from ros_3d_bb.stamped import NS
 from support.realsense_recordings import (COLOR_CAMERA, START_MS, STEP_MS, SUFFIX, colored, sloping_depth,
                                           write_recording)
 from support.ros import Recorder, diagnostics_of, wait_until

@@ -10,11 +10,11 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.images import depth_from, rgb_from
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.simulation.scenario import read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.stamped import NS
 from support.ros import Recorder, wait_until
 
 SCENE = """

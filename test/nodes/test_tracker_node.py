@@ -12,9 +12,9 @@ from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.messages import time_from
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
-from ros_3d_bb.stamped import NS
 from support.ros import TIMEOUT_S, Recorder, diagnostics_of, header_at, publisher, wait_until
 
 PERIOD = NS // 10

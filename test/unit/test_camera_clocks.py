@@ -2,8 +2,8 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.camera_clocks import ALIVE_NS, LONGEST_LAG_NS, CameraClocks
-from ros_3d_bb.stamped import JUMP_NS, NS
+from ros_3d_bb.core.camera_clocks import ALIVE_NS, LONGEST_LAG_NS, CameraClocks
+from ros_3d_bb.core.time_sync import JUMP_NS, NS
 
 HOUR_NS = 3600 * NS
 

@@ -2,6 +2,7 @@
 import numpy as np
 import pytest
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.camera_faults import frames_fault, intrinsics_fault
 from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS, findings
 from ros_3d_bb.diagnosis.seen import CameraSeen, Clock, Finding, ImageSeen, Publisher, Role, Seen, Stream, TfSeen
@@ -10,7 +11,6 @@ from ros_3d_bb.diagnosis.topic_faults import paired_share, span
 from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.geometry import Camera
 from ros_3d_bb.images import units_fault
-from ros_3d_bb.stamped import NS
 
 IMAGE, CAMERA = 'sensor_msgs/Image', Camera(640, 480, 600, 600, 320, 240)
 STAMPS = tuple(1000 * NS + number * NS // 10 for number in range(50))

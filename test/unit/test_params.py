@@ -3,7 +3,7 @@ from typing import NamedTuple
 
 import pytest
 
-from ros_3d_bb.params import SET_BY_LAUNCH, Param, params_from, parameters, table_of
+from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, params_from, parameters, table_of
 
 
 RATE = Param(30.0, 'Rate of the images.', 'Hz', limits=(0.5, 60), live=(1, 60), section='both')

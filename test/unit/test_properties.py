@@ -7,12 +7,12 @@ import pytest
 import yaml
 from hypothesis import given, strategies as st
 
+from ros_3d_bb.core.params import params_from
+from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.detection.bodies import DepthPeopleParams
 from ros_3d_bb.images import LAYOUTS, array_from, depth_from, fill_image, rgb_from
 from ros_3d_bb.measurements import SessionError, read_session
-from ros_3d_bb.params import params_from
 from ros_3d_bb.simulation.scenario import ScenarioError, scenario_from
-from ros_3d_bb.yaml_file import load_yaml
 
 PLAIN = st.recursive(st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
                      lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=20)

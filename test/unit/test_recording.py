@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb import recording, session_file
+from ros_3d_bb import recording
+from ros_3d_bb.core import atomic_file
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation import Box3D, DepthImage
 from ros_3d_bb.geometry import Camera
 from ros_3d_bb.measurements import read_color, read_depth, read_session
 from ros_3d_bb.recording import Measurement, append, stored_depth
-from ros_3d_bb.stamped import NS
 
 CAMERA = Camera(64, 48, 60.0, 61.0, 31.5, 23.25, 'plumb_bob', (0.1, -0.2, 0.001, 0.002, 0.03))
 STAMP_NS = 1616161616 * NS + 123456789
@@ -112,7 +113,7 @@ def test_without_boxes_the_images_are_stored(folder):
 def test_ids_are_ascending_after_measurements_were_removed(folder):
     first = append(folder, measurement(0)).id
     second = append(folder, measurement(1)).id
-    with session_file.changing(folder) as content:
+    with atomic_file.changing(folder) as content:
         del content['frames'][0]
     third = append(folder, measurement(2, stamp_ns=NS)).id  # an earlier stamp, as of a bag
     assert first < second < third and len({first, second, third}) == 3
@@ -205,7 +206,7 @@ def test_invalid_sessions_are_rejected_and_kept(tmp_path, text):
 @pytest.mark.parametrize('full_at', ['color', 'depth', 'frames.json'])
 def test_a_full_disk_does_not_change_the_session(folder, monkeypatch, full_at):
     append(folder, measurement(0))
-    before, write_whole = content_of(folder), session_file.write_whole
+    before, write_whole = content_of(folder), atomic_file.write_whole
 
     def failing(path, data):
         if full_at in os.path.relpath(path, folder):
@@ -213,7 +214,7 @@ def test_a_full_disk_does_not_change_the_session(folder, monkeypatch, full_at):
         write_whole(path, data)
 
     monkeypatch.setattr(recording, 'write_whole', failing)
-    monkeypatch.setattr(session_file, 'write_whole', failing)
+    monkeypatch.setattr(atomic_file, 'write_whole', failing)
     with pytest.raises(OSError):
         append(folder, measurement(1))
     assert content_of(folder) == before

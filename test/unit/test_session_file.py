@@ -6,7 +6,7 @@ import stat
 
 import pytest
 
-from ros_3d_bb.session_file import changing, write_whole
+from ros_3d_bb.core.atomic_file import changing, write_whole
 
 
 def _add_many(folder, name, count):

@@ -4,8 +4,8 @@ import itertools
 import pytest
 from hypothesis import given, strategies as st
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.snapshots import Snapshots
-from ros_3d_bb.stamped import NS
 
 MS = NS // 1000
 PERIOD = 33 * MS

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation import Box3D
 from ros_3d_bb.evaluation import speed as benchmark
 from ros_3d_bb.evaluation.crowd import JITTER_PX, crowd_of, people_of
@@ -13,7 +14,6 @@ from ros_3d_bb.evaluation.machine import describe_machine
 from ros_3d_bb.evaluation.speed_picture import draw_speed
 from ros_3d_bb.evaluation.tracking.original import OriginalTracker
 from ros_3d_bb.measurements import read_session
-from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.thesis import ThesisTracker
 from ros_3d_bb.tracking.tracked import Detection
 

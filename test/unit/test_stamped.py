@@ -2,7 +2,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.stamped import MAX_RATE_HZ, MAX_WAITING, NS, Pairing, StampedCache
+from ros_3d_bb.core.time_sync import MAX_RATE_HZ, MAX_WAITING, NS, Pairing, StampedCache
 
 MS = NS // 1000
 PERIOD = 33 * MS

@@ -5,7 +5,7 @@ from unittest import mock
 
 import pytest
 
-from ros_3d_bb.tally import Tally
+from ros_3d_bb.core.event_counter import Tally
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as hnp
 
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import match_greedily, plane_distances
 from ros_3d_bb.tracking.thesis import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, Detection

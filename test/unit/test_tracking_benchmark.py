@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.evaluation.tracking import __main__ as command
 from ros_3d_bb.evaluation.tracking.benchmark import CONTESTANTS, compare, outputs_of, runs_of, table
 from ros_3d_bb.evaluation.tracking.detector import DOUBLE, FALSE
@@ -16,7 +17,6 @@ from ros_3d_bb.evaluation.tracking.original import OriginalTracker, as_it_arrive
 from ros_3d_bb.evaluation.tracking.perfect import outputs_with_perfect_association
 from ros_3d_bb.evaluation.tracking.robot import DRIVING
 from ros_3d_bb.evaluation.tracking.trajectories import made_sequences
-from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.thesis import ThesisTracker
 from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, Detection
 

@@ -2,10 +2,9 @@
 import numpy as np
 import pytest
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation import Box3D, DepthImage
-from ros_3d_bb.overlay import BOX_COLOR
-from ros_3d_bb.stamped import NS
-from ros_3d_bb.overlay import colorize_depth
+from ros_3d_bb.overlay import BOX_COLOR, colorize_depth
 from ros_3d_bb.viewer_picture import RATE_WINDOW_NS, WARNING_INK, FrameRate, View, box_lines, compose, text_image
 
 BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75,

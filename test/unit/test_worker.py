@@ -1,7 +1,7 @@
 """The worker: always the newest item, and no item can end it."""
 import threading
 
-from ros_3d_bb.worker import NewestWorker
+from ros_3d_bb.core.latest_worker import NewestWorker
 
 
 def test_only_the_newest_of_the_waiting_items_is_worked_on():

@@ -9,6 +9,7 @@ import rosbag
 import tf2_ros
 
 from ros_3d_bb.bags import START_NS, SessionBagOptions, images_in, scenario_images, session_images, write_bag
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.images import depth_from, rgb_from
 from ros_3d_bb.measurements import read_color, read_depth, read_session
 from ros_3d_bb.messages import (boxes2d_from_message, camera_from_message, time_from, tracks_from_message,
@@ -16,7 +17,6 @@ from ros_3d_bb.messages import (boxes2d_from_message, camera_from_message, time_
 from ros_3d_bb.simulation.scenario import scenario_from
 from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulation.truth import truth_at
-from ros_3d_bb.stamped import NS
 
 
 @pytest.fixture(scope='module')

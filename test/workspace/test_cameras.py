@@ -10,6 +10,7 @@ import rospy
 from ros_3d_bb.bag_processing import process_bag
 from ros_3d_bb.bag_reading import BagError
 from ros_3d_bb.bags import scenario_images, write_bag
+from ros_3d_bb.core.event_counter import Tally
 from ros_3d_bb.evaluation.identities import score
 from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.messages import stamp_of
@@ -18,7 +19,6 @@ from ros_3d_bb.pipeline import Settings
 from ros_3d_bb.process_bag import with_tracker
 from ros_3d_bb.report import panels_of, read_recording
 from ros_3d_bb.simulation.scenario import scenario_from
-from ros_3d_bb.tally import Tally
 from support.launching import loaded
 from support.masterless import masterless, on_the_wire
 from support.two_cameras import PERIOD_NS, START_NS, Rig, Transforms

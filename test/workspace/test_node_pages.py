@@ -9,11 +9,11 @@ import pytest
 
 from fuzz import hostile
 from fuzz.nodes import TARGETS
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.latency_probe_node import LatencyProbeNode
 from ros_3d_bb.nodes.realsense_node import RealSenseNode
 from ros_3d_bb.nodes.replay_node import ReplayNode
 from ros_3d_bb.nodes.simulator_node import SimulatorNode
-from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.thesis import ThesisTrackerParams
 from support.masterless import masterless
 from support.planner_definitions import package

@@ -2,8 +2,8 @@
 import numpy as np
 import pytest
 
+from ros_3d_bb.core.event_counter import Tally
 from ros_3d_bb.nodes.numbers import RESERVED, Numbers
-from ros_3d_bb.tally import Tally
 from ros_3d_bb.tracking.thesis import ThesisTracker
 from ros_3d_bb.tracking.tracked import Detection
 

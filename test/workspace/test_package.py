@@ -10,8 +10,8 @@ import pytest
 import roslaunch
 import yaml
 
+from ros_3d_bb.core.params import check, params_from, table_of
 from ros_3d_bb.markers import NAMESPACES
-from ros_3d_bb.params import check, params_from, table_of
 from support.pages import node_pages
 from support.standard_library import STANDARD_LIBRARY, TEST_STANDARD_LIBRARY
 

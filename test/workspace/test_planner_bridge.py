@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.messages import TRACKS_TOPIC, time_from
 from ros_3d_bb.msg import TrackedObject, TrackedObjectArray
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeNode
-from ros_3d_bb.stamped import NS
 from support.masterless import masterless
 from support.planner_definitions import package
 

@@ -15,7 +15,7 @@ from unittest import mock
 import pytest
 
 from fuzz.hostile import Source, good_frame
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.core.time_sync import NS
 from soak.faults import FAULTS
 from soak.graph import LAUNCH, Graph
 from soak.invariants import it_recovers

@@ -1,7 +1,7 @@
 """One of several cameras has a wrong clock, lags or hangs: when the images of the others are tracked again."""
 import pytest
 
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.core.time_sync import NS
 from support.two_cameras import Play
 
 RECOVERY_NS = 2 * NS

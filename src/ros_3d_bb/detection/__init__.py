@@ -1,1 +1,4 @@
-"""2D detection: YOLOv5 in colour images, and people in depth images. Free of ROS; only this package imports torch."""
+"""2D boxes, and the detectors that find people in images.
+
+May import: core.
+"""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ros_3d_bb.params import Param, parameters
+from ros_3d_bb.core.params import Param, parameters
 
 MIN_CELLS = 20  # smaller clusters are ignored; a person 6 m away has about 300 cells
 HEADROOM_M = 0.15  # minimum depth of the valley between the heads of two people side by side

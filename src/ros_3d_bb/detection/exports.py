@@ -11,10 +11,10 @@ import os
 
 import numpy as np
 
+from ros_3d_bb.core.atomic_file import write_whole
 from ros_3d_bb.detection.checkpoint import cause, checkpoint_digest
 from ros_3d_bb.detection.onnx_file import metadata_entry
 from ros_3d_bb.detection.onnx_runtime import INSTALL, ExportedRuntime, OnnxUnusable, reference_image
-from ros_3d_bb.session_file import write_whole
 
 VERSION = 1  # of the cached files; increase it when network.py or onnx_export.py change their content
 

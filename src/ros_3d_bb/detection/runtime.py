@@ -10,10 +10,10 @@ import os
 import warnings
 from typing import NamedTuple
 
+from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.detection.checkpoint import WeightsError
 from ros_3d_bb.detection.exports import export_folder, open_exported
 from ros_3d_bb.detection.onnx_runtime import OnnxRuntime, OnnxUnusable
-from ros_3d_bb.params import Param, parameters
 
 RUNTIMES = ('auto', 'onnxruntime', 'torch')
 MAX_THREADS = 4  # default maximum; small networks gain little from more threads

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.detection.boxes import Detections, non_maximum_suppression
-from ros_3d_bb.params import LARGEST, Param, parameters
 
 GREY = (114, 114, 114)  # padding colour of letterboxed images in the training of YOLOv5
 MAX_INPUT_PX = 4096  # larger inputs exhaust the memory

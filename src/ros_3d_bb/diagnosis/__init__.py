@@ -1,1 +1,4 @@
-"""What keeps a pipeline from working, and what to do about it: from observations to sentences."""
+"""What is wrong with a running graph or a bag, and how to fix it.
+
+May import: bags, camera, conversions, core, msg.
+"""

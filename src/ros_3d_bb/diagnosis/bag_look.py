@@ -8,13 +8,13 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.bag_reading import BagReader, message_in
 from ros_3d_bb.bag_transforms import BagTransforms
 from ros_3d_bb.camera_messages import INFO_TOPICS, STATIC_TOPIC, TF_TOPIC
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS
 from ros_3d_bb.diagnosis.observing import Observation, camera_seen, color_seen, depth_seen
 from ros_3d_bb.diagnosis.roles import ROLES
 from ros_3d_bb.diagnosis.seen import Seen, TfSeen
 from ros_3d_bb.diagnosis.tf_tree import links_in
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
-from ros_3d_bb.stamped import NS
 
 CLASSES = {COLOR: Image, DEPTH: Image, INFO: CameraInfo, BOXES2D: Int32MultiArray, BOXES3D: BoundingBox3DArray,
            TRACKS: TrackedObjectArray}

@@ -3,8 +3,8 @@ from typing import NamedTuple
 
 from yaml import YAMLError
 
-from ros_3d_bb.params import nearest_name
-from ros_3d_bb.yaml_file import load_yaml
+from ros_3d_bb.core.params import nearest_name
+from ros_3d_bb.core.yaml_loader import load_yaml
 
 NAMED = 8  # frames that a sentence names
 

@@ -1,6 +1,6 @@
 """Topics on which nothing comes, stamps that are far from now, and stamps that do not pair."""
-from ros_3d_bb.params import nearest_name
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.core.params import nearest_name
+from ros_3d_bb.core.time_sync import NS
 
 LATE_S, EARLY_S = 5.0, 2.0  # by so much a stamp may be before and after ROS time
 LEAST_RATE_HZ = 4.0  # of images; people who walk are lost between slower ones

@@ -9,7 +9,7 @@ from typing import List, NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import assign, plane_distances
 from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
 

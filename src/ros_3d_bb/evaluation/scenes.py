@@ -4,6 +4,7 @@ from typing import List, NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.error_model import corrected_boxes
 from ros_3d_bb.estimation import DepthImage, estimate_boxes, estimator_named, is_plausible
@@ -11,7 +12,6 @@ from ros_3d_bb.evaluation.identities import Moment
 from ros_3d_bb.geometry import transform_points
 from ros_3d_bb.simulation.simulator import Frame
 from ros_3d_bb.simulation.truth import truth_at
-from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.association import match_greedily
 from ros_3d_bb.tracking.tracked import Detection, TrackedObject, View, detection_from_box
 from ros_3d_bb.tracking.tracker import Tracker

@@ -5,6 +5,8 @@ import rospy
 from sensor_msgs.msg import CameraInfo, Image
 
 from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.core.latest_worker import NewestWorker
+from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.detection.bodies import DepthPeopleParams
 from ros_3d_bb.nodes.boxes_output import BoxesOutput, Switch
 from ros_3d_bb.nodes.diagnostics import Diagnostics
@@ -13,8 +15,6 @@ from ros_3d_bb.nodes.transforms import Transforms
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.nodes.tuning import Tuning
 from ros_3d_bb.searching import DepthDetectorParams, DepthSearch
-from ros_3d_bb.stamped import arrival_clock_ns
-from ros_3d_bb.worker import NewestWorker
 
 
 class DepthDetectorNode(object):

@@ -1,8 +1,8 @@
 """Numbers of tracks that stay unique when the tracker is killed and started again."""
 import rospy
 
+from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.nodes.registration import on_new_master
-from ros_3d_bb.worker import NewestWorker
 
 RESERVED = 1000  # numbers at a time: whoever is started again goes on with the next thousand
 LARGEST = 2 ** 31 - 1  # that a ROS parameter holds

@@ -6,6 +6,8 @@ import rospy
 import tf2_ros
 from std_msgs.msg import Header
 
+from ros_3d_bb.core.params import LARGEST, Param, parameters
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.messages import TRACKS_TOPIC, stamp_of, time_from, tracks_from_message
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
@@ -13,8 +15,6 @@ from ros_3d_bb.nodes.planner_outputs import outputs_from
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
 from ros_3d_bb.nodes.transport import subscribe
-from ros_3d_bb.params import LARGEST, Param, parameters
-from ros_3d_bb.stamped import NS
 from ros_3d_bb.tracking.for_planners import SAME_FRAME, predicted_to, rounding_m, usable_tracks
 
 MOST_ROUNDING_M = 0.005  # of coordinates: a tenth of a cell of a usual costmap

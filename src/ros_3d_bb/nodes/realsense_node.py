@@ -12,14 +12,14 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.camera_messages import (COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, TYPES, CameraFrame, image_messages_of,
                                        transform_messages)
+from ros_3d_bb.core.params import SET_BY_LAUNCH, WAIT_FOR_SUBSCRIBERS, Param, parameters
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.messages import time_from
 from ros_3d_bb.nodes.diagnostics import Diagnostics, is_ending
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.subscribers import wait_for_subscribers
-from ros_3d_bb.params import SET_BY_LAUNCH, WAIT_FOR_SUBSCRIBERS, Param, parameters
 from ros_3d_bb.realsense import (CameraLost, RealSense, RealSenseParams, check_params, frame_links, librealsense,
                                  optical_frame)
-from ros_3d_bb.stamped import NS
 
 RETRY_S = 2.0
 CLOSING_S = 5.0  # at most

@@ -9,10 +9,10 @@ from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.bags import images_in
 from ros_3d_bb.camera_messages import TYPES
+from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters
 from ros_3d_bb.messages import BOXES_TOPIC, restamped
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
-from ros_3d_bb.params import SET_BY_LAUNCH, Param, parameters
 
 
 @parameters()

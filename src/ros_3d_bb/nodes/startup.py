@@ -3,9 +3,9 @@ import sys
 
 import rospy
 
+from ros_3d_bb.core.params import params_from
 from ros_3d_bb.memory import reuse_freed_memory
 from ros_3d_bb.nodes.registration import Registration
-from ros_3d_bb.params import params_from
 
 
 def read_params(*kinds):

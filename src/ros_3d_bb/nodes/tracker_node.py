@@ -7,6 +7,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from visualization_msgs.msg import MarkerArray
 
 from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS, topic_of
+from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 from ros_3d_bb.messages import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_message
@@ -17,7 +18,6 @@ from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.nodes.tuning import Tuning
-from ros_3d_bb.stamped import arrival_clock_ns
 
 
 class TrackerNode(object):

@@ -6,13 +6,13 @@ from dynamic_reconfigure.encoding import decode_config, encode_config, encode_de
 from dynamic_reconfigure.msg import Config, ConfigDescription
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
+from ros_3d_bb.core.params import params_from
 from ros_3d_bb.live_parameters import description_of, live_in, plain_values
 from ros_3d_bb.nodes.registration import on_new_master
-from ros_3d_bb.params import params_from
 
 
 class Tuning(object):
-    """Takes changes of those parameters of a node that its table marks as live (see `ros_3d_bb.params.Param`).
+    """Takes changes of those parameters of a node that its table marks as live (see `ros_3d_bb.core.params.Param`).
 
     The description that dynamic_reconfigure generates code for is made from that table. A request with a value that is
     not allowed is rejected as a whole, where dynamic_reconfigure's own server would clamp the value. The response has

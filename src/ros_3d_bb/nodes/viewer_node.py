@@ -10,6 +10,8 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
+from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
 from ros_3d_bb.images import depth_from, rgb_from
 from ros_3d_bb.messages import (BOXES3D_TOPIC, boxes2d_from_message, boxes3d_from_message, camera_from_message,
                                 stamp_if_any, stamp_of, time_from, usable_boxes3d)
@@ -18,10 +20,8 @@ from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.label import Label
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
-from ros_3d_bb.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.recording import Measurement, append
 from ros_3d_bb.snapshots import Snapshots
-from ros_3d_bb.stamped import NS, arrival_clock_ns
 from ros_3d_bb.viewer_picture import FrameRate, View, compose, text_image
 from ros_3d_bb.window import Window, WindowError
 

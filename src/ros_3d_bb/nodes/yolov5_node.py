@@ -3,6 +3,7 @@ import rospy
 from sensor_msgs.msg import Image
 
 from ros_3d_bb.camera_messages import COLOR_TOPIC
+from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.detection.runtime import RuntimeParams
 from ros_3d_bb.detection.yolov5 import DetectionParams
 from ros_3d_bb.nodes.boxes_output import BoxesOutput, Switch
@@ -11,7 +12,6 @@ from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import subscribe
 from ros_3d_bb.nodes.tuning import Tuning
 from ros_3d_bb.searching import Yolov5NodeParams, opened_yolov5, search_color
-from ros_3d_bb.worker import NewestWorker
 
 
 class Yolov5Node(object):

@@ -5,8 +5,8 @@ from typing import NamedTuple, Optional, Tuple
 
 import yaml
 
-from ros_3d_bb.params import nearest_name
-from ros_3d_bb.yaml_file import load_yaml
+from ros_3d_bb.core.params import nearest_name
+from ros_3d_bb.core.yaml_loader import load_yaml
 
 Color = Tuple[int, int, int]
 Point = Tuple[float, float]

@@ -1,1 +1,4 @@
-"""From boxes in a fixed frame to tracks with velocity and prediction. Nothing here knows ROS."""
+"""From 3D boxes in a fixed frame to tracks with velocity, visibility and prediction.
+
+May import: camera, core.
+"""

@@ -2,7 +2,7 @@
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman
 
 RECENT_NS = 7 * NS // 10  # tracks matched so recently are associated before those that were missed for longer

@@ -3,7 +3,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.params import Param, parameters
+from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.tracking.kalman import Measurements
 from ros_3d_bb.tracking.visibility import NEARER_M, wrapped
 

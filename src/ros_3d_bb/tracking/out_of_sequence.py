@@ -2,7 +2,7 @@
 import collections
 from typing import NamedTuple
 
-from ros_3d_bb.stamped import MAX_RATE_HZ, NS
+from ros_3d_bb.core.time_sync import MAX_RATE_HZ, NS
 from ros_3d_bb.tracking.tracked import View
 
 LATEST_NS = NS // 2  # images that are older than the newest by more are refused

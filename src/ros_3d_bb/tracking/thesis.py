@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.params import Param, parameters
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.core.params import Param, parameters
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import match_greedily, plane_distances
-from ros_3d_bb.tracking.tracked import (
-    MOVING_SPEED, OCCLUDED, PREDICTION_STEP, PREDICTION_TIME, VISIBLE, TrackedObject, check_steps, prediction_times_s)
+from ros_3d_bb.tracking.tracked import (MOVING_SPEED, OCCLUDED, PREDICTION_STEP, PREDICTION_TIME, VISIBLE,
+                                        TrackedObject, check_steps, prediction_times_s)
 
 
 @parameters('thesis')

@@ -1,7 +1,7 @@
 """Tracks as one structured array, and what detections change in it. Fixed frame, metres, nanoseconds."""
 import numpy as np
 
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman
 from ros_3d_bb.tracking.tracked import VISIBLE
 

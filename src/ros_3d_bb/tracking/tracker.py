@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.params import LARGEST, Param, parameters
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.core.params import LARGEST, Param, parameters
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman
 from ros_3d_bb.tracking.association import associate, remaining
 from ros_3d_bb.tracking.measuring import BOX_ERRORS, NoiseParams, sightings_of

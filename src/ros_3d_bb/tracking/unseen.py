@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, View
 from ros_3d_bb.tracking.visibility import places_in
 

@@ -1,5 +1,5 @@
 """What a tracker scores that is told whose each detection is, and remembers people as long as ours."""
-from ros_3d_bb.stamped import NS
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.tracker import TrackerParams
 
 FORGOTTEN_S = TrackerParams().memory  # who was not found for so long gets another number

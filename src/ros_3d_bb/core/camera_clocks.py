@@ -1,7 +1,7 @@
 """Whether the stamps of several cameras are of one time, and which cameras are right where they are not."""
 from typing import NamedTuple
 
-from ros_3d_bb.stamped import JUMP_NS, NS
+from ros_3d_bb.core.time_sync import JUMP_NS, NS
 
 ALIVE_NS = NS  # a camera without images for longer has no say
 LONGEST_LAG_NS = 4 * NS  # a camera whose stamps are behind by less may have the right time and a slow detector
