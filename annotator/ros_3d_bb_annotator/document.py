@@ -29,7 +29,7 @@ class Document(object):
     folder : str
     measurements : tuple of Measurement
         In the order of the file. An index remains valid while the document is open.
-    camera : geometry.Camera or None
+    camera : camera_model.Camera or None
         None in the old format, which does not contain it.
     depth_scale_m : float or None
         Metres per unit of depth.

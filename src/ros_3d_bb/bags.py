@@ -11,9 +11,9 @@ import numpy as np
 import rosbag
 from std_msgs.msg import Header
 
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.camera_messages import CameraFrame, messages_of, topic_of
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.measurements import SessionError, read_color, read_depth, read_session
 from ros_3d_bb.messages import BOXES_TOPIC, boxes2d_to_message, time_from
 from ros_3d_bb.simulation.scenario import ScenarioError, with_overrides, read_scenario

@@ -156,7 +156,7 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     ----------
     samples : Samples
     rect_px : (x1, y1, x2, y2)
-    camera : geometry.Camera
+    camera : camera_model.Camera
     nearer : sequence of Box3D
         Of people who may stand in front: their pixels are not taken for this one's.
 
@@ -261,7 +261,7 @@ def estimate_boxes(depth, rects_px, camera, estimator):
     depth : DepthImage
     rects_px : list of (x1, y1, x2, y2)
         Usable ones, see `check_rect`.
-    camera : geometry.Camera
+    camera : camera_model.Camera
     estimator : Estimator
 
     Returns

@@ -3,10 +3,10 @@ from typing import NamedTuple
 
 from std_msgs.msg import Header
 
+from ros_3d_bb.camera.alignment import ALIGN, size_fault
 from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.core.params import DEPTH_SCALE, LARGEST, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, Pairing
-from ros_3d_bb.diagnosis.camera_faults import ALIGN, size_fault
 from ros_3d_bb.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.estimation import DepthImage, check_rect, estimate_boxes, estimator_named, is_plausible
 from ros_3d_bb.images import checked_depth_from
@@ -58,7 +58,7 @@ class Lifter(object):
     params : Bbox3dParams
     tally : event_counter.Tally
     on_frame : callable
-        Called with `messages.Boxes2D`, sensor_msgs/Image and `geometry.Camera` of one stamp.
+        Called with `messages.Boxes2D`, sensor_msgs/Image and `camera_model.Camera` of one stamp.
     depth_topic, info_topic : str
         Where depth images and camera_info come from, for messages about missing ones.
 
@@ -123,7 +123,7 @@ class Lifter(object):
         ----------
         boxes2d : messages.Boxes2D
         depth_msg : sensor_msgs.msg.Image
-        camera : geometry.Camera
+        camera : camera_model.Camera
 
         Returns
         -------

@@ -13,11 +13,11 @@ from typing import NamedTuple, Optional, Tuple
 import cv2
 import numpy as np
 
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.distortion import PLUMB_BOB
 from ros_3d_bb.core.atomic_file import FILE_NAME
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.distortion import PLUMB_BOB
 from ros_3d_bb.estimation import DepthImage
-from ros_3d_bb.geometry import Camera
 
 SAME_PERSON_IOU = 0.3  # low, because a detector may find half of a body; boxes of two people seldom overlap so much
 

@@ -7,9 +7,9 @@ from geometry_msgs.msg import Point, PoseWithCovariance, Vector3
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb import msg
+from ros_3d_bb.camera.camera_model import Camera, transform_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation import Box3D
-from ros_3d_bb.geometry import Camera, transform_from
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.tracking.tracked import FARTHEST_M, LARGEST_M, TrackedObject, detection_from_box
 

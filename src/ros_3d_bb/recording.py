@@ -10,10 +10,10 @@ from typing import NamedTuple, Tuple
 import cv2
 import numpy as np
 
+from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.core.atomic_file import FILE_NAME, changing, write_whole
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation import Box3D, DepthImage
-from ros_3d_bb.geometry import Camera
 from ros_3d_bb.measurements import read_session
 
 MILLIMETRE = 0.001

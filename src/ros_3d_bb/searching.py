@@ -5,13 +5,13 @@ from typing import NamedTuple
 import genpy
 import tf2_ros
 
+from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.core.params import ENABLED, PUBLISH_EMPTY, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, Pairing
 from ros_3d_bb.detection.depth_people import DepthPeople
 from ros_3d_bb.detection.floor import floor_from_transform
 from ros_3d_bb.detection.runtime import open_runtime
 from ros_3d_bb.detection.yolov5 import Yolov5
-from ros_3d_bb.geometry import transform_from
 from ros_3d_bb.images import checked_depth_from, rgb_from
 from ros_3d_bb.messages import camera_from_message, stamp_if_any, stamp_of
 
@@ -82,7 +82,7 @@ class DepthSearch(object):
     people : DepthPeopleParams
     tally : event_counter.Tally
     on_frame : callable
-        Called with two sensor_msgs/Image, colour and depth, and a `geometry.Camera` of one stamp.
+        Called with two sensor_msgs/Image, colour and depth, and a `camera_model.Camera` of one stamp.
     transforms
         As for `following.Follower`; None where no frame of the floor is given.
 

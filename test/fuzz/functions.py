@@ -11,6 +11,7 @@ import numpy as np
 import yaml
 
 from fuzz import hostile
+from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.bodies import DepthPeopleParams
@@ -21,7 +22,6 @@ from ros_3d_bb.detection.yolov5 import filter_predictions
 from ros_3d_bb.error_model import read_error_model
 from ros_3d_bb.estimation import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.following import TRACKING_PARAMS, TrackerNodeParams
-from ros_3d_bb.geometry import transform_from
 from ros_3d_bb.images import array_from, depth_from, rgb_from
 from ros_3d_bb.lifting import Bbox3dParams
 from ros_3d_bb.markers import MarkerParams

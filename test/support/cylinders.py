@@ -3,8 +3,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.estimation import DepthImage
-from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from
 
 FARTHEST_M = 12.0
 

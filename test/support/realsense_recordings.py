@@ -4,7 +4,7 @@ import time
 import numpy as np
 import pyrealsense2 as rs
 
-from ros_3d_bb.geometry import Camera, transform_from
+from ros_3d_bb.camera.camera_model import Camera, transform_from
 
 # As a D435i has them: depth sees more, and colour is 15 mm to its right, turned a little.
 DEPTH_CAMERA = Camera(640, 480, 386.0, 386.0, 320.3, 238.9)

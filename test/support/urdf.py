@@ -1,7 +1,7 @@
 """Where links of a robot's description are."""
 import numpy as np
 
-from ros_3d_bb.geometry import transform_from
+from ros_3d_bb.camera.camera_model import transform_from
 
 
 def parent_from_child(joint):

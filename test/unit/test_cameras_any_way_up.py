@@ -4,8 +4,8 @@ import functools
 import numpy as np
 from hypothesis import assume, example, given, settings, strategies as st
 
+from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.estimation import estimate_boxes, estimator_named
-from ros_3d_bb.geometry import Camera
 from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, View, detection_from_box
 from ros_3d_bb.tracking.visibility import depths_towards, places_in
 from support.cylinders import Cylinder, mounted, rect_of, render

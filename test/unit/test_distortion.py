@@ -5,8 +5,8 @@ import pyrealsense2
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.distortion import EQUIDISTANT, INVERSE_BROWN_CONRADY, PLUMB_BOB, RATIONAL_POLYNOMIAL
-from ros_3d_bb.geometry import Camera
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.distortion import EQUIDISTANT, INVERSE_BROWN_CONRADY, PLUMB_BOB, RATIONAL_POLYNOMIAL
 
 # Horizontal field of view in degrees, where the camera has 640 x 480, and the lens. The first is a D435's colour
 # camera, the second a D455's, then a wide-angle lens, an Azure Kinect's, and T265's fisheye cut to 120 degrees.

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as hnp
 
-from ros_3d_bb.geometry import OPTICAL_ROTATION, Camera, quaternion_from, transform_from, transform_points
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, quaternion_from, transform_from, transform_points
 
 D435I = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)
 COORDINATE = st.floats(-100, 100)

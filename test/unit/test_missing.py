@@ -33,7 +33,7 @@ def test_nothing_is_left_out_unless_asked_for(without_onnx):
                                           ('nodes/test_realsense_node.py', 'pyrealsense2')])  # by a helper
 def test_a_file_needs_what_it_and_its_helpers_import(path, module):
     assert module in imports_when_loaded(os.path.join(TEST, path))
-    assert module not in imports_when_loaded(os.path.join(TEST, 'unit', 'test_geometry.py'))
+    assert module not in imports_when_loaded(os.path.join(TEST, 'unit', 'test_camera_model.py'))
 
 
 @pytest.mark.parametrize('names, misses', [(('numpy', 'json.decoder'), False), (('numpy', 'onnx'), True),

@@ -2,11 +2,11 @@
 import numpy as np
 import pytest
 
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.evaluation.identities import Moment
 from ros_3d_bb.evaluation.scene_tracks import is_in_image, score_tracks
 from ros_3d_bb.evaluation.scenes import Step
-from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.simulation.simulator import D435I_COLOR, Frame, Poses, Truth
 from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject
 

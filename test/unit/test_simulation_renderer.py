@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb.geometry import Camera
+from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.simulation import textures
 from ros_3d_bb.simulation.body import Body, Build
 from ros_3d_bb.simulation.color import ColorSensor

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb.geometry import Camera
+from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.simulation.scenario import Follow, Furniture, Mount, Move, Person, Robot, Room, Scenario
 from ros_3d_bb.simulation.simulator import D435I_COLOR, Simulator
 from ros_3d_bb.simulation.truth import PREDICTION_STEP_S, truth_at

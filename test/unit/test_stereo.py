@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from conftest import DATA
-from ros_3d_bb.geometry import Camera
+from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.measurements import read_depth, read_session
 from ros_3d_bb.simulation.stereo import StereoCamera, StereoParams
 

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.evaluation.tracking import robot
 from ros_3d_bb.evaluation.tracking.camera_model import CameraModel, half_width, shown, thesis_bias_m
 from ros_3d_bb.evaluation.tracking.detector import DOUBLE, FALSE, Detector, Seen
@@ -11,7 +12,6 @@ from ros_3d_bb.evaluation.tracking.generator import HORIZONS_S, Models, Timing, 
 from ros_3d_bb.evaluation.tracking.robot import DRIVING, STANDING, OdometryModel
 from ros_3d_bb.evaluation.tracking.timing import crowd
 from ros_3d_bb.evaluation.tracking.trajectories import made_sequences
-from ros_3d_bb.geometry import transform_points
 from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE
 
 SECONDS = 4

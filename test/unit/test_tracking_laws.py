@@ -4,8 +4,8 @@ import warnings
 import numpy as np
 from hypothesis import given, settings, strategies as st
 
+from ros_3d_bb.camera.camera_model import Camera, transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.geometry import Camera, transform_from, transform_points
 from ros_3d_bb.tracking.tracked import VISIBLE, Detection, View
 from ros_3d_bb.tracking.tracker import Tracker
 from support.cylinders import mounted

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xacro
 
-from ros_3d_bb.geometry import transform_points
+from ros_3d_bb.camera.camera_model import transform_points
 from support.launching import JACKAL_TO_BE_EXTENDED, dumped, given_to_stand_ins, stand_in_gazebo, write
 from support.urdf import base_from
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
+from ros_3d_bb.camera.camera_model import transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.geometry import transform_from, transform_points
 from ros_3d_bb.messages import time_from
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
 from ros_3d_bb.nodes.planner_outputs import outputs_from

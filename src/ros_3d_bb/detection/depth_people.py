@@ -55,7 +55,7 @@ class DepthPeople(object):
         image : numpy.ndarray, (height, width, 3), uint8, RGB
         depth : ros_3d_bb.estimation.DepthImage
             Aligned to the colour image.
-        camera : ros_3d_bb.geometry.Camera
+        camera : ros_3d_bb.camera.camera_model.Camera
         floor : ros_3d_bb.detection.floor.Floor, optional
             If not given, the floor is fitted to this image. If that fails, the last fitted floor is used.
 

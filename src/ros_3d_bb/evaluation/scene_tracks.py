@@ -7,9 +7,9 @@ from typing import NamedTuple, Optional
 
 import numpy as np
 
+from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.evaluation.identities import ClearMatcher
 from ros_3d_bb.evaluation.scenes import LEAST_SHOWN
-from ros_3d_bb.geometry import transform_points
 from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.tracked import VISIBLE
 
@@ -51,7 +51,7 @@ def score_tracks(steps, camera):
     ----------
     steps : list of scenes.Step
         In the order of their stamps.
-    camera : geometry.Camera
+    camera : camera_model.Camera
 
     Returns
     -------

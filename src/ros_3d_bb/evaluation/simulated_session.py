@@ -8,7 +8,7 @@ import os
 import cv2
 import numpy as np
 
-from ros_3d_bb.geometry import transform_points
+from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.simulation.scenario import Move, Person, Robot, Room, Scenario
 from ros_3d_bb.simulation.simulator import D435I_COLOR, Simulator
 

@@ -16,6 +16,7 @@ import time
 
 import numpy as np
 
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation import estimate_boxes, estimate_median, estimator_named, sample_median
 from ros_3d_bb.evaluation.crowd import crowd_of, people_of
@@ -24,7 +25,6 @@ from ros_3d_bb.evaluation.detector_speed import detector_speed
 from ros_3d_bb.evaluation.machine import describe_machine
 from ros_3d_bb.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb.evaluation.tracking.original import OriginalTracker
-from ros_3d_bb.geometry import OPTICAL_ROTATION, transform_from, transform_points
 from ros_3d_bb.measurements import read_color, read_session
 from ros_3d_bb.tracking.tracked import Detection, View, detection_from_box
 from ros_3d_bb.tracking.tracker import Tracker

@@ -2,8 +2,8 @@
 import rospy
 from sensor_msgs.msg import CameraInfo
 
+from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault
 from ros_3d_bb.camera_messages import DEPTH_TOPIC
-from ros_3d_bb.diagnosis.camera_faults import ALIGN, frames_fault, intrinsics_fault
 from ros_3d_bb.messages import camera_from_message
 
 

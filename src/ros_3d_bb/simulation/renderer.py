@@ -62,7 +62,7 @@ def render(room, meshes, shadows, camera, world_from_camera):
         At most 254, in world coordinates.
     shadows : list of (x, y, radius)
         Soft shadows on the floor, in metres.
-    camera : geometry.Camera
+    camera : camera_model.Camera
     world_from_camera : numpy.ndarray, (4, 4)
 
     Returns

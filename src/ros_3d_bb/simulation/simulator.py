@@ -4,7 +4,7 @@ from typing import List, NamedTuple, Tuple
 import cv2
 import numpy as np
 
-from ros_3d_bb.geometry import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.simulation import mesh
 from ros_3d_bb.simulation.body import Body, Build
 from ros_3d_bb.simulation.color import ColorSensor
@@ -90,7 +90,7 @@ class Simulator(object):
     Parameters
     ----------
     scenario : scenario.Scenario
-    camera : geometry.Camera
+    camera : camera_model.Camera
     """
 
     def __init__(self, scenario, camera=D435I_COLOR):

@@ -47,7 +47,7 @@ class StereoCamera(object):
 
     Parameters
     ----------
-    camera : ros_3d_bb.geometry.Camera
+    camera : ros_3d_bb.camera.camera_model.Camera
         The colour camera.
     seed : int
         Seed of the noise of this camera, 0 to 2**32 - 1.

@@ -4,7 +4,7 @@ Positions and velocities as in `tracked.TrackedObject`; points are (n, 3), metre
 """
 import numpy as np
 
-from ros_3d_bb.geometry import transform_points
+from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.tracking.tracked import FARTHEST_M, LARGEST_M
 
 SWATH_STEP_S = 0.1  # a person at 3 m/s is 0.3 m further on, less than a body is wide: the footprints overlap

@@ -77,7 +77,7 @@ def depths_towards(camera, depth, points):
 
     Parameters
     ----------
-    camera : geometry.Camera
+    camera : camera_model.Camera
     depth : estimation.DepthImage
     points : numpy.ndarray, (k, 3)
         In the optical frame, metres.

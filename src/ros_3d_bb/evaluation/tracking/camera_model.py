@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.geometry import Camera
+from ros_3d_bb.camera.camera_model import Camera
 
 SIZE_PX = 1280, 720
 BODY_RADIUS_M = 0.25

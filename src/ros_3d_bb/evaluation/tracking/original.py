@@ -7,8 +7,8 @@ failed with an exception, rospy went on with the next image.
 """
 import numpy as np
 
+from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.geometry import transform_points
 from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject
 

@@ -8,7 +8,7 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from ros_3d_bb.distortion import checked_distortion, distort, undistort
+from ros_3d_bb.camera.distortion import checked_distortion, distort, undistort
 
 STEEP = 0.34  # sine of the angle between the optical axis and the vertical: 20 degrees
 OPTICAL_ROTATION = (-0.5, 0.5, -0.5, 0.5)  # quaternion of an optical frame that looks along the body's x (REP 103)
