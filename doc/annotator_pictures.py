@@ -10,7 +10,8 @@ import tempfile
 import cv2
 import numpy as np
 
-from ros_3d_bb.estimation import DepthImage, estimate_boxes, estimator_named
+from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.recording import box_entry
 from ros_3d_bb.simulation.scenario import Person, Robot, Room, Scenario
 from ros_3d_bb.simulation.simulator import D435I_COLOR, Simulator

@@ -8,8 +8,9 @@ import os
 
 import numpy as np
 
+from ros_3d_bb.camera.depth_image import FARTHEST_M
 from ros_3d_bb.core.atomic_file import FILE_NAME, changing
-from ros_3d_bb.estimation import FARTHEST_M, check_rect, estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.measurements import (Session, SessionError, camera_of, boxes_of_others, read_color, read_depth,
                                     read_description, session_errors)
 from ros_3d_bb_annotator import legacy
@@ -82,7 +83,7 @@ class Document(object):
         return read_color(self._usable(index), self.camera)
 
     def depth(self, index):
-        """Read the depth of a measurement, an estimation.DepthImage. Raises SessionError."""
+        """Read the depth of a measurement, an box3d_estimator.DepthImage. Raises SessionError."""
         if self.is_old_form:
             raise SessionError(legacy.NOTES[0])
         return read_depth(self._usable(index), self._session)
@@ -96,7 +97,7 @@ class Document(object):
 
         Returns
         -------
-        estimation.Box3D or None
+        box3d_estimator.Box3D or None
             None if there is not enough depth.
 
         Raises
@@ -172,7 +173,7 @@ class Document(object):
 
         Returns
         -------
-        estimation.Box3D or None
+        box3d_estimator.Box3D or None
             None if there is not enough depth. The box is added nevertheless.
 
         Raises

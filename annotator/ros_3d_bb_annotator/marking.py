@@ -22,7 +22,8 @@ class MarkedBox(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """Overlay of an image: boxes, the index of the person's box or None, and the visible samples (estimation.Samples).
+    """Overlay of an image: boxes, the index of the person's box or None, and the visible samples
+    (box3d_estimator.Samples).
     """
 
     boxes: Tuple[MarkedBox, ...]

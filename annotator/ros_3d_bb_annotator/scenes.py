@@ -1,5 +1,5 @@
 """Texts and overlays of a measurement."""
-from ros_3d_bb.estimation import estimator_named
+from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb_annotator.document import ESTIMATOR
 from ros_3d_bb_annotator.marking import MarkedBox, Scene
 

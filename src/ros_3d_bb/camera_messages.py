@@ -8,8 +8,8 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import Camera, quaternion_from
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import PLUMB_BOB
-from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.images import fill_image
 
 TF_TOPIC, STATIC_TOPIC = 'tf', 'tf_static'

@@ -5,7 +5,7 @@ functions accept any object with the fields of sensor_msgs/Image and do not impo
 """
 import numpy as np
 
-from ros_3d_bb.estimation import DepthImage
+from ros_3d_bb.camera.depth_image import DepthImage
 
 # encoding: (dtype without byte order, channels)
 LAYOUTS = {'rgb8': ('u1', 3), 'bgr8': ('u1', 3), 'rgba8': ('u1', 4), 'bgra8': ('u1', 4), 'mono8': ('u1', 1),
@@ -102,7 +102,7 @@ def units_fault(depth):
 
     Parameters
     ----------
-    depth : estimation.DepthImage
+    depth : box3d_estimator.DepthImage
 
     Returns
     -------

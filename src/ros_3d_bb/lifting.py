@@ -4,11 +4,12 @@ from typing import NamedTuple
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.core.params import DEPTH_SCALE, LARGEST, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, Pairing
-from ros_3d_bb.error_model import corrected_boxes, read_error_model
-from ros_3d_bb.estimation import DepthImage, check_rect, estimate_boxes, estimator_named, is_plausible
+from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named, is_plausible
+from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.images import checked_depth_from
 from ros_3d_bb.messages import boxes2d_from_message, camera_from_message, stamp_if_any, stamp_of, time_from
 from ros_3d_bb.tracking.tracked import LARGEST_M
@@ -39,7 +40,7 @@ class Bbox3dParams(NamedTuple):
 
 
 class Lifted(NamedTuple):
-    """The 3D boxes (`estimation.Box3D`) of one image, its header and its depth image."""
+    """The 3D boxes (`box3d_estimator.Box3D`) of one image, its header and its depth image."""
 
     header: Header
     depth: DepthImage
@@ -89,7 +90,7 @@ class Lifter(object):
 
     @property
     def sample(self):
-        """See `estimation.Estimator`."""
+        """See `box3d_estimator.Estimator`."""
         return self._estimator.sample
 
     def add_camera_info(self, message, now_ns):

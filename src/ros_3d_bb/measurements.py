@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import PLUMB_BOB
 from ros_3d_bb.core.atomic_file import FILE_NAME
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.estimation import DepthImage
 
 SAME_PERSON_IOU = 0.3  # low, because a detector may find half of a body; boxes of two people seldom overlap so much
 
@@ -28,7 +28,7 @@ class SessionError(ValueError):
 
 class Detection(NamedTuple):
     """Person in an image: `box_px` (x1, y1, x2, y2), `estimate_m` (x, y, z) in the optical frame, `size_m` (width,
-    height), `support` and `truncated` as in estimation.Box3D; None if not stored. `by_hand`: a user drew the box.
+    height), `support` and `truncated` as in box3d_estimator.Box3D; None if not stored. `by_hand`: a user drew the box.
     """
 
     box_px: Optional[Tuple[int, int, int, int]]

@@ -9,7 +9,7 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from ros_3d_bb import msg
 from ros_3d_bb.camera.camera_model import Camera, transform_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation import Box3D
+from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.tracking.tracked import FARTHEST_M, LARGEST_M, TrackedObject, detection_from_box
 
@@ -152,7 +152,7 @@ def transform_from_message(message):
 
 
 def boxes3d_to_message(boxes, header, camera):
-    """3D boxes (`estimation.Box3D`) as BoundingBox3DArray."""
+    """3D boxes (`box3d_estimator.Box3D`) as BoundingBox3DArray."""
     return BoundingBox3DArray(header=header, boxes=[_box3d_to_message(box, camera) for box in boxes])
 
 
@@ -174,7 +174,7 @@ def _box3d_to_message(box, camera):
 
 
 def boxes3d_from_message(message):
-    """The 3D boxes in a BoundingBox3DArray, as (`estimation.Box3D`, ...). Inverse of `boxes3d_to_message`."""
+    """The 3D boxes in a BoundingBox3DArray, as (`box3d_estimator.Box3D`, ...). Inverse of `boxes3d_to_message`."""
     return tuple(_box3d_from_message(box) for box in message.boxes)
 
 

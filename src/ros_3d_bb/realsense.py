@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import EQUIDISTANT, INVERSE_BROWN_CONRADY, PLUMB_BOB
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation import DepthImage
 
 POLL_MS = 100
 LOST_S = 5.0  # a camera that sends no images for this time is considered lost

@@ -11,9 +11,10 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.atomic_file import FILE_NAME, changing, write_whole
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation import Box3D, DepthImage
+from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.measurements import read_session
 
 MILLIMETRE = 0.001

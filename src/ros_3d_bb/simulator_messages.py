@@ -1,9 +1,9 @@
 """What the simulated robot sends for one frame."""
 from std_msgs.msg import Header
 
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera_messages import CAMERA, TF_TOPIC, CameraFrame, messages_of, topic_of
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.messages import time_from, tracks_to_message
 from ros_3d_bb.simulation.truth import truth_at
 

@@ -8,8 +8,9 @@ from typing import NamedTuple, Optional, Tuple
 import cv2
 import numpy as np
 
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation import Box3D, DepthImage
+from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.overlay import colorize_depth, draw_boxes, depth_to_grey
 
 PAPER, INK, WARNING_INK = (32, 32, 32), (235, 235, 235), (255, 190, 60)

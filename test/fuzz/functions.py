@@ -19,8 +19,8 @@ from ros_3d_bb.detection.boxes import non_maximum_suppression
 from ros_3d_bb.detection.checkpoint import read_checkpoint
 from ros_3d_bb.detection.predictions import decode_heads
 from ros_3d_bb.detection.yolov5 import filter_predictions
-from ros_3d_bb.error_model import read_error_model
-from ros_3d_bb.estimation import check_rect, estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
+from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.following import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.images import array_from, depth_from, rgb_from
 from ros_3d_bb.lifting import Bbox3dParams

@@ -7,10 +7,10 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import MODELS
 from ros_3d_bb.camera_messages import CameraFrame, messages_of
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.images import LAYOUTS
 from ros_3d_bb.messages import time_from
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray

@@ -8,8 +8,8 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation import DepthImage
 from ros_3d_bb.images import depth_from, rgb_from
 from ros_3d_bb.messages import camera_from_message, transform_from_message
 from ros_3d_bb.nodes import realsense_node

@@ -16,8 +16,9 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header, Int32MultiArray
 from std_srvs.srv import SetBool, SetBoolResponse, Trigger
 
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation import DepthImage, estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.measurements import read_color, read_depth, read_session
 from ros_3d_bb.messages import boxes2d_to_message, boxes3d_to_message, time_from
 from ros_3d_bb.msg import BoundingBox3DArray

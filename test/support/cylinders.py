@@ -4,7 +4,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
-from ros_3d_bb.estimation import DepthImage
+from ros_3d_bb.camera.depth_image import DepthImage
 
 FARTHEST_M = 12.0
 

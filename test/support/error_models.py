@@ -1,7 +1,7 @@
 """Error models with known numbers, and measurements made by them."""
 import numpy as np
 
-from ros_3d_bb.error_model import ErrorModel, MeasuredRange, Provenance, Spread, XBias
+from ros_3d_bb.estimation.error_model import ErrorModel, MeasuredRange, Provenance, Spread, XBias
 
 MODEL = ErrorModel(
     z_bias=(-0.04, 0.06, 0.008), x_bias=XBias(-0.05, -0.1, 0.02), z_sigma=Spread(0.01, 0.004, 0.0),

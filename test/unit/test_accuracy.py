@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from conftest import DATA
-from ros_3d_bb.estimation import estimator_named
+from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.evaluation.accuracy import Estimates, boxes_of, compare, scenario_scores, scores_of, table
 from ros_3d_bb.evaluation.scenes import position_errors_m
 from ros_3d_bb.evaluation.simulated_session import write_simulated_session

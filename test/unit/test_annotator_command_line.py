@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ros_3d_bb.error_model import read_error_model
+from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb_annotator.command_line import main
 from support.old_session import write_old_session
 from support.small_session import change_json, write_small_session

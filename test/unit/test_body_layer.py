@@ -3,7 +3,7 @@ import numpy as np
 from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as hnp
 
-from ros_3d_bb.body_layer import EDGE_PERCENT, edges, first_layer, trimmed_mean, whole, within
+from ros_3d_bb.estimation.depth_layers import EDGE_PERCENT, edges, first_layer, trimmed_mean, whole, within
 
 METRES = st.floats(0.3, 9.0)
 MILLIMETRES = hnp.arrays(int, st.integers(1, 60), elements=st.integers(300, 9000))

@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import assume, example, given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.estimation import estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, View, detection_from_box
 from ros_3d_bb.tracking.visibility import depths_towards, places_in
 from support.cylinders import Cylinder, mounted, rect_of, render

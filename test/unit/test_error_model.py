@@ -8,9 +8,9 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ros_3d_bb.error_model import (STEEPEST_BIAS, Scores, Spread, XBias, checked, corrected_boxes, read_error_model,
-                                   write_error_model)
-from ros_3d_bb.estimation import Box3D
+from ros_3d_bb.estimation.box3d_estimator import Box3D
+from ros_3d_bb.estimation.error_model import (STEEPEST_BIAS, Scores, Spread, XBias, checked, corrected_boxes,
+                                              read_error_model, write_error_model)
 from support.error_models import MODEL
 
 SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'error_models')

@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.estimation import (AXIS_BEHIND_SURFACE_M, DepthImage, estimate_boxes, estimate_foreground,
-                                  estimate_median, estimator_named, near_first, sample_foreground, sample_median,
-                                  truncated_edges)
+from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.estimation.box3d_estimator import (AXIS_BEHIND_SURFACE_M, estimate_boxes, estimate_foreground,
+                                                  estimate_median, estimator_named, near_first, sample_foreground,
+                                                  sample_median, truncated_edges)
 from ros_3d_bb.measurements import read_depth, read_session
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)

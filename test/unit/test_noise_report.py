@@ -12,7 +12,7 @@ import cv2
 import pytest
 
 import conftest
-from ros_3d_bb.error_model import read_error_model
+from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.evaluation.noise import __main__ as command
 from support.noise_tables import rows_of, write_table
 

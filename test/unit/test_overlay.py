@@ -1,7 +1,8 @@
 """Image overlays are drawn at the right place, and only inside the image."""
 import numpy as np
 
-from ros_3d_bb.estimation import DepthImage, sample_median
+from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.estimation.box3d_estimator import sample_median
 from ros_3d_bb.overlay import BOX_COLOR, INVALID_COLOR, VALID_COLOR, draw_boxes, draw_samples, depth_to_grey
 
 

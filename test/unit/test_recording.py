@@ -12,9 +12,10 @@ from hypothesis import given, strategies as st
 
 from ros_3d_bb import recording
 from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core import atomic_file
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation import Box3D, DepthImage
+from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.measurements import read_color, read_depth, read_session
 from ros_3d_bb.recording import Measurement, append, stored_depth
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from conftest import DATA
-from ros_3d_bb.error_model import read_error_model
+from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.evaluation.identities import score
 from ros_3d_bb.evaluation.scene_benchmark import (RANGE_M, depth_detector, exact_detector, main, result_of,
                                                   yolov5_detector)

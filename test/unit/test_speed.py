@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation import Box3D
+from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.evaluation import speed as benchmark
 from ros_3d_bb.evaluation.crowd import JITTER_PX, crowd_of, people_of
 from ros_3d_bb.evaluation.machine import describe_machine

@@ -2,8 +2,9 @@
 import numpy as np
 import pytest
 
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation import Box3D, DepthImage
+from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.overlay import BOX_COLOR, colorize_depth
 from ros_3d_bb.viewer_picture import RATE_WINDOW_NS, WARNING_INK, FrameRate, View, box_lines, compose, text_image
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
-from ros_3d_bb.estimation import DepthImage
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, View
 from ros_3d_bb.tracking.visibility import depths_towards, places_in
 

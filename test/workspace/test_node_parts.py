@@ -12,7 +12,7 @@ import rospy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from ros_3d_bb.estimation import DepthImage
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.graph import published_topics, publishers_of
 from ros_3d_bb.nodes.input_watch import InputWatch, unheard

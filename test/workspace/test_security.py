@@ -17,7 +17,7 @@ from ros_3d_bb.core.atomic_file import write_whole
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.detection.checkpoint import WeightsError, read_checkpoint
 from ros_3d_bb.detection.runtime import open_runtime
-from ros_3d_bb.error_model import read_error_model
+from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.evaluation.noise.tables import read_table
 from ros_3d_bb.evaluation.tracking.trajectories import read_sequence
 from ros_3d_bb.measurements import SessionError, read_session
@@ -163,6 +163,6 @@ def test_files_are_written_with_the_rights_that_the_user_wants(tmp_path):
 def test_reading_a_hostile_file_writes_nothing(tmp_path):
     """A program of its own, whose folder is watched."""
     (tmp_path / 'model.yaml').write_text(ATTACKS[0])
-    program = 'from ros_3d_bb.error_model import read_error_model; read_error_model("model.yaml")'
+    program = 'from ros_3d_bb.estimation.error_model import read_error_model; read_error_model("model.yaml")'
     result = subprocess.run([sys.executable, '-c', program], cwd=str(tmp_path), stderr=subprocess.PIPE)
     assert result.returncode == 1 and b'ValueError' in result.stderr and os.listdir(str(tmp_path)) == ['model.yaml']

@@ -53,7 +53,7 @@ class DepthPeople(object):
         Parameters
         ----------
         image : numpy.ndarray, (height, width, 3), uint8, RGB
-        depth : ros_3d_bb.estimation.DepthImage
+        depth : ros_3d_bb.estimation.box3d_estimator.DepthImage
             Aligned to the colour image.
         camera : ros_3d_bb.camera.camera_model.Camera
         floor : ros_3d_bb.detection.floor.Floor, optional

@@ -64,7 +64,7 @@ def fit_floor(depth, camera, seed=0):
 
     Parameters
     ----------
-    depth : ros_3d_bb.estimation.DepthImage
+    depth : ros_3d_bb.estimation.box3d_estimator.DepthImage
     camera : ros_3d_bb.camera.camera_model.Camera
     seed : int
         Seed of the random numbers. The same image always gives the same floor.

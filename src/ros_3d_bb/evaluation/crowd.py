@@ -5,7 +5,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.estimation import DepthImage
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.measurements import read_depth
 
 COVERED = 0.2  # of a box, by its neighbour

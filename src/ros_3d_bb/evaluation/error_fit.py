@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.error_model import ErrorModel, MeasuredRange, Provenance, Scores, Spread, XBias, checked
+from ros_3d_bb.estimation.error_model import ErrorModel, MeasuredRange, Provenance, Scores, Spread, XBias, checked
 
 DEGREES = (0, 1, 2, 3)  # of the polynomial of z_bias
 X_TERMS = ((False, True), (True, False), (True, True))  # whether x_bias has slope, and per_angle_m

@@ -6,10 +6,10 @@ import sys
 
 import numpy as np
 
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.detection.depth_people import DepthPeople
 from ros_3d_bb.detection.floor import floor_from_transform
-from ros_3d_bb.error_model import read_error_model
-from ros_3d_bb.estimation import DepthImage
+from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path, scenario_paths
 from ros_3d_bb.evaluation.identities import score
 from ros_3d_bb.evaluation.scene_tracks import is_in_image, score_tracks

@@ -5,10 +5,11 @@ from typing import List, NamedTuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.error_model import corrected_boxes
-from ros_3d_bb.estimation import DepthImage, estimate_boxes, estimator_named, is_plausible
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, is_plausible
+from ros_3d_bb.estimation.error_model import corrected_boxes
 from ros_3d_bb.evaluation.identities import Moment
 from ros_3d_bb.simulation.simulator import Frame
 from ros_3d_bb.simulation.truth import truth_at

@@ -18,7 +18,7 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation import estimate_boxes, estimate_median, estimator_named, sample_median
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_median, estimator_named, sample_median
 from ros_3d_bb.evaluation.crowd import crowd_of, people_of
 from ros_3d_bb.evaluation.defaults import default_weights
 from ros_3d_bb.evaluation.detector_speed import detector_speed

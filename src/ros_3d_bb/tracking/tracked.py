@@ -3,9 +3,9 @@ from typing import Callable, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from ros_3d_bb.body_layer import USUAL_HEIGHT_M, USUAL_WIDTH_M
 from ros_3d_bb.camera.camera_model import Camera, transform_points, upright_turns
 from ros_3d_bb.core.params import Param
+from ros_3d_bb.estimation.depth_layers import USUAL_HEIGHT_M, USUAL_WIDTH_M
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
 LARGEST_M, FARTHEST_M = 10.0, 1e8  # nobody is wider or taller, and no map is larger
@@ -42,7 +42,7 @@ def detection_from_box(box, fixed_from_camera):
 
     Parameters
     ----------
-    box : estimation.Box3D
+    box : box3d_estimator.Box3D
     fixed_from_camera : numpy.ndarray, (4, 4)
 
     Returns

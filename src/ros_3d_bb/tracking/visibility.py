@@ -78,7 +78,7 @@ def depths_towards(camera, depth, points):
     Parameters
     ----------
     camera : camera_model.Camera
-    depth : estimation.DepthImage
+    depth : box3d_estimator.DepthImage
     points : numpy.ndarray, (k, 3)
         In the optical frame, metres.
 

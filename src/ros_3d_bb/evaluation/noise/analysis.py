@@ -5,7 +5,7 @@ from typing import Any, NamedTuple, Optional
 
 import numpy as np
 
-from ros_3d_bb.error_model import ErrorModel, MeasuredRange, Provenance, Spread, XBias, checked
+from ros_3d_bb.estimation.error_model import ErrorModel, MeasuredRange, Provenance, Spread, XBias, checked
 from ros_3d_bb.evaluation.error_fit import GROWTH_OUTSIDE, LEAST_SIGMA_M, Y_SIGMA_M, fit_error_model
 from ros_3d_bb.evaluation.noise import theory
 from ros_3d_bb.evaluation.noise.statistics import AxisStatistics, axis_statistics, share_between_positions

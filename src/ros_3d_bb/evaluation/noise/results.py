@@ -1,7 +1,7 @@
 """What the noise analysis leaves: a folder with report, figures, summary and error models, and a few lines of text."""
 import json
 
-from ros_3d_bb.error_model import write_error_model
+from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.evaluation.noise.analysis import summary_of
 from ros_3d_bb.evaluation.noise.figures import polynomial_text, write_figures
 from ros_3d_bb.evaluation.noise.report import report_of

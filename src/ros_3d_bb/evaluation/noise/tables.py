@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.estimation import BORDER_PX, estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import BORDER_PX, estimate_boxes, estimator_named
 from ros_3d_bb.measurements import read_depth, read_session
 
 AXES = ('X', 'Z')

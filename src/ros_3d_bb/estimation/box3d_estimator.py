@@ -7,11 +7,10 @@ from typing import Any, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from ros_3d_bb.body_layer import (BODY_HALF_DEPTH_M, USUAL_HEIGHT_M, USUAL_WIDTH_M, edges, first_layer, trimmed_mean,
-                                  whole, within)
+from ros_3d_bb.estimation.depth_layers import (BODY_HALF_DEPTH_M, USUAL_HEIGHT_M, USUAL_WIDTH_M, edges, first_layer,
+                                               trimmed_mean, whole, within)
 from ros_3d_bb.tracking.tracked import LARGEST_M
 
-FARTHEST_M = 100.0  # farther away no depth camera measures anything
 # A box whose edge is this close to the image border is taken to be cut by it: detectors round to whole pixels and
 # regress the edge of a cut person a pixel or two inside the image.
 BORDER_PX = 2
@@ -19,22 +18,6 @@ SAMPLES_WANTED = 2000  # pixels that the foreground estimator looks at
 AXIS_BEHIND_SURFACE_M = 0.09  # mean over standing and walking bodies of the simulation, seen from all sides
 LEAST_SUPPORT = 0.1  # what carries less of the samples is no person that anything can be said about
 LEAST_WIDTH_M = 0.05
-
-
-class DepthImage(NamedTuple):
-    """A depth image as the camera sent it: `values` (height, width) of any numeric type, times `scale_m` is metres.
-
-    Zero, negative, nan, inf and more than `FARTHEST_M` mean: no depth measured there.
-    """
-
-    values: np.ndarray
-    scale_m: float
-
-    def at(self, u, v):
-        """Depth in metres at integer pixels (columns u, rows v: arrays, or slices for a grid), and whether it was
-        measured; arrays of one shape."""
-        depth_m = self.values[v, u].astype(float) * self.scale_m
-        return depth_m, (depth_m > 0) & (depth_m <= FARTHEST_M)
 
 
 class Samples(NamedTuple):

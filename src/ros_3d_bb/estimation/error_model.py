@@ -186,7 +186,7 @@ class ErrorModel(NamedTuple):
 
 
 def corrected_boxes(boxes, model):
-    """3D boxes (`estimation.Box3D`) without their bias and with their covariance."""
+    """3D boxes (`box3d_estimator.Box3D`) without their bias and with their covariance."""
     if not boxes:
         return []
     centers_m = model.corrected([box.center_m for box in boxes])
