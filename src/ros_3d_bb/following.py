@@ -13,12 +13,12 @@ from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameter
 from ros_3d_bb.core.time_sync import JUMP_NS, NS, StampedCache
 from ros_3d_bb.images import depth_from
 from ros_3d_bb.messages import camera_from_message, detections_from_message, stamp_of, time_from, usable_boxes3d
-from ros_3d_bb.tracking.measuring import NoiseParams
+from ros_3d_bb.tracking.measurement_model import NoiseParams
+from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.prediction import PredictionParams
-from ros_3d_bb.tracking.thesis import ThesisTracker, ThesisTrackerParams
-from ros_3d_bb.tracking.tracked import View
+from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
-from ros_3d_bb.tracking.visibility import depths_towards
+from ros_3d_bb.tracking.types import View
 
 TRACKING_PARAMS = ThesisTrackerParams, TrackerParams, NoiseParams, PredictionParams
 TRACKERS = {'thesis': (ThesisTracker, slice(0, 1)), 'kalman': (Tracker, slice(1, 4))}  # with their part of those
@@ -55,7 +55,7 @@ class Located(NamedTuple):
 
 
 class Followed(NamedTuple):
-    """The tracks (`tracked.TrackedObject`) after one image; the header has the newest stamp and the fixed frame."""
+    """The tracks (`types.TrackedObject`) after one image; the header has the newest stamp and the fixed frame."""
 
     header: Header
     tracks: list

@@ -6,13 +6,13 @@ from std_msgs.msg import Header
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.core.limits import LARGEST_M
 from ros_3d_bb.core.params import DEPTH_SCALE, LARGEST, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, Pairing
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named, is_plausible
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.images import checked_depth_from
 from ros_3d_bb.messages import boxes2d_from_message, camera_from_message, stamp_if_any, stamp_of, time_from
-from ros_3d_bb.tracking.tracked import LARGEST_M
 
 
 @parameters()

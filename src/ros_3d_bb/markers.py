@@ -10,7 +10,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 
 MARKERS_TOPIC = 'visualization_marker_array'
 CYLINDER, ID, VELOCITY, PREDICTION, HISTORY, ELLIPSE, PREDICTION_ELLIPSE = NAMESPACES = (
@@ -91,7 +91,7 @@ class MarkerWriter(object):
 
         Parameters
         ----------
-        tracks : list of tracked.TrackedObject
+        tracks : list of types.TrackedObject
         header : std_msgs.msg.Header
             Stamp of the image, and fixed frame.
 

@@ -8,10 +8,11 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb import msg
 from ros_3d_bb.camera.camera_model import Camera, transform_from
+from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
-from ros_3d_bb.tracking.tracked import FARTHEST_M, LARGEST_M, TrackedObject, detection_from_box
+from ros_3d_bb.tracking.types import TrackedObject, detection_from_box
 
 BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC = 'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'
 LATEST_NS = 2 ** 31 * NS  # differences of stamps have to fit into a duration
@@ -248,7 +249,7 @@ def detections_from_message(message, fixed_from_camera):
 
 
 def tracks_to_message(tracks, header):
-    """Tracks (`tracked.TrackedObject`) as TrackedObjectArray."""
+    """Tracks (`types.TrackedObject`) as TrackedObjectArray."""
     return TrackedObjectArray(header=header, objects=[_track_to_message(track) for track in tracks])
 
 

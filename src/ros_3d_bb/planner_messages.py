@@ -1,7 +1,7 @@
 """Tracks as the messages that planners read.
 
 The classes of a package that is not on every robot come as an argument, the `msg` module of that package. Tracks are
-lists of `tracked.TrackedObject` along the axes of the header's frame.
+lists of `types.TrackedObject` along the axes of the header's frame.
 """
 import numpy as np
 from geometry_msgs.msg import Point, Point32, Quaternion

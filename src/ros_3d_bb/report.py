@@ -17,7 +17,7 @@ from ros_3d_bb.messages import (BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message,
                                 transform_from_message)
 from ros_3d_bb.overlay import draw_boxes, draw_caption
 from ros_3d_bb.simulator_messages import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
-from ros_3d_bb.tracking.tracked import VISIBLE
+from ros_3d_bb.tracking.types import VISIBLE
 
 PANELS = 6
 

@@ -30,10 +30,10 @@ from ros_3d_bb.messages import (boxes2d_from_message, boxes2d_to_message, boxes3
                                 camera_from_message, detections_from_message, tracks_from_message, tracks_to_message,
                                 usable_boxes3d)
 from ros_3d_bb.planner_messages import points_to_message
+from ros_3d_bb.planning.planner_view import footprint_points, in_frame, predicted_to, usable_tracks
 from ros_3d_bb.process_bag import read_params
 from ros_3d_bb.searching import DepthDetectorParams, Yolov5NodeParams
 from ros_3d_bb.simulation.scenario import read_scenario, scenario_from
-from ros_3d_bb.tracking.for_planners import footprint_points, in_frame, predicted_to, usable_tracks
 from ros_3d_bb_annotator import legacy
 from ros_3d_bb_annotator.lengths import parse_length
 from support.masterless import on_the_wire

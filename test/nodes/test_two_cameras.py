@@ -13,7 +13,7 @@ from ros_3d_bb.evaluation.identities import score
 from ros_3d_bb.messages import stamp_of
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.report import read_recording
-from ros_3d_bb.tracking.tracked import OUT_OF_VIEW, VISIBLE
+from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE
 from support.ros import Recorder, launched
 
 SCENARIO = os.path.join(os.path.dirname(__file__), '..', '..', 'config', 'scenarios', 'two_cameras.yaml')

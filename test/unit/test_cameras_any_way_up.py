@@ -6,8 +6,8 @@ from hypothesis import assume, example, given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
-from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, View, detection_from_box
-from ros_3d_bb.tracking.visibility import depths_towards, places_in
+from ros_3d_bb.tracking.occlusion import depths_towards, places_in
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, View, detection_from_box
 from support.cylinders import Cylinder, mounted, rect_of, render
 
 LANDSCAPE, PORTRAIT = Camera(160, 120, 110, 110, 79.5, 59.5), Camera(120, 160, 110, 110, 59.5, 79.5)

@@ -5,9 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.tracking.for_planners import (disc_points, footprint_points, in_frame, position_after, predicted_to,
+from ros_3d_bb.planning.planner_view import (disc_points, footprint_points, in_frame, position_after, predicted_to,
                                              ring_points, rounding_m, usable_tracks)
-from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
+from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
 
 STEP_S = 0.25
 

@@ -10,7 +10,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.evaluation.identities import GATE_M, Moment, score, table
 from ros_3d_bb.evaluation.tracking.metrics import Scored, _data_of, _metrics
 from ros_3d_bb.tracking.association import plane_distances
-from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 
 
 def at(number, x, y, status=VISIBLE):

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.tracking.kalman import Measurements, Outliers, predict, unlikeliness, update
+from ros_3d_bb.tracking.kalman_filter import Measurements, Outliers, predict, unlikeliness, update
 
 NONE = Outliers(probability=0.0)
 AHEAD = np.array([[1.0, 0.0]])

@@ -14,8 +14,8 @@ from ros_3d_bb.evaluation.machine import describe_machine
 from ros_3d_bb.evaluation.speed_picture import draw_speed
 from ros_3d_bb.evaluation.tracking.original import OriginalTracker
 from ros_3d_bb.measurements import read_session
-from ros_3d_bb.tracking.thesis import ThesisTracker
-from ros_3d_bb.tracking.tracked import Detection
+from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
+from ros_3d_bb.tracking.types import Detection
 
 SIZE = np.array([0.5, 0.5, 1.7])
 

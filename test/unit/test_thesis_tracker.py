@@ -6,8 +6,8 @@ from hypothesis.extra import numpy as hnp
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import match_greedily, plane_distances
-from ros_3d_bb.tracking.thesis import ThesisTracker, ThesisTrackerParams
-from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, Detection
+from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, Detection
 
 SIZE = np.array([0.5, 0.5, 1.7])
 

@@ -8,10 +8,10 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.measuring import NoiseParams
+from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.prediction import PredictionParams
-from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
 
 CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)  # sees x from -0.6 to 0.6 of the depth
 VIEW = View(transform_from((0, 0, 1), OPTICAL_ROTATION), CAMERA)

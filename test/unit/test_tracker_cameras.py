@@ -10,8 +10,8 @@ from hypothesis import given, settings, strategies as st
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.out_of_sequence import LATEST_NS, MOST_KEPT
-from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
 from ros_3d_bb.tracking.tracker import Tracker
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
 
 START_NS, PERIOD_NS = 1000 * NS, NS // 30
 CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)

@@ -17,8 +17,8 @@ from ros_3d_bb.evaluation.tracking.original import OriginalTracker, as_it_arrive
 from ros_3d_bb.evaluation.tracking.perfect import outputs_with_perfect_association
 from ros_3d_bb.evaluation.tracking.robot import DRIVING
 from ros_3d_bb.evaluation.tracking.trajectories import made_sequences
-from ros_3d_bb.tracking.thesis import ThesisTracker
-from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, Detection
+from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, Detection
 
 SCENARIOS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
 KEYS = {'hota', 'mota', 'idf1', 'id_switches', 'fragmentations', 'position_rmse_m', 'velocity_rmse_mps', 'ade_1s_m',

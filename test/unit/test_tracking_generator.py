@@ -12,7 +12,7 @@ from ros_3d_bb.evaluation.tracking.generator import HORIZONS_S, Models, Timing, 
 from ros_3d_bb.evaluation.tracking.robot import DRIVING, STANDING, OdometryModel
 from ros_3d_bb.evaluation.tracking.timing import crowd
 from ros_3d_bb.evaluation.tracking.trajectories import made_sequences
-from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
 
 SECONDS = 4
 HALF_VIEW = CameraModel().field_of_view / 2

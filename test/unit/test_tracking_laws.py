@@ -6,8 +6,8 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera, transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.tracked import VISIBLE, Detection, View
 from ros_3d_bb.tracking.tracker import Tracker
+from ros_3d_bb.tracking.types import VISIBLE, Detection, View
 from support.cylinders import mounted
 
 CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)

@@ -7,8 +7,8 @@ from hypothesis import assume, given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, View
-from ros_3d_bb.tracking.visibility import depths_towards, places_in
+from ros_3d_bb.tracking.occlusion import depths_towards, places_in
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, View
 
 CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
 LOOK = transform_from((0, 0, 1), OPTICAL_ROTATION)

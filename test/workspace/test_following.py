@@ -11,7 +11,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.messages import time_from
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray
-from ros_3d_bb.tracking.tracked import VISIBLE
+from ros_3d_bb.tracking.types import VISIBLE
 
 START_NS = 1000 * NS
 

@@ -15,8 +15,8 @@ from ros_3d_bb.messages import stamp_of
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
-from ros_3d_bb.tracking.for_planners import usable_tracks
-from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
+from ros_3d_bb.planning.planner_view import usable_tracks
+from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
 from support.masterless import masterless
 
 TOPICS = ('camera/color/camera_info', 'camera/aligned_depth_to_color/image_raw', 'camera/color/image_raw',

@@ -17,8 +17,8 @@ from ros_3d_bb.messages import (boxes2d_from_message, boxes2d_to_message, boxes3
                                 camera_from_message, detections_from_message, restamped, stamp_of, time_from,
                                 tracks_from_message, tracks_to_message, transform_from_message, usable_boxes3d)
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
-from ros_3d_bb.tracking.thesis import ThesisTracker
-from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject as Track
+from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject as Track
 
 INT32 = st.integers(-2 ** 31, 2 ** 31 - 1)
 STAMP = st.integers(1, 2 ** 32 * NS - 1)

@@ -4,8 +4,8 @@ import pytest
 
 from ros_3d_bb.core.event_counter import Tally
 from ros_3d_bb.nodes.numbers import RESERVED, Numbers
-from ros_3d_bb.tracking.thesis import ThesisTracker
-from ros_3d_bb.tracking.tracked import Detection
+from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
+from ros_3d_bb.tracking.types import Detection
 
 TRACK, = ThesisTracker().update(0, [Detection(np.zeros(3), np.ones(3))])
 NAME = '/tracker_node_numbers'

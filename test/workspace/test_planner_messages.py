@@ -16,11 +16,11 @@ from ros_3d_bb.camera.camera_model import transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.messages import time_from
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
-from ros_3d_bb.nodes.planner_outputs import outputs_from
 from ros_3d_bb.planner_messages import (detections3d_to_message, objects_to_message, obstacles_to_message,
                                         people_to_message)
-from ros_3d_bb.tracking.for_planners import footprint_points, in_frame, predicted_to
-from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject
+from ros_3d_bb.planning.planner_outputs import outputs_from
+from ros_3d_bb.planning.planner_view import footprint_points, in_frame, predicted_to
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 from support.planner_definitions import PUBLISHED_MD5, message_class, package
 from support.planners import JackalMpcReplica, ObstacleLayerReplica, SocialLayerReplica, TebReplica
 

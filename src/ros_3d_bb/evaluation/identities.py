@@ -11,7 +11,7 @@ import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import assign, plane_distances
-from ros_3d_bb.tracking.tracked import VISIBLE, TrackedObject
+from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
 
 GATE_M = 1.0
 KEPT = 1000  # score of a match that is kept; of another one 0.5 at the gate to 1 at no distance, as in TrackEval

@@ -14,9 +14,9 @@ from ros_3d_bb.evaluation.identities import Moment
 from ros_3d_bb.simulation.simulator import Frame
 from ros_3d_bb.simulation.truth import truth_at
 from ros_3d_bb.tracking.association import match_greedily
-from ros_3d_bb.tracking.tracked import Detection, TrackedObject, View, detection_from_box
+from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.visibility import depths_towards
+from ros_3d_bb.tracking.types import Detection, TrackedObject, View, detection_from_box
 
 LEAST_SHOWN = 0.3  # share of the body; less of it tells nothing of where the person is
 FOUND_IOU = 0.5  # a detection is that of a person where the boxes overlap by so much, else it is false

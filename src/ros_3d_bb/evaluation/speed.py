@@ -26,9 +26,9 @@ from ros_3d_bb.evaluation.machine import describe_machine
 from ros_3d_bb.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb.evaluation.tracking.original import OriginalTracker
 from ros_3d_bb.measurements import read_color, read_session
-from ros_3d_bb.tracking.tracked import Detection, View, detection_from_box
+from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.visibility import depths_towards
+from ros_3d_bb.tracking.types import Detection, View, detection_from_box
 
 OBJECTS = (1, 2, 5, 10, 20, 50, 100)
 WARM_UPS = 10  # images before the times count: until tracks are confirmed, and caches warm

@@ -37,7 +37,7 @@ class Numbers(object):
         self._worker = NewestWorker(self._reserve, self._on_error)
 
     def continued(self, tracks):
-        """The tracks, a list of `tracked.TrackedObject`, with their numbers among all."""
+        """The tracks, a list of `types.TrackedObject`, with their numbers among all."""
         tracks = [track._replace(id=self._before + track.id) for track in tracks]
         newest = max([track.id for track in tracks], default=0)
         if newest > self._reserved - RESERVED // 2:

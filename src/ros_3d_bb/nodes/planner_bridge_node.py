@@ -11,11 +11,11 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.messages import TRACKS_TOPIC, stamp_of, time_from, tracks_from_message
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
-from ros_3d_bb.nodes.planner_outputs import outputs_from
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
 from ros_3d_bb.nodes.transport import subscribe
-from ros_3d_bb.tracking.for_planners import SAME_FRAME, predicted_to, rounding_m, usable_tracks
+from ros_3d_bb.planning.planner_outputs import outputs_from
+from ros_3d_bb.planning.planner_view import SAME_FRAME, predicted_to, rounding_m, usable_tracks
 
 MOST_ROUNDING_M = 0.005  # of coordinates: a tenth of a cell of a usual costmap
 

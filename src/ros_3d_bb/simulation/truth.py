@@ -2,7 +2,7 @@
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject, prediction_times_s
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject, prediction_times_s
 
 MIN_VISIBLE = 0.25  # minimum share of the body in the image of a person with the status VISIBLE
 MOVING_MPS = 0.05

@@ -3,7 +3,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking import kalman
+from ros_3d_bb.tracking import kalman_filter
 
 RECENT_NS = 7 * NS // 10  # tracks matched so recently are associated before those that were missed for longer
 UNSURE_SHARE = 0.1  # the density of new targets is at most this share of that of a detection at its centre
@@ -20,18 +20,18 @@ def associate(tracks, batch, stamp_ns, params, outliers):
     ----------
     tracks : numpy.ndarray of track.TRACK, (n,)
         Predicted to the stamp.
-    batch : measuring.Sightings
+    batch : measurement_model.Sightings
         m measurements.
     stamp_ns : int
     params : tracker.TrackerParams
-    outliers : kalman.Outliers
+    outliers : kalman_filter.Outliers
 
     Returns
     -------
     rows, columns : numpy.ndarray of int, (k,)
         Pairs of a track and a measurement.
     """
-    cost = kalman.unlikeliness(tracks['mean'], tracks['covariance'], batch.ground, outliers)
+    cost = kalman_filter.unlikeliness(tracks['mean'], tracks['covariance'], batch.ground, outliers)
     cost += _height_cost(tracks, batch, params.height_sigma)
     # An uncertain detection hardly tells a track from a new target; the track then gets it.
     largest_density = 1 / (2 * np.pi * np.sqrt(np.linalg.det(batch.ground.noise_m2)))

@@ -4,7 +4,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.core.params import Param, parameters
-from ros_3d_bb.tracking.tracked import PREDICTION_STEP, PREDICTION_TIME, TrackedObject, prediction_times_s
+from ros_3d_bb.tracking.types import PREDICTION_STEP, PREDICTION_TIME, TrackedObject, prediction_times_s
 
 
 @parameters('kalman: how certain predictions are')

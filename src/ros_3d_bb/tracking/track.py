@@ -2,8 +2,8 @@
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking import kalman
-from ros_3d_bb.tracking.tracked import VISIBLE
+from ros_3d_bb.tracking import kalman_filter
+from ros_3d_bb.tracking.types import VISIBLE
 
 # `hits` counts the detections of a track, `end_hits` those that showed the lower and the upper end of the body.
 # `unseen_s` is the time since the last detection, `missed_s` the part of it for which it should have been detected.
@@ -26,15 +26,15 @@ def update_matched(tracks, rows, batch, stamp_ns, params, outliers):
     tracks : numpy.ndarray of TRACK, (n,)
         Predicted to the stamp.
     rows : numpy.ndarray of int, (m,)
-    batch : measuring.Sightings
+    batch : measurement_model.Sightings
         m measurements.
     stamp_ns : int
     params : tracker.TrackerParams
-    outliers : kalman.Outliers
+    outliers : kalman_filter.Outliers
     """
     matched = tracks[rows]
-    matched['mean'], matched['covariance'] = kalman.update(matched['mean'], matched['covariance'], batch.ground,
-                                                           outliers)
+    matched['mean'], matched['covariance'] = kalman_filter.update(matched['mean'], matched['covariance'], batch.ground,
+                                                                  outliers)
     matched['hits'] += 1
     matched['last_ns'], matched['unseen_s'], matched['missed_s'], matched['status'] = stamp_ns, 0, 0, VISIBLE
     is_old_enough = stamp_ns - matched['first_ns'] >= params.min_age * NS
@@ -51,7 +51,7 @@ def new_targets(tracks, batch, stamp_ns, params):
     Parameters
     ----------
     tracks : numpy.ndarray of TRACK, (n,)
-    batch : measuring.Sightings
+    batch : measurement_model.Sightings
         m measurements.
     stamp_ns : int
     params : tracker.TrackerParams

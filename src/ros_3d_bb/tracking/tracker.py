@@ -1,10 +1,10 @@
 """The multi-object tracker: positions, velocities and predictions of people from the boxes of image after image.
 
-Each person is tracked by a constant-velocity Kalman filter in the plane (`kalman`). Detections are assigned to tracks
-by the sum of their likelihoods (`association`); a detection that a new target explains better starts a track, which is
-published once it was detected often enough (`track`). Undetected people are not dropped immediately: their tracks are
-published for a moment where the camera should have detected them, for longer where a person or an object hides them
-(`visibility`, `unseen`), and kept for longer still, so that they get their ID back.
+Each person is tracked by a constant-velocity Kalman filter in the plane (`kalman_filter`). Detections are assigned to
+tracks by the sum of their likelihoods (`association`); a detection that a new target explains better starts a track,
+which is published once it was detected often enough (`track`). Undetected people are not dropped immediately: their
+tracks are published for a moment where the camera should have detected them, for longer where a person or an object
+hides them (`occlusion`, `missed_detections`), and kept for longer still, so that they get their ID back.
 """
 from typing import NamedTuple
 
@@ -12,14 +12,14 @@ import numpy as np
 
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking import kalman
+from ros_3d_bb.tracking import kalman_filter
 from ros_3d_bb.tracking.association import associate, remaining
-from ros_3d_bb.tracking.measuring import BOX_ERRORS, NoiseParams, sightings_of
+from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, sightings_of
+from ros_3d_bb.tracking.missed_detections import SEEN, Look, carried, miss, others_of, sigma_of
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, Matches, OutOfSequenceBuffer
 from ros_3d_bb.tracking.prediction import PredictionParams, objects_of
 from ros_3d_bb.tracking.track import TRACK, new_targets, update_matched
-from ros_3d_bb.tracking.tracked import MOVING_SPEED, OUT_OF_VIEW, VISIBLE, check_steps
-from ros_3d_bb.tracking.unseen import SEEN, Look, carried, miss, others_of, sigma_of
+from ros_3d_bb.tracking.types import MOVING_SPEED, OUT_OF_VIEW, VISIBLE, check_steps
 
 KNOWN_NS = 60 * NS  # a camera that sent nothing for longer, while others did, is a new one
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped
@@ -71,7 +71,7 @@ class TrackerParams(NamedTuple):
 
 class _State(NamedTuple):
     """What images change: the tracks and the stamp of the latest image; by camera, the stamp of its latest image and
-    its `unseen.Look`.
+    its `missed_detections.Look`.
     """
 
     tracks: np.ndarray
@@ -100,7 +100,7 @@ class Tracker(object):
         """Go on with other parameters and the same tracks. Raises ValueError as at the start, and changes nothing."""
         check_steps(prediction.prediction_time, prediction.prediction_step)
         self._params, self._noise, self._prediction = params, noise, prediction
-        self._outliers = kalman.Outliers(params.outlier_share, params.outlier_offset, params.outlier_spread)
+        self._outliers = kalman_filter.Outliers(params.outlier_share, params.outlier_offset, params.outlier_spread)
 
     def reset(self):
         """Forget all tracks, as after a jump in time. IDs are not used again."""
@@ -173,8 +173,8 @@ class Tracker(object):
         """The tracks (n,) at a stamp."""
         tracks = state.tracks.copy()
         elapsed_s = 0.0 if state.now_ns is None else (stamp_ns - state.now_ns) / NS
-        tracks['mean'], tracks['covariance'] = kalman.predict(tracks['mean'], tracks['covariance'], elapsed_s,
-                                                              self._params.acceleration)
+        tracks['mean'], tracks['covariance'] = kalman_filter.predict(tracks['mean'], tracks['covariance'], elapsed_s,
+                                                                     self._params.acceleration)
         return tracks
 
     def _measure(self, state, image):

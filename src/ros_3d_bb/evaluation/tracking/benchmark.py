@@ -8,7 +8,7 @@ from ros_3d_bb.evaluation.tracking.original import OriginalTracker, as_it_arrive
 from ros_3d_bb.evaluation.tracking.perfect import outputs_with_perfect_association
 from ros_3d_bb.evaluation.tracking.robot import DRIVING, STANDING
 from ros_3d_bb.evaluation.tracking.timing import PEOPLE, cpu_ms
-from ros_3d_bb.tracking.thesis import ThesisTracker
+from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.tracker import Tracker
 
 ROWS = (('hota', '%.1f'), ('assa', '%.1f'), ('deta', '%.1f'), ('mota', '%.1f'), ('idf1', '%.1f'),

@@ -12,7 +12,7 @@ from ros_3d_bb.evaluation.tracking.camera_model import CameraModel, half_width, 
 from ros_3d_bb.evaluation.tracking.detector import HARD_TO_SEE, Detector, Seen
 from ros_3d_bb.evaluation.tracking.robot import (PERIOD_S, STANDING, OdometryModel, bearing_of, driving, from_frame,
                                                  jittered, standing, to_frame, turned, with_odometry)
-from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
 
 HORIZONS_S = np.array([0.5, 1.0, 1.5, 2.0])  # at which predictions are compared with where people went
 CAMERA_HEIGHT_M = 0.5

@@ -4,7 +4,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.tracked import OCCLUDED, VISIBLE, TrackedObject, prediction_times_s
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject, prediction_times_s
 
 
 class NorfairParams(NamedTuple):

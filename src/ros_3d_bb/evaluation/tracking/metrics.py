@@ -16,7 +16,7 @@ from scipy.optimize import linear_sum_assignment
 from ros_3d_bb.evaluation.tracking.generator import HORIZONS_S
 from ros_3d_bb.evaluation.tracking.robot import bearing_of, to_frame
 from ros_3d_bb.tracking.association import plane_distances
-from ros_3d_bb.tracking.tracked import VISIBLE
+from ros_3d_bb.tracking.types import VISIBLE
 
 PAIRED_M, MATCHED_M = 1.0, 0.5
 FAR_M = 1e3  # what a pair that is none costs

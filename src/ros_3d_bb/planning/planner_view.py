@@ -1,11 +1,11 @@
 """Tracks as planners need them: where people are now, in the planner's frame, and what ground they take up.
 
-Positions and velocities as in `tracked.TrackedObject`; points are (n, 3), metres, in the frame of the tracks.
+Positions and velocities as in `types.TrackedObject`; points are (n, 3), metres, in the frame of the tracks.
 """
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.tracking.tracked import FARTHEST_M, LARGEST_M
+from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
 
 SWATH_STEP_S = 0.1  # a person at 3 m/s is 0.3 m further on, less than a body is wide: the footprints overlap
 SAME_FRAME = np.eye(4)
@@ -17,7 +17,7 @@ def usable_tracks(tracks):
 
     Returns
     -------
-    usable : list of tracked.TrackedObject
+    usable : list of types.TrackedObject
     faults : list of str
         For each other track, what is wrong with it.
     """
@@ -54,7 +54,7 @@ def position_after(track, ahead_s):
 
     Parameters
     ----------
-    track : tracked.TrackedObject
+    track : types.TrackedObject
     ahead_s : array_like, (...)
         Seconds after the stamp of the tracks, 0 or more.
 
@@ -80,7 +80,7 @@ def in_frame(tracks, b_from_a):
 
     Parameters
     ----------
-    tracks : list of tracked.TrackedObject
+    tracks : list of types.TrackedObject
     b_from_a : numpy.ndarray, (4, 4)
         Both frames have z up.
     """
@@ -108,7 +108,7 @@ def footprint_points(tracks, ahead_s, spacing_m):
 
     Parameters
     ----------
-    tracks : list of tracked.TrackedObject
+    tracks : list of types.TrackedObject
     ahead_s : float
         How far ahead; 0: where people are only.
     spacing_m : float

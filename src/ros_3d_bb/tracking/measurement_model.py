@@ -4,8 +4,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.core.params import Param, parameters
-from ros_3d_bb.tracking.kalman import Measurements
-from ros_3d_bb.tracking.visibility import NEARER_M, wrapped
+from ros_3d_bb.tracking.kalman_filter import Measurements
+from ros_3d_bb.tracking.occlusion import NEARER_M, wrapped
 
 FLOOR_M = 0.02  # nobody's centre is known better than that: people sway as they walk
 PERSON_WIDTH_M = 0.5

@@ -12,8 +12,8 @@ import numpy as np
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import match_greedily, plane_distances
-from ros_3d_bb.tracking.tracked import (MOVING_SPEED, OCCLUDED, PREDICTION_STEP, PREDICTION_TIME, VISIBLE,
-                                        TrackedObject, check_steps, prediction_times_s)
+from ros_3d_bb.tracking.types import (MOVING_SPEED, OCCLUDED, PREDICTION_STEP, PREDICTION_TIME, VISIBLE, TrackedObject,
+                                      check_steps, prediction_times_s)
 
 
 @parameters('thesis')

@@ -1,7 +1,7 @@
 """Why a person is not seen: hidden by somebody or something, outside the camera's view, or gone."""
 import numpy as np
 
-from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 
 EDGE_RAD = 0.04  # people this close to the image border are not detected reliably
 NEAREST_M = 0.45  # nor are people this close to the camera

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.tracked import OCCLUDED, OUT_OF_VIEW, VISIBLE, View
-from ros_3d_bb.tracking.visibility import places_in
+from ros_3d_bb.tracking.occlusion import places_in
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, View
 
 SEEN = -1  # better than what `places_in` says of places where nobody was found: VISIBLE, OCCLUDED, OUT_OF_VIEW
 STATUS = np.array([OCCLUDED, OCCLUDED, OUT_OF_VIEW, VISIBLE])  # by that, the last one of SEEN

@@ -8,7 +8,6 @@ from ros_3d_bb.core.params import Param
 from ros_3d_bb.estimation.depth_layers import USUAL_HEIGHT_M, USUAL_WIDTH_M
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
-LARGEST_M, FARTHEST_M = 10.0, 1e8  # nobody is wider or taller, and no map is larger
 MOST_STEPS = 1000  # of a prediction; more only cost memory
 VERTICAL = 0.02  # horizontal part of the optical axis of a camera that looks straight up or down
 # Parameters of both trackers.
