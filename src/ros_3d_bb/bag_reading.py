@@ -9,8 +9,8 @@ import genpy
 import rosbag
 import rosbag.bag
 
+from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.params import nearest_name
-from ros_3d_bb.detection.checkpoint import cause
 
 
 class BagError(ValueError):

@@ -8,10 +8,10 @@ from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, topic_of
-from ros_3d_bb.detection.bodies import DepthPeopleParams
-from ros_3d_bb.detection.checkpoint import cause
-from ros_3d_bb.detection.runtime import RuntimeParams
-from ros_3d_bb.detection.yolov5 import DetectionParams
+from ros_3d_bb.core.error_text import cause
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from ros_3d_bb.detection.yolov5.backends import RuntimeParams
+from ros_3d_bb.detection.yolov5.detector import DetectionParams
 from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.lifting import Bbox3dParams, Lifter
 from ros_3d_bb.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter

@@ -14,9 +14,9 @@ import ros_3d_bb
 from ros_3d_bb.bag_processing import process_bag
 from ros_3d_bb.bag_reading import BagError
 from ros_3d_bb.bags import remove_partial
+from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.yaml_loader import load_yaml
-from ros_3d_bb.detection.checkpoint import cause
 from ros_3d_bb.pipeline import DETECTORS, Settings
 
 POLL_S, BAR = 0.2, 40

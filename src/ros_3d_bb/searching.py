@@ -8,10 +8,10 @@ import tf2_ros
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.core.params import ENABLED, PUBLISH_EMPTY, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, Pairing
-from ros_3d_bb.detection.depth_people import DepthPeople
-from ros_3d_bb.detection.floor import floor_from_transform
-from ros_3d_bb.detection.runtime import open_runtime
-from ros_3d_bb.detection.yolov5 import Yolov5
+from ros_3d_bb.detection.depth.detector import DepthPeople
+from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
+from ros_3d_bb.detection.yolov5.backends import open_runtime
+from ros_3d_bb.detection.yolov5.detector import Yolov5
 from ros_3d_bb.images import checked_depth_from, rgb_from
 from ros_3d_bb.messages import camera_from_message, stamp_if_any, stamp_of
 
@@ -53,7 +53,7 @@ def opened_yolov5(weights, detection, running, warn):
 
 
 def search_color(detector, message):
-    """Find objects in a colour image with a `detection.yolov5.Yolov5`.
+    """Find objects in a colour image with a `detector.Yolov5`.
 
     Returns
     -------

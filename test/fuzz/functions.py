@@ -14,11 +14,11 @@ from fuzz import hostile
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.detection.bodies import DepthPeopleParams
 from ros_3d_bb.detection.boxes import non_maximum_suppression
-from ros_3d_bb.detection.checkpoint import read_checkpoint
-from ros_3d_bb.detection.predictions import decode_heads
-from ros_3d_bb.detection.yolov5 import filter_predictions
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from ros_3d_bb.detection.yolov5.checkpoint import read_checkpoint
+from ros_3d_bb.detection.yolov5.detector import filter_predictions
+from ros_3d_bb.detection.yolov5.predictions import decode_heads
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.following import TRACKING_PARAMS, TrackerNodeParams

@@ -10,7 +10,7 @@ from dynamic_reconfigure.msg import Config
 from dynamic_reconfigure.srv import Reconfigure
 from rosgraph_msgs.msg import Log
 
-from ros_3d_bb.detection.bodies import DepthPeopleParams
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.following import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.lifting import Bbox3dParams
 from ros_3d_bb.live_parameters import live_in

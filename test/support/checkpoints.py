@@ -6,7 +6,7 @@ import types
 import numpy as np
 import torch
 
-from ros_3d_bb.detection.network import Bottleneck, C3, Concat, Conv, Detect, Focus, Network, SPP, SPPF
+from ros_3d_bb.detection.yolov5.network import Bottleneck, C3, Concat, Conv, Detect, Focus, Network, SPP, SPPF
 
 
 def write_checkpoint(path, layout, yaml=None, root='Model', anchor_grid=False, **extra):

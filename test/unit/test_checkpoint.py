@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import torch
 
-from ros_3d_bb.detection.checkpoint import EXPECTED, WeightsError, class_names, read_checkpoint
-from ros_3d_bb.detection import checkpoint
-from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime
+from ros_3d_bb.detection.yolov5 import checkpoint
+from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
+from ros_3d_bb.detection.yolov5.checkpoint import EXPECTED, WeightsError, class_names, read_checkpoint
 from support.checkpoints import official_classes, write_checkpoint
 from support.layouts import layout
 from support.red_detector import write_red_detector

@@ -6,11 +6,11 @@ import pytest
 from conftest import DATA
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.detection import depth_people
-from ros_3d_bb.detection.bodies import DepthPeopleParams, find_person_clusters, grid_of
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.detection.depth_people import DepthPeople
-from ros_3d_bb.detection.floor import Floor
+from ros_3d_bb.detection.depth import detector as depth_people
+from ros_3d_bb.detection.depth.detector import DepthPeople
+from ros_3d_bb.detection.depth.ground_plane import Floor
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_person_clusters, grid_of
 from ros_3d_bb.measurements import read_color, read_depth, read_session
 
 CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)

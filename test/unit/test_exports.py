@@ -10,16 +10,16 @@ import onnx
 import pytest
 import torch
 
-from ros_3d_bb.detection import exports, runtime as backends
-from ros_3d_bb.detection.checkpoint import WeightsError, checkpoint_digest
-from ros_3d_bb.detection.exports import export, export_folder, open_exported, with_checksum
-from ros_3d_bb.detection.onnx_export import onnx_model_of
-from ros_3d_bb.detection.onnx_runtime import ExportedRuntime, OnnxUnusable
-from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime
+from ros_3d_bb.detection.yolov5 import onnx_cache, backends
+from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
+from ros_3d_bb.detection.yolov5.checkpoint import WeightsError, checkpoint_digest
+from ros_3d_bb.detection.yolov5.onnx_backend import ExportedRuntime, OnnxUnusable
+from ros_3d_bb.detection.yolov5.onnx_cache import export, export_folder, open_exported, with_checksum
+from ros_3d_bb.detection.yolov5.onnx_export import onnx_model_of
 from support.checkpoints import random_network, write_checkpoint
 from support.layouts import layout
 
-SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(exports.__file__))))
+SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(onnx_cache.__file__))))
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def opened(checkpoint, folder, warnings):
 @pytest.fixture
 def cached_path(checkpoint, folder):
     """Path of the cached export of the checkpoint."""
-    return os.path.join(folder, '%s-%d.onnx' % (checkpoint_digest(checkpoint), exports.VERSION))
+    return os.path.join(folder, '%s-%d.onnx' % (checkpoint_digest(checkpoint), onnx_cache.VERSION))
 
 
 def content_of(path):
@@ -66,7 +66,7 @@ def rows_of(runtime):
 
 def test_a_checkpoint_is_exported_once(opened, cached_path, folder, warnings, monkeypatch):
     first = rows_of(opened())
-    monkeypatch.setattr(exports, 'export', None)
+    monkeypatch.setattr(onnx_cache, 'export', None)
     np.testing.assert_array_equal(rows_of(opened()), first)
     assert os.listdir(folder) == [os.path.basename(cached_path)] and warnings == []
     assert os.stat(folder).st_mode & 0o077 == 0
@@ -75,7 +75,7 @@ def test_a_checkpoint_is_exported_once(opened, cached_path, folder, warnings, mo
 def test_a_cached_export_does_not_need_torch(opened, checkpoint, folder):
     opened()
     code = ('import sys; sys.modules["torch"] = None\n'
-            'from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime\n'
+            'from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime\n'
             'print(open_runtime(%r, RuntimeParams(device="cpu", export_folder=%r)).names[0])' % (checkpoint, folder))
     output = subprocess.check_output([sys.executable, '-c', code], env=dict(os.environ, PYTHONPATH=os.pathsep.join(
         [SOURCE] + [path for path in sys.path if path])))
@@ -123,7 +123,7 @@ def test_a_folder_that_cannot_be_written_causes_a_warning_only(opened, folder, w
     if reason == 'a full disk':
         def full(*_unused):
             raise OSError('no space left')
-        monkeypatch.setattr(exports.os, 'replace', full)
+        monkeypatch.setattr(onnx_cache.os, 'replace', full)
     else:
         write(os.path.dirname(folder), b'')
     assert rows_of(opened()).shape[1] == 8
@@ -142,7 +142,7 @@ def test_torch_replaces_an_onnx_runtime_that_does_not_work(checkpoint, folder, w
     if fault == 'not installed':
         monkeypatch.setitem(sys.modules, 'onnxruntime', None)
     else:
-        monkeypatch.setattr(exports, 'export', lambda path, digest: with_other_weights(export(path, digest)))
+        monkeypatch.setattr(onnx_cache, 'export', lambda path, digest: with_other_weights(export(path, digest)))
     params = RuntimeParams(device='cpu', export_folder=folder)
     runtime = backends.open_runtime(checkpoint, params, warnings.append)
     assert runtime.description.startswith('torch on the CPU') and rows_of(runtime).shape[1] == 8
@@ -174,12 +174,12 @@ def test_files_of_other_origin_are_rejected():
 
 @pytest.mark.parametrize('release,digest', [('6.0', 'f57881000fd9a334'), ('5.0', 'e2f0edfc821a2f67')])
 def test_the_exported_model_changes_only_with_the_version(release, digest):
-    """Files cached by earlier releases must not be used as current ones. If this fails, increase exports.VERSION."""
+    """Files cached by earlier releases must not be used as current ones. If this fails, increase onnx_cache.VERSION."""
     network = random_network(layout(release, 'n', 3)).fuse()
     with torch.no_grad():
         for parameter in network.parameters():
             parameter.zero_()
-    assert (exports.VERSION, hashlib.sha256(onnx_model_of(network, {})).hexdigest()[:16]) == (1, digest)
+    assert (onnx_cache.VERSION, hashlib.sha256(onnx_model_of(network, {})).hexdigest()[:16]) == (1, digest)
 
 
 @pytest.mark.parametrize('variables,expected', [

@@ -4,7 +4,7 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera, transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.detection.floor import Floor, fit_floor, floor_from_transform
+from ros_3d_bb.detection.depth.ground_plane import Floor, fit_floor, floor_from_transform
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 V, U = np.mgrid[:CAMERA.height, :CAMERA.width]

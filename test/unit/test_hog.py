@@ -3,9 +3,9 @@ import cv2
 import numpy as np
 import pytest
 
-from ros_3d_bb.detection.depth_people import DepthPeople
-from ros_3d_bb.detection.hog import (BEST_HOG, LOW_SCORE, PersonHog, PersonWindow, person_score, pyramid_of,
-                                     shape_features_of)
+from ros_3d_bb.detection.depth.detector import DepthPeople
+from ros_3d_bb.detection.depth.person_classifier import (BEST_HOG, LOW_SCORE, PersonHog, PersonWindow, person_score,
+                                                         pyramid_of, shape_features_of)
 
 
 def drawing(window, shape=(480, 640)):

@@ -2,7 +2,7 @@
 import pytest
 import torch
 
-from ros_3d_bb.detection.network import Network
+from ros_3d_bb.detection.yolov5.network import Network
 from support.checkpoints import random_network
 from support.layouts import PUBLISHED_MILLIONS, layout
 

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 import torch
 
-from ros_3d_bb.detection.checkpoint import WeightsError
-from ros_3d_bb.detection import runtime as backends
-from ros_3d_bb.detection import torch_runtime
-from ros_3d_bb.detection.exports import export
-from ros_3d_bb.detection.onnx_runtime import session_of
-from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime, physical_cores
-from ros_3d_bb.detection.torch_runtime import TorchRuntime, torch_device
-from ros_3d_bb.detection.yolov5 import DetectionParams, Yolov5
+from ros_3d_bb.detection.yolov5 import backends, torch_backend
+from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime, physical_cores
+from ros_3d_bb.detection.yolov5.checkpoint import WeightsError
+from ros_3d_bb.detection.yolov5.detector import DetectionParams, Yolov5
+from ros_3d_bb.detection.yolov5.onnx_backend import session_of
+from ros_3d_bb.detection.yolov5.onnx_cache import export
+from ros_3d_bb.detection.yolov5.torch_backend import TorchRuntime, torch_device
 from ros_3d_bb.measurements import read_color, read_session
 from support.checkpoints import random_network, write_checkpoint
 from support.layouts import layout
@@ -34,7 +33,7 @@ def image_of(height=96, width=128):
 
 def predicted(network, image):
     """All predictions of a network in torch."""
-    return torch_runtime.run(network, image).numpy()
+    return torch_backend.run(network, image).numpy()
 
 
 def exported_onnx(path, network, hw, metadata, dynamic=False):
@@ -283,8 +282,8 @@ class Gpu(object):
 def test_a_gpu_is_used_by_torch_in_half_precision(monkeypatch, official_output):
     calls = []
     monkeypatch.setattr(backends, 'gpu_count', lambda: 1)
-    monkeypatch.setattr(torch_runtime, 'torch_device', lambda name: Gpu())
-    monkeypatch.setattr(torch_runtime.Network, 'to', lambda network, device: calls.append(device.type) or network)
+    monkeypatch.setattr(torch_backend, 'torch_device', lambda name: Gpu())
+    monkeypatch.setattr(torch_backend.Network, 'to', lambda network, device: calls.append(device.type) or network)
     runtime = open_runtime(official_output[0])
     assert isinstance(runtime, TorchRuntime) and calls == ['cuda']
     assert next(runtime._network.parameters()).dtype == torch.float16
@@ -301,9 +300,9 @@ def test_onnx_runtime_is_used_if_torch_cannot_use_the_gpu(monkeypatch, official_
 def test_half_precision_gives_the_same_boxes(official_output):
     """Within 1 px and 0.01 of the recorded predictions. Runs on the CPU."""
     path, cases = official_output
-    network = torch_runtime.network_of(path)[0].half()
+    network = torch_backend.network_of(path)[0].half()
     for image, rows, values in cases:
-        output = torch_runtime.run(network, image).numpy()[rows]
+        output = torch_backend.run(network, image).numpy()[rows]
         likely = values[:, 4] > 0.2
         assert output.dtype == np.float32 and likely.any()
         assert np.abs(output - values)[likely, :4].max() <= 1

@@ -3,15 +3,15 @@ import sys
 
 import pytest
 
-from ros_3d_bb.detection.checkpoint import WeightsError
-from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime
+from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
+from ros_3d_bb.detection.yolov5.checkpoint import WeightsError
 
 
 @pytest.fixture
 def without_torch(monkeypatch):
     """A machine without torch, on which nothing has imported it yet."""
     for module in [name for name in sys.modules if name.startswith('ros_3d_bb.detection.')]:
-        if not module.endswith(('.checkpoint', '.runtime')):  # whose error and function are those of this test
+        if not module.endswith(('.checkpoint', '.backends')):  # whose error and function are those of this test
             monkeypatch.delitem(sys.modules, module)
     monkeypatch.setitem(sys.modules, 'torch', None)
 
@@ -27,6 +27,6 @@ def test_the_error_says_what_to_install(tmp_path, without_torch, name, runtime):
 
 
 def test_a_fault_of_another_import_is_not_taken_for_it(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, 'ros_3d_bb.detection.torch_runtime', None)
+    monkeypatch.setitem(sys.modules, 'ros_3d_bb.detection.yolov5.torch_backend', None)
     with pytest.raises(ImportError):
         open_runtime(str(tmp_path / 'model.torchscript'), RuntimeParams('torch', 'cpu', 1))

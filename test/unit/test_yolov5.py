@@ -5,9 +5,10 @@ from hypothesis import given, settings, strategies as st
 from hypothesis.extra import numpy as hnp
 
 from ros_3d_bb.detection.boxes import Detections, iou, non_maximum_suppression
-from ros_3d_bb.detection.predictions import batch_of
-from ros_3d_bb.detection.runtime import open_runtime
-from ros_3d_bb.detection.yolov5 import DetectionParams, Yolov5, class_number, filter_predictions, apply_letterbox
+from ros_3d_bb.detection.yolov5.backends import open_runtime
+from ros_3d_bb.detection.yolov5.detector import (DetectionParams, Yolov5, class_number, filter_predictions,
+                                                 apply_letterbox)
+from ros_3d_bb.detection.yolov5.predictions import batch_of
 from ros_3d_bb.measurements import read_color, read_session
 
 

@@ -15,8 +15,8 @@ import yaml
 
 from ros_3d_bb.core.atomic_file import write_whole
 from ros_3d_bb.core.yaml_loader import load_yaml
-from ros_3d_bb.detection.checkpoint import WeightsError, read_checkpoint
-from ros_3d_bb.detection.runtime import open_runtime
+from ros_3d_bb.detection.yolov5.backends import open_runtime
+from ros_3d_bb.detection.yolov5.checkpoint import WeightsError, read_checkpoint
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.evaluation.noise.tables import read_table
 from ros_3d_bb.evaluation.tracking.trajectories import read_sequence

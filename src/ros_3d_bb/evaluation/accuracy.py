@@ -49,8 +49,8 @@ def boxes_of(session, weights=None):
             raise ValueError('frame %s has no 2D box; all frames with ground truth need one' % frame.id)
     if weights is None:
         return [frame.boxes_px[0] for frame in session.frames]
-    from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime  # may import torch, which takes seconds
-    from ros_3d_bb.detection.yolov5 import Yolov5
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch, which takes seconds
+    from ros_3d_bb.detection.yolov5.detector import Yolov5
     detector, chosen = Yolov5(open_runtime(weights, RuntimeParams(device='cpu'))), []
     for frame in session.frames:
         boxes = detector.detect(read_color(frame, session.camera)).boxes

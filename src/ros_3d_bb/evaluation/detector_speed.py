@@ -18,7 +18,7 @@ def detector_speed(images, weights, runtimes=('torch', 'onnxruntime'), sizes=(64
     weights : str
         A checkpoint (.pt): the one kind of file that every runtime can run.
     runtimes : sequence of str
-        See `ros_3d_bb.detection.runtime`. All run on the CPU.
+        See `ros_3d_bb.detection.yolov5.backends`. All run on the CPU.
     sizes : sequence of int
         Longer side of the input, pixels.
     threads : sequence of int
@@ -45,8 +45,8 @@ def detector_speed(images, weights, runtimes=('torch', 'onnxruntime'), sizes=(64
 
 
 def _detector(weights, runtime, size, threads):
-    from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime
-    from ros_3d_bb.detection.yolov5 import DetectionParams, Yolov5
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
+    from ros_3d_bb.detection.yolov5.detector import DetectionParams, Yolov5
     running = RuntimeParams(runtime=runtime, device='cpu', threads=threads)
     return Yolov5(open_runtime(weights, running), DetectionParams(image_size=size))
 

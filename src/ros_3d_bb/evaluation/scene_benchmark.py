@@ -7,8 +7,8 @@ import sys
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.detection.depth_people import DepthPeople
-from ros_3d_bb.detection.floor import floor_from_transform
+from ros_3d_bb.detection.depth.detector import DepthPeople
+from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path, scenario_paths
 from ros_3d_bb.evaluation.identities import score
@@ -34,8 +34,8 @@ def depth_detector(simulator):
 
 def yolov5_detector(weights):
     """YOLOv5 for `run_scene`, of a checkpoint. Raises ValueError where it cannot be used."""
-    from ros_3d_bb.detection.runtime import RuntimeParams, open_runtime  # may import torch, which takes seconds
-    from ros_3d_bb.detection.yolov5 import Yolov5
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch, which takes seconds
+    from ros_3d_bb.detection.yolov5.detector import Yolov5
     detector = Yolov5(open_runtime(weights, RuntimeParams(device='cpu')))
     return lambda frame: detector.detect(frame.color).boxes
 

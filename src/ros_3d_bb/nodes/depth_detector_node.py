@@ -7,7 +7,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.time_sync import arrival_clock_ns
-from ros_3d_bb.detection.bodies import DepthPeopleParams
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.nodes.boxes_output import BoxesOutput, Switch
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node

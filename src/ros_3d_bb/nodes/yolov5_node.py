@@ -4,8 +4,8 @@ from sensor_msgs.msg import Image
 
 from ros_3d_bb.camera_messages import COLOR_TOPIC
 from ros_3d_bb.core.latest_worker import NewestWorker
-from ros_3d_bb.detection.runtime import RuntimeParams
-from ros_3d_bb.detection.yolov5 import DetectionParams
+from ros_3d_bb.detection.yolov5.backends import RuntimeParams
+from ros_3d_bb.detection.yolov5.detector import DetectionParams
 from ros_3d_bb.nodes.boxes_output import BoxesOutput, Switch
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node

@@ -1,13 +1,13 @@
-"""Export of `ros_3d_bb.detection.network.Network` to ONNX.
+"""Export of `ros_3d_bb.detection.yolov5.network.Network` to ONNX.
 
 The input of the model is an RGB image (1, height, width, 3), uint8, whose height and width are multiples of the stride.
-The outputs are the heads of the network (see `ros_3d_bb.detection.predictions`).
+The outputs are the heads of the network (see `ros_3d_bb.detection.yolov5.predictions`).
 """
 import numpy as np
 from torch import nn
 
-from ros_3d_bb.detection import network as yolov5
-from ros_3d_bb.detection.onnx_file import FLOAT, UINT8, Graph
+from ros_3d_bb.detection.yolov5 import network as yolov5
+from ros_3d_bb.detection.yolov5.onnx_writer import FLOAT, UINT8, Graph
 
 
 def onnx_model_of(network, metadata):
@@ -15,7 +15,7 @@ def onnx_model_of(network, metadata):
 
     Parameters
     ----------
-    network : ros_3d_bb.detection.network.Network
+    network : ros_3d_bb.detection.yolov5.network.Network
         Fused, float32, on the CPU.
     metadata : dict of str to str
         Metadata of the model.

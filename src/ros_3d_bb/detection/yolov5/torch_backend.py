@@ -1,12 +1,13 @@
-"""Runtimes by torch: checkpoints in a network of ours, and TorchScript exports. See `ros_3d_bb.detection.runtime`."""
+"""Torch backends: checkpoints in the network of this package, and TorchScript exports. See `backends`."""
 import json
 
 import numpy as np
 import torch
 
-from ros_3d_bb.detection.checkpoint import EXPECTED, WeightsError, cause, class_names, read_checkpoint
-from ros_3d_bb.detection.network import Network
-from ros_3d_bb.detection.predictions import batch_of, check_stride, predictions
+from ros_3d_bb.core.error_text import cause
+from ros_3d_bb.detection.yolov5.checkpoint import EXPECTED, WeightsError, class_names, read_checkpoint
+from ros_3d_bb.detection.yolov5.network import Network
+from ros_3d_bb.detection.yolov5.predictions import batch_of, check_stride, predictions
 
 
 def torch_device(name):
@@ -27,7 +28,7 @@ def network_of(path):
 
     Returns
     -------
-    network : ros_3d_bb.detection.network.Network
+    network : ros_3d_bb.detection.yolov5.network.Network
         Fused, float32, on the CPU.
     names : list of str
         Class names.

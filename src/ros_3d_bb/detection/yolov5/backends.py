@@ -11,9 +11,9 @@ import warnings
 from typing import NamedTuple
 
 from ros_3d_bb.core.params import Param, parameters
-from ros_3d_bb.detection.checkpoint import WeightsError
-from ros_3d_bb.detection.exports import export_folder, open_exported
-from ros_3d_bb.detection.onnx_runtime import OnnxRuntime, OnnxUnusable
+from ros_3d_bb.detection.yolov5.checkpoint import WeightsError
+from ros_3d_bb.detection.yolov5.onnx_backend import OnnxRuntime, OnnxUnusable
+from ros_3d_bb.detection.yolov5.onnx_cache import export_folder, open_exported
 
 RUNTIMES = ('auto', 'onnxruntime', 'torch')
 MAX_THREADS = 4  # default maximum; small networks gain little from more threads
@@ -76,7 +76,7 @@ def _open_file(path, params, threads, warn):
     if path.endswith(('.torchscript', '.torchscript.pt')):
         if params.runtime == 'onnxruntime':
             raise ValueError('runtime onnxruntime cannot run %s; use auto or torch, or the .pt checkpoint' % path)
-        from ros_3d_bb.detection.torch_runtime import TorchScriptRuntime, torch_device
+        from ros_3d_bb.detection.yolov5.torch_backend import TorchScriptRuntime, torch_device
         return TorchScriptRuntime(path, torch_device(params.device), threads)
     return _open_checkpoint(path, params, threads, warn)
 
@@ -90,7 +90,7 @@ def _open_checkpoint(path, params, threads, warn):
             if params.runtime == 'onnxruntime':
                 raise
             warn('%s; using torch instead, which takes twice as long' % error)
-    from ros_3d_bb.detection.torch_runtime import TorchRuntime, torch_device
+    from ros_3d_bb.detection.yolov5.torch_backend import TorchRuntime, torch_device
     return TorchRuntime(path, torch_device(params.device), threads)
 
 
@@ -104,7 +104,7 @@ def on_gpu(device):
     if gpu_count() == 0:
         return False
     try:
-        from ros_3d_bb.detection.torch_runtime import torch_device
+        from ros_3d_bb.detection.yolov5.torch_backend import torch_device
     except ImportError:  # only torch runs networks on a GPU
         return False
     return torch_device('auto').type == 'cuda'

@@ -13,6 +13,8 @@ from typing import Dict, List, NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.core.error_text import cause
+
 EXPECTED = 'expected the checkpoint (.pt) of an official YOLOv5 detection model, release 5.0 to 7.0'
 # Modules whose classes become inert stand-ins: the model itself, and leftovers of training in the file.
 INERT_MODULES = ('models', 'utils', 'torch.nn', 'numpy', '_codecs', 'pathlib', 'datetime')
@@ -70,11 +72,6 @@ def checkpoint_digest(path):
 
 def _missing(path):
     return WeightsError('weights %s: no such file; %s' % (path, EXPECTED))
-
-
-def cause(error):
-    """Message of an exception as one short line without control characters, or its type if the message is empty."""
-    return ascii(' '.join(str(error).split()))[1:-1][:300] or type(error).__name__
 
 
 class Inert(object):

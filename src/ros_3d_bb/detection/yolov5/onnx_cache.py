@@ -12,9 +12,10 @@ import os
 import numpy as np
 
 from ros_3d_bb.core.atomic_file import write_whole
-from ros_3d_bb.detection.checkpoint import cause, checkpoint_digest
-from ros_3d_bb.detection.onnx_file import metadata_entry
-from ros_3d_bb.detection.onnx_runtime import INSTALL, ExportedRuntime, OnnxUnusable, reference_image
+from ros_3d_bb.core.error_text import cause
+from ros_3d_bb.detection.yolov5.checkpoint import checkpoint_digest
+from ros_3d_bb.detection.yolov5.onnx_backend import INSTALL, ExportedRuntime, OnnxUnusable, reference_image
+from ros_3d_bb.detection.yolov5.onnx_writer import metadata_entry
 
 VERSION = 1  # of the cached files; increase it when network.py or onnx_export.py change their content
 
@@ -34,7 +35,7 @@ def open_exported(path, folder, threads, warn):
 
     Returns
     -------
-    ros_3d_bb.detection.onnx_runtime.ExportedRuntime
+    ros_3d_bb.detection.yolov5.onnx_backend.ExportedRuntime
 
     Raises
     ------
@@ -80,8 +81,8 @@ def export(path, digest):
     -------
     bytes
     """
-    from ros_3d_bb.detection.onnx_export import onnx_model_of  # importing torch takes a second and 200 MB
-    from ros_3d_bb.detection.torch_runtime import network_of, run
+    from ros_3d_bb.detection.yolov5.onnx_export import onnx_model_of  # importing torch takes a second and 200 MB
+    from ros_3d_bb.detection.yolov5.torch_backend import network_of, run
     network, names = network_of(path)
     detect, stride = network.model[-1], int(network.stride)
     reference = run(network, reference_image(stride)).numpy()

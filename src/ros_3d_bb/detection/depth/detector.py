@@ -7,10 +7,11 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from ros_3d_bb.detection.bodies import DepthPeopleParams, check_params, find_person_clusters, grid_of
 from ros_3d_bb.detection.boxes import Detections
-from ros_3d_bb.detection.floor import check_upright, fit_floor
-from ros_3d_bb.detection.hog import BEST_HOG, PersonHog, PersonWindow, person_score, pyramid_of, shape_features_of
+from ros_3d_bb.detection.depth.ground_plane import check_upright, fit_floor
+from ros_3d_bb.detection.depth.person_classifier import (BEST_HOG, PersonHog, PersonWindow, person_score, pyramid_of,
+                                                         shape_features_of)
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, check_params, find_person_clusters, grid_of
 
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
 MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person
@@ -56,7 +57,7 @@ class DepthPeople(object):
         depth : ros_3d_bb.estimation.box3d_estimator.DepthImage
             Aligned to the colour image.
         camera : ros_3d_bb.camera.camera_model.Camera
-        floor : ros_3d_bb.detection.floor.Floor, optional
+        floor : ros_3d_bb.detection.depth.ground_plane.Floor, optional
             If not given, the floor is fitted to this image. If that fails, the last fitted floor is used.
 
         Returns

@@ -53,7 +53,7 @@ class Yolov5(object):
     Parameters
     ----------
     runtime : callable
-        See `ros_3d_bb.detection.runtime`.
+        See `ros_3d_bb.detection.yolov5.backends`.
     params : DetectionParams
 
     Raises

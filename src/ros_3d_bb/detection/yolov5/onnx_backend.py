@@ -1,12 +1,13 @@
-"""ONNX Runtime backends, on the CPU. See `ros_3d_bb.detection.runtime`."""
+"""ONNX Runtime backends, on the CPU. See `ros_3d_bb.detection.yolov5.backends`."""
 import ast
 import base64
 import json
 
 import numpy as np
 
-from ros_3d_bb.detection.checkpoint import WeightsError, cause, class_names
-from ros_3d_bb.detection.predictions import batch_of, check_stride, decode_heads, predictions
+from ros_3d_bb.core.error_text import cause
+from ros_3d_bb.detection.yolov5.checkpoint import WeightsError, class_names
+from ros_3d_bb.detection.yolov5.predictions import batch_of, check_stride, decode_heads, predictions
 
 # Maximum difference between ONNX Runtime and torch. Measured with yolov5n: 3e-4 px, 1e-6.
 MAX_DIFFERENCE_PX, MAX_DIFFERENCE = 0.05, 1e-3
@@ -48,7 +49,7 @@ class OnnxRuntime(object):
 
 
 class ExportedRuntime(object):
-    """Checkpoint that was exported to ONNX by `ros_3d_bb.detection.exports`.
+    """Checkpoint that was exported to ONNX by `ros_3d_bb.detection.yolov5.onnx_cache`.
 
     Parameters
     ----------

@@ -1,0 +1,4 @@
+"""People in depth images without a trained network: ground plane, clusters, classifier.
+
+May import: core, detection.
+"""
