@@ -9,10 +9,10 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.bag_reading import BagError, BagReader, Raw, message_in
 from ros_3d_bb.bag_transforms import BagTransforms
 from ros_3d_bb.bags import new_bag
-from ros_3d_bb.camera_messages import COLOR_TOPIC, STATIC_TOPIC, TF_TOPIC
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, STATIC_TOPIC, TF_TOPIC
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import Tally
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.messages import BOXES_TOPIC
 from ros_3d_bb.pipeline import INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, Pipeline, Settings
 from ros_3d_bb.searching import opened_yolov5, search_color
 

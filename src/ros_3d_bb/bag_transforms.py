@@ -3,8 +3,8 @@ import collections
 
 import tf2_ros
 
+from ros_3d_bb.conversions.perception_msgs import check_transforms, transform_from_message
 from ros_3d_bb.core.time_sync import JUMP_NS
-from ros_3d_bb.messages import check_transforms, transform_from_message
 
 
 class BagTransforms(object):

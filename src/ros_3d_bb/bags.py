@@ -12,13 +12,13 @@ import rosbag
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
-from ros_3d_bb.camera_messages import CameraFrame, messages_of, topic_of
+from ros_3d_bb.conversions.camera_msgs import START_NS, CameraFrame, frame_id_of, messages_of, topic_of
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_message, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.measurements import SessionError, read_color, read_depth, read_session
-from ros_3d_bb.messages import BOXES_TOPIC, boxes2d_to_message, time_from
 from ros_3d_bb.simulation.scenario import ScenarioError, with_overrides, read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulator_messages import START_NS, frame_id_of, simulated_messages
+from ros_3d_bb.simulator_messages import simulated_messages
 
 PARTIAL = '.active'  # suffix of incomplete bags, as of rosbag record
 MOUNT_M = (0.17, 0.0, 0.20)  # position of the camera of a Jackal in base_link: forward, left, up (thesis 3.5.1)

@@ -8,11 +8,12 @@ import numpy as np
 import tf2_ros
 from std_msgs.msg import Header
 
+from ros_3d_bb.conversions.image_msgs import depth_from
+from ros_3d_bb.conversions.perception_msgs import (camera_from_message, detections_from_message, stamp_of, time_from,
+                                                   usable_boxes3d)
 from ros_3d_bb.core.camera_clocks import LONGEST_LAG_NS, CameraClocks
 from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import JUMP_NS, NS, StampedCache
-from ros_3d_bb.images import depth_from
-from ros_3d_bb.messages import camera_from_message, detections_from_message, stamp_of, time_from, usable_boxes3d
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.prediction import PredictionParams

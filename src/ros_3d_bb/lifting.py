@@ -5,14 +5,15 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.image_msgs import checked_depth_from
+from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_message, camera_from_message, stamp_if_any, stamp_of,
+                                                   time_from)
 from ros_3d_bb.core.limits import LARGEST_M
 from ros_3d_bb.core.params import DEPTH_SCALE, LARGEST, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, Pairing
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named, is_plausible
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
-from ros_3d_bb.images import checked_depth_from
-from ros_3d_bb.messages import boxes2d_from_message, camera_from_message, stamp_if_any, stamp_of, time_from
 
 
 @parameters()
@@ -59,7 +60,7 @@ class Lifter(object):
     params : Bbox3dParams
     tally : event_counter.Tally
     on_frame : callable
-        Called with `messages.Boxes2D`, sensor_msgs/Image and `camera_model.Camera` of one stamp.
+        Called with `perception_msgs.Boxes2D`, sensor_msgs/Image and `camera_model.Camera` of one stamp.
     depth_topic, info_topic : str
         Where depth images and camera_info come from, for messages about missing ones.
 
@@ -122,7 +123,7 @@ class Lifter(object):
 
         Parameters
         ----------
-        boxes2d : messages.Boxes2D
+        boxes2d : perception_msgs.Boxes2D
         depth_msg : sensor_msgs.msg.Image
         camera : camera_model.Camera
 

@@ -7,7 +7,9 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, topic_of
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, topic_of
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_message,
+                                                   boxes3d_to_message, tracks_to_message)
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
@@ -15,8 +17,6 @@ from ros_3d_bb.detection.yolov5.detector import DetectionParams
 from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.lifting import Bbox3dParams, Lifter
 from ros_3d_bb.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
-from ros_3d_bb.messages import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_message, boxes3d_to_message,
-                                tracks_to_message)
 from ros_3d_bb.searching import DepthDetectorParams, DepthSearch, Yolov5NodeParams
 
 INFO_TOPIC = INFO_TOPICS[0]

@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 import rosbag
 
-from ros_3d_bb.camera_messages import COLOR_TOPIC, topic_of
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, topic_of
+from ros_3d_bb.conversions.image_msgs import rgb_from
+from ros_3d_bb.conversions.perception_msgs import (BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message, stamp_of,
+                                                   tracks_from_message, transform_from_message)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.evaluation.identities import Moment, score, table
 from ros_3d_bb.evaluation.picture import Paths, scene_picture
-from ros_3d_bb.images import rgb_from
-from ros_3d_bb.messages import (BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message, stamp_of, tracks_from_message,
-                                transform_from_message)
 from ros_3d_bb.overlay import draw_boxes, draw_caption
 from ros_3d_bb.simulator_messages import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
 from ros_3d_bb.tracking.types import VISIBLE

@@ -6,14 +6,14 @@ import genpy
 import tf2_ros
 
 from ros_3d_bb.camera.camera_model import transform_from
+from ros_3d_bb.conversions.image_msgs import checked_depth_from, rgb_from
+from ros_3d_bb.conversions.perception_msgs import camera_from_message, stamp_if_any, stamp_of
 from ros_3d_bb.core.params import ENABLED, PUBLISH_EMPTY, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, Pairing
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
 from ros_3d_bb.detection.yolov5.backends import open_runtime
 from ros_3d_bb.detection.yolov5.detector import Yolov5
-from ros_3d_bb.images import checked_depth_from, rgb_from
-from ros_3d_bb.messages import camera_from_message, stamp_if_any, stamp_of
 
 CACHE_NS = NS  # how long images wait for each other
 NEWEST = genpy.Time(0)  # what tf takes it for

@@ -2,19 +2,12 @@
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.camera_messages import CAMERA, TF_TOPIC, CameraFrame, messages_of, topic_of
-from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.messages import time_from, tracks_to_message
+from ros_3d_bb.conversions.camera_msgs import TF_TOPIC, CameraFrame, frame_id_of, messages_of, topic_of
+from ros_3d_bb.conversions.perception_msgs import time_from, tracks_to_message
 from ros_3d_bb.simulation.truth import truth_at
 
-START_NS = 1600000000 * NS  # when scenes and bags begin: any time will do, but the same each time
 TRUTH_TOPIC = 'ground_truth'
 MAP_FRAME, ODOM_FRAME, BASE_FRAME = 'map', 'odom', 'base_link'
-
-
-def frame_id_of(camera):
-    """The frame of the images of one of several cameras by its name, '' of the only one."""
-    return '%s_color_optical_frame' % (camera or CAMERA)
 
 
 def simulated_messages(simulator, frame, stamp_ns):

@@ -12,6 +12,11 @@ import yaml
 
 from fuzz import hostile
 from ros_3d_bb.camera.camera_model import transform_from
+from ros_3d_bb.conversions.image_msgs import array_from, depth_from, rgb_from
+from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_message, boxes2d_to_message, boxes3d_from_message,
+                                                   boxes3d_to_message, camera_from_message, detections_from_message,
+                                                   tracks_from_message, tracks_to_message, usable_boxes3d)
+from ros_3d_bb.conversions.planner_msgs import points_to_message
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import non_maximum_suppression
@@ -22,14 +27,9 @@ from ros_3d_bb.detection.yolov5.predictions import decode_heads
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.following import TRACKING_PARAMS, TrackerNodeParams
-from ros_3d_bb.images import array_from, depth_from, rgb_from
 from ros_3d_bb.lifting import Bbox3dParams
 from ros_3d_bb.markers import MarkerParams
 from ros_3d_bb.measurements import read_session
-from ros_3d_bb.messages import (boxes2d_from_message, boxes2d_to_message, boxes3d_from_message, boxes3d_to_message,
-                                camera_from_message, detections_from_message, tracks_from_message, tracks_to_message,
-                                usable_boxes3d)
-from ros_3d_bb.planner_messages import points_to_message
 from ros_3d_bb.planning.planner_view import footprint_points, in_frame, predicted_to, usable_tracks
 from ros_3d_bb.process_bag import read_params
 from ros_3d_bb.searching import DepthDetectorParams, Yolov5NodeParams

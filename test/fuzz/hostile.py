@@ -9,10 +9,10 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import MODELS
-from ros_3d_bb.camera_messages import CameraFrame, messages_of
+from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
+from ros_3d_bb.conversions.image_msgs import LAYOUTS
+from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.images import LAYOUTS
-from ros_3d_bb.messages import time_from
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 
 FLOATS = (0.0, -0.0, 1.0, -1.0, 0.5, 3.0, float('nan'), float('inf'), -float('inf'), 1e308, -1e308, 5e-324, 1e-30, 1e6)

@@ -8,9 +8,9 @@ from dynamic_reconfigure.client import Client
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 
+from ros_3d_bb.conversions.image_msgs import fill_image
+from ros_3d_bb.conversions.perception_msgs import boxes2d_to_message, time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.images import fill_image
-from ros_3d_bb.messages import boxes2d_to_message, time_from
 from ros_3d_bb.msg import BoundingBox3DArray
 from support.ros import (TIMEOUT_S, Recorder, camera_info, depth_message, diagnostics_of, header_at, publisher,
                          wait_until)

@@ -8,9 +8,9 @@ from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.messages import boxes2d_from_message
 from ros_3d_bb.simulation.scenario import scenario_from
 from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulator_messages import simulated_messages

@@ -18,10 +18,10 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.conversions.image_msgs import fill_image
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, boxes2d_to_message
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.evaluation.latency import end, free_port
-from ros_3d_bb.images import fill_image
-from ros_3d_bb.messages import boxes2d_from_message, boxes2d_to_message
 from ros_3d_bb.nodes.doctor import graph_findings
 from support.ros import Recorder, camera_info, depth_message, header_at, wait_until
 

@@ -14,7 +14,7 @@ from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Int32MultiArray
 from visualization_msgs.msg import MarkerArray
 
-from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from support.processes import hanging, killed_and_back, never_reading, starved

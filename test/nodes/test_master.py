@@ -14,7 +14,7 @@ from dynamic_reconfigure.client import Client
 from sensor_msgs.msg import CameraInfo
 from std_srvs.srv import Trigger
 
-from ros_3d_bb.camera_messages import INFO_TOPICS
+from ros_3d_bb.conversions.camera_msgs import INFO_TOPICS
 from ros_3d_bb.measurements import read_session
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.label import Label

@@ -16,8 +16,8 @@ from sensor_msgs import point_cloud2
 from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.messages import time_from
 from ros_3d_bb.msg import TrackedObject, TrackedObjectArray
 from support.planner_definitions import message_class
 from support.ros import Recorder, diagnostics_of, header_at, publisher, wait_until

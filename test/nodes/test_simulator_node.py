@@ -10,8 +10,8 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.images import depth_from, rgb_from
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.simulation.scenario import read_scenario
 from ros_3d_bb.simulation.simulator import Simulator

@@ -9,8 +9,8 @@ import pytest
 import rosbag
 import rospy
 
+from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.evaluation.identities import score
-from ros_3d_bb.messages import stamp_of
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.report import read_recording
 from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE

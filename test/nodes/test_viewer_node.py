@@ -17,14 +17,15 @@ from std_msgs.msg import Header, Int32MultiArray
 from std_srvs.srv import SetBool, SetBoolResponse, Trigger
 
 from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.conversions.camera_msgs import frame_id_of
+from ros_3d_bb.conversions.perception_msgs import boxes2d_to_message, boxes3d_to_message, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.measurements import read_color, read_depth, read_session
-from ros_3d_bb.messages import boxes2d_to_message, boxes3d_to_message, time_from
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.simulation.scenario import scenario_from
 from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulator_messages import frame_id_of, simulated_messages
+from ros_3d_bb.simulator_messages import simulated_messages
 from support.processes import pid_of
 from support.ros import Recorder, launched, publisher, wait_until
 from support.screen import press, start_screen

@@ -11,11 +11,11 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool
 
+from ros_3d_bb.conversions.image_msgs import fill_image, rgb_from
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, stamp_of
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.images import fill_image, rgb_from
 from ros_3d_bb.measurements import read_color, read_session
-from ros_3d_bb.messages import boxes2d_from_message, stamp_of
 from support.ros import TIMEOUT_S, Recorder, diagnostics_of, header_at, launched, publisher, wait_until
 
 START = 1000 * NS

@@ -3,9 +3,9 @@ import collections
 
 import numpy as np
 
-from ros_3d_bb.camera_messages import COLOR_TOPIC
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
 from ros_3d_bb.evaluation.machine import describe_machine
-from ros_3d_bb.messages import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
 from soak.invariants import (BALANCES, balance_of, cpu_ms_of, findings_of, growth_of, halves_ms, lags_of, last_of_each,
                              processes_of, thirds_of)
 

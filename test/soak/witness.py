@@ -7,9 +7,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Int32MultiArray
 from visualization_msgs.msg import MarkerArray
 
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
 from ros_3d_bb.evaluation.processes import usage_of
 from ros_3d_bb.markers import MARKERS_TOPIC
-from ros_3d_bb.messages import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.latency_probe_node import stamp_in
 from soak.invariants import BALANCES

@@ -10,8 +10,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-from ros_3d_bb.images import fill_image
-from ros_3d_bb.messages import time_from
+from ros_3d_bb.conversions.image_msgs import fill_image
+from ros_3d_bb.conversions.perception_msgs import time_from
 
 TIMEOUT_S = 20.0
 

@@ -11,13 +11,13 @@ import rospy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2
 
-from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, TF_TOPIC, TYPES
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, START_NS, TF_TOPIC, TYPES
+from ros_3d_bb.conversions.perception_msgs import restamped, time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.messages import restamped, time_from
 from ros_3d_bb.msg import TrackedObject, TrackedObjectArray
 from ros_3d_bb.simulation.scenario import scenario_from
 from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulator_messages import START_NS, simulated_messages
+from ros_3d_bb.simulator_messages import simulated_messages
 from support.ros import TIMEOUT_S, Recorder, publisher, wait_until
 
 TOPICS = INFO_TOPICS[0], DEPTH_TOPIC, COLOR_TOPIC, TF_TOPIC

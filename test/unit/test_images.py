@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.images import array_from, depth_from, fill_image, rgb_from
+from ros_3d_bb.conversions.image_msgs import array_from, depth_from, fill_image, rgb_from
 
 
 def message_of(pixels, encoding, padding=0, big_endian=False):

@@ -7,10 +7,10 @@ import pytest
 import yaml
 from hypothesis import given, strategies as st
 
+from ros_3d_bb.conversions.image_msgs import LAYOUTS, array_from, depth_from, fill_image, rgb_from
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
-from ros_3d_bb.images import LAYOUTS, array_from, depth_from, fill_image, rgb_from
 from ros_3d_bb.measurements import SessionError, read_session
 from ros_3d_bb.simulation.scenario import ScenarioError, scenario_from
 

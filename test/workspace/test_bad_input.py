@@ -12,9 +12,10 @@ from std_msgs.msg import Header
 
 from fuzz import hostile
 from fuzz.nodes import TARGETS, _quiet, _send_transforms
-from ros_3d_bb.camera_messages import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message,
+                                                   time_from)
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.messages import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message, time_from
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from support.masterless import masterless, on_the_wire
 

@@ -9,11 +9,11 @@ import rosbag
 import tf2_ros
 
 from ros_3d_bb.bags import START_NS, SessionBagOptions, images_in, scenario_images, session_images, write_bag
+from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from
+from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_message, camera_from_message, time_from,
+                                                   tracks_from_message, transform_from_message)
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.images import depth_from, rgb_from
 from ros_3d_bb.measurements import read_color, read_depth, read_session
-from ros_3d_bb.messages import (boxes2d_from_message, camera_from_message, time_from, tracks_from_message,
-                                transform_from_message)
 from ros_3d_bb.simulation.scenario import scenario_from
 from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulation.truth import truth_at

@@ -10,10 +10,10 @@ import rospy
 from ros_3d_bb.bag_processing import process_bag
 from ros_3d_bb.bag_reading import BagError
 from ros_3d_bb.bags import scenario_images, write_bag
+from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.event_counter import Tally
 from ros_3d_bb.evaluation.identities import score
 from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
-from ros_3d_bb.messages import stamp_of
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline import Settings
 from ros_3d_bb.process_bag import with_tracker

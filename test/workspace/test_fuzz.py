@@ -11,7 +11,7 @@ from fuzz.functions import FUNCTIONS, fuzz_functions
 from fuzz.hostile import good_boxes, good_frame
 from fuzz.nodes import TARGETS, fuzz_node
 from ros_3d_bb import overlay
-from ros_3d_bb.messages import stamp_of
+from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode

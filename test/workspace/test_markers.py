@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
+from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.markers import HISTORY_POINTS, NAMESPACES, PALETTE, MarkerParams, MarkerWriter
-from ros_3d_bb.messages import time_from
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject
 
 ALL = MarkerParams(marker_namespaces=list(NAMESPACES))

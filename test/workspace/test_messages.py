@@ -10,12 +10,13 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb.camera.camera_model import Camera, transform_from
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.camera_messages import CameraFrame, messages_of
+from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
+from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_message, boxes2d_to_message, boxes3d_from_message,
+                                                   boxes3d_to_message, camera_from_message, detections_from_message,
+                                                   restamped, stamp_of, time_from, tracks_from_message,
+                                                   tracks_to_message, transform_from_message, usable_boxes3d)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
-from ros_3d_bb.messages import (boxes2d_from_message, boxes2d_to_message, boxes3d_from_message, boxes3d_to_message,
-                                camera_from_message, detections_from_message, restamped, stamp_of, time_from,
-                                tracks_from_message, tracks_to_message, transform_from_message, usable_boxes3d)
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject as Track

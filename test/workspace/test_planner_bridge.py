@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.messages import TRACKS_TOPIC, time_from
 from ros_3d_bb.msg import TrackedObject, TrackedObjectArray
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeNode
 from support.masterless import masterless

@@ -13,11 +13,11 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.camera_model import transform_from, transform_points
+from ros_3d_bb.conversions.perception_msgs import time_from
+from ros_3d_bb.conversions.planner_msgs import (detections3d_to_message, objects_to_message, obstacles_to_message,
+                                                people_to_message)
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.messages import time_from
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
-from ros_3d_bb.planner_messages import (detections3d_to_message, objects_to_message, obstacles_to_message,
-                                        people_to_message)
 from ros_3d_bb.planning.planner_outputs import outputs_from
 from ros_3d_bb.planning.planner_view import footprint_points, in_frame, predicted_to
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject

@@ -11,7 +11,7 @@ import yaml
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray, MultiArrayDimension
 
-from ros_3d_bb.messages import boxes2d_from_message, time_from
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, time_from
 from support.code_blocks import claimed
 
 DEMO_AND_TESTS = claimed('./run demo\n./run test')

@@ -4,8 +4,8 @@ import collections
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.messages import stamp_of
 from ros_3d_bb.tracking.out_of_sequence import MOST_KEPT
 from support.two_cameras import PERIODS_NS, START_NS, Play
 

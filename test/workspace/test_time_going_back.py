@@ -2,8 +2,8 @@
 import pytest
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped
 
+from ros_3d_bb.conversions.perception_msgs import stamp_of, time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.messages import stamp_of, time_from
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from support.masterless import masterless, on_the_wire
 from support.two_cameras import PERIOD_NS, START_NS, Rig, Transforms, boxes

@@ -1,11 +1,11 @@
 """From messages to what was seen of them, the same for a running graph and for a bag."""
 import collections
 
+from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from, units_fault
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, camera_from_message
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.roles import ROLES
 from ros_3d_bb.diagnosis.seen import CameraSeen, ImageSeen, Stream
-from ros_3d_bb.images import depth_from, rgb_from, units_fault
-from ros_3d_bb.messages import boxes2d_from_message, camera_from_message
 
 KEPT = 1000  # stamps of a topic
 

@@ -5,10 +5,10 @@ import rospy
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 
-from ros_3d_bb.camera_messages import DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_message
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
 from ros_3d_bb.lifting import Bbox3dParams, Lifter
-from ros_3d_bb.messages import BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_message
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.depth_camera import DepthCameraCheck
 from ros_3d_bb.nodes.diagnostics import Diagnostics

@@ -7,8 +7,8 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, SetBoolResponse
 
-from ros_3d_bb.images import fill_image
-from ros_3d_bb.messages import boxes2d_to_message
+from ros_3d_bb.conversions.image_msgs import fill_image
+from ros_3d_bb.conversions.perception_msgs import boxes2d_to_message
 from ros_3d_bb.overlay import draw_boxes
 
 SILENT_S = 5.0  # an image waits so long for its search to end

@@ -3,8 +3,8 @@ import rospy
 from sensor_msgs.msg import CameraInfo
 
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault
-from ros_3d_bb.camera_messages import DEPTH_TOPIC
-from ros_3d_bb.messages import camera_from_message
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC
+from ros_3d_bb.conversions.perception_msgs import camera_from_message
 
 
 class DepthCameraCheck(object):

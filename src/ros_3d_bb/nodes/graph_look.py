@@ -9,7 +9,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import CameraInfo
 
-from ros_3d_bb.camera_messages import topic_of
+from ros_3d_bb.conversions.camera_msgs import topic_of
+from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
 from ros_3d_bb.diagnosis.bag_look import CLASSES, tf_seen
 from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, INFO
 from ros_3d_bb.diagnosis.observing import Observation, camera_seen, color_seen, depth_seen
@@ -17,7 +18,6 @@ from ros_3d_bb.diagnosis.roles import ROLES
 from ros_3d_bb.diagnosis.seen import Clock, Seen
 from ros_3d_bb.following import TrackerNodeParams
 from ros_3d_bb.lifting import Bbox3dParams
-from ros_3d_bb.messages import TRACKS_TOPIC
 from ros_3d_bb.nodes.graph import published_topics, publishers_of
 from ros_3d_bb.nodes.transport import IMAGE_BUFFER
 

@@ -11,9 +11,9 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Int32MultiArray
 from visualization_msgs.msg import MarkerArray
 
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.evaluation.processes import usage_of
-from ros_3d_bb.messages import BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe

@@ -6,9 +6,9 @@ import rospy
 import tf2_ros
 from std_msgs.msg import Header
 
+from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, stamp_of, time_from, tracks_from_message
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.messages import TRACKS_TOPIC, stamp_of, time_from, tracks_from_message
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node

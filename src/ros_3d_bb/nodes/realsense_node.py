@@ -10,11 +10,11 @@ import tf2_ros
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
-from ros_3d_bb.camera_messages import (COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, TYPES, CameraFrame, image_messages_of,
-                                       transform_messages)
+from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, TYPES, CameraFrame,
+                                               image_messages_of, transform_messages)
+from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.params import SET_BY_LAUNCH, WAIT_FOR_SUBSCRIBERS, Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.messages import time_from
 from ros_3d_bb.nodes.diagnostics import Diagnostics, is_ending
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.subscribers import wait_for_subscribers

@@ -8,9 +8,9 @@ import rospy
 from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.bags import images_in
-from ros_3d_bb.camera_messages import TYPES
+from ros_3d_bb.conversions.camera_msgs import TYPES
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, restamped
 from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters
-from ros_3d_bb.messages import BOXES_TOPIC, restamped
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
 

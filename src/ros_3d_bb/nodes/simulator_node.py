@@ -7,17 +7,17 @@ from typing import NamedTuple
 import rospy
 from rosgraph_msgs.msg import Clock
 
-from ros_3d_bb.camera_messages import COLOR_TOPIC, TF_TOPIC, TYPES, topic_of
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, START_NS, TF_TOPIC, TYPES, topic_of
+from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.params import WAIT_FOR_SUBSCRIBERS, Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.messages import time_from
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics, is_ending
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.subscribers import wait_for_subscribers
 from ros_3d_bb.simulation.scenario import read_scenario, with_overrides
 from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulator_messages import START_NS, TRUTH_TOPIC, simulated_messages
+from ros_3d_bb.simulator_messages import TRUTH_TOPIC, simulated_messages
 
 CLOCK_LEAD_NS = NS  # between the time that is told while waiting and the first image
 PAUSE_NS = 3 * NS  # between two rounds of a scene, so that the people of one are not taken for those of the next

@@ -5,8 +5,8 @@ import time
 import rospy
 import tf2_ros
 
+from ros_3d_bb.conversions.perception_msgs import check_transforms, transform_from_message
 from ros_3d_bb.diagnosis.tf_tree import links_in, why_missing
-from ros_3d_bb.messages import check_transforms, transform_from_message
 
 LONGEST_WAIT_S = 0.05  # without news; shutting down takes no longer
 EXPLAINED_S = 2.0  # between two looks at the whole tree for one pair of frames; each takes as long as some images

@@ -10,11 +10,12 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
+from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, boxes2d_from_message, boxes3d_from_message,
+                                                   camera_from_message, stamp_if_any, stamp_of, time_from,
+                                                   usable_boxes3d)
 from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
-from ros_3d_bb.images import depth_from, rgb_from
-from ros_3d_bb.messages import (BOXES3D_TOPIC, boxes2d_from_message, boxes3d_from_message, camera_from_message,
-                                stamp_if_any, stamp_of, time_from, usable_boxes3d)
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.label import Label

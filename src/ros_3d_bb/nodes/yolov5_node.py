@@ -2,7 +2,7 @@
 import rospy
 from sensor_msgs.msg import Image
 
-from ros_3d_bb.camera_messages import COLOR_TOPIC
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
 from ros_3d_bb.detection.yolov5.detector import DetectionParams

@@ -6,9 +6,9 @@ from typing import Any, Callable, NamedTuple
 from sensor_msgs.msg import PointCloud2
 
 from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.conversions.planner_msgs import (detections3d_to_message, objects_to_message, obstacles_to_message,
+                                                people_to_message, points_to_message)
 from ros_3d_bb.core.params import nearest_name
-from ros_3d_bb.planner_messages import (detections3d_to_message, objects_to_message, obstacles_to_message,
-                                        people_to_message, points_to_message)
 from ros_3d_bb.planning.planner_view import footprint_points, in_frame, ring_points
 
 CLEARING_SPACING_M = 0.025  # half a cell of a usual costmap: the rays from the robot leave out none

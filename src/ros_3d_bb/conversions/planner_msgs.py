@@ -7,7 +7,7 @@ import numpy as np
 from geometry_msgs.msg import Point, Point32, Quaternion
 from sensor_msgs.msg import PointCloud2, PointField
 
-from ros_3d_bb.messages import tracks_to_message
+from ros_3d_bb.conversions.perception_msgs import tracks_to_message
 from ros_3d_bb.msg import TrackedObject
 
 STATUS_NAMES = {TrackedObject.VISIBLE: 'visible', TrackedObject.OCCLUDED: 'occluded',

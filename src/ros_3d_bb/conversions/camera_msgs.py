@@ -10,7 +10,8 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.camera.camera_model import Camera, quaternion_from
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import PLUMB_BOB
-from ros_3d_bb.images import fill_image
+from ros_3d_bb.conversions.image_msgs import fill_image
+from ros_3d_bb.core.time_sync import NS
 
 TF_TOPIC, STATIC_TOPIC = 'tf', 'tf_static'
 COLOR_TOPIC, DEPTH_TOPIC = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
@@ -18,6 +19,7 @@ INFO_TOPICS = ('camera/color/camera_info', 'camera/aligned_depth_to_color/camera
 CAMERA = 'camera'  # namespace of the only camera's topics
 TYPES = {TF_TOPIC: TFMessage, COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPICS[0]: CameraInfo,
          INFO_TOPICS[1]: CameraInfo}
+START_NS = 1600000000 * NS  # when scenes and bags begin: any time will do, but the same each time
 
 
 class CameraFrame(NamedTuple):
@@ -85,3 +87,8 @@ def _transform(stamp, parent, child, parent_from_child):
     place.x, place.y, place.z = parent_from_child[:3, 3].tolist()
     turn.x, turn.y, turn.z, turn.w = quaternion_from(parent_from_child).tolist()
     return message
+
+
+def frame_id_of(camera):
+    """The frame of the images of one of several cameras by its name, '' of the only one."""
+    return '%s_color_optical_frame' % (camera or CAMERA)
