@@ -3,7 +3,7 @@ from typing import Any, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from ros_3d_bb.overlay import BOX_COLOR, INVALID_COLOR, VALID_COLOR
+from ros_3d_bb.visualization.image_overlay import BOX_COLOR, INVALID_COLOR, VALID_COLOR
 
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui
 

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.overlay import colorize_depth, depth_to_grey
+from ros_3d_bb.visualization.image_overlay import colorize_depth, depth_to_grey
 from ros_3d_bb_annotator.qt import QtGui
 
 CACHE_SIZE = 7  # number of measurements: the current one and its neighbours

@@ -16,8 +16,8 @@ from ros_3d_bb.detection.yolov5.backends import RuntimeParams
 from ros_3d_bb.detection.yolov5.detector import DetectionParams
 from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.lifting import Bbox3dParams, Lifter
-from ros_3d_bb.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 from ros_3d_bb.searching import DepthDetectorParams, DepthSearch, Yolov5NodeParams
+from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 
 INFO_TOPIC = INFO_TOPICS[0]
 INPUTS = {COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPIC: CameraInfo, BOXES_TOPIC: Int32MultiArray,

@@ -14,8 +14,8 @@ from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.following import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.lifting import Bbox3dParams
 from ros_3d_bb.live_parameters import live_in
-from ros_3d_bb.markers import MarkerParams
 from ros_3d_bb.searching import DepthDetectorParams
+from ros_3d_bb.visualization.markers import MarkerParams
 from support.ros import TIMEOUT_S, Recorder, wait_until
 
 LIVE = {'bbox3d_node': live_in([Bbox3dParams]),

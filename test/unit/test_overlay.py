@@ -3,7 +3,8 @@ import numpy as np
 
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.estimation.box3d_estimator import sample_median
-from ros_3d_bb.overlay import BOX_COLOR, INVALID_COLOR, VALID_COLOR, draw_boxes, draw_samples, depth_to_grey
+from ros_3d_bb.visualization.image_overlay import (BOX_COLOR, INVALID_COLOR, VALID_COLOR, draw_boxes, draw_samples,
+                                                   depth_to_grey)
 
 
 def test_boxes_are_drawn_with_their_edges():

@@ -10,13 +10,13 @@ from tf2_msgs.msg import TFMessage
 from fuzz.functions import FUNCTIONS, fuzz_functions
 from fuzz.hostile import good_boxes, good_frame
 from fuzz.nodes import TARGETS, fuzz_node
-from ros_3d_bb import overlay
 from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.planning.planner_view import usable_tracks
 from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
+from ros_3d_bb.visualization import image_overlay
 from support.masterless import masterless
 
 TOPICS = ('camera/color/camera_info', 'camera/aligned_depth_to_color/image_raw', 'camera/color/image_raw',
@@ -68,9 +68,10 @@ def test_tracks_of_absurd_size_get_to_no_planner():
 def test_edges_far_outside_the_image_are_not_walked_along(monkeypatch):
     """OpenCV takes a tenth of a second for one of 2^31 pixels."""
     corners = []
-    monkeypatch.setattr(overlay.cv2, 'rectangle', lambda _image, *given: corners.extend(given[0] + given[1]))
-    overlay.draw_boxes(np.zeros((48, 64, 3), np.uint8), np.array([[-2 ** 31, 5, 2 ** 31 - 1, 20], [3, 4, 9, 1e300]]),
-                       ['', ''])
+    monkeypatch.setattr(image_overlay.cv2, 'rectangle', lambda _image, *given: corners.extend(given[0] + given[1]))
+    image_overlay.draw_boxes(np.zeros((48, 64, 3), np.uint8),
+                             np.array([[-2 ** 31, 5, 2 ** 31 - 1, 20], [3, 4, 9, 1e300]]),
+                             ['', ''])
     assert corners == [-4, 5, 68, 20, 3, 4, 9, 52]
 
 

@@ -8,8 +8,8 @@ from visualization_msgs.msg import Marker
 
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.markers import HISTORY_POINTS, NAMESPACES, PALETTE, MarkerParams, MarkerWriter
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject
+from ros_3d_bb.visualization.markers import HISTORY_POINTS, NAMESPACES, PALETTE, MarkerParams, MarkerWriter
 
 ALL = MarkerParams(marker_namespaces=list(NAMESPACES))
 SECOND_NS = 1000 * NS

@@ -11,7 +11,7 @@ import roslaunch
 import yaml
 
 from ros_3d_bb.core.params import check, params_from, table_of
-from ros_3d_bb.markers import NAMESPACES
+from ros_3d_bb.visualization.markers import NAMESPACES
 from support.pages import node_pages
 from support.standard_library import STANDARD_LIBRARY, TEST_STANDARD_LIBRARY
 

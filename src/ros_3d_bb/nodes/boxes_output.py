@@ -9,7 +9,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_message
-from ros_3d_bb.overlay import draw_boxes
+from ros_3d_bb.visualization.image_overlay import draw_boxes
 
 SILENT_S = 5.0  # an image waits so long for its search to end
 

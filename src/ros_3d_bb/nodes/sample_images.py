@@ -8,7 +8,7 @@ from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.time_sync import StampedCache
 from ros_3d_bb.nodes.master import patient_master
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
-from ros_3d_bb.overlay import draw_boxes, draw_samples, depth_to_grey
+from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_samples, depth_to_grey
 
 
 class SampleImages(object):

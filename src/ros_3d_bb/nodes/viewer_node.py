@@ -23,8 +23,8 @@ from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.recording import Measurement, append
 from ros_3d_bb.snapshots import Snapshots
-from ros_3d_bb.viewer_picture import FrameRate, View, compose, text_image
-from ros_3d_bb.window import Window, WindowError
+from ros_3d_bb.visualization.cv_window import Window, WindowError
+from ros_3d_bb.visualization.viewer_layout import FrameRate, View, compose, text_image
 
 COLOR_TOPIC, DEPTH_TOPIC = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
 CAMERA_INFO_TOPIC = 'camera/color/camera_info'

@@ -11,7 +11,7 @@ import numpy as np
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
-from ros_3d_bb.overlay import colorize_depth, draw_boxes, depth_to_grey
+from ros_3d_bb.visualization.image_overlay import colorize_depth, draw_boxes, depth_to_grey
 
 PAPER, INK, WARNING_INK = (32, 32, 32), (235, 235, 235), (255, 190, 60)
 FONT, FONT_SCALE, LINE_PX, MARGIN_PX = cv2.FONT_HERSHEY_SIMPLEX, 0.45, 20, 8
