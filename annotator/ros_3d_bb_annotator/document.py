@@ -11,8 +11,8 @@ import numpy as np
 from ros_3d_bb.camera.depth_image import FARTHEST_M
 from ros_3d_bb.core.atomic_file import FILE_NAME, changing
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
-from ros_3d_bb.measurements import (Session, SessionError, camera_of, boxes_of_others, read_color, read_depth,
-                                    read_description, session_errors)
+from ros_3d_bb.sessions.session_reader import (Session, SessionError, camera_of, boxes_of_others, read_color,
+                                               read_depth, read_description, session_errors)
 from ros_3d_bb_annotator import legacy
 from ros_3d_bb_annotator.drafts import Drafts
 from ros_3d_bb_annotator.entries import (Edit, changed, changes_with_estimate, detections_with, entry_at, grid_of,

@@ -1,5 +1,5 @@
 """Edits of the document by the window."""
-from ros_3d_bb.measurements import SessionError
+from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb_annotator import dialogs
 from ros_3d_bb_annotator.truth_panel import error_text
 

@@ -4,8 +4,8 @@ from typing import Any, Dict, NamedTuple, Optional
 
 import numpy as np
 
-from ros_3d_bb.measurements import SessionError
-from ros_3d_bb.recording import box_entry
+from ros_3d_bb.sessions.session_reader import SessionError
+from ros_3d_bb.sessions.session_writer import box_entry
 from ros_3d_bb_annotator.measurement import Mark
 
 DIGITS = 3  # micrometres: negligible rounding that avoids values such as 1229.9999999999998

@@ -4,7 +4,7 @@ import io
 import os
 
 from ros_3d_bb.core.atomic_file import write_whole
-from ros_3d_bb.measurements import SessionError
+from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb_annotator.measurement import ANNOTATED
 
 COLUMNS = ('X measured', 'X true', 'Z measured', 'Z true', 'X error', 'X absolute error', 'Z error', 'Z absolute error')

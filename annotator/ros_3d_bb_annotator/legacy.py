@@ -10,7 +10,7 @@ import os
 import re
 
 from ros_3d_bb.core.atomic_file import FILE_NAME
-from ros_3d_bb.measurements import SessionError, read_image
+from ros_3d_bb.sessions.session_reader import SessionError, read_image
 
 FORM = 'thesis'
 TEXT_NAME = 'measurements.txt'

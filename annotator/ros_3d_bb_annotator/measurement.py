@@ -2,7 +2,7 @@
 import os
 from typing import NamedTuple, Optional, Tuple
 
-from ros_3d_bb.measurements import Detection, SessionError, frame_of, session_errors
+from ros_3d_bb.sessions.session_reader import Detection, SessionError, frame_of, session_errors
 
 NEW, ANNOTATED, REJECTED = 'new', 'annotated', 'rejected'
 # Field of the stretched depth of the old format. Its name differs from that of depth in metric units.

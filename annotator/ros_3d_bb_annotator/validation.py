@@ -2,7 +2,7 @@
 import collections
 import os
 
-from ros_3d_bb.measurements import SessionError, read_description
+from ros_3d_bb.sessions.session_reader import SessionError, read_description
 from ros_3d_bb_annotator.measurement import ANNOTATED, REJECTED
 
 MAX_ERROR_M = 1.0  # a larger error means that the estimate is of another person, or the truth of another place

@@ -15,7 +15,7 @@ from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.conversions.camera_msgs import START_NS, CameraFrame, frame_id_of, messages_of, topic_of
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_message, time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.measurements import SessionError, read_color, read_depth, read_session
+from ros_3d_bb.sessions.session_reader import SessionError, read_color, read_depth, read_session
 from ros_3d_bb.simulation.scenario import ScenarioError, with_overrides, read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulator_messages import simulated_messages

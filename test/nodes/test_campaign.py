@@ -16,8 +16,8 @@ import rospy
 
 from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.atomic_file import changing
-from ros_3d_bb.measurements import read_session
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
+from ros_3d_bb.sessions.session_reader import read_session
 from support.ros import Recorder, launched, wait_until
 from support.screen import press, start_screen
 

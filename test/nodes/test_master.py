@@ -15,10 +15,10 @@ from sensor_msgs.msg import CameraInfo
 from std_srvs.srv import Trigger
 
 from ros_3d_bb.conversions.camera_msgs import INFO_TOPICS
-from ros_3d_bb.measurements import read_session
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.label import Label
 from ros_3d_bb.nodes.registration import Registration, on_new_master
+from ros_3d_bb.sessions.session_reader import read_session
 from support.processes import killed_and_back, pid_of
 from support.ros import TIMEOUT_S, Recorder, launched, wait_until
 from support.stage import RECOVERY_IMAGES, Stage

@@ -9,7 +9,7 @@ import rosbag
 import rospy
 from std_srvs.srv import Trigger
 
-from ros_3d_bb.measurements import read_color, read_depth, read_session
+from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from support.ros import launched, wait_until
 
 SCENE = """

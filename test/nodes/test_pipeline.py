@@ -13,8 +13,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ros_3d_bb.bags import MOUNT_M, START_NS, SessionBagOptions, scenario_images, session_images, write_bag
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
-from ros_3d_bb.measurements import read_depth, read_session
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
+from ros_3d_bb.sessions.session_reader import read_depth, read_session
 from ros_3d_bb.simulation.scenario import scenario_from
 from support.ros import Recorder, launched, wait_until
 

@@ -21,8 +21,8 @@ from ros_3d_bb.conversions.camera_msgs import frame_id_of
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_message, boxes3d_to_message, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
-from ros_3d_bb.measurements import read_color, read_depth, read_session
 from ros_3d_bb.msg import BoundingBox3DArray
+from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.simulation.scenario import scenario_from
 from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulator_messages import simulated_messages

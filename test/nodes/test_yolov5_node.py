@@ -15,7 +15,7 @@ from ros_3d_bb.conversions.image_msgs import fill_image, rgb_from
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, stamp_of
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.measurements import read_color, read_session
+from ros_3d_bb.sessions.session_reader import read_color, read_session
 from support.ros import TIMEOUT_S, Recorder, diagnostics_of, header_at, launched, publisher, wait_until
 
 START = 1000 * NS

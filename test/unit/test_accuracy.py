@@ -9,7 +9,7 @@ from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.evaluation.accuracy import Estimates, boxes_of, compare, scenario_scores, scores_of, table
 from ros_3d_bb.evaluation.scenes import position_errors_m
 from ros_3d_bb.evaluation.simulated_session import write_simulated_session
-from ros_3d_bb.measurements import read_session
+from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb.simulation.scenario import read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
 

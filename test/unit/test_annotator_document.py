@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb.core.atomic_file import changing
-from ros_3d_bb.measurements import SessionError, read_session
+from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.measurement import Mark
 from support.small_session import (FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json, write_measurement,

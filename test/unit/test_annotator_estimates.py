@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ros_3d_bb.measurements import read_session
+from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_annotator.document import Document
 from support.small_session import FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json
 from support.synthetic_session import write_synthetic_session

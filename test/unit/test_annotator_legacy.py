@@ -4,7 +4,7 @@ import os
 import numpy as np
 import pytest
 
-from ros_3d_bb.measurements import SessionError, read_session
+from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_annotator.analysis import analyse
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.export import rows_of

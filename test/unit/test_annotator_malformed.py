@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ros_3d_bb.measurements import SessionError, read_session
+from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.validation import problems_of
 from support.small_session import NEAR_BOX, change_json, read_json

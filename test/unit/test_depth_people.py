@@ -11,7 +11,7 @@ from ros_3d_bb.detection.depth import detector as depth_people
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import Floor
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_person_clusters, grid_of
-from ros_3d_bb.measurements import read_color, read_depth, read_session
+from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 
 CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
 # (lowest, highest, to the right, nearer, half the width, shade), metres: a person in mid-stride, facing the camera

@@ -9,7 +9,7 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.estimation.box3d_estimator import (AXIS_BEHIND_SURFACE_M, estimate_boxes, estimate_foreground,
                                                   estimate_median, estimator_named, near_first, sample_foreground,
                                                   sample_median, truncated_edges)
-from ros_3d_bb.measurements import read_depth, read_session
+from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
 

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ros_3d_bb.measurements import SessionError, read_color, read_depth, read_session
+from ros_3d_bb.sessions.session_reader import SessionError, read_color, read_depth, read_session
 from support.synthetic_session import FRAMES_PER_PLACE, PLACES_M, write_synthetic_session
 
 

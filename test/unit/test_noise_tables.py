@@ -4,7 +4,7 @@ import pytest
 
 from ros_3d_bb.evaluation.noise.tables import (Measurements, TableError, clusters_of, read_session_measurements,
                                                read_table)
-from ros_3d_bb.measurements import read_session
+from ros_3d_bb.sessions.session_reader import read_session
 from support.noise_tables import COLUMNS, RANGES_M, SIDES_M, rows_of, write_table
 
 

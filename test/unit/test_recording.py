@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb import recording
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core import atomic_file
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
-from ros_3d_bb.measurements import read_color, read_depth, read_session
-from ros_3d_bb.recording import Measurement, append, stored_depth
+from ros_3d_bb.sessions import session_writer
+from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
+from ros_3d_bb.sessions.session_writer import Measurement, append, stored_depth
 
 CAMERA = Camera(64, 48, 60.0, 61.0, 31.5, 23.25, 'plumb_bob', (0.1, -0.2, 0.001, 0.002, 0.03))
 STAMP_NS = 1616161616 * NS + 123456789
@@ -214,7 +214,7 @@ def test_a_full_disk_does_not_change_the_session(folder, monkeypatch, full_at):
             raise OSError(28, 'No space left on device')
         write_whole(path, data)
 
-    monkeypatch.setattr(recording, 'write_whole', failing)
+    monkeypatch.setattr(session_writer, 'write_whole', failing)
     monkeypatch.setattr(atomic_file, 'write_whole', failing)
     with pytest.raises(OSError):
         append(folder, measurement(1))

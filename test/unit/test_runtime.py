@@ -14,7 +14,7 @@ from ros_3d_bb.detection.yolov5.detector import DetectionParams, Yolov5
 from ros_3d_bb.detection.yolov5.onnx_backend import session_of
 from ros_3d_bb.detection.yolov5.onnx_cache import export
 from ros_3d_bb.detection.yolov5.torch_backend import TorchRuntime, torch_device
-from ros_3d_bb.measurements import read_color, read_session
+from ros_3d_bb.sessions.session_reader import read_color, read_session
 from support.checkpoints import random_network, write_checkpoint
 from support.layouts import layout
 from support.official_reference import made

@@ -13,7 +13,7 @@ from ros_3d_bb.evaluation.crowd import JITTER_PX, crowd_of, people_of
 from ros_3d_bb.evaluation.machine import describe_machine
 from ros_3d_bb.evaluation.speed_picture import draw_speed
 from ros_3d_bb.evaluation.tracking.original import OriginalTracker
-from ros_3d_bb.measurements import read_session
+from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.types import Detection
 

@@ -10,7 +10,7 @@ import pytest
 
 from conftest import DATA
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.measurements import read_depth, read_session
+from ros_3d_bb.sessions.session_reader import read_depth, read_session
 from ros_3d_bb.simulation.stereo import StereoCamera, StereoParams
 
 D435I = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)

@@ -9,7 +9,7 @@ from ros_3d_bb.detection.yolov5.backends import open_runtime
 from ros_3d_bb.detection.yolov5.detector import (DetectionParams, Yolov5, class_number, filter_predictions,
                                                  apply_letterbox)
 from ros_3d_bb.detection.yolov5.predictions import batch_of
-from ros_3d_bb.measurements import read_color, read_session
+from ros_3d_bb.sessions.session_reader import read_color, read_session
 
 
 class FixedRuntime(object):

@@ -13,7 +13,7 @@ from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_message, camera_from_message, time_from,
                                                    tracks_from_message, transform_from_message)
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.measurements import read_color, read_depth, read_session
+from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.simulation.scenario import scenario_from
 from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulation.truth import truth_at

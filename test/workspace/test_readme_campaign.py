@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from ros_3d_bb.measurements import read_session
+from ros_3d_bb.sessions.session_reader import read_session
 from support.code_blocks import claimed
 
 BOXES, TRACKS = 'ros_3d_bb/bb_3d:boxes', 'ros_3d_bb/tracks:objects'

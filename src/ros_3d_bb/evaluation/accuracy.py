@@ -17,7 +17,7 @@ from ros_3d_bb.estimation.error_model import read_error_model, write_error_model
 from ros_3d_bb.evaluation.defaults import default_weights, scenario_path
 from ros_3d_bb.evaluation.error_fit import coverage, data_of, fit_error_model, held_out
 from ros_3d_bb.evaluation.scenes import position_errors_m
-from ros_3d_bb.measurements import read_color, read_depth, read_session
+from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.simulation.scenario import read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.measurements import read_depth
+from ros_3d_bb.sessions.session_reader import read_depth
 
 COVERED = 0.2  # of a box, by its neighbour
 JITTER_PX = 2  # of the edges of a detector's box from image to image
@@ -50,7 +50,7 @@ def crowd_of(people, count, session):
     ----------
     people : sequence of Person
     count : int
-    session : measurements.Session
+    session : session_reader.Session
 
     Returns
     -------

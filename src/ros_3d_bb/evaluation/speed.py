@@ -25,7 +25,7 @@ from ros_3d_bb.evaluation.detector_speed import detector_speed
 from ros_3d_bb.evaluation.machine import describe_machine
 from ros_3d_bb.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb.evaluation.tracking.original import OriginalTracker
-from ros_3d_bb.measurements import read_color, read_session
+from ros_3d_bb.sessions.session_reader import read_color, read_session
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import Detection, View, detection_from_box
@@ -86,7 +86,7 @@ def speed(session, counts=OBJECTS, images=60, seed=0):
 
     Parameters
     ----------
-    session : measurements.Session
+    session : session_reader.Session
     counts : sequence of int
         Numbers of people.
     images : int

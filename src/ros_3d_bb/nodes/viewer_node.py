@@ -21,8 +21,8 @@ from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.label import Label
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
-from ros_3d_bb.recording import Measurement, append
-from ros_3d_bb.snapshots import Snapshots
+from ros_3d_bb.sessions.frame_synchronizer import Snapshots
+from ros_3d_bb.sessions.session_writer import Measurement, append
 from ros_3d_bb.visualization.cv_window import Window, WindowError
 from ros_3d_bb.visualization.viewer_layout import FrameRate, View, compose, text_image
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.estimation.box3d_estimator import BORDER_PX, estimate_boxes, estimator_named
-from ros_3d_bb.measurements import read_depth, read_session
+from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
 AXES = ('X', 'Z')
 LEAST_IN_CLUSTER = 3

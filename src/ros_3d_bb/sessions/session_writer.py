@@ -15,7 +15,7 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.atomic_file import FILE_NAME, changing, write_whole
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
-from ros_3d_bb.measurements import read_session
+from ros_3d_bb.sessions.session_reader import read_session
 
 MILLIMETRE = 0.001
 MAX_DEPTH_MM = 65535  # of 16 bits

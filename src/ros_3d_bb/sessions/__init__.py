@@ -1,0 +1,4 @@
+"""Measurement sessions on disk: read, write, and collect the images and boxes of one stamp.
+
+May import: camera, core, detection, estimation.
+"""
