@@ -12,8 +12,8 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from
 from ros_3d_bb.conversions.perception_msgs import camera_from_message, transform_from_message
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.drivers.realsense import CameraLost, Pair
 from ros_3d_bb.nodes import realsense_node
-from ros_3d_bb.realsense import CameraLost, Pair
 from support.realsense_recordings import (COLOR_CAMERA, START_MS, STEP_MS, SUFFIX, colored, sloping_depth,
                                           write_recording)
 from support.ros import Recorder, diagnostics_of, wait_until

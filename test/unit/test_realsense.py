@@ -5,11 +5,11 @@ import numpy as np
 import pyrealsense2 as rs
 import pytest
 
-from ros_3d_bb import realsense
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.realsense import (CameraLost, RealSense, RealSenseParams, Stamps, camera_from_intrinsics, check_params,
-                                 frame_links, rgb_of)
+from ros_3d_bb.drivers import realsense
+from ros_3d_bb.drivers.realsense import (CameraLost, RealSense, RealSenseParams, Stamps, camera_from_intrinsics,
+                                         check_params, frame_links, rgb_of)
 from support.realsense_recordings import (COLOR_CAMERA, DEPTH_CAMERA, DEPTH_FROM_COLOR, START_MS, STEP_MS, SUFFIX,
                                           colored, intrinsics_of, sloping_depth, write_recording)
 

@@ -15,11 +15,11 @@ from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, INFO_TO
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.params import SET_BY_LAUNCH, WAIT_FOR_SUBSCRIBERS, Param, parameters
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.drivers.realsense import (CameraLost, RealSense, RealSenseParams, check_params, frame_links,
+                                         librealsense, optical_frame)
 from ros_3d_bb.nodes.diagnostics import Diagnostics, is_ending
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.subscribers import wait_for_subscribers
-from ros_3d_bb.realsense import (CameraLost, RealSense, RealSenseParams, check_params, frame_links, librealsense,
-                                 optical_frame)
 
 RETRY_S = 2.0
 CLOSING_S = 5.0  # at most

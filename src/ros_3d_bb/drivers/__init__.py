@@ -1,0 +1,4 @@
+"""Cameras read without a ROS driver.
+
+May import: camera, core.
+"""
