@@ -13,8 +13,8 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, STATIC_TOPIC, TF_TOPI
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import Tally
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.pipeline import INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, Pipeline, Settings
-from ros_3d_bb.searching import opened_yolov5, search_color
+from ros_3d_bb.pipeline.detection_stage import opened_yolov5, search_color
+from ros_3d_bb.pipeline.offline_pipeline import INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, Pipeline, Settings
 
 MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
 

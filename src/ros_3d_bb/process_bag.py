@@ -17,7 +17,7 @@ from ros_3d_bb.bags import remove_partial
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.yaml_loader import load_yaml
-from ros_3d_bb.pipeline import DETECTORS, Settings
+from ros_3d_bb.pipeline.offline_pipeline import DETECTORS, Settings
 
 POLL_S, BAR = 0.2, 40
 GIB = 2 ** 30
@@ -100,7 +100,7 @@ def settings_from(given):
 
 
 def with_tracker(settings, **changed):
-    """Settings with other parameters of the tracker (`following.TrackerNodeParams`)."""
+    """Settings with other parameters of the tracker (`tracking_stage.TrackerNodeParams`)."""
     params, *others = settings.tracker
     return settings._replace(tracker=(params._replace(**changed),) + tuple(others))
 

@@ -26,11 +26,11 @@ from ros_3d_bb.detection.yolov5.detector import filter_predictions
 from ros_3d_bb.detection.yolov5.predictions import decode_heads
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import read_error_model
-from ros_3d_bb.following import TRACKING_PARAMS, TrackerNodeParams
-from ros_3d_bb.lifting import Bbox3dParams
+from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, Yolov5NodeParams
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
+from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.planning.planner_view import footprint_points, in_frame, predicted_to, usable_tracks
 from ros_3d_bb.process_bag import read_params
-from ros_3d_bb.searching import DepthDetectorParams, Yolov5NodeParams
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb.visualization.markers import MarkerParams

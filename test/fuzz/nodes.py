@@ -57,7 +57,7 @@ class Network(object):
 
 
 def _yolov5(source):
-    with mock.patch('ros_3d_bb.searching.open_runtime', lambda *_given: Network(source)):
+    with mock.patch('ros_3d_bb.pipeline.detection_stage.open_runtime', lambda *_given: Network(source)):
         return Yolov5Node()
 
 

@@ -13,9 +13,9 @@ from ros_3d_bb.bags import scenario_images, write_bag
 from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.event_counter import Tally
 from ros_3d_bb.evaluation.identities import score
-from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.nodes.tracker_node import TrackerNode
-from ros_3d_bb.pipeline import Settings
+from ros_3d_bb.pipeline.offline_pipeline import Settings
+from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.process_bag import with_tracker
 from ros_3d_bb.report import panels_of, read_recording
 from ros_3d_bb.simulation.scenario import scenario_from

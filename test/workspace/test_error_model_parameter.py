@@ -4,7 +4,7 @@ import os
 import pytest
 
 from ros_3d_bb.core.event_counter import Tally
-from ros_3d_bb.lifting import Bbox3dParams, Lifter, error_model_of
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, Lifter, error_model_of
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'error_models')
 

@@ -9,8 +9,8 @@ from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.event_counter import Tally
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray
+from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.tracking.types import VISIBLE
 
 START_NS = 1000 * NS

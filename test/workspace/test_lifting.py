@@ -8,7 +8,7 @@ from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_message, boxes3d_to_message, time_from, usable_boxes3d
 from ros_3d_bb.core.event_counter import Tally
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.lifting import Bbox3dParams, Lifter
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, Lifter
 
 HEADER = Header(stamp=time_from(1000 * NS), frame_id='camera')
 INTRINSICS = [614.7, 0, 319.2, 0, 614.8, 242.1, 0, 0, 1]

@@ -7,7 +7,7 @@ from ros_3d_bb.bags import scenario_images, write_bag
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
-from ros_3d_bb.pipeline import Settings
+from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb.simulation.scenario import scenario_from
 from support.masterless import masterless, on_the_wire
 

@@ -22,8 +22,8 @@ from ros_3d_bb.bags import SessionBagOptions, scenario_images, session_images, w
 from ros_3d_bb.conversions.camera_msgs import START_NS
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, time_from, tracks_from_message
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.pipeline import Settings
-from ros_3d_bb.searching import Yolov5NodeParams
+from ros_3d_bb.pipeline.detection_stage import Yolov5NodeParams
+from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb.simulation.scenario import scenario_from
 

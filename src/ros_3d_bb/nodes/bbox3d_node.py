@@ -8,7 +8,6 @@ from std_msgs.msg import Int32MultiArray
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_message
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
-from ros_3d_bb.lifting import Bbox3dParams, Lifter
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.depth_camera import DepthCameraCheck
 from ros_3d_bb.nodes.diagnostics import Diagnostics
@@ -16,6 +15,7 @@ from ros_3d_bb.nodes.sample_images import SampleImages
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.nodes.tuning import Tuning
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, Lifter
 
 
 class Bbox3dNode(object):

@@ -14,7 +14,7 @@ from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transforms import Transforms
 from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.nodes.tuning import Tuning
-from ros_3d_bb.searching import DepthDetectorParams, DepthSearch
+from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, DepthSearch
 
 
 class DepthDetectorNode(object):

@@ -16,10 +16,10 @@ from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, INFO
 from ros_3d_bb.diagnosis.observing import Observation, camera_seen, color_seen, depth_seen
 from ros_3d_bb.diagnosis.roles import ROLES
 from ros_3d_bb.diagnosis.seen import Clock, Seen
-from ros_3d_bb.following import TrackerNodeParams
-from ros_3d_bb.lifting import Bbox3dParams
 from ros_3d_bb.nodes.graph import published_topics, publishers_of
 from ros_3d_bb.nodes.transport import IMAGE_BUFFER
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
+from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams
 
 NAMES_S = 1.5  # nodes say once a second what their topics are called
 OURS = ': pipeline'  # ends the names of our nodes' diagnostics

@@ -11,7 +11,7 @@ from ros_3d_bb.nodes.diagnostics import Diagnostics
 from ros_3d_bb.nodes.startup import read_params, run_node
 from ros_3d_bb.nodes.transport import subscribe
 from ros_3d_bb.nodes.tuning import Tuning
-from ros_3d_bb.searching import Yolov5NodeParams, opened_yolov5, search_color
+from ros_3d_bb.pipeline.detection_stage import Yolov5NodeParams, opened_yolov5, search_color
 
 
 class Yolov5Node(object):

@@ -84,7 +84,7 @@ class DepthSearch(object):
     on_frame : callable
         Called with two sensor_msgs/Image, colour and depth, and a `camera_model.Camera` of one stamp.
     transforms
-        As for `following.Follower`; None where no frame of the floor is given.
+        As for `tracking_stage.Follower`; None where no frame of the floor is given.
 
     Raises
     ------

@@ -14,9 +14,9 @@ from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
 from ros_3d_bb.detection.yolov5.detector import DetectionParams
-from ros_3d_bb.following import TRACKING_PARAMS, Follower, TrackerNodeParams
-from ros_3d_bb.lifting import Bbox3dParams, Lifter
-from ros_3d_bb.searching import DepthDetectorParams, DepthSearch, Yolov5NodeParams
+from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, DepthSearch, Yolov5NodeParams
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, Lifter
+from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 
 INFO_TOPIC = INFO_TOPICS[0]
