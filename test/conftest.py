@@ -101,7 +101,7 @@ def reader(tmp_path_factory, weights):
 @pytest.fixture(scope='session')
 def camera_bag(session_folder, tmp_path_factory):
     """A bag at 2 Hz of a camera before which somebody stands, with 2D boxes; it lasts while a detector starts."""
-    from ros_3d_bb.bags import SessionBagOptions, session_images, write_bag
+    from ros_3d_bb.bags.bag_writer import SessionBagOptions, session_images, write_bag
     from ros_3d_bb.sessions.session_reader import read_session
     session = read_session(session_folder)
     nearest = sorted(session.frames, key=lambda frame: abs(frame.truth_m[1] - 2.4) + abs(frame.truth_m[0]))

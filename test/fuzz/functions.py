@@ -11,6 +11,7 @@ import numpy as np
 import yaml
 
 from fuzz import hostile
+from ros_3d_bb.bags.process_bag import read_params
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.image_msgs import array_from, depth_from, rgb_from
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_message, boxes2d_to_message, boxes3d_from_message,
@@ -30,7 +31,6 @@ from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, Yolov5NodePa
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.planning.planner_view import footprint_points, in_frame, predicted_to, usable_tracks
-from ros_3d_bb.process_bag import read_params
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb.visualization.markers import MarkerParams

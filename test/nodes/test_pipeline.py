@@ -10,7 +10,7 @@ import rospy
 from std_msgs.msg import Int32MultiArray
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_3d_bb.bags import MOUNT_M, START_NS, SessionBagOptions, scenario_images, session_images, write_bag
+from ros_3d_bb.bags.bag_writer import MOUNT_M, START_NS, SessionBagOptions, scenario_images, session_images, write_bag
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray

@@ -8,7 +8,7 @@ import rospy
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Int32MultiArray
 
-from ros_3d_bb.bags import scenario_images
+from ros_3d_bb.bags.bag_writer import scenario_images
 from ros_3d_bb.conversions.camera_msgs import START_NS, TF_TOPIC, TYPES
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, restamped, time_from
 from ros_3d_bb.core.time_sync import NS

@@ -8,7 +8,7 @@ import pytest
 import rosbag
 import tf2_ros
 
-from ros_3d_bb.bags import START_NS, SessionBagOptions, images_in, scenario_images, session_images, write_bag
+from ros_3d_bb.bags.bag_writer import START_NS, SessionBagOptions, images_in, scenario_images, session_images, write_bag
 from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_message, camera_from_message, time_from,
                                                    tracks_from_message, transform_from_message)

@@ -7,16 +7,16 @@ import pytest
 import rosbag
 import rospy
 
-from ros_3d_bb.bag_processing import process_bag
-from ros_3d_bb.bag_reading import BagError
-from ros_3d_bb.bags import scenario_images, write_bag
+from ros_3d_bb.bags.bag_pipeline import process_bag
+from ros_3d_bb.bags.bag_reader import BagError
+from ros_3d_bb.bags.bag_writer import scenario_images, write_bag
+from ros_3d_bb.bags.process_bag import with_tracker
 from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.event_counter import Tally
 from ros_3d_bb.evaluation.identities import score
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, Follower, TrackerNodeParams
-from ros_3d_bb.process_bag import with_tracker
 from ros_3d_bb.report import panels_of, read_recording
 from ros_3d_bb.simulation.scenario import scenario_from
 from support.launching import loaded

@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-from ros_3d_bb.bags import scenario_images, write_bag
+from ros_3d_bb.bags.bag_writer import scenario_images, write_bag
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.diagnosis.bag_look import look_at_bag
 from ros_3d_bb.diagnosis.checks import findings

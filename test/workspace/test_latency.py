@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from ros_3d_bb.bags import scenario_images, write_bag
+from ros_3d_bb.bags.bag_writer import scenario_images, write_bag
 from ros_3d_bb.simulation.scenario import scenario_from
 from support.running import processes_naming
 

@@ -2,8 +2,8 @@
 import pytest
 import rosbag
 
-from ros_3d_bb.bag_processing import process_bag
-from ros_3d_bb.bags import scenario_images, write_bag
+from ros_3d_bb.bags.bag_pipeline import process_bag
+from ros_3d_bb.bags.bag_writer import scenario_images, write_bag
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode

@@ -15,10 +15,10 @@ from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import Image
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.bag_processing import process_bag
-from ros_3d_bb.bag_reading import BagError, BagReader
-from ros_3d_bb.bag_transforms import BagTransforms
-from ros_3d_bb.bags import SessionBagOptions, scenario_images, session_images, write_bag
+from ros_3d_bb.bags.bag_pipeline import process_bag
+from ros_3d_bb.bags.bag_reader import BagError, BagReader
+from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
+from ros_3d_bb.bags.bag_writer import SessionBagOptions, scenario_images, session_images, write_bag
 from ros_3d_bb.conversions.camera_msgs import START_NS
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, time_from, tracks_from_message
 from ros_3d_bb.core.time_sync import NS

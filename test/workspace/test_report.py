@@ -8,7 +8,7 @@ import pytest
 import rosbag
 from std_msgs.msg import Header
 
-from ros_3d_bb.bags import START_NS, scenario_images, write_bag
+from ros_3d_bb.bags.bag_writer import START_NS, scenario_images, write_bag
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_message, time_from, tracks_from_message, tracks_to_message
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.report import BOXES_TOPIC, TRACKS_TOPIC, paths_of, read_recording, write_report

@@ -5,8 +5,8 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.bag_reading import BagReader, message_in
-from ros_3d_bb.bag_transforms import BagTransforms
+from ros_3d_bb.bags.bag_reader import BagReader, message_in
+from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.conversions.camera_msgs import INFO_TOPICS, STATIC_TOPIC, TF_TOPIC
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS

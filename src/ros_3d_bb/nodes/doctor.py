@@ -9,7 +9,7 @@ from urllib.parse import urlparse
 import rosgraph
 import rospy
 
-from ros_3d_bb.bag_reading import BagError
+from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.diagnosis.bag_look import look_at_bag
 from ros_3d_bb.diagnosis.checks import findings

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import rospy
 from std_msgs.msg import Int32MultiArray
 
-from ros_3d_bb.bags import images_in
+from ros_3d_bb.bags.bag_writer import images_in
 from ros_3d_bb.conversions.camera_msgs import TYPES
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, restamped
 from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import yaml
 
 import ros_3d_bb
-from ros_3d_bb.bag_processing import process_bag
-from ros_3d_bb.bag_reading import BagError
-from ros_3d_bb.bags import remove_partial
+from ros_3d_bb.bags.bag_pipeline import process_bag
+from ros_3d_bb.bags.bag_reader import BagError
+from ros_3d_bb.bags.bag_writer import remove_partial
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.yaml_loader import load_yaml

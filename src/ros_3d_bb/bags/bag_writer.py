@@ -15,8 +15,8 @@ from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.conversions.camera_msgs import START_NS, CameraFrame, frame_id_of, messages_of, topic_of
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_message, time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.sessions.session_reader import SessionError, read_color, read_depth, read_session
-from ros_3d_bb.simulation.scenario import ScenarioError, with_overrides, read_scenario
+from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
+from ros_3d_bb.simulation.scenario import with_overrides, read_scenario
 from ros_3d_bb.simulation.simulator import Simulator
 from ros_3d_bb.simulator_messages import simulated_messages
 
@@ -132,7 +132,7 @@ def scenario_images(scenario, with_boxes=False):
 
 def session_to_bag():
     """The command `session_to_bag`: convert a measurement session to a bag of a camera on a stationary Jackal."""
-    parser = _parser('session_to_bag', session_to_bag.__doc__)
+    parser = bag_command_parser('session_to_bag', session_to_bag.__doc__)
     parser.add_argument('session', help='folder of a measurement session, with frames.json')
     parser.add_argument('bag', help='bag to write')
     parser.add_argument('--rate', type=float, default=30.0, metavar='HZ', help='frames per second (default: 30)')
@@ -144,12 +144,12 @@ def session_to_bag():
     if not arguments.rate > 0:
         parser.error('--rate %g: more than 0 expected' % arguments.rate)
     options = SessionBagOptions(arguments.rate, tuple(arguments.mount), arguments.boxes)
-    _write(parser, arguments, lambda: session_images(read_session(arguments.session), options))
+    write_bag_of_command(parser, arguments, lambda: session_images(read_session(arguments.session), options))
 
 
 def scenario_to_bag():
     """The command `scenario_to_bag`: render a scenario to a bag with ground truth."""
-    parser = _parser('scenario_to_bag', scenario_to_bag.__doc__)
+    parser = bag_command_parser('scenario_to_bag', scenario_to_bag.__doc__)
     parser.add_argument('scenario', help='scenario file (YAML), see config/scenarios')
     parser.add_argument('bag', help='bag to write')
     parser.add_argument('--rate', type=float, metavar='HZ', help="images per second (default: the scenario's)")
@@ -164,20 +164,21 @@ def scenario_to_bag():
     def images():
         scenario = with_overrides(read_scenario(arguments.scenario), arguments.rate, arguments.seed)
         return itertools.islice(scenario_images(scenario, arguments.boxes), arguments.images)
-    _write(parser, arguments, images)
+    write_bag_of_command(parser, arguments, images)
 
 
-def _parser(name, doc):
+def bag_command_parser(name, doc):
+    """The argument parser of a command that writes a bag."""
     parser = argparse.ArgumentParser(prog=name, description=doc.split(': ', 1)[1])
     parser.add_argument('--compression', choices=('none', 'bz2', 'lz4'), default='lz4', help='default: lz4')
     return parser
 
 
-def _write(parser, arguments, images):
-    """Write the bag of a command, or say why not and exit with 1."""
+def write_bag_of_command(parser, arguments, images):
+    """Write the bag of a command. Print the cause and exit with 1 if a session or a scenario cannot be read."""
     try:
         count = write_bag(images(), arguments.bag, arguments.compression)
-    except (SessionError, ScenarioError, OSError) as error:
+    except (ValueError, OSError) as error:
         print('%s: %s; no bag was written' % (parser.prog, error), file=sys.stderr)
         sys.exit(1)
     print('%s: %d images' % (arguments.bag, count))

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple, Optional
 from sensor_msgs.msg import Image
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.bag_reading import BagError, BagReader, Raw, message_in
-from ros_3d_bb.bag_transforms import BagTransforms
-from ros_3d_bb.bags import new_bag
+from ros_3d_bb.bags.bag_reader import BagError, BagReader, Raw, message_in
+from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
+from ros_3d_bb.bags.bag_writer import new_bag
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, STATIC_TOPIC, TF_TOPIC
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import Tally
