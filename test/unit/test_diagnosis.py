@@ -8,7 +8,8 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.image_msgs import units_fault
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS, findings
-from ros_3d_bb.diagnosis.seen import CameraSeen, Clock, Finding, ImageSeen, Publisher, Role, Seen, Stream, TfSeen
+from ros_3d_bb.diagnosis.observations import (CameraSeen, Clock, Finding, ImageSeen, Publisher, Role, Seen, Stream,
+                                              TfSeen)
 from ros_3d_bb.diagnosis.tf_tree import Link, chain, links_in, why_missing
 from ros_3d_bb.diagnosis.topic_faults import paired_share, span
 

@@ -13,7 +13,7 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_writer import scenario_images, write_bag
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.diagnosis.bag_look import look_at_bag
+from ros_3d_bb.diagnosis.bag_observer import look_at_bag
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.nodes.depth_camera import DepthCameraCheck
 from ros_3d_bb.nodes.doctor import tracked_cameras

@@ -3,7 +3,7 @@
 A check whose ground is missing is left out: without depth images nothing is said of their units.
 """
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault, size_fault
-from ros_3d_bb.diagnosis.seen import Finding
+from ros_3d_bb.diagnosis.observations import Finding
 from ros_3d_bb.diagnosis.tf_tree import why_missing
 from ros_3d_bb.diagnosis.topic_faults import (LATE_S, LEAST_PAIRED, LEAST_RATE_HZ, STANDSTILL, clock_fault,
                                               paired_share, silence_fault, span)

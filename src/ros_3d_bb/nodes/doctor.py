@@ -11,9 +11,9 @@ import rospy
 
 from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.core.params import params_from
-from ros_3d_bb.diagnosis.bag_look import look_at_bag
+from ros_3d_bb.diagnosis.bag_observer import look_at_bag
 from ros_3d_bb.diagnosis.checks import findings
-from ros_3d_bb.diagnosis.seen import Finding
+from ros_3d_bb.diagnosis.observations import Finding
 from ros_3d_bb.nodes.graph_look import GraphLook, name_for, tracker_param
 from ros_3d_bb.nodes.master import NO_ANSWER, PATIENCE_S, patient_master
 from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams

@@ -11,11 +11,11 @@ from sensor_msgs.msg import CameraInfo
 
 from ros_3d_bb.conversions.camera_msgs import topic_of
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
-from ros_3d_bb.diagnosis.bag_look import CLASSES, tf_seen
+from ros_3d_bb.diagnosis.bag_observer import CLASSES, tf_seen
 from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, INFO
-from ros_3d_bb.diagnosis.observing import Observation, camera_seen, color_seen, depth_seen
-from ros_3d_bb.diagnosis.roles import ROLES
-from ros_3d_bb.diagnosis.seen import Clock, Seen
+from ros_3d_bb.diagnosis.message_observer import Observation, camera_seen, color_seen, depth_seen
+from ros_3d_bb.diagnosis.observations import Clock, Seen
+from ros_3d_bb.diagnosis.topic_roles import ROLES
 from ros_3d_bb.nodes.graph import published_topics, publishers_of
 from ros_3d_bb.nodes.transport import IMAGE_BUFFER
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams

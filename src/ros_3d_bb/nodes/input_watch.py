@@ -5,9 +5,9 @@ import weakref
 import rospy
 from rospy.topics import get_topic_manager
 
-from ros_3d_bb.diagnosis.roles import role_named
-from ros_3d_bb.diagnosis.seen import Stream
+from ros_3d_bb.diagnosis.observations import Stream
 from ros_3d_bb.diagnosis.topic_faults import STANDSTILL, clock_fault, silence_fault
+from ros_3d_bb.diagnosis.topic_roles import role_named
 from ros_3d_bb.nodes.graph import published_topics, publishers_of
 from ros_3d_bb.nodes.master import NO_ANSWER
 from ros_3d_bb.nodes.transport import inputs

@@ -10,10 +10,10 @@ from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.conversions.camera_msgs import INFO_TOPICS, STATIC_TOPIC, TF_TOPIC
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS
-from ros_3d_bb.diagnosis.observing import Observation, camera_seen, color_seen, depth_seen
-from ros_3d_bb.diagnosis.roles import ROLES
-from ros_3d_bb.diagnosis.seen import Seen, TfSeen
+from ros_3d_bb.diagnosis.message_observer import Observation, camera_seen, color_seen, depth_seen
+from ros_3d_bb.diagnosis.observations import Seen, TfSeen
 from ros_3d_bb.diagnosis.tf_tree import links_in
+from ros_3d_bb.diagnosis.topic_roles import ROLES
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 
 CLASSES = {COLOR: Image, DEPTH: Image, INFO: CameraInfo, BOXES2D: Int32MultiArray, BOXES3D: BoundingBox3DArray,

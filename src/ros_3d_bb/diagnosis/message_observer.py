@@ -4,8 +4,8 @@ import collections
 from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from, units_fault
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, camera_from_message
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.diagnosis.roles import ROLES
-from ros_3d_bb.diagnosis.seen import CameraSeen, ImageSeen, Stream
+from ros_3d_bb.diagnosis.observations import CameraSeen, ImageSeen, Stream
+from ros_3d_bb.diagnosis.topic_roles import ROLES
 
 KEPT = 1000  # stamps of a topic
 
@@ -16,7 +16,7 @@ class Observation(object):
     Parameters
     ----------
     key : str
-        A role, see `roles.ROLES`.
+        A role, see `topic_roles.ROLES`.
     topic : str
     """
 
