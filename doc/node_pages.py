@@ -74,22 +74,24 @@ class _Comments(ElementTree.TreeBuilder):
 
 def nodes():
     """All nodes of the package, by name."""
-    paths = sorted(glob.glob(os.path.join(ROOT, 'src', 'ros_3d_bb', 'nodes', '*_node.py')))
-    return [node_of(os.path.basename(path)[:-len('.py')]) for path in paths]
+    source = os.path.join(ROOT, 'src')
+    paths = glob.glob(os.path.join(source, '**', '*_node.py'), recursive=True)
+    modules = [os.path.relpath(path, source)[:-len('.py')].replace(os.sep, '.') for path in paths]
+    return sorted((node_of(module) for module in modules), key=lambda node: node.name)
 
 
-def node_of(name):
-    """The node of a module's name, with the topics and services of the classes in ros_3d_bb.nodes that it uses."""
-    module = importlib.import_module('ros_3d_bb.nodes.' + name)
+def node_of(module_name):
+    """The node in a module, with the topics and services of the classes in ros_3d_bb.nodes that it uses."""
+    module = importlib.import_module(module_name)
     classes = [value for value in vars(module).values()
-               if inspect.isclass(value) and value.__module__.startswith('ros_3d_bb.nodes.')]
+               if inspect.isclass(value) and value.__module__.startswith(('ros_3d_bb.nodes.', module_name))]
     node_class, = (kind for kind in classes if kind.__module__ == module.__name__ and kind.__name__.endswith('Node'))
     text, sections = split(node_class)
     for kind in classes:
         for title, entries in split(kind)[1].items() if kind is not node_class else ():
             sections.setdefault(title, []).extend(entries)
     summary, _blank, rest = text.partition('\n\n')
-    return Node(name, node_class, _one_line(summary), _one_line(rest), sections)
+    return Node(module_name.rpartition('.')[2], node_class, _one_line(summary), _one_line(rest), sections)
 
 
 def split(kind):

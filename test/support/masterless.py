@@ -128,9 +128,9 @@ def masterless(params=()):
         'diagnostic_updater.Updater': mock.Mock(),
         'ros_3d_bb.nodes.yolov5_node.NewestWorker': Immediately,
         'ros_3d_bb.nodes.depth_detector_node.NewestWorker': Immediately,
-        'ros_3d_bb.nodes.numbers.NewestWorker': Immediately,
-        'ros_3d_bb.nodes.sample_images.NewestWorker': Immediately,
-        'ros_3d_bb.nodes.sample_images.patient_master': mock.Mock()}
+        'ros_3d_bb.nodes.common.persistent_track_ids.NewestWorker': Immediately,
+        'ros_3d_bb.nodes.common.debug_images.NewestWorker': Immediately,
+        'ros_3d_bb.nodes.common.debug_images.patient_master': mock.Mock()}
     for level in ('loginfo', 'logwarn', 'loginfo_once'):
         replaced['rospy.' + level] = lambda text, *arguments: text % arguments
     with contextlib.ExitStack() as stack:

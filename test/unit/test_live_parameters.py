@@ -4,7 +4,7 @@ from typing import NamedTuple
 import pytest
 
 from ros_3d_bb.core.params import Param, parameters
-from ros_3d_bb.live_parameters import description_of, live_in, plain_values
+from ros_3d_bb.nodes.common.live_parameters import description_of, live_in, plain_values
 
 
 @parameters()

@@ -5,7 +5,7 @@ import sys
 
 PAGE_FAULTS = """
 import resource, sys, threading
-from ros_3d_bb.memory import reuse_freed_memory
+from ros_3d_bb.nodes.common.allocator import reuse_freed_memory
 if sys.argv[1] == 'reuse':
     assert reuse_freed_memory()
 def faults():

@@ -15,9 +15,9 @@ from ros_3d_bb.bags.bag_writer import scenario_images, write_bag
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.diagnosis.bag_observer import look_at_bag
 from ros_3d_bb.diagnosis.checks import findings
-from ros_3d_bb.nodes.depth_camera import DepthCameraCheck
+from ros_3d_bb.nodes.common.alignment_check import DepthCameraCheck
+from ros_3d_bb.nodes.common.graph_observer import GraphLook
 from ros_3d_bb.nodes.doctor import tracked_cameras
-from ros_3d_bb.nodes.graph_look import GraphLook
 from ros_3d_bb.simulation.scenario import scenario_from
 from support.masterless import masterless
 
@@ -209,8 +209,8 @@ def look():
     """Makes a GraphLook, {topic: type} of what is published, and (node, {input: topic}) of what nodes say."""
     with masterless() as connections, mock.patch('rospy.get_namespace', lambda: '/robot1/'), \
             mock.patch('rospy.resolve_name', lambda name: '/robot1/' + name), mock.patch('time.sleep') as sleep, \
-            mock.patch('ros_3d_bb.nodes.graph_look.published_topics') as topics, \
-            mock.patch('ros_3d_bb.nodes.graph_look.publishers_of', lambda *_: ()):
+            mock.patch('ros_3d_bb.nodes.common.graph_observer.published_topics') as topics, \
+            mock.patch('ros_3d_bb.nodes.common.graph_observer.publishers_of', lambda *_: ()):
         def made(published, said, camera=''):
             topics.return_value = published
             message = DiagnosticArray(status=[DiagnosticStatus(name=node + ': pipeline', values=[

@@ -13,12 +13,12 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.nodes.diagnostics import Diagnostics
-from ros_3d_bb.nodes.graph import published_topics, publishers_of
-from ros_3d_bb.nodes.input_watch import InputWatch, unheard
-from ros_3d_bb.nodes.master import NO_ANSWER
-from ros_3d_bb.nodes.sample_images import SampleImages
-from ros_3d_bb.nodes.transport import inputs, subscribe
+from ros_3d_bb.nodes.common.debug_images import SampleImages
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.input_monitor import InputWatch, unheard
+from ros_3d_bb.nodes.common.master import NO_ANSWER
+from ros_3d_bb.nodes.common.subscribers import inputs, subscribe
+from ros_3d_bb.nodes.common.topic_publishers import published_topics, publishers_of
 from support.ros import wait_until
 
 PATIENCE_S = 0.2
@@ -31,7 +31,7 @@ def hanging_master(monkeypatch):
         listener.bind(('localhost', 0))
         listener.listen(10)
         monkeypatch.setenv('ROS_MASTER_URI', 'http://localhost:%d' % listener.getsockname()[1])
-        monkeypatch.setattr('ros_3d_bb.nodes.master.PATIENCE_S', PATIENCE_S)
+        monkeypatch.setattr('ros_3d_bb.nodes.common.master.PATIENCE_S', PATIENCE_S)
         yield
 
 
@@ -56,9 +56,9 @@ def test_a_master_that_hangs_is_asked_once_for_all_silent_inputs():
     for number, noted in enumerate(silent):
         noted.name, noted.subscriber.resolved_name = 'topic', '/topic%d' % number
     asked = mock.Mock(side_effect=socket.timeout('timed out'))
-    with mock.patch('ros_3d_bb.nodes.input_watch.inputs', lambda: silent), \
-            mock.patch('ros_3d_bb.nodes.input_watch.published_topics', asked), \
-            mock.patch('ros_3d_bb.nodes.input_watch.SILENT_S', -1.0), \
+    with mock.patch('ros_3d_bb.nodes.common.input_monitor.inputs', lambda: silent), \
+            mock.patch('ros_3d_bb.nodes.common.input_monitor.published_topics', asked), \
+            mock.patch('ros_3d_bb.nodes.common.input_monitor.SILENT_S', -1.0), \
             mock.patch('rospy.get_rostime', lambda: rospy.Time(1)):
         watch = InputWatch()
         said = [sentence for _look in range(2) for _event, sentence in watch.faults()]
@@ -70,7 +70,7 @@ def test_a_master_that_hangs_is_asked_once_for_all_silent_inputs():
 def test_3d_boxes_do_not_wait_for_a_master_to_subscribe_colour():
     """rospy.Subscriber would wait for one, under the node's lock."""
     with mock.patch('rospy.Publisher') as publisher, mock.patch('rospy.Subscriber') as subscriber, \
-            mock.patch('ros_3d_bb.nodes.sample_images.patient_master', side_effect=OSError('no route')) as master:
+            mock.patch('ros_3d_bb.nodes.common.debug_images.patient_master', side_effect=OSError('no route')) as master:
         publisher.return_value.get_num_connections.return_value = 1
         diagnostics, depth = mock.MagicMock(), DepthImage(np.zeros((4, 4), np.uint16), 0.001)
         images = SampleImages(10 ** 9, None, 6.0, diagnostics)
@@ -84,7 +84,7 @@ def test_3d_boxes_do_not_wait_for_a_master_to_subscribe_colour():
 
 def test_the_diagnostics_go_on_after_a_report_that_could_not_be_made():
     with mock.patch('diagnostic_updater.Updater') as updater, mock.patch('rospy.logwarn') as said, \
-            mock.patch('ros_3d_bb.nodes.diagnostics.PERIOD_S', 0.01):
+            mock.patch('ros_3d_bb.nodes.common.diagnostics.PERIOD_S', 0.01):
         updater.return_value.force_update.side_effect = [ZeroDivisionError('by nothing')] + 1000 * [None]
         Diagnostics()
         wait_until(lambda: updater.return_value.force_update.call_count >= 3, 'another report')
@@ -104,7 +104,7 @@ def test_an_input_subscribed_while_others_are_looked_through_is_kept():
                 threads[0].start()
                 threads[0].join(0.2)
             super(Inputs, self).__setitem__(index, value)
-    with mock.patch('rospy.Subscriber'), mock.patch('ros_3d_bb.nodes.transport._inputs', Inputs()):
+    with mock.patch('rospy.Subscriber'), mock.patch('ros_3d_bb.nodes.common.subscribers._inputs', Inputs()):
         subscribe('first', Image, None)
         inputs()
         threads[0].join()
@@ -117,7 +117,7 @@ def test_what_tools_subscribe_for_tuning_is_no_result(tuned):
     def publisher(connected):
         return mock.Mock(has_connections=lambda: connected)
     pubs = {'/ros_3d_bb/tracks': publisher(False), rospy.get_name() + tuned: publisher(True)}
-    with mock.patch('ros_3d_bb.nodes.input_watch.get_topic_manager') as manager:
+    with mock.patch('ros_3d_bb.nodes.common.input_monitor.get_topic_manager') as manager:
         manager.return_value.pubs = pubs
         assert unheard() == ['/ros_3d_bb/tracks']
         pubs['/ros_3d_bb/tracks'] = publisher(True)

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.core.event_counter import Tally
-from ros_3d_bb.nodes.numbers import RESERVED, Numbers
+from ros_3d_bb.nodes.common.persistent_track_ids import RESERVED, Numbers
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.types import Detection
 
@@ -23,8 +23,8 @@ def parameters(monkeypatch):
     monkeypatch.setattr('rospy.get_name', lambda: '/tracker_node')
     monkeypatch.setattr('rospy.get_param', lambda name, default: parameters.get(name, default))
     monkeypatch.setattr('rospy.set_param', set_param)
-    monkeypatch.setattr('ros_3d_bb.nodes.numbers.on_new_master', lambda _function: None)
-    monkeypatch.setattr('ros_3d_bb.nodes.numbers.NewestWorker', Immediately)
+    monkeypatch.setattr('ros_3d_bb.nodes.common.persistent_track_ids.on_new_master', lambda _function: None)
+    monkeypatch.setattr('ros_3d_bb.nodes.common.persistent_track_ids.NewestWorker', Immediately)
     return parameters
 
 

@@ -4,7 +4,7 @@ from unittest import mock
 import pytest
 from std_srvs.srv import SetBoolRequest
 
-from ros_3d_bb.nodes.boxes_output import Switch
+from ros_3d_bb.nodes.common.detector_output import Switch
 
 
 class Noting(object):

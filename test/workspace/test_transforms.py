@@ -8,8 +8,8 @@ from geometry_msgs.msg import TransformStamped
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.nodes import transforms as module
-from ros_3d_bb.nodes.transforms import Transforms
+from ros_3d_bb.nodes.common import tf_lookup as module
+from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from support.masterless import masterless
 
 STAMP = rospy.Time(100)

@@ -9,12 +9,12 @@ from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_message
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
-from ros_3d_bb.nodes.depth_camera import DepthCameraCheck
-from ros_3d_bb.nodes.diagnostics import Diagnostics
-from ros_3d_bb.nodes.sample_images import SampleImages
-from ros_3d_bb.nodes.startup import read_params, run_node
-from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
-from ros_3d_bb.nodes.tuning import Tuning
+from ros_3d_bb.nodes.common.alignment_check import DepthCameraCheck
+from ros_3d_bb.nodes.common.debug_images import SampleImages
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.reconfigure_server import Tuning
+from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, Lifter
 
 

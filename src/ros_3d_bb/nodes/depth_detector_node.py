@@ -8,12 +8,12 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOP
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
-from ros_3d_bb.nodes.boxes_output import BoxesOutput, Switch
-from ros_3d_bb.nodes.diagnostics import Diagnostics
-from ros_3d_bb.nodes.startup import read_params, run_node
-from ros_3d_bb.nodes.transforms import Transforms
-from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
-from ros_3d_bb.nodes.tuning import Tuning
+from ros_3d_bb.nodes.common.detector_output import BoxesOutput, Switch
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.reconfigure_server import Tuning
+from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, DepthSearch
 
 

@@ -14,8 +14,8 @@ from ros_3d_bb.core.params import params_from
 from ros_3d_bb.diagnosis.bag_observer import look_at_bag
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.diagnosis.observations import Finding
-from ros_3d_bb.nodes.graph_look import GraphLook, name_for, tracker_param
-from ros_3d_bb.nodes.master import NO_ANSWER, PATIENCE_S, patient_master
+from ros_3d_bb.nodes.common.graph_observer import GraphLook, name_for, tracker_param
+from ros_3d_bb.nodes.common.master import NO_ANSWER, PATIENCE_S, patient_master
 from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams
 
 LOCAL = 'localhost', '127.0.0.1', '127.0.1.1', '::1'

@@ -15,8 +15,8 @@ from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, TRACKS_TOPIC, box
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.evaluation.processes import usage_of
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
-from ros_3d_bb.nodes.startup import read_params, run_node
-from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 
 START_TIMEOUT_S = 120.0  # a detector may have to export its network first
 SAMPLE_S = 1.0

@@ -10,10 +10,10 @@ from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, stamp_of, time_f
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
-from ros_3d_bb.nodes.diagnostics import Diagnostics
-from ros_3d_bb.nodes.startup import read_params, run_node
-from ros_3d_bb.nodes.transforms import Transforms
-from ros_3d_bb.nodes.transport import subscribe
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.subscribers import subscribe
+from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.planning.planner_outputs import outputs_from
 from ros_3d_bb.planning.planner_view import SAME_FRAME, predicted_to, rounding_m, usable_tracks
 

@@ -11,8 +11,8 @@ from ros_3d_bb.bags.bag_writer import images_in
 from ros_3d_bb.conversions.camera_msgs import TYPES
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, restamped
 from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters
-from ros_3d_bb.nodes.diagnostics import Diagnostics
-from ros_3d_bb.nodes.startup import read_params, run_node
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.startup import read_params, run_node
 
 
 @parameters()

@@ -10,12 +10,12 @@ from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS, topic_of
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_message
 from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
-from ros_3d_bb.nodes.diagnostics import Diagnostics
-from ros_3d_bb.nodes.numbers import Numbers
-from ros_3d_bb.nodes.startup import read_params, run_node
-from ros_3d_bb.nodes.transforms import Transforms
-from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
-from ros_3d_bb.nodes.tuning import Tuning
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.persistent_track_ids import Numbers
+from ros_3d_bb.nodes.common.reconfigure_server import Tuning
+from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, Follower, TrackerNodeParams
 from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 

@@ -17,10 +17,10 @@ from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, boxes2d_from_m
 from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
-from ros_3d_bb.nodes.diagnostics import Diagnostics
-from ros_3d_bb.nodes.label import Label
-from ros_3d_bb.nodes.startup import read_params, run_node
-from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.measurement_label import Label
+from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.sessions.frame_synchronizer import Snapshots
 from ros_3d_bb.sessions.session_writer import Measurement, append
 from ros_3d_bb.visualization.cv_window import Window, WindowError

@@ -6,11 +6,11 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
 from ros_3d_bb.detection.yolov5.detector import DetectionParams
-from ros_3d_bb.nodes.boxes_output import BoxesOutput, Switch
-from ros_3d_bb.nodes.diagnostics import Diagnostics
-from ros_3d_bb.nodes.startup import read_params, run_node
-from ros_3d_bb.nodes.transport import subscribe
-from ros_3d_bb.nodes.tuning import Tuning
+from ros_3d_bb.nodes.common.detector_output import BoxesOutput, Switch
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.reconfigure_server import Tuning
+from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.pipeline.detection_stage import Yolov5NodeParams, opened_yolov5, search_color
 
 

@@ -7,8 +7,8 @@ from dynamic_reconfigure.msg import Config, ConfigDescription
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
 from ros_3d_bb.core.params import params_from
-from ros_3d_bb.live_parameters import description_of, live_in, plain_values
-from ros_3d_bb.nodes.registration import on_new_master
+from ros_3d_bb.nodes.common.live_parameters import description_of, live_in, plain_values
+from ros_3d_bb.nodes.common.master_registration import on_new_master
 
 
 class Tuning(object):

@@ -6,8 +6,8 @@ from ros_3d_bb.conversions.image_msgs import fill_image, rgb_from
 from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.time_sync import StampedCache
-from ros_3d_bb.nodes.master import patient_master
-from ros_3d_bb.nodes.transport import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.common.master import patient_master
+from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_samples, depth_to_grey
 
 

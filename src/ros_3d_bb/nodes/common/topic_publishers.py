@@ -5,7 +5,7 @@ from urllib.parse import urlparse
 from rosgraph.masterapi import MasterError
 
 from ros_3d_bb.diagnosis.observations import Publisher
-from ros_3d_bb.nodes.master import PATIENCE_S, patient_master
+from ros_3d_bb.nodes.common.master import PATIENCE_S, patient_master
 
 
 def published_topics():

@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from ros_3d_bb.core.event_counter import MOST_LAGS, Tally
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.nodes.input_watch import InputWatch, unheard
+from ros_3d_bb.nodes.common.input_monitor import InputWatch, unheard
 
 PERIOD_S = 1.0
 WARNING_LASTS_S = 5.0

@@ -2,7 +2,7 @@
 import rospy
 
 from ros_3d_bb.core.latest_worker import NewestWorker
-from ros_3d_bb.nodes.registration import on_new_master
+from ros_3d_bb.nodes.common.master_registration import on_new_master
 
 RESERVED = 1000  # numbers at a time: whoever is started again goes on with the next thousand
 LARGEST = 2 ** 31 - 1  # that a ROS parameter holds

@@ -8,9 +8,9 @@ from rospy.topics import get_topic_manager
 from ros_3d_bb.diagnosis.observations import Stream
 from ros_3d_bb.diagnosis.topic_faults import STANDSTILL, clock_fault, silence_fault
 from ros_3d_bb.diagnosis.topic_roles import role_named
-from ros_3d_bb.nodes.graph import published_topics, publishers_of
-from ros_3d_bb.nodes.master import NO_ANSWER
-from ros_3d_bb.nodes.transport import inputs
+from ros_3d_bb.nodes.common.master import NO_ANSWER
+from ros_3d_bb.nodes.common.subscribers import inputs
+from ros_3d_bb.nodes.common.topic_publishers import published_topics, publishers_of
 
 SILENT_S = 5.0
 ASKED_S = 10.0  # between two questions to the master about one topic

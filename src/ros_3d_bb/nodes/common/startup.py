@@ -4,8 +4,8 @@ import sys
 import rospy
 
 from ros_3d_bb.core.params import params_from
-from ros_3d_bb.memory import reuse_freed_memory
-from ros_3d_bb.nodes.registration import Registration
+from ros_3d_bb.nodes.common.allocator import reuse_freed_memory
+from ros_3d_bb.nodes.common.master_registration import Registration
 
 
 def read_params(*kinds):

@@ -16,8 +16,8 @@ from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, INFO
 from ros_3d_bb.diagnosis.message_observer import Observation, camera_seen, color_seen, depth_seen
 from ros_3d_bb.diagnosis.observations import Clock, Seen
 from ros_3d_bb.diagnosis.topic_roles import ROLES
-from ros_3d_bb.nodes.graph import published_topics, publishers_of
-from ros_3d_bb.nodes.transport import IMAGE_BUFFER
+from ros_3d_bb.nodes.common.subscribers import IMAGE_BUFFER
+from ros_3d_bb.nodes.common.topic_publishers import published_topics, publishers_of
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams
 

@@ -11,8 +11,8 @@ import rospy
 from rosgraph.masterapi import MasterError
 from rospy.impl.registration import get_service_manager, get_topic_manager
 
-from ros_3d_bb.nodes.diagnostics import is_ending
-from ros_3d_bb.nodes.master import log_without_asking, patient_master
+from ros_3d_bb.nodes.common.diagnostics import is_ending
+from ros_3d_bb.nodes.common.master import log_without_asking, patient_master
 
 PERIOD_S = 1.0
 _functions = []
