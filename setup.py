@@ -6,6 +6,6 @@ setup(**generate_distutils_setup(
               'ros_3d_bb.detection', 'ros_3d_bb.detection.depth', 'ros_3d_bb.detection.yolov5', 'ros_3d_bb.diagnosis',
               'ros_3d_bb.drivers', 'ros_3d_bb.estimation', 'ros_3d_bb.evaluation', 'ros_3d_bb.evaluation.noise',
               'ros_3d_bb.evaluation.tracking', 'ros_3d_bb.nodes', 'ros_3d_bb.nodes.common', 'ros_3d_bb.pipeline',
-              'ros_3d_bb.planning', 'ros_3d_bb.sessions', 'ros_3d_bb.simulation', 'ros_3d_bb.tracking',
-              'ros_3d_bb.visualization', 'ros_3d_bb_annotator'],
+              'ros_3d_bb.planning', 'ros_3d_bb.sessions', 'ros_3d_bb.tracking', 'ros_3d_bb.visualization',
+              'ros_3d_bb_lab', 'ros_3d_bb_lab.simulation', 'ros_3d_bb_lab.simulation.ros', 'ros_3d_bb_annotator'],
     package_dir={'': 'src', 'ros_3d_bb_annotator': 'annotator/ros_3d_bb_annotator'}))

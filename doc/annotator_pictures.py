@@ -13,11 +13,11 @@ import numpy as np
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.sessions.session_writer import box_entry
-from ros_3d_bb.simulation.scenario import Person, Robot, Room, Scenario
-from ros_3d_bb.simulation.simulator import D435I_COLOR, Simulator
 from ros_3d_bb_annotator.application import make_application
 from ros_3d_bb_annotator.main_window import AnnotatorWindow
 from ros_3d_bb_annotator.qt import QtGui
+from ros_3d_bb_lab.simulation.scenario import Person, Robot, Room, Scenario
+from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
 
 ROOM, ROBOT = Room(bounds=(-2.0, 7.0, -3.0, 3.0)), Robot()
 PLACES_M = [(x, z) for z in (1.5, 2.0, 2.5, 3.0, 4.0) for x in (-0.5, 0.0, 0.5)]

@@ -15,9 +15,9 @@ from ros_3d_bb.conversions.perception_msgs import (BOXES_TOPIC, TRACKS_TOPIC, bo
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.evaluation.identities import Moment, score, table
 from ros_3d_bb.evaluation.picture import Paths, scene_picture
-from ros_3d_bb.simulator_messages import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_caption
+from ros_3d_bb_lab.simulation.ros.simulator_msgs import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
 
 PANELS = 6
 

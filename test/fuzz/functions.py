@@ -32,10 +32,10 @@ from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.planning.planner_view import footprint_points, in_frame, predicted_to, usable_tracks
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb.visualization.markers import MarkerParams
 from ros_3d_bb_annotator import legacy
 from ros_3d_bb_annotator.lengths import parse_length
+from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
 from support.masterless import on_the_wire
 
 CONFIG = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'config')

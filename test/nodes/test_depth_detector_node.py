@@ -11,9 +11,9 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.simulation.scenario import scenario_from
-from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulator_messages import simulated_messages
+from ros_3d_bb_lab.simulation.ros.simulator_msgs import simulated_messages
+from ros_3d_bb_lab.simulation.scenario import scenario_from
+from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.ros import TIMEOUT_S, Recorder, diagnostics_of, publisher
 
 START_NS = 1000 * NS

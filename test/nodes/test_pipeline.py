@@ -10,12 +10,13 @@ import rospy
 from std_msgs.msg import Int32MultiArray
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_3d_bb.bags.bag_writer import MOUNT_M, START_NS, SessionBagOptions, scenario_images, session_images, write_bag
+from ros_3d_bb.bags.bag_writer import MOUNT_M, START_NS, SessionBagOptions, session_images, write_bag
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
-from ros_3d_bb.simulation.scenario import scenario_from
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
+from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.ros import Recorder, launched, wait_until
 
 

@@ -13,8 +13,8 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
-from ros_3d_bb.simulation.scenario import read_scenario
-from ros_3d_bb.simulation.simulator import Simulator
+from ros_3d_bb_lab.simulation.scenario import read_scenario
+from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.ros import Recorder, wait_until
 
 SCENE = """

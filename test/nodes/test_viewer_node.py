@@ -23,9 +23,9 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb.simulation.scenario import scenario_from
-from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulator_messages import simulated_messages
+from ros_3d_bb_lab.simulation.ros.simulator_msgs import simulated_messages
+from ros_3d_bb_lab.simulation.scenario import scenario_from
+from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.processes import pid_of
 from support.ros import Recorder, launched, publisher, wait_until
 from support.screen import press, start_screen

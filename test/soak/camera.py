@@ -8,11 +8,11 @@ import rospy
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Int32MultiArray
 
-from ros_3d_bb.bags.bag_writer import scenario_images
 from ros_3d_bb.conversions.camera_msgs import START_NS, TF_TOPIC, TYPES
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, restamped, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 
 ROUNDS = 3  # of one scene, forwards and backwards, before the next
 AFTER_JUMP_NS = 1009  # added at each jump, so that no stamp comes twice

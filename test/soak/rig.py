@@ -9,7 +9,7 @@ import rospy
 
 from fuzz import hostile
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
-from ros_3d_bb.simulation.scenario import ScenarioError, read_scenario
+from ros_3d_bb_lab.simulation.scenario import ScenarioError, read_scenario
 from soak.camera import Camera, rendered
 from soak.faults import FAULTS
 from soak.graph import Graph, GraphEnded

@@ -10,8 +10,8 @@ from ros_3d_bb.evaluation.accuracy import Estimates, boxes_of, compare, scenario
 from ros_3d_bb.evaluation.scenes import position_errors_m
 from ros_3d_bb.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb.simulation.scenario import read_scenario
-from ros_3d_bb.simulation.simulator import Simulator
+from ros_3d_bb_lab.simulation.scenario import read_scenario
+from ros_3d_bb_lab.simulation.simulator import Simulator
 
 SCENARIOS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
 PLACES = np.repeat([(0.0, 1.0), (0.5, 2.0), (-1.0, 3.0)], 4, axis=0)

@@ -12,7 +12,7 @@ from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
-from ros_3d_bb.simulation.scenario import ScenarioError, scenario_from
+from ros_3d_bb_lab.simulation.scenario import ScenarioError, scenario_from
 
 PLAIN = st.recursive(st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
                      lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=20)

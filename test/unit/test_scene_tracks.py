@@ -7,8 +7,8 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.evaluation.identities import Moment
 from ros_3d_bb.evaluation.scene_tracks import is_in_image, score_tracks
 from ros_3d_bb.evaluation.scenes import Step
-from ros_3d_bb.simulation.simulator import D435I_COLOR, Frame, Poses, Truth
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
+from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Frame, Poses, Truth
 
 CAMERA_M = (0.0, 0.0, 1.0)
 SIZE_M, BOX_PX = np.array([0.5, 0.5, 1.7]), (200, 0, 400, 480)

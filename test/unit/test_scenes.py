@@ -16,8 +16,8 @@ from ros_3d_bb.evaluation.identities import score
 from ros_3d_bb.evaluation.scene_benchmark import (RANGE_M, depth_detector, exact_detector, main, result_of,
                                                   yolov5_detector)
 from ros_3d_bb.evaluation.scenes import look_at_scene, run_scene, score_detections
-from ros_3d_bb.simulation.scenario import read_scenario
-from ros_3d_bb.simulation.simulator import Simulator
+from ros_3d_bb_lab.simulation.scenario import read_scenario
+from ros_3d_bb_lab.simulation.simulator import Simulator
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
 SCENES = sorted(os.path.basename(path) for path in glob.glob(os.path.join(FOLDER, '*.yaml')))

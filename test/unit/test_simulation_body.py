@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb.simulation.body import Body, Build
-from ros_3d_bb.simulation.gait import (BONES, JOINTS_M, PARENTS, STANCE, TABLE_HEIGHT_M, Posture, bone_transforms,
-                                       stride_m)
-from ros_3d_bb.simulation.mesh import volume
+from ros_3d_bb_lab.simulation.body import Body, Build
+from ros_3d_bb_lab.simulation.gait import (BONES, JOINTS_M, PARENTS, STANCE, TABLE_HEIGHT_M, Posture, bone_transforms,
+                                           stride_m)
+from ros_3d_bb_lab.simulation.mesh import volume
 from support.meshes import assert_closed
 
 postures = st.builds(Posture, st.floats(-3, 3), st.floats(0, 1), st.floats(0, 1))

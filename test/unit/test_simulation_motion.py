@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb.simulation.gait import stride_m
-from ros_3d_bb.simulation.motion import SMOOTHING_S, person_motion, robot_motion
-from ros_3d_bb.simulation.scenario import Follow, Move, Person, Robot
+from ros_3d_bb_lab.simulation.gait import stride_m
+from ros_3d_bb_lab.simulation.motion import SMOOTHING_S, person_motion, robot_motion
+from ros_3d_bb_lab.simulation.scenario import Follow, Move, Person, Robot
 
 HEIGHT_M, LONG_S = 1.75, 60.0
 TINY_S = 1e-5

@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.simulation import textures
-from ros_3d_bb.simulation.body import Body, Build
-from ros_3d_bb.simulation.color import ColorSensor
-from ros_3d_bb.simulation.mesh import Mesh, box
-from ros_3d_bb.simulation.renderer import render
-from ros_3d_bb.simulation.room import FLOOR, Room
+from ros_3d_bb_lab.simulation import textures
+from ros_3d_bb_lab.simulation.body import Body, Build
+from ros_3d_bb_lab.simulation.color_sensor import ColorSensor
+from ros_3d_bb_lab.simulation.mesh import Mesh, box
+from ros_3d_bb_lab.simulation.renderer import render
+from ros_3d_bb_lab.simulation.room import FLOOR, Room
 
 BOUNDS, HEIGHT = (-3.0, 9.0, -4.0, 4.0), 2.8
 CAMERA = Camera(160, 120, 153.7, 153.7, 79.8, 60.5)

@@ -8,9 +8,9 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb.simulation.motion import person_motion, robot_motion
-from ros_3d_bb.simulation.scenario import (Follow, Furniture, Mount, Move, Person, Robot, Room, Scenario, ScenarioError,
-                                           read_scenario, scenario_from)
+from ros_3d_bb_lab.simulation.motion import person_motion, robot_motion
+from ros_3d_bb_lab.simulation.scenario import (Follow, Furniture, Mount, Move, Person, Robot, Room, Scenario,
+                                               ScenarioError, read_scenario, scenario_from)
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'config', 'scenarios')
 SHIPPED = sorted(os.path.basename(path) for path in glob.glob(os.path.join(FOLDER, '*.yaml')))

@@ -5,10 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.simulation.scenario import Follow, Furniture, Mount, Move, Person, Robot, Room, Scenario
-from ros_3d_bb.simulation.simulator import D435I_COLOR, Simulator
-from ros_3d_bb.simulation.truth import PREDICTION_STEP_S, truth_at
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
+from ros_3d_bb_lab.simulation.ground_truth import PREDICTION_STEP_S, truth_at
+from ros_3d_bb_lab.simulation.scenario import Follow, Furniture, Mount, Move, Person, Robot, Room, Scenario
+from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
 
 CAMERA = Camera(160, 120, 153.7, 153.7, 79.8, 60.5)
 HALL = Room(furniture=(Furniture((3.0, 0.0), (.4, .8, 2.8)),))

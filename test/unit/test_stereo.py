@@ -11,7 +11,7 @@ import pytest
 from conftest import DATA
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
-from ros_3d_bb.simulation.stereo import StereoCamera, StereoParams
+from ros_3d_bb_lab.simulation.stereo import StereoCamera, StereoParams
 
 D435I = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)
 SMALL = Camera(160, 120, 153.7, 153.7, 80, 60)

@@ -8,15 +8,16 @@ import pytest
 import rosbag
 import tf2_ros
 
-from ros_3d_bb.bags.bag_writer import START_NS, SessionBagOptions, images_in, scenario_images, session_images, write_bag
+from ros_3d_bb.bags.bag_writer import START_NS, SessionBagOptions, images_in, session_images, write_bag
 from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_message, camera_from_message, time_from,
                                                    tracks_from_message, transform_from_message)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb.simulation.scenario import scenario_from
-from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulation.truth import truth_at
+from ros_3d_bb_lab.simulation.ground_truth import truth_at
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
+from ros_3d_bb_lab.simulation.scenario import scenario_from
+from ros_3d_bb_lab.simulation.simulator import Simulator
 
 
 @pytest.fixture(scope='module')

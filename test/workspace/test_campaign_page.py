@@ -7,7 +7,7 @@ import sys
 import yaml
 
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb.simulation.scenario import scenario_from
+from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.pages import DOC
 from support.small_session import change_json, write_small_session
 

@@ -11,14 +11,15 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-from ros_3d_bb.bags.bag_writer import scenario_images, write_bag
+from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.diagnosis.bag_observer import look_at_bag
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.nodes.common.alignment_check import DepthCameraCheck
 from ros_3d_bb.nodes.common.graph_observer import GraphLook
 from ros_3d_bb.nodes.doctor import tracked_cameras
-from ros_3d_bb.simulation.scenario import scenario_from
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
+from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.masterless import masterless
 
 SCENE = {'duration': 1.0, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}

@@ -3,12 +3,13 @@ import pytest
 import rosbag
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
-from ros_3d_bb.bags.bag_writer import scenario_images, write_bag
+from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.offline_pipeline import Settings
-from ros_3d_bb.simulation.scenario import scenario_from
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
+from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.masterless import masterless, on_the_wire
 
 SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}

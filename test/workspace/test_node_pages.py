@@ -13,8 +13,8 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.latency_probe_node import LatencyProbeNode
 from ros_3d_bb.nodes.realsense_node import RealSenseNode
 from ros_3d_bb.nodes.replay_node import ReplayNode
-from ros_3d_bb.nodes.simulator_node import SimulatorNode
 from ros_3d_bb.tracking.thesis_tracker import ThesisTrackerParams
+from ros_3d_bb_lab.simulation.ros.simulator_node import SimulatorNode
 from support.masterless import masterless
 from support.planner_definitions import package
 from support.pages import DOC, ROOT, node_pages

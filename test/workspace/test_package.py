@@ -54,7 +54,7 @@ def imported(paths):
                     names.update(name.name.split('.')[0] for name in node.names)
                 elif isinstance(node, ast.ImportFrom):
                     names.add(node.module.split('.')[0])
-    return names - STANDARD_LIBRARY - {'ros_3d_bb', 'ros_3d_bb_annotator'}
+    return names - STANDARD_LIBRARY - {'ros_3d_bb', 'ros_3d_bb_annotator', 'ros_3d_bb_lab'}
 
 
 def test_every_import_is_declared_and_every_dependency_is_used():

@@ -18,14 +18,15 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError, BagReader
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
-from ros_3d_bb.bags.bag_writer import SessionBagOptions, scenario_images, session_images, write_bag
+from ros_3d_bb.bags.bag_writer import SessionBagOptions, session_images, write_bag
 from ros_3d_bb.conversions.camera_msgs import START_NS
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, time_from, tracks_from_message
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.pipeline.detection_stage import Yolov5NodeParams
 from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb.simulation.scenario import scenario_from
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
+from ros_3d_bb_lab.simulation.scenario import scenario_from
 
 SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]},
                                                    {'start': [4.0, -0.8]}]}

@@ -8,8 +8,9 @@ import sys
 
 import yaml
 
-from ros_3d_bb.bags.bag_writer import scenario_images, write_bag
-from ros_3d_bb.simulation.scenario import scenario_from
+from ros_3d_bb.bags.bag_writer import write_bag
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
+from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.code_blocks import claimed
 from support.realsense_recordings import SUFFIX, colored, sloping_depth, write_recording
 

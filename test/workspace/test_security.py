@@ -21,7 +21,7 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.evaluation.noise.tables import read_table
 from ros_3d_bb.evaluation.tracking.trajectories import read_sequence
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
-from ros_3d_bb.simulation.scenario import read_scenario
+from ros_3d_bb_lab.simulation.scenario import read_scenario
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 BOMB = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(

@@ -1,8 +1,7 @@
-"""Bags of what a camera on a robot sends, made of measurement sessions and of scenarios."""
+"""Bags of what a camera on a robot sends, made of measurement sessions."""
 import argparse
 import collections
 import contextlib
-import itertools
 import os
 import sys
 from typing import NamedTuple, Tuple
@@ -12,13 +11,10 @@ import rosbag
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
-from ros_3d_bb.conversions.camera_msgs import START_NS, CameraFrame, frame_id_of, messages_of, topic_of
+from ros_3d_bb.conversions.camera_msgs import START_NS, CameraFrame, messages_of
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_message, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb.simulation.scenario import with_overrides, read_scenario
-from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulator_messages import simulated_messages
 
 PARTIAL = '.active'  # suffix of incomplete bags, as of rosbag record
 MOUNT_M = (0.17, 0.0, 0.20)  # position of the camera of a Jackal in base_link: forward, left, up (thesis 3.5.1)
@@ -115,21 +111,6 @@ def session_images(session, options=SessionBagOptions()):
         yield stamp_ns, messages
 
 
-def scenario_images(scenario, with_boxes=False):
-    """Yield the images of a scenario for `write_bag`, with ground truth and optionally with its 2D boxes."""
-    simulator = Simulator(scenario)
-    for number in range(simulator.frame_count):
-        frame = simulator.frame(number)
-        stamp_ns = START_NS + int(round(frame.time_s * NS))
-        messages = simulated_messages(simulator, frame, stamp_ns)
-        if with_boxes:
-            boxes = [person.box_px for person in frame.people if person.box_px is not None]
-            header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(frame.camera))
-            messages.append((topic_of(frame.camera, BOXES_TOPIC),
-                             boxes2d_to_message(np.array(boxes, int).reshape(-1, 4), header)))
-        yield stamp_ns, messages
-
-
 def session_to_bag():
     """The command `session_to_bag`: convert a measurement session to a bag of a camera on a stationary Jackal."""
     parser = bag_command_parser('session_to_bag', session_to_bag.__doc__)
@@ -145,26 +126,6 @@ def session_to_bag():
         parser.error('--rate %g: more than 0 expected' % arguments.rate)
     options = SessionBagOptions(arguments.rate, tuple(arguments.mount), arguments.boxes)
     write_bag_of_command(parser, arguments, lambda: session_images(read_session(arguments.session), options))
-
-
-def scenario_to_bag():
-    """The command `scenario_to_bag`: render a scenario to a bag with ground truth."""
-    parser = bag_command_parser('scenario_to_bag', scenario_to_bag.__doc__)
-    parser.add_argument('scenario', help='scenario file (YAML), see config/scenarios')
-    parser.add_argument('bag', help='bag to write')
-    parser.add_argument('--rate', type=float, metavar='HZ', help="images per second (default: the scenario's)")
-    parser.add_argument('--seed', type=int, help="seed of noise and people's appearance (default: the scenario's)")
-    parser.add_argument('--images', type=int, metavar='N', help='number of images, from the start (default: all)')
-    parser.add_argument('--boxes', action='store_true', help='also write the true 2D boxes to yolo_bounding_box')
-    arguments = parser.parse_args()
-
-    if arguments.images is not None and arguments.images < 1:
-        parser.error('--images %d: at least 1 expected' % arguments.images)
-
-    def images():
-        scenario = with_overrides(read_scenario(arguments.scenario), arguments.rate, arguments.seed)
-        return itertools.islice(scenario_images(scenario, arguments.boxes), arguments.images)
-    write_bag_of_command(parser, arguments, images)
 
 
 def bag_command_parser(name, doc):

@@ -18,8 +18,8 @@ from ros_3d_bb.evaluation.defaults import default_weights, scenario_path
 from ros_3d_bb.evaluation.error_fit import coverage, data_of, fit_error_model, held_out
 from ros_3d_bb.evaluation.scenes import position_errors_m
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb.simulation.scenario import read_scenario
-from ros_3d_bb.simulation.simulator import Simulator
+from ros_3d_bb_lab.simulation.scenario import read_scenario
+from ros_3d_bb_lab.simulation.simulator import Simulator
 
 LENGTHS = ('rmse_x_m', 'rmse_z_m', 'rmse_plane_m', 'p95_plane_m', 'bias_x_m', 'bias_z_m', 'repeatability_x_m',
            'repeatability_z_m', 'rmse_x_truncated_m')

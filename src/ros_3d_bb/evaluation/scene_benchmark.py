@@ -14,8 +14,8 @@ from ros_3d_bb.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path, 
 from ros_3d_bb.evaluation.identities import score
 from ros_3d_bb.evaluation.scene_tracks import is_in_image, score_tracks
 from ros_3d_bb.evaluation.scenes import LEAST_SHOWN, run_scene, score_detections
-from ros_3d_bb.simulation.scenario import ScenarioError, read_scenario
-from ros_3d_bb.simulation.simulator import D435I_COLOR, Simulator
+from ros_3d_bb_lab.simulation.scenario import ScenarioError, read_scenario
+from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
 
 RANGE_M = {'yolov5': (2.0, 8.0), 'depth': (2.0, 6.0), 'exact': (0.5, 8.0)}  # in which a detector has to find people
 EVERY = {'yolov5': 2, 'depth': 2, 'exact': 1}  # one image of so many is used

@@ -11,12 +11,12 @@ from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, is_plausible
 from ros_3d_bb.estimation.error_model import corrected_boxes
 from ros_3d_bb.evaluation.identities import Moment
-from ros_3d_bb.simulation.simulator import Frame
-from ros_3d_bb.simulation.truth import truth_at
 from ros_3d_bb.tracking.association import match_greedily
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import Detection, TrackedObject, View, detection_from_box
+from ros_3d_bb_lab.simulation.ground_truth import truth_at
+from ros_3d_bb_lab.simulation.simulator import Frame
 
 LEAST_SHOWN = 0.3  # share of the body; less of it tells nothing of where the person is
 FOUND_IOU = 0.5  # a detection is that of a person where the boxes overlap by so much, else it is false

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.simulation.scenario import Move, Person, Robot, Room, Scenario
-from ros_3d_bb.simulation.simulator import D435I_COLOR, Simulator
+from ros_3d_bb_lab.simulation.scenario import Move, Person, Robot, Room, Scenario
+from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
 
 RANGES_M = (1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0)
 TANGENTS = (-0.4, -0.25, -0.1, 0.0, 0.1, 0.25, 0.4)  # of the angle off the optical axis

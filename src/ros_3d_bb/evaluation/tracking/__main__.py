@@ -12,7 +12,7 @@ from ros_3d_bb.evaluation.tracking.benchmark import BOUND, CONTESTANTS, compare,
 from ros_3d_bb.evaluation.tracking.generator import SECONDS
 from ros_3d_bb.evaluation.tracking.scenes import compare_scenes
 from ros_3d_bb.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
-from ros_3d_bb.simulation.scenario import ScenarioError
+from ros_3d_bb_lab.simulation.scenario import ScenarioError
 
 
 def main():

@@ -4,8 +4,8 @@ import os
 from ros_3d_bb.evaluation.scene_benchmark import depth_detector, result_of, yolov5_detector
 from ros_3d_bb.evaluation.scenes import look_at_scene, track_scene
 from ros_3d_bb.evaluation.tracking.benchmark import CONTESTANTS
-from ros_3d_bb.simulation.scenario import read_scenario
-from ros_3d_bb.simulation.simulator import Simulator
+from ros_3d_bb_lab.simulation.scenario import read_scenario
+from ros_3d_bb_lab.simulation.simulator import Simulator
 
 TRACKERS = [contestant for contestant in CONTESTANTS if contestant.name != 'thesis']
 COLUMNS = '%-22s %-8s %7s %9s %9s %9s'

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ros_3d_bb.simulation.room import FLOOR, copy_where
+from ros_3d_bb_lab.simulation.room import FLOOR, copy_where
 
 MIN_DEPTH_M = 0.1  # faces with a vertex at less depth are not drawn
 SUBPIXEL_BITS = 4

@@ -4,7 +4,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ros_3d_bb.simulation import textures
+from ros_3d_bb_lab.simulation import textures
 
 FLOOR = 0  # number of the floor among the surfaces
 WALL_COLORS = ((210, 206, 196), (205, 200, 190), (196, 192, 180), (202, 196, 186))

@@ -4,7 +4,7 @@ from std_msgs.msg import Header
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import TF_TOPIC, CameraFrame, frame_id_of, messages_of, topic_of
 from ros_3d_bb.conversions.perception_msgs import time_from, tracks_to_message
-from ros_3d_bb.simulation.truth import truth_at
+from ros_3d_bb_lab.simulation.ground_truth import truth_at
 
 TRUTH_TOPIC = 'ground_truth'
 MAP_FRAME, ODOM_FRAME, BASE_FRAME = 'map', 'odom', 'base_link'

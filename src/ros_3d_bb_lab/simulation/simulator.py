@@ -5,13 +5,13 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
-from ros_3d_bb.simulation import mesh
-from ros_3d_bb.simulation.body import Body, Build
-from ros_3d_bb.simulation.color import ColorSensor
-from ros_3d_bb.simulation.motion import person_motion, robot_motion
-from ros_3d_bb.simulation.renderer import render
-from ros_3d_bb.simulation.room import Room
-from ros_3d_bb.simulation.stereo import StereoCamera
+from ros_3d_bb_lab.simulation import mesh
+from ros_3d_bb_lab.simulation.body import Body, Build
+from ros_3d_bb_lab.simulation.color_sensor import ColorSensor
+from ros_3d_bb_lab.simulation.motion import person_motion, robot_motion
+from ros_3d_bb_lab.simulation.renderer import render
+from ros_3d_bb_lab.simulation.room import Room
+from ros_3d_bb_lab.simulation.stereo import StereoCamera
 
 D435I_COLOR = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)  # camera of the measurements in the thesis
 FRONT_FROM_OPTICAL = transform_from((0, 0, 0), OPTICAL_ROTATION)

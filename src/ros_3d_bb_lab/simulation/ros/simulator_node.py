@@ -15,9 +15,9 @@ from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics, is_ending
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.wait_for_subscribers import wait_for_subscribers
-from ros_3d_bb.simulation.scenario import read_scenario, with_overrides
-from ros_3d_bb.simulation.simulator import Simulator
-from ros_3d_bb.simulator_messages import TRUTH_TOPIC, simulated_messages
+from ros_3d_bb_lab.simulation.ros.simulator_msgs import TRUTH_TOPIC, simulated_messages
+from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
+from ros_3d_bb_lab.simulation.simulator import Simulator
 
 CLOCK_LEAD_NS = NS  # between the time that is told while waiting and the first image
 PAUSE_NS = 3 * NS  # between two rounds of a scene, so that the people of one are not taken for those of the next

@@ -8,8 +8,8 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from ros_3d_bb.simulation.gait import BONES, JOINTS_M, TABLE_HEIGHT_M, Posture, bone_transforms
-from ros_3d_bb.simulation.mesh import Mesh, loft, vertex_normals
+from ros_3d_bb_lab.simulation.gait import BONES, JOINTS_M, TABLE_HEIGHT_M, Posture, bone_transforms
+from ros_3d_bb_lab.simulation.mesh import Mesh, loft, vertex_normals
 
 Color = Tuple[int, int, int]
 

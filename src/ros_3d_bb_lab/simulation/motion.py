@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.simulation.gait import Posture, stride_m
+from ros_3d_bb_lab.simulation.gait import Posture, stride_m
 
 SMOOTHING_S = 0.6
 WALKING_MPS = 1.3  # speed at which legs and arms reach their full swing

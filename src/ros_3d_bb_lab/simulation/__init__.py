@@ -1,0 +1,4 @@
+"""A simulated room with walking people, seen by a RealSense D435i on a Jackal; free of ROS.
+
+May import: camera, core, tracking.
+"""

@@ -1,0 +1,48 @@
+"""Scenarios as bags: the command `scenario_to_bag`."""
+import itertools
+
+import numpy as np
+from std_msgs.msg import Header
+
+from ros_3d_bb.bags.bag_writer import bag_command_parser, write_bag_of_command
+from ros_3d_bb.conversions.camera_msgs import START_NS, frame_id_of, topic_of
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_message, time_from
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb_lab.simulation.ros.simulator_msgs import simulated_messages
+from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
+from ros_3d_bb_lab.simulation.simulator import Simulator
+
+
+def scenario_images(scenario, with_boxes=False):
+    """Yield the images of a scenario for `write_bag`, with ground truth and optionally with its 2D boxes."""
+    simulator = Simulator(scenario)
+    for number in range(simulator.frame_count):
+        frame = simulator.frame(number)
+        stamp_ns = START_NS + int(round(frame.time_s * NS))
+        messages = simulated_messages(simulator, frame, stamp_ns)
+        if with_boxes:
+            boxes = [person.box_px for person in frame.people if person.box_px is not None]
+            header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(frame.camera))
+            messages.append((topic_of(frame.camera, BOXES_TOPIC),
+                             boxes2d_to_message(np.array(boxes, int).reshape(-1, 4), header)))
+        yield stamp_ns, messages
+
+
+def scenario_to_bag():
+    """The command `scenario_to_bag`: render a scenario to a bag with ground truth."""
+    parser = bag_command_parser('scenario_to_bag', scenario_to_bag.__doc__)
+    parser.add_argument('scenario', help='scenario file (YAML), see config/scenarios')
+    parser.add_argument('bag', help='bag to write')
+    parser.add_argument('--rate', type=float, metavar='HZ', help="images per second (default: the scenario's)")
+    parser.add_argument('--seed', type=int, help="seed of noise and people's appearance (default: the scenario's)")
+    parser.add_argument('--images', type=int, metavar='N', help='number of images, from the start (default: all)')
+    parser.add_argument('--boxes', action='store_true', help='also write the true 2D boxes to yolo_bounding_box')
+    arguments = parser.parse_args()
+
+    if arguments.images is not None and arguments.images < 1:
+        parser.error('--images %d: at least 1 expected' % arguments.images)
+
+    def images():
+        scenario = with_overrides(read_scenario(arguments.scenario), arguments.rate, arguments.seed)
+        return itertools.islice(scenario_images(scenario, arguments.boxes), arguments.images)
+    write_bag_of_command(parser, arguments, images)
