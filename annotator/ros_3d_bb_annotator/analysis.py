@@ -5,12 +5,11 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from ros_3d_bb.evaluation.noise.analysis import Inputs
-from ros_3d_bb.evaluation.noise.analysis import analyse as analyse_noise
-from ros_3d_bb.evaluation.noise.results import text_of, write_results
-from ros_3d_bb.evaluation.noise.tables import Measurements, TableError, read_session_measurements
 from ros_3d_bb_annotator.document import ESTIMATOR
 from ros_3d_bb_annotator.measurement import ANNOTATED
+from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse as analyse_noise
+from ros_3d_bb_lab.evaluation.noise.results import text_of, write_results
+from ros_3d_bb_lab.evaluation.noise.tables import Measurements, TableError, read_session_measurements
 
 FOLDER_NAME = 'analysis'
 RECORDED = 'recorded'

@@ -21,8 +21,8 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, boxes2d_to_message
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.evaluation.latency import end, free_port
 from ros_3d_bb.nodes.doctor import graph_findings
+from ros_3d_bb_lab.evaluation.latency.benchmark import end, free_port
 from support.ros import Recorder, camera_info, depth_message, header_at, wait_until
 
 COLOR, DEPTH = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'

@@ -8,8 +8,8 @@ import pytest
 import rosbag
 import rospy
 
-from ros_3d_bb.evaluation.identities import score
-from ros_3d_bb.report import read_recording, write_report
+from ros_3d_bb_lab.evaluation.clear_mot import score
+from ros_3d_bb_lab.evaluation.demo.scene_report import read_recording, write_report
 from support.ros import launched
 
 SCENE = """

@@ -10,10 +10,10 @@ import rosbag
 import rospy
 
 from ros_3d_bb.conversions.perception_msgs import stamp_of
-from ros_3d_bb.evaluation.identities import score
 from ros_3d_bb.msg import TrackedObjectArray
-from ros_3d_bb.report import read_recording
 from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE
+from ros_3d_bb_lab.evaluation.clear_mot import score
+from ros_3d_bb_lab.evaluation.demo.scene_report import read_recording
 from support.ros import Recorder, launched
 
 SCENARIO = os.path.join(os.path.dirname(__file__), '..', '..', 'config', 'scenarios', 'two_cameras.yaml')

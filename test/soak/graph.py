@@ -5,7 +5,7 @@ import subprocess
 import threading
 import time
 
-from ros_3d_bb.evaluation.latency import end
+from ros_3d_bb_lab.evaluation.latency.benchmark import end
 from soak.records import Death
 
 LAUNCH = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'soak.launch')

@@ -6,10 +6,10 @@ import pytest
 
 from conftest import DATA
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
-from ros_3d_bb.evaluation.accuracy import Estimates, boxes_of, compare, scenario_scores, scores_of, table
-from ros_3d_bb.evaluation.scenes import position_errors_m
-from ros_3d_bb.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb.sessions.session_reader import read_session
+from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scenario_scores, scores_of, table
+from ros_3d_bb_lab.evaluation.scenes import position_errors_m
+from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 

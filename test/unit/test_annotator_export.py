@@ -5,10 +5,10 @@ import os
 import pytest
 
 import conftest
-from ros_3d_bb.evaluation.noise.tables import read_table
 from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.export import COLUMNS, export, rows_of
+from ros_3d_bb_lab.evaluation.noise.tables import read_table
 from support.small_session import change_json, write_small_session
 
 

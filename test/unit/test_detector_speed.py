@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb.evaluation import detector_speed
+from ros_3d_bb_lab.evaluation import detector_speed
 from support.checkpoints import write_checkpoint
 from support.layouts import layout
 

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.estimation.error_model import Spread, XBias
-from ros_3d_bb.evaluation.error_fit import data_of, fit_error_model, held_out, scores_of
+from ros_3d_bb_lab.evaluation.error_model_fit import data_of, fit_error_model, held_out, scores_of
 from support.error_models import MODEL, PLACES_M, measure
 
 SIMPLE = MODEL._replace(x_bias=XBias(-0.1, 0.0, 0.02))

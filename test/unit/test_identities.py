@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.evaluation.identities import GATE_M, Moment, score, table
-from ros_3d_bb.evaluation.tracking.metrics import Scored, _data_of, _metrics
 from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
+from ros_3d_bb_lab.evaluation.clear_mot import GATE_M, Moment, score, table
+from ros_3d_bb_lab.evaluation.tracking.metrics import Scored, _data_of, _metrics
 
 
 def at(number, x, y, status=VISIBLE):

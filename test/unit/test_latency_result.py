@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.evaluation.latency import CASES, row
-from ros_3d_bb.evaluation.latency_result import STAGES, latencies, percentiles, result_of
-from ros_3d_bb.evaluation.processes import usage_of
+from ros_3d_bb_lab.evaluation.latency.benchmark import CASES, row
+from ros_3d_bb_lab.evaluation.latency.latency_result import STAGES, latencies, percentiles, result_of
+from ros_3d_bb_lab.evaluation.latency.process_usage import usage_of
 
 NS = 10 ** 9
 BEGAN_S = 1000.0

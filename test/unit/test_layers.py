@@ -21,7 +21,7 @@ PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime', 'yaml', 'matplotlib', 
                   'pyrealsense2'}
 # desk tools: no node may come to need their libraries
 NOISE, TRACKING_BENCHMARK = os.path.join('evaluation', 'noise'), os.path.join('evaluation', 'tracking')
-ORIGINAL = 'ros_3d_bb.evaluation.tracking.original'  # needs none of those libraries
+ORIGINAL = 'ros_3d_bb_lab.evaluation.baselines.original_tracker'  # needs none of those libraries
 SPEED_PICTURE = os.path.join('evaluation', 'speed_picture.py')  # of a benchmark, which imports it last
 ASSIGNMENT = os.path.join('tracking', 'association.py')  # SciPy's solver has no equal
 # know ROS messages, bags and transforms, but neither nodes nor topics nor a master
@@ -93,7 +93,7 @@ def test_the_annotator_knows_no_ros_and_only_its_windows_qt(module):
     assert others <= allowed | (set() if module in WITHOUT_WINDOW else QT)
     assert not any(name.startswith(('ros_3d_bb.nodes', 'ros_3d_bb.msg', 'ros_3d_bb.conversions.perception_msgs'))
                    for name in ours)
-    noise = any(name.startswith('ros_3d_bb.evaluation.noise') for name in ours)
+    noise = any(name.startswith('ros_3d_bb_lab.evaluation.noise') for name in ours)
     assert not noise or module == 'analysis.py'  # it takes a second to import
 
 

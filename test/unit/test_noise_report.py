@@ -13,7 +13,7 @@ import pytest
 
 import conftest
 from ros_3d_bb.estimation.error_model import read_error_model
-from ros_3d_bb.evaluation.noise import __main__ as command
+from ros_3d_bb_lab.evaluation.noise import __main__ as command
 from support.noise_tables import rows_of, write_table
 
 FIGURES = ['figure_5_%d.png' % number for number in range(2, 9)]

@@ -2,10 +2,10 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb.evaluation.noise import theory
-from ros_3d_bb.evaluation.noise.statistics import (DISTRIBUTIONS, axis_statistics, cluster_statistics,
-                                                   held_out_log_likelihood, share_between_positions)
-from ros_3d_bb.evaluation.noise.tables import Cluster, Measurements
+from ros_3d_bb_lab.evaluation.noise import theory
+from ros_3d_bb_lab.evaluation.noise.statistics import (DISTRIBUTIONS, axis_statistics, cluster_statistics,
+                                                       held_out_log_likelihood, share_between_positions)
+from ros_3d_bb_lab.evaluation.noise.tables import Cluster, Measurements
 
 
 def drawn(kind, count=300):

@@ -2,9 +2,9 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb.evaluation.noise.tables import (Measurements, TableError, clusters_of, read_session_measurements,
-                                               read_table)
 from ros_3d_bb.sessions.session_reader import read_session
+from ros_3d_bb_lab.evaluation.noise.tables import (Measurements, TableError, clusters_of, read_session_measurements,
+                                                   read_table)
 from support.noise_tables import COLUMNS, RANGES_M, SIDES_M, rows_of, write_table
 
 

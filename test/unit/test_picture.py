@@ -1,7 +1,7 @@
 """Content of the image of a report."""
 import numpy as np
 
-from ros_3d_bb.evaluation.picture import TRACK_COLORS, TRUTH_COLOR, Paths, scene_picture, top_view
+from ros_3d_bb_lab.evaluation.demo.scene_plot import TRACK_COLORS, TRUTH_COLOR, Paths, scene_picture, top_view
 
 
 def has(image, color):

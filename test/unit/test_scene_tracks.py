@@ -4,10 +4,10 @@ import pytest
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.evaluation.identities import Moment
-from ros_3d_bb.evaluation.scene_tracks import is_in_image, score_tracks
-from ros_3d_bb.evaluation.scenes import Step
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
+from ros_3d_bb_lab.evaluation.clear_mot import Moment
+from ros_3d_bb_lab.evaluation.scene_tracks import is_in_image, score_tracks
+from ros_3d_bb_lab.evaluation.scenes import Step
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Frame, Poses, Truth
 
 CAMERA_M = (0.0, 0.0, 1.0)

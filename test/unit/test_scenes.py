@@ -12,10 +12,10 @@ import pytest
 
 from conftest import DATA
 from ros_3d_bb.estimation.error_model import read_error_model
-from ros_3d_bb.evaluation.identities import score
-from ros_3d_bb.evaluation.scene_benchmark import (RANGE_M, depth_detector, exact_detector, main, result_of,
-                                                  yolov5_detector)
-from ros_3d_bb.evaluation.scenes import look_at_scene, run_scene, score_detections
+from ros_3d_bb_lab.evaluation.clear_mot import score
+from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, exact_detector, main, result_of,
+                                                      yolov5_detector)
+from ros_3d_bb_lab.evaluation.scenes import look_at_scene, run_scene, score_detections
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 

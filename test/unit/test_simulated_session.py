@@ -2,9 +2,9 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb.evaluation.noise.tables import read_session_measurements
-from ros_3d_bb.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb.sessions.session_reader import read_session
+from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements
+from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 
 
 def test_measured_positions_agree_with_the_truth(tmp_path):

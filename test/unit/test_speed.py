@@ -8,14 +8,14 @@ from hypothesis import given, strategies as st
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
-from ros_3d_bb.evaluation import speed as benchmark
-from ros_3d_bb.evaluation.crowd import JITTER_PX, crowd_of, people_of
-from ros_3d_bb.evaluation.machine import describe_machine
-from ros_3d_bb.evaluation.speed_picture import draw_speed
-from ros_3d_bb.evaluation.tracking.original import OriginalTracker
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.types import Detection
+from ros_3d_bb_lab.evaluation import speed as benchmark
+from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
+from ros_3d_bb_lab.evaluation.crowd import JITTER_PX, crowd_of, people_of
+from ros_3d_bb_lab.evaluation.machine import describe_machine
+from ros_3d_bb_lab.evaluation.speed_plot import draw_speed
 
 SIZE = np.array([0.5, 0.5, 1.7])
 

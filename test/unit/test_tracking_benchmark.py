@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.evaluation.tracking import __main__ as command
-from ros_3d_bb.evaluation.tracking.benchmark import CONTESTANTS, compare, outputs_of, runs_of, table
-from ros_3d_bb.evaluation.tracking.detector import DOUBLE, FALSE
-from ros_3d_bb.evaluation.tracking.generator import simulate
-from ros_3d_bb.evaluation.tracking.library import Norfair
-from ros_3d_bb.evaluation.tracking.metrics import score_run, scores_of
-from ros_3d_bb.evaluation.tracking.original import OriginalTracker, as_it_arrived
-from ros_3d_bb.evaluation.tracking.perfect import outputs_with_perfect_association
-from ros_3d_bb.evaluation.tracking.robot import DRIVING
-from ros_3d_bb.evaluation.tracking.trajectories import made_sequences
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, Detection
+from ros_3d_bb_lab.evaluation.baselines.norfair_baseline import Norfair
+from ros_3d_bb_lab.evaluation.baselines.oracle_association import outputs_with_perfect_association
+from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker, as_it_arrived
+from ros_3d_bb_lab.evaluation.tracking import __main__ as command
+from ros_3d_bb_lab.evaluation.tracking.benchmark import CONTESTANTS, compare, outputs_of, runs_of, table
+from ros_3d_bb_lab.evaluation.tracking.detection_generator import DOUBLE, FALSE
+from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
+from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING
+from ros_3d_bb_lab.evaluation.tracking.run_generator import simulate
+from ros_3d_bb_lab.evaluation.tracking.trajectories import made_sequences
 
 SCENARIOS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
 KEYS = {'hota', 'mota', 'idf1', 'id_switches', 'fragmentations', 'position_rmse_m', 'velocity_rmse_mps', 'ade_1s_m',

@@ -5,14 +5,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.evaluation.tracking import robot
-from ros_3d_bb.evaluation.tracking.camera_model import CameraModel, half_width, shown, thesis_bias_m
-from ros_3d_bb.evaluation.tracking.detector import DOUBLE, FALSE, Detector, Seen
-from ros_3d_bb.evaluation.tracking.generator import HORIZONS_S, Models, Timing, simulate, view_of
-from ros_3d_bb.evaluation.tracking.robot import DRIVING, STANDING, OdometryModel
-from ros_3d_bb.evaluation.tracking.timing import crowd
-from ros_3d_bb.evaluation.tracking.trajectories import made_sequences
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
+from ros_3d_bb_lab.evaluation.tracking import robot_motion
+from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel, half_width, shown, thesis_bias_m
+from ros_3d_bb_lab.evaluation.tracking.detection_generator import DOUBLE, FALSE, Detector, Seen
+from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING, OdometryModel
+from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, Models, Timing, simulate, view_of
+from ros_3d_bb_lab.evaluation.tracking.timing import crowd
+from ros_3d_bb_lab.evaluation.tracking.trajectories import made_sequences
 
 SECONDS = 4
 HALF_VIEW = CameraModel().field_of_view / 2
@@ -63,7 +63,7 @@ def shown_in(image):
     """What an image of a robot with exact odometry shows of the people in its truth."""
     local_m = seen_from(image.view, image.truth.position_m)[:, ::-1] * (1, -1)
     range_m = np.linalg.norm(local_m, axis=1)
-    return shown(robot.bearing_of(local_m), half_width(range_m), range_m, HALF_VIEW)
+    return shown(robot_motion.bearing_of(local_m), half_width(range_m), range_m, HALF_VIEW)
 
 
 def test_without_errors_detections_of_whole_people_are_the_truth(exact):
@@ -123,7 +123,7 @@ def test_the_intrinsics_show_as_much_as_the_field_of_view():
     pose = np.array([1.0, -2.0, 0.7])
     view = view_of(pose, CameraModel())
     for u, side in ((-0.5, 1), (view.intrinsics.width - 0.5, -1)):  # left, right
-        point_m = robot.from_frame(pose, 3 * np.array([np.cos(HALF_VIEW), side * np.sin(HALF_VIEW)]))
+        point_m = robot_motion.from_frame(pose, 3 * np.array([np.cos(HALF_VIEW), side * np.sin(HALF_VIEW)]))
         (right_m, forward_m), = seen_from(view, point_m[None])
         assert view.intrinsics.project((right_m, 0, forward_m))[0] == pytest.approx(u)
 
@@ -147,9 +147,9 @@ def test_velocities_and_futures_of_the_truth_are_those_of_the_walks(exact):
 def test_who_stands_behind_another_is_hidden_and_who_is_half_behind_is_seen_at_the_side():
     local_m = np.array([(2, 0), (4, 0), (4, 1.2), (4, -0.5)])
     range_m = np.linalg.norm(local_m, axis=1)
-    what = shown(robot.bearing_of(local_m), half_width(range_m), range_m, HALF_VIEW)
+    what = shown(robot_motion.bearing_of(local_m), half_width(range_m), range_m, HALF_VIEW)
     assert what.share[:3].tolist() == [1, 0, 1] and 0.3 < what.share[3] < 0.95
-    assert what.middle[3] < robot.bearing_of(local_m[3]) and not what.cut.any()
+    assert what.middle[3] < robot_motion.bearing_of(local_m[3]) and not what.cut.any()
 
 
 bearings = st.lists(st.tuples(st.floats(-1.2, 1.2), st.floats(0.5, 8)), min_size=1, max_size=8)
@@ -173,16 +173,17 @@ def test_shares_are_shares_the_nearest_is_whole_and_the_farther_hides_nobody(peo
 @given(st.floats(-3, 3), st.floats(-5, 5), st.floats(-5, 5), st.floats(-5, 5), st.floats(-5, 5))
 def test_to_frame_undoes_from_frame(heading, x_m, y_m, forward_m, left_m):
     pose = np.array([x_m, y_m, heading])
-    assert np.allclose(robot.to_frame(pose, robot.from_frame(pose, [forward_m, left_m])), (forward_m, left_m))
+    assert np.allclose(robot_motion.to_frame(pose, robot_motion.from_frame(pose, [forward_m, left_m])),
+                       (forward_m, left_m))
 
 
 def test_odometry_drifts_from_the_truth_only_while_the_robot_drives():
     random = np.random.RandomState(0)
-    still = robot.with_odometry(robot.standing((1, 2), 0.5, 10), OdometryModel(), random)
+    still = robot_motion.with_odometry(robot_motion.standing((1, 2), 0.5, 10), OdometryModel(), random)
     assert np.allclose(still.odometry, still.true)
-    true = robot.driving((1, 2), 0.5, 0.3, 30)
-    moving = robot.with_odometry(true, OdometryModel(), random)
-    exact_path = robot.with_odometry(true, OdometryModel(*[0.0] * 6), random)
+    true = robot_motion.driving((1, 2), 0.5, 0.3, 30)
+    moving = robot_motion.with_odometry(true, OdometryModel(), random)
+    exact_path = robot_motion.with_odometry(true, OdometryModel(*[0.0] * 6), random)
     assert np.allclose(exact_path.odometry, true, atol=1e-6)
     off_m = np.linalg.norm(moving.odometry[:, :2] - true[:, :2], axis=1)
     assert off_m[0] == 0 and 0.02 < off_m.max() < 3

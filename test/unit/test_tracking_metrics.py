@@ -4,10 +4,10 @@ import sys
 import numpy as np
 import pytest
 
-from ros_3d_bb.evaluation.tracking.camera_model import CameraModel
-from ros_3d_bb.evaluation.tracking.generator import HORIZONS_S, Image, Run, Truth
-from ros_3d_bb.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject
+from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
+from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
+from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, Image, Run, Truth
 
 pytestmark = pytest.mark.needs('trackeval')
 IMAGES = 40

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ros_3d_bb.evaluation.tracking.trajectories import (
-    FEWEST_POINTS, LONGEST_GAP_S, made_sequences, pedestrian_of, read_sequence, read_sequences)
+from ros_3d_bb_lab.evaluation.tracking.trajectories import (FEWEST_POINTS, LONGEST_GAP_S, made_sequences,
+                                                            pedestrian_of, read_sequence, read_sequences)
 
 TIMES_S = np.arange(0, 8, 0.4)
 

@@ -13,11 +13,11 @@ from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.bags.process_bag import with_tracker
 from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.event_counter import Tally
-from ros_3d_bb.evaluation.identities import score
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, Follower, TrackerNodeParams
-from ros_3d_bb.report import panels_of, read_recording
+from ros_3d_bb_lab.evaluation.clear_mot import score
+from ros_3d_bb_lab.evaluation.demo.scene_report import panels_of, read_recording
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.launching import loaded

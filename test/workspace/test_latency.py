@@ -32,7 +32,7 @@ def benchmark(tmp_path):
     environment = dict(os.environ, ROS_HOSTNAME='localhost', ROS_LOG_DIR=str(tmp_path))
 
     def start(*arguments):
-        return subprocess.Popen([sys.executable, '-m', 'ros_3d_bb.evaluation.latency'] + list(arguments),
+        return subprocess.Popen([sys.executable, '-m', 'ros_3d_bb_lab.evaluation.latency.benchmark'] + list(arguments),
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True,
                                 env=environment)
     return start

@@ -10,10 +10,10 @@ import pytest
 from fuzz import hostile
 from fuzz.nodes import TARGETS
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.nodes.latency_probe_node import LatencyProbeNode
 from ros_3d_bb.nodes.realsense_node import RealSenseNode
-from ros_3d_bb.nodes.replay_node import ReplayNode
 from ros_3d_bb.tracking.thesis_tracker import ThesisTrackerParams
+from ros_3d_bb_lab.evaluation.latency.latency_probe_node import LatencyProbeNode
+from ros_3d_bb_lab.evaluation.latency.replay_node import ReplayNode
 from ros_3d_bb_lab.simulation.ros.simulator_node import SimulatorNode
 from support.masterless import masterless
 from support.planner_definitions import package
@@ -40,7 +40,7 @@ def connected(name):
         params, make = TARGETS[name].params, functools.partial(TARGETS[name].make, None)
     with masterless(dict(params, **MORE_PARAMS.get(name, {}))) as connections, \
             mock.patch.dict(sys.modules, stand_ins), mock.patch('threading.Thread.start'), \
-            mock.patch('ros_3d_bb.nodes.replay_node.images_in', lambda _path, _topics: []):
+            mock.patch('ros_3d_bb_lab.evaluation.latency.replay_node.images_in', lambda _path, _topics: []):
         node = make()
         messages = dict(hostile.good_frame(NS), yolo_bounding_box=hostile.good_boxes(NS))
         for topic in sorted(set(messages) & set(connections.subscribers)):

@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 from ros_3d_bb.bags.bag_writer import START_NS, write_bag
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_message, time_from, tracks_from_message, tracks_to_message
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.report import BOXES_TOPIC, TRACKS_TOPIC, paths_of, read_recording, write_report
+from ros_3d_bb_lab.evaluation.demo.scene_report import BOXES_TOPIC, TRACKS_TOPIC, paths_of, read_recording, write_report
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 

@@ -18,9 +18,9 @@ from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.detection.yolov5.backends import open_runtime
 from ros_3d_bb.detection.yolov5.checkpoint import WeightsError, read_checkpoint
 from ros_3d_bb.estimation.error_model import read_error_model
-from ros_3d_bb.evaluation.noise.tables import read_table
-from ros_3d_bb.evaluation.tracking.trajectories import read_sequence
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
+from ros_3d_bb_lab.evaluation.noise.tables import read_table
+from ros_3d_bb_lab.evaluation.tracking.trajectories import read_sequence
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))

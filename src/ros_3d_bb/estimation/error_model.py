@@ -4,7 +4,7 @@ Convention: positions (x, y, z) are in the camera optical frame, metres; error =
 function of the TRUE position, as in the thesis: the noise is in what the camera measured, not in the tape's truth, and
 a fit the other way round would pull every position towards the middle of the data. A node knows only the measured
 position, so `ErrorModel.corrected` solves measured = truth + bias(truth). The model is fitted by
-ros_3d_bb.evaluation.error_fit; its file is described in config/error_models/README.md.
+ros_3d_bb_lab.evaluation.error_model_fit; its file is described in config/error_models/README.md.
 """
 from typing import NamedTuple, Optional
 

@@ -4,9 +4,9 @@ import time
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.evaluation.tracking.camera_model import CameraModel
-from ros_3d_bb.evaluation.tracking.detector import Found
-from ros_3d_bb.evaluation.tracking.generator import detection_of, view_of
+from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
+from ros_3d_bb_lab.evaluation.tracking.detection_generator import Found
+from ros_3d_bb_lab.evaluation.tracking.run_generator import detection_of, view_of
 
 PEOPLE = (5, 20, 100)
 AREA_M2 = 1.0  # for each person

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple, Optional
 import numpy as np
 
 from ros_3d_bb.estimation.error_model import ErrorModel, MeasuredRange, Provenance, Spread, XBias, checked
-from ros_3d_bb.evaluation.error_fit import GROWTH_OUTSIDE, LEAST_SIGMA_M, Y_SIGMA_M, fit_error_model
-from ros_3d_bb.evaluation.noise import theory
-from ros_3d_bb.evaluation.noise.statistics import AxisStatistics, axis_statistics, share_between_positions
-from ros_3d_bb.evaluation.noise.tables import Measurements, clusters_of
+from ros_3d_bb_lab.evaluation.error_model_fit import GROWTH_OUTSIDE, LEAST_SIGMA_M, Y_SIGMA_M, fit_error_model
+from ros_3d_bb_lab.evaluation.noise import theory
+from ros_3d_bb_lab.evaluation.noise.statistics import AxisStatistics, axis_statistics, share_between_positions
+from ros_3d_bb_lab.evaluation.noise.tables import Measurements, clusters_of
 
 Z_DEGREE, X_DEGREE = 2, 1
 RMS_FIT_FROM_M = 1.5  # nearer, the error does not go with the square of the distance (thesis 5.2)

@@ -8,10 +8,10 @@ from typing import NamedTuple, Optional
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.evaluation.identities import ClearMatcher
-from ros_3d_bb.evaluation.scenes import LEAST_SHOWN
 from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import VISIBLE
+from ros_3d_bb_lab.evaluation.clear_mot import ClearMatcher
+from ros_3d_bb_lab.evaluation.scenes import LEAST_SHOWN
 
 NEAREST_M = 0.5  # distance from the camera in the plane
 HELD_M = 0.5  # a track farther from a person is not of that person

@@ -14,10 +14,10 @@ import numpy as np
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, truncated_edges
 from ros_3d_bb.estimation.error_model import read_error_model, write_error_model
-from ros_3d_bb.evaluation.defaults import default_weights, scenario_path
-from ros_3d_bb.evaluation.error_fit import coverage, data_of, fit_error_model, held_out
-from ros_3d_bb.evaluation.scenes import position_errors_m
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
+from ros_3d_bb_lab.evaluation.defaults import default_weights, scenario_path
+from ros_3d_bb_lab.evaluation.error_model_fit import coverage, data_of, fit_error_model, held_out
+from ros_3d_bb_lab.evaluation.scenes import position_errors_m
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 

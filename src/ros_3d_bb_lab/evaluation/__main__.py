@@ -1,4 +1,4 @@
-"""The benchmarks: `python3 -m ros_3d_bb.evaluation NAME [OPTION ...]`, which `./run bench` calls."""
+"""The benchmarks: `python3 -m ros_3d_bb_lab.evaluation NAME [OPTION ...]`, which `./run bench` calls."""
 import importlib
 import sys
 
@@ -13,7 +13,7 @@ def main():
         sys.stderr.write('./run bench: unknown benchmark %r; %s expected\n' % (name, ', '.join(sorted(MODULES))))
         return 2
     sys.argv = ['./run bench ' + name] + sys.argv[2:]
-    return importlib.import_module('ros_3d_bb.evaluation.' + MODULES[name]).main()
+    return importlib.import_module('ros_3d_bb_lab.evaluation.' + MODULES[name]).main()
 
 
 if __name__ == '__main__':

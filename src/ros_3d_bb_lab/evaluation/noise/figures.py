@@ -3,8 +3,8 @@ import matplotlib
 import numpy as np
 from scipy import stats
 
-from ros_3d_bb.evaluation.noise import theory
-from ros_3d_bb.evaluation.noise.analysis import RMS_FIT_FROM_M
+from ros_3d_bb_lab.evaluation.noise import theory
+from ros_3d_bb_lab.evaluation.noise.analysis import RMS_FIT_FROM_M
 
 matplotlib.use('Agg')  # no screen is needed
 import matplotlib.pyplot as plt  # noqa: E402

@@ -1,8 +1,8 @@
 """The noise analysis as a page that a person reads from top to bottom."""
-from ros_3d_bb.evaluation.noise import theory
-from ros_3d_bb.evaluation.noise.figures import RMS_FIT_FROM_M, polynomial_text
-from ros_3d_bb.evaluation.noise.page import figure, heading, page, paragraph, table
-from ros_3d_bb.evaluation.noise.statistics import DISTRIBUTIONS, LEAST_TO_TEST
+from ros_3d_bb_lab.evaluation.noise import theory
+from ros_3d_bb_lab.evaluation.noise.figures import RMS_FIT_FROM_M, polynomial_text
+from ros_3d_bb_lab.evaluation.noise.html_page import figure, heading, page, paragraph, table
+from ros_3d_bb_lab.evaluation.noise.statistics import DISTRIBUTIONS, LEAST_TO_TEST
 
 SIMILAR = 0.05  # of log likelihood a measurement: less says nothing
 

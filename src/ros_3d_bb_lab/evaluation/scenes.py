@@ -10,11 +10,11 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, is_plausible
 from ros_3d_bb.estimation.error_model import corrected_boxes
-from ros_3d_bb.evaluation.identities import Moment
 from ros_3d_bb.tracking.association import match_greedily
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import Detection, TrackedObject, View, detection_from_box
+from ros_3d_bb_lab.evaluation.clear_mot import Moment
 from ros_3d_bb_lab.simulation.ground_truth import truth_at
 from ros_3d_bb_lab.simulation.simulator import Frame
 

@@ -8,11 +8,12 @@ from typing import List, NamedTuple, Tuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.evaluation.tracking.camera_model import CameraModel, half_width, shown
-from ros_3d_bb.evaluation.tracking.detector import HARD_TO_SEE, Detector, Seen
-from ros_3d_bb.evaluation.tracking.robot import (PERIOD_S, STANDING, OdometryModel, bearing_of, driving, from_frame,
-                                                 jittered, standing, to_frame, turned, with_odometry)
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
+from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel, half_width, shown
+from ros_3d_bb_lab.evaluation.tracking.detection_generator import HARD_TO_SEE, Detector, Seen
+from ros_3d_bb_lab.evaluation.tracking.robot_motion import (PERIOD_S, STANDING, OdometryModel, bearing_of, driving,
+                                                            from_frame, jittered, standing, to_frame, turned,
+                                                            with_odometry)
 
 HORIZONS_S = np.array([0.5, 1.0, 1.5, 2.0])  # at which predictions are compared with where people went
 CAMERA_HEIGHT_M = 0.5
@@ -108,7 +109,7 @@ def simulate(sequence, motion, seed, models=Models(), seconds=SECONDS):
     ----------
     sequence : trajectories.Sequence
     motion : str
-        robot.STANDING or robot.DRIVING.
+        robot_motion.STANDING or robot_motion.DRIVING.
     seed : int or sequence of int
     models : Models
     seconds : float

@@ -19,16 +19,16 @@ import numpy as np
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_median, estimator_named, sample_median
-from ros_3d_bb.evaluation.crowd import crowd_of, people_of
-from ros_3d_bb.evaluation.defaults import default_weights
-from ros_3d_bb.evaluation.detector_speed import detector_speed
-from ros_3d_bb.evaluation.machine import describe_machine
-from ros_3d_bb.evaluation.simulated_session import write_simulated_session
-from ros_3d_bb.evaluation.tracking.original import OriginalTracker
 from ros_3d_bb.sessions.session_reader import read_color, read_session
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import Detection, View, detection_from_box
+from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
+from ros_3d_bb_lab.evaluation.crowd import crowd_of, people_of
+from ros_3d_bb_lab.evaluation.defaults import default_weights
+from ros_3d_bb_lab.evaluation.detector_speed import detector_speed
+from ros_3d_bb_lab.evaluation.machine import describe_machine
+from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 
 OBJECTS = (1, 2, 5, 10, 20, 50, 100)
 WARM_UPS = 10  # images before the times count: until tracks are confirmed, and caches warm
@@ -181,7 +181,7 @@ def main():
             with open(arguments.json, 'w') as stream:
                 json.dump(result, stream, indent=1)
         if arguments.picture:
-            from ros_3d_bb.evaluation.speed_picture import draw_speed  # takes seconds to import
+            from ros_3d_bb_lab.evaluation.speed_plot import draw_speed  # takes seconds to import
             draw_speed(result, arguments.picture)
     except (ValueError, OSError) as error:
         sys.exit('./run bench speed: %s' % error)

@@ -13,10 +13,10 @@ from ros_3d_bb.conversions.image_msgs import rgb_from
 from ros_3d_bb.conversions.perception_msgs import (BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message, stamp_of,
                                                    tracks_from_message, transform_from_message)
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.evaluation.identities import Moment, score, table
-from ros_3d_bb.evaluation.picture import Paths, scene_picture
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_caption
+from ros_3d_bb_lab.evaluation.clear_mot import Moment, score, table
+from ros_3d_bb_lab.evaluation.demo.scene_plot import Paths, scene_picture
 from ros_3d_bb_lab.simulation.ros.simulator_msgs import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
 
 PANELS = 6

@@ -10,10 +10,10 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
 from ros_3d_bb.estimation.error_model import read_error_model
-from ros_3d_bb.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path, scenario_paths
-from ros_3d_bb.evaluation.identities import score
-from ros_3d_bb.evaluation.scene_tracks import is_in_image, score_tracks
-from ros_3d_bb.evaluation.scenes import LEAST_SHOWN, run_scene, score_detections
+from ros_3d_bb_lab.evaluation.clear_mot import score
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path, scenario_paths
+from ros_3d_bb_lab.evaluation.scene_tracks import is_in_image, score_tracks
+from ros_3d_bb_lab.evaluation.scenes import LEAST_SHOWN, run_scene, score_detections
 from ros_3d_bb_lab.simulation.scenario import ScenarioError, read_scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
 

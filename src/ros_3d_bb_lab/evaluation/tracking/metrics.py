@@ -13,10 +13,10 @@ from typing import List, NamedTuple, Optional
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from ros_3d_bb.evaluation.tracking.generator import HORIZONS_S
-from ros_3d_bb.evaluation.tracking.robot import bearing_of, to_frame
 from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import VISIBLE
+from ros_3d_bb_lab.evaluation.tracking.robot_motion import bearing_of, to_frame
+from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S
 
 PAIRED_M, MATCHED_M = 1.0, 0.5
 FAR_M = 1e3  # what a pair that is none costs
@@ -63,7 +63,7 @@ def score_run(run, outputs):
 
     Parameters
     ----------
-    run : generator.Run
+    run : run_generator.Run
     outputs : list of list of TrackedObject
         What the tracker published after each image.
 

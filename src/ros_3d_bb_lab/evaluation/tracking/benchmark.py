@@ -1,15 +1,15 @@
 """Our tracker, the thesis' and a library's on the same detections of robots among pedestrians."""
 from typing import Any, NamedTuple
 
-from ros_3d_bb.evaluation.tracking.generator import SECONDS, simulate
-from ros_3d_bb.evaluation.tracking.library import Norfair
-from ros_3d_bb.evaluation.tracking.metrics import score_run, scores_of
-from ros_3d_bb.evaluation.tracking.original import OriginalTracker, as_it_arrived
-from ros_3d_bb.evaluation.tracking.perfect import outputs_with_perfect_association
-from ros_3d_bb.evaluation.tracking.robot import DRIVING, STANDING
-from ros_3d_bb.evaluation.tracking.timing import PEOPLE, cpu_ms
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.tracker import Tracker
+from ros_3d_bb_lab.evaluation.baselines.norfair_baseline import Norfair
+from ros_3d_bb_lab.evaluation.baselines.oracle_association import outputs_with_perfect_association
+from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker, as_it_arrived
+from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
+from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
+from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, simulate
+from ros_3d_bb_lab.evaluation.tracking.timing import PEOPLE, cpu_ms
 
 ROWS = (('hota', '%.1f'), ('assa', '%.1f'), ('deta', '%.1f'), ('mota', '%.1f'), ('idf1', '%.1f'),
         ('id_switches', '%d'), ('fragmentations', '%d'), ('recall', '%.1f'), ('precision', '%.1f'),
@@ -52,7 +52,7 @@ def compare(runs, contestants, on_run=None):
 
     Parameters
     ----------
-    runs : iterable of generator.Run
+    runs : iterable of run_generator.Run
     contestants : sequence of Contestant
     on_run : callable, optional
         Called with each run and {name: scores} of it, once it is done.

@@ -4,7 +4,7 @@ from typing import NamedTuple, Optional
 import numpy as np
 from scipy import stats
 
-from ros_3d_bb.evaluation.noise.tables import AXES
+from ros_3d_bb_lab.evaluation.noise.tables import AXES
 
 LEAST_SCALE_M = 0.001  # values come in whole millimetres: a density must not rise above what that can show
 FOLDS = 5

@@ -7,11 +7,11 @@ import json
 import os
 import sys
 
-from ros_3d_bb.evaluation.defaults import scenario_path
-from ros_3d_bb.evaluation.tracking.benchmark import BOUND, CONTESTANTS, compare, cpu_times, runs_of, table
-from ros_3d_bb.evaluation.tracking.generator import SECONDS
-from ros_3d_bb.evaluation.tracking.scenes import compare_scenes
-from ros_3d_bb.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
+from ros_3d_bb_lab.evaluation.defaults import scenario_path
+from ros_3d_bb_lab.evaluation.tracking.benchmark import BOUND, CONTESTANTS, compare, cpu_times, runs_of, table
+from ros_3d_bb_lab.evaluation.tracking.rendered_scenes import compare_scenes
+from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS
+from ros_3d_bb_lab.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
 from ros_3d_bb_lab.simulation.scenario import ScenarioError
 
 

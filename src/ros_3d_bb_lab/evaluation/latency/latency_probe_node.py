@@ -13,10 +13,10 @@ from visualization_msgs.msg import MarkerArray
 
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message
 from ros_3d_bb.core.params import Param, parameters
-from ros_3d_bb.evaluation.processes import usage_of
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
+from ros_3d_bb_lab.evaluation.latency.process_usage import usage_of
 
 START_TIMEOUT_S = 120.0  # a detector may have to export its network first
 SAMPLE_S = 1.0
@@ -38,7 +38,7 @@ class LatencyProbeNode(object):
     """Record stamps and arrivals for a while, and what each node uses meanwhile; then write them down and end.
 
     Parameters: see `LatencyProbeParams`; launch/latency.launch. The record: see
-    `ros_3d_bb.evaluation.latency_result.result_of`.
+    `ros_3d_bb_lab.evaluation.latency.latency_result.result_of`.
 
     Subscribes
     ----------

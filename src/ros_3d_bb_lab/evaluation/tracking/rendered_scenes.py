@@ -1,9 +1,9 @@
 """Trackers at the end of the whole pipeline, on the rendered scenes of the simulation."""
 import os
 
-from ros_3d_bb.evaluation.scene_benchmark import depth_detector, result_of, yolov5_detector
-from ros_3d_bb.evaluation.scenes import look_at_scene, track_scene
-from ros_3d_bb.evaluation.tracking.benchmark import CONTESTANTS
+from ros_3d_bb_lab.evaluation.scene_benchmark import depth_detector, result_of, yolov5_detector
+from ros_3d_bb_lab.evaluation.scenes import look_at_scene, track_scene
+from ros_3d_bb_lab.evaluation.tracking.benchmark import CONTESTANTS
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 

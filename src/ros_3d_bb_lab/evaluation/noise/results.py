@@ -2,10 +2,10 @@
 import json
 
 from ros_3d_bb.estimation.error_model import write_error_model
-from ros_3d_bb.evaluation.noise.analysis import summary_of
-from ros_3d_bb.evaluation.noise.figures import polynomial_text, write_figures
-from ros_3d_bb.evaluation.noise.report import report_of
-from ros_3d_bb.evaluation.noise.tables import clusters_of
+from ros_3d_bb_lab.evaluation.noise.analysis import summary_of
+from ros_3d_bb_lab.evaluation.noise.figures import polynomial_text, write_figures
+from ros_3d_bb_lab.evaluation.noise.report import report_of
+from ros_3d_bb_lab.evaluation.noise.tables import clusters_of
 
 
 def write_results(folder, analysis):

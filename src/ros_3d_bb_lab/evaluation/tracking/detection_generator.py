@@ -3,8 +3,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.evaluation.tracking.camera_model import BODY_RADIUS_M, thesis_bias_m
-from ros_3d_bb.evaluation.tracking.robot import bearing_of, from_frame, to_frame
+from ros_3d_bb_lab.evaluation.tracking.d435_model import BODY_RADIUS_M, thesis_bias_m
+from ros_3d_bb_lab.evaluation.tracking.robot_motion import bearing_of, from_frame, to_frame
 
 FALSE, DOUBLE = -1, -2  # in place of a person's number
 HARD_TO_SEE, EASY_TO_SEE = 0.3, 0.6  # shares of a person: less is never found; from here on it is not missed for that
@@ -31,7 +31,7 @@ class Found(NamedTuple):
 
 class Seen(NamedTuple):
     """Who can be found in an image: person's number, the depth of the centre, the range, `middle`, `share` and `cut`
-    as in `camera_model.Shown`, speed in m/s, and the heading seen from the camera.
+    as in `d435_model.Shown`, speed in m/s, and the heading seen from the camera.
     """
 
     person: int

@@ -3,9 +3,9 @@ import argparse
 import pathlib
 import sys
 
-from ros_3d_bb.evaluation.noise.analysis import Inputs, analyse
-from ros_3d_bb.evaluation.noise.results import text_of, write_results
-from ros_3d_bb.evaluation.noise.tables import read_session_measurements, read_table
+from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse
+from ros_3d_bb_lab.evaluation.noise.results import text_of, write_results
+from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements, read_table
 
 
 def main():

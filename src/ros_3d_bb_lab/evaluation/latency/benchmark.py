@@ -10,9 +10,9 @@ import sys
 import tempfile
 from typing import NamedTuple
 
-from ros_3d_bb.evaluation.defaults import default_weights, scenario_path
-from ros_3d_bb.evaluation.latency_result import result_of
-from ros_3d_bb.evaluation.machine import describe_machine
+from ros_3d_bb_lab.evaluation.defaults import default_weights, scenario_path
+from ros_3d_bb_lab.evaluation.latency.latency_result import result_of
+from ros_3d_bb_lab.evaluation.machine import describe_machine
 
 IMAGES = 60  # of the scene, played forwards and backwards: two seconds, 90 MB
 ENDING_S = 40.0  # roslaunch gives its nodes 17 s to end
@@ -79,7 +79,7 @@ def eating_a_core(really):
 
 
 def launch(arguments, timeout_s, log):
-    """roslaunch latency.launch on a free port until it ends by itself; ended with its nodes in any case.
+    """roslaunch benchmark.launch on a free port until it ends by itself; ended with its nodes in any case.
 
     In a session of its own: a Ctrl-C in the terminal reaches it through here, once.
     """

@@ -1,1 +1,0 @@
-"""What the pipeline found, against what was there."""

@@ -1,1 +1,0 @@
-"""The noise analysis of the thesis' chapter 5, for any measurements: `./run noise`."""
