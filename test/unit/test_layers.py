@@ -1,4 +1,4 @@
-"""Who may import what: pure modules know no ROS, nodes no mathematics and not each other."""
+"""Which folder may import what. The docstring of a folder's __init__.py says the same in words."""
 import ast
 import os
 import re
@@ -8,101 +8,186 @@ import pytest
 from support.standard_library import STANDARD_LIBRARY
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-SOURCE, ANNOTATOR = os.path.join(ROOT, 'src', 'ros_3d_bb'), os.path.join(ROOT, 'annotator', 'ros_3d_bb_annotator')
+SOURCE, ANNOTATOR = os.path.join(ROOT, 'src'), os.path.join(ROOT, 'annotator', 'ros_3d_bb_annotator')
+
+# folder: (folders that it may import, libraries beside numpy and Python's own); each folder imports itself.
+# `core` is ros_3d_bb.core, `lab.evaluation` is ros_3d_bb_lab.evaluation, `msg` the generated messages.
+ALLOWED = {
+    'ros_3d_bb.core': ('', 'yaml'),
+    'ros_3d_bb.camera': ('core', ''),
+    'ros_3d_bb.estimation': ('camera core', 'yaml'),
+    'ros_3d_bb.tracking': ('camera core', 'scipy'),
+    'ros_3d_bb.detection': ('core', ''),
+    'ros_3d_bb.detection.yolov5': ('core detection', 'cv2 onnxruntime torch'),
+    'ros_3d_bb.detection.depth': ('core detection', 'cv2'),
+    'ros_3d_bb.conversions': (
+        'camera core estimation msg tracking',
+        'genpy geometry_msgs sensor_msgs std_msgs tf2_msgs'),
+    'ros_3d_bb.planning': ('camera conversions core tracking', 'sensor_msgs std_msgs'),
+    'ros_3d_bb.visualization': (
+        'camera core estimation tracking',
+        'cv2 genpy geometry_msgs std_msgs visualization_msgs'),
+    'ros_3d_bb.sessions': ('camera core detection estimation', 'cv2'),
+    'ros_3d_bb.drivers': ('camera core', 'pyrealsense2'),
+    'ros_3d_bb.pipeline': (
+        'camera conversions core detection detection.depth detection.yolov5 estimation tracking visualization',
+        'genpy sensor_msgs std_msgs tf2_msgs tf2_ros'),
+    'ros_3d_bb.bags': (
+        'camera conversions core pipeline sessions',
+        'genpy rosbag sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
+    'ros_3d_bb.diagnosis': ('bags camera conversions core msg', 'genpy sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
+    'ros_3d_bb.nodes.common': (
+        'camera conversions core diagnosis msg pipeline visualization',
+        'diagnostic_msgs diagnostic_updater dynamic_reconfigure genpy rosgraph rosgraph_msgs rospkg rospy '
+        'sensor_msgs std_msgs std_srvs tf2_ros'),
+    'ros_3d_bb.nodes': (
+        'bags camera conversions core detection.depth detection.yolov5 diagnosis drivers msg nodes.common pipeline '
+        'planning sessions tracking visualization',
+        'rosgraph rosgraph_msgs rospy sensor_msgs std_msgs std_srvs tf2_ros visualization_msgs'),
+    'ros_3d_bb_lab.simulation': ('camera core tracking', 'cv2 yaml'),
+    'ros_3d_bb_lab.simulation.ros': (
+        'bags camera conversions core msg nodes.common lab.simulation',
+        'rosgraph_msgs rospy std_msgs'),
+    'ros_3d_bb_lab.evaluation.baselines': ('camera core tracking', 'norfair'),
+    'ros_3d_bb_lab.evaluation': (
+        'camera core detection detection.depth detection.yolov5 estimation sessions tracking '
+        'lab.evaluation.baselines lab.simulation',
+        'cv2 matplotlib'),
+    'ros_3d_bb_lab.evaluation.noise': ('estimation sessions lab.evaluation', 'matplotlib scipy'),
+    'ros_3d_bb_lab.evaluation.tracking': (
+        'camera core tracking lab.evaluation lab.evaluation.baselines lab.simulation',
+        'scipy trackeval'),
+    'ros_3d_bb_lab.evaluation.demo': (
+        'conversions core tracking visualization lab.evaluation lab.simulation.ros',
+        'cv2 rosbag'),
+    'ros_3d_bb_lab.evaluation.latency': (
+        'bags conversions msg nodes.common lab.evaluation',
+        'rospy sensor_msgs std_msgs visualization_msgs'),
+}
+MATHEMATICS = {'numpy', 'math', 'cv2', 'torch', 'scipy'}
+QT = {'PyQt5', 'python_qt_binding'}
+SESSION_MODULES = 'command_line', 'document', 'export', 'analysis', 'legacy'  # of the annotator: no windows
 
 
 def modules_in(root):
-    return sorted(os.path.relpath(os.path.join(folder, name), root)
+    return sorted(os.path.relpath(os.path.join(folder, name), root)[:-len('.py')].replace(os.sep, '.')
                   for folder, _folders, names in os.walk(root) for name in names if name.endswith('.py'))
 
 
-MODULES = modules_in(SOURCE)
-PURE_LIBRARIES = {'numpy', 'cv2', 'torch', 'onnxruntime', 'yaml', 'matplotlib', 'scipy', 'norfair', 'trackeval',
-                  'pyrealsense2'}
-# desk tools: no node may come to need their libraries
-NOISE, TRACKING_BENCHMARK = os.path.join('evaluation', 'noise'), os.path.join('evaluation', 'tracking')
-ORIGINAL = 'ros_3d_bb_lab.evaluation.baselines.original_tracker'  # needs none of those libraries
-SPEED_PICTURE = os.path.join('evaluation', 'speed_picture.py')  # of a benchmark, which imports it last
-ASSIGNMENT = os.path.join('tracking', 'association.py')  # SciPy's solver has no equal
-# know ROS messages, bags and transforms, but neither nodes nor topics nor a master
-ROS_TYPES = {'bag_processing.py', 'bag_reading.py', 'bag_transforms.py', 'bags.py', 'camera_messages.py',
-             'following.py', 'lifting.py', 'markers.py', 'messages.py', 'pipeline.py', 'planner_messages.py',
-             'process_bag.py', 'report.py', 'searching.py', 'simulator_messages.py',
-             os.path.join('diagnosis', 'bag_look.py'), os.path.join('diagnosis', 'observing.py'),
-             os.path.join('diagnosis', 'roles.py')}
-
-# what a session is, without the windows that show it
-WITHOUT_WINDOW = {'__init__.py', 'analysis.py', 'command_line.py', 'document.py', 'drafts.py', 'entries.py',
-                  'export.py', 'legacy.py', 'lengths.py', 'measurement.py', 'validation.py'}
-QT = {'PyQt5', 'python_qt_binding'}
+MODULES = [module for module in modules_in(SOURCE) if not module.endswith('.__init__')]
 
 
-def imports_of(module, root=SOURCE):
-    """Top-level names of other packages, and dotted names of ours, that a module imports."""
-    with open(os.path.join(root, module)) as stream:
-        tree = ast.parse(stream.read())
+def tree_of(module, root=SOURCE):
+    with open(os.path.join(root, *module.split('.')) + '.py') as stream:
+        return ast.parse(stream.read())
+
+
+def imports_of(tree):
+    """Top-level names of other packages, and dotted names of ours, that a module or a part of it imports."""
     names = [name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names]
-    names += [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            names += ['%s.%s' % (node.module, name.name) for name in node.names]
     ours = set(name for name in names if name.startswith('ros_3d_bb'))
-    return set(name.split('.')[0] for name in names) - {'ros_3d_bb'}, ours
+    return set(name.split('.')[0] for name in names if name not in ours), ours
 
 
-def test_there_is_something_to_check():
-    assert len(MODULES) > 15 and 'nodes/bbox3d_node.py' in MODULES
+def full(name):
+    return 'ros_3d_bb_' + name if name.startswith('lab') else 'ros_3d_bb.' + name
 
 
-@pytest.mark.parametrize('module', [m for m in MODULES if not m.startswith('nodes/') and m not in ROS_TYPES])
-def test_pure_modules_know_no_ros(module):
-    others, ours = imports_of(module)
-    assert others <= PURE_LIBRARIES | STANDARD_LIBRARY
-    assert not any(name.startswith(('ros_3d_bb.nodes', 'ros_3d_bb.msg', 'ros_3d_bb.conversions.perception_msgs'))
-                   for name in ours)
+def folder_of(name):
+    """The folder of ALLOWED, or the package of messages, that a dotted name lies in; None for a package itself."""
+    parts = name.split('.')
+    for count in range(len(parts), 1, -1):
+        folder = '.'.join(parts[:count])
+        if folder in ALLOWED or folder == 'ros_3d_bb.msg':
+            return folder
+    return None
+
+
+def lies_in(name, package):
+    return name == package or name.startswith(package + '.')
+
+
+def test_each_module_lies_in_a_folder_of_the_table():
+    assert set(folder_of(module) for module in MODULES) == set(ALLOWED)
+    assert 'ros_3d_bb.nodes.bbox3d_node' in MODULES
 
 
 @pytest.mark.parametrize('module', MODULES)
-def test_rospy_is_for_nodes_torch_for_detection_and_scipy_for_desk_tools(module):
-    others, ours = imports_of(module)
-    assert 'rospy' not in others or module.startswith('nodes/')
-    assert 'torch' not in others or module.startswith('detection/')
-    assert 'matplotlib' not in others or module.startswith(NOISE) or module == SPEED_PICTURE
-    assert 'scipy' not in others or module.startswith((NOISE, TRACKING_BENCHMARK)) or module == ASSIGNMENT
-    assert 'pyrealsense2' not in others or module == 'realsense.py'
-    assert not others & {'norfair', 'trackeval'} or module.startswith(TRACKING_BENCHMARK)
-    for tool in (NOISE, TRACKING_BENCHMARK):
-        name = 'ros_3d_bb.' + tool.replace(os.sep, '.')
-        assert not any(our.startswith(name) for our in ours - {ORIGINAL}) or module.startswith(tool)
+def test_modules_import_what_their_folder_may(module):
+    folder = folder_of(module)
+    folders, libraries = ALLOWED[folder]
+    others, ours = imports_of(tree_of(module))
+    assert others <= STANDARD_LIBRARY | {'numpy'} | set(libraries.split())
+    assert set(map(folder_of, ours)) <= set(map(full, folders.split())) | {folder, None}
 
 
-@pytest.mark.parametrize('module', [m for m in MODULES if m.startswith(TRACKING_BENCHMARK)])
-def test_libraries_of_the_tracking_benchmark_are_imported_where_they_are_used(module):
-    with open(os.path.join(SOURCE, module)) as stream:
-        assert not re.search(r'^(import|from) (norfair|trackeval)', stream.read(), re.MULTILINE)
+def test_no_folder_imports_one_that_imports_it():
+    below = {folder: set(map(full, folders.split())) - {'ros_3d_bb.msg'} for folder, (folders, _) in ALLOWED.items()}
+    while below:
+        ground = [folder for folder, imported in below.items() if not imported & set(below)]
+        assert ground, 'a circle of ' + ', '.join(sorted(below))
+        for folder in ground:
+            del below[folder]
 
 
-@pytest.mark.parametrize('module', [m for m in MODULES if m.startswith('nodes/')])
+def test_what_runs_on_a_robot_imports_nothing_of_the_lab():
+    for folder, (folders, _libraries) in ALLOWED.items():
+        assert lies_in(folder, 'ros_3d_bb_lab') or 'lab' not in re.split(r'[ .]', folders)
+
+
+@pytest.mark.parametrize('module', MODULES)
+def test_libraries_have_their_place(module):
+    others, _ours = imports_of(tree_of(module))
+    assert 'rospy' not in others or lies_in(module, 'ros_3d_bb.nodes') or module.endswith('_node')
+    assert 'torch' not in others or lies_in(module, 'ros_3d_bb.detection')
+    assert not others & {'matplotlib', 'norfair', 'trackeval'} or lies_in(module, 'ros_3d_bb_lab')
+    assert 'scipy' not in others or lies_in(module, 'ros_3d_bb_lab') or lies_in(module, 'ros_3d_bb.tracking')
+    assert 'pyrealsense2' not in others or lies_in(module, 'ros_3d_bb.drivers')
+
+
+@pytest.mark.parametrize('module', [module for module in MODULES if lies_in(module, 'ros_3d_bb_lab.evaluation')])
+def test_libraries_of_a_comparison_are_imported_where_they_are_used(module):
+    at_the_top = [node for node in tree_of(module).body if isinstance(node, (ast.Import, ast.ImportFrom))]
+    others, _ours = imports_of(ast.Module(at_the_top, []))
+    assert not others & {'norfair', 'trackeval'}
+
+
+@pytest.mark.parametrize('module', [module for module in MODULES
+                                    if lies_in(module, 'ros_3d_bb.nodes') or module.endswith('_node')])
 def test_nodes_know_no_mathematics_and_not_each_other(module):
-    others, ours = imports_of(module)
-    assert not others & {'numpy', 'math', 'cv2', 'torch'}
-    assert not any(name.endswith('_node') for name in ours)
+    libraries, ours = imports_of(tree_of(module))
+    assert not libraries & MATHEMATICS
+    others = [node for node in MODULES if node.endswith('_node') and node != module]
+    assert not any(lies_in(name, node) for name in ours for node in others)
 
 
 @pytest.mark.parametrize('module', modules_in(ANNOTATOR))
-def test_the_annotator_knows_no_ros_and_only_its_windows_qt(module):
-    others, ours = imports_of(module, ANNOTATOR)
-    allowed = STANDARD_LIBRARY | {'numpy', 'cv2', 'ros_3d_bb_annotator'}
-    assert others <= allowed | (set() if module in WITHOUT_WINDOW else QT)
-    assert not any(name.startswith(('ros_3d_bb.nodes', 'ros_3d_bb.msg', 'ros_3d_bb.conversions.perception_msgs'))
-                   for name in ours)
-    noise = any(name.startswith('ros_3d_bb_lab.evaluation.noise') for name in ours)
-    assert not noise or module == 'analysis.py'  # it takes a second to import
+def test_the_annotator_imports_no_ros(module):
+    others, ours = imports_of(tree_of(module, ANNOTATOR))
+    assert others <= STANDARD_LIBRARY | {'numpy', 'cv2'} | QT
+    with_ros = 'ros_3d_bb.nodes', 'ros_3d_bb.msg', 'ros_3d_bb.conversions'
+    assert not any(lies_in(name, package) for name in ours for package in with_ros)
 
 
-def test_the_modules_without_windows_are_there():
-    assert WITHOUT_WINDOW <= set(modules_in(ANNOTATOR))
+def test_one_module_of_the_annotator_imports_the_noise_analysis():
+    """It takes a second to import."""
+    imported = {module: imports_of(tree_of(module, ANNOTATOR))[1] for module in modules_in(ANNOTATOR)}
+    assert [module for module, ours in sorted(imported.items())
+            if any(lies_in(name, 'ros_3d_bb_lab') for name in ours)] == ['analysis']
 
 
-@pytest.mark.parametrize('module', sorted(WITHOUT_WINDOW - {'command_line.py'}))
-def test_modules_without_windows_import_none_with(module):
-    _others, ours = imports_of(module, ANNOTATOR)
-    own = set(name.split('.')[1] + '.py' for name in ours if name.startswith('ros_3d_bb_annotator.'))
-    assert own <= WITHOUT_WINDOW
+@pytest.mark.parametrize('module', SESSION_MODULES)
+def test_the_annotators_sessions_need_no_qt(module):
+    waiting, seen = [module], set()
+    while waiting:
+        module = waiting.pop()
+        seen.add(module)
+        body = [node for node in tree_of(module, ANNOTATOR).body if isinstance(node, (ast.Import, ast.ImportFrom))]
+        others, ours = imports_of(ast.Module(body, []))
+        assert not others & QT, module
+        own = set(name.split('.')[1] for name in ours if name.startswith('ros_3d_bb_annotator.'))
+        waiting += sorted(own - seen - {'qt'})
+        assert 'qt' not in own, module
