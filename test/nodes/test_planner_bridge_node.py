@@ -1,7 +1,7 @@
 """planner_bridge_node on made tracks. Needs a master because it predicts to ROS time and asks tf2 for a transform.
 
 Stamps are the clock's, as from a camera: a tenth of a second old. What the planners make of the messages is in
-test/workspace/test_planner_messages.py; here it is which message comes when, with which stamp and frame.
+test/workspace/test_planner_msgs.py; here it is which message comes when, with which stamp and frame.
 """
 import signal
 import subprocess

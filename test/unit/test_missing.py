@@ -29,7 +29,7 @@ def test_nothing_is_left_out_unless_asked_for(without_onnx):
     assert 'onnx' in conftest.left_out(config_that_leaves_out(True))
 
 
-@pytest.mark.parametrize('path, module', [('unit/test_exports.py', 'onnx'),
+@pytest.mark.parametrize('path, module', [('unit/test_onnx_cache.py', 'onnx'),
                                           ('nodes/test_realsense_node.py', 'pyrealsense2')])  # by a helper
 def test_a_file_needs_what_it_and_its_helpers_import(path, module):
     assert module in imports_when_loaded(os.path.join(TEST, path))

@@ -119,7 +119,7 @@ def test_camera_info_of_an_unknown_lens_is_refused():
         camera_from_message(info)
 
 
-def test_transforms():
+def test_tf_lookup():
     message = TransformStamped()
     message.transform.translation.x, message.transform.rotation.w = 3.0, 1.0
     np.testing.assert_allclose(transform_from_message(message), transform_from((3, 0, 0), (0, 0, 0, 1)))
