@@ -9,7 +9,7 @@ from ros_3d_bb_annotator.document import ESTIMATOR
 from ros_3d_bb_annotator.measurement import ANNOTATED
 from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse as analyse_noise
 from ros_3d_bb_lab.evaluation.noise.results import text_of, write_results
-from ros_3d_bb_lab.evaluation.noise.tables import Measurements, TableError, read_session_measurements
+from ros_3d_bb_lab.evaluation.noise.tables import MeasurementTable, TableError, read_session_measurements
 
 FOLDER_NAME = 'analysis'
 RECORDED = 'recorded'
@@ -71,6 +71,6 @@ def _recorded(document, estimator):
             if measurement.state == ANNOTATED and measurement.estimate_m is not None]
     if not used:
         raise TableError('%s: no annotated measurement with an estimate' % document.folder)
-    return Measurements(document.folder, np.array([measurement.estimate_m for measurement in used]),
-                        np.array([(measurement.truth_m[0], measurement.truth_m[2]) for measurement in used]),
-                        np.zeros(len(used), bool))
+    return MeasurementTable(document.folder, np.array([measurement.estimate_m for measurement in used]),
+                            np.array([(measurement.truth_m[0], measurement.truth_m[2]) for measurement in used]),
+                            np.zeros(len(used), bool))

@@ -9,7 +9,7 @@ import os
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import FARTHEST_M
-from ros_3d_bb.core.atomic_file import FILE_NAME, changing
+from ros_3d_bb.core.atomic_file import FILE_NAME, locked_update
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.sessions.session_reader import (Session, SessionError, camera_of, boxes_of_others, read_color,
                                                read_depth, read_description, session_errors)
@@ -270,7 +270,7 @@ class Document(object):
     def _save(self, edit):
         """Write an edit. Returns its inverse."""
         try:
-            with changing(self.folder) as content:
+            with locked_update(self.folder) as content:
                 if self.is_old_form and 'form' not in content:
                     content.update(copy.deepcopy(self._content))
                 inverse = changed(content if edit.index is None else entry_at(content['frames'], edit), edit)

@@ -3,7 +3,7 @@ import contextlib
 import json
 import os
 
-from ros_3d_bb.core.atomic_file import write_whole
+from ros_3d_bb.core.atomic_file import atomic_write
 
 FILE_NAME = '.annotator_draft.json'
 
@@ -28,7 +28,7 @@ class Drafts(object):
         if not fields:
             del self._fields[name]
         if self._fields:
-            write_whole(self._path, json.dumps(self._fields).encode())
+            atomic_write(self._path, json.dumps(self._fields).encode())
         else:
             with contextlib.suppress(FileNotFoundError):
                 os.remove(self._path)

@@ -3,7 +3,7 @@ import csv
 import io
 import os
 
-from ros_3d_bb.core.atomic_file import write_whole
+from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb_annotator.measurement import ANNOTATED
 
@@ -42,7 +42,7 @@ def export(document, path):
     writer.writerow(COLUMNS)
     writer.writerows(rows)
     try:
-        write_whole(os.path.abspath(path), text.getvalue().encode())
+        atomic_write(os.path.abspath(path), text.getvalue().encode())
     except OSError as error:
         raise SessionError('%s: cannot be written (%s)' % (path, error.strerror))
     return len(rows)

@@ -2,7 +2,7 @@
 import os
 from typing import NamedTuple, Optional, Tuple
 
-from ros_3d_bb.sessions.session_reader import Detection, SessionError, frame_of, session_errors
+from ros_3d_bb.sessions.session_reader import RecordedDetection, SessionError, frame_of, session_errors
 
 NEW, ANNOTATED, REJECTED = 'new', 'annotated', 'rejected'
 # Field of the stretched depth of the old format. Its name differs from that of depth in metric units.
@@ -17,7 +17,7 @@ class Mark(NamedTuple):
     z_m: float
 
 
-class Measurement(NamedTuple):
+class EditedMeasurement(NamedTuple):
     """One measurement. `person` is the index of the detection that the truth belongs to, or None without detections;
     `truth_m` is (x, y, z) in the optical frame, where y may be None; `rejected` is the reason for rejection or None;
     `problem` is the fault of an invalid measurement or None. `stamp_text` is '<secs>.<nsecs>' or empty.
@@ -28,7 +28,7 @@ class Measurement(NamedTuple):
     depth_path: str
     stamp_text: str = ''
     label: str = ''
-    detections: Tuple[Detection, ...] = ()
+    detections: Tuple[RecordedDetection, ...] = ()
     person: Optional[int] = None
     truth_m: Optional[Tuple[float, Optional[float], float]] = None
     rejected: Optional[str] = None
@@ -83,9 +83,9 @@ def measurement_of(folder, entry, files):
         return _broken(entry, str(error))
     missing = [os.path.relpath(path, folder) for path in (frame.color_path, frame.depth_path) if path not in files]
     truth_m = None if frame.truth_m is None else (float(frame.truth_m[0]), frame.truth_y_m, float(frame.truth_m[1]))
-    return Measurement(frame.id, frame.color_path, frame.depth_path, str(entry.get('stamp') or ''), frame.label,
-                       frame.detections, frame.person if frame.detections else None, truth_m, frame.rejected,
-                       'there is no file %s' % ' and no file '.join(missing) if missing else None)
+    return EditedMeasurement(frame.id, frame.color_path, frame.depth_path, str(entry.get('stamp') or ''), frame.label,
+                             frame.detections, frame.person if frame.detections else None, truth_m, frame.rejected,
+                             'there is no file %s' % ' and no file '.join(missing) if missing else None)
 
 
 def _with_depth(entry):
@@ -96,5 +96,5 @@ def _with_depth(entry):
 
 def _broken(entry, problem):
     known = entry if isinstance(entry, dict) else {}
-    return Measurement(str(known.get('id', '')), '', '', problem=problem,
-                       rejected=str(known['rejected']) if known.get('rejected') else None)
+    return EditedMeasurement(str(known.get('id', '')), '', '', problem=problem,
+                             rejected=str(known['rejected']) if known.get('rejected') else None)

@@ -13,11 +13,11 @@ import yaml
 from fuzz import hostile
 from ros_3d_bb.bags.process_bag import read_params
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.conversions.image_msgs import array_from, depth_from, rgb_from
-from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_message, boxes2d_to_message, boxes3d_from_message,
-                                                   boxes3d_to_message, camera_from_message, detections_from_message,
-                                                   tracks_from_message, tracks_to_message, usable_boxes3d)
-from ros_3d_bb.conversions.planner_msgs import points_to_message
+from ros_3d_bb.conversions.image_msgs import array_from, imgmsg_to_depth, imgmsg_to_rgb
+from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, boxes3d_from_msg,
+                                                   boxes3d_to_msg, camera_from_msg, detections_from_msg,
+                                                   tracks_from_msg, tracks_to_msg, usable_boxes3d)
+from ros_3d_bb.conversions.planner_msgs import points_to_msg
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import non_maximum_suppression
@@ -64,27 +64,27 @@ def _image(read, good):
 
 
 def _boxes2d(source, _folder):
-    boxes = boxes2d_from_message(hostile.boxes2d(source, NOW_NS))
-    back = boxes2d_from_message(boxes2d_to_message(boxes.boxes, source.header(NOW_NS)))
+    boxes = boxes2d_from_msg(hostile.boxes2d(source, NOW_NS))
+    back = boxes2d_from_msg(boxes2d_to_msg(boxes.boxes, source.header(NOW_NS)))
     assert back.boxes.tolist() == boxes.boxes.tolist()
 
 
 def _boxes3d(source, _folder):
     message = hostile.boxes3d(source, NOW_NS)
-    on_the_wire(boxes3d_to_message(boxes3d_from_message(message), message.header, hostile.CAMERA))
+    on_the_wire(boxes3d_to_msg(boxes3d_from_msg(message), message.header, hostile.CAMERA))
 
 
 def _detections(source, _folder):
     usable, _faults = usable_boxes3d(hostile.boxes3d(source, NOW_NS))
-    for detection in detections_from_message(usable, FROM_CAMERA):
+    for detection in detections_from_msg(usable, FROM_CAMERA):
         assert np.isfinite(detection.position_m).all() and (detection.size_m > 0).all()
 
 
 def _tracks(source, _folder):
-    tracks, faults = usable_tracks(tracks_from_message(hostile.tracks(source, NOW_NS)))
+    tracks, faults = usable_tracks(tracks_from_msg(hostile.tracks(source, NOW_NS)))
     header = source.header(NOW_NS)
-    on_the_wire(tracks_to_message(in_frame(predicted_to(tracks, abs(source.gauss(0, 1))), FROM_CAMERA), header))
-    on_the_wire(points_to_message(footprint_points(tracks, 0.5, 0.05), header))
+    on_the_wire(tracks_to_msg(in_frame(predicted_to(tracks, abs(source.gauss(0, 1))), FROM_CAMERA), header))
+    on_the_wire(points_to_msg(footprint_points(tracks, 0.5, 0.05), header))
     if faults:
         raise ValueError(faults[0])
 
@@ -96,7 +96,7 @@ def _estimates(source, _folder):
                 for rect_px in rects_px]
     for rect_px in rects_px:
         check_rect(rect_px)
-    depth = depth_from(hostile.image(source, NOW_NS, DEPTH))
+    depth = imgmsg_to_depth(hostile.image(source, NOW_NS, DEPTH))
     camera = hostile.CAMERA._replace(width=depth.values.shape[1], height=depth.values.shape[0])
     estimate_boxes(depth, rects_px, camera, estimator_named(source.choice(('foreground', 'median')), 20))
 
@@ -204,13 +204,13 @@ def _checkpoint(source, folder):
 
 
 FUNCTIONS = {
-    'array_from': Function(_image(array_from, COLOR), 10), 'rgb_from': Function(_image(rgb_from, COLOR), 8),
-    'depth_from': Function(_image(depth_from, DEPTH), 8),
-    'camera_from_message': Function(
-        lambda source, _folder: camera_from_message(hostile.camera_info(source, NOW_NS, INFO)), 8),
-    'boxes2d_from_message, boxes2d_to_message': Function(_boxes2d, 6),
-    'boxes3d_from_message, boxes3d_to_message': Function(_boxes3d, 3),
-    'usable_boxes3d, detections_from_message': Function(_detections, 4), 'tracks, planners': Function(_tracks, 3),
+    'array_from': Function(_image(array_from, COLOR), 10), 'imgmsg_to_rgb': Function(_image(imgmsg_to_rgb, COLOR), 8),
+    'imgmsg_to_depth': Function(_image(imgmsg_to_depth, DEPTH), 8),
+    'camera_from_msg': Function(
+        lambda source, _folder: camera_from_msg(hostile.camera_info(source, NOW_NS, INFO)), 8),
+    'boxes2d_from_msg, boxes2d_to_msg': Function(_boxes2d, 6),
+    'boxes3d_from_msg, boxes3d_to_msg': Function(_boxes3d, 3),
+    'usable_boxes3d, detections_from_msg': Function(_detections, 4), 'tracks, planners': Function(_tracks, 3),
     'estimate_boxes': Function(_estimates, 2), 'filter_predictions, non_maximum_suppression': Function(_predictions, 3),
     'decode_heads': Function(_heads, 2), 'params_from': Function(_params, 15),
     'parse_length': Function(lambda source, _folder: parse_length(

@@ -178,6 +178,6 @@ def _check_good(name, target, node, connections, now_ns):
 
 def _check_outcomes(name, node):
     if name in BALANCES:
-        found = balance_of(Status(0.0, name, 0, dict(node._diagnostics.told()), 0.0, 0.0))
+        found = balance_of(Status(0.0, name, 0, dict(node._diagnostics.counters()), 0.0, 0.0))
         assert 0 <= found[3] <= WAITING, '%s: %d inputs, %d published, %d not for a reason, %d without outcome' % (
             (name,) + found)

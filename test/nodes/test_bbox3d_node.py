@@ -9,7 +9,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.conversions.perception_msgs import boxes2d_to_message, time_from
+from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray
 from support.ros import (TIMEOUT_S, Recorder, camera_info, depth_message, diagnostics_of, header_at, publisher,
@@ -33,7 +33,7 @@ class Rig(object):
         self.depth.publish(depth_message(stamp_ns, depth_mm))
 
     def send_boxes(self, stamp_ns, boxes=BOX):
-        self.boxes.publish(boxes2d_to_message(np.array(boxes).reshape(-1, 4), header_at(stamp_ns)))
+        self.boxes.publish(boxes2d_to_msg(np.array(boxes).reshape(-1, 4), header_at(stamp_ns)))
 
 
 @pytest.fixture(scope='module')
@@ -162,7 +162,7 @@ def test_time_that_goes_back_starts_anew(rig, output, now):
 
 @pytest.mark.parametrize('bad', [
     Int32MultiArray(data=[1, 2, 3]), Int32MultiArray(data=[1] * 4004),
-    boxes2d_to_message(BOX, header_at(7 * NS)),  # far older than the cache
+    boxes2d_to_msg(BOX, header_at(7 * NS)),  # far older than the cache
 ])
 def test_arrays_that_cannot_be_used_are_refused_and_the_next_works(rig, output, now, bad):
     rig.send_camera(now)

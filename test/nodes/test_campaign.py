@@ -15,7 +15,7 @@ import pytest
 import rospy
 
 from ros_3d_bb.conversions.perception_msgs import stamp_of
-from ros_3d_bb.core.atomic_file import changing
+from ros_3d_bb.core.atomic_file import locked_update
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.sessions.session_reader import read_session
 from support.ros import Recorder, launched, wait_until
@@ -91,7 +91,7 @@ def expected_m(frames, truths, boxes):
 def annotated(campaign):
     """The campaign after somebody has clicked and typed in the annotator's window."""
     folder, expected = campaign
-    with changing(folder) as content:
+    with locked_update(folder) as content:
         content['grid'] = [{'name': name, 'x': 1000 * x_m, 'z': 1000 * z_m}
                            for name, (x_m, z_m) in zip('ABC', PLACES_M)]
     from support.hands import Hands  # Qt must not come before its display

@@ -8,7 +8,7 @@ from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb_lab.simulation.ros.simulator_msgs import simulated_messages
@@ -61,7 +61,7 @@ def output(recorder):
 
 
 def is_found(message, true_boxes):
-    boxes = boxes2d_from_message(message).boxes.astype(float)
+    boxes = boxes2d_from_msg(message).boxes.astype(float)
     return len(boxes) == len(true_boxes) and all(
         iou(np.array(true_box, float), boxes).max() > 0.5 for true_box in true_boxes)
 
@@ -81,7 +81,7 @@ def test_people_are_found_and_carry_the_stamp_of_their_image(rig, output):
     sent.append(rig.send())
     messages = output.wait_for(2)
     for message, (stamp_ns, true_boxes) in zip(messages, sent):
-        found = boxes2d_from_message(message)
+        found = boxes2d_from_msg(message)
         assert (found.stamp_ns, found.frame_id) == (stamp_ns, 'camera_color_optical_frame')
         assert is_found(message, true_boxes)
 
@@ -97,7 +97,7 @@ def test_an_image_without_depth_is_not_searched_and_the_next_one_is(rig, output)
     lost_ns, _boxes = rig.send(leave_out=[DEPTH])
     stamp_ns, true_boxes = rig.send()
     message, = output.wait_for(1)
-    assert boxes2d_from_message(message).stamp_ns == stamp_ns != lost_ns and is_found(message, true_boxes)
+    assert boxes2d_from_msg(message).stamp_ns == stamp_ns != lost_ns and is_found(message, true_boxes)
     assert output.stays_at(1)
 
 
@@ -124,6 +124,6 @@ def test_a_changed_range_works_from_the_next_image_on(rig, output):
     for max_depth in (6.5, 4.5, 6.5):
         client.update_configuration({'max_depth': max_depth})
         rig.send()
-        counts.append(len(boxes2d_from_message(output.wait_for(len(counts) + 1)[-1]).boxes))
+        counts.append(len(boxes2d_from_msg(output.wait_for(len(counts) + 1)[-1]).boxes))
     client.close()
     assert counts == [2, 1, 2]

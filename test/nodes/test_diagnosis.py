@@ -19,7 +19,7 @@ from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, boxes2d_to_message
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, boxes2d_to_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.doctor import graph_findings
 from ros_3d_bb_lab.evaluation.latency.benchmark import end, free_port
@@ -67,7 +67,7 @@ def made(topic, stamp_ns):
         return depth_message(stamp_ns, 2000)
     if topic == COLOR:
         return fill_image(Image(header=header_at(stamp_ns)), np.zeros((48, 64, 3), np.uint8), 'rgb8')
-    return boxes2d_to_message(np.array([[20, 10, 44, 38]]), header_at(stamp_ns))
+    return boxes2d_to_msg(np.array([[20, 10, 44, 38]]), header_at(stamp_ns))
 
 
 def without(*topics):
@@ -99,8 +99,8 @@ def wider(message):
 def long_ago(_topic, message):
     """As of a bag of two years ago that is played without its clock."""
     if isinstance(message, Int32MultiArray):
-        boxes = boxes2d_from_message(message)
-        return boxes2d_to_message(boxes.boxes, header_at(boxes.stamp_ns - 63000000 * NS))
+        boxes = boxes2d_from_msg(message)
+        return boxes2d_to_msg(boxes.boxes, header_at(boxes.stamp_ns - 63000000 * NS))
     for part in getattr(message, 'transforms', [message]):
         part.header.stamp = part.header.stamp - rospy.Duration(63000000)
     return message
@@ -108,7 +108,7 @@ def long_ago(_topic, message):
 
 def old_boxes(message):
     stamp_ns = int((time.time() - 3) * NS)
-    return boxes2d_to_message(np.array([[20, 10, 44, 38]]), header_at(stamp_ns))
+    return boxes2d_to_msg(np.array([[20, 10, 44, 38]]), header_at(stamp_ns))
 
 
 # what is wrong; who says what in its log; what doctor says, and its fix

@@ -9,10 +9,10 @@ from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from
-from ros_3d_bb.conversions.perception_msgs import camera_from_message, transform_from_message
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
+from ros_3d_bb.conversions.perception_msgs import camera_from_msg, transform_from_msg
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.drivers.realsense import CameraLost, Pair
+from ros_3d_bb.drivers.realsense import CameraLost, RgbdFrame
 from ros_3d_bb.nodes import realsense_node
 from support.realsense_recordings import (COLOR_CAMERA, START_MS, STEP_MS, SUFFIX, colored, sloping_depth,
                                           write_recording)
@@ -63,15 +63,15 @@ def test_all_images_come_with_one_stamp_for_colour_depth_and_camera(played):
 def test_the_images_are_those_of_the_recording_and_depth_is_in_millimetres(played):
     for number, message in enumerate(played[COLOR]):
         assert message.encoding == 'rgb8'
-        np.testing.assert_array_equal(rgb_from(message), colored(number))
+        np.testing.assert_array_equal(imgmsg_to_rgb(message), colored(number))
     assert played[DEPTH][0].encoding == '16UC1'
-    depth = depth_from(played[DEPTH][0])
+    depth = imgmsg_to_depth(played[DEPTH][0])
     assert depth.values.shape == (480, 640) and depth.values[244, 320] * depth.scale_m == pytest.approx(0.8)
 
 
 def test_the_intrinsics_have_the_lens_of_the_camera(played):
     for topic in ('camera/color/camera_info', 'camera/aligned_depth_to_color/camera_info'):
-        camera = camera_from_message(played[topic][0])
+        camera = camera_from_msg(played[topic][0])
         assert camera.distortion_model == COLOR_CAMERA.distortion_model == 'inverse_brown_conrady'
         np.testing.assert_allclose(camera[2:6] + camera.distortion, COLOR_CAMERA[2:6] + COLOR_CAMERA.distortion,
                                    rtol=1e-6)
@@ -83,7 +83,7 @@ def test_the_frames_of_the_camera_are_told_once_and_are_a_tree(played):
     assert {child: link.header.frame_id for child, link in links.items()} == {
         'camera_color_frame': 'camera_link', 'camera_color_optical_frame': 'camera_color_frame',
         'camera_depth_frame': 'camera_link', 'camera_depth_optical_frame': 'camera_depth_frame'}
-    ahead = transform_from_message(links['camera_color_optical_frame'])[:3, 2]
+    ahead = transform_from_msg(links['camera_color_optical_frame'])[:3, 2]
     np.testing.assert_allclose(ahead, (1, 0, 0), atol=1e-12)
 
 
@@ -114,8 +114,8 @@ class ComingAndGoing(object):
         event = self._events.pop(0)
         if isinstance(event, Exception):
             raise event
-        return event and Pair(rospy.get_rostime().to_nsec(), colored(ComingAndGoing.opened),
-                              DepthImage(np.full((480, 640), 2500, np.uint16), 0.0001))
+        return event and RgbdFrame(rospy.get_rostime().to_nsec(), colored(ComingAndGoing.opened),
+                                   DepthImage(np.full((480, 640), 2500, np.uint16), 0.0001))
 
     def close(self):
         ComingAndGoing.closed += 1
@@ -132,7 +132,8 @@ def test_a_camera_that_is_unplugged_is_waited_for_and_bad_images_are_left_out(re
         wait_until(lambda: any(message.data[0] == 4 for message in color.messages), 'images of the camera that is back')
         depth.wait_for(3)
     assert ComingAndGoing.opened == 4 and ComingAndGoing.closed == 1
-    assert depth.messages[0].encoding == '32FC1' and depth_from(depth.messages[0]).values[0, 0] == pytest.approx(0.25)
+    assert depth.messages[0].encoding == '32FC1' and imgmsg_to_depth(depth.messages[0]).values[0,
+                                                                                               0] == pytest.approx(0.25)
     assert abs(color.messages[-1].header.stamp.to_nsec() - rospy.get_rostime().to_nsec()) < 60 * NS
     _level, _message, counts = diagnostics_of('test_realsense_node')
     assert counts['camera lost'] >= 3 and counts['images refused'] >= 1

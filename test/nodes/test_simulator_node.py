@@ -10,7 +10,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -69,8 +69,8 @@ def test_the_images_are_those_of_the_scenario(round_of_scene, path):
     expected = Simulator(read_scenario(path))
     for number in (0, 9):
         frame = expected.frame(number)
-        np.testing.assert_array_equal(rgb_from(round_of_scene['camera/color/image_raw'][number]), frame.color)
-        depth = depth_from(round_of_scene['camera/aligned_depth_to_color/image_raw'][number])
+        np.testing.assert_array_equal(imgmsg_to_rgb(round_of_scene['camera/color/image_raw'][number]), frame.color)
+        depth = imgmsg_to_depth(round_of_scene['camera/aligned_depth_to_color/image_raw'][number])
         np.testing.assert_array_equal(depth.values, frame.depth_mm)
         person, = round_of_scene['ground_truth'][number].objects
         place = person.pose.pose.position

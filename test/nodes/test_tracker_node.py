@@ -260,7 +260,7 @@ def tuned(rig):
 
 def test_changed_parameters_work_from_the_next_image_on_and_numbers_are_kept(rig, tracks, markers, tuned, now):
     number = rig.stand(tracks, now)
-    tuned({'prediction_time': 3.0, 'missed_limit': 2.0, 'marker_namespaces': 'cylinder'})
+    tuned({'prediction_time': 3.0, 'max_missed_time': 2.0, 'marker_namespaces': 'cylinder'})
     rig.send(now + 10 * PERIOD)
     track, = tracks.wait_for(11)[-1].objects
     assert track.id == number and len(track.prediction) == 12

@@ -95,24 +95,24 @@ def test_a_value_that_makes_no_sense_is_refused_with_all_that_came_with_it(track
     before = in_force(tracker)
     with Recorder('/tracker_node/parameter_updates', Config) as updates:
         known = len(updates.wait_for(1))
-        answer = tracker.update_configuration({'missed_limit': 1.0, 'outlier_share': 1.5, 'marker_history': 9.0})
+        answer = tracker.update_configuration({'max_missed_time': 1.0, 'outlier_share': 1.5, 'marker_history': 9.0})
         updates.wait_for(known + 1)  # sliders go back
     assert answer == before
     said('parameter ~outlier_share is 1.5')
-    kept = [rospy.get_param('/tracker_node/' + name) for name in ('missed_limit', 'outlier_share', 'marker_history')]
+    kept = [rospy.get_param('/tracker_node/' + name) for name in ('max_missed_time', 'outlier_share', 'marker_history')]
     assert kept == [0.35, 0.1, 4.0]
 
 
 @pytest.mark.parametrize('node, change, words', [
     ('tracker_node', {'target_frame': 'odom'},
      'parameter ~target_frame is read at the start only; those that can be changed: accel'),
-    ('tracker_node', {'memry': 1.0}, 'unknown parameter ~memry; did you mean ~memory?'),
-    ('tracker_node', {'min_sightings': 2.5}, 'parameter ~min_sightings is 2.5, a float; int expected'),
+    ('tracker_node', {'max_aeg': 1.0}, 'unknown parameter ~max_aeg; did you mean ~max_age?'),
+    ('tracker_node', {'min_hits': 2.5}, 'parameter ~min_hits is 2.5, a float; int expected'),
     ('tracker_node', {'marker_namespaces': 'cylinder, elipse'},
      "parameter ~marker_namespaces has 'elipse'; did you mean ellipse?"),
     ('tracker_node', {'prediction_step': 1e-6},
      'prediction_step is 1e-06 and prediction_time 2; at most 1000 steps expected'),
-    ('tracker_node', {'memory': float('nan')}, 'parameter ~memory is nan'),
+    ('tracker_node', {'max_age': float('nan')}, 'parameter ~max_age is nan'),
     ('tracker_node', {'alpha': 7.0}, 'parameter ~alpha is 7'),  # of the tracker not in use
     ('depth_detector_node', {'min_depth': 7.0}, 'min_depth is 7 and max_depth is 6.5; the first must be less'),
     ('depth_detector_node', {'floor_height': float('nan'), 'min_depth': 1.0}, 'parameter ~floor_height is nan'),

@@ -18,7 +18,7 @@ from std_srvs.srv import SetBool, SetBoolResponse, Trigger
 
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import frame_id_of
-from ros_3d_bb.conversions.perception_msgs import boxes2d_to_message, boxes3d_to_message, time_from
+from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg, boxes3d_to_msg, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.msg import BoundingBox3DArray
@@ -71,8 +71,8 @@ class Rig(object):
                                estimator_named('foreground'))
         if with_boxes:
             header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(''))
-            self.pubs[BOXES2D].publish(boxes2d_to_message(np.array(rects_px), header))
-            self.pubs[BOXES3D].publish(boxes3d_to_message(boxes, header, self.simulator.camera))
+            self.pubs[BOXES2D].publish(boxes2d_to_msg(np.array(rects_px), header))
+            self.pubs[BOXES3D].publish(boxes3d_to_msg(boxes, header, self.simulator.camera))
         return Sent(frame, self.simulator.camera, stamp_ns, tuple(rects_px), boxes)
 
 

@@ -11,8 +11,8 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool
 
-from ros_3d_bb.conversions.image_msgs import fill_image, rgb_from
-from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, stamp_of
+from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, stamp_of
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.sessions.session_reader import read_color, read_session
@@ -64,7 +64,7 @@ def test_the_person_is_found_and_the_array_carries_stamp_and_frame(camera, found
     image, box = images[number]
     camera.publish(color_message(image if encoding == 'rgb8' else image[..., ::-1], START + number, encoding))
     message, = found.wait_for(1)
-    boxes = boxes2d_from_message(message)
+    boxes = boxes2d_from_msg(message)
     assert boxes.stamp_ns == START + number and boxes.frame_id == 'camera_color_optical_frame'
     assert message.layout.dim[0].label == ('boxes;stamp=1000.%09d;frame=camera_color_optical_frame' % number)
     assert message.layout.dim[0].size == len(boxes.boxes) == 1 and message.layout.dim[1].size == 4
@@ -75,7 +75,7 @@ def test_the_person_is_found_and_the_array_carries_stamp_and_frame(camera, found
 def test_nobody_is_an_answer(camera, found):
     camera.publish(color_message(np.full((480, 640, 3), 128, np.uint8), START))
     message, = found.wait_for(1)
-    assert len(message.data) == 0 and boxes2d_from_message(message).stamp_ns == START
+    assert len(message.data) == 0 and boxes2d_from_msg(message).stamp_ns == START
 
 
 def test_the_service_pauses_and_resumes(camera, found, images):
@@ -86,7 +86,7 @@ def test_the_service_pauses_and_resumes(camera, found, images):
     assert found.stays_at(0, 1.0)
     assert enable(True).success
     camera.publish(color_message(images[0][0], START + 5))
-    assert boxes2d_from_message(found.wait_for(1)[0]).stamp_ns == START + 5
+    assert boxes2d_from_msg(found.wait_for(1)[0]).stamp_ns == START + 5
 
 
 def test_the_newest_image_is_searched_and_the_others_are_left_out(camera, found, images):
@@ -95,9 +95,9 @@ def test_the_newest_image_is_searched_and_the_others_are_left_out(camera, found,
     for number in range(60):
         camera.publish(color_message(big[number % 3], START + number * NS // 200))
         rospy.sleep(0.005)
-    wait_until(lambda: found.messages and boxes2d_from_message(found.messages[-1]).stamp_ns == START + 59 * NS // 200,
+    wait_until(lambda: found.messages and boxes2d_from_msg(found.messages[-1]).stamp_ns == START + 59 * NS // 200,
                'the boxes of the last image')
-    stamps = [boxes2d_from_message(message).stamp_ns for message in found.messages]
+    stamps = [boxes2d_from_msg(message).stamp_ns for message in found.messages]
     assert stamps == sorted(stamps) and len(stamps) < 60
 
 
@@ -107,7 +107,7 @@ def test_the_annotated_image_comes_while_somebody_looks(camera, found, images):
         camera.publish(color_message(image, START + 7))
         message, = drawn.wait_for(1)
     assert stamp_of(message) == START + 7 and message.encoding == 'rgb8'
-    changed = (rgb_from(message) != image).any(axis=2)
+    changed = (imgmsg_to_rgb(message) != image).any(axis=2)
     lines, columns = np.nonzero(changed)
     assert changed.any() and abs(columns.max() - box[2]) < 30 and abs(lines.max() - box[3]) < 30
 
@@ -119,7 +119,7 @@ def test_images_that_cannot_be_used_are_refused_and_the_next_works(camera, found
     wait_until(lambda: 'yuv422' in diagnostics_of('yolov5_node')[1], 'a warning that names the encoding')
     assert found.messages == []
     camera.publish(color_message(images[0][0], START + 1))
-    assert boxes2d_from_message(found.wait_for(1)[0]).stamp_ns == START + 1
+    assert boxes2d_from_msg(found.wait_for(1)[0]).stamp_ns == START + 1
 
 
 def test_changed_thresholds_work_from_the_next_image_on(camera, found, images):
@@ -130,7 +130,7 @@ def test_changed_thresholds_work_from_the_next_image_on(camera, found, images):
     for number, (change, count) in enumerate(changes):
         client.update_configuration(change)
         camera.publish(color_message(images[0][0], START + number))
-        assert len(boxes2d_from_message(found.wait_for(number + 1)[-1]).boxes) == count
+        assert len(boxes2d_from_msg(found.wait_for(number + 1)[-1]).boxes) == count
     client.update_configuration({'image_size': 640})
     client.close()
 

@@ -9,7 +9,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.conversions.camera_msgs import START_NS, TF_TOPIC, TYPES
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, restamped, time_from
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, time_from, with_stamp
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
@@ -85,7 +85,7 @@ class Camera(object):
         self.images.append((self._now_ns, time.monotonic()))
         for topic, message in messages:
             if topic not in self.missing:
-                message = restamped(message, stamp)
+                message = with_stamp(message, stamp)
                 self._publish(topic, self.change(topic, message) if self.change else message)
         for topic, stamp_ns, message in wrong:
             self.wrong_ns.add(stamp_ns)

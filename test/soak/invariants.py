@@ -6,7 +6,7 @@ import numpy as np
 
 
 BEHIND_S = 3.0  # messages of the time before a jump may be heard so long after the first answer
-LONGEST_UNSEEN_S = 4.0  # ~memory of the tracker: nobody is published longer than they are remembered
+LONGEST_UNSEEN_S = 4.0  # ~max_age of the tracker: nobody is published longer than they are remembered
 WAITING_AT_END = 3  # inputs without an outcome yet: at work, or waiting for the other half of their pair
 WAITING = 103  # the same in the middle of a fault: what `stamped.Pairing` lets wait, and the worker
 WARM_UP_S = 60.0  # caches fill, and libraries take what they keep

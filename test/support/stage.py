@@ -12,7 +12,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, START_NS, TF_TOPIC, TYPES
-from ros_3d_bb.conversions.perception_msgs import restamped, time_from
+from ros_3d_bb.conversions.perception_msgs import time_from, with_stamp
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObject, TrackedObjectArray
 from ros_3d_bb_lab.simulation.ros.simulator_msgs import simulated_messages
@@ -28,7 +28,7 @@ STAYING = {'start': [5.0, -0.9], 'facing': 1.6, 'height': 1.7}
 SCENES = ([STAYING, {'start': [4.0, 0.8], 'facing': 3.1, 'height': 1.8}],
           [STAYING, {'start': [3.0, -1.2], 'facing': 3.1, 'height': 1.8}])  # the second has left, a third has come
 NEAR_M = 0.5  # people are 1.7 m apart and more
-SHOWN_S = 0.5  # for how long people are published who should be seen and are not (~missed_limit, and an image)
+SHOWN_S = 0.5  # for how long people are published who should be seen and are not (~max_missed_time, and an image)
 
 
 class Moment(NamedTuple):
@@ -68,7 +68,7 @@ class Stage(object):
         self._moments[self.now_ns] = Moment(self._round, people)
         for topic, message in messages:
             if topic not in without:
-                self._pubs[topic].publish(restamped(message, time_from(self.now_ns)))
+                self._pubs[topic].publish(with_stamp(message, time_from(self.now_ns)))
         return self.now_ns
 
     def pass_time(self, elapsed_ns):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb.core.atomic_file import changing
+from ros_3d_bb.core.atomic_file import locked_update
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.measurement import Mark
@@ -138,14 +138,14 @@ def test_after_any_edits_the_file_is_what_is_shown_and_undo_leads_back(tmp_path_
 
 
 def test_measurements_added_by_a_viewer_are_kept_and_shown(document, folder):
-    with changing(folder) as content:
+    with locked_update(folder) as content:
         content['frames'].append(write_measurement(folder, 'new'))
     assert len(document.measurements) == 4
     document.set_truth(0, 0.1, 2.0)
     assert [entry['id'] for entry in read_json(folder)['frames']] == ['m0', 'm1', 'm2', 'm3', 'new']
     assert document.measurements[4].id == 'new' and document.progress == (1, 5)
     assert not document.refresh()  # nothing but its own edit
-    with changing(folder) as content:
+    with locked_update(folder) as content:
         content['frames'].append(write_measurement(folder, 'newer'))
     assert document.refresh() and document.measurements[5].id == 'newer' and not document.refresh()
     document.undo()
@@ -164,7 +164,7 @@ def test_two_annotators_keep_the_fields_of_each_other(document, folder):
 
 
 def test_a_moved_measurement_is_found_by_its_id_and_a_removed_one_is_named(document, folder):
-    with changing(folder) as content:
+    with locked_update(folder) as content:
         content['frames'].reverse()
     document.set_truth(0, 0.1, 2.0)
     assert [entry['id'] for entry in read_json(folder)['frames'] if 'truth_mm' in entry] == ['m0']

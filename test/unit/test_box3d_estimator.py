@@ -7,7 +7,7 @@ from hypothesis import given, strategies as st
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.estimation.box3d_estimator import (AXIS_BEHIND_SURFACE_M, estimate_boxes, estimate_foreground,
-                                                  estimate_median, estimator_named, near_first, sample_foreground,
+                                                  estimate_median, estimator_named, front_to_back, sample_foreground,
                                                   sample_median, truncated_edges)
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
@@ -174,7 +174,7 @@ def test_boxes_come_in_the_order_of_their_rectangles(name):
 
 
 def test_those_who_stand_lower_in_the_image_come_first():
-    assert near_first([(0, 10, 5, 30), (0, 5, 5, 45), (0, 2, 5, 45)]) == [2, 1, 0]
+    assert front_to_back([(0, 10, 5, 30), (0, 5, 5, 45), (0, 2, 5, 45)]) == [2, 1, 0]
 
 
 @pytest.mark.parametrize('name,stride,complaint', [('mean', 20, "estimator is 'mean'"), ('median', 0, 'stride is 0')])

@@ -6,8 +6,8 @@ from hypothesis import assume, example, given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
-from ros_3d_bb.tracking.occlusion import depths_towards, places_in
-from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, View, detection_from_box
+from ros_3d_bb.tracking.occlusion import classify_visibility, depths_towards
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, CameraView, detection_from_box
 from support.cylinders import Cylinder, mounted, rect_of, render
 
 LANDSCAPE, PORTRAIT = Camera(160, 120, 110, 110, 79.5, 59.5), Camera(120, 160, 110, 110, 59.5, 79.5)
@@ -42,9 +42,9 @@ def test_a_pillar_hides_a_person_where_no_ray_reaches_the_body(height_m, pitch_d
     seen_share = shown.sum() / alone.sum()
     assume(not 0.1 < seen_share < 0.9)
     depth = render(camera, view_from, [pillar])[0]  # the person has gone
-    view = View(view_from, camera, depth_at=functools.partial(depths_towards, camera, depth))
+    view = CameraView(view_from, camera, depth_at=functools.partial(depths_towards, camera, depth))
     place_m = np.array([[person.x_m, person.y_m, 0.85]])
-    place, = places_in(view, place_m, SIZE_M, place_m, 20.0)
+    place, = classify_visibility(view, place_m, SIZE_M, place_m, 20.0)
     assert place != (VISIBLE if seen_share <= 0.1 else OCCLUDED)
 
 

@@ -3,7 +3,8 @@ import numpy as np
 from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as hnp
 
-from ros_3d_bb.estimation.depth_layers import EDGE_PERCENT, edges, first_layer, trimmed_mean, whole, within
+from ros_3d_bb.estimation.depth_layers import (EDGE_PERCENT, complete_truncated_extent, edges, nearest_dominant_layer,
+                                               trimmed_mean, within)
 
 METRES = st.floats(0.3, 9.0)
 MILLIMETRES = hnp.arrays(int, st.integers(1, 60), elements=st.integers(300, 9000))
@@ -30,30 +31,31 @@ def test_within_holds_its_bounds_as_the_rounded_difference_does(depths_mm, middl
 
 @given(hnp.arrays(float, st.integers(1, 60), elements=METRES))
 def test_the_trimmed_mean_looks_past_a_tenth_on_both_sides(depths_m):
-    in_order_m, tenth = np.sort(depths_m), len(depths_m) // 10
-    spoilt_m = in_order_m.copy()
+    sorted_depths_m, tenth = np.sort(depths_m), len(depths_m) // 10
+    spoilt_m = sorted_depths_m.copy()
     spoilt_m[:tenth], spoilt_m[len(spoilt_m) - tenth:] = 0, 100
-    assert trimmed_mean(in_order_m) == trimmed_mean(spoilt_m)
-    assert in_order_m[0] - 1e-9 <= trimmed_mean(in_order_m) <= in_order_m[-1] + 1e-9
+    assert trimmed_mean(sorted_depths_m) == trimmed_mean(spoilt_m)
+    assert sorted_depths_m[0] - 1e-9 <= trimmed_mean(sorted_depths_m) <= sorted_depths_m[-1] + 1e-9
 
 
 @given(MILLIMETRES, st.integers(0, 100))
 def test_the_layer_is_among_the_depths_in_whatever_order_they_come(depths_mm, seed):
     depths_m = depths_mm * 0.001
-    in_order_m, even = np.sort(depths_m), np.ones(len(depths_m))
-    layer_m = first_layer(depths_m, even, in_order_m)
-    assert in_order_m[0] <= layer_m <= in_order_m[-1]
-    assert layer_m == first_layer(np.random.RandomState(seed).permutation(depths_m), even, in_order_m)
+    sorted_depths_m, even = np.sort(depths_m), np.ones(len(depths_m))
+    layer_m = nearest_dominant_layer(depths_m, even, sorted_depths_m)
+    assert sorted_depths_m[0] <= layer_m <= sorted_depths_m[-1]
+    assert layer_m == nearest_dominant_layer(np.random.RandomState(seed).permutation(depths_m), even, sorted_depths_m)
 
 
 def test_the_nearest_strong_layer_is_the_person():
     depths_m = np.array([0.9] * 5 + [2.0] * 30 + [4.0] * 50)  # a few flying pixels, a person, a wall
-    assert first_layer(depths_m, np.ones(85), depths_m) == 2.0
-    assert first_layer(depths_m, np.where(depths_m == 2.0, 0.1, 1.0), depths_m) == 4.0
+    assert nearest_dominant_layer(depths_m, np.ones(85), depths_m) == 2.0
+    assert nearest_dominant_layer(depths_m, np.where(depths_m == 2.0, 0.1, 1.0), depths_m) == 4.0
 
 
 def test_a_cut_body_is_whole_on_the_side_that_is_cut():
-    np.testing.assert_allclose(whole(-0.1, 0.2, True, False, 0.5), (-0.3, 0.2))
-    np.testing.assert_allclose(whole(-0.1, 0.2, False, True, 0.5), (-0.1, 0.4))
-    assert whole(-0.1, 0.2, False, False, 0.5) == whole(-0.1, 0.2, True, True, 0.5) == (-0.1, 0.2)
-    assert whole(-0.5, 0.5, True, False, 0.5) == (-0.5, 0.5)
+    np.testing.assert_allclose(complete_truncated_extent(-0.1, 0.2, True, False, 0.5), (-0.3, 0.2))
+    np.testing.assert_allclose(complete_truncated_extent(-0.1, 0.2, False, True, 0.5), (-0.1, 0.4))
+    assert complete_truncated_extent(-0.1, 0.2, False, False, 0.5) == complete_truncated_extent(-0.1, 0.2, True, True,
+                                                                                                0.5) == (-0.1, 0.2)
+    assert complete_truncated_extent(-0.5, 0.5, True, False, 0.5) == (-0.5, 0.5)

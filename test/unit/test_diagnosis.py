@@ -8,8 +8,8 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.image_msgs import units_fault
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS, findings
-from ros_3d_bb.diagnosis.observations import (CameraSeen, Clock, Finding, ImageSeen, Publisher, Role, Seen, Stream,
-                                              TfSeen)
+from ros_3d_bb.diagnosis.observations import (CameraSeen, Clock, Finding, ImageSeen, Observations, Publisher, Role,
+                                              Stream, TfSeen)
 from ros_3d_bb.diagnosis.tf_tree import Link, chain, links_in, why_missing
 from ros_3d_bb.diagnosis.topic_faults import paired_share, span
 
@@ -36,10 +36,10 @@ def sound(**changes):
     """What is seen of a pipeline in which all is well, but for some changes."""
     streams = {key: sound_stream(key) for key in ROLES}
     topics = {stream.topic: stream.role.kind for stream in streams.values()}
-    seen = Seen(streams, topics, 5.0, color_camera=CameraSeen(CAMERA, 'optical'),
-                depth_camera=CameraSeen(CAMERA, 'optical'), color=ImageSeen(640, 480, 'rgb8', 'optical'),
-                depth=ImageSeen(640, 480, '16UC1', 'optical'), tf=TfSeen('map', 'optical', 1000.0, LINKS, ''),
-                clock=Clock(False, 0), nodes={'tracker_node': (0, 'working')})
+    seen = Observations(streams, topics, 5.0, color_camera=CameraSeen(CAMERA, 'optical'),
+                        depth_camera=CameraSeen(CAMERA, 'optical'), color=ImageSeen(640, 480, 'rgb8', 'optical'),
+                        depth=ImageSeen(640, 480, '16UC1', 'optical'), tf=TfSeen('map', 'optical', 1000.0, LINKS, ''),
+                        clock=Clock(False, 0), nodes={'tracker_node': (0, 'working')})
     return seen._replace(**changes)
 
 

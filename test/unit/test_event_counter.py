@@ -5,7 +5,7 @@ from unittest import mock
 
 import pytest
 
-from ros_3d_bb.core.event_counter import Tally
+from ros_3d_bb.core.event_counter import EventCounter
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def switching():
 
 
 def test_events_are_counted_in_the_order_in_which_they_came_up():
-    tally = Tally()
+    tally = EventCounter()
     tally.count('images')
     tally.warn('refused', 'why')
     tally.warn('refused', 'why again')
@@ -27,48 +27,48 @@ def test_events_are_counted_in_the_order_in_which_they_came_up():
 
 
 def test_events_of_one_message_are_counted_at_once():
-    tally = Tally()
+    tally = EventCounter()
     tally.count('boxes')
     tally.count_all({'images': 1, 'boxes': 3, 'boxes without depth': 0})
     assert list(tally.counts.items()) == [('boxes', 4), ('images', 1), ('boxes without depth', 0)]
 
 
 def test_a_message_is_counted_as_received_whether_it_is_refused_or_not():
-    tally = Tally()
-    with tally.taking('boxes'):
+    tally = EventCounter()
+    with tally.receiving('boxes'):
         pass
-    with tally.taking('boxes'):
+    with tally.receiving('boxes'):
         raise ValueError('3 numbers')
     assert tally.received == {'boxes': 2} and tally.counts == {'boxes refused': 1}
 
 
 def test_other_errors_are_raised_unless_they_are_harmless():
-    tally = Tally()
-    with pytest.raises(ZeroDivisionError), tally.refusing('boxes'):
+    tally = EventCounter()
+    with pytest.raises(ZeroDivisionError), tally.rejecting('boxes'):
         raise ZeroDivisionError
     tally.is_harmless = lambda error: isinstance(error, ZeroDivisionError)
-    with tally.refusing('boxes'):
+    with tally.rejecting('boxes'):
         raise ZeroDivisionError
     assert not tally.counts
 
 
 def test_the_latency_of_a_result_is_the_age_of_its_stamp():
     now, stamp = mock.Mock(to_nsec=lambda: 12500), mock.Mock(to_nsec=lambda: 11700)
-    tally = Tally(clock=lambda: now)
-    tally.answered(stamp)
+    tally = EventCounter(clock=lambda: now)
+    tally.record_latency(stamp)
     assert list(tally.lags_ns) == [800]
 
 
 def test_an_input_that_is_refused_is_counted_and_the_next_is_taken():
-    tally = Tally()
-    with tally.refusing('boxes'):
+    tally = EventCounter()
+    with tally.rejecting('boxes'):
         raise ValueError('3 numbers')
     assert tally.counts == {'boxes refused': 1} and '3 numbers' in tally.sentences['boxes refused']
 
 
 def test_no_count_is_lost_between_threads(switching):
     """rospy has a thread for each publisher of a topic."""
-    tally = Tally()
+    tally = EventCounter()
     threads = [threading.Thread(target=lambda: [tally.count('images') for _ in range(5000)]) for _ in range(4)]
     for thread in threads:
         thread.start()
@@ -78,7 +78,7 @@ def test_no_count_is_lost_between_threads(switching):
 
 
 def test_parts_that_are_left_out_are_counted_one_by_one():
-    tally = Tally()
+    tally = EventCounter()
     tally.leave_out('3D boxes', [])
     assert not tally.counts
     tally.leave_out('3D boxes', ['box 0 is 11 m wide', 'box 2 is 12 m wide'])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.conversions.image_msgs import array_from, depth_from, fill_image, rgb_from
+from ros_3d_bb.conversions.image_msgs import array_from, fill_image, imgmsg_to_depth, imgmsg_to_rgb
 
 
 def message_of(pixels, encoding, padding=0, big_endian=False):
@@ -21,13 +21,13 @@ def message_of(pixels, encoding, padding=0, big_endian=False):
 def test_any_row_step_and_byte_order(height, width, padding, big_endian, layout):
     encoding, dtype = layout
     pixels = (np.arange(height * width).reshape(height, width) * 257 % 65521).astype(dtype)
-    depth = depth_from(message_of(pixels, encoding, padding, big_endian))
+    depth = imgmsg_to_depth(message_of(pixels, encoding, padding, big_endian))
     np.testing.assert_array_equal(depth.values, pixels)
     assert depth.scale_m == (1.0 if encoding == '32FC1' else 0.001)
 
 
 def test_depth_scale_can_be_given():
-    assert depth_from(message_of(np.ones((2, 2), np.uint16), '16UC1'), 0.00025).scale_m == 0.00025
+    assert imgmsg_to_depth(message_of(np.ones((2, 2), np.uint16), '16UC1'), 0.00025).scale_m == 0.00025
 
 
 @pytest.mark.parametrize('encoding,channels', [('rgb8', [0, 1, 2]), ('bgr8', [2, 1, 0]), ('rgba8', [0, 1, 2]),
@@ -35,7 +35,7 @@ def test_depth_scale_can_be_given():
 def test_colours_are_converted_to_rgb(encoding, channels):
     depth = 1 if encoding == 'mono8' else 4 if 'a' in encoding else 3
     pixels = np.random.RandomState(0).randint(0, 256, (4, 5, depth)).astype(np.uint8)
-    rgb = rgb_from(message_of(pixels[..., 0] if depth == 1 else pixels, encoding, padding=3))
+    rgb = imgmsg_to_rgb(message_of(pixels[..., 0] if depth == 1 else pixels, encoding, padding=3))
     np.testing.assert_array_equal(rgb, pixels[..., channels])
 
 
@@ -60,9 +60,9 @@ def test_invalid_images_are_rejected(change, named):
 
 def test_colour_is_rejected_as_depth_and_depth_as_colour():
     with pytest.raises(ValueError, match="'rgb8'"):
-        depth_from(message_of(np.zeros((2, 2, 3), np.uint8), 'rgb8'))
+        imgmsg_to_depth(message_of(np.zeros((2, 2, 3), np.uint8), 'rgb8'))
     with pytest.raises(ValueError, match="'16UC1'"):
-        rgb_from(message_of(np.zeros((2, 2), np.uint16), '16UC1'))
+        imgmsg_to_rgb(message_of(np.zeros((2, 2), np.uint16), '16UC1'))
 
 
 @pytest.mark.parametrize('encoding,pixels', [('rgb8', np.arange(24, dtype=np.uint8).reshape(2, 4, 3)),

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.tracking.kalman_filter import Measurements, Outliers, predict, unlikeliness, update
+from ros_3d_bb.tracking.kalman_filter import Measurements, Outliers, negative_log_likelihood, predict, update
 
 NONE = Outliers(probability=0.0)
 AHEAD = np.array([[1.0, 0.0]])
@@ -64,7 +64,7 @@ def test_likelihood_is_a_density():
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(-3, 4, step_m), np.arange(-3, 3, step_m)))
     places = Measurements(np.column_stack((x, y)), np.tile(np.eye(2) * 0.01, (x.size, 1, 1)),
                           np.tile(AHEAD, (x.size, 1)))
-    cost = unlikeliness(mean, covariance, places, Outliers())
+    cost = negative_log_likelihood(mean, covariance, places, Outliers())
     assert np.exp(-cost / 2).sum() * step_m ** 2 / (2 * np.pi) == pytest.approx(1, abs=0.01)
 
 
@@ -72,7 +72,7 @@ def test_all_pairs_are_as_likely_as_each_alone():
     random = np.random.RandomState(3)
     mean, covariance = random.normal(0, 1, (3, 4)), np.tile(np.eye(4) * 0.1, (3, 1, 1))
     places = Measurements(random.normal(0, 1, (5, 2)), np.tile(np.eye(2) * 0.01, (5, 1, 1)), np.tile(AHEAD, (5, 1)))
-    cost = unlikeliness(mean, covariance, places, Outliers())
+    cost = negative_log_likelihood(mean, covariance, places, Outliers())
     assert cost.shape == (3, 5)
     one = Measurements(*(values[2:3] for values in places))
-    assert cost[1, 2] == pytest.approx(unlikeliness(mean[1:2], covariance[1:2], one, Outliers())[0, 0])
+    assert cost[1, 2] == pytest.approx(negative_log_likelihood(mean[1:2], covariance[1:2], one, Outliers())[0, 0])

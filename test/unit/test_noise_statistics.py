@@ -5,7 +5,7 @@ import pytest
 from ros_3d_bb_lab.evaluation.noise import theory
 from ros_3d_bb_lab.evaluation.noise.statistics import (DISTRIBUTIONS, axis_statistics, cluster_statistics,
                                                        held_out_log_likelihood, share_between_positions)
-from ros_3d_bb_lab.evaluation.noise.tables import Cluster, Measurements
+from ros_3d_bb_lab.evaluation.noise.tables import Cluster, MeasurementTable
 
 
 def drawn(kind, count=300):
@@ -70,7 +70,7 @@ def test_too_few_clusters_for_the_polynomial_are_refused():
 def test_variance_between_positions_is_told_from_that_of_repetitions():
     x_m, z_m = np.repeat([[-1, 0, 1, -1, 0, 1], [1, 1, 1, 2, 2, 2]], 50, axis=1).astype(float)
     error_m = 0.03 * x_m + 0.01 * np.random.RandomState(0).normal(size=len(x_m))
-    table = Measurements('made', np.stack((x_m, x_m, z_m + error_m), axis=1), np.stack((x_m, z_m), axis=1), x_m > 9)
+    table = MeasurementTable('made', np.stack((x_m, x_m, z_m + error_m), axis=1), np.stack((x_m, z_m), axis=1), x_m > 9)
     assert share_between_positions(table, 'Z') == pytest.approx(6 / 7.0, abs=0.03)
     table.measured_m[:, 0] = np.nan
     assert share_between_positions(table, 'Z') is None

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb_lab.evaluation.noise.tables import (Measurements, TableError, clusters_of, read_session_measurements,
-                                                   read_table)
+from ros_3d_bb_lab.evaluation.noise.tables import (MeasurementTable, TableError, clusters_of,
+                                                   read_session_measurements, read_table)
 from support.noise_tables import COLUMNS, RANGES_M, SIDES_M, rows_of, write_table
 
 
@@ -80,10 +80,11 @@ def test_people_cut_by_the_edge_of_the_image_are_known(session_folder):
 
 def test_without_those_cut_by_the_edge_no_cluster_is_too_small():
     x_m = np.array([0, 0, 0, 0, 1, 1, 1, 1.0])
-    table = Measurements('made', np.zeros((8, 3)), np.stack((x_m, x_m), axis=1), np.arange(8) > 5)
+    table = MeasurementTable('made', np.zeros((8, 3)), np.stack((x_m, x_m), axis=1), np.arange(8) > 5)
     assert table.whole().truth_m[:, 0].tolist() == [0, 0, 0, 0]
 
 
 def test_complete_are_those_with_both_axes():
-    table = Measurements('made', np.arange(6.0).reshape(2, 3), np.array([[1, np.nan], [1, 2]]), np.array([False, True]))
+    table = MeasurementTable('made', np.arange(6.0).reshape(2, 3), np.array([[1, np.nan], [1, 2]]),
+                             np.array([False, True]))
     assert table.complete().measured_m.tolist() == [[3, 4, 5]]

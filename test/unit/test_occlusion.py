@@ -7,18 +7,18 @@ from hypothesis import assume, given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.tracking.occlusion import depths_towards, places_in
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, View
+from ros_3d_bb.tracking.occlusion import classify_visibility, depths_towards
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
 
 CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
 LOOK = transform_from((0, 0, 1), OPTICAL_ROTATION)
-PLAIN = View(LOOK, CAMERA)
+PLAIN = CameraView(LOOK, CAMERA)
 
 
 def place(x, y, view=PLAIN, others=(), farthest_m=6.0):
     """What the camera makes of the place (x, y), with others at places of their own."""
     positions_m = np.array([(x, y, 0.9)] + [tuple(other) + (0.9,) for other in others], float)
-    return places_in(view, positions_m[:1], np.array([[0.5, 0.5, 1.7]]), positions_m, farthest_m)[0]
+    return classify_visibility(view, positions_m[:1], np.array([[0.5, 0.5, 1.7]]), positions_m, farthest_m)[0]
 
 
 def with_depth(values_mm):
@@ -36,7 +36,7 @@ def test_places_are_in_view_or_not(x, y, expected):
 def test_a_camera_that_looks_to_the_left_sees_to_the_left():
     """An off-centre principal point: more is seen on one side."""
     camera = Camera(640, 480, 600.0, 600.0, 600.0, 239.5)
-    view = View(LOOK, camera)
+    view = CameraView(LOOK, camera)
     assert place(3, 2, view) == VISIBLE and place(3, -2, view) == OUT_OF_VIEW
 
 
@@ -46,7 +46,7 @@ FOLDING = Camera(640, 480, 280, 280, 320, 240, 'plumb_bob', (-0.35, 0.12, 0, 0, 
 @pytest.mark.parametrize('x,y,expected', [
     (3, 0, VISIBLE), (3, 2.5, VISIBLE), (-3, 0, OUT_OF_VIEW), (0.5, 3, OUT_OF_VIEW)])
 def test_a_camera_whose_distortion_folds_before_the_border_has_a_view_with_an_end(x, y, expected):
-    assert place(x, y, View(LOOK, FOLDING)) == expected
+    assert place(x, y, CameraView(LOOK, FOLDING)) == expected
 
 
 def mounted(height, pitch, roll=0.0):
@@ -63,7 +63,7 @@ def mounted(height, pitch, roll=0.0):
     (2.5, 45, 2.5, VISIBLE), (2.5, 45, 6, OUT_OF_VIEW), (2.5, 45, 0.3, OUT_OF_VIEW), (3, 90, 0, VISIBLE),
     (3, 90, 2.5, OUT_OF_VIEW), (0.3, -40, 5, OUT_OF_VIEW), (0.3, -40, 1.2, VISIBLE)])
 def test_the_upper_and_the_lower_border_of_the_image_count(height, pitch, x, expected):
-    assert place(x, 0, View(mounted(height, pitch), CAMERA)) == expected
+    assert place(x, 0, CameraView(mounted(height, pitch), CAMERA)) == expected
 
 
 def pixels_on_axis(camera, fixed_from_camera, x, y):
@@ -84,19 +84,19 @@ def test_what_is_visible_is_in_the_image_and_what_is_out_of_view_is_not(height, 
     camera, transform = Camera(640, 480, focal, focal, 319.5, 239.5), mounted(height, pitch, roll)
     assume(np.hypot(x, y) > 0.5)
     shown, narrower = (pixels_on_axis(camera._replace(fx=f, fy=f), transform, x, y) for f in (focal, 1.4 * focal))
-    result = place(x, y, View(transform, camera), farthest_m=20.0)
+    result = place(x, y, CameraView(transform, camera), farthest_m=20.0)
     assert result != VISIBLE or shown > 0.1
     assert result != OUT_OF_VIEW or narrower < 0.6
 
 
 def test_people_on_opposite_sides_of_a_camera_that_looks_down_do_not_hide_each_other():
-    view = View(mounted(3, 90), CAMERA)
+    view = CameraView(mounted(3, 90), CAMERA)
     assert place(0.02, 0.9, view, others=[(-0.02, 0.4)]) == OCCLUDED
     assert place(0.02, 0.9, view, others=[(-0.02, -0.4)]) == VISIBLE
 
 
 def test_a_view_without_intrinsics_sees_all_that_is_ahead():
-    view = View(LOOK)
+    view = CameraView(LOOK)
     assert place(3, 2.9, view) == VISIBLE and place(-1, 0, view) == OUT_OF_VIEW
 
 

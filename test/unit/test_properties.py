@@ -7,7 +7,7 @@ import pytest
 import yaml
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.conversions.image_msgs import LAYOUTS, array_from, depth_from, fill_image, rgb_from
+from ros_3d_bb.conversions.image_msgs import LAYOUTS, array_from, fill_image, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
@@ -25,7 +25,7 @@ IMAGES = st.builds(SimpleNamespace, width=st.integers(0, 2 ** 32 - 1) | st.integ
 
 @given(IMAGES)
 def test_an_image_has_its_pixels_or_is_refused(message):
-    for read in (array_from, rgb_from, lambda image: depth_from(image).values):
+    for read in (array_from, imgmsg_to_rgb, lambda image: imgmsg_to_depth(image).values):
         try:
             pixels = read(message)
         except ValueError:

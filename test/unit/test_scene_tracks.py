@@ -8,7 +8,7 @@ from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 from ros_3d_bb_lab.evaluation.clear_mot import Moment
 from ros_3d_bb_lab.evaluation.scene_tracks import is_in_image, score_tracks
 from ros_3d_bb_lab.evaluation.scenes import Step
-from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Frame, Poses, Truth
+from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, PersonTruth, Poses, SimulatedFrame
 
 CAMERA_M = (0.0, 0.0, 1.0)
 SIZE_M, BOX_PX = np.array([0.5, 0.5, 1.7]), (200, 0, 400, 480)
@@ -16,7 +16,8 @@ SIZE_M, BOX_PX = np.array([0.5, 0.5, 1.7]), (200, 0, 400, 480)
 
 def person(number, x_m, y_m=0.0, speed_mps=0.0, hidden=0.0, box_px=BOX_PX):
     """Somebody who walks along x. The image border cuts most of the body."""
-    return Truth(number, np.array([x_m, y_m, 0.85]), np.array([speed_mps, 0.0, 0.0]), SIZE_M, 0.1, hidden, 0.1, box_px)
+    return PersonTruth(number, np.array([x_m, y_m, 0.85]), np.array([speed_mps, 0.0, 0.0]), SIZE_M, 0.1, hidden, 0.1,
+                       box_px)
 
 
 def as_track(position_m, velocity_mps, number, status=VISIBLE, horizon_s=2.0):
@@ -34,7 +35,7 @@ def track_of(someone, number=1, status=VISIBLE, off_m=(0.0, 0.0, 0.0), off_mps=(
 def step(number, people, tracks):
     poses = Poses(np.eye(4), np.eye(4), transform_from(CAMERA_M, OPTICAL_ROTATION))
     truth = [track_of(someone, someone.id) for someone in people]
-    return Step(Frame(number, number / 30.0, None, None, poses, people), np.zeros((0, 4)),
+    return Step(SimulatedFrame(number, number / 30.0, None, None, poses, people), np.zeros((0, 4)),
                 Moment(number * NS // 30, truth, tracks))
 
 

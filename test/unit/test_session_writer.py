@@ -17,7 +17,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.sessions import session_writer
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb.sessions.session_writer import Measurement, append, stored_depth
+from ros_3d_bb.sessions.session_writer import MeasurementRecord, append, stored_depth
 
 CAMERA = Camera(64, 48, 60.0, 61.0, 31.5, 23.25, 'plumb_bob', (0.1, -0.2, 0.001, 0.002, 0.03))
 STAMP_NS = 1616161616 * NS + 123456789
@@ -31,7 +31,7 @@ def measurement(number=0, **changes):
                   depth=DepthImage(random.randint(0, 65536, (48, 64)).astype(np.uint16), 0.001), camera=CAMERA,
                   frame_id='optical', stamp_ns=STAMP_NS + number * NS, rects_px=((10, 0, 30, 48),), boxes=(BOX,))
     values.update(changes)
-    return Measurement(**values)
+    return MeasurementRecord(**values)
 
 
 def description(folder):
@@ -114,7 +114,7 @@ def test_without_boxes_the_images_are_stored(folder):
 def test_ids_are_ascending_after_measurements_were_removed(folder):
     first = append(folder, measurement(0)).id
     second = append(folder, measurement(1)).id
-    with atomic_file.changing(folder) as content:
+    with atomic_file.locked_update(folder) as content:
         del content['frames'][0]
     third = append(folder, measurement(2, stamp_ns=NS)).id  # an earlier stamp, as of a bag
     assert first < second < third and len({first, second, third}) == 3
@@ -207,15 +207,15 @@ def test_invalid_sessions_are_rejected_and_kept(tmp_path, text):
 @pytest.mark.parametrize('full_at', ['color', 'depth', 'frames.json'])
 def test_a_full_disk_does_not_change_the_session(folder, monkeypatch, full_at):
     append(folder, measurement(0))
-    before, write_whole = content_of(folder), atomic_file.write_whole
+    before, write_whole = content_of(folder), atomic_file.atomic_write
 
     def failing(path, data):
         if full_at in os.path.relpath(path, folder):
             raise OSError(28, 'No space left on device')
         write_whole(path, data)
 
-    monkeypatch.setattr(session_writer, 'write_whole', failing)
-    monkeypatch.setattr(atomic_file, 'write_whole', failing)
+    monkeypatch.setattr(session_writer, 'atomic_write', failing)
+    monkeypatch.setattr(atomic_file, 'atomic_write', failing)
     with pytest.raises(OSError):
         append(folder, measurement(1))
     assert content_of(folder) == before

@@ -11,7 +11,7 @@ from ros_3d_bb_lab.simulation.body import Body, Build
 from ros_3d_bb_lab.simulation.color_sensor import ColorSensor
 from ros_3d_bb_lab.simulation.mesh import Mesh, box
 from ros_3d_bb_lab.simulation.renderer import render
-from ros_3d_bb_lab.simulation.room import FLOOR, Room
+from ros_3d_bb_lab.simulation.room import FLOOR, RenderedRoom
 
 BOUNDS, HEIGHT = (-3.0, 9.0, -4.0, 4.0), 2.8
 CAMERA = Camera(160, 120, 153.7, 153.7, 79.8, 60.5)
@@ -35,7 +35,7 @@ poses = st.builds(pose, st.tuples(st.floats(-2.5, 8.5), st.floats(-3.5, 3.5), st
 
 @pytest.fixture(scope='module')
 def room():
-    return Room(BOUNDS, HEIGHT, np.random.RandomState(3))
+    return RenderedRoom(BOUNDS, HEIGHT, np.random.RandomState(3))
 
 
 @pytest.fixture(scope='module')
@@ -118,7 +118,8 @@ def test_a_mark_on_a_surface_is_seen_where_it_projects_to(surface, spot, yaw, pi
     world_from_camera = pose((0, y, 1.2), yaw, pitch, roll)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(textures, surface, marked)
-        color, _inverse, surfaces = Room(BOUNDS, HEIGHT, np.random.RandomState(0)).draw(CAMERA, world_from_camera)
+        color, _inverse, surfaces = RenderedRoom(BOUNDS, HEIGHT, np.random.RandomState(0)).draw(CAMERA,
+                                                                                                world_from_camera)
     marks = (color[..., 0] > 128) & (surfaces == (FLOOR if surface == 'floor' else 2))
     found = np.argwhere(marks).mean(axis=0)[::-1]
     camera_from_world = np.linalg.inv(world_from_camera)
@@ -278,13 +279,14 @@ def test_objects_are_lit_from_above(room):
 @pytest.mark.parametrize('height', [1.0, 1.4, 2.4])
 def test_rooms_may_be_low_and_small(height):
     for seed in range(5):
-        color, inverse_depth, _surfaces = Room((-1.5, 3.0, -1.0, 6.0), height, np.random.RandomState(seed)).draw(
+        color, inverse_depth, _surfaces = RenderedRoom((-1.5, 3.0, -1.0, 6.0), height,
+                                                       np.random.RandomState(seed)).draw(
             CAMERA, pose((0, 0, .5)))
         assert color.mean() > 50 and inverse_depth.min() >= 1 / 7.
 
 
 def test_rooms_depend_on_the_seed(room):
-    images = [Room(BOUNDS, HEIGHT, np.random.RandomState(seed)).draw(CAMERA, pose((0, 0, 1.2)))[0]
+    images = [RenderedRoom(BOUNDS, HEIGHT, np.random.RandomState(seed)).draw(CAMERA, pose((0, 0, 1.2)))[0]
               for seed in (3, 3, 4)]
     np.testing.assert_array_equal(images[0], images[1])
     assert np.mean(images[0] != images[2]) > .3

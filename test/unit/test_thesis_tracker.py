@@ -173,7 +173,7 @@ def test_other_parameters_work_from_the_next_image_on_and_tracks_go_on():
     for frame in range(5):
         before, = tracker.update(seconds(frame / 10), [at(0.1 * frame, 0)])
     assert before.velocity_mps[0] < 0.7
-    tracker.tune(ThesisTrackerParams(alpha=1.0, prediction_time=1.0))
+    tracker.reconfigure(ThesisTrackerParams(alpha=1.0, prediction_time=1.0))
     track, = tracker.update(seconds(0.5), [at(0.5, 0)])
     assert track.velocity_mps[0] == pytest.approx(1.0) and len(track.prediction_m) == 4
     assert (track.id, track.first_seen_ns) == (before.id, before.first_seen_ns)
@@ -182,5 +182,5 @@ def test_other_parameters_work_from_the_next_image_on_and_tracks_go_on():
 def test_parameters_that_are_refused_leave_the_old_ones():
     tracker = ThesisTracker()
     with pytest.raises(ValueError, match='prediction_step'):
-        tracker.tune(ThesisTrackerParams(prediction_step=0.0, prediction_time=1.0))
+        tracker.reconfigure(ThesisTrackerParams(prediction_step=0.0, prediction_time=1.0))
     assert len(tracker.update(0, [at(0, 0)])[0].prediction_m) == 8

@@ -2,7 +2,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.core.time_sync import MAX_RATE_HZ, MAX_WAITING, NS, Pairing, StampedCache
+from ros_3d_bb.core.time_sync import MAX_RATE_HZ, MAX_WAITING, NS, MessageCache, StampSynchronizer
 
 MS = NS // 1000
 PERIOD = 33 * MS
@@ -20,7 +20,7 @@ class Recorder(object):
     """
 
     def __init__(self, length_ns=NS, tolerance_ns=5 * MS, assumed_delay_ns=0):
-        self.sync = Pairing(length_ns, tolerance_ns, assumed_delay_ns, self._on_frame, self._on_lost)
+        self.sync = StampSynchronizer(length_ns, tolerance_ns, assumed_delay_ns, self._on_frame, self._on_lost)
         self.frames, self.forgotten = [], []
 
     def _on_frame(self, boxes, depth, camera):
@@ -178,30 +178,30 @@ def test_boxes_are_settled_or_counted_as_forgotten_whatever_comes(events):
 
 @given(st.lists(st.integers(0, 5 * NS), min_size=1, max_size=50))
 def test_the_cache_keeps_no_more_than_its_length_in_order(stamps):
-    cache = StampedCache(NS)
+    cache = MessageCache(NS)
     for stamp_ns in stamps:
         newest_ns = cache.newest_ns
         assert cache.add(stamp_ns, 0, stamp_ns) == (newest_ns is not None and stamp_ns < newest_ns)
         kept = [entry.stamp_ns for entry in cache._entries]
-        assert kept == sorted(kept) and kept[-1] - kept[0] <= NS and cache.at(stamp_ns).value == stamp_ns
+        assert kept == sorted(kept) and kept[-1] - kept[0] <= NS and cache.nearest(stamp_ns).value == stamp_ns
 
 
 def test_an_empty_cache_has_no_answer():
-    cache = StampedCache(NS)
-    assert cache.newest_ns is None and cache.at(0, NS) is None and cache.arrived_at(0, NS) is None
+    cache = MessageCache(NS)
+    assert cache.newest_ns is None and cache.nearest(0, NS) is None and cache.arrived_at(0, NS) is None
 
 
 def test_of_equal_stamps_the_newest_value_is_kept():
     """The clock of a driver hangs, or /clock is frozen."""
-    cache = StampedCache(NS)
+    cache = MessageCache(NS)
     for number in range(1000):
         assert cache.add(NS, number, number) is False
-    assert len(cache) == 1 and cache.at(NS) == (NS, 999, 999)
+    assert len(cache) == 1 and cache.nearest(NS) == (NS, 999, 999)
 
 
 @pytest.mark.parametrize('length_ns', [0, NS // 2, NS, 10 * NS])
 def test_stamps_that_creep_keep_no_more_than_the_fastest_camera_would(length_ns):
-    cache = StampedCache(length_ns)
+    cache = MessageCache(length_ns)
     for number in range(4000):
         cache.add(number, number, number)
     kept = [entry.value for entry in reversed(cache)]
@@ -211,7 +211,7 @@ def test_stamps_that_creep_keep_no_more_than_the_fastest_camera_would(length_ns)
 @pytest.mark.parametrize('rate_hz,length_ns', [(90, NS), (120, 10 * NS), (300, NS), (30, 60 * NS)])
 def test_what_a_real_camera_sends_is_kept_for_the_whole_length(rate_hz, length_ns):
     """However slowly it is played: nothing depends on when it arrives."""
-    cache = StampedCache(length_ns)
+    cache = MessageCache(length_ns)
     for number in range(70 * rate_hz):
         cache.add(number * NS // rate_hz, 3600 * NS * number, number)
     oldest = [entry for entry in reversed(cache)][-1]

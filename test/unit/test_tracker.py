@@ -11,10 +11,10 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, Detection
 
 CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)  # sees x from -0.6 to 0.6 of the depth
-VIEW = View(transform_from((0, 0, 1), OPTICAL_ROTATION), CAMERA)
+VIEW = CameraView(transform_from((0, 0, 1), OPTICAL_ROTATION), CAMERA)
 START_NS = 1000 * NS
 SIZE = np.array([0.5, 0.5, 1.7])
 
@@ -46,7 +46,7 @@ def test_numbers_start_at_1_and_are_not_used_again():
 
 
 def test_somebody_is_published_once_seen_often_enough():
-    published = play(Tracker(TrackerParams(min_sightings=4, min_age=0.0)), 0.3, standing((3, 0)))
+    published = play(Tracker(TrackerParams(min_hits=4, min_age=0.0)), 0.3, standing((3, 0)))
     assert [len(objects) for objects in published] == [0, 0, 0, 1, 1, 1, 1, 1, 1]
 
 
@@ -132,7 +132,7 @@ def test_somebody_who_does_not_come_out_from_behind_something_is_still_there():
 
 
 def test_somebody_who_is_gone_is_not_published_for_longer_than_the_limit():
-    walk = play(Tracker(TrackerParams(missed_limit=0.35)), 2, lambda time_s: [at(3, 0)] if time_s < 1 else [])
+    walk = play(Tracker(TrackerParams(max_missed_time=0.35)), 2, lambda time_s: [at(3, 0)] if time_s < 1 else [])
     assert [bool(objects) for objects in walk[30:]] == [frame < 10 for frame in range(30)]
     assert walk[35][0].status == OCCLUDED
 
@@ -373,10 +373,10 @@ def test_other_parameters_work_from_the_next_image_on_and_tracks_go_on():
     """Nobody is found any more; by the old limit the person would be gone after 0.35 s, and come back after 4 s."""
     tracker = Tracker()
     number, = ids(play(tracker, 1, standing((3, 0)))[-1])
-    tracker.tune(TrackerParams(missed_limit=2.0), NoiseParams(), PredictionParams(prediction_time=1.0))
+    tracker.reconfigure(TrackerParams(max_missed_time=2.0), NoiseParams(), PredictionParams(prediction_time=1.0))
     missed = play(tracker, 1, standing(), start_s=1)[-1]
     assert ids(missed) == [number] and len(missed[0].prediction_m) == 4
-    tracker.tune(TrackerParams(memory=0.5), NoiseParams(), PredictionParams())
+    tracker.reconfigure(TrackerParams(max_age=0.5), NoiseParams(), PredictionParams())
     assert play(tracker, 0.1, standing(), start_s=2)[-1] == []
     assert ids(play(tracker, 1, standing((3, 0)), start_s=3)[-1]) == [number + 1]
 
@@ -384,7 +384,7 @@ def test_other_parameters_work_from_the_next_image_on_and_tracks_go_on():
 def test_parameters_that_are_refused_leave_all_the_old_ones():
     tracker = Tracker()
     with pytest.raises(ValueError, match='prediction_step'):
-        tracker.tune(TrackerParams(), NoiseParams(), PredictionParams(prediction_time=1.0, prediction_step=0.0))
+        tracker.reconfigure(TrackerParams(), NoiseParams(), PredictionParams(prediction_time=1.0, prediction_step=0.0))
     assert len(play(tracker, 1, standing((3, 0)))[-1][0].prediction_m) == 8
 
 
@@ -393,7 +393,7 @@ def test_images_that_come_late_are_done_again_with_the_new_parameters():
     tracker = Tracker()
     play(tracker, 1, standing((3, 0)))
     number, = ids(tracker.objects())
-    tracker.tune(TrackerParams(acceleration=0.5), NoiseParams(), PredictionParams())
+    tracker.reconfigure(TrackerParams(acceleration=0.5), NoiseParams(), PredictionParams())
     assert ids(tracker.update(START_NS + int(0.9 * NS) + 1, [at(3, 0)], VIEW)) == [number]
 
 

@@ -11,7 +11,7 @@ from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_fr
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.out_of_sequence import LATEST_NS, MOST_KEPT
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, Detection
 
 START_NS, PERIOD_NS = 1000 * NS, NS // 30
 CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)
@@ -20,8 +20,9 @@ EDGE = 0.6  # x / z of what the image border shows
 
 def looking(yaw, camera):
     turn = transform_from((0, 0, 0), (0, 0, np.sin(yaw / 2), np.cos(yaw / 2)))
-    return View(transform_from((0, 0, 1), (0, 0, 0, 1)).dot(turn).dot(transform_from((0, 0, 0), OPTICAL_ROTATION)),
-                CAMERA, camera)
+    return CameraView(transform_from((0, 0, 1),
+                                     (0, 0, 0, 1)).dot(turn).dot(transform_from((0, 0, 0), OPTICAL_ROTATION)),
+                      CAMERA, camera)
 
 
 FRONT, LEFT = looking(0, 'front'), looking(np.pi / 4, 'left')

@@ -8,7 +8,7 @@ from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
 from ros_3d_bb_lab.evaluation.tracking import robot_motion
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel, half_width, shown, thesis_bias_m
-from ros_3d_bb_lab.evaluation.tracking.detection_generator import DOUBLE, FALSE, Detector, Seen
+from ros_3d_bb_lab.evaluation.tracking.detection_generator import DOUBLE, FALSE, DetectablePerson, Detector
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING, OdometryModel
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, Models, Timing, simulate, view_of
 from ros_3d_bb_lab.evaluation.tracking.timing import crowd
@@ -194,7 +194,7 @@ def test_odometry_drifts_from_the_truth_only_while_the_robot_drives():
 def boxes():
     """What is found of somebody who stands 3 m straight ahead, for 20000 images; None where nothing is."""
     detector, boxes = Detector(CameraModel(), 1, 1 / 30.0, np.random.RandomState(0)), []
-    seen, pose = [Seen(0, 3.0, 3.0, 0.0, 1.0, False, 0.0, 0.0)], np.zeros(3)
+    seen, pose = [DetectablePerson(0, 3.0, 3.0, 0.0, 1.0, False, 0.0, 0.0)], np.zeros(3)
     for number in range(20000):
         detector.advance(pose)
         boxes.append(detector.find(seen, pose, number / 30.0))

@@ -7,7 +7,7 @@ from hypothesis import given, settings, strategies as st
 from ros_3d_bb.camera.camera_model import Camera, transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import VISIBLE, Detection, View
+from ros_3d_bb.tracking.types import VISIBLE, CameraView, Detection
 from support.cylinders import mounted
 
 CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)
@@ -34,7 +34,7 @@ def test_covariances_of_tracks_are_positive_definite_whatever_boxes_come(seed):
             places_m = random.choice([0, 1, 3, 3.01, -3], (random.randint(0, 3), 2))
             detections = [Detection(np.append(place_m, 0.85), np.array([0.5, 0.5, 1.7]), any_covariance(random))
                           for place_m in places_m]
-            view = View(mounted(1.0, *random.choice([0, 45, 90, 180], 3)), CAMERA)
+            view = CameraView(mounted(1.0, *random.choice([0, 45, 90, 180], 3)), CAMERA)
             tracker.update(stamp_ns, detections, view)
             covariances = tracker._buffer.state.tracks['covariance']
             assert np.isfinite(covariances).all() and (np.linalg.eigvalsh(covariances) > 0).all()
@@ -45,7 +45,7 @@ def test_covariances_of_tracks_are_positive_definite_whatever_boxes_come(seed):
 def test_furniture_before_the_legs_leaves_a_person_the_id(seed, hidden_share, hidden_s):
     """A table hides the lower part of the body for a while; the border of the image cuts nothing."""
     random, tracker, height_m = np.random.RandomState(seed), Tracker(), 1.7
-    view, published = View(mounted(1.0), CAMERA), []
+    view, published = CameraView(mounted(1.0), CAMERA), []
     for image in range(90):
         time_s = image / 30.0
         seen_m = height_m * (1 - hidden_share if 1.5 < time_s < 1.5 + hidden_s else 1) + random.normal(0, 0.03)
@@ -69,7 +69,7 @@ def test_tracks_are_the_same_anywhere_on_the_map(seed, x_m, y_m, yaw_deg):
         for tracker, transform in ((near, np.eye(4)), (far, moved)):
             detections = [Detection(center_m, np.array([0.5, 0.5, 1.7])) for center_m in
                           transform_points(transform, centers_m)]
-            view = View(transform.dot(mounted(1.0)), CAMERA)
+            view = CameraView(transform.dot(mounted(1.0)), CAMERA)
             tracks.append(tracker.update(START_NS + image * PERIOD_NS, detections, view))
         assert [track[:1] + track[5:9] for track in tracks[0]] == [track[:1] + track[5:9] for track in tracks[1]]
         for here, there in zip(*tracks):

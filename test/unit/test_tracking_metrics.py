@@ -7,7 +7,7 @@ import pytest
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
-from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, Image, Run, Truth
+from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, Image, Run, RunTruth
 
 pytestmark = pytest.mark.needs('trackeval')
 IMAGES = 40
@@ -22,8 +22,8 @@ def run_of(status=(VISIBLE, VISIBLE), images=IMAGES, future=True):
     for number in range(images):
         places_m = PLACES_M + number / 30.0 * VELOCITY_MPS
         future_m = places_m[:, None] + HORIZONS_S[:, None] * VELOCITY_MPS
-        truth = Truth(np.array([10, 20]), places_m, np.tile(VELOCITY_MPS, (2, 1)),
-                      future_m if future else np.full_like(future_m, np.nan), np.array(status), np.zeros(3))
+        truth = RunTruth(np.array([10, 20]), places_m, np.tile(VELOCITY_MPS, (2, 1)),
+                         future_m if future else np.full_like(future_m, np.nan), np.array(status), np.zeros(3))
         found.append(Image(number, [], None, truth, [], number, None))
     return Run('made', CameraModel(), tuple(found))
 

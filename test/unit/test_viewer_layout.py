@@ -6,8 +6,8 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.visualization.image_overlay import BOX_COLOR, colorize_depth
-from ros_3d_bb.visualization.viewer_layout import (RATE_WINDOW_NS, WARNING_INK, FrameRate, View, box_lines, compose,
-                                                   text_image)
+from ros_3d_bb.visualization.viewer_layout import (RATE_WINDOW_NS, WARNING_INK, FrameRate, ViewerContent, box_lines,
+                                                   compose, text_image)
 
 BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75,
             (True,) * 4)
@@ -18,7 +18,7 @@ def view(**changes):
                   depth=DepthImage(np.full((240, 320), 1500, np.uint16), 0.001), rects_px=((100, 40, 200, 160),),
                   boxes=(BOX,))
     values.update(changes)
-    return View(**values)
+    return ViewerContent(**values)
 
 
 @pytest.mark.parametrize('width_px', [160, 320, 640])

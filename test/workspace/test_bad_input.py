@@ -13,7 +13,7 @@ from std_msgs.msg import Header
 from fuzz import hostile
 from fuzz.nodes import TARGETS, _quiet, _send_transforms
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message,
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg,
                                                    time_from)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
@@ -131,7 +131,7 @@ class Rig(object):
         if not self._target.output:
             return self._node._snapshots.newest.stamp_ns == self._now_ns
         newest = self._connections.publishers[self._target.output].newest
-        stamp_ns = newest.header.stamp.to_nsec() if hasattr(newest, 'header') else boxes2d_from_message(newest).stamp_ns
+        stamp_ns = newest.header.stamp.to_nsec() if hasattr(newest, 'header') else boxes2d_from_msg(newest).stamp_ns
         return stamp_ns == self._now_ns
 
 

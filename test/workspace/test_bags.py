@@ -9,9 +9,9 @@ import rosbag
 import tf2_ros
 
 from ros_3d_bb.bags.bag_writer import START_NS, SessionBagOptions, images_in, session_images, write_bag
-from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from
-from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_message, camera_from_message, time_from,
-                                                   tracks_from_message, transform_from_message)
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
+from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from_msg, time_from,
+                                                   tracks_from_msg, transform_from_msg)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb_lab.simulation.ground_truth import truth_at
@@ -58,12 +58,12 @@ def test_pixels_boxes_and_intrinsics_are_those_of_the_session(session, messages)
         depth = messages['/camera/aligned_depth_to_color/image_raw'][number]
         assert color.header.stamp == depth.header.stamp == time_from(START_NS + number * NS // 10)
         assert color.header.frame_id == depth.header.frame_id == session.frame_id
-        np.testing.assert_array_equal(rgb_from(color), read_color(frame, session.camera))
-        np.testing.assert_array_equal(depth_from(depth).values, read_depth(frame, session).values)
-        boxes = boxes2d_from_message(messages['/yolo_bounding_box'][number])
+        np.testing.assert_array_equal(imgmsg_to_rgb(color), read_color(frame, session.camera))
+        np.testing.assert_array_equal(imgmsg_to_depth(depth).values, read_depth(frame, session).values)
+        boxes = boxes2d_from_msg(messages['/yolo_bounding_box'][number])
         assert boxes.stamp_ns == color.header.stamp.to_nsec()
         assert [tuple(box) for box in boxes.boxes.tolist()] == list(frame.boxes_px)
-        assert camera_from_message(messages['/camera/color/camera_info'][number]) == session.camera
+        assert camera_from_msg(messages['/camera/color/camera_info'][number]) == session.camera
 
 
 def test_transforms_of_a_session_are_those_of_a_jackal_in_the_map(session, messages):
@@ -72,7 +72,7 @@ def test_transforms_of_a_session_are_those_of_a_jackal_in_the_map(session, messa
     for transform in messages['/tf'][3].transforms:
         buffer.set_transform(transform, 'test')
     stamp = messages['/camera/color/image_raw'][3].header.stamp
-    map_from_camera = transform_from_message(buffer.lookup_transform_core('map', session.frame_id, stamp))
+    map_from_camera = transform_from_msg(buffer.lookup_transform_core('map', session.frame_id, stamp))
     np.testing.assert_allclose(map_from_camera.dot([0, 0, 2, 1]), [2.17, 0, 0.2, 1], atol=1e-9)
     assert buffer.can_transform_core('odom', 'base_link', stamp)[0]
 
@@ -81,7 +81,7 @@ def test_depth_in_other_units_than_millimetres_keeps_its_scale(session, tmp_path
     """The depth unit of the camera is 0.25 mm; the depth in the bag is in metres."""
     path = str(tmp_path / 'fine.bag')
     write_bag(session_images(session._replace(depth_scale_m=0.00025, frames=session.frames[:1])), path, 'none')
-    depth = depth_from(messages_in(path)['/camera/aligned_depth_to_color/image_raw'][0])
+    depth = imgmsg_to_depth(messages_in(path)['/camera/aligned_depth_to_color/image_raw'][0])
     assert depth.scale_m == 1.0
     np.testing.assert_allclose(depth.values, read_depth(session.frames[0], session).values * 0.00025, rtol=1e-6)
 
@@ -137,12 +137,12 @@ def test_a_scene_contains_the_images_of_the_simulator(scene):
     simulator, messages = scene
     for number in (0, 4):
         frame = simulator.frame(number)
-        np.testing.assert_array_equal(rgb_from(messages['/camera/color/image_raw'][number]), frame.color)
-        depth = depth_from(messages['/camera/aligned_depth_to_color/image_raw'][number])
+        np.testing.assert_array_equal(imgmsg_to_rgb(messages['/camera/color/image_raw'][number]), frame.color)
+        depth = imgmsg_to_depth(messages['/camera/aligned_depth_to_color/image_raw'][number])
         assert depth.scale_m == 0.001
         np.testing.assert_array_equal(depth.values, frame.depth_mm)
-        assert camera_from_message(messages['/camera/color/camera_info'][number]) == simulator.camera
-        written, = tracks_from_message(messages['/ground_truth'][number])
+        assert camera_from_msg(messages['/camera/color/camera_info'][number]) == simulator.camera
+        written, = tracks_from_msg(messages['/ground_truth'][number])
         person, = truth_at(simulator, frame, START_NS + number * NS // 10)
         assert (written.id, written.status, written.moving) == (person.id, person.status, person.moving)
         for field in ('position_m', 'velocity_mps', 'size_m', 'prediction_m'):
@@ -158,7 +158,7 @@ def test_the_transforms_of_a_scene_connect_map_and_camera(scene):
     for number in range(5):
         found = buffer.lookup_transform_core('map', 'camera_color_optical_frame',
                                              messages['/ground_truth'][number].header.stamp)
-        np.testing.assert_allclose(transform_from_message(found),
+        np.testing.assert_allclose(transform_from_msg(found),
                                    simulator.poses_at(simulator.time_s(number)).map_from_camera, atol=1e-9)
 
 
@@ -184,7 +184,7 @@ def test_the_number_of_images_and_true_boxes_are_optional(tmp_path):
     assert result.returncode == 0 and ': 2 images' in result.stdout
     simulator, messages = Simulator(scenario_from(SCENE)), messages_in(path)
     for number, message in enumerate(messages['/yolo_bounding_box']):
-        boxes, (person,) = boxes2d_from_message(message), simulator.frame(number).people
+        boxes, (person,) = boxes2d_from_msg(message), simulator.frame(number).people
         assert boxes.stamp_ns == START_NS + number * NS // 10 and boxes.frame_id == 'camera_color_optical_frame'
         assert boxes.boxes.tolist() == [list(person.box_px)]
     assert len(messages['/yolo_bounding_box']) == 2
@@ -199,7 +199,7 @@ def test_a_bag_is_read_by_image(session, tmp_path):
     assert len(images) == len(session.frames)
     for messages, frame in zip(images, session.frames):
         assert set(topic for topic, _message in messages) == topics
-        np.testing.assert_array_equal(rgb_from(dict(messages)['camera/color/image_raw']),
+        np.testing.assert_array_equal(imgmsg_to_rgb(dict(messages)['camera/color/image_raw']),
                                       read_color(frame, session.camera))
     with pytest.raises(ValueError, match='ground_truth'):
         images_in(path, {'tf', 'ground_truth'})

@@ -12,10 +12,10 @@ from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.bags.process_bag import with_tracker
 from ros_3d_bb.conversions.perception_msgs import stamp_of
-from ros_3d_bb.core.event_counter import Tally
+from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.offline_pipeline import Settings
-from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, Follower, TrackerNodeParams
+from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.demo.scene_report import panels_of, read_recording
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
@@ -199,7 +199,7 @@ def test_cameras_with_the_same_frame_are_taken_and_pointed_out(rig):
     ({'cameras': ['front'], 'tracker': 'thesis'}, 'knows one camera only')])
 def test_parameters_that_make_no_sense_are_refused(params, complaint):
     with pytest.raises(ValueError, match=complaint):
-        Follower(TrackerNodeParams(**params), [kind() for kind in TRACKING_PARAMS], Tally(), Transforms())
+        TrackingStage(TrackerNodeParams(**params), [kind() for kind in TRACKING_PARAMS], EventCounter(), Transforms())
 
 
 @pytest.mark.parametrize('cameras', ['front,rear', 'front, left, rear', 'front'])

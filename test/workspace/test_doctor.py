@@ -13,10 +13,10 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.diagnosis.bag_observer import look_at_bag
+from ros_3d_bb.diagnosis.bag_observer import observe_bag
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.nodes.common.alignment_check import DepthCameraCheck
-from ros_3d_bb.nodes.common.graph_observer import GraphLook
+from ros_3d_bb.nodes.common.graph_observer import GraphObserver
 from ros_3d_bb.nodes.doctor import tracked_cameras
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
@@ -46,7 +46,7 @@ def changed(bag, folder, change):
 
 
 def wrong_in(path, target_frame='map'):
-    seen = look_at_bag(path, lambda topic: '/' + topic, target_frame)
+    seen = observe_bag(path, lambda topic: '/' + topic, target_frame)
     return [finding for finding in findings(seen) if finding.is_wrong]
 
 
@@ -218,7 +218,7 @@ def look():
                 KeyValue('input ' + name, topic + ' 30.0 Hz') for name, topic in inputs.items()])
                                               for node, inputs in said])
             sleep.side_effect = lambda _s: connections.subscribers['/diagnostics'].callback(message)
-            return GraphLook(camera=camera).seen()
+            return GraphObserver(camera=camera).observations()
         yield made
 
 

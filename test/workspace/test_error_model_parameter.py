@@ -3,8 +3,8 @@ import os
 
 import pytest
 
-from ros_3d_bb.core.event_counter import Tally
-from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, Lifter, error_model_of
+from ros_3d_bb.core.event_counter import EventCounter
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage, error_model_of
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'error_models')
 
@@ -28,10 +28,10 @@ def test_the_shipped_models_are_for_their_estimators(name, estimator):
 
 def test_an_estimator_that_the_model_is_not_for_is_refused_later_too():
     path = os.path.join(FOLDER, 'thesis.yaml')
-    lifter = Lifter(params(path, 'median'), Tally(), None)
+    lifter = EstimationStage(params(path, 'median'), EventCounter(), None)
     sample = lifter.sample
     with pytest.raises(ValueError, match='is for the estimator median, not foreground'):
-        lifter.tune(params(path, 'foreground'))
+        lifter.reconfigure(params(path, 'foreground'))
     assert lifter.sample is sample
 
 

@@ -5,10 +5,10 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.conversions.perception_msgs import boxes2d_to_message, boxes3d_to_message, time_from, usable_boxes3d
-from ros_3d_bb.core.event_counter import Tally
+from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg, boxes3d_to_msg, time_from, usable_boxes3d
+from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, Lifter
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
 
 HEADER = Header(stamp=time_from(1000 * NS), frame_id='camera')
 INTRINSICS = [614.7, 0, 319.2, 0, 614.8, 242.1, 0, 0, 1]
@@ -18,7 +18,7 @@ NEAR_PX = (230, 0, 640, 480)  # right before the camera, too near for depth: it 
 
 @pytest.fixture
 def tally():
-    return Tally()
+    return EventCounter()
 
 
 def scene(wall_m, person_m=PERSON_M):
@@ -35,12 +35,12 @@ def lift(depth_m, rects_px, tally, estimator='foreground'):
 
     def on_frame(boxes2d, depth_msg, camera):
         header, _depth, boxes3d = lifter.estimate(boxes2d, depth_msg, camera)
-        results.append(boxes3d_to_message(boxes3d, header, camera))
+        results.append(boxes3d_to_msg(boxes3d, header, camera))
         results.append(boxes3d)
-    lifter = Lifter(Bbox3dParams(estimator=estimator), tally, on_frame)
+    lifter = EstimationStage(Bbox3dParams(estimator=estimator), tally, on_frame)
     lifter.add_camera_info(CameraInfo(header=HEADER, width=640, height=480, K=INTRINSICS), 0)
     lifter.add_depth(fill_image(Image(header=HEADER), depth_m, '32FC1'), 0)
-    lifter.add_boxes(boxes2d_to_message(np.array(rects_px), HEADER), 0)
+    lifter.add_boxes(boxes2d_to_msg(np.array(rects_px), HEADER), 0)
     message, boxes3d = results
     return message, boxes3d
 

@@ -239,7 +239,7 @@ def test_new_parameters_apply_to_the_next_image_and_unused_markers_are_deleted()
     """The history continues, because it is recorded even while it is not drawn."""
     writer = MarkerWriter(MarkerParams(marker_namespaces=['cylinder', 'id']))
     writer.write([track(3)], header())
-    writer.tune(MarkerParams(marker_namespaces=['cylinder', 'history'], marker_lifetime=0.5))
+    writer.reconfigure(MarkerParams(marker_namespaces=['cylinder', 'history'], marker_lifetime=0.5))
     markers = writer.write([track(3, position=(2.5, 1.0, 0.9))], header(SECOND_NS + NS))
     assert sorted(keys(markers)) == [('cylinder', 3), ('history', 3)]
     assert keys(markers, Marker.DELETE) == [('id', 3)]

@@ -11,10 +11,10 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from ros_3d_bb.camera.camera_model import Camera, transform_from
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
-from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_message, boxes2d_to_message, boxes3d_from_message,
-                                                   boxes3d_to_message, camera_from_message, detections_from_message,
-                                                   restamped, stamp_of, time_from, tracks_from_message,
-                                                   tracks_to_message, transform_from_message, usable_boxes3d)
+from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, boxes3d_from_msg,
+                                                   boxes3d_to_msg, camera_from_msg, detections_from_msg,
+                                                   stamp_of, time_from, tracks_from_msg, tracks_to_msg,
+                                                   transform_from_msg, usable_boxes3d, with_stamp)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
@@ -39,8 +39,8 @@ def on_the_wire(message):
 
 @given(st.lists(st.tuples(INT32, INT32, INT32, INT32), max_size=20), STAMP, st.sampled_from(['camera', 'a/b_c', '']))
 def test_2d_boxes_and_their_stamp_survive_to_the_nanosecond(boxes, stamp_ns, frame_id):
-    message = boxes2d_to_message(np.array(boxes, float).reshape(-1, 4), header(stamp_ns, frame_id))
-    back = boxes2d_from_message(on_the_wire(message))
+    message = boxes2d_to_msg(np.array(boxes, float).reshape(-1, 4), header(stamp_ns, frame_id))
+    back = boxes2d_from_msg(on_the_wire(message))
     assert back.boxes.tolist() == [list(box) for box in boxes]
     assert back.stamp_ns == stamp_ns and back.frame_id == frame_id
     assert message.layout.dim[0].size == len(boxes) and message.layout.data_offset == 0
@@ -50,26 +50,26 @@ def test_2d_boxes_and_their_stamp_survive_to_the_nanosecond(boxes, stamp_ns, fra
 def test_the_covariance_of_a_3d_box_is_sent_and_zero_where_unknown(covariance_m2):
     box = Box3D(np.array([1.0, 0, 3]), np.array([0.5, 1.7, 0.5]), (10, 10, 40, 40), 0.8, UNCUT,
                 covariance_m2)
-    sent, = on_the_wire(boxes3d_to_message([box], header(1), Camera(64, 48, 60.0, 60.0, 31.5, 23.5))).boxes
+    sent, = on_the_wire(boxes3d_to_msg([box], header(1), Camera(64, 48, 60.0, 60.0, 31.5, 23.5))).boxes
     expected = np.zeros(9) if covariance_m2 is None else np.ravel(covariance_m2)
     assert list(sent.position_covariance) == expected.tolist()
 
 
 def test_the_label_is_as_documented():
-    label = boxes2d_to_message(np.zeros((1, 4)), header(12 * NS + 34, 'camera')).layout.dim[0].label
+    label = boxes2d_to_msg(np.zeros((1, 4)), header(12 * NS + 34, 'camera')).layout.dim[0].label
     assert label == 'boxes;stamp=12.000000034;frame=camera'
 
 
 def test_boxes_are_rounded_to_whole_pixels():
-    assert boxes2d_to_message(np.array([[0.4, 1.6, 2.5, -0.6]]), header(1)).data == [0, 2, 2, -1]
+    assert boxes2d_to_msg(np.array([[0.4, 1.6, 2.5, -0.6]]), header(1)).data == [0, 2, 2, -1]
 
 
 def test_plain_arrays_have_no_stamp():
-    plain = boxes2d_from_message(Int32MultiArray(data=[1, 2, 3, 4]))
+    plain = boxes2d_from_msg(Int32MultiArray(data=[1, 2, 3, 4]))
     assert plain.stamp_ns is None and plain.boxes.tolist() == [[1, 2, 3, 4]]
     labelled = Int32MultiArray(data=[1, 2, 3, 4])
     labelled.layout.dim = [MultiArrayDimension(label='boxes')]
-    assert boxes2d_from_message(labelled).stamp_ns is None
+    assert boxes2d_from_msg(labelled).stamp_ns is None
 
 
 @pytest.mark.parametrize('label', ['boxes;stamp=1.5', 'boxes;stamp=;frame=a', 'boxes;stamp=-1.000000000',
@@ -78,13 +78,13 @@ def test_damaged_stamps_are_refused(label):
     message = Int32MultiArray(data=[1, 2, 3, 4])
     message.layout.dim = [MultiArrayDimension(label=label)]
     with pytest.raises(ValueError, match='expected'):
-        boxes2d_from_message(message)
+        boxes2d_from_msg(message)
 
 
 @pytest.mark.parametrize('count,reason', [(3, 'multiple of 4'), (4004, '1001 2D boxes')])
 def test_arrays_of_the_wrong_length_are_refused(count, reason):
     with pytest.raises(ValueError, match=reason):
-        boxes2d_from_message(Int32MultiArray(data=[1] * count))
+        boxes2d_from_msg(Int32MultiArray(data=[1] * count))
 
 
 def test_a_stamp_of_zero_is_refused():
@@ -94,11 +94,11 @@ def test_a_stamp_of_zero_is_refused():
 
 def test_camera_info():
     info = CameraInfo(width=640, height=480, K=[600, 0, 320, 0, 610, 240, 0, 0, 1])
-    assert camera_from_message(info) == Camera(640, 480, 600, 610, 320, 240)
+    assert camera_from_msg(info) == Camera(640, 480, 600, 610, 320, 240)
     with pytest.raises(ValueError, match='it is empty'):
-        camera_from_message(CameraInfo(width=640, height=480))
+        camera_from_msg(CameraInfo(width=640, height=480))
     with pytest.raises(ValueError, match='fx=0'):
-        camera_from_message(CameraInfo(width=640, height=480, K=[0, 0, 320, 0, 610, 240, 0, 0, 1]))
+        camera_from_msg(CameraInfo(width=640, height=480, K=[0, 0, 320, 0, 610, 240, 0, 0, 1]))
 
 
 @pytest.mark.parametrize('lens', [('', ()), ('plumb_bob', (0.1, -0.2, 0.001, 0.002, 0.3)),
@@ -109,26 +109,26 @@ def test_camera_info_carries_the_lens_distortion_there_and_back(lens):
     frame = CameraFrame(header(5), camera, np.zeros((480, 640, 3), np.uint8),
                         DepthImage(np.zeros((480, 640), np.uint16), 0.001), [])
     infos = [on_the_wire(message) for _topic, message in messages_of(frame) if isinstance(message, CameraInfo)]
-    assert [camera_from_message(info) for info in infos] == [camera, camera]
+    assert [camera_from_msg(info) for info in infos] == [camera, camera]
     assert infos[0].distortion_model == (lens[0] or 'plumb_bob') and len(infos[0].D) == (len(lens[1]) or 5)
 
 
 def test_camera_info_of_an_unknown_lens_is_refused():
     info = CameraInfo(width=640, height=480, K=[600, 0, 320, 0, 610, 240, 0, 0, 1], distortion_model='ftheta', D=[0.9])
     with pytest.raises(ValueError, match="distortion model is 'ftheta'; one of equidistant"):
-        camera_from_message(info)
+        camera_from_msg(info)
 
 
 def test_tf_lookup():
     message = TransformStamped()
     message.transform.translation.x, message.transform.rotation.w = 3.0, 1.0
-    np.testing.assert_allclose(transform_from_message(message), transform_from((3, 0, 0), (0, 0, 0, 1)))
+    np.testing.assert_allclose(transform_from_msg(message), transform_from((3, 0, 0), (0, 0, 0, 1)))
 
 
 def test_3d_boxes_fill_every_field():
     box = Box3D(np.array([0.1, 0.2, 3.0]), np.array([0.5, 1.7, 0.5]), (-10, 20, 700, 300), 0.75,
                 (True, False, True, False))
-    message = on_the_wire(boxes3d_to_message([box], header(5), Camera(640, 480, 600, 600, 320, 240)))
+    message = on_the_wire(boxes3d_to_msg([box], header(5), Camera(640, 480, 600, 600, 320, 240)))
     assert message.header.stamp == time_from(5) and message.header.frame_id == 'camera'
     box, = message.boxes
     assert (box.center.position.x, box.center.position.y, box.center.position.z) == (0.1, 0.2, 3.0)
@@ -144,7 +144,7 @@ def test_3d_boxes_survive(covariance_m2):
     sent = Box3D(np.array([0.1, 0.2, 3.0]), np.array([0.5, 1.7, 0.5]), (10, 20, 64, 48), 0.75,
                  (False, False, True, True), covariance_m2)
     camera = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
-    back, other = boxes3d_from_message(on_the_wire(boxes3d_to_message([sent] * 2, header(1), camera)))
+    back, other = boxes3d_from_msg(on_the_wire(boxes3d_to_msg([sent] * 2, header(1), camera)))
     for field, value in sent._asdict().items():
         np.testing.assert_array_equal(getattr(back, field), value)
     assert back.rect_px == other.rect_px == sent.rect_px
@@ -156,7 +156,7 @@ def test_detections_are_upright_in_the_fixed_frame():
     box = BoundingBox3D()
     box.center.position.x, box.center.position.y, box.center.position.z = 0.5, 0.1, 3.0
     box.size.x, box.size.y, box.size.z = 0.6, 1.8, 0.6
-    detection, = detections_from_message(BoundingBox3DArray(boxes=[box]), map_from_camera)
+    detection, = detections_from_msg(BoundingBox3DArray(boxes=[box]), map_from_camera)
     np.testing.assert_allclose(detection.position_m, (3, -0.5, 0.9))
     np.testing.assert_allclose(detection.size_m, (0.6, 0.6, 1.8))
 
@@ -169,8 +169,8 @@ def test_people_stand_upright_however_the_camera_is_mounted(roll, size, edges):
     turn = transform_from((0, 0, 0), (np.sin(np.radians(roll) / 2), 0, 0, np.cos(np.radians(roll) / 2)))
     box = BoundingBox3D(truncated=True, truncated_edges=getattr(BoundingBox3D, edges.upper()))
     box.center.position.z, box.size.x, box.size.y, box.size.z = (3.0,) + size + (size[0],)
-    detection, = detections_from_message(BoundingBox3DArray(boxes=[box]),
-                                         turn.dot(transform_from((0, 0, 0), (-0.5, 0.5, -0.5, 0.5))))
+    detection, = detections_from_msg(BoundingBox3DArray(boxes=[box]),
+                                     turn.dot(transform_from((0, 0, 0), (-0.5, 0.5, -0.5, 0.5))))
     np.testing.assert_allclose(detection.size_m, (0.5, 0.5, 1.75))
     assert detection.truncated_edges == (False, True, False, False)
 
@@ -194,7 +194,7 @@ def test_a_3d_box_that_cannot_be_used_takes_no_other_with_it(wrong):
     assert usable.boxes == [good, other] and usable.header == message.header
     assert len(faults) == 1 and faults[0].startswith('3D box 1 has ')
     assert len(message.boxes) == 3
-    positions_m = [detection.position_m[0] for detection in detections_from_message(usable, np.eye(4))]
+    positions_m = [detection.position_m[0] for detection in detections_from_msg(usable, np.eye(4))]
     assert positions_m == [-1.0, 2.0]
 
 
@@ -212,7 +212,7 @@ def test_the_covariance_of_a_detection_is_turned_into_the_fixed_frame():
     """Camera looking along x of the map: its z, the range, is the map's x."""
     box = BoundingBox3D(position_covariance=np.diag([0.01, 0.04, 0.09]).ravel(), truncated=True)
     box.size.x = box.size.y = 1.0
-    detection, = detections_from_message(BoundingBox3DArray(boxes=[box]), transform_from((0, 0, 1), (-.5, .5, -.5, .5)))
+    detection, = detections_from_msg(BoundingBox3DArray(boxes=[box]), transform_from((0, 0, 1), (-.5, .5, -.5, .5)))
     np.testing.assert_allclose(detection.covariance_m2, np.diag([0.09, 0.01, 0.04]), atol=1e-12)
     assert detection.truncated_edges == (True,) * 4  # the message does not say which
 
@@ -221,11 +221,11 @@ def test_the_covariance_of_tracks_and_predictions_survives():
     covariance = np.diag([0.01, 0.02, 0.03, 0.04, 0.05, 0.06])
     track = Track(1, np.zeros(3), np.ones(3), np.zeros(3), np.zeros(3), VISIBLE, False, 1, 2, np.ones((2, 3)), 0.5,
                   covariance, np.array([2 * np.eye(3), 3 * np.eye(3)]))
-    back, = tracks_from_message(on_the_wire(tracks_to_message([track], header(NS))))
+    back, = tracks_from_msg(on_the_wire(tracks_to_msg([track], header(NS))))
     np.testing.assert_array_equal(back.covariance, covariance)
     np.testing.assert_array_equal(back.prediction_covariance_m2, track.prediction_covariance_m2)
     unknown = track._replace(covariance=None, prediction_covariance_m2=None)
-    back, = tracks_from_message(on_the_wire(tracks_to_message([unknown], header(NS))))
+    back, = tracks_from_msg(on_the_wire(tracks_to_msg([unknown], header(NS))))
     assert back.covariance is None and back.prediction_covariance_m2 is None
 
 
@@ -235,9 +235,9 @@ def test_tracks_fill_every_field():
     box.size.x, box.size.y = 0.5, 1.7
     for frame in range(5):
         box.center.position.x = 0.1 * frame
-        detections = detections_from_message(BoundingBox3DArray(boxes=[box]), np.eye(4))
+        detections = detections_from_msg(BoundingBox3DArray(boxes=[box]), np.eye(4))
         tracks = tracker.update(NS + frame * NS // 10, detections)
-    message = on_the_wire(tracks_to_message(tracks, header(NS, 'map')))
+    message = on_the_wire(tracks_to_msg(tracks, header(NS, 'map')))
     assert isinstance(message, TrackedObjectArray) and message.header.frame_id == 'map'
     track, = message.objects
     assert track.id == 1 and track.status == TrackedObject.VISIBLE and track.moving
@@ -256,14 +256,14 @@ def test_states_have_the_numbers_of_the_message():
 
 def test_another_stamp_leaves_the_rest_of_a_message():
     stamp = time_from(7 * NS + 5)
-    boxes = boxes2d_from_message(restamped(boxes2d_to_message(np.array([[1, 2, 3, 4]]), header(1, 'camera')), stamp))
+    boxes = boxes2d_from_msg(with_stamp(boxes2d_to_msg(np.array([[1, 2, 3, 4]]), header(1, 'camera')), stamp))
     assert (boxes.boxes.tolist(), boxes.stamp_ns, boxes.frame_id) == ([[1, 2, 3, 4]], 7 * NS + 5, 'camera')
     depth = DepthImage(np.ones((2, 2), np.uint16), 0.001)
     chain = [('map', 'odom', np.eye(4)), ('odom', 'camera', np.eye(4))]
     camera, color = Camera(2, 2, 1.0, 1.0, 0.5, 0.5), np.zeros((2, 2, 3), np.uint8)
     camera_frame = CameraFrame(header(1, 'camera'), camera, color, depth, chain)
     for topic, message in messages_of(camera_frame):
-        parts = restamped(message, stamp).transforms if topic == 'tf' else [restamped(message, stamp)]
+        parts = with_stamp(message, stamp).transforms if topic == 'tf' else [with_stamp(message, stamp)]
         assert [part.header.stamp for part in parts] == [stamp] * len(parts)
         assert parts[-1].header.frame_id == ('odom' if topic == 'tf' else 'camera')
 
@@ -274,8 +274,8 @@ def test_a_person_whom_the_border_cuts_in_portrait_is_as_wide_as_a_person(edge, 
     box = BoundingBox3D(truncated=True, truncated_edges=getattr(BoundingBox3D, edge))
     box.center.position.y, box.center.position.z, box.size.x, box.size.y = center_y, 3.0, 1.7, 1.7
     turn = transform_from((0, 0, 0), (np.sqrt(0.5), 0, 0, np.sqrt(0.5)))  # the left edge of the image is up
-    detection, = detections_from_message(BoundingBox3DArray(boxes=[box]),
-                                         turn.dot(transform_from((0, 0, 0), (-0.5, 0.5, -0.5, 0.5))))
+    detection, = detections_from_msg(BoundingBox3DArray(boxes=[box]),
+                                     turn.dot(transform_from((0, 0, 0), (-0.5, 0.5, -0.5, 0.5))))
     np.testing.assert_allclose(detection.size_m, (0.46, 0.46, 1.7))
     np.testing.assert_allclose(abs(detection.position_m[1]), 0.27)
 
@@ -288,6 +288,6 @@ def test_a_camera_that_looks_straight_down_keeps_one_orientation_in_spite_of_noi
         for axis, angle in ((2, yaw), (1, pitch), (0, roll)):
             quaternion = np.eye(4)[axis] * np.sin(angle / 2) + np.eye(4)[3] * np.cos(angle / 2)
             down = down.dot(transform_from((0, 0, 0), quaternion))
-        detection, = detections_from_message(BoundingBox3DArray(boxes=[box]),
-                                             down.dot(transform_from((0, 0, 0), (-0.5, 0.5, -0.5, 0.5))))
+        detection, = detections_from_msg(BoundingBox3DArray(boxes=[box]),
+                                         down.dot(transform_from((0, 0, 0), (-0.5, 0.5, -0.5, 0.5))))
         np.testing.assert_allclose(detection.size_m, (0.5, 0.5, 1.7))

@@ -2,8 +2,8 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb.core.event_counter import Tally
-from ros_3d_bb.nodes.common.persistent_track_ids import RESERVED, Numbers
+from ros_3d_bb.core.event_counter import EventCounter
+from ros_3d_bb.nodes.common.persistent_track_ids import RESERVED, PersistentTrackIds
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.types import Detection
 
@@ -44,19 +44,19 @@ class Immediately(object):
 def given(numbers, *ids):
     """The numbers of tracks to which a tracker gave some."""
     tracks = [TRACK._replace(id=number) for number in ids]
-    return [track.id for track in numbers.continued(tracks)]
+    return [track.id for track in numbers.assign(tracks)]
 
 
 def test_a_tracker_that_is_started_again_goes_on_with_the_next_thousand(parameters):
-    assert given(Numbers(Tally()), 1, 2, 7) == [1, 2, 7]
-    assert given(Numbers(Tally()), 1, 2) == [RESERVED + 1, RESERVED + 2]
+    assert given(PersistentTrackIds(EventCounter()), 1, 2, 7) == [1, 2, 7]
+    assert given(PersistentTrackIds(EventCounter()), 1, 2) == [RESERVED + 1, RESERVED + 2]
 
 
 def test_whatever_it_has_given_is_below_what_the_next_one_gives(parameters):
     """As many as there are, for each of five lives."""
     largest = 0
     for life in range(5):
-        numbers = Numbers(Tally())
+        numbers = PersistentTrackIds(EventCounter())
         for number in range(1, 700 * (life + 1), 100):
             first, = given(numbers, number)
             assert first > largest
@@ -65,8 +65,8 @@ def test_whatever_it_has_given_is_below_what_the_next_one_gives(parameters):
 
 
 def test_without_the_master_numbers_go_on_and_it_is_said(parameters):
-    tally = Tally()
-    numbers = Numbers(tally)
+    tally = EventCounter()
+    numbers = PersistentTrackIds(tally)
     parameters['fails'] = True
     assert given(numbers, 5 * RESERVED) == [5 * RESERVED]
     assert 'Connection refused' in tally.sentences['numbers not reserved'] and NAME in tally.sentences[
@@ -80,4 +80,4 @@ def test_without_the_master_numbers_go_on_and_it_is_said(parameters):
 def test_a_parameter_of_somebody_else_is_refused(parameters, value):
     parameters[NAME] = value
     with pytest.raises(ValueError, match=NAME):
-        Numbers(Tally())
+        PersistentTrackIds(EventCounter())

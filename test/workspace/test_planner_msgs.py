@@ -14,8 +14,8 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.camera.camera_model import transform_from, transform_points
 from ros_3d_bb.conversions.perception_msgs import time_from
-from ros_3d_bb.conversions.planner_msgs import (detections3d_to_message, objects_to_message, obstacles_to_message,
-                                                people_to_message)
+from ros_3d_bb.conversions.planner_msgs import (detections3d_to_msg, objects_to_msg, obstacles_to_msg,
+                                                people_to_msg)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
 from ros_3d_bb.planning.planner_outputs import outputs_from
@@ -56,13 +56,13 @@ def test_the_definitions_used_here_are_the_published_ones(kind):
 def test_teb_turns_no_velocities_so_they_come_in_its_own_frame():
     teb = TebReplica({'map': QUARTER})
     tracks = [walker(3, [1, 2, 0.9], [1.2, 0, 0])]
-    teb.receive(received(obstacles_to_message(in_frame(tracks, QUARTER), header_in('odom'),
-                                              package('costmap_converter'))))
+    teb.receive(received(obstacles_to_msg(in_frame(tracks, QUARTER), header_in('odom'),
+                                          package('costmap_converter'))))
     (centre, radius, velocity), = teb.obstacles()
     np.testing.assert_allclose(centre, [8, 6], atol=1e-6)
     assert radius == pytest.approx(0.3)
     np.testing.assert_allclose(velocity, [0, 1.2], atol=1e-9)
-    teb.receive(received(obstacles_to_message(tracks, header_in('map'), package('costmap_converter'))))
+    teb.receive(received(obstacles_to_msg(tracks, header_in('map'), package('costmap_converter'))))
     (centre, _radius, velocity), = teb.obstacles()  # what the frame of the tracks would have led to
     np.testing.assert_allclose(centre, [8, 6], atol=1e-6)
     np.testing.assert_allclose(velocity, [1.2, 0], atol=1e-9)
@@ -71,24 +71,24 @@ def test_teb_turns_no_velocities_so_they_come_in_its_own_frame():
 def test_teb_plans_from_now_so_positions_are_predicted_to_now():
     """The image is 0.3 s old; TEB plans 1 s ahead, so the person is 1.3 s further on."""
     teb, tracks = TebReplica({}), [walker(3, [1, 2, 0.9], [1.2, 0, 0]), walker(4, [5, 5, 0.9], [0, 0, 0])]
-    teb.receive(received(obstacles_to_message(predicted_to(tracks, 0.3), header_in('odom'),
-                                              package('costmap_converter'))))
+    teb.receive(received(obstacles_to_msg(predicted_to(tracks, 0.3), header_in('odom'),
+                                          package('costmap_converter'))))
     np.testing.assert_allclose(teb.predicted(1.0), [[1 + 1.3 * 1.2, 2], [5, 5]], atol=1e-6)
     assert [velocity is None for _centre, _radius, velocity in teb.obstacles()] == [False, True]
 
 
 def test_teb_keeps_an_array_until_an_empty_one_comes():
     teb = TebReplica({})
-    teb.receive(received(obstacles_to_message([walker(3, [1, 2, 0.9], [0, 0, 0])], header_in('odom'),
-                                              package('costmap_converter'))))
+    teb.receive(received(obstacles_to_msg([walker(3, [1, 2, 0.9], [0, 0, 0])], header_in('odom'),
+                                          package('costmap_converter'))))
     assert len(teb.obstacles()) == 1
-    teb.receive(received(obstacles_to_message([], header_in('odom'), package('costmap_converter'))))
+    teb.receive(received(obstacles_to_msg([], header_in('odom'), package('costmap_converter'))))
     assert teb.obstacles() == []
 
 
 def test_obstacles_keep_number_and_velocity_covariance():
-    obstacle, = received(obstacles_to_message(in_frame([walker(3, [1, 2, 0.9], [1, 0, 0])], QUARTER), header_in('odom'),
-                                              package('costmap_converter'))).obstacles
+    obstacle, = received(obstacles_to_msg(in_frame([walker(3, [1, 2, 0.9], [1, 0, 0])], QUARTER), header_in('odom'),
+                                          package('costmap_converter'))).obstacles
     assert obstacle.id == 3 and obstacle.header.frame_id == 'odom' and obstacle.orientation.w == 1
     np.testing.assert_allclose(np.diag(np.reshape(obstacle.velocities.covariance, (6, 6)))[:3], [0.2, 0.1, 0.3])
 
@@ -96,7 +96,7 @@ def test_obstacles_keep_number_and_velocity_covariance():
 def test_mpc_planner_jackal_sees_everybody_with_radius_and_velocity():
     mpc = JackalMpcReplica()
     tracks = [walker(1, [1, 2, 0.9], [0.3, -1.1, 0]), walker(2, [4, 2, 0.9], [0, 0, 0], width_m=0.4)]
-    mpc.receive(received(objects_to_message(tracks, header_in('map'), package('derived_object_msgs'))))
+    mpc.receive(received(objects_to_msg(tracks, header_in('map'), package('derived_object_msgs'))))
     assert sorted(mpc.obstacles) == [1, 2]
     centre, radius, velocity = mpc.obstacles[1]
     np.testing.assert_allclose(centre, [1, 2])
@@ -105,14 +105,14 @@ def test_mpc_planner_jackal_sees_everybody_with_radius_and_velocity():
 
 
 def test_objects_are_tracked_pedestrians():
-    item, = received(objects_to_message([walker(1, [1, 2, 0.9], [0, 0, 0])], header_in('map'),
-                                        package('derived_object_msgs'))).objects
+    item, = received(objects_to_msg([walker(1, [1, 2, 0.9], [0, 0, 0])], header_in('map'),
+                                    package('derived_object_msgs'))).objects
     assert (item.detection_level, item.classification, item.object_classified) == (1, 4, True)
     assert item.shape.dimensions == pytest.approx((1.7, 0.3)) and item.header.stamp == time_from(STAMP_NS)
 
 
 def obstacle_point(tracks, frame_id):
-    obstacle, = received(obstacles_to_message(tracks, header_in(frame_id), package('costmap_converter'))).obstacles
+    obstacle, = received(obstacles_to_msg(tracks, header_in(frame_id), package('costmap_converter'))).obstacles
     point = obstacle.polygon.points[0]
     return np.array([point.x, point.y, point.z])
 
@@ -125,22 +125,22 @@ def test_points_of_obstacles_are_float32_and_exact_only_in_a_frame_near_the_robo
 
 
 def test_a_status_that_is_not_known_loses_nobody():
-    person, = received(people_to_message([walker(3, [1, 2, 0.9], [0, 0, 0], status=7)], header_in('map'),
-                                         package('people_msgs'))).people
+    person, = received(people_to_msg([walker(3, [1, 2, 0.9], [0, 0, 0], status=7)], header_in('map'),
+                                     package('people_msgs'))).people
     assert (person.tags[0], person.reliability) == ('unknown', 0.5)
 
 
 def test_the_social_layer_finds_position_and_velocity_in_its_own_frame():
     layer = SocialLayerReplica({'map': QUARTER})
-    layer.receive(received(people_to_message([walker(3, [1, 2, 0.9], [1.2, 0, 0])], header_in('map'),
-                                             package('people_msgs'))))
+    layer.receive(received(people_to_msg([walker(3, [1, 2, 0.9], [1.2, 0, 0])], header_in('map'),
+                                         package('people_msgs'))))
     (position, velocity), = layer.people()
     np.testing.assert_allclose(position, [8, 6, 0.9])
     np.testing.assert_allclose(velocity, [0, 1.2, 0], atol=1e-9)
 
 
 def test_people_say_who_they_are_and_how_sure_the_tracker_is():
-    seen, hidden = received(people_to_message(
+    seen, hidden = received(people_to_msg(
         [walker(3, [1, 2, 0.9], [0, 0, 0]), walker(12, [1, 2, 0.9], [0, 0, 0], OCCLUDED)], header_in('map'),
         package('people_msgs'))).people
     assert (seen.name, seen.reliability, hidden.name, hidden.reliability) == ('3', 1.0, '12', 0.5)
@@ -148,8 +148,8 @@ def test_people_say_who_they_are_and_how_sure_the_tracker_is():
 
 
 def test_detections_have_box_number_and_covariance():
-    message = received(detections3d_to_message([walker(3, [1, 2, 0.9], [1, 0, 0])], header_in('map'),
-                                               package('vision_msgs')))
+    message = received(detections3d_to_msg([walker(3, [1, 2, 0.9], [1, 0, 0])], header_in('map'),
+                                           package('vision_msgs')))
     detection, = message.detections
     assert message.header.frame_id == detection.header.frame_id == 'map'
     box, result = detection.bbox, detection.results[0]

@@ -20,7 +20,7 @@ from ros_3d_bb.bags.bag_reader import BagError, BagReader
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import SessionBagOptions, session_images, write_bag
 from ros_3d_bb.conversions.camera_msgs import START_NS
-from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, time_from, tracks_from_message
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, tracks_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.pipeline.detection_stage import Yolov5NodeParams
 from ros_3d_bb.pipeline.offline_pipeline import Settings
@@ -78,9 +78,9 @@ def test_people_are_tracked_and_the_input_is_kept(scene, tmp_path):
                                         '/visualization_marker_array'}
     assert tally.counts['images searched'] == tally.counts['images tracked'] == len(after['/ros_3d_bb/tracks']) == 15
     assert not tally.sentences
-    truth = {message.header.stamp: tracks_from_message(message) for message in before['/ground_truth']}
+    truth = {message.header.stamp: tracks_from_msg(message) for message in before['/ground_truth']}
     last = after['/ros_3d_bb/tracks'][-1]
-    found = tracks_from_message(last)
+    found = tracks_from_msg(last)
     assert len(found) == 2
     for person in truth[last.header.stamp]:
         assert min(np.linalg.norm(track.position_m[:2] - person.position_m[:2]) for track in found) < 0.3
@@ -122,7 +122,7 @@ def test_boxes_in_the_bag_serve_where_no_detector_is_wanted(session_folder, tmp_
     found = messages_in(tmp_path / 'out.bag')
     assert set(found) == {'/yolo_bounding_box', '/ros_3d_bb/bb_3d', '/ros_3d_bb/tracks', '/visualization_marker_array'}
     for boxes2d, boxes3d in zip(found['/yolo_bounding_box'], found['/ros_3d_bb/bb_3d']):
-        assert boxes3d.header.stamp.to_nsec() == boxes2d_from_message(boxes2d).stamp_ns
+        assert boxes3d.header.stamp.to_nsec() == boxes2d_from_msg(boxes2d).stamp_ns
         assert len(boxes3d.boxes) == len(boxes2d.data) // 4
 
 

@@ -105,7 +105,7 @@ def test_planners_get_points_diagnostics_say_how_it_goes_and_parameters_change(r
             reader.types(block, **master)
         told = subprocess.check_output(['rosparam', 'get', '/tracker_node'], env=graph.environment)
     parameters = yaml.safe_load(told)
-    assert [parameters[name] for name in ('prediction_time', 'missed_limit', 'memory')] == [3.0, 1.0, 8.0]
+    assert [parameters[name] for name in ('prediction_time', 'max_missed_time', 'max_age')] == [3.0, 1.0, 8.0]
 
 
 def test_a_scene_is_simulated_and_shown_and_the_doctor_finds_nothing_wrong(reader):

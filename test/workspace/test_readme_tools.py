@@ -11,7 +11,7 @@ import yaml
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray, MultiArrayDimension
 
-from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, time_from
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from
 from support.code_blocks import claimed
 
 DEMO_AND_TESTS = claimed('./run demo\n./run test')
@@ -175,7 +175,7 @@ def test_a_label_written_by_hand_is_read_as_stamp_and_frame():
     names = {'image': image, 'Int32MultiArray': Int32MultiArray, 'MultiArrayDimension': MultiArrayDimension,
              'x1': 10, 'y1': 20, 'x2': 30, 'y2': 40}
     exec(STAMPED.text, names)  # the README's own code
-    boxes = boxes2d_from_message(names['message'])
+    boxes = boxes2d_from_msg(names['message'])
     assert (boxes.stamp_ns, boxes.frame_id) == (1600000000000000005, 'some_camera')
     assert boxes.boxes.tolist() == [[10, 20, 30, 40]]
 

@@ -9,7 +9,7 @@ import rosbag
 from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_writer import START_NS, write_bag
-from ros_3d_bb.conversions.perception_msgs import boxes2d_to_message, time_from, tracks_from_message, tracks_to_message
+from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg, time_from, tracks_from_msg, tracks_to_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb_lab.evaluation.demo.scene_report import BOXES_TOPIC, TRACKS_TOPIC, paths_of, read_recording, write_report
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
@@ -26,10 +26,10 @@ def images_with_tracks(frame_id):
         messages, header = list(messages), Header(stamp=time_from(stamp_ns), frame_id=frame_id)
         truth = dict(messages)['ground_truth']
         tracks = [track._replace(id=7, position_m=track.position_m + [0, SHIFT_M, 0])
-                  for track in tracks_from_message(truth)]
-        messages.append((BOXES_TOPIC, boxes2d_to_message(np.array([[100, 50, 200, 300]]), header)))
+                  for track in tracks_from_msg(truth)]
+        messages.append((BOXES_TOPIC, boxes2d_to_msg(np.array([[100, 50, 200, 300]]), header)))
         if number:
-            messages.append((TRACKS_TOPIC, tracks_to_message(tracks, header)))
+            messages.append((TRACKS_TOPIC, tracks_to_msg(tracks, header)))
         yield stamp_ns, messages
 
 

@@ -13,7 +13,7 @@ import zipfile
 import pytest
 import yaml
 
-from ros_3d_bb.core.atomic_file import write_whole
+from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.detection.yolov5.backends import open_runtime
 from ros_3d_bb.detection.yolov5.checkpoint import WeightsError, read_checkpoint
@@ -154,7 +154,7 @@ def test_files_are_written_with_the_rights_that_the_user_wants(tmp_path):
     for mask in (0o077, 0o022, 0o002):
         before = os.umask(mask)
         try:
-            write_whole(str(tmp_path / 'file'), b'x')
+            atomic_write(str(tmp_path / 'file'), b'x')
         finally:
             os.umask(before)
         assert stat.S_IMODE(os.stat(str(tmp_path / 'file')).st_mode) == 0o666 & ~mask

@@ -7,10 +7,10 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.conversions.perception_msgs import time_from
-from ros_3d_bb.core.event_counter import Tally
+from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray
-from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, Follower, TrackerNodeParams
+from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
 from ros_3d_bb.tracking.types import VISIBLE
 
 START_NS = 1000 * NS
@@ -38,12 +38,12 @@ def transforms():
 
 @pytest.fixture
 def tally():
-    return Tally()
+    return EventCounter()
 
 
 @pytest.fixture
 def follower(transforms, tally):
-    return Follower(TrackerNodeParams(), [kind() for kind in TRACKING_PARAMS], tally, transforms)
+    return TrackingStage(TrackerNodeParams(), [kind() for kind in TRACKING_PARAMS], tally, transforms)
 
 
 def boxes(stamp_ns, z=3.0, count=1):

@@ -11,7 +11,7 @@ from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import new_bag
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, STATIC_TOPIC, TF_TOPIC
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
-from ros_3d_bb.core.event_counter import Tally
+from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.pipeline.detection_stage import opened_yolov5, search_color
 from ros_3d_bb.pipeline.offline_pipeline import INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, Pipeline, Settings
@@ -55,7 +55,7 @@ class BagRun(object):
         """Yield (Raw, [(topic, message), ...]): each message of the bag, and what the nodes would publish then."""
         static = self._settings.name(STATIC_TOPIC)
         for raw in self._reader.messages([static]):
-            with self._tally.refusing('transforms'):
+            with self._tally.rejecting('transforms'):
                 self._transforms.set_static(message_in(raw, TFMessage))
         with ThreadPoolExecutor(self._settings.searches) as pool:
             for waiting in self._ahead(pool):
@@ -82,11 +82,11 @@ class BagRun(object):
         """A message that was read; what can be done ahead of its turn is begun."""
         (topic, camera), message, search = self._topics.get(raw.topic, (None, '')), None, None
         if topic == TF_TOPIC:
-            with self._tally.refusing('transforms'):
+            with self._tally.rejecting('transforms'):
                 message = message_in(raw, TFMessage)
                 self._transforms.ahead(message)
         elif topic == COLOR_TOPIC and self._detect is not None:
-            with self._tally.refusing('images'):
+            with self._tally.rejecting('images'):
                 message = message_in(raw, Image)
                 search = pool.submit(self._detect, message)
         return Waiting(raw, topic, camera, message, search)
@@ -101,7 +101,7 @@ class BagRun(object):
             if message is not None:
                 self._transforms.passed(message)
             return []
-        with self._tally.refusing('messages on %s' % raw.topic):
+        with self._tally.rejecting('messages on %s' % raw.topic):
             if topic == COLOR_TOPIC and self._detect is not None:
                 return self._found(message, search, raw.time.to_nsec(), camera)
             return self._pipeline.take(topic, message_in(raw, INPUTS[topic]), raw.time.to_nsec(), camera)
@@ -129,7 +129,7 @@ def process_bag(source, target, settings=Settings(), progress=lambda share: None
 
     Returns
     -------
-    event_counter.Tally
+    event_counter.EventCounter
 
     Raises
     ------
@@ -140,7 +140,7 @@ def process_bag(source, target, settings=Settings(), progress=lambda share: None
     OSError
         If the target cannot be written.
     """
-    tally = Tally()
+    tally = EventCounter()
     with BagReader(source) as reader, new_bag(target, settings.compression) as bag:
         run, copier = BagRun(reader, settings, tally), Copier(bag, settings)
         start_ns, end_ns = reader.span_ns

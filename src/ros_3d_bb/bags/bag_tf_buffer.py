@@ -3,7 +3,7 @@ import collections
 
 import tf2_ros
 
-from ros_3d_bb.conversions.perception_msgs import check_transforms, transform_from_message
+from ros_3d_bb.conversions.perception_msgs import check_transforms, transform_from_msg
 from ros_3d_bb.core.time_sync import JUMP_NS
 
 
@@ -49,8 +49,8 @@ class BagTransforms(object):
 
     def lookup(self, target_frame, source_frame, stamp):
         """`target_from_source` at a stamp, a 4x4 matrix. Raises tf2_ros.TransformException."""
-        return transform_from_message(self._buffer.lookup_transform_core(target_frame.lstrip('/'),
-                                                                         source_frame.lstrip('/'), stamp))
+        return transform_from_msg(self._buffer.lookup_transform_core(target_frame.lstrip('/'),
+                                                                     source_frame.lstrip('/'), stamp))
 
     def go_back(self):
         """Nothing to do: the transforms themselves tell."""

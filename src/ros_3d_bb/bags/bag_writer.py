@@ -12,7 +12,7 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.conversions.camera_msgs import START_NS, CameraFrame, messages_of
-from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_message, time_from
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_msg, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 
@@ -107,7 +107,7 @@ def session_images(session, options=SessionBagOptions()):
         messages = list(messages_of(CameraFrame(header, session.camera, read_color(frame, session.camera),
                                                 read_depth(frame, session), chain)))
         if options.with_boxes:
-            messages.append((BOXES_TOPIC, boxes2d_to_message(np.array(frame.boxes_px, int).reshape(-1, 4), header)))
+            messages.append((BOXES_TOPIC, boxes2d_to_msg(np.array(frame.boxes_px, int).reshape(-1, 4), header)))
         yield stamp_ns, messages
 
 

@@ -47,7 +47,7 @@ def array_from(message):
     return pixels[..., 0] if channels == 1 else pixels
 
 
-def rgb_from(message):
+def imgmsg_to_rgb(message):
     """Pixels of a colour image message as RGB, (height, width, 3), uint8; a view if the encoding allows it.
 
     Raises
@@ -64,7 +64,7 @@ def rgb_from(message):
     return pixels[..., 2::-1] if message.encoding in ('bgr8', 'bgra8', '8UC3') else pixels[..., :3]
 
 
-def depth_from(message, scale_m=None):
+def imgmsg_to_depth(message, scale_m=None):
     """Depth image of an image message.
 
     Parameters
@@ -89,8 +89,8 @@ def depth_from(message, scale_m=None):
 
 
 def checked_depth_from(message, scale_m=None):
-    """As `depth_from`, for what is measured in the image: raises ValueError also if it seems to have other units."""
-    depth = depth_from(message, scale_m)
+    """As `imgmsg_to_depth`, for what is measured in the image: raises ValueError also if it seems to have other units."""
+    depth = imgmsg_to_depth(message, scale_m)
     fault = units_fault(depth)
     if fault:
         raise ValueError(fault)

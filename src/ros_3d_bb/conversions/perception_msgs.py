@@ -71,7 +71,7 @@ def check_transforms(message):
                              % (transform.child_frame_id, transform.header.stamp.secs))
 
 
-def boxes2d_to_message(boxes, header):
+def boxes2d_to_msg(boxes, header):
     """2D boxes as std_msgs/Int32MultiArray, with the stamp and frame of their image in the layout.
 
     Parameters
@@ -88,7 +88,7 @@ def boxes2d_to_message(boxes, header):
     return message
 
 
-def boxes2d_from_message(message):
+def boxes2d_from_msg(message):
     """The 2D boxes in an Int32MultiArray, with or without a stamp in its layout.
 
     Raises
@@ -115,20 +115,20 @@ def boxes2d_from_message(message):
     return Boxes2D(boxes, int(secs) * NS + int(nsecs), fields.get('frame', ''))
 
 
-def restamped(message, stamp):
+def with_stamp(message, stamp):
     """The message with another stamp: in its header, its transforms' headers, or the label of its 2D boxes.
 
     Its frames are kept. Messages with a header are changed in place, as images are large.
     """
     if hasattr(message, 'layout'):
-        boxes = boxes2d_from_message(message)
-        return boxes2d_to_message(boxes.boxes, Header(stamp=stamp, frame_id=boxes.frame_id))
+        boxes = boxes2d_from_msg(message)
+        return boxes2d_to_msg(boxes.boxes, Header(stamp=stamp, frame_id=boxes.frame_id))
     for part in getattr(message, 'transforms', [message]):
         part.header.stamp = stamp
     return message
 
 
-def camera_from_message(message):
+def camera_from_msg(message):
     """The intrinsics and the lens distortion in a sensor_msgs/CameraInfo.
 
     realsense2_camera names librealsense's inverse Brown-Conrady plumb_bob, which it is but for a few hundredths of a
@@ -145,19 +145,19 @@ def camera_from_message(message):
                   message.distortion_model, message.D)
 
 
-def transform_from_message(message):
+def transform_from_msg(message):
     """The 4x4 matrix of a geometry_msgs/TransformStamped: header.frame_id from child_frame_id."""
     translation, rotation = message.transform.translation, message.transform.rotation
     return transform_from((translation.x, translation.y, translation.z),
                           (rotation.x, rotation.y, rotation.z, rotation.w))
 
 
-def boxes3d_to_message(boxes, header, camera):
+def boxes3d_to_msg(boxes, header, camera):
     """3D boxes (`box3d_estimator.Box3D`) as BoundingBox3DArray."""
-    return BoundingBox3DArray(header=header, boxes=[_box3d_to_message(box, camera) for box in boxes])
+    return BoundingBox3DArray(header=header, boxes=[_box3d_to_msg(box, camera) for box in boxes])
 
 
-def _box3d_to_message(box, camera):
+def _box3d_to_msg(box, camera):
     message = BoundingBox3D(support=box.support, truncated=any(box.truncated_edges))
     for flag, is_cut in zip(EDGE_FLAGS, box.truncated_edges):
         message.truncated_edges |= flag if is_cut else 0
@@ -174,12 +174,12 @@ def _box3d_to_message(box, camera):
     return message
 
 
-def boxes3d_from_message(message):
-    """The 3D boxes in a BoundingBox3DArray, as (`box3d_estimator.Box3D`, ...). Inverse of `boxes3d_to_message`."""
-    return tuple(_box3d_from_message(box) for box in message.boxes)
+def boxes3d_from_msg(message):
+    """The 3D boxes in a BoundingBox3DArray, as (`box3d_estimator.Box3D`, ...). Inverse of `boxes3d_to_msg`."""
+    return tuple(_box3d_from_msg(box) for box in message.boxes)
 
 
-def _box3d_from_message(box):
+def _box3d_from_msg(box):
     roi, covariance_m2 = box.roi, np.reshape(box.position_covariance, (3, 3))
     rect_px = (roi.x_offset, roi.y_offset, roi.x_offset + roi.width, roi.y_offset + roi.height)
     edges = tuple(bool(box.truncated_edges & flag) for flag in EDGE_FLAGS)
@@ -232,7 +232,7 @@ def _check_box3d(box):
                          'not known, expected' % list(box.position_covariance))
 
 
-def detections_from_message(message, fixed_from_camera):
+def detections_from_msg(message, fixed_from_camera):
     """The 3D boxes in a BoundingBox3DArray as detections in the fixed frame.
 
     Parameters
@@ -245,15 +245,15 @@ def detections_from_message(message, fixed_from_camera):
     -------
     list of Detection
     """
-    return [detection_from_box(box, fixed_from_camera) for box in boxes3d_from_message(message)]
+    return [detection_from_box(box, fixed_from_camera) for box in boxes3d_from_msg(message)]
 
 
-def tracks_to_message(tracks, header):
+def tracks_to_msg(tracks, header):
     """Tracks (`types.TrackedObject`) as TrackedObjectArray."""
-    return TrackedObjectArray(header=header, objects=[_track_to_message(track) for track in tracks])
+    return TrackedObjectArray(header=header, objects=[_track_to_msg(track) for track in tracks])
 
 
-def _track_to_message(track):
+def _track_to_msg(track):
     message = msg.TrackedObject(id=track.id, status=track.status, moving=track.moving)
     message.pose = _pose_at(track.position_m)
     _set_xyz(message.twist.twist.linear, track.velocity_mps)
@@ -270,15 +270,15 @@ def _track_to_message(track):
     return message
 
 
-def tracks_from_message(message):
+def tracks_from_msg(message):
     """The tracks in a TrackedObjectArray; the instant velocity is not in the message and is that of the track.
 
     Nor is how position and velocity go together: that part of the covariance is zero.
     """
-    return [_track_from_message(track) for track in message.objects]
+    return [_track_from_msg(track) for track in message.objects]
 
 
-def _track_from_message(track):
+def _track_from_msg(track):
     velocity_mps = _xyz(track.twist.twist.linear)
     prediction_m = np.array([_xyz(pose.pose.position) for pose in track.prediction]).reshape(-1, 3)
     covariance = prediction_covariance_m2 = None

@@ -7,7 +7,7 @@ import numpy as np
 from geometry_msgs.msg import Point, Point32, Quaternion
 from sensor_msgs.msg import PointCloud2, PointField
 
-from ros_3d_bb.conversions.perception_msgs import tracks_to_message
+from ros_3d_bb.conversions.perception_msgs import tracks_to_msg
 from ros_3d_bb.msg import TrackedObject
 
 STATUS_NAMES = {TrackedObject.VISIBLE: 'visible', TrackedObject.OCCLUDED: 'occluded',
@@ -15,7 +15,7 @@ STATUS_NAMES = {TrackedObject.VISIBLE: 'visible', TrackedObject.OCCLUDED: 'occlu
 UNSEEN_RELIABILITY = 0.5  # of a track that the latest image did not show; some planners scale their costs by it
 
 
-def people_to_message(tracks, header, people_msgs):
+def people_to_msg(tracks, header, people_msgs):
     """people_msgs/People; status and size (metres) of a person are in the tags."""
     return people_msgs.People(header=header, people=[people_msgs.Person(
         name=str(track.id), position=Point(*track.position_m), velocity=Point(*track.velocity_mps),
@@ -24,10 +24,10 @@ def people_to_message(tracks, header, people_msgs):
         for track in tracks])
 
 
-def obstacles_to_message(tracks, header, costmap_converter):
+def obstacles_to_msg(tracks, header, costmap_converter):
     """costmap_converter/ObstacleArrayMsg: one point, float32, and a radius are a circle."""
     obstacles = []
-    for track in tracks_to_message(tracks, header).objects:
+    for track in tracks_to_msg(tracks, header).objects:
         obstacle = costmap_converter.ObstacleMsg(header=header, id=track.id, radius=track.size.x / 2,
                                                  orientation=Quaternion(w=1.0), velocities=track.twist)
         place = track.pose.pose.position
@@ -36,10 +36,10 @@ def obstacles_to_message(tracks, header, costmap_converter):
     return costmap_converter.ObstacleArrayMsg(header=header, obstacles=obstacles)
 
 
-def objects_to_message(tracks, header, derived_object_msgs):
+def objects_to_msg(tracks, header, derived_object_msgs):
     """derived_object_msgs/ObjectArray: upright cylinders of pedestrians."""
     objects = []
-    for track in tracks_to_message(tracks, header).objects:
+    for track in tracks_to_msg(tracks, header).objects:
         item = derived_object_msgs.Object(header=header, id=track.id, pose=track.pose.pose, twist=track.twist.twist,
                                           object_classified=True, classification_certainty=255)
         item.detection_level, item.classification = item.OBJECT_TRACKED, item.CLASSIFICATION_PEDESTRIAN
@@ -50,10 +50,10 @@ def objects_to_message(tracks, header, derived_object_msgs):
     return derived_object_msgs.ObjectArray(header=header, objects=objects)
 
 
-def detections3d_to_message(tracks, header, vision_msgs):
+def detections3d_to_msg(tracks, header, vision_msgs):
     """vision_msgs/Detection3DArray of ROS 1: the id of the one hypothesis is the number of the track."""
     detections = []
-    for track, message in zip(tracks, tracks_to_message(tracks, header).objects):
+    for track, message in zip(tracks, tracks_to_msg(tracks, header).objects):
         detection = vision_msgs.Detection3D(header=header, results=[vision_msgs.ObjectHypothesisWithPose(
             id=track.id, score=_reliability(track), pose=message.pose)])
         detection.bbox.center, detection.bbox.size = message.pose.pose, message.size
@@ -65,7 +65,7 @@ def _reliability(track):
     return 1.0 if track.status == TrackedObject.VISIBLE else UNSEEN_RELIABILITY
 
 
-def points_to_message(points_m, header):
+def points_to_msg(points_m, header):
     """sensor_msgs/PointCloud2 of points (n, 3): x, y, z as float32."""
     fields = [PointField(name=name, offset=4 * number, datatype=PointField.FLOAT32, count=1)
               for number, name in enumerate('xyz')]

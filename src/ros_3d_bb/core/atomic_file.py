@@ -9,7 +9,7 @@ FILE_NAME = 'frames.json'
 
 
 @contextlib.contextmanager
-def changing(folder):
+def locked_update(folder):
     """Update the description of a session: it is locked, and written when the block ends without an error.
 
     Other programs wait for the lock, so the viewer can add measurements to a session that is being annotated. The file
@@ -37,10 +37,10 @@ def changing(folder):
         fcntl.flock(lock, fcntl.LOCK_EX)
         content = _read(path)
         yield content
-        write_whole(path, _text_of(content).encode())
+        atomic_write(path, _text_of(content).encode())
 
 
-def write_whole(path, data):
+def atomic_write(path, data):
     """Write the bytes `data` to `path` atomically: after an error or a crash the old content is intact."""
     descriptor, temporary = tempfile.mkstemp(dir=os.path.dirname(path), prefix='.', suffix='.tmp')
     try:

@@ -7,7 +7,7 @@ import threading
 MOST_LAGS = 10000  # that are kept for a report, where none can be made
 
 
-class Tally(object):
+class EventCounter(object):
     """Counts events, and keeps the first sentence about each.
 
     Parameters
@@ -59,14 +59,14 @@ class Tally(object):
         for fault in faults:
             self.warn('%s left out' % parts, '%s; the others in this image are used' % fault)
 
-    def taking(self, inputs):
+    def receiving(self, inputs):
         """Around a callback: counts its message as received, so that one sees whether each got an outcome."""
         with self._lock:
             self.received[inputs] = self.received.get(inputs, 0) + 1
-        return self.refusing(inputs)
+        return self.rejecting(inputs)
 
     @contextlib.contextmanager
-    def refusing(self, inputs):
+    def rejecting(self, inputs):
         """Around what is done with one input: a ValueError rejects that input, and the next one is processed."""
         try:
             yield
@@ -80,6 +80,6 @@ class Tally(object):
         """Whether an exception other than ValueError ends the processing of an input without being reported."""
         return False
 
-    def answered(self, stamp):
+    def record_latency(self, stamp):
         """An image of a stamp was answered: its result is published, or it has none. Makes a rate and a latency."""
         self.lags_ns.append(self._clock().to_nsec() - stamp.to_nsec())

@@ -22,7 +22,7 @@ class Stamped(NamedTuple):
     value: Any
 
 
-class StampedCache(object):
+class MessageCache(object):
     """The latest values of one topic, as far back as `length_ns` before the newest.
 
     Their number is bounded, whatever the stamps are: a driver whose clock hangs, or a frozen /clock, must not fill the
@@ -68,7 +68,7 @@ class StampedCache(object):
             self._entries.popleft()
         return went_back
 
-    def at(self, stamp_ns, tolerance_ns=0):
+    def nearest(self, stamp_ns, tolerance_ns=0):
         """The entry whose stamp is nearest, within the tolerance; None where there is none."""
         nearest, nearest_ns = None, tolerance_ns
         for entry in list(self._entries):  # a copy, as another thread may add entries
@@ -88,7 +88,7 @@ class StampedCache(object):
         self.newest_ns = None
 
 
-class Pairing(object):
+class StampSynchronizer(object):
     """Pairs the boxes of a colour image with the depth image and the camera of the same stamp.
 
     Boxes arrive later than their depth image by the latency of the detector. Boxes that arrive first wait for the depth
@@ -116,7 +116,7 @@ class Pairing(object):
     def __init__(self, length_ns, tolerance_ns, assumed_delay_ns, on_frame, on_lost):
         self._length_ns, self._tolerance_ns, self.assumed_delay_ns = length_ns, tolerance_ns, assumed_delay_ns
         self._on_frame, self._on_lost = on_frame, on_lost
-        self._depths, self._cameras = StampedCache(length_ns), StampedCache(length_ns)
+        self._depths, self._cameras = MessageCache(length_ns), MessageCache(length_ns)
         self._plain_camera = None  # without a stamp; None where the newest one has a stamp
         self._waiting = []
         self._end_before_ns = 0  # the last stamp before time went back
@@ -195,19 +195,19 @@ class Pairing(object):
 
     def _frame(self, stamp_ns):
         """Depth and camera of a stamp, None while one of them is missing."""
-        depth = self._depths.at(stamp_ns, self._tolerance_ns)
+        depth = self._depths.nearest(stamp_ns, self._tolerance_ns)
         if depth is None:
             return None
         if self._plain_camera is not None:
             return depth.value, self._plain_camera
-        camera = self._cameras.at(depth.stamp_ns, self._tolerance_ns)
+        camera = self._cameras.nearest(depth.stamp_ns, self._tolerance_ns)
         if camera is None and max(self._depths.newest_ns, self._cameras.newest_ns or 0) > depth.stamp_ns:
-            camera = self._cameras.at(depth.stamp_ns, float('inf'))
+            camera = self._cameras.nearest(depth.stamp_ns, float('inf'))
         return None if camera is None else (depth.value, camera.value)
 
     def _is_hopeless(self, entry, now_ns):
         """Whether boxes have waited too long, or their image was lost or arrived too long ago."""
         newest_ns = self._depths.newest_ns
         is_past = newest_ns is not None and entry.stamp_ns < newest_ns
-        is_lost = is_past and self._depths.at(entry.stamp_ns, self._tolerance_ns) is None
+        is_lost = is_past and self._depths.nearest(entry.stamp_ns, self._tolerance_ns) is None
         return is_lost or now_ns - entry.arrival_ns > self._length_ns

@@ -11,7 +11,7 @@ from ros_3d_bb.conversions.camera_msgs import INFO_TOPICS, STATIC_TOPIC, TF_TOPI
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS
 from ros_3d_bb.diagnosis.message_observer import Observation, camera_seen, color_seen, depth_seen
-from ros_3d_bb.diagnosis.observations import Seen, TfSeen
+from ros_3d_bb.diagnosis.observations import Observations, TfSeen
 from ros_3d_bb.diagnosis.tf_tree import links_in
 from ros_3d_bb.diagnosis.topic_roles import ROLES
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
@@ -21,7 +21,7 @@ CLASSES = {COLOR: Image, DEPTH: Image, INFO: CameraInfo, BOXES2D: Int32MultiArra
 SECONDS = 10.0  # as far as tf2 looks back
 
 
-def look_at_bag(path, name_of, target_frame, seconds=SECONDS):
+def observe_bag(path, name_of, target_frame, seconds=SECONDS):
     """What was seen of a bag.
 
     Parameters
@@ -36,7 +36,7 @@ def look_at_bag(path, name_of, target_frame, seconds=SECONDS):
 
     Returns
     -------
-    Seen
+    Observations
 
     Raises
     ------
@@ -49,9 +49,9 @@ def look_at_bag(path, name_of, target_frame, seconds=SECONDS):
         kinds = reader.topics
         transforms = _read(reader, observed, depth_info, seconds)
     streams = {key: one.stream(kinds.get(one.topic, '')) for key, one in observed.items()}
-    return Seen(streams, kinds, seconds, is_bag=True, color_camera=camera_seen(observed[INFO].newest),
-                depth_camera=camera_seen(depth_info.newest), color=color_seen(observed[COLOR].newest),
-                depth=depth_seen(observed[DEPTH].newest), tf=tf_seen(transforms, observed[DEPTH], target_frame))
+    return Observations(streams, kinds, seconds, is_bag=True, color_camera=camera_seen(observed[INFO].newest),
+                        depth_camera=camera_seen(depth_info.newest), color=color_seen(observed[COLOR].newest),
+                        depth=depth_seen(observed[DEPTH].newest), tf=tf_seen(transforms, observed[DEPTH], target_frame))
 
 
 class _Newest(object):

@@ -1,8 +1,8 @@
 """From messages to what was seen of them, the same for a running graph and for a bag."""
 import collections
 
-from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from, units_fault
-from ros_3d_bb.conversions.perception_msgs import boxes2d_from_message, camera_from_message
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb, units_fault
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.observations import CameraSeen, ImageSeen, Stream
 from ros_3d_bb.diagnosis.topic_roles import ROLES
@@ -53,7 +53,7 @@ def _stamp_in(message):
     if hasattr(message, 'header'):
         return message.header.stamp.to_nsec()
     try:
-        return boxes2d_from_message(message).stamp_ns
+        return boxes2d_from_msg(message).stamp_ns
     except ValueError:
         return None
 
@@ -63,19 +63,19 @@ def camera_seen(message):
     if message is None:
         return None
     try:
-        return CameraSeen(camera_from_message(message), message.header.frame_id)
+        return CameraSeen(camera_from_msg(message), message.header.frame_id)
     except ValueError as error:
         return CameraSeen(None, message.header.frame_id, str(error))
 
 
 def color_seen(message):
     """The ImageSeen of a colour image, None of None."""
-    return _image_seen(message, rgb_from, lambda _pixels: '')
+    return _image_seen(message, imgmsg_to_rgb, lambda _pixels: '')
 
 
 def depth_seen(message):
     """The ImageSeen of a depth image, None of None."""
-    return _image_seen(message, depth_from, units_fault)
+    return _image_seen(message, imgmsg_to_depth, units_fault)
 
 
 def _image_seen(message, read, fault_of):

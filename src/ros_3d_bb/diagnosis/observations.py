@@ -78,7 +78,7 @@ class Clock(NamedTuple):
     count: int
 
 
-class Seen(NamedTuple):
+class Observations(NamedTuple):
     """All that was observed; None where nothing was. `clock` is None of a bag.
 
     `topics`: {name: type} of all that is published; `nodes`: {name: (level, sentence)} of what nodes say of themselves;

@@ -45,7 +45,7 @@ class RealSenseParams(NamedTuple):
     repeat: bool = Param(False)
 
 
-class Pair(NamedTuple):
+class RgbdFrame(NamedTuple):
     """Images of one time: `color` (h, w, 3), uint8, RGB, and `depth` aligned to it."""
 
     stamp_ns: int
@@ -165,8 +165,8 @@ class RealSense(object):
             # Both images get the stamp of depth, because depth determines positions.
             own_clock = depth.get_frame_timestamp_domain() == self._rs.timestamp_domain.hardware_clock
             stamp_ns = self._stamps.stamp_ns(depth.get_timestamp(), own_clock, int(time.time() * NS))
-            return Pair(stamp_ns, rgb_of(np.array(color.get_data()), color.get_profile().format().name),
-                        DepthImage(np.array(depth.get_data()), self._depth_scale_m))
+            return RgbdFrame(stamp_ns, rgb_of(np.array(color.get_data()), color.get_profile().format().name),
+                             DepthImage(np.array(depth.get_data()), self._depth_scale_m))
         except RuntimeError as error:
             raise ValueError('librealsense could not align depth to colour: %s' % error)
 

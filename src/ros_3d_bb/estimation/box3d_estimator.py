@@ -8,8 +8,9 @@ from typing import Any, NamedTuple, Optional, Tuple
 import numpy as np
 
 from ros_3d_bb.core.limits import LARGEST_M
-from ros_3d_bb.estimation.depth_layers import (BODY_HALF_DEPTH_M, USUAL_HEIGHT_M, USUAL_WIDTH_M, edges, first_layer,
-                                               trimmed_mean, whole, within)
+from ros_3d_bb.estimation.depth_layers import (BODY_HALF_DEPTH_M, USUAL_HEIGHT_M, USUAL_WIDTH_M,
+                                               complete_truncated_extent, edges, nearest_dominant_layer, trimmed_mean,
+                                               within)
 
 # A box whose edge is this close to the image border is taken to be cut by it: detectors round to whole pixels and
 # regress the edge of a cut person a pixel or two inside the image.
@@ -32,7 +33,7 @@ class Samples(NamedTuple):
     depth_m: np.ndarray
     valid: np.ndarray
 
-    def in_order(self, chosen):
+    def sorted_depths(self, chosen):
         """The depths in metres of chosen samples (h, w), nearest first: numpy sorts 16-bit integers in linear time."""
         return np.sort(self.values[chosen], kind='mergesort').astype(float) * self.scale_m
 
@@ -160,8 +161,8 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
         return None
     x1, y1, x2, y2 = rect_px
     in_middle = np.exp(-0.5 * ((samples.columns - (x1 + x2) / 2.0) / ((x2 - x1) / 4.0)) ** 2)
-    depths_m = samples.in_order(own)
-    layer_m = first_layer(samples.depth_m[own], np.broadcast_to(in_middle, own.shape)[own], depths_m)
+    depths_m = samples.sorted_depths(own)
+    layer_m = nearest_dominant_layer(samples.depth_m[own], np.broadcast_to(in_middle, own.shape)[own], depths_m)
     body_m = within(depths_m, layer_m, BODY_HALF_DEPTH_M)
     support = len(body_m) / float(own.size)
     if support < LEAST_SUPPORT:
@@ -173,8 +174,8 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     _left_px, top_px, _right_px, bottom_px = flat_px
     top_m, bottom_m = (top_px - camera.cy) / camera.fy * layer_m, (bottom_px - camera.cy) / camera.fy * layer_m
     cut_left, cut_top, cut_right, cut_bottom = cut = truncated_edges(rect_px, camera)
-    left_m, right_m = whole(left_m, right_m, cut_left, cut_right, USUAL_WIDTH_M)
-    top_m, bottom_m = whole(top_m, bottom_m, cut_top, cut_bottom, USUAL_HEIGHT_M)
+    left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, USUAL_WIDTH_M)
+    top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, USUAL_HEIGHT_M)
     surface_m = np.array([(left_m + right_m) / 2, (top_m + bottom_m) / 2, layer_m])
     width_m = max(right_m - left_m, LEAST_WIDTH_M)
     return Box3D(surface_m * (1 + AXIS_BEHIND_SURFACE_M / layer_m), np.array([width_m, bottom_m - top_m, width_m]),
@@ -253,7 +254,7 @@ def estimate_boxes(depth, rects_px, camera, estimator):
         In the order of the rectangles.
     """
     boxes, nearer = [None] * len(rects_px), []
-    for number in near_first(rects_px):
+    for number in front_to_back(rects_px):
         rect_px = rects_px[number]
         samples = estimator.sample(depth, rect_px)
         box = estimator.estimate(samples, rect_px, camera, nearer)
@@ -268,7 +269,7 @@ def is_plausible(box):
     return bool(np.isfinite(box.center_m.sum()) and 0 < min(box.size_m) and max(box.size_m) < LARGEST_M)
 
 
-def near_first(rects_px):
+def front_to_back(rects_px):
     """Numbers of rectangles, those of nearer people first: they stand lower in the image, and are larger."""
     return sorted(range(len(rects_px)), key=lambda number: (-rects_px[number][3], rects_px[number][1], number))
 

@@ -14,7 +14,7 @@ USUAL_WIDTH_M, USUAL_HEIGHT_M = 0.46, 1.7  # of a body that the image border cut
 EDGE_PERCENT = 5  # of the pixels of the layer are looked past on the left and on the right: arms, flying pixels
 
 
-def first_layer(depths_m, weights, in_order_m):
+def nearest_dominant_layer(depths_m, weights, sorted_depths_m):
     """Depth of the trunk of the person: the median of the nearest strong layer of weighted depths.
 
     Parameters
@@ -27,24 +27,24 @@ def first_layer(depths_m, weights, in_order_m):
     -------
     float
     """
-    bins = ((depths_m - in_order_m[0]) / BIN_M).astype(int)
+    bins = ((depths_m - sorted_depths_m[0]) / BIN_M).astype(int)
     histogram = np.convolve(np.bincount(bins, weights), np.ones(LAYER_BINS), 'same')
     first = np.argmax(histogram >= FIRST_LAYER_SHARE * histogram.max())
     best = first + np.argmax(histogram[first:first + LAYER_BINS])
-    nearest, farthest = ((in_order_m - in_order_m[0]) / BIN_M).searchsorted(
+    nearest, farthest = ((sorted_depths_m - sorted_depths_m[0]) / BIN_M).searchsorted(
         (best - LAYER_BINS // 2, best + LAYER_BINS // 2 + 1))
-    median_m = _median(in_order_m[nearest:farthest])
+    median_m = _median(sorted_depths_m[nearest:farthest])
     for _ in range(MEDIANS):
-        before_m, median_m = median_m, _median(within(in_order_m, median_m, TRUNK_HALF_DEPTH_M))
+        before_m, median_m = median_m, _median(within(sorted_depths_m, median_m, TRUNK_HALF_DEPTH_M))
         if median_m == before_m:
             break
     return median_m
 
 
-def within(in_order_m, middle_m, half_m):
+def within(sorted_depths_m, middle_m, half_m):
     """Those of the depths in order that are at most so far from the middle, a slice."""
-    offsets_m = in_order_m - middle_m
-    return in_order_m[offsets_m.searchsorted(-half_m):offsets_m.searchsorted(half_m, 'right')]
+    offsets_m = sorted_depths_m - middle_m
+    return sorted_depths_m[offsets_m.searchsorted(-half_m):offsets_m.searchsorted(half_m, 'right')]
 
 
 def edges(x_m):
@@ -59,13 +59,13 @@ def edges(x_m):
     return low_m - beyond_m, high_m + beyond_m
 
 
-def trimmed_mean(in_order_m):
+def trimmed_mean(sorted_depths_m):
     """The mean without the lowest and the highest tenth: finer than the median, which is one of the camera's steps."""
-    tenth = len(in_order_m) // 10
-    return in_order_m[tenth:len(in_order_m) - tenth].mean()
+    tenth = len(sorted_depths_m) // 10
+    return sorted_depths_m[tenth:len(sorted_depths_m) - tenth].mean()
 
 
-def whole(low, high, cut_low, cut_high, usual):
+def complete_truncated_extent(low, high, cut_low, cut_high, usual):
     """The extent low..high of a body that the image border cuts on one side, where it is at least the usual one."""
     missing = max(0.0, usual - (high - low))
     if cut_low and not cut_high:
@@ -73,6 +73,6 @@ def whole(low, high, cut_low, cut_high, usual):
     return low, high + (missing if cut_high and not cut_low else 0.0)
 
 
-def _median(in_order_m):
-    last = len(in_order_m) - 1
-    return (in_order_m[last // 2] + in_order_m[last - last // 2]) / 2
+def _median(sorted_depths_m):
+    last = len(sorted_depths_m) - 1
+    return (sorted_depths_m[last // 2] + sorted_depths_m[last - last // 2]) / 2

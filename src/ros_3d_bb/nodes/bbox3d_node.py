@@ -6,16 +6,16 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_message
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.common.alignment_check import DepthCameraCheck
 from ros_3d_bb.nodes.common.debug_images import SampleImages
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.reconfigure_server import Tuning
+from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
-from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, Lifter
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
 
 
 class Bbox3dNode(object):
@@ -42,11 +42,13 @@ class Bbox3dNode(object):
     def __init__(self):
         params, = read_params(Bbox3dParams)
         self._diagnostics = Diagnostics()
-        self._lifter = Lifter(params, self._diagnostics, self._on_frame, rospy.resolve_name(DEPTH_TOPIC),
-                              rospy.resolve_name(INFO_TOPICS[0]))
+        self._estimation_stage = EstimationStage(params, self._diagnostics, self._on_frame,
+                                                 rospy.resolve_name(DEPTH_TOPIC),
+                                                 rospy.resolve_name(INFO_TOPICS[0]))
         self._lock = threading.Lock()
         self._boxes_pub = rospy.Publisher(BOXES3D_TOPIC, BoundingBox3DArray, queue_size=10)
-        self._images = SampleImages(int(params.cache_length * NS), self._lifter.sample, params.depth_image_range,
+        self._images = SampleImages(int(params.cache_length * NS), self._estimation_stage.sample,
+                                    params.depth_image_range,
                                     self._diagnostics)
         self._alignment = DepthCameraCheck(with_frames=not params.frame_id)
         self._diagnostics.check(self._alignment.faults)
@@ -54,33 +56,33 @@ class Bbox3dNode(object):
         subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
         subscribe(BOXES_TOPIC, Int32MultiArray, self._on_boxes)
-        self._tuning = Tuning([params], self._tune)
+        self._tuning = ReconfigureServer([params], self._tune)
 
     def _tune(self, params):
         with self._lock:
-            self._lifter.tune(params)
-            self._images.tune(self._lifter.sample, params.depth_image_range)
+            self._estimation_stage.reconfigure(params)
+            self._images.reconfigure(self._estimation_stage.sample, params.depth_image_range)
 
     def _on_camera_info(self, message):
         self._alignment.color = message
-        with self._diagnostics.taking('camera_info'), self._lock:
-            self._lifter.add_camera_info(message, arrival_clock_ns())
+        with self._diagnostics.receiving('camera_info'), self._lock:
+            self._estimation_stage.add_camera_info(message, arrival_clock_ns())
 
     def _on_depth(self, message):
         self._alignment.depth_frame = message.header.frame_id
-        with self._diagnostics.taking('depth images'), self._lock:
-            self._lifter.add_depth(message, arrival_clock_ns())
+        with self._diagnostics.receiving('depth images'), self._lock:
+            self._estimation_stage.add_depth(message, arrival_clock_ns())
 
     def _on_boxes(self, message):
-        with self._diagnostics.taking('2D boxes'), self._lock:
-            self._lifter.add_boxes(message, arrival_clock_ns())
+        with self._diagnostics.receiving('2D boxes'), self._lock:
+            self._estimation_stage.add_boxes(message, arrival_clock_ns())
 
     def _on_frame(self, boxes2d, depth_msg, camera):
         """Publish the 3D boxes of one image: 2D boxes, depth image and camera of one stamp have arrived."""
-        with self._diagnostics.refusing('2D boxes'):
-            header, depth, boxes3d = self._lifter.estimate(boxes2d, depth_msg, camera)
-            self._boxes_pub.publish(boxes3d_to_message(boxes3d, header, camera))
-            self._diagnostics.answered(header.stamp)
+        with self._diagnostics.rejecting('2D boxes'):
+            header, depth, boxes3d = self._estimation_stage.estimate(boxes2d, depth_msg, camera)
+            self._boxes_pub.publish(boxes3d_to_msg(boxes3d, header, camera))
+            self._diagnostics.record_latency(header.stamp)
             self._images.publish(header, depth, boxes3d)
 
 

@@ -10,11 +10,11 @@ from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.nodes.common.detector_output import BoxesOutput, Switch
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.reconfigure_server import Tuning
+from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
-from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, DepthSearch
+from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, RgbdDetectionStage
 
 
 class DepthDetectorNode(object):
@@ -42,7 +42,7 @@ class DepthDetectorNode(object):
         transforms = Transforms(wait_s=0) if params.floor_frame else None
         if transforms is not None:
             self._diagnostics.show('tf age', transforms.age)
-        self._search = DepthSearch(params, people, self._diagnostics, self._on_frame, transforms)
+        self._search = RgbdDetectionStage(params, people, self._diagnostics, self._on_frame, transforms)
         self._lock, self._searching = threading.Lock(), threading.Lock()
         self._output = BoxesOutput(params.publish_empty)
         self._worker = NewestWorker(self._work, self._on_error)
@@ -51,22 +51,22 @@ class DepthDetectorNode(object):
         subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
         subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(COLOR_TOPIC, Image, self._on_color)
-        self._tuning = Tuning([params, people], self._tune)
+        self._tuning = ReconfigureServer([params, people], self._tune)
 
     def _tune(self, params, people):
         with self._searching:
-            self._search.tune(params, people)
+            self._search.reconfigure(params, people)
 
     def _on_camera_info(self, message):
-        with self._diagnostics.taking('camera_info'), self._lock:
+        with self._diagnostics.receiving('camera_info'), self._lock:
             self._search.add_camera_info(message, arrival_clock_ns())
 
     def _on_depth(self, message):
-        with self._diagnostics.taking('depth images'), self._lock:
+        with self._diagnostics.receiving('depth images'), self._lock:
             self._search.add_depth(message, arrival_clock_ns())
 
     def _on_color(self, message):
-        with self._diagnostics.taking('colour images'), self._lock:
+        with self._diagnostics.receiving('colour images'), self._lock:
             self._search.add_color(message, arrival_clock_ns())
 
     def _on_frame(self, color_msg, depth_msg, camera):
@@ -79,7 +79,7 @@ class DepthDetectorNode(object):
             self._diagnostics.count('images skipped for a newer one')
 
     def _work(self, frame):
-        with self._diagnostics.refusing('images'), self._switch.searching(), self._searching:
+        with self._diagnostics.rejecting('images'), self._switch.searching(), self._searching:
             if not self._switch.on:  # it may have been paused meanwhile
                 self._diagnostics.count('images while paused')
                 return
@@ -88,7 +88,7 @@ class DepthDetectorNode(object):
             if found is not None:
                 image, detections = found
                 self._output.publish(color_msg.header, image, detections, names=self._search.names)
-                self._diagnostics.answered(color_msg.header.stamp)
+                self._diagnostics.record_latency(color_msg.header.stamp)
 
     def _on_error(self, error):
         self._diagnostics.warn('searches failed', 'the detector failed: %s; waiting for the next image' % error)

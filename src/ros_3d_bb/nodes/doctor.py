@@ -11,10 +11,10 @@ import rospy
 
 from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.core.params import params_from
-from ros_3d_bb.diagnosis.bag_observer import look_at_bag
+from ros_3d_bb.diagnosis.bag_observer import observe_bag
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.diagnosis.observations import Finding
-from ros_3d_bb.nodes.common.graph_observer import GraphLook, name_for, tracker_param
+from ros_3d_bb.nodes.common.graph_observer import GraphObserver, name_for, tracker_param
 from ros_3d_bb.nodes.common.master import NO_ANSWER, PATIENCE_S, patient_master
 from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams
 
@@ -53,7 +53,7 @@ def bag_findings(arguments):
         wanted = name_for(arguments.camera, topic)
         return '/' + names.get(wanted, wanted).lstrip('/')
     try:
-        seen = look_at_bag(arguments.bag, name_of, arguments.target_frame or 'map')
+        seen = observe_bag(arguments.bag, name_of, arguments.target_frame or 'map')
     except BagError as error:
         return [Finding('bag', '', str(error), 'rosbag info %s says what is in it' % arguments.bag)]
     return findings(seen)
@@ -68,9 +68,9 @@ def graph_findings(arguments):
     while True:
         cameras = tracked_cameras()
         camera = arguments.camera or cameras[0]
-        look = GraphLook(arguments.target_frame, camera)
+        look = GraphObserver(arguments.target_frame, camera)
         _sleep(arguments.seconds)
-        found = findings(look.seen())
+        found = findings(look.observations())
         look.close()
         if len(cameras) > 1:
             found.insert(0, Finding('cameras', '%s; of %s, looked at one by one: doctor --camera NAME'

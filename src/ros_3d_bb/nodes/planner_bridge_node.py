@@ -6,7 +6,7 @@ import rospy
 import tf2_ros
 from std_msgs.msg import Header
 
-from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, stamp_of, time_from, tracks_from_message
+from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, stamp_of, time_from, tracks_from_msg
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
@@ -133,14 +133,14 @@ class PlannerBridgeNode(object):
         self._timer = rospy.Timer(rospy.Duration.from_sec(self._params.resend_period), self._on_timer, reset=True)
 
     def _on_tracks(self, message):
-        with self._diagnostics.taking('tracks'):
+        with self._diagnostics.receiving('tracks'):
             news = self._read(message)
             with self._lock:
                 self._news = news
                 for topic in self._topics:
                     self._send(topic, _now_ns())
             self._diagnostics.count('tracks handed on')
-            self._diagnostics.answered(message.header.stamp)
+            self._diagnostics.record_latency(message.header.stamp)
 
     def _read(self, message):
         """The news in a message. Raises ValueError where a planner should not see them."""
@@ -150,7 +150,7 @@ class PlannerBridgeNode(object):
                              'use_sim_time' % ((now_ns - stamp_ns) / NS, self._params.timeout))
         if self._news is not None and stamp_ns < self._news.stamp_ns:
             self._transforms.go_back()
-        tracks, faults = usable_tracks(tracks_from_message(message))
+        tracks, faults = usable_tracks(tracks_from_msg(message))
         for fault in faults:
             self._diagnostics.warn('broken tracks', '%s; planners do not get it' % fault)
         return News(stamp_ns, now_ns, message.header.frame_id, tracks, self._transforms_at(message.header))
@@ -189,7 +189,7 @@ class PlannerBridgeNode(object):
 
     def _on_timer(self, _event):
         """Send again what planners take for now; empty what is out of date."""
-        with self._diagnostics.refusing('outputs'), self._lock:
+        with self._diagnostics.rejecting('outputs'), self._lock:
             now_ns = _now_ns()
             for topic in self._topics:
                 if topic.sent is None:

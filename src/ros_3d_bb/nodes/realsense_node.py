@@ -99,7 +99,7 @@ class RealSenseNode(object):
     def _read(self, camera):
         links = frame_links(self._params.frame_prefix, camera.link_from_color)
         while not (is_ending() or camera.is_over):
-            with self._diagnostics.refusing('images'):
+            with self._diagnostics.rejecting('images'):
                 pair = camera.read()
                 if pair is not None:
                     self._publish(camera, pair, links)
@@ -117,7 +117,7 @@ class RealSenseNode(object):
         for topic, message in image_messages_of(CameraFrame(header, camera.camera, pair.color, pair.depth, ())):
             self._pubs[topic].publish(message)
         self._diagnostics.count('images')
-        self._diagnostics.answered(stamp)
+        self._diagnostics.record_latency(stamp)
 
     def _tell_time(self, stamp_ns):
         if self._clock_pub is not None:

@@ -7,16 +7,16 @@ from sensor_msgs.msg import CameraInfo, Image
 from visualization_msgs.msg import MarkerArray
 
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS, topic_of
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_message
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_msg
 from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.persistent_track_ids import Numbers
-from ros_3d_bb.nodes.common.reconfigure_server import Tuning
+from ros_3d_bb.nodes.common.persistent_track_ids import PersistentTrackIds
+from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
-from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, Follower, TrackerNodeParams
+from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
 from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 
 
@@ -56,52 +56,52 @@ class TrackerNode(object):
         self._diagnostics = Diagnostics()
         transforms = Transforms(params.tf_timeout)
         self._diagnostics.show('tf age', transforms.age)
-        self._follower = Follower(params, tracking, self._diagnostics, transforms)
-        self._numbers = Numbers(self._diagnostics)
+        self._tracking_stage = TrackingStage(params, tracking, self._diagnostics, transforms)
+        self._numbers = PersistentTrackIds(self._diagnostics)
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
-        for camera in self._follower.cameras:
+        for camera in self._tracking_stage.cameras:
             self._subscribe(camera)
-        self._tuning = Tuning(given, self._tune)
+        self._tuning = ReconfigureServer(given, self._tune)
 
     def _tune(self, _params, marker_params, *tracking):
         with self._lock:
-            self._follower.tune(tracking)
-            self._markers.tune(marker_params)
+            self._tracking_stage.reconfigure(tracking)
+            self._markers.reconfigure(marker_params)
 
     def _subscribe(self, camera):
         def of_camera(callback):
             return functools.partial(callback, camera=camera)
         subscribe(topic_of(camera, BOXES3D_TOPIC), BoundingBox3DArray, of_camera(self._on_boxes))
-        with_camera, with_depth = self._follower.looks
+        with_camera, with_depth = self._tracking_stage.looks
         if with_camera:
             subscribe(topic_of(camera, INFO_TOPICS[0]), CameraInfo, of_camera(self._on_camera_info), 1)
         if with_depth:
             subscribe(topic_of(camera, DEPTH_TOPIC), Image, of_camera(self._on_depth), KEPT_AT_ONCE)
 
     def _on_camera_info(self, message, camera):
-        with self._diagnostics.taking('camera_info'):
-            self._follower.add_camera_info(message, camera)
+        with self._diagnostics.receiving('camera_info'):
+            self._tracking_stage.add_camera_info(message, camera)
 
     def _on_depth(self, message, camera):
-        with self._diagnostics.taking('depth images'):
-            self._follower.add_depth(message, arrival_clock_ns(), camera)
+        with self._diagnostics.receiving('depth images'):
+            self._tracking_stage.add_depth(message, arrival_clock_ns(), camera)
 
     def _on_boxes(self, message, camera):
-        with self._diagnostics.taking('3D boxes'):
+        with self._diagnostics.receiving('3D boxes'):
             # One camera's wait for a transform holds up no other.
-            located = self._follower.locate(message, arrival_clock_ns(), camera)
+            located = self._tracking_stage.locate(message, arrival_clock_ns(), camera)
             if located is None:
                 return
             with self._lock:
-                followed = self._follower.follow(located)
+                followed = self._tracking_stage.follow(located)
                 if followed is not None:
                     self._publish(followed)
 
     def _publish(self, followed):
-        tracks = self._numbers.continued(followed.tracks)
-        self._tracks_pub.publish(tracks_to_message(tracks, followed.header))
-        self._diagnostics.answered(followed.header.stamp)
+        tracks = self._numbers.assign(followed.tracks)
+        self._tracks_pub.publish(tracks_to_msg(tracks, followed.header))
+        self._diagnostics.record_latency(followed.header.stamp)
         if self._markers_pub.get_num_connections():
             self._markers_pub.publish(self._markers.write(tracks, followed.header))
 

@@ -10,9 +10,9 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
-from ros_3d_bb.conversions.image_msgs import depth_from, rgb_from
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, boxes2d_from_message, boxes3d_from_message,
-                                                   camera_from_message, stamp_if_any, stamp_of, time_from,
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, boxes2d_from_msg, boxes3d_from_msg,
+                                                   camera_from_msg, stamp_if_any, stamp_of, time_from,
                                                    usable_boxes3d)
 from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
@@ -22,9 +22,9 @@ from ros_3d_bb.nodes.common.measurement_label import Label
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.sessions.frame_synchronizer import Snapshots
-from ros_3d_bb.sessions.session_writer import Measurement, append
+from ros_3d_bb.sessions.session_writer import MeasurementRecord, append
 from ros_3d_bb.visualization.cv_window import Window, WindowError
-from ros_3d_bb.visualization.viewer_layout import FrameRate, View, compose, text_image
+from ros_3d_bb.visualization.viewer_layout import FrameRate, ViewerContent, compose, text_image
 
 COLOR_TOPIC, DEPTH_TOPIC = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
 CAMERA_INFO_TOPIC = 'camera/color/camera_info'
@@ -105,27 +105,27 @@ class ViewerNode(object):
             subscribe(topic, kind, callback, KEPT_AT_ONCE)
 
     def _on_color(self, message):
-        with self._diagnostics.taking('colour images'), self._lock:
-            color, now_ns = Color(rgb_from(message), message.header.frame_id), arrival_clock_ns()
+        with self._diagnostics.receiving('colour images'), self._lock:
+            color, now_ns = Color(imgmsg_to_rgb(message), message.header.frame_id), arrival_clock_ns()
             self._rate.add(now_ns)
             self._snapshots.add_color(stamp_of(message), now_ns, color)
             self._note(COLOR_TOPIC)
 
     def _on_depth(self, message):
-        with self._diagnostics.taking('depth images'), self._lock:
-            depth = depth_from(message, self._params.depth_scale)
+        with self._diagnostics.receiving('depth images'), self._lock:
+            depth = imgmsg_to_depth(message, self._params.depth_scale)
             self._snapshots.add_depth(stamp_of(message), arrival_clock_ns(), depth)
             self._note(DEPTH_TOPIC)
 
     def _on_camera_info(self, message):
-        with self._diagnostics.taking('camera_info'), self._lock:
-            camera = camera_from_message(message)
+        with self._diagnostics.receiving('camera_info'), self._lock:
+            camera = camera_from_msg(message)
             self._snapshots.add_camera(stamp_if_any(message), arrival_clock_ns(), camera)
             self._note(CAMERA_INFO_TOPIC)
 
     def _on_boxes2d(self, message):
-        with self._diagnostics.taking('2D boxes'), self._lock:
-            boxes = boxes2d_from_message(message)
+        with self._diagnostics.receiving('2D boxes'), self._lock:
+            boxes = boxes2d_from_msg(message)
             if boxes.stamp_ns is None:
                 rospy.loginfo_once('the 2D boxes carry no stamp: only those of which 3D boxes are made are stored')
                 return
@@ -133,10 +133,10 @@ class ViewerNode(object):
                                         tuple(tuple(rect_px) for rect_px in boxes.boxes.tolist()))
 
     def _on_boxes3d(self, message):
-        with self._diagnostics.taking('3D boxes'), self._lock:
+        with self._diagnostics.receiving('3D boxes'), self._lock:
             usable, faults = usable_boxes3d(message)
             self._diagnostics.leave_out('3D boxes', faults)
-            self._snapshots.add_boxes3d(stamp_of(message), arrival_clock_ns(), boxes3d_from_message(usable))
+            self._snapshots.add_boxes3d(stamp_of(message), arrival_clock_ns(), boxes3d_from_msg(usable))
             self._is_said = False
 
     def _note(self, topic):
@@ -173,7 +173,7 @@ class ViewerNode(object):
             raise ValueError('no session is given; start the viewer with session:=FOLDER')
         snapshot = self._snapshot_to_store()
         label = self._label.asked()
-        appended = append(self._params.session, Measurement(
+        appended = append(self._params.session, MeasurementRecord(
             snapshot.color.pixels, snapshot.depth, snapshot.camera, self._params.frame_id or snapshot.color.frame_id,
             snapshot.stamp_ns, snapshot.boxes2d or (), snapshot.boxes3d or (), label))
         self._captured_ns = snapshot.stamp_ns
@@ -255,10 +255,10 @@ class ViewerNode(object):
         lines = ('%.1f images/s    stamp %d.%09d    %s' % ((rate_hz,) + divmod(snapshot.stamp_ns, NS) + (
                      'no 3D boxes' if snapshot.boxes3d is None else '3D boxes: %d' % len(snapshot.boxes3d),)),
                  'session: %s    label: %s' % (self._params.session or 'none', label or 'none'), KEYS, self._answer)
-        view = View(snapshot.color.pixels, snapshot.depth, snapshot.boxes2d, snapshot.boxes3d, lines,
-                    tuple(self._warnings(snapshot, is_early, rate_hz)))
+        view = ViewerContent(snapshot.color.pixels, snapshot.depth, snapshot.boxes2d, snapshot.boxes3d, lines,
+                             tuple(self._warnings(snapshot, is_early, rate_hz)))
         self._window.show(compose(view, self._params.panel_width, self._params.depth_image_range))
-        self._diagnostics.answered(time_from(snapshot.stamp_ns))
+        self._diagnostics.record_latency(time_from(snapshot.stamp_ns))
         return news
 
     def _warnings(self, snapshot, is_early, rate_hz):

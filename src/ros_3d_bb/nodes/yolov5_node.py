@@ -8,7 +8,7 @@ from ros_3d_bb.detection.yolov5.backends import RuntimeParams
 from ros_3d_bb.detection.yolov5.detector import DetectionParams
 from ros_3d_bb.nodes.common.detector_output import BoxesOutput, Switch
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.reconfigure_server import Tuning
+from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.pipeline.detection_stage import Yolov5NodeParams, opened_yolov5, search_color
@@ -37,13 +37,13 @@ class Yolov5Node(object):
         subscribe(COLOR_TOPIC, Image, self._on_image, 1)
         rospy.loginfo('looking for %s with %s on %s', ', '.join(map(str, detection.classes)), params.weights,
                       self._detector.description)
-        self._tuning = Tuning(given, self._tune)
+        self._tuning = ReconfigureServer(given, self._tune)
 
     def _tune(self, _params, detection, _running):
         self._detector = self._detector.with_params(detection)  # an image is searched with the one or the other
 
     def _on_image(self, message):
-        with self._diagnostics.taking('colour images'):
+        with self._diagnostics.receiving('colour images'):
             if not self._switch.on:
                 self._diagnostics.count('images while paused')
                 return
@@ -52,7 +52,7 @@ class Yolov5Node(object):
                 self._diagnostics.count('images skipped for a newer one')
 
     def _search(self, message):
-        with self._diagnostics.refusing('images'), self._switch.searching():
+        with self._diagnostics.rejecting('images'), self._switch.searching():
             if self._switch.on:
                 self._detect(message)
             else:  # it was paused since the image came
@@ -63,7 +63,7 @@ class Yolov5Node(object):
         image, found = search_color(detector, message)
         self._diagnostics.count('images searched')
         self._output.publish(message.header, image, found, detector.names)
-        self._diagnostics.answered(message.header.stamp)
+        self._diagnostics.record_latency(message.header.stamp)
 
     def _on_error(self, error):
         self._diagnostics.warn('searches failed', 'the detector failed: %s; waiting for the next image' % error)

@@ -6,10 +6,10 @@ import genpy
 import tf2_ros
 
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.conversions.image_msgs import checked_depth_from, rgb_from
-from ros_3d_bb.conversions.perception_msgs import camera_from_message, stamp_if_any, stamp_of
+from ros_3d_bb.conversions.image_msgs import checked_depth_from, imgmsg_to_rgb
+from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_if_any, stamp_of
 from ros_3d_bb.core.params import ENABLED, PUBLISH_EMPTY, STAMP_TOLERANCE, Param, parameters
-from ros_3d_bb.core.time_sync import NS, Pairing
+from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
 from ros_3d_bb.detection.yolov5.backends import open_runtime
@@ -66,25 +66,25 @@ def search_color(detector, message):
         If the image cannot be used.
     """
     stamp_of(message)
-    image = rgb_from(message)
+    image = imgmsg_to_rgb(message)
     return image, detector.detect(image)
 
 
-class DepthSearch(object):
+class RgbdDetectionStage(object):
     """Pairs colour images with depth and camera of their stamp, and detects people in them.
 
     Each `add_` validates a message and hands it to the synchronizer, with its arrival (integer nanoseconds, see
-    `time_sync.Pairing`). `on_frame` then gets a colour image with its depth and camera, for `search`.
+    `time_sync.StampSynchronizer`). `on_frame` then gets a colour image with its depth and camera, for `search`.
 
     Parameters
     ----------
     params : DepthDetectorParams
     people : DepthPeopleParams
-    tally : event_counter.Tally
+    tally : event_counter.EventCounter
     on_frame : callable
         Called with two sensor_msgs/Image, colour and depth, and a `camera_model.Camera` of one stamp.
     transforms
-        As for `tracking_stage.Follower`; None where no frame of the floor is given.
+        As for `tracking_stage.TrackingStage`; None where no frame of the floor is given.
 
     Raises
     ------
@@ -97,19 +97,19 @@ class DepthSearch(object):
     def __init__(self, params, people, tally, on_frame, transforms):
         self._params, self._tally, self._transforms = params, tally, transforms
         self._detector = DepthPeople(people)
-        self._sync = Pairing(CACHE_NS, int(params.stamp_tolerance * NS), 0, on_frame, self._on_lost)
+        self._sync = StampSynchronizer(CACHE_NS, int(params.stamp_tolerance * NS), 0, on_frame, self._on_lost)
 
-    def tune(self, params, people):
+    def reconfigure(self, params, people):
         """Search the next images with another floor height and other people.
 
         Raises ValueError, and keeps the old ones, where they make no sense.
         """
-        self._detector.tune(people)
+        self._detector.reconfigure(people)
         self._params = params
 
     def add_camera_info(self, message, now_ns):
         """Add a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
-        camera = camera_from_message(message)
+        camera = camera_from_msg(message)
         self._sync.add_camera(stamp_if_any(message), now_ns, camera)
 
     def add_depth(self, message, now_ns):
@@ -144,7 +144,7 @@ class DepthSearch(object):
         ValueError
             If the images cannot be used.
         """
-        image = rgb_from(color_msg)
+        image = imgmsg_to_rgb(color_msg)
         camera_frame = self._params.frame_id or color_msg.header.frame_id
         depth = checked_depth_from(depth_msg)
         found = self._detector.detect(image, depth, camera, self._floor(camera_frame))

@@ -7,11 +7,11 @@ from ros_3d_bb.camera.alignment import ALIGN, size_fault
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import checked_depth_from
-from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_message, camera_from_message, stamp_if_any, stamp_of,
+from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from_msg, stamp_if_any, stamp_of,
                                                    time_from)
 from ros_3d_bb.core.limits import LARGEST_M
 from ros_3d_bb.core.params import DEPTH_SCALE, LARGEST, STAMP_TOLERANCE, Param, parameters
-from ros_3d_bb.core.time_sync import NS, Pairing
+from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named, is_plausible
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
 
@@ -40,7 +40,7 @@ class Bbox3dParams(NamedTuple):
         6.0, 'Depth that is black in the grey image on ros_3d_bb/depth.', 'm', live=(1, 20))
 
 
-class Lifted(NamedTuple):
+class EstimatedBoxes(NamedTuple):
     """The 3D boxes (`box3d_estimator.Box3D`) of one image, its header and its depth image."""
 
     header: Header
@@ -48,17 +48,17 @@ class Lifted(NamedTuple):
     boxes: list
 
 
-class Lifter(object):
+class EstimationStage(object):
     """Pairs arrays of 2D boxes with depth and camera of their stamp, and estimates their 3D boxes.
 
     Each `add_` validates a message and hands it to the synchronizer, with its arrival (integer nanoseconds, see
-    `time_sync.Pairing`). `on_frame` then gets the boxes of one image with their depth and camera, for `estimate`. What
-    is rejected is counted by the tally.
+    `time_sync.StampSynchronizer`). `on_frame` then gets the boxes of one image with their depth and camera, for
+    `estimate`. What is rejected is counted by the tally.
 
     Parameters
     ----------
     params : Bbox3dParams
-    tally : event_counter.Tally
+    tally : event_counter.EventCounter
     on_frame : callable
         Called with `perception_msgs.Boxes2D`, sensor_msgs/Image and `camera_model.Camera` of one stamp.
     depth_topic, info_topic : str
@@ -74,11 +74,11 @@ class Lifter(object):
         self._tally, self._depth_topic, self._info_topic = tally, depth_topic, info_topic
         self._error_model = error_model_of(params)
         cache_ns, tolerance_ns = int(params.cache_length * NS), int(params.stamp_tolerance * NS)
-        self._sync = Pairing(cache_ns, tolerance_ns, int(params.assumed_delay * NS), on_frame, self._on_lost)
+        self._sync = StampSynchronizer(cache_ns, tolerance_ns, int(params.assumed_delay * NS), on_frame, self._on_lost)
         self._said_plain = False
-        self.tune(params)
+        self.reconfigure(params)
 
-    def tune(self, params):
+    def reconfigure(self, params):
         """Use another estimator, stride or assumed delay from the next boxes on.
 
         Raises ValueError, and keeps the old ones, where they make no sense.
@@ -96,7 +96,7 @@ class Lifter(object):
 
     def add_camera_info(self, message, now_ns):
         """Add a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
-        camera = camera_from_message(message)
+        camera = camera_from_msg(message)
         self._sync.add_camera(stamp_if_any(message), now_ns, camera)
 
     def add_depth(self, message, now_ns):
@@ -105,7 +105,7 @@ class Lifter(object):
 
     def add_boxes(self, message, now_ns):
         """Add an Int32MultiArray of 2D boxes. Raises ValueError where it is none."""
-        boxes = boxes2d_from_message(message)
+        boxes = boxes2d_from_msg(message)
         if boxes.stamp_ns is None and not self._said_plain:
             self._said_plain = True
             self._tally.note('2D boxes without a stamp', 'the 2D boxes carry no stamp: each array is paired with the '
@@ -129,7 +129,7 @@ class Lifter(object):
 
         Returns
         -------
-        Lifted
+        EstimatedBoxes
 
         Raises
         ------
@@ -152,7 +152,7 @@ class Lifter(object):
         self._tally.count_all(counts)
         stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
         frame_id = self._params.frame_id or depth_msg.header.frame_id
-        return Lifted(Header(stamp=stamp, frame_id=frame_id), depth, boxes3d)
+        return EstimatedBoxes(Header(stamp=stamp, frame_id=frame_id), depth, boxes3d)
 
     def _usable_rects(self, boxes2d):
         """The rectangles (x1, y1, x2, y2) that are neither empty nor reversed."""
@@ -183,7 +183,7 @@ class Lifter(object):
         if of_time_before:
             self._tally.count('2D boxes of a time before')
             return
-        with self._tally.refusing('2D boxes'):
+        with self._tally.rejecting('2D boxes'):
             self._tally.count('arrays without a depth image')
             raise ValueError(self._why_no_frame(boxes2d))
 

@@ -8,15 +8,15 @@ from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, topic_of
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_message,
-                                                   boxes3d_to_message, tracks_to_message)
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg,
+                                                   boxes3d_to_msg, tracks_to_msg)
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
 from ros_3d_bb.detection.yolov5.detector import DetectionParams
-from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, DepthSearch, Yolov5NodeParams
-from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, Lifter
-from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, Follower, TrackerNodeParams
+from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, RgbdDetectionStage, Yolov5NodeParams
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
+from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
 from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 
 INFO_TOPIC = INFO_TOPICS[0]
@@ -65,33 +65,37 @@ class Pipeline(object):
     def __init__(self, settings, tally, transforms):
         self._tally = tally
         follower, marker_params, *tracking = settings.tracker
-        self._follower, self._markers = Follower(follower, tracking, tally, transforms), MarkerWriter(marker_params)
-        self._lifters = {camera: Lifter(settings.bbox3d[0], tally, functools.partial(self._on_frame, camera),
-                                        settings.name(DEPTH_TOPIC, camera), settings.name(INFO_TOPIC, camera))
-                         for camera in settings.cameras}
+        self._tracking_stage, self._markers = TrackingStage(follower, tracking, tally,
+                                                            transforms), MarkerWriter(marker_params)
+        self._estimation_stages = {camera: EstimationStage(settings.bbox3d[0], tally,
+                                                           functools.partial(self._on_frame, camera),
+                                                           settings.name(DEPTH_TOPIC, camera),
+                                                           settings.name(INFO_TOPIC, camera))
+                                   for camera in settings.cameras}
         self._searches, self._publish_empty = {}, settings.yolov5[0].publish_empty
         if settings.detector == 'depth':
             params, people = settings.depth
             transforms = transforms if params.floor_frame else None
-            self._searches = {camera: DepthSearch(params, people, tally, functools.partial(self._on_images, camera),
-                                                  transforms) for camera in settings.cameras}
+            self._searches = {camera: RgbdDetectionStage(params, people, tally,
+                                                         functools.partial(self._on_images, camera),
+                                                         transforms) for camera in settings.cameras}
             self._publish_empty = params.publish_empty
         self._now_ns, self._outputs = 0, []  # of the message that is being processed
 
     def take(self, topic, message, now_ns, camera=''):
         """Take a message of a topic of the nodes, recorded at a time. Returns [(topic, message), ...]."""
         self._now_ns, self._outputs = now_ns, []
-        search, lifter = self._searches.get(camera), self._lifters[camera]
-        with_camera, with_depth = self._follower.looks
+        search, lifter = self._searches.get(camera), self._estimation_stages[camera]
+        with_camera, with_depth = self._tracking_stage.looks
         if topic == INFO_TOPIC:
             if with_camera:
-                self._follower.add_camera_info(message, camera)
+                self._tracking_stage.add_camera_info(message, camera)
             if search is not None:
                 search.add_camera_info(message, now_ns)
             lifter.add_camera_info(message, now_ns)
         elif topic == DEPTH_TOPIC:
             if with_depth:
-                self._follower.add_depth(message, now_ns, camera)
+                self._tracking_stage.add_depth(message, now_ns, camera)
             if search is not None:
                 search.add_depth(message, now_ns)
             lifter.add_depth(message, now_ns)
@@ -111,14 +115,14 @@ class Pipeline(object):
     def searching(self):
         """Around the search in one image: whatever it raises, the next one is searched."""
         try:
-            with self._tally.refusing('images'):
+            with self._tally.rejecting('images'):
                 yield
         except Exception as error:  # as the nodes' workers do
             self._tally.warn('searches failed', 'the detector failed: %s; waiting for the next image' % cause(error))
 
     def end(self):
         """Nothing more will come."""
-        for part in list(self._searches.values()) + list(self._lifters.values()):
+        for part in list(self._searches.values()) + list(self._estimation_stages.values()):
             part.end()
 
     def _on_images(self, camera, color_msg, depth_msg, camera_model):
@@ -133,22 +137,22 @@ class Pipeline(object):
         """As the detector nodes: publish 2D boxes."""
         if not len(detections.boxes) and not self._publish_empty:
             return
-        message = boxes2d_to_message(detections.boxes, header)
+        message = boxes2d_to_msg(detections.boxes, header)
         self._outputs.append((topic_of(camera, BOXES_TOPIC), message))
-        self._lifters[camera].add_boxes(message, self._now_ns)
+        self._estimation_stages[camera].add_boxes(message, self._now_ns)
 
     def _on_frame(self, camera, boxes2d, depth_msg, camera_model):
         """As bbox3d_node: publish the 3D boxes of one image."""
-        with self._tally.refusing('2D boxes'):
-            header, _depth, boxes3d = self._lifters[camera].estimate(boxes2d, depth_msg, camera_model)
-            message = boxes3d_to_message(boxes3d, header, camera_model)
+        with self._tally.rejecting('2D boxes'):
+            header, _depth, boxes3d = self._estimation_stages[camera].estimate(boxes2d, depth_msg, camera_model)
+            message = boxes3d_to_msg(boxes3d, header, camera_model)
             self._outputs.append((topic_of(camera, BOXES3D_TOPIC), message))
             self._on_boxes3d(camera, message)
 
     def _on_boxes3d(self, camera, message):
         """As tracker_node: publish tracks and markers."""
-        with self._tally.refusing('3D boxes'):
-            followed = self._follower.add_boxes(message, self._now_ns, camera)
+        with self._tally.rejecting('3D boxes'):
+            followed = self._tracking_stage.add_boxes(message, self._now_ns, camera)
             if followed is not None:
-                self._outputs.append((TRACKS_TOPIC, tracks_to_message(followed.tracks, followed.header)))
+                self._outputs.append((TRACKS_TOPIC, tracks_to_msg(followed.tracks, followed.header)))
                 self._outputs.append((MARKERS_TOPIC, self._markers.write(followed.tracks, followed.header)))

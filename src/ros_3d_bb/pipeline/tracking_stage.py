@@ -8,18 +8,18 @@ import numpy as np
 import tf2_ros
 from std_msgs.msg import Header
 
-from ros_3d_bb.conversions.image_msgs import depth_from
-from ros_3d_bb.conversions.perception_msgs import (camera_from_message, detections_from_message, stamp_of, time_from,
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
+from ros_3d_bb.conversions.perception_msgs import (camera_from_msg, detections_from_msg, stamp_of, time_from,
                                                    usable_boxes3d)
 from ros_3d_bb.core.camera_clocks import LONGEST_LAG_NS, CameraClocks
 from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
-from ros_3d_bb.core.time_sync import JUMP_NS, NS, StampedCache
+from ros_3d_bb.core.time_sync import JUMP_NS, NS, MessageCache
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
-from ros_3d_bb.tracking.types import View
+from ros_3d_bb.tracking.types import CameraView
 
 TRACKING_PARAMS = ThesisTrackerParams, TrackerParams, NoiseParams, PredictionParams
 TRACKERS = {'thesis': (ThesisTracker, slice(0, 1)), 'kalman': (Tracker, slice(1, 4))}  # with their part of those
@@ -44,7 +44,7 @@ class TrackerNodeParams(NamedTuple):
     tf_timeout: float = Param(0.2, 'How long to wait for the transform at the stamp of the boxes.', 's')
 
 
-class Located(NamedTuple):
+class LocatedBoxes(NamedTuple):
     """A BoundingBox3DArray of a camera (its namespace, '' for the only one) whose transform is known, (4, 4), and how
     often time had gone back until it came.
     """
@@ -55,14 +55,14 @@ class Located(NamedTuple):
     jumps: int
 
 
-class Followed(NamedTuple):
+class TrackingResult(NamedTuple):
     """The tracks (`types.TrackedObject`) after one image; the header has the newest stamp and the fixed frame."""
 
     header: Header
     tracks: list
 
 
-class Follower(object):
+class TrackingStage(object):
     """Follow 3D boxes in a fixed frame. Without a transform at their stamp there is no answer and nobody ages.
 
     Each message comes with the namespace of its camera, '' for the only one; boxes and depth also with when they
@@ -73,7 +73,7 @@ class Follower(object):
     params : TrackerNodeParams
     tracking : list
         One instance of each of `TRACKING_PARAMS`.
-    tally : event_counter.Tally
+    tally : event_counter.EventCounter
     transforms
         Its `lookup(target_frame, source_frame, stamp)` returns target_from_source (4, 4) or raises
         tf2_ros.TransformException; `go_back()` is called where time went back.
@@ -94,18 +94,18 @@ class Follower(object):
         self._jumps = 0  # how often time has gone back
         self._frames = {}  # by camera
         self._intrinsics = {}
-        self._depths = {camera: StampedCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
+        self._depths = {camera: MessageCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
 
     @property
     def cameras(self):
         """The namespaces of the cameras."""
         return tuple(self._params.cameras) or ('',)
 
-    def tune(self, tracking):
+    def reconfigure(self, tracking):
         """Take the next boxes with other parameters of tracking; tracks go on. Raises ValueError as at the start."""
         _trackers_of(tracking)  # also what the other one would refuse is refused
         with self._tracks_lock:
-            self._tracker.tune(*tracking[TRACKERS[self._params.tracker][1]])
+            self._tracker.reconfigure(*tracking[TRACKERS[self._params.tracker][1]])
 
     @property
     def looks(self):
@@ -115,7 +115,7 @@ class Follower(object):
 
     def add_camera_info(self, message, camera=''):
         """Take a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
-        self._intrinsics[camera] = camera_from_message(message)
+        self._intrinsics[camera] = camera_from_msg(message)
 
     def add_depth(self, message, now_ns, camera=''):
         """Take a depth image. Raises ValueError where it carries no stamp."""
@@ -127,7 +127,7 @@ class Follower(object):
 
         Returns
         -------
-        Followed or None
+        TrackingResult or None
             None where there is no transform for it, or where its stamp is not of the time of the other cameras.
 
         Raises
@@ -143,7 +143,7 @@ class Follower(object):
 
         Returns
         -------
-        Located or None
+        LocatedBoxes or None
             As of `add_boxes`, and ValueError, too.
         """
         stamp_ns = stamp_of(message)
@@ -157,8 +157,8 @@ class Follower(object):
                 self._go_back(stamp_ns)
             jumps = self._jumps
         try:
-            return Located(message, camera, self._transforms.lookup(self._params.target_frame, frame_id,
-                                                                    message.header.stamp), jumps)
+            return LocatedBoxes(message, camera, self._transforms.lookup(self._params.target_frame, frame_id,
+                                                                         message.header.stamp), jumps)
         except tf2_ros.TransformException as error:
             with self._tracks_lock:
                 if jumps == self._jumps:
@@ -172,7 +172,7 @@ class Follower(object):
 
         Returns
         -------
-        Followed or None
+        TrackingResult or None
             None where time went back since it was located. Raises ValueError as `add_boxes`.
         """
         message, camera, fixed_from_camera, jumps = located
@@ -185,7 +185,7 @@ class Follower(object):
             with self._tracks_lock:
                 self._tracker.skip(stamp_ns, camera or message.header.frame_id)
             raise ValueError('none of their %d boxes can be used; tracks are kept as they are' % len(faults))
-        detections = detections_from_message(usable, fixed_from_camera)
+        detections = detections_from_msg(usable, fixed_from_camera)
         with self._tracks_lock:
             if jumps != self._jumps:
                 self._tally.warn('images of the time before', 'boxes at %.3f are left out: time went back while their '
@@ -196,23 +196,23 @@ class Follower(object):
             self._newest_ns[camera] = max(stamp_ns, self._newest_ns.get(camera, stamp_ns))
             newest_ns = max(self._newest_ns.values())
         self._tally.count('images tracked')
-        return Followed(Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame), tracks)
+        return TrackingResult(Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame), tracks)
 
     def _view(self, stamp_ns, located):
         """What the camera saw at a stamp, as far as it is known."""
         name = located.camera or located.message.header.frame_id
         camera = self._intrinsics.get(located.camera)
         if camera is None:
-            return View(located.fixed_from_camera, camera=name)
+            return CameraView(located.fixed_from_camera, camera=name)
         with self._images_lock:
-            entry = self._depths[located.camera].at(stamp_ns, int(self._params.stamp_tolerance * NS))
+            entry = self._depths[located.camera].nearest(stamp_ns, int(self._params.stamp_tolerance * NS))
         depth_at = None
         if entry is not None:
-            with self._tally.refusing('depth images'):  # the boxes are good without
-                depth = depth_from(entry.value, self._params.depth_scale)
+            with self._tally.rejecting('depth images'):  # the boxes are good without
+                depth = imgmsg_to_depth(entry.value, self._params.depth_scale)
                 if depth.values.shape == (camera.height, camera.width):  # bbox3d_node says what is wrong with others
                     depth_at = functools.partial(depths_towards, camera, depth)
-        return View(located.fixed_from_camera, camera, name, depth_at)
+        return CameraView(located.fixed_from_camera, camera, name, depth_at)
 
     def _is_jump_back(self, stamp_ns, now_ns, camera):
         """Whether time went back with an image that was accepted; not where a camera lags behind one that has ended."""

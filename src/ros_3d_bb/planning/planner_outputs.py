@@ -6,8 +6,8 @@ from typing import Any, Callable, NamedTuple
 from sensor_msgs.msg import PointCloud2
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.conversions.planner_msgs import (detections3d_to_message, objects_to_message, obstacles_to_message,
-                                                people_to_message, points_to_message)
+from ros_3d_bb.conversions.planner_msgs import (detections3d_to_msg, objects_to_msg, obstacles_to_msg,
+                                                people_to_msg, points_to_msg)
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.planning.planner_view import footprint_points, in_frame, ring_points
 
@@ -44,12 +44,12 @@ class OptionalOutput(NamedTuple):
 
 
 OPTIONAL = {
-    'people': OptionalOutput('/people', 'people_msgs', 'People', people_to_message, to_now=True),
-    'teb': OptionalOutput('~obstacles', 'costmap_converter', 'ObstacleArrayMsg', obstacles_to_message,
+    'people': OptionalOutput('/people', 'people_msgs', 'People', people_to_msg, to_now=True),
+    'teb': OptionalOutput('~obstacles', 'costmap_converter', 'ObstacleArrayMsg', obstacles_to_msg,
                           in_planner_frame=True, to_now=True, float32=True),
-    'mpc': OptionalOutput('~objects', 'derived_object_msgs', 'ObjectArray', objects_to_message,
+    'mpc': OptionalOutput('~objects', 'derived_object_msgs', 'ObjectArray', objects_to_msg,
                           in_planner_frame=True, to_now=True),
-    'vision': OptionalOutput('~detections', 'vision_msgs', 'Detection3DArray', detections3d_to_message)}
+    'vision': OptionalOutput('~detections', 'vision_msgs', 'Detection3DArray', detections3d_to_msg)}
 NAMES = ['costmap'] + sorted(OPTIONAL)
 
 
@@ -102,9 +102,9 @@ def _costmap_outputs(params):
 
 def _footprints(params, tracks, robot_from_tracks, header):
     points_m = footprint_points(tracks, params.points_prediction, params.point_spacing)
-    return points_to_message(transform_points(robot_from_tracks, points_m), header)
+    return points_to_msg(transform_points(robot_from_tracks, points_m), header)
 
 
 def _ring(ring_m, _tracks, robot_from_tracks, header):
     """Around the robot's origin, level in the frame of the tracks."""
-    return points_to_message(ring_m.dot(robot_from_tracks[:3, :3].T), header)
+    return points_to_msg(ring_m.dot(robot_from_tracks[:3, :3].T), header)

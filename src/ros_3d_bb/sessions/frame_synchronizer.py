@@ -1,7 +1,7 @@
 """Synchronizer of the messages of one image: colour, depth, camera, 2D boxes and 3D boxes."""
 from typing import Any, NamedTuple
 
-from ros_3d_bb.core.time_sync import Pairing, StampedCache
+from ros_3d_bb.core.time_sync import MessageCache, StampSynchronizer
 
 
 class Snapshot(NamedTuple):
@@ -18,8 +18,8 @@ class Snapshot(NamedTuple):
 class Snapshots(object):
     """Combines messages of five topics, which may arrive in any order, to snapshots.
 
-    The stamps of boxes must be equal to that of the colour image. Depth and camera are paired as in `Pairing`. If time
-    jumps back, older messages are dropped.
+    The stamps of boxes must be equal to that of the colour image. Depth and camera are paired as in
+    `StampSynchronizer`. If time jumps back, older messages are dropped.
 
     Parameters
     ----------
@@ -33,9 +33,9 @@ class Snapshots(object):
 
     def __init__(self, length_ns, tolerance_ns, on_lost):
         self._length_ns = length_ns
-        self._sync = Pairing(length_ns, tolerance_ns, 0, self._on_frame, self._on_lost_color)
+        self._sync = StampSynchronizer(length_ns, tolerance_ns, 0, self._on_frame, self._on_lost_color)
         self._report_lost = on_lost
-        self._images, self._boxes2d, self._boxes3d = (StampedCache(length_ns) for _part in range(3))
+        self._images, self._boxes2d, self._boxes3d = (MessageCache(length_ns) for _part in range(3))
         self._first_ns = None
 
     def add_color(self, stamp_ns, now_ns, color):
@@ -47,7 +47,7 @@ class Snapshots(object):
         self._sync.add_depth(stamp_ns, now_ns, depth)
 
     def add_camera(self, stamp_ns, now_ns, camera):
-        """Take the camera of an image, as `Pairing.add_camera`."""
+        """Take the camera of an image, as `StampSynchronizer.add_camera`."""
         self._sync.add_camera(stamp_ns, now_ns, camera)
 
     def add_boxes2d(self, stamp_ns, now_ns, boxes):
@@ -75,7 +75,7 @@ class Snapshots(object):
 
     def _snapshot(self, entry):
         color, depth, camera = entry.value
-        boxes2d, boxes3d = (cache.at(entry.stamp_ns) for cache in (self._boxes2d, self._boxes3d))
+        boxes2d, boxes3d = (cache.nearest(entry.stamp_ns) for cache in (self._boxes2d, self._boxes3d))
         return Snapshot(entry.stamp_ns, color, depth, camera, boxes2d and boxes2d.value,
                         boxes3d and boxes3d.value)
 

@@ -26,7 +26,7 @@ class SessionError(ValueError):
     """Measurement session that cannot be read. The message names the file, the fault, and what was expected."""
 
 
-class Detection(NamedTuple):
+class RecordedDetection(NamedTuple):
     """Person in an image: `box_px` (x1, y1, x2, y2), `estimate_m` (x, y, z) in the optical frame, `size_m` (width,
     height), `support` and `truncated` as in box3d_estimator.Box3D; None if not stored. `by_hand`: a user drew the box.
     """
@@ -39,7 +39,7 @@ class Detection(NamedTuple):
     by_hand: bool = False
 
 
-class Frame(NamedTuple):
+class Measurement(NamedTuple):
     """One measurement. `person` is the index of the detection that the ground truth belongs to; `truth_m` (x, z) and
     `truth_y_m` are in the optical frame; None if not annotated. `rejected` is the reason why the measurement is
     excluded, or None. `stamp_ns` is the stamp of the image, or None if not stored.
@@ -48,7 +48,7 @@ class Frame(NamedTuple):
     id: str
     color_path: str
     depth_path: str
-    detections: Tuple[Detection, ...]
+    detections: Tuple[RecordedDetection, ...]
     person: int = 0
     truth_m: Optional[np.ndarray] = None
     truth_y_m: Optional[float] = None
@@ -81,7 +81,7 @@ class Session(NamedTuple):
     camera: Camera
     depth_scale_m: float
     frame_id: str
-    frames: Tuple[Frame, ...]
+    frames: Tuple[Measurement, ...]
 
 
 def read_session(folder):
@@ -143,7 +143,7 @@ def frame_of(folder, entry):
     person, truth_mm, stamp = int(entry.get('person', 0)), entry.get('truth_mm'), entry.get('stamp')
     if not 0 <= person < max(1, len(detections)):
         raise ValueError('person is %d, but there are %d detections' % (person, len(detections)))
-    return Frame(
+    return Measurement(
         str(entry['id']), os.path.join(folder, entry['color']), os.path.join(folder, entry['depth']),
         tuple(_detection_from(detection) for detection in detections), person,
         None if truth_mm is None else _numbers([truth_mm['x'], truth_mm['z']], 2) / 1000,
@@ -204,11 +204,12 @@ def _used_frames(folder, entries, path):
 def _detection_from(entry):
     box, size_mm, support = entry.get('box'), entry.get('size_mm'), entry.get('support')
     estimate_mm = entry.get('estimate_mm', entry.get('original_mm'))
-    return Detection(None if not box else tuple(int(edge) for edge in _numbers(box, 4)),
-                     None if estimate_mm is None else _numbers(estimate_mm, 3) / 1000,
-                     None if size_mm is None else _numbers(size_mm, 2) / 1000,
-                     None if support is None else float(_numbers([support], 1)[0]),
-                     None if entry.get('truncated') is None else bool(entry['truncated']), entry.get('by') == 'hand')
+    return RecordedDetection(None if not box else tuple(int(edge) for edge in _numbers(box, 4)),
+                             None if estimate_mm is None else _numbers(estimate_mm, 3) / 1000,
+                             None if size_mm is None else _numbers(size_mm, 2) / 1000,
+                             None if support is None else float(_numbers([support], 1)[0]),
+                             None if entry.get('truncated') is None else bool(entry['truncated']),
+                             entry.get('by') == 'hand')
 
 
 def _stamp_ns_from(text):

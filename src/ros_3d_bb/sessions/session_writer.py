@@ -12,7 +12,7 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.core.atomic_file import FILE_NAME, changing, write_whole
+from ros_3d_bb.core.atomic_file import FILE_NAME, atomic_write, locked_update
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.sessions.session_reader import read_session
@@ -22,7 +22,7 @@ MAX_DEPTH_MM = 65535  # of 16 bits
 ID_FORMAT = re.compile(r'(\d+)_\d+_\d{9}$')
 
 
-class Measurement(NamedTuple):
+class MeasurementRecord(NamedTuple):
     """One measurement to be stored.
 
     Attributes
@@ -83,13 +83,13 @@ def append(folder, measurement):
         os.makedirs(os.path.join(folder, name), exist_ok=True)
     written = []
     try:
-        with changing(folder) as content:
+        with locked_update(folder) as content:
             _check_camera(folder, measurement, depth.scale_m)
             content.setdefault('camera', _camera_entry(measurement, depth.scale_m))
             entry = _frame_entry(measurement, _next_id(content['frames'], measurement.stamp_ns))
             for name, pixels in (('color', measurement.color[..., ::-1]), ('depth', depth.values)):
                 path = os.path.join(folder, entry[name])
-                write_whole(path, _png(pixels))
+                atomic_write(path, _png(pixels))
                 written.append(path)
             content['frames'].append(entry)
     except BaseException:

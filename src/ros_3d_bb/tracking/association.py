@@ -20,7 +20,7 @@ def associate(tracks, batch, stamp_ns, params, outliers):
     ----------
     tracks : numpy.ndarray of track.TRACK, (n,)
         Predicted to the stamp.
-    batch : measurement_model.Sightings
+    batch : measurement_model.MeasurementBatch
         m measurements.
     stamp_ns : int
     params : tracker.TrackerParams
@@ -31,11 +31,11 @@ def associate(tracks, batch, stamp_ns, params, outliers):
     rows, columns : numpy.ndarray of int, (k,)
         Pairs of a track and a measurement.
     """
-    cost = kalman_filter.unlikeliness(tracks['mean'], tracks['covariance'], batch.ground, outliers)
+    cost = kalman_filter.negative_log_likelihood(tracks['mean'], tracks['covariance'], batch.ground, outliers)
     cost += _height_cost(tracks, batch, params.height_sigma)
     # An uncertain detection hardly tells a track from a new target; the track then gets it.
     largest_density = 1 / (2 * np.pi * np.sqrt(np.linalg.det(batch.ground.noise_m2)))
-    density = np.minimum(params.newcomer_density, UNSURE_SHARE * largest_density)
+    density = np.minimum(params.new_target_density, UNSURE_SHARE * largest_density)
     cost[cost >= -2 * np.log(2 * np.pi * density)] = np.inf
     is_missed = stamp_ns - tracks['last_ns'] >= RECENT_NS
     priority = np.where(tracks['confirmed'], is_missed.astype(int), 2)
@@ -114,7 +114,7 @@ def assign(costs):
     return [(int(row), int(column)) for row, column in pairs if allowed[row, column]]
 
 
-def remaining(count, numbers):
+def unmatched(count, numbers):
     """The numbers (k,) below `count` that are not among `numbers`, in order."""
     left = np.ones(count, bool)
     left[numbers] = False

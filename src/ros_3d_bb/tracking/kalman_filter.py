@@ -48,7 +48,7 @@ def _white(elapsed_s):
     return np.array([[position, 0, both, 0], [0, position, 0, both], [both, 0, elapsed_s, 0], [0, both, 0, elapsed_s]])
 
 
-def unlikeliness(mean, covariance, measurements, outliers):
+def negative_log_likelihood(mean, covariance, measurements, outliers):
     """How well each measurement fits each object.
 
     Returns

@@ -28,7 +28,7 @@ class NoiseParams(NamedTuple):
     noise_correlation_time: float = Param(0.15, 'How long they are correlated.', 's', live=(0, 1))
 
 
-class Sightings(NamedTuple):
+class MeasurementBatch(NamedTuple):
     """The detections of one image as arrays: where they are on the ground, extents (n, 3), height of the centre and
     its variance, (n,), and whether the image border cuts them on the left, at the top, on the right and at the bottom,
     (n, 4)."""
@@ -49,13 +49,14 @@ class Sightings(NamedTuple):
         """Whether the image border hides the lower and the upper end, (n, 2)."""
         return self.truncated[:, [3, 1]]
 
-    def taken(self, columns):
+    def select(self, columns):
         """Those in `columns` alone."""
         ground, *others = self
-        return Sightings(Measurements(*(values[columns] for values in ground)), *(values[columns] for values in others))
+        return MeasurementBatch(Measurements(*(values[columns] for values in ground)),
+                                *(values[columns] for values in others))
 
 
-class _Seen(NamedTuple):
+class _ObservedDetections(NamedTuple):
     """Detections as the camera saw them: on the ground, (n, 2); distances, bearings, half widths in radians, (n,)."""
 
     positions_m: np.ndarray
@@ -70,7 +71,7 @@ class _Seen(NamedTuple):
         return np.stack((-self.rays[:, 1], self.rays[:, 0]), axis=1)
 
 
-def sightings_of(detections, view, elapsed_s, params):
+def measurement_batch_of(detections, view, elapsed_s, params):
     """The detections of one image, with the noise that a filter may believe.
 
     An error that lasts for several images would be taken for certainty if each image counted as a new opinion. The part
@@ -88,7 +89,7 @@ def sightings_of(detections, view, elapsed_s, params):
 
     Returns
     -------
-    Sightings
+    MeasurementBatch
     """
     positions_m = np.array([detection.position_m for detection in detections]).reshape(-1, 3)
     sizes_m = np.array([detection.size_m for detection in detections]).reshape(-1, 3)
@@ -105,7 +106,7 @@ def sightings_of(detections, view, elapsed_s, params):
     shift_m = np.clip((PERSON_WIDTH_M - sizes_m[:, 0]) / 2, 0, MAX_SHIFT_M)
     noise_m2 = _noise(covariances[:, :2, :2], seen, cut | (hidden != 0), elapsed_s, params)
     ground = Measurements(seen.positions_m + (side * shift_m)[:, None] * seen.sides, noise_m2, seen.rays)
-    return Sightings(ground, sizes_m, positions_m[:, 2], covariances[:, 2, 2], truncated)
+    return MeasurementBatch(ground, sizes_m, positions_m[:, 2], covariances[:, 2, 2], truncated)
 
 
 def _seen(positions_m, widths_m, view):
@@ -114,7 +115,7 @@ def _seen(positions_m, widths_m, view):
     distances_m = np.maximum(distances_m, NEAR_M)
     rays = (positions_m - view.fixed_from_camera[:2, 3]) / distances_m[:, None]
     rays[is_near] = view.ahead
-    return _Seen(positions_m, rays, distances_m, bearings, np.arctan2(widths_m / 2, distances_m))
+    return _ObservedDetections(positions_m, rays, distances_m, bearings, np.arctan2(widths_m / 2, distances_m))
 
 
 def _hidden_side(seen):

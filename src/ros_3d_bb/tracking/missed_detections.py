@@ -8,23 +8,24 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.occlusion import places_in
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, View
+from ros_3d_bb.tracking.occlusion import classify_visibility
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
 
-SEEN = -1  # better than what `places_in` says of places where nobody was found: VISIBLE, OCCLUDED, OUT_OF_VIEW
+# better than what `classify_visibility` says of places where nobody was found: VISIBLE, OCCLUDED, OUT_OF_VIEW
+SEEN = -1
 STATUS = np.array([OCCLUDED, OCCLUDED, OUT_OF_VIEW, VISIBLE])  # by that, the last one of SEEN
 LATELY_NS = NS  # a camera whose latest image is older is not asked
 BEHIND_M = 0.45  # no less sure is where somebody is who does not come out from behind something
 HIDING_S = 0.3  # who was missed for longer hides nobody
 
 
-class Look(NamedTuple):
+class CameraVisibility(NamedTuple):
     """The latest image of a camera: its stamp, its view, and what it said of each track (n,): SEEN, or what the camera
     could see of the place.
     """
 
     stamp_ns: int
-    view: View
+    view: CameraView
     places: np.ndarray
 
 
@@ -40,7 +41,7 @@ def carried(looks, kept, begun):
             for camera, look in looks.items()}
 
 
-def miss(tracks, before, rows, view, others, looked_s, farthest_m):
+def mark_missed(tracks, before, rows, view, others, looked_s, farthest_m):
     """Say why the tracks in `rows` were not seen, and count for how long, and how long of that they should have.
 
     Who was hidden, should have come out by now and did not, is still behind what hid them.
@@ -50,7 +51,7 @@ def miss(tracks, before, rows, view, others, looked_s, farthest_m):
     tracks, before : numpy.ndarray of tracker.TRACK, (n,)
         At the stamp of the image, changed in place; and after the image before.
     rows : numpy.ndarray of int
-    view : View
+    view : CameraView
     others : dict
         Of `others_of`.
     looked_s : float
@@ -99,7 +100,7 @@ def _places(missed, tracks, view, farthest_m):
     if not len(missed):
         return np.zeros(0, int)
     hiding = tracks[tracks['confirmed'] & (tracks['missed_s'] < HIDING_S)]
-    return places_in(view, positions_of(missed), missed['size_m'], positions_of(hiding), farthest_m)
+    return classify_visibility(view, positions_of(missed), missed['size_m'], positions_of(hiding), farthest_m)
 
 
 def positions_of(tracks):

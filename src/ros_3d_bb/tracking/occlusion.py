@@ -15,7 +15,7 @@ HIDDEN_SHARE = 0.5
 ACROSS, ALONG = np.meshgrid((-0.6, 0, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))  # where depth is asked for, in half extents
 
 
-def places_in(view, positions_m, sizes_m, others_m, farthest_m):
+def classify_visibility(view, positions_m, sizes_m, others_m, farthest_m):
     """What the camera could see of the places where people are thought to be.
 
     Parameters

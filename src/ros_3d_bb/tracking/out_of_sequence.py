@@ -3,7 +3,7 @@ import collections
 from typing import NamedTuple
 
 from ros_3d_bb.core.time_sync import MAX_RATE_HZ, NS
-from ros_3d_bb.tracking.types import View
+from ros_3d_bb.tracking.types import CameraView
 
 LATEST_NS = NS // 2  # images that are older than the newest by more are refused
 MOST_KEPT = LATEST_NS * MAX_RATE_HZ // NS  # images of one camera
@@ -15,7 +15,7 @@ class DetectedImage(NamedTuple):
 
     stamp_ns: int
     detections: tuple
-    view: View
+    view: CameraView
 
     @property
     def order(self):

@@ -63,12 +63,12 @@ class ThesisTracker(object):
     """
 
     def __init__(self, params=ThesisTrackerParams()):
-        self.tune(params)
+        self.reconfigure(params)
         self._tracks = []
         self._last_id = 0
         self._now_ns, self._skipped_ns = None, 0
 
-    def tune(self, params):
+    def reconfigure(self, params):
         """Go on with other parameters and the same tracks. Raises ValueError as at the start, and changes nothing."""
         check_steps(params.prediction_time, params.prediction_step)
         self._params = params

@@ -26,7 +26,7 @@ def update_matched(tracks, rows, batch, stamp_ns, params, outliers):
     tracks : numpy.ndarray of TRACK, (n,)
         Predicted to the stamp.
     rows : numpy.ndarray of int, (m,)
-    batch : measurement_model.Sightings
+    batch : measurement_model.MeasurementBatch
         m measurements.
     stamp_ns : int
     params : tracker.TrackerParams
@@ -38,7 +38,7 @@ def update_matched(tracks, rows, batch, stamp_ns, params, outliers):
     matched['hits'] += 1
     matched['last_ns'], matched['unseen_s'], matched['missed_s'], matched['status'] = stamp_ns, 0, 0, VISIBLE
     is_old_enough = stamp_ns - matched['first_ns'] >= params.min_age * NS
-    matched['confirmed'] |= is_old_enough & (matched['hits'] >= params.min_sightings)
+    matched['confirmed'] |= is_old_enough & (matched['hits'] >= params.min_hits)
     speed_mps = np.linalg.norm(matched['mean'][:, 2:], axis=1)
     matched['moving'] = speed_mps >= params.moving_speed * np.where(matched['moving'], STILL_MOVING, 1)
     _update_size(matched, batch)
@@ -51,7 +51,7 @@ def new_targets(tracks, batch, stamp_ns, params):
     Parameters
     ----------
     tracks : numpy.ndarray of TRACK, (n,)
-    batch : measurement_model.Sightings
+    batch : measurement_model.MeasurementBatch
         m measurements.
     stamp_ns : int
     params : tracker.TrackerParams

@@ -13,9 +13,9 @@ import numpy as np
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
-from ros_3d_bb.tracking.association import associate, remaining
-from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, sightings_of
-from ros_3d_bb.tracking.missed_detections import SEEN, Look, carried, miss, others_of, sigma_of
+from ros_3d_bb.tracking.association import associate, unmatched
+from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurement_batch_of
+from ros_3d_bb.tracking.missed_detections import SEEN, CameraVisibility, carried, mark_missed, others_of, sigma_of
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, Matches, OutOfSequenceBuffer
 from ros_3d_bb.tracking.prediction import PredictionParams, objects_of
 from ros_3d_bb.tracking.track import TRACK, new_targets, update_matched
@@ -44,7 +44,7 @@ class TrackerParams(NamedTuple):
         0.45, 'How far behind the person their depth is: mean.', 'm', live=(0, 2), section=BOX_ERRORS)
     outlier_spread: float = Param(
         0.3, 'How far behind the person their depth is: standard deviation.', 'm', live=(0, 2), section=BOX_ERRORS)
-    newcomer_density: float = Param(
+    new_target_density: float = Param(
         0.12, 'Density of new targets and false detections. A box that no track explains better than this starts a '
         'new track.', '1/m²', limits=(1e-9, LARGEST), live=(0.001, 1), section=ASSOCIATION)
     duplicate_distance: float = Param(
@@ -52,17 +52,17 @@ class TrackerParams(NamedTuple):
     height_sigma: float = Param(
         0.06, "Standard deviation of the height of a person's boxes.", 'm', limits=(1e-6, LARGEST), live=(0.01, 0.5),
         section=ASSOCIATION)
-    min_sightings: int = Param(4, 'A track is published after at least this many detections.', live=(1, 20))
+    min_hits: int = Param(4, 'A track is published after at least this many detections.', live=(1, 20))
     min_age: float = Param(0.1, 'A track is published at this age at the earliest.', 's', live=(0, 2))
-    missed_limit: float = Param(
+    max_missed_time: float = Param(
         0.35, 'How long a track stays published while a camera should detect the person and does not.', 's',
         live=(0, 5))
     out_of_view_limit: float = Param(
         1.0, 'How long a track stays published while the person is out of view of all cameras.', 's', live=(0, 10))
-    unsure_limit: float = Param(
+    max_position_std: float = Param(
         0.5, 'A track stays published during occlusion up to this standard deviation of its position.', 'm',
         live=(0, 2))
-    memory: float = Param(4.0, 'A person who reappears within this time keeps the track ID.', 's', live=(0, 30))
+    max_age: float = Param(4.0, 'A person who reappears within this time keeps the track ID.', 's', live=(0, 30))
     max_range: float = Param(
         8.0, 'Range of the detector: people who are farther from the camera are not expected to be detected.', 'm',
         live=(1, 20))
@@ -71,7 +71,7 @@ class TrackerParams(NamedTuple):
 
 class _State(NamedTuple):
     """What images change: the tracks and the stamp of the latest image; by camera, the stamp of its latest image and
-    its `missed_detections.Look`.
+    its `missed_detections.CameraVisibility`.
     """
 
     tracks: np.ndarray
@@ -93,10 +93,10 @@ class Tracker(object):
     """
 
     def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams()):
-        self.tune(params, noise, prediction)
+        self.reconfigure(params, noise, prediction)
         self._buffer = OutOfSequenceBuffer(self._step, _State(np.zeros(0, TRACK), None, {}, {}))
 
-    def tune(self, params, noise, prediction):
+    def reconfigure(self, params, noise, prediction):
         """Go on with other parameters and the same tracks. Raises ValueError as at the start, and changes nothing."""
         check_steps(prediction.prediction_time, prediction.prediction_step)
         self._params, self._noise, self._prediction = params, noise, prediction
@@ -137,7 +137,7 @@ class Tracker(object):
         """The people who are published now, by ID, at the stamp of the newest image."""
         tracks, params = self._buffer.state.tracks, self._params
         tracks = tracks[np.argsort(tracks['id'])]
-        published = (tracks['missed_s'] <= params.missed_limit) & (sigma_of(tracks) < params.unsure_limit)
+        published = (tracks['missed_s'] <= params.max_missed_time) & (sigma_of(tracks) < params.max_position_std)
         published |= tracks['status'] == VISIBLE
         published &= (tracks['status'] != OUT_OF_VIEW) | (tracks['unseen_s'] <= params.out_of_view_limit)
         return objects_of(tracks[tracks['confirmed'] & published], self._prediction)
@@ -152,11 +152,11 @@ class Tracker(object):
         update_matched(tracks, rows, batch.taken(columns), stamp_ns, params, self._outliers)
 
         others = others_of(state.looks, view, stamp_ns)
-        missed = remaining(len(tracks), rows)
-        places = miss(tracks, state.tracks, missed, view, others, observed_s, params.max_range)
+        missed = unmatched(len(tracks), rows)
+        places = mark_missed(tracks, state.tracks, missed, view, others, observed_s, params.max_range)
 
         kept = self._is_kept(tracks)
-        tracks, unmatched_columns = tracks[kept], remaining(len(image.detections), columns)
+        tracks, unmatched_columns = tracks[kept], unmatched(len(image.detections), columns)
         new = np.zeros(0, TRACK)
         if len(unmatched_columns):
             new, started = new_targets(tracks, batch.taken(unmatched_columns), stamp_ns, params)
@@ -164,7 +164,7 @@ class Tracker(object):
             tracks = np.concatenate((tracks, new))
 
         looks = carried(others, kept, len(new))
-        looks[view.camera] = Look(stamp_ns, view, np.concatenate((places[kept], np.full(len(new), SEEN))))
+        looks[view.camera] = CameraVisibility(stamp_ns, view, np.concatenate((places[kept], np.full(len(new), SEEN))))
         stamps_ns = {camera: last_ns for camera, last_ns in state.stamps_ns.items() if stamp_ns - last_ns <= KNOWN_NS}
         stamps_ns[view.camera] = stamp_ns
         return _State(tracks, stamp_ns, stamps_ns, looks), matches
@@ -180,9 +180,9 @@ class Tracker(object):
     def _measure(self, state, image):
         """The detections of an image as measurements, with their noise."""
         last_ns = state.stamps_ns.get(image.view.camera, image.stamp_ns)
-        return sightings_of(image.detections, image.view, (image.stamp_ns - last_ns) / NS, self._noise)
+        return measurement_batch_of(image.detections, image.view, (image.stamp_ns - last_ns) / NS, self._noise)
 
     def _is_kept(self, tracks):
         """Which tracks are kept, (n,); tentative ones only for a moment."""
-        limit_s = np.where(tracks['confirmed'], self._params.memory, TENTATIVE_TIMEOUT_S)
+        limit_s = np.where(tracks['confirmed'], self._params.max_age, TENTATIVE_TIMEOUT_S)
         return (tracks['unseen_s'] < limit_s) & (sigma_of(tracks) < MAX_POSITION_STD_M)

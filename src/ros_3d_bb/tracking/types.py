@@ -76,7 +76,7 @@ def _completed_in_portrait(box):
     return center_m, extents_m
 
 
-class View(NamedTuple):
+class CameraView(NamedTuple):
     """Where the camera of an image was, (4, 4) from its optical frame, and what it sees.
 
     `intrinsics` is None where they are not known. `camera` tells the images of one camera from those of another.

@@ -75,9 +75,9 @@ class MarkerWriter(object):
     def __init__(self, params=MarkerParams()):
         self._drawn = set()  # (namespace, id)
         self._histories = {}  # {track ID: PathHistory}
-        self.tune(params)
+        self.reconfigure(params)
 
-    def tune(self, params):
+    def reconfigure(self, params):
         """Draw the next tracks with other parameters."""
         self._params = params
         self._lifetime = genpy.Duration.from_sec(params.marker_lifetime)

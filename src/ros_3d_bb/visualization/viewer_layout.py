@@ -21,7 +21,7 @@ RATE_WINDOW_NS = 2 * NS  # interval for the frame rate
 TITLES = ('colour', 'depth', 'boxes')
 
 
-class View(NamedTuple):
+class ViewerContent(NamedTuple):
     """Content of the window: an image, its boxes, and text.
 
     `rects_px` are the 2D boxes, `boxes` the 3D boxes; None if they have not been received. `lines` are shown as plain

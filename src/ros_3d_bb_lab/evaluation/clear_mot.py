@@ -26,7 +26,7 @@ class Moment(NamedTuple):
     tracks: List[TrackedObject]
 
 
-class Pair(NamedTuple):
+class MatchedPair(NamedTuple):
     """A person and a track in one image; `error_m` is where the track lies, seen from the person, in x and y (2,)."""
 
     person: int
@@ -99,7 +99,8 @@ class ClearMatcher(object):
         kept = np.array([[self._last_matches.get(person.id) == track.id for track in tracks] for person in people])
         scores = np.where(near, KEPT * kept + 1 - distances_m / (2 * self._gate_m), 0)
         matches = sorted((match for match in assign(-scores) if near[match]), key=lambda match: -scores[match])
-        pairs = [Pair(people[row].id, tracks[column].id, tracks[column].position_m[:2] - people[row].position_m[:2])
+        pairs = [MatchedPair(people[row].id, tracks[column].id,
+                             tracks[column].position_m[:2] - people[row].position_m[:2])
                  for row, column in matches]
         self._last_matches = {pair.person: pair.track for pair in pairs}
         return pairs

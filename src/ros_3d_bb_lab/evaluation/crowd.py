@@ -12,7 +12,7 @@ COVERED = 0.2  # of a box, by its neighbour
 JITTER_PX = 2  # of the edges of a detector's box from image to image
 
 
-class Person(NamedTuple):
+class PersonCutout(NamedTuple):
     """Depth in the box of a person, (height, width), in the camera's units, and the row at which the box begins."""
 
     values: np.ndarray
@@ -39,7 +39,7 @@ def people_of(session):
     for frame in session.frames:
         if frame.boxes_px:
             x1, y1, x2, y2 = np.clip(frame.boxes_px[0], 0, (session.camera.width, session.camera.height) * 2)
-            people.append(Person(read_depth(frame, session).values[y1:y2, x1:x2], int(y1)))
+            people.append(PersonCutout(read_depth(frame, session).values[y1:y2, x1:x2], int(y1)))
     return people
 
 
@@ -48,7 +48,7 @@ def crowd_of(people, count, session):
 
     Parameters
     ----------
-    people : sequence of Person
+    people : sequence of PersonCutout
     count : int
     session : session_reader.Session
 

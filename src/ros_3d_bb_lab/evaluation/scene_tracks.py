@@ -35,7 +35,7 @@ class TrackScore(NamedTuple):
 
 
 def is_in_image(person, map_from_camera, camera):
-    """Whether the axis of a person (`simulator.Truth`) is between the left and the right border of the image
+    """Whether the axis of a person (`simulator.PersonTruth`) is between the left and the right border of the image
     and others hide little of what the image shows.
     """
     x_m, _y, z_m = transform_points(np.linalg.inv(map_from_camera), person.position_m)

@@ -13,10 +13,10 @@ from ros_3d_bb.estimation.error_model import corrected_boxes
 from ros_3d_bb.tracking.association import match_greedily
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import Detection, TrackedObject, View, detection_from_box
+from ros_3d_bb.tracking.types import CameraView, Detection, TrackedObject, detection_from_box
 from ros_3d_bb_lab.evaluation.clear_mot import Moment
 from ros_3d_bb_lab.simulation.ground_truth import truth_at
-from ros_3d_bb_lab.simulation.simulator import Frame
+from ros_3d_bb_lab.simulation.simulator import SimulatedFrame
 
 LEAST_SHOWN = 0.3  # share of the body; less of it tells nothing of where the person is
 FOUND_IOU = 0.5  # a detection is that of a person where the boxes overlap by so much, else it is false
@@ -25,7 +25,7 @@ FOUND_IOU = 0.5  # a detection is that of a person where the boxes overlap by so
 class Step(NamedTuple):
     """One image: the frame without its pixels, the 2D boxes (n, 4) found in it, and the tracks after it."""
 
-    frame: Frame
+    frame: SimulatedFrame
     boxes: np.ndarray
     moment: Moment
 
@@ -34,10 +34,10 @@ class SceneImage(NamedTuple):
     """One image: the frame without its pixels, the 2D boxes (n, 4) found in it, what a tracker gets, and the truth."""
 
     stamp_ns: int
-    frame: Frame
+    frame: SimulatedFrame
     boxes: np.ndarray
     detections: List[Detection]
-    view: View
+    view: CameraView
     truth: List[TrackedObject]
 
 
@@ -117,7 +117,7 @@ def _view(frame, camera):
     """What the tracker is told of the camera, as tracker_node does it."""
     depth = DepthImage(frame.depth_mm, 0.001)
     depth_at = functools.partial(depths_towards, camera, depth)
-    return View(frame.poses.map_from_camera, camera, frame.camera, depth_at)
+    return CameraView(frame.poses.map_from_camera, camera, frame.camera, depth_at)
 
 
 def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6.0):

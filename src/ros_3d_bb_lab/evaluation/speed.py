@@ -22,7 +22,7 @@ from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_median
 from ros_3d_bb.sessions.session_reader import read_color, read_session
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import Detection, View, detection_from_box
+from ros_3d_bb.tracking.types import CameraView, Detection, detection_from_box
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
 from ros_3d_bb_lab.evaluation.crowd import crowd_of, people_of
 from ros_3d_bb_lab.evaluation.defaults import default_weights
@@ -46,7 +46,7 @@ class Ours(object):
     def __init__(self, crowd):
         self._camera, self._tracker, self._estimator = crowd.camera, Tracker(), estimator_named('foreground')
         depth_at = functools.partial(depths_towards, crowd.camera, crowd.depth)
-        self._view = View(FIXED_FROM_CAMERA, crowd.camera, depth_at=depth_at)
+        self._view = CameraView(FIXED_FROM_CAMERA, crowd.camera, depth_at=depth_at)
 
     def estimate(self, depth, rects_px):
         """3D boxes in the frame of the camera."""

@@ -24,7 +24,7 @@ class Surface(NamedTuple):
     ppm: float
 
 
-class Room(object):
+class RenderedRoom(object):
     """Room x0..x1, y0..y1, 0..height, seen from inside.
 
     Parameters

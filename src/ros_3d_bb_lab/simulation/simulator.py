@@ -10,7 +10,7 @@ from ros_3d_bb_lab.simulation.body import Body, Build
 from ros_3d_bb_lab.simulation.color_sensor import ColorSensor
 from ros_3d_bb_lab.simulation.motion import person_motion, robot_motion
 from ros_3d_bb_lab.simulation.renderer import render
-from ros_3d_bb_lab.simulation.room import Room
+from ros_3d_bb_lab.simulation.room import RenderedRoom
 from ros_3d_bb_lab.simulation.stereo import StereoCamera
 
 D435I_COLOR = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)  # camera of the measurements in the thesis
@@ -23,7 +23,7 @@ TROUSERS = ((85, 75, 60), (45, 60, 95), (40, 40, 45), (110, 100, 85), (60, 60, 6
 SHOES = ((45, 40, 40), (35, 35, 35), (205, 200, 200))
 
 
-class Truth(NamedTuple):
+class PersonTruth(NamedTuple):
     """Ground truth of a person in one frame, in the map frame.
 
     Attributes
@@ -68,7 +68,7 @@ class Poses(NamedTuple):
         return self.map_from_odom.dot(self.odom_from_base).dot(self.base_from_camera)
 
 
-class Frame(NamedTuple):
+class SimulatedFrame(NamedTuple):
     """`time_s` since the start; `color` (h, w, 3), uint8 RGB; `depth_mm` (h, w), uint16, aligned to colour, 0 means no
     depth; `camera`, the name of the camera, or '' if there is only one.
     """
@@ -78,7 +78,7 @@ class Frame(NamedTuple):
     color: np.ndarray
     depth_mm: np.ndarray
     poses: Poses
-    people: List[Truth]
+    people: List[PersonTruth]
     camera: str = ''
 
 
@@ -95,7 +95,7 @@ class Simulator(object):
 
     def __init__(self, scenario, camera=D435I_COLOR):
         self.scenario, self.camera = scenario, camera
-        self._room = Room(scenario.room.bounds, scenario.room.height, np.random.RandomState(scenario.seed))
+        self._room = RenderedRoom(scenario.room.bounds, scenario.room.height, np.random.RandomState(scenario.seed))
         self._furniture = [_furniture(item, number) for number, item in enumerate(scenario.room.furniture)]
         self._bodies = [Body(_build(person, scenario.seed, number), np.random.RandomState(number))
                         for number, person in enumerate(scenario.people)]
@@ -129,7 +129,7 @@ class Simulator(object):
 
         Returns
         -------
-        Frame
+        SimulatedFrame
         """
         time_s, turn = self.time_s(number), number % len(self.cameras)
         poses, states = self.poses_at(time_s, turn), [motion.at(time_s) for motion in self._motions]
@@ -140,8 +140,9 @@ class Simulator(object):
         depth_mm = (self._stereo.measure(rendering.inverse_depth, number) if self._stereo is not None
                     else np.rint(1000 / rendering.inverse_depth).clip(0, 65535).astype(np.uint16))
         people = [self._truth(index, state, bodies[index], rendering) for index, state in enumerate(states)]
-        return Frame(number, time_s, self._color_sensor.capture(rendering.color, number), depth_mm, poses, people,
-                     self.cameras[turn])
+        return SimulatedFrame(number, time_s, self._color_sensor.capture(rendering.color, number), depth_mm, poses,
+                              people,
+                              self.cameras[turn])
 
     def poses_at(self, time_s, camera=0):
         """Poses of odometry, robot and camera at a time. `camera` is the index of the camera.
@@ -173,9 +174,9 @@ class Simulator(object):
         x, y, width, height = cv2.boundingRect(visible)
         hidden = 1 - count / float(rendering.areas[index]) if rendering.areas[index] else 0.0
         inside = rendering.inside[index]
-        return Truth(index + 1, np.append(state.position_m, height_m / 2), np.append(state.velocity_mps, 0),
-                     np.array([width_m, width_m, height_m]), (1 - hidden) * inside, hidden, inside,
-                     (x, y, x + width, y + height) if count else None)
+        return PersonTruth(index + 1, np.append(state.position_m, height_m / 2), np.append(state.velocity_mps, 0),
+                           np.array([width_m, width_m, height_m]), (1 - hidden) * inside, hidden, inside,
+                           (x, y, x + width, y + height) if count else None)
 
 
 def _upright(x, y, z, yaw):

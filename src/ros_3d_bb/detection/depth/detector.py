@@ -17,7 +17,7 @@ MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outs
 MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person
 
 
-class Found(NamedTuple):
+class DepthDetection(NamedTuple):
     """A detected person: box (x1, y1, x2, y2), score 0..1, and position to the right of and ahead of the camera."""
 
     box: Tuple[float, float, float, float]
@@ -40,10 +40,10 @@ class DepthPeople(object):
     """
 
     def __init__(self, params=DepthPeopleParams()):
-        self.tune(params)
+        self.reconfigure(params)
         self._hog, self._floor = PersonHog(), None
 
-    def tune(self, params):
+    def reconfigure(self, params):
         """Change the parameters. If one is out of range, raise ValueError and keep the old ones."""
         check_params(params)
         self._params = params
@@ -93,7 +93,7 @@ class DepthPeople(object):
             if score >= self._params.min_score:
                 box = box_of(blob, shape, grid, camera, floor)
                 x_m = ((box[0] + box[2]) / 2.0 - camera.cx) / camera.fx * shape.depth_m
-                people.append(Found(box, score, x_m, shape.depth_m))
+                people.append(DepthDetection(box, score, x_m, shape.depth_m))
         return _merged_detections(people)
 
 

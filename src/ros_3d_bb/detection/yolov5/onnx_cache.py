@@ -11,7 +11,7 @@ import os
 
 import numpy as np
 
-from ros_3d_bb.core.atomic_file import write_whole
+from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.yolov5.checkpoint import checkpoint_digest
 from ros_3d_bb.detection.yolov5.onnx_backend import INSTALL, ExportedRuntime, OnnxUnusable, reference_image
@@ -60,7 +60,7 @@ def open_exported(path, folder, threads, warn):
     runtime = ExportedRuntime(model, threads)
     try:
         os.makedirs(folder, mode=0o700, exist_ok=True)
-        write_whole(file_path, with_checksum(model))
+        atomic_write(file_path, with_checksum(model))
     except OSError as error:
         warn('the ONNX export cannot be saved (%s); the checkpoint will be exported again at the next start'
              % cause(error))

@@ -4,7 +4,7 @@ from sensor_msgs.msg import CameraInfo
 
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC
-from ros_3d_bb.conversions.perception_msgs import camera_from_message
+from ros_3d_bb.conversions.perception_msgs import camera_from_msg
 
 
 class DepthCameraCheck(object):
@@ -42,7 +42,7 @@ class DepthCameraCheck(object):
         if depth is None:
             return ''
         try:
-            return intrinsics_fault(camera_from_message(color), camera_from_message(depth))
+            return intrinsics_fault(camera_from_msg(color), camera_from_msg(depth))
         except ValueError:  # of colour the node says so; many drivers leave that of depth empty
             return ''
 

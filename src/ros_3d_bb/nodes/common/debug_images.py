@@ -2,10 +2,10 @@
 import rospy
 from sensor_msgs.msg import Image
 
-from ros_3d_bb.conversions.image_msgs import fill_image, rgb_from
+from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.latest_worker import NewestWorker
-from ros_3d_bb.core.time_sync import StampedCache
+from ros_3d_bb.core.time_sync import MessageCache
 from ros_3d_bb.nodes.common.master import patient_master
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_samples, depth_to_grey
@@ -32,14 +32,14 @@ class SampleImages(object):
     def __init__(self, cache_ns, sample, depth_range_m, diagnostics):
         self._diagnostics = diagnostics
         self._cache_ns = cache_ns
-        self.tune(sample, depth_range_m)
+        self.reconfigure(sample, depth_range_m)
         self._raw_pub, self._color_pub, self._depth_pub = (
             rospy.Publisher('ros_3d_bb/' + name, Image, queue_size=1) for name in ('raw', 'color', 'depth'))
         self._colors, self._subscriber = None, None
         # In a thread of its own, as a master that does not answer must not hold up the 3D boxes.
-        self._follower = NewestWorker(self._follow, self._on_error)
+        self._tracking_stage = NewestWorker(self._follow, self._on_error)
 
-    def tune(self, sample, depth_range_m):
+    def reconfigure(self, sample, depth_range_m):
         """Draw the next images with these samples, and this depth as black."""
         self._sample, self._depth_range_m = sample, depth_range_m
 
@@ -50,23 +50,23 @@ class SampleImages(object):
         """
         needs_raw, needs_color = self._raw_pub.get_num_connections() > 0, self._color_pub.get_num_connections() > 0
         if (needs_raw or needs_color) != (self._subscriber is not None):
-            self._follower.offer(needs_raw or needs_color)
+            self._tracking_stage.offer(needs_raw or needs_color)
         if self._depth_pub.get_num_connections():
             grey = depth_to_grey(depth, self._depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))
         colors = self._colors
-        color = colors.at(header.stamp.to_nsec()) if colors is not None else None
+        color = colors.nearest(header.stamp.to_nsec()) if colors is not None else None
         if color is None:
             return
         if needs_raw:
             self._raw_pub.publish(color.value)
         if needs_color:
-            with self._diagnostics.refusing('colour images'):
+            with self._diagnostics.rejecting('colour images'):
                 drawn = self._drawn(color.value, depth, boxes)
                 self._color_pub.publish(fill_image(Image(header=header), drawn, 'rgb8'))
 
     def _drawn(self, color_message, depth, boxes):
-        image = rgb_from(color_message).copy()
+        image = imgmsg_to_rgb(color_message).copy()
         for box in boxes:
             draw_boxes(image, [box.rect_px], ['%.2f m' % box.center_m[2]])
         for box in boxes:
@@ -77,7 +77,7 @@ class SampleImages(object):
         """Subscribe colour, or no more."""
         patient_master().getPid()  # raises where there is none: rospy would hold a lock until one comes, also at Ctrl-C
         if wanted and self._subscriber is None:
-            self._colors = StampedCache(self._cache_ns)
+            self._colors = MessageCache(self._cache_ns)
             self._subscriber = subscribe('camera/color/image_raw', Image, self._on_color, KEPT_AT_ONCE)
         elif not wanted and self._subscriber is not None:
             self._subscriber.unregister()
@@ -91,5 +91,5 @@ class SampleImages(object):
         colors = self._colors
         if colors is None:
             return
-        with self._diagnostics.refusing('colour images'):
+        with self._diagnostics.rejecting('colour images'):
             colors.add(stamp_of(message), 0, message)

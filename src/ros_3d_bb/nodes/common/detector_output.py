@@ -8,7 +8,7 @@ from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, SetBoolResponse
 
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.conversions.perception_msgs import boxes2d_to_message
+from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg
 from ros_3d_bb.visualization.image_overlay import draw_boxes
 
 SILENT_S = 5.0  # an image waits so long for its search to end
@@ -33,7 +33,7 @@ class BoxesOutput(object):
     def publish(self, header, image, found, names):
         """The detections in an RGB image with a header; `names` of the classes by number."""
         if len(found.boxes) or self._publish_empty:
-            self._boxes_pub.publish(boxes2d_to_message(found.boxes, header))
+            self._boxes_pub.publish(boxes2d_to_msg(found.boxes, header))
         if self._image_pub.get_num_connections():
             labels = ['%s %.2f' % (names[number], score) for number, score in zip(found.classes, found.scores)]
             drawn = draw_boxes(image.copy(), found.boxes, labels)

@@ -7,7 +7,7 @@ import diagnostic_updater
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from ros_3d_bb.core.event_counter import MOST_LAGS, Tally
+from ros_3d_bb.core.event_counter import MOST_LAGS, EventCounter
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.common.input_monitor import InputWatch, unheard
 
@@ -22,7 +22,7 @@ def is_ending():
     return rospy.is_shutdown() or rospy.core.is_shutdown_requested()
 
 
-class Diagnostics(Tally):
+class Diagnostics(EventCounter):
     """Counts the messages that came and what happened to each, and publishes that on /diagnostics once a second, with
     rates, latency and what else the node shows.
 
@@ -85,13 +85,13 @@ class Diagnostics(Tally):
             status.summary(DiagnosticStatus.STALE, 'no input yet')
         else:
             status.summary(DiagnosticStatus.OK, 'working')
-        for event, amount in self.told():
+        for event, amount in self.counters():
             status.add(event, str(amount))
         for name, text in self._answers() + [entry for shown in self._shown for entry in shown()]:
             status.add(name, text)
         return status
 
-    def told(self):
+    def counters(self):
         """What is published of the input: (event, how often), and (inputs received, how many)."""
         return list(self.counts.items()) + [('%s received' % inputs, amount)
                                             for inputs, amount in list(self.received.items())]

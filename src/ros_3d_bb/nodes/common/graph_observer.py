@@ -14,7 +14,7 @@ from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
 from ros_3d_bb.diagnosis.bag_observer import CLASSES, tf_seen
 from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, INFO
 from ros_3d_bb.diagnosis.message_observer import Observation, camera_seen, color_seen, depth_seen
-from ros_3d_bb.diagnosis.observations import Clock, Seen
+from ros_3d_bb.diagnosis.observations import Clock, Observations
 from ros_3d_bb.diagnosis.topic_roles import ROLES
 from ros_3d_bb.nodes.common.subscribers import IMAGE_BUFFER
 from ros_3d_bb.nodes.common.topic_publishers import published_topics, publishers_of
@@ -25,7 +25,7 @@ NAMES_S = 1.5  # nodes say once a second what their topics are called
 OURS = ': pipeline'  # ends the names of our nodes' diagnostics
 
 
-class GraphLook(object):
+class GraphObserver(object):
     """Listens to the graph; `seen` says what came.
 
     Names of topics: those that doctor is given as remappings, else those that the running nodes say they use. `camera`
@@ -54,13 +54,13 @@ class GraphLook(object):
         for subscriber in self._subscribers:
             subscriber.unregister()
 
-    def seen(self):
+    def observations(self):
         """What was seen until now, a Seen."""
         self._topics.update(published_topics())
         streams = {key: one.stream(self._topics.get(one.topic, ''), self._publishers(one))
                    for key, one in self._observed.items()}
         newest = {key: one.newest for key, one in self._observed.items()}
-        return Seen(
+        return Observations(
             streams, _to_be_suggested(self._topics), time.monotonic() - self._began_s,
             color_camera=camera_seen(newest[INFO]), depth_camera=camera_seen(self._depth_info),
             color=color_seen(newest[COLOR]), depth=depth_seen(newest[DEPTH]), tf=self._tf(newest[BOXES3D]),

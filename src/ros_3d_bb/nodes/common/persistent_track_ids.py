@@ -8,7 +8,7 @@ RESERVED = 1000  # numbers at a time: whoever is started again goes on with the 
 LARGEST = 2 ** 31 - 1  # that a ROS parameter holds
 
 
-class Numbers(object):
+class PersistentTrackIds(object):
     """Adds to the numbers that a tracker gives those that were given before it was started.
 
     The parameter server, which outlives the node, remembers up to where numbers are reserved; the parameter is beside
@@ -36,7 +36,7 @@ class Numbers(object):
         # In a thread of its own, as a master that does not answer must not hold up the tracks.
         self._worker = NewestWorker(self._reserve, self._on_error)
 
-    def continued(self, tracks):
+    def assign(self, tracks):
         """The tracks, a list of `types.TrackedObject`, with their numbers among all."""
         tracks = [track._replace(id=self._before + track.id) for track in tracks]
         newest = max([track.id for track in tracks], default=0)

@@ -11,7 +11,7 @@ from ros_3d_bb.nodes.common.live_parameters import description_of, live_in, plai
 from ros_3d_bb.nodes.common.master_registration import on_new_master
 
 
-class Tuning(object):
+class ReconfigureServer(object):
     """Takes changes of those parameters of a node that its table marks as live (see `ros_3d_bb.core.params.Param`).
 
     The description that dynamic_reconfigure generates code for is made from that table. A request with a value that is

@@ -5,7 +5,7 @@ import time
 import rospy
 import tf2_ros
 
-from ros_3d_bb.conversions.perception_msgs import check_transforms, transform_from_message
+from ros_3d_bb.conversions.perception_msgs import check_transforms, transform_from_msg
 from ros_3d_bb.diagnosis.tf_tree import links_in, why_missing
 
 LONGEST_WAIT_S = 0.05  # without news; shutting down takes no longer
@@ -82,7 +82,7 @@ class Transforms(object):
         asked = target_frame.lstrip('/'), source_frame.lstrip('/')
         self._asked[asked] = time.monotonic()
         try:
-            return transform_from_message(self._awaited(asked, stamp))
+            return transform_from_msg(self._awaited(asked, stamp))
         except tf2_ros.TransformException as error:
             explained = type(error)(self._explained(asked, stamp) or str(error))
             self._forget_time_before()

@@ -2,7 +2,7 @@
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.tracker import TrackerParams
 
-FORGOTTEN_S = TrackerParams().memory  # who was not found for so long gets another number
+FORGOTTEN_S = TrackerParams().max_age  # who was not found for so long gets another number
 COASTS_S = 1.0
 
 

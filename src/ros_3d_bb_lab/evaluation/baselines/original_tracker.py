@@ -32,7 +32,7 @@ def _as_it_arrived(image):
     return image._replace(stamp_ns=image.arrival_ns, detections=moved, view=image.arrival_view)
 
 
-class _Track(object):
+class _OriginalTrack(object):
     def __init__(self, track_id, stamp_ns, detection):
         self.id, self.first_ns = track_id, stamp_ns
         self.position_m = detection.position_m
@@ -90,7 +90,7 @@ class OriginalTracker(object):
             for column in set(range(len(detections))) - taken:
                 if all(abs(distances_m[row, column] - own_m) > ALIKE_M for (row, _), own_m in matched_m.items()):
                     self._last_id += 1
-                    self._tracks.append(_Track(self._last_id, self._now_ns, detections[column]))
+                    self._tracks.append(_OriginalTrack(self._last_id, self._now_ns, detections[column]))
 
     def _move_matched(self, distances_m, detections):
         """Give each track its nearest box, nearest pair first; one whose box is taken gets none.

@@ -9,9 +9,9 @@ import numpy as np
 import rosbag
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, topic_of
-from ros_3d_bb.conversions.image_msgs import rgb_from
-from ros_3d_bb.conversions.perception_msgs import (BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message, stamp_of,
-                                                   tracks_from_message, transform_from_message)
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
+from ros_3d_bb.conversions.perception_msgs import (BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg, stamp_of,
+                                                   tracks_from_msg, transform_from_msg)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_caption
@@ -55,12 +55,12 @@ def read_recording(bag):
     boxes_topics = topics_of_cameras(bag, BOXES_TOPIC)
     for topic, message, _time in bag.read_messages(['/' + TRUTH_TOPIC, '/' + TRACKS_TOPIC, '/tf'] + boxes_topics):
         if topic == '/tf':
-            links.update({(link.header.frame_id, link.child_frame_id): transform_from_message(link)
+            links.update({(link.header.frame_id, link.child_frame_id): transform_from_msg(link)
                           for link in message.transforms})
             if {(MAP_FRAME, ODOM_FRAME), (ODOM_FRAME, BASE_FRAME)} <= set(links):
                 robot.append(links[MAP_FRAME, ODOM_FRAME].dot(links[ODOM_FRAME, BASE_FRAME])[:2, 3])
         elif topic in boxes_topics:
-            boxes2d = boxes2d_from_message(message)
+            boxes2d = boxes2d_from_msg(message)
             boxes[boxes2d.stamp_ns] = boxes2d.boxes
         else:
             by_stamp = truth if topic == '/' + TRUTH_TOPIC else tracks
@@ -71,8 +71,8 @@ def read_recording(bag):
     frames = set(message.header.frame_id for by_stamp in (truth, tracks) for message in by_stamp.values())
     if len(frames) > 1:
         raise ValueError('truth and tracks have the frames %s; one frame expected' % ', '.join(sorted(frames)))
-    moments = [Moment(stamp_ns, tracks_from_message(truth[stamp_ns]),
-                      tracks_from_message(tracks[stamp_ns]) if stamp_ns in tracks else [])
+    moments = [Moment(stamp_ns, tracks_from_msg(truth[stamp_ns]),
+                      tracks_from_msg(tracks[stamp_ns]) if stamp_ns in tracks else [])
                for stamp_ns in sorted(truth)]
     return Recording(moments, len(set(truth) & set(tracks)), boxes, np.array(robot).reshape(-1, 2))
 
@@ -105,7 +105,7 @@ def panels_of(bag, recording, count=PANELS):
         stamp_ns = message.header.stamp.to_nsec()
         if stamp_ns in wanted:
             boxes = recording.boxes.get(stamp_ns, np.zeros((0, 4), int))
-            panel = draw_boxes(rgb_from(message).copy(), boxes, [''] * len(boxes))
+            panel = draw_boxes(imgmsg_to_rgb(message).copy(), boxes, [''] * len(boxes))
             panels.append(draw_caption(panel, '%.1f s' % ((stamp_ns - recording.moments[0].stamp_ns) / NS)))
     return panels
 

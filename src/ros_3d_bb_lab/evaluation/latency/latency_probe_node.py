@@ -11,7 +11,7 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Int32MultiArray
 from visualization_msgs.msg import MarkerArray
 
-from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_message
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.common.startup import read_params, run_node
@@ -104,7 +104,7 @@ def stamp_in(message):
     if isinstance(message, MarkerArray):
         return message.markers[0].header.stamp.to_nsec() if message.markers else None
     if isinstance(message, Int32MultiArray):
-        return boxes2d_from_message(message).stamp_ns
+        return boxes2d_from_msg(message).stamp_ns
     return message.header.stamp.to_nsec()
 
 

@@ -9,7 +9,7 @@ from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.bags.bag_writer import images_in
 from ros_3d_bb.conversions.camera_msgs import TYPES
-from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, restamped
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, with_stamp
 from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.startup import read_params, run_node
@@ -72,11 +72,11 @@ class ReplayNode(object):
 
     def _publish(self, messages):
         stamp = rospy.get_rostime()
-        with self._diagnostics.refusing('images'):
+        with self._diagnostics.rejecting('images'):
             for topic, message in messages:
-                self._pubs[topic].publish(restamped(message, stamp))
+                self._pubs[topic].publish(with_stamp(message, stamp))
             self._diagnostics.count('images')
-            self._diagnostics.answered(stamp)
+            self._diagnostics.record_latency(stamp)
 
 
 def main():

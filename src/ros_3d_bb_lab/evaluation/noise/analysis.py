@@ -9,7 +9,7 @@ from ros_3d_bb.estimation.error_model import ErrorModel, MeasuredRange, Provenan
 from ros_3d_bb_lab.evaluation.error_model_fit import GROWTH_OUTSIDE, LEAST_SIGMA_M, Y_SIGMA_M, fit_error_model
 from ros_3d_bb_lab.evaluation.noise import theory
 from ros_3d_bb_lab.evaluation.noise.statistics import AxisStatistics, axis_statistics, share_between_positions
-from ros_3d_bb_lab.evaluation.noise.tables import Measurements, clusters_of
+from ros_3d_bb_lab.evaluation.noise.tables import MeasurementTable, clusters_of
 
 Z_DEGREE, X_DEGREE = 2, 1
 RMS_FIT_FROM_M = 1.5  # nearer, the error does not go with the square of the distance (thesis 5.2)
@@ -19,9 +19,9 @@ class Inputs(NamedTuple):
     """Measurements for z, for x, and for the variance of x (the thesis leaves out people cut by the image's edge), and
     who made them."""
 
-    z: Measurements
-    x: Measurements
-    x_variance: Measurements
+    z: MeasurementTable
+    x: MeasurementTable
+    x_variance: MeasurementTable
     estimator: str
     camera: str
 

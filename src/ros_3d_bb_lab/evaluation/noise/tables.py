@@ -20,7 +20,7 @@ class TableError(ValueError):
     """Measurements that cannot be used: says where, what is wrong and what was expected."""
 
 
-class Measurements(NamedTuple):
+class MeasurementTable(NamedTuple):
     """`measured_m` (n, 3) as x, y, z, and `truth_m` (n, 2) as x, z, metres; nan where not measured. `name` says where
     they come from; `cut` (n,) whether the person is cut by the left or right edge of the image, where known."""
 
@@ -80,7 +80,7 @@ def read_table(path, axis):
 
     Returns
     -------
-    Measurements
+    MeasurementTable
 
     Raises
     ------
@@ -103,7 +103,7 @@ def read_table(path, axis):
         raise TableError('%s: a table without rows' % path)
     values_m = np.array(rows).reshape(-1, 2, 2) / 1000  # row, axis, (measured, true)
     measured_m = np.stack((values_m[:, 0, 0], np.zeros(len(rows)), values_m[:, 1, 0]), axis=1)
-    return Measurements(path, measured_m, values_m[:, :, 1], np.zeros(len(rows), bool))
+    return MeasurementTable(path, measured_m, values_m[:, :, 1], np.zeros(len(rows), bool))
 
 
 def read_session_measurements(folder, estimator):
@@ -117,7 +117,7 @@ def read_session_measurements(folder, estimator):
 
     Returns
     -------
-    Measurements
+    MeasurementTable
         Of the frames with ground truth and an estimate.
 
     Raises
@@ -130,9 +130,9 @@ def read_session_measurements(folder, estimator):
     found = [(frame, position_m) for frame, position_m in found if position_m is not None]
     if not found:
         raise TableError('%s: no frame with ground truth and an estimate (%s)' % (folder, estimator))
-    return Measurements(str(folder), np.array([position_m for _frame, position_m in found]),
-                        np.array([frame.truth_m for frame, _position in found]),
-                        np.array([_is_cut(frame, session.camera) for frame, _position in found]))
+    return MeasurementTable(str(folder), np.array([position_m for _frame, position_m in found]),
+                            np.array([frame.truth_m for frame, _position in found]),
+                            np.array([_is_cut(frame, session.camera) for frame, _position in found]))
 
 
 def _estimate(frame, session, name):

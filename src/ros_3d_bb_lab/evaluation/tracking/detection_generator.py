@@ -16,7 +16,7 @@ FALSE_RANGE_M, FALSE_HEIGHT_M, FALSE_WIDTH_M = (1.0, 6.0), (0.8, 1.9), (0.2, 0.6
 FALSE_SIDE_M, FALSE_DEPTH_M = 0.02, 0.04
 
 
-class Found(NamedTuple):
+class SimulatedDetection(NamedTuple):
     """One 3D box: `depth_m` along the optical axis, `bearing`, size in metres, whether the image border cuts it, and
     the number of whose it is, or FALSE or DOUBLE.
     """
@@ -29,7 +29,7 @@ class Found(NamedTuple):
     source: int
 
 
-class Seen(NamedTuple):
+class DetectablePerson(NamedTuple):
     """Who can be found in an image: person's number, the depth of the centre, the range, `middle`, `share` and `cut`
     as in `d435_model.Shown`, speed in m/s, and the heading seen from the camera.
     """
@@ -84,7 +84,7 @@ class Detector(object):
 
         Parameters
         ----------
-        seen : list of Seen
+        seen : list of DetectablePerson
         pose : numpy.ndarray, (3,)
             The true one of the camera.
         time_s : float
@@ -130,15 +130,15 @@ class Detector(object):
                   + random.normal(0, camera.side_floor_m))
         width_m = 2 * BODY_RADIUS_M * seen.share * np.clip(random.normal(1, 0.15), 0.5, 1.6)
         height_m = self._height_m[person] + random.normal(0, 0.05)
-        return Found(seen.middle + side_m / seen.range_m, depth_m, width_m, height_m, seen.cut, person)
+        return SimulatedDetection(seen.middle + side_m / seen.range_m, depth_m, width_m, height_m, seen.cut, person)
 
     def _double(self, box):
         """A second box of the same person."""
         random = self._random
         depth_m = box.depth_m + abs(random.normal(0, DEEP_DOUBLE_M))
         side_m = box.depth_m * np.tan(box.bearing) + random.normal(0, SIDE_DOUBLE_M)
-        return Found(np.arctan2(side_m, depth_m), depth_m, DOUBLE_WIDTH_M,
-                     self._height_m[box.source] * random.uniform(0.6, 1), box.cut, DOUBLE)
+        return SimulatedDetection(np.arctan2(side_m, depth_m), depth_m, DOUBLE_WIDTH_M,
+                                  self._height_m[box.source] * random.uniform(0.6, 1), box.cut, DOUBLE)
 
     def _false(self, pose):
         """Boxes of nobody that are in view."""
@@ -146,6 +146,6 @@ class Detector(object):
         for forward_m, left_m in to_frame(pose, self._false_m):
             if forward_m > 0 and abs(np.arctan2(left_m, forward_m)) < self._camera.field_of_view / 2:
                 point_m = np.array([forward_m, left_m]) + random.normal(0, (FALSE_DEPTH_M, FALSE_SIDE_M))
-                found.append(Found(bearing_of(point_m), point_m[0], random.uniform(*FALSE_WIDTH_M),
-                                   random.uniform(*FALSE_HEIGHT_M), False, FALSE))
+                found.append(SimulatedDetection(bearing_of(point_m), point_m[0], random.uniform(*FALSE_WIDTH_M),
+                                                random.uniform(*FALSE_HEIGHT_M), False, FALSE))
         return found

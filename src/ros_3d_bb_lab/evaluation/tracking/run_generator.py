@@ -8,9 +8,9 @@ from typing import List, NamedTuple, Tuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, Detection, View
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, Detection
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel, half_width, shown
-from ros_3d_bb_lab.evaluation.tracking.detection_generator import HARD_TO_SEE, Detector, Seen
+from ros_3d_bb_lab.evaluation.tracking.detection_generator import HARD_TO_SEE, DetectablePerson, Detector
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import (PERIOD_S, STANDING, OdometryModel, bearing_of, driving,
                                                             from_frame, jittered, standing, to_frame, turned,
                                                             with_odometry)
@@ -50,7 +50,7 @@ class Models(NamedTuple):
     timing: Timing = Timing()
 
 
-class Truth(NamedTuple):
+class RunTruth(NamedTuple):
     """The people around the robot when an image was taken, n of them, in the fixed frame as the odometry has it then.
 
     `status` is VISIBLE (to be found: enough of the body in view), OCCLUDED (less than that) or OUT_OF_VIEW (or its
@@ -75,11 +75,11 @@ class Image(NamedTuple):
 
     stamp_ns: int
     detections: List[Detection]
-    view: View
-    truth: Truth
+    view: CameraView
+    truth: RunTruth
     sources: List[int]
     arrival_ns: int
-    arrival_view: View
+    arrival_view: CameraView
 
 
 class Run(NamedTuple):
@@ -218,12 +218,12 @@ def _looked_at(walks, row, pose, odometry, camera):
     inside = (there & (np.abs(bearing) < half_view) & (local_m[:, 0] > camera.nearest_m)
               & (range_m < camera.farthest_m))
     velocity_mps, turn = walks.velocity_mps[row, ids], odometry[2] - pose[2]
-    truth = Truth(ids, from_frame(odometry, local_m), turned(turn, velocity_mps),
-                  from_frame(odometry, to_frame(pose, walks.future_m[row, ids])),
-                  np.where(inside, np.where(share >= HARD_TO_SEE, VISIBLE, OCCLUDED), OUT_OF_VIEW), odometry)
+    truth = RunTruth(ids, from_frame(odometry, local_m), turned(turn, velocity_mps),
+                     from_frame(odometry, to_frame(pose, walks.future_m[row, ids])),
+                     np.where(inside, np.where(share >= HARD_TO_SEE, VISIBLE, OCCLUDED), OUT_OF_VIEW), odometry)
     heading = bearing_of(velocity_mps) - pose[2]
-    seen = [Seen(ids[i], local_m[i, 0], range_m[i], what.middle[i], share[i], what.cut[i],
-                 np.linalg.norm(velocity_mps[i]), heading[i]) for i in np.flatnonzero(share > 0)]
+    seen = [DetectablePerson(ids[i], local_m[i, 0], range_m[i], what.middle[i], share[i], what.cut[i],
+                             np.linalg.norm(velocity_mps[i]), heading[i]) for i in np.flatnonzero(share > 0)]
     return truth, seen
 
 
@@ -234,7 +234,7 @@ def view_of(pose, camera):
     body[:2, :2] = turned(pose[2], np.eye(2)).T
     fixed_from_camera[:3, :3] = body.dot(OPTICAL_FROM_BODY.T)
     fixed_from_camera[:3, 3] = pose[0], pose[1], CAMERA_HEIGHT_M
-    return View(fixed_from_camera, camera.intrinsics, 'camera')
+    return CameraView(fixed_from_camera, camera.intrinsics, 'camera')
 
 
 def detection_of(box, view, camera):

@@ -5,7 +5,7 @@ import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
-from ros_3d_bb_lab.evaluation.tracking.detection_generator import Found
+from ros_3d_bb_lab.evaluation.tracking.detection_generator import SimulatedDetection
 from ros_3d_bb_lab.evaluation.tracking.run_generator import detection_of, view_of
 
 PEOPLE = (5, 20, 100)
@@ -39,6 +39,7 @@ def crowd(people, images):
         left_m = range_m * np.sin(bearing) + CIRCLE_M * np.sin(angle)
         depth_m += random.normal(size=people) * camera.depth_sigma_m(depth_m)
         left_m += random.normal(size=people) * camera.side_floor_m
-        found = [Found(np.arctan2(left_m[row], depth_m[row]), depth_m[row], SIZE_M[0], SIZE_M[1], False, row)
+        found = [SimulatedDetection(np.arctan2(left_m[row], depth_m[row]), depth_m[row], SIZE_M[0], SIZE_M[1], False,
+                                    row)
                  for row in range(people)]
         yield (number + 1) * NS // RATE_HZ, [detection_of(box, view, camera) for box in found], view

@@ -6,7 +6,7 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_writer import bag_command_parser, write_bag_of_command
 from ros_3d_bb.conversions.camera_msgs import START_NS, frame_id_of, topic_of
-from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_message, time_from
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_msg, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb_lab.simulation.ros.simulator_msgs import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
@@ -24,7 +24,7 @@ def scenario_images(scenario, with_boxes=False):
             boxes = [person.box_px for person in frame.people if person.box_px is not None]
             header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(frame.camera))
             messages.append((topic_of(frame.camera, BOXES_TOPIC),
-                             boxes2d_to_message(np.array(boxes, int).reshape(-1, 4), header)))
+                             boxes2d_to_msg(np.array(boxes, int).reshape(-1, 4), header)))
         yield stamp_ns, messages
 
 

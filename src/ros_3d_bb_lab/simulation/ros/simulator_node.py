@@ -137,7 +137,7 @@ class SimulatorNode(object):
         for topic, message in messages:
             self._pubs[topic].publish(message)
         self._diagnostics.count('images')
-        self._diagnostics.answered(time_from(stamp_ns))
+        self._diagnostics.record_latency(time_from(stamp_ns))
 
     def _tell_time(self, stamp_ns):
         if self._clock_pub is not None:
