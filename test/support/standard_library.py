@@ -2,6 +2,7 @@
 STANDARD_LIBRARY = {'argparse', 'ast', 'base64', 'bisect', 'collections', 'concurrent', 'contextlib', 'copy', 'csv',
                     'ctypes', 'datetime', 'difflib', 'fcntl', 'functools', 'glob', 'hashlib', 'html', 'http',
                     'importlib', 'io', 'itertools', 'json', 'math', 'multiprocessing', 'os', 'pathlib', 'pickle',
-                    'platform', 're', 'resource', 'signal', 'socket', 'struct', 'subprocess', 'sys', 'tempfile',
-                    'threading', 'time', 'typing', 'urllib', 'warnings', 'weakref', 'xmlrpc', 'zipfile', 'zlib'}
+                    'pkgutil', 'platform', 're', 'resource', 'signal', 'socket', 'struct', 'subprocess', 'sys',
+                    'tempfile', 'threading', 'time', 'typing', 'urllib', 'warnings', 'weakref', 'xmlrpc', 'zipfile',
+                    'zlib'}
 TEST_STANDARD_LIBRARY = {'atexit', 'bz2', 'random', 'shutil', 'stat', 'types', 'unittest', 'xml'}

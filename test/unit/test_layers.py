@@ -14,7 +14,7 @@ SOURCE, ANNOTATOR = os.path.join(ROOT, 'src'), os.path.join(ROOT, 'annotator', '
 # `core` is ros_3d_bb.core, `lab.evaluation` is ros_3d_bb_lab.evaluation, `msg` the generated messages.
 ALLOWED = {
     'ros_3d_bb.core': ('', 'yaml'),
-    'ros_3d_bb.camera': ('core', ''),
+    'ros_3d_bb.camera': ('core', 'cv2'),
     'ros_3d_bb.estimation': ('camera core', 'yaml'),
     'ros_3d_bb.tracking': ('camera core', 'scipy'),
     'ros_3d_bb.detection': ('core', ''),
@@ -61,7 +61,7 @@ ALLOWED = {
         'conversions core tracking visualization lab.evaluation lab.simulation.ros',
         'cv2 rosbag'),
     'ros_3d_bb_lab.evaluation.latency': (
-        'bags conversions msg nodes.common lab.evaluation',
+        'bags conversions core msg nodes.common lab.evaluation',
         'rospy sensor_msgs std_msgs visualization_msgs'),
 }
 MATHEMATICS = {'numpy', 'math', 'cv2', 'torch', 'scipy'}

@@ -89,7 +89,7 @@ def imgmsg_to_depth(message, scale_m=None):
 
 
 def checked_depth_from(message, scale_m=None):
-    """As `imgmsg_to_depth`, for what is measured in the image: raises ValueError also if it seems to have other units."""
+    """As `imgmsg_to_depth`, but raises ValueError also if the values seem to have another unit."""
     depth = imgmsg_to_depth(message, scale_m)
     fault = units_fault(depth)
     if fault:

@@ -7,10 +7,9 @@ from typing import Any, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from ros_3d_bb.core.limits import LARGEST_M
-from ros_3d_bb.estimation.depth_layers import (BODY_HALF_DEPTH_M, USUAL_HEIGHT_M, USUAL_WIDTH_M,
-                                               complete_truncated_extent, edges, nearest_dominant_layer, trimmed_mean,
-                                               within)
+from ros_3d_bb.core.limits import LARGEST_M, USUAL_HEIGHT_M, USUAL_WIDTH_M
+from ros_3d_bb.estimation.depth_layers import (BODY_HALF_DEPTH_M, complete_truncated_extent, edges,
+                                               nearest_dominant_layer, trimmed_mean, within)
 
 # A box whose edge is this close to the image border is taken to be cut by it: detectors round to whole pixels and
 # regress the edge of a cut person a pixel or two inside the image.

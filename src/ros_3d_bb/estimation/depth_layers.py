@@ -10,7 +10,6 @@ TRUNK_HALF_DEPTH_M = 0.25  # without arms and legs: a wall close behind must not
 BIN_M, LAYER_BINS = 0.05, 5  # a layer is the depth in so many bins of a histogram
 MEDIANS = 3  # of the trunk, at most: each is that of what is around the one before
 FIRST_LAYER_SHARE = 0.5  # the nearest layer with this share of the strongest one's weight is the person
-USUAL_WIDTH_M, USUAL_HEIGHT_M = 0.46, 1.7  # of a body that the image border cuts
 EDGE_PERCENT = 5  # of the pixels of the layer are looked past on the left and on the right: arms, flying pixels
 
 

@@ -4,8 +4,8 @@ from typing import Callable, NamedTuple, Optional, Tuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera, transform_points, upright_turns
+from ros_3d_bb.core.limits import USUAL_HEIGHT_M, USUAL_WIDTH_M
 from ros_3d_bb.core.params import Param
-from ros_3d_bb.estimation.depth_layers import USUAL_HEIGHT_M, USUAL_WIDTH_M
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
 MOST_STEPS = 1000  # of a prediction; more only cost memory

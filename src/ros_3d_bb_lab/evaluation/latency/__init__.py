@@ -1,4 +1,4 @@
 """The latency benchmark under roslaunch, with its two rig nodes.
 
-May import: bags, conversions, msg, nodes.common, ros_3d_bb_lab.evaluation.
+May import: bags, conversions, core, msg, nodes.common, ros_3d_bb_lab.evaluation.
 """
