@@ -28,7 +28,7 @@ demo() {
   build
   options+=("cameras:=$(PYTHONPATH=$here/src "$venv/bin/python3" -c '
 import sys
-from ros_3d_bb.simulation.scenario import read_scenario
+from ros_3d_bb_lab.simulation.scenario import read_scenario
 print(",".join(mount.name for mount in read_scenario(sys.argv[1]).robot.cameras))' "$file")")
   mkdir -p "$workspace/demo"
   exec 9> "$workspace/demo/lock"
