@@ -116,7 +116,7 @@ def test_values_outside_of_the_table_are_rejected(name):
 def test_parameters_are_live_only_where_a_node_takes_changes(name):
     module = sys.modules[NODES[name].node_class.__module__]
     is_live = any(param.live for param in table_of(node_pages.parameter_types(NODES[name].node_class)).values())
-    assert is_live == hasattr(module, 'Tuning')
+    assert is_live == hasattr(module, 'ReconfigureServer')
 
 
 @pytest.mark.parametrize('path, node', sorted(
