@@ -149,7 +149,7 @@ class Tracker(object):
         batch = self._measure(state, image)
         rows, columns = associate(tracks, batch, stamp_ns, params, self._outliers)
         matches = Matches(tracks['id'][rows].tolist(), tracks['confirmed'][rows].tolist(), columns.tolist())
-        update_matched(tracks, rows, batch.taken(columns), stamp_ns, params, self._outliers)
+        update_matched(tracks, rows, batch.select(columns), stamp_ns, params, self._outliers)
 
         others = others_of(state.looks, view, stamp_ns)
         missed = unmatched(len(tracks), rows)
@@ -159,7 +159,7 @@ class Tracker(object):
         tracks, unmatched_columns = tracks[kept], unmatched(len(image.detections), columns)
         new = np.zeros(0, TRACK)
         if len(unmatched_columns):
-            new, started = new_targets(tracks, batch.taken(unmatched_columns), stamp_ns, params)
+            new, started = new_targets(tracks, batch.select(unmatched_columns), stamp_ns, params)
             new['id'] = [id_of(column) for column in unmatched_columns[started].tolist()]
             tracks = np.concatenate((tracks, new))
 
