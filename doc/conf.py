@@ -18,7 +18,7 @@ project = 'ros_3d_bb'
 author = 'ros_3d_bb developers'
 root_doc = 'doc/index'
 source_suffix = {'.md': 'markdown'}
-include_patterns = ['README.md', 'doc/**', 'config/**']
+include_patterns = ['README.md', 'CONTRIBUTING.md', 'doc/**', 'config/**']
 extensions = ['myst_parser']
 myst_enable_extensions = ['dollarmath']
 highlight_language = 'none'
@@ -47,7 +47,7 @@ def _prepare(_app, name, source):
     if name == root_doc:
         first = ['doc/' + page for page in FIRST]
         others = [other for other in _names('doc') + _names('config/**') if other not in first + [root_doc]]
-        for caption, names in (('How it works', ['README'] + first), ('More', others), ('Nodes', _names('doc/nodes'))):
+        for caption, names in (('How it works', ['README', 'CONTRIBUTING'] + first), ('More', others), ('Nodes', _names('doc/nodes'))):
             pages = '\n'.join('/' + page for page in names)
             source[0] += '\n```{toctree}\n:hidden:\n:caption: %s\n\n%s\n```\n' % (caption, pages)
 
