@@ -62,6 +62,7 @@ def result(tmp_path_factory):
     return compare(session, boxes, estimator_named('foreground'))[0]
 
 
+@pytest.mark.slow
 def test_positions_are_as_good_as_a_planner_was_promised(result):
     """Leave-one-position-out; the bars are those on the real measurements, the simulation's are wider."""
     ours, thesis = result['ours'], result['thesis']
@@ -73,6 +74,7 @@ def test_positions_are_as_good_as_a_planner_was_promised(result):
         assert ours['rmse_x_truncated_m'] <= 0.045 and ours['missed'] <= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('scene', ['behind_a_pillar', 'thesis_f_in_front'])
 def test_nobody_in_front_or_behind_throws_a_position_off(scene):
     """Where the thesis' median is more than 0.4 m off again and again."""
@@ -83,6 +85,7 @@ def test_nobody_in_front_or_behind_throws_a_position_off(scene):
     assert np.count_nonzero(median > 0.4) > 3
 
 
+@pytest.mark.slow
 def test_scenes_have_their_scores_too():
     path = os.path.join(SCENARIOS, 'thesis_a_start.yaml')
     scores = scenario_scores(path, estimator_named('foreground'), every=40)

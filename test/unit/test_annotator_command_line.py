@@ -32,6 +32,7 @@ def test_export(folder, capsys):
     assert capsys.readouterr().out == '%s: 4 measurements\n' % path
 
 
+@pytest.mark.slow
 def test_the_output_folder_of_the_analysis_can_be_chosen(tmp_path, capsys):
     session = write_synthetic_session(str(tmp_path / 'session'))
     assert main(['--analyse', session]) == 0
@@ -46,6 +47,7 @@ def test_the_output_folder_of_the_analysis_can_be_chosen(tmp_path, capsys):
         assert read_error_model(os.path.join(folder, 'error_model.yaml')).provenance.estimator == estimator
 
 
+@pytest.mark.slow
 def test_a_sound_session_is_valid(session_folder, capsys):
     assert main(['--validate', session_folder]) == 0
     assert 'nothing wrong' in capsys.readouterr().out

@@ -7,6 +7,7 @@ import sys
 import time
 
 import numpy as np
+import pytest
 
 from ros_3d_bb_annotator.document import Document
 from support.small_session import change_json, write_small_session
@@ -67,6 +68,7 @@ def _run_and_kill(folder, random):
     return reports
 
 
+@pytest.mark.slow
 def test_kill_at_any_moment_loses_at_most_what_is_being_typed(tmp_path):
     folder = write_session(str(tmp_path))
     random, entered, kills = np.random.RandomState(5), set(), 0
@@ -100,6 +102,7 @@ def _type_and_kill(folder, to_wait_for, wait_s):
     return entered, process.wait()
 
 
+@pytest.mark.slow
 def test_kill_of_the_window_at_any_moment_loses_at_most_what_is_being_typed(tmp_path):
     folder = write_session(str(tmp_path))
     random, entered = np.random.RandomState(6), set()

@@ -45,6 +45,7 @@ def test_a_box_without_pixels_is_rejected(document, box_px):
     assert not document.can_undo
 
 
+@pytest.mark.slow
 def test_a_box_in_a_session_of_one_box_a_frame(tmp_path):
     folder = write_synthetic_session(str(tmp_path))
     before = read_json(folder)
@@ -76,6 +77,7 @@ def test_a_box_without_estimate_is_estimated_when_it_is_needed(document, folder,
     assert read_json(folder) == before
 
 
+@pytest.mark.slow
 def test_the_only_box_of_a_measurement_is_estimated_when_truth_is_entered(tmp_path):
     folder = write_synthetic_session(str(tmp_path))
     change_json(folder, lambda content: content['frames'][0].pop('estimate_mm'))

@@ -71,6 +71,7 @@ def test_stretched_depth_is_never_used_as_distances(tmp_path):
         read_session(str(tmp_path))
 
 
+@pytest.mark.slow
 def test_the_recorded_positions_are_analysed(tmp_path):
     random = np.random.RandomState(3)
     places = [(x, z) for z in (1000, 2000, 3000) for x in (-600, 0, 600)] * 4

@@ -114,6 +114,7 @@ def test_an_empty_folder_is_rejected(tmp_path):
             Document.open(str(folder))
 
 
+@pytest.mark.slow
 def test_5000_measurements_are_opened_without_reading_images(folder, monkeypatch):
     change_json(folder, lambda content: content.update(
         frames=[dict(content['frames'][0], id='m%d' % number) for number in range(5000)]))

@@ -46,6 +46,7 @@ def test_typed_text_is_restored(drive, window_on, folder):
     assert again.window.pane.truth.fields['x'].text() == '5' and again.measurement(0).state == 'new'
 
 
+@pytest.mark.slow
 def test_measurements_added_by_other_programs_are_shown(drive, folder):
     drive.press('12')
     entry = write_measurement(folder, 'm4')
@@ -55,6 +56,7 @@ def test_measurements_added_by_other_programs_are_shown(drive, folder):
     assert drive.window.progress.text() == '0 of 5 done'
 
 
+@pytest.mark.slow
 def test_a_removed_measurement_is_no_longer_shown(drive, folder):
     drive.press((Qt.Key_End, ALT), '12')
     change_json(folder, lambda content: content['frames'].pop())
@@ -62,6 +64,7 @@ def test_a_removed_measurement_is_no_longer_shown(drive, folder):
     assert drive.window.current == 0 and drive.window.pane.truth.fields['x'].text() == ''
 
 
+@pytest.mark.slow
 def test_the_first_measurement_of_a_session_is_shown_when_it_comes(window_on, tmp_path):
     driver = window_on(write_small_session(str(tmp_path), count=0))
     entry = write_measurement(str(tmp_path), 'm0')
@@ -177,6 +180,7 @@ def test_only_images_of_shown_measurements_are_read(window_on, tmp_path, monkeyp
     assert driver.window.current == 4999 and len(reads) == 2 * 22
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings('ignore:.*divide:RuntimeWarning')  # equal images: the error is all bias
 def test_export_and_analysis(window_on, tmp_path):
     folder = write_small_session(str(tmp_path), count=24)

@@ -237,6 +237,7 @@ def test_parameters_that_contradict_each_other_are_rejected(params, message):
         DepthPeople(DepthPeopleParams(**params))
 
 
+@pytest.mark.slow
 def test_detects_the_people_of_a_session_with_few_false_positives(session_folder):
     """On real frames at least 97 % of the people whose body is in view at 1.4 m or more are detected, with at most 2
     false positives in 100 frames. The synthetic session shows flat boxes only, which must not be detected.

@@ -14,6 +14,7 @@ def checkpoint(tmp_path):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.needs('onnxruntime')
 def test_a_row_for_each_case(checkpoint):
     image = np.random.RandomState(0).randint(0, 256, (240, 320, 3)).astype(np.uint8)

@@ -43,6 +43,7 @@ def every_pixel(camera, step=1):
     return np.stack((u, v), axis=-1).reshape(-1, 2).astype(float)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('camera', CAMERAS, ids=named)
 def test_project_undoes_deproject_at_every_pixel(camera):
     pixels = every_pixel(camera, camera.width // 640)
@@ -51,6 +52,7 @@ def test_project_undoes_deproject_at_every_pixel(camera):
     assert np.abs(camera.project(points) - pixels).max() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('camera', FOR_OPENCV, ids=named)
 def test_is_what_opencv_computes(camera):
     """Rays to 1e-6 pixels where OpenCV iterates until it is there, and back again by its own projection."""
@@ -178,6 +180,7 @@ def test_unusable_distortion_is_refused(model, coefficients, reason):
         Camera(640, 480, 600, 600, 320, 240, model, coefficients)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('model', [PLUMB_BOB, RATIONAL_POLYNOMIAL, INVERSE_BROWN_CONRADY, EQUIDISTANT])
 def test_any_coefficients_give_numbers_or_nothing(model):
     """No exception, no endless search: only nan where there is no ray."""

@@ -14,6 +14,7 @@ def fitted():
     return fit_error_model(*measure(SIMPLE, 4), source='made', estimator='median', camera='none', date='2026-01-01')
 
 
+@pytest.mark.slow
 def test_recovers_the_bias(fitted):
     true_m = np.array([[0.5, 0.0, 1.2], [-1.0, 0.2, 2.2], [1.2, 0.1, 3.8]])
     assert np.abs(fitted.corrected(SIMPLE.biased(true_m)) - true_m)[:, [0, 2]].max() < 0.03
@@ -21,6 +22,7 @@ def test_recovers_the_bias(fitted):
     assert fitted.x_bias.slope == pytest.approx(-0.1, abs=0.01)
 
 
+@pytest.mark.slow
 def test_recovers_a_bias_that_goes_with_the_angle():
     model = fit_error_model(*measure(MODEL._replace(x_bias=XBias(0.0, -0.25, 0.0)), 3))
     assert model.x_bias.slope == 0 and model.x_bias.per_angle_m == pytest.approx(-0.25, abs=0.02)
@@ -32,11 +34,13 @@ def test_recovers_the_spread(fitted):
     assert fitted.x_sigma.at(ranges_m) == pytest.approx(MODEL.x_sigma.at(ranges_m), rel=0.4)
 
 
+@pytest.mark.slow
 def test_recovers_a_spread_that_falls_with_range():
     model = fit_error_model(*measure(SIMPLE._replace(x_sigma=Spread(0.005, 0.0, 0.08)), 4))
     assert model.x_sigma.at(1.0) > 2 * model.x_sigma.at(3.0)
 
 
+@pytest.mark.slow
 def test_without_noise_the_bias_is_exact():
     model = fit_error_model(*measure(SIMPLE, 1, noise=0.0))
     assert model.z_bias == pytest.approx(SIMPLE.z_bias, abs=1e-6) and model.x_bias == pytest.approx(SIMPLE.x_bias)
@@ -50,6 +54,7 @@ def test_ellipses_hold_what_they_promise(fitted):
     assert 0.92 < scores.coverage_95 < 0.99 and 0.62 < scores.coverage_68 < 0.8
 
 
+@pytest.mark.slow
 def test_ellipses_hold_long_tails():
     random = np.random.RandomState(4)
     measured_m, truth_m = measure(SIMPLE, 200, noise=0.0)
@@ -60,6 +65,7 @@ def test_ellipses_hold_long_tails():
     assert 0.92 < scores_of(corrected_m, model.covariance(corrected_m), truth_m[~some]).coverage_95 < 0.99
 
 
+@pytest.mark.slow
 def test_scores_are_of_positions_that_the_model_never_saw():
     measured_m, truth_m = measure(SIMPLE, 3)
     outlier = (truth_m == PLACES_M[10]).all(axis=1)
@@ -68,6 +74,7 @@ def test_scores_are_of_positions_that_the_model_never_saw():
     assert (corrected_m[outlier, 2] - truth_m[outlier, 1]).mean() > 0.29
 
 
+@pytest.mark.slow
 def test_a_position_counts_once_however_often_it_was_measured():
     measured_m, truth_m = measure(SIMPLE, 1)
     often = np.repeat(np.arange(len(truth_m)), np.where(np.arange(len(truth_m)) == 3, 40, 1))
@@ -98,6 +105,7 @@ def test_measurements_that_are_none_are_refused():
         fit_error_model(measured_m, truth_m)
 
 
+@pytest.mark.slow
 def test_a_bias_too_steep_to_be_undone_is_refused():
     measured_m, truth_m = measure(SIMPLE._replace(x_sigma=Spread(0.001, 0.0, 0.0)), 1, noise=0.0)
     measured_m[:, 2] = 0.3 * truth_m[:, 1]

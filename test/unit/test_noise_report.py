@@ -57,6 +57,7 @@ def out(tables, tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_the_digits_that_the_thesis_prints(out):
     summary = json.loads((out / 'summary.json').read_text())
     assert [round(value, digits) for value, digits in zip(summary['z']['poly'], (2, 2, 3))] == [-0.04, 0.06, 0.008]
@@ -93,6 +94,7 @@ def test_the_error_models_can_be_read_and_correct_the_bias(out):
     assert scores.rmse_plane_m < 0.07 and 0.85 < scores.coverage_95 <= 1
 
 
+@pytest.mark.slow
 def test_a_session_is_analysed_in_the_same_way(session_folder, tmp_path, monkeypatch, capsys):
     run(monkeypatch, session_folder, '--out', tmp_path / 'out', '--estimator', 'recorded')
     model = read_error_model(tmp_path / 'out' / 'error_model.yaml')
@@ -100,6 +102,7 @@ def test_a_session_is_analysed_in_the_same_way(session_folder, tmp_path, monkeyp
     assert 'report.html' in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_without_positions_in_both_axes_the_model_has_the_form_of_the_thesis(tmp_path, monkeypatch):
     z = write_table(tmp_path / 'z.csv', [['', '', row[2], row[3]] for row in rows_of(3)])
     x = write_table(tmp_path / 'x.csv', [[row[0], row[1], '', ''] for row in rows_of(3)])

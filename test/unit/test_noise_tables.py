@@ -62,6 +62,7 @@ def test_too_little_to_analyse_is_refused(tmp_path, rows, reason):
         clusters_of(table, 'Z')
 
 
+@pytest.mark.slow
 def test_a_session_gives_what_is_stored_in_it_or_what_an_estimator_makes_of_it(session_folder):
     recorded, median, foreground = (read_session_measurements(session_folder, name)
                                     for name in ('recorded', 'median', 'foreground'))

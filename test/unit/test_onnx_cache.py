@@ -82,6 +82,7 @@ def test_a_cached_export_does_not_need_torch(opened, checkpoint, folder):
     assert output.decode().split() == ['person']
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('damage', [lambda content: content[:-1000], lambda content: b'', lambda content: b'nonsense',
                                     lambda content: content[:5000] + bytes([content[5000] ^ 1]) + content[5001:],
                                     lambda content: content[:-1] + b'x', lambda content: with_checksum(b'nonsense')])

@@ -45,6 +45,7 @@ def test_pixels_survive_an_image_message_and_a_byte_less_is_refused(encoding, he
         array_from(message)
 
 
+@pytest.mark.slow
 @given(PLAIN)
 def test_yaml_gives_back_plain_data(content):
     content = json.loads(json.dumps(content))  # no list in it is another one, for which YAML would write an alias
@@ -59,6 +60,7 @@ def test_any_text_is_yaml_or_refused(text):
         pass
 
 
+@pytest.mark.slow
 @given(st.dictionaries(st.sampled_from(DepthPeopleParams._fields) | st.text(), PLAIN, max_size=3))
 def test_parameters_have_their_types_or_are_refused(given_params):
     try:

@@ -56,6 +56,7 @@ def test_there_are_the_scenes_that_the_package_promises():
             'empty_room.yaml'} <= set(SCENES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('detector', ['yolov5', 'depth'])
 @pytest.mark.parametrize('name', THESIS_SCENES)
 def test_everybody_in_the_thesis_scenes_gets_one_number_and_keeps_it(runs, name, detector):
@@ -98,6 +99,7 @@ def approach():
     return Simulator(read_scenario(os.path.join(FOLDER, 'approach_jackal.yaml')))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', sorted(APPROACHES))
 def test_somebody_comes_within_half_a_metre_stays_for_two_seconds_and_goes(name):
     camera_m, person_m = APPROACHES[name]
@@ -149,6 +151,7 @@ def test_a_person_who_comes_to_half_a_metre_is_one_visible_track(name):
     assert result['velocity_rmse_mps'] < 0.3
 
 
+@pytest.mark.slow
 def test_results_tell_how_well_tracks_hold(approach):
     """At 5 images a second, from where the person starts; and what a result had before is still there."""
     steps = run_scene(approach, exact_detector(approach), 6, error_model=read_error_model(ERROR_MODEL))
@@ -160,6 +163,7 @@ def test_results_tell_how_well_tracks_hold(approach):
     assert result['velocity_rmse_mps'] < 0.3 and result['prediction_1s_m'] < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('every,images', [([], {'depth': 4, 'exact': 8}),
                                           (['--every', '4'], {'depth': 2, 'exact': 2})])
 def test_the_command_writes_a_row_for_each_detector(every, images, tmp_path, monkeypatch):

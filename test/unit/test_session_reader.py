@@ -50,6 +50,7 @@ def test_reads_a_session(session_folder):
     assert abs(frame.estimate_m[2] - frame.truth_m[1]) < 0.1 and len(frame.boxes_px) == 1
 
 
+@pytest.mark.slow
 def test_lens_distortion_is_that_of_plumb_bob(folder):
     assert read_session(folder).camera.distortion_model == ''
     change(folder, lambda content: content['camera'].update(distortion=[0.1, 0, 0, 0, 0.2]))

@@ -7,6 +7,7 @@ from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 
 
+@pytest.mark.slow
 def test_measured_positions_agree_with_the_truth(tmp_path):
     session = read_session(write_simulated_session(str(tmp_path), (3.0,), (0.0, 0.2), repetitions=2))
     assert [frame.truth_m.tolist() for frame in session.frames] == [[0, 3], [0, 3], [0.6, 3], [0.6, 3]]

@@ -101,6 +101,7 @@ def test_depth_of_a_box_is_that_of_rays(room, camera, x, y, yaw, size):
         np.testing.assert_allclose(drawn.inverse_depth[on_side], 1 / near[on_side], rtol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('surface,spot', [('floor', (5.0, 1.0, 0.0)), ('wall', (9.0, .5, 1.5))])
 @given(st.floats(-.1, .1), st.floats(-.15, .05), st.floats(-.1, .1), st.floats(-.5, 1))
 @settings(max_examples=15)

@@ -191,6 +191,7 @@ def test_scenarios_are_shipped():
     assert len(SHIPPED) >= 13 and 'demo.yaml' in SHIPPED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', SHIPPED)
 def test_shipped_scenarios_have_no_collisions(name):
     scenario = read_scenario(os.path.join(FOLDER, name))

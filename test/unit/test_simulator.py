@@ -101,6 +101,7 @@ def test_with_noise_depth_has_the_errors_of_a_d435():
     assert .001 < np.median(np.abs(errors)) < .03
 
 
+@pytest.mark.slow
 @given(st.floats(2.5, 7), st.floats(-2, 2), st.floats(-3, 3))
 @settings(max_examples=12)
 def test_the_box_encloses_the_pixels_of_the_person(empty_simulator, x, y, facing):
@@ -138,6 +139,7 @@ def test_truth_has_the_position_and_size_of_the_body():
     assert (standing.id, crouching.id) == (1, 2)
 
 
+@pytest.mark.slow
 @given(st.floats(-2, 0), st.floats(-1, 1), st.floats(-.3, .3), st.floats(-.1, .2), st.floats(2.5, 6), st.floats(-1, 1))
 @settings(max_examples=12)
 def test_images_agree_with_the_poses(x, y, yaw, pitch, ahead, beside):

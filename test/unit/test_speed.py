@@ -115,6 +115,7 @@ def test_the_command_writes_what_it_measured(tmp_path, session_folder, monkeypat
     assert describe_machine() in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_without_data_people_are_simulated(tmp_path, monkeypatch, capsys):
     monkeypatch.delenv('ROS_3D_BB_DATA', raising=False)
     monkeypatch.setattr(benchmark, 'OBJECTS', (1,))

@@ -187,6 +187,7 @@ def assert_within(factor, values, expected):
     assert ratios.min() > 1. / factor and ratios.max() < factor, ratios
 
 
+@pytest.mark.slow
 def test_constants_agree_with_the_real_frames(session_folder):
     """Without the real frames, only the agreement of the constants with the shadow formula is tested."""
     if not DATA:
@@ -227,6 +228,7 @@ def test_shadow_and_invalid_share_agree_with_real_frames(simulated, place):
     assert_within(1.3, [standing.invalid], [REAL_STANDING[place].invalid])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('near_m,wall_m', [(0.5, 2), (0.5, 8), (1, 2), (1, 4), (1, 8), (2, 3), (2, 8), (4, 8)])
 @pytest.mark.parametrize('params', [StereoParams(), NO_NOISE])
 def test_shadow_follows_the_formula(near_m, wall_m, params):

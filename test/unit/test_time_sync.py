@@ -222,6 +222,7 @@ def held_by(sync):
     return len(sync._depths), len(sync._cameras), len(sync._waiting)
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.sampled_from(['depth', 'camera', 'boxes']),
                           st.sampled_from([0, 0, 1, 2, MS, PERIOD, -1, -PERIOD, 3600 * NS, -3600 * NS])),
                 min_size=200, max_size=600))

@@ -213,6 +213,7 @@ def test_heads_tell_people_apart_where_feet_are_cut():
     assert ids(play(Tracker(), 2, swapped)[-1]) == [2]
 
 
+@pytest.mark.slow
 def test_a_person_who_stands_is_not_said_to_move_and_one_who_slows_down_moves_on_for_a_while():
     """0.2 m/s begins it, 0.1 m/s ends it."""
     def speed(mps):
@@ -229,6 +230,7 @@ def test_size_is_smoothed():
     assert np.std(heights_m) < 0.025 and np.mean(heights_m) == pytest.approx(1.7, abs=0.03)
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(st.permutations(range(6)))
 def test_images_in_another_order_give_the_same_tracks(order):
@@ -397,6 +399,7 @@ def test_images_that_come_late_are_done_again_with_the_new_parameters():
     assert ids(tracker.update(START_NS + int(0.9 * NS) + 1, [at(3, 0)], VIEW)) == [number]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('slope', [-0.1, 0.05, 0.1])
 @pytest.mark.parametrize('cut,height', [(['top'], 1.7), (['bottom'], 1.7), (['top', 'bottom'], 0.6)])
 def test_the_height_of_a_person_holds_on_a_slope(slope, cut, height):

@@ -80,6 +80,7 @@ def test_who_walks_from_one_view_into_the_other_keeps_the_number():
     assert speed_mps == pytest.approx(0.9, abs=0.1)
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(st.floats(0, 0.3), st.floats(-np.pi, np.pi), st.integers(0, 1000))
 def test_one_person_is_one_track_though_the_cameras_do_not_quite_agree(apart_m, direction, seed):
@@ -105,6 +106,7 @@ def test_two_people_side_by_side_whom_both_see_are_two_tracks():
         assert np.linalg.norm(track.position_m[:2] - place_m) < 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('bearing', [IN_FRONT, IN_BOTH, AT_LEFT])
 def test_who_is_gone_is_published_for_as_long_as_with_one_camera(bearing):
     """0.35 s after they should have been seen, however many cameras look, of which some cannot see them."""
@@ -209,6 +211,7 @@ def walk_into_both(time_s):
     return around(0.5 * time_s - 0.2)
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(st.permutations(range(10)), st.booleans())
 def test_the_order_in_which_the_images_come_does_not_matter(order, same_stamps):
@@ -246,6 +249,7 @@ KINDS = ['skip', 'none', 'seen']
 ARRIVALS = st.tuples(st.integers(0, 14), st.sampled_from([FRONT, LEFT, REAR]), st.sampled_from(KINDS))
 
 
+@pytest.mark.slow
 @settings(max_examples=100)
 @given(st.lists(ARRIVALS, min_size=2, max_size=14, unique_by=lambda arrival: (arrival[0], arrival[1].camera)),
        st.floats(0, 2.5), st.integers(1, 3), st.randoms())
@@ -270,6 +274,7 @@ def test_neither_does_it_where_images_have_no_answer(arrivals, pause_s, cameras,
     assert shuffled._buffer.state.tracks.tobytes() == in_time._buffer.state.tracks.tobytes()
 
 
+@pytest.mark.slow
 @settings(max_examples=14)
 @given(st.integers(1, 14), st.booleans())
 def test_the_delay_of_one_camera_changes_no_number(delay, into_front):
@@ -283,6 +288,7 @@ def test_the_delay_of_one_camera_changes_no_number(delay, into_front):
     assert set(number for objects in published for number in ids(objects)) == {1}
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(st.lists(st.tuples(st.integers(0, 12), st.booleans(), st.lists(st.floats(-0.6, 1.4), max_size=3)), min_size=1,
                 max_size=25))

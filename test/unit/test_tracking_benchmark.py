@@ -131,6 +131,7 @@ def run_command(monkeypatch, *arguments):
     command.main()
 
 
+@pytest.mark.slow
 @pytest.mark.needs('norfair', 'trackeval')
 def test_the_command_writes_all_keys_of_the_design(monkeypatch, tmp_path, capsys):
     monkeypatch.delenv('ROS_3D_BB_DATA', raising=False)
@@ -148,6 +149,7 @@ def test_the_command_writes_all_keys_of_the_design(monkeypatch, tmp_path, capsys
     assert 'made; no recordings are at hand' in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.needs('norfair', 'trackeval')
 def test_the_command_runs_the_whole_pipeline_on_a_scene(monkeypatch, tmp_path, capsys):
     scenario, path = tmp_path / 'short.yaml', tmp_path / 'scores.json'

@@ -201,6 +201,7 @@ def boxes():
     return boxes
 
 
+@pytest.mark.slow
 def test_depth_errors_are_those_of_the_model_with_outliers_behind(boxes):
     camera = CameraModel()
     errors_m = np.array([box.depth_m - 3 - 0.2 * thesis_bias_m(3) for found in boxes for box in found

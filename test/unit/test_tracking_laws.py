@@ -2,6 +2,7 @@
 import warnings
 
 import numpy as np
+import pytest
 from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera, transform_from, transform_points
@@ -55,6 +56,7 @@ def test_furniture_before_the_legs_leaves_a_person_the_id(seed, hidden_share, hi
     assert all([(track.id, track.status) for track in tracks] == [(1, VISIBLE)] for tracks in published[20:])
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(SEEDS, st.floats(-5e6, 5e6), st.floats(-5e6, 5e6), st.floats(-180, 180))
 def test_tracks_are_the_same_anywhere_on_the_map(seed, x_m, y_m, yaw_deg):

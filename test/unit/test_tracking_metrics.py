@@ -122,6 +122,7 @@ def test_predictions_of_people_of_whom_nobody_knows_where_they_went_do_not_count
     assert result['fde_2s_m'] is None and result['position_rmse_m'] == pytest.approx(0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('factor,coverage', [(1.0, 0.95), (0.25, 1 - np.exp(-5.991 * 0.25 / 2)), (100.0, 1.0)])
 def test_coverage_is_the_share_of_errors_within_the_ellipse(factor, coverage):
     """`factor`: of the covariance that the track claims to that of its errors."""

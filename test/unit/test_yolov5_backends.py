@@ -50,6 +50,7 @@ def exported_onnx(path, network, hw, metadata, dynamic=False):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('runtime', RUNTIMES)
 def test_raw_output_agrees_with_the_official_code(official_output, runtime):
     """Within 0.01 px and 1e-4 in every score."""
@@ -60,6 +61,7 @@ def test_raw_output_agrees_with_the_official_code(official_output, runtime):
         assert difference[:, :4].max() <= 0.01 and difference[:, 4:].max() <= 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('runtime', RUNTIMES)
 @pytest.mark.parametrize('release,model', [('6.0', 'n'), ('5.0', 's')])
 def test_raw_output_agrees_with_plain_numpy(tmp_path, release, model, runtime):
@@ -71,6 +73,7 @@ def test_raw_output_agrees_with_plain_numpy(tmp_path, release, model, runtime):
         assert difference[:, :4].max() <= 0.01 and difference[:, 4:].max() <= 1e-4
 
 
+@pytest.mark.slow
 @needs_onnx
 def test_detections_in_a_measurement_session_do_not_depend_on_the_runtime(session_folder, official_output):
     """Boxes within 1 px and scores within 0.01, at the two sizes that are measured."""
@@ -143,6 +146,7 @@ def test_weights_that_do_not_match_their_layout_are_rejected(tmp_path):
         open_runtime(path)
 
 
+@pytest.mark.slow
 @needs_onnx
 @pytest.mark.parametrize('dynamic', [False, True])
 def test_onnx_exports_give_the_same_predictions(tmp_path, dynamic):
@@ -155,6 +159,7 @@ def test_onnx_exports_give_the_same_predictions(tmp_path, dynamic):
     np.testing.assert_allclose(runtime(image_of(), -1), predicted(network, image_of()), atol=1e-3, rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_torchscript_exports_give_the_same_predictions(tmp_path):
     network = random_network(layout('6.0', 'n', 3)).fuse()
     path = str(tmp_path / 'model.torchscript')
@@ -213,6 +218,7 @@ def test_without_onnx_runtime_the_error_names_what_to_install(tmp_path, monkeypa
         open_runtime(str(tmp_path / 'model.onnx'))
 
 
+@pytest.mark.slow
 @needs_onnx
 def test_class_names_in_an_export_are_not_executed(tmp_path):
     victim = tmp_path / 'touched'

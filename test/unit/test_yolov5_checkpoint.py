@@ -216,6 +216,7 @@ def test_attributes_set_by_a_file_do_not_persist(path):
     assert len(read_checkpoint(path).weights) > 100
 
 
+@pytest.mark.slow
 def test_a_wrong_byte_in_the_directory_raises_no_other_error(path):
     """A damaged byte causes a WeightsError or, if the byte has no effect, no error."""
     write_checkpoint(path, layout('6.0', 'n'))

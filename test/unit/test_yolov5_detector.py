@@ -27,6 +27,7 @@ class FixedRuntime(object):
         return self.rows
 
 
+@pytest.mark.slow
 def test_detects_the_person_in_a_measurement_session(session_folder, weights):
     """In at least 107 of 110 frames at confidence 0.25, with a median IoU of at least 0.93 with the recorded boxes."""
     session = read_session(session_folder)
