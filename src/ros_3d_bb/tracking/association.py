@@ -53,8 +53,8 @@ def _height_cost(tracks, batch, sigma_m):
     """Association cost (n, m) of the height differences, as a negative log likelihood.
 
     The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track. The
-    tops of the heads are then compared if both are known; otherwise the cost is 0. The tops are also compared if the
-    heights differ, because furniture occludes the lower part of a body only.
+    tops of the heads are then compared if both are known; otherwise the cost is 0. Where the height is known, the cost
+    is at most that of the tops plus `HIDDEN_FEET_COST`, because furniture occludes only the lower part of a body.
     """
     seen, cut = tracks['end_hits'] > 0, batch.vertical_cuts
     cost = ((tracks['size_m'][:, 2:] - batch.sizes_m[:, 2]) / sigma_m) ** 2 / 2
