@@ -4,7 +4,7 @@ import time
 from typing import Any, NamedTuple
 
 NS = 1000000000  # nanoseconds in a second
-MAX_WAITING = 100  # maximum number of waiting boxes messages; more than any camera sends in a second
+MAX_WAITING = 100  # maximum number of waiting box arrays; more than any camera sends in a second
 MAX_RATE_HZ = 300  # faster than any camera; if stamps are closer, the clock hangs and not all images are kept
 JUMP_NS = NS  # a larger deviation from the expected stamp is a jump in time
 

@@ -68,7 +68,7 @@ class Provenance(NamedTuple):
 
 class Scores(NamedTuple):
     """Leave-one-position-out cross-validation: root mean square errors after correction, metres, and the share of
-    positions inside the 68 % and the 95 % covariance ellipse in the horizontal plane."""
+    measurements inside the 68 % and the 95 % covariance ellipse in the horizontal plane."""
 
     rmse_x_m: float
     rmse_z_m: float
@@ -137,7 +137,7 @@ class ErrorModel(NamedTuple):
     def covariance(self, position_m):
         """Covariance of corrected positions in the camera optical frame, square metres.
 
-        The covariance is diagonal: in the measurements, errors of x and z are not correlated along the ray.
+        The covariance is diagonal: the measurements show no correlation of x and z errors along the ray.
 
         Parameters
         ----------
