@@ -1,4 +1,4 @@
-"""The pinhole camera, lens distortion, rigid transforms, and whether depth is aligned to colour.
+"""Pinhole camera model, lens distortion, rigid transforms, depth images, and checks of depth-to-colour alignment.
 
 May import: core.
 """

@@ -1,17 +1,22 @@
-"""Depth that is not aligned to colour."""
-SAME_PX = 1.0  # intrinsics that differ by less are the same: half a pixel is 1 cm at 6 m
+"""Checks whether the depth image is aligned to the colour image."""
+SAME_PX = 1.0  # intrinsics that differ by less count as equal: half a pixel is 1 cm at 6 m
 ALIGN = ('start the camera with realsense.launch, or realsense2_camera with align_depth:=true, and take '
          'camera/aligned_depth_to_color/image_raw')
 
 
 def size_fault(color, width, height):
-    """Whether a depth image has another size than the camera of the colour image; a phrase, or empty.
+    """Compare the size of a depth image with that of the colour camera.
 
     Parameters
     ----------
-    color : geometry.Camera
+    color : camera_model.Camera
     width, height : int
-        Pixels of the depth image.
+        Size of the depth image, pixels.
+
+    Returns
+    -------
+    str
+        Description of the difference; empty if the sizes are equal.
     """
     if (width, height) == color[:2]:
         return ''
@@ -19,11 +24,16 @@ def size_fault(color, width, height):
 
 
 def intrinsics_fault(color, depth):
-    """In what the camera of a depth image differs from that of the colour image; a phrase, empty where in nothing.
+    """Compare the intrinsics of the depth camera with those of the colour camera.
 
     Parameters
     ----------
-    color, depth : geometry.Camera
+    color, depth : camera_model.Camera
+
+    Returns
+    -------
+    str
+        Description of the difference; empty if the intrinsics agree within `SAME_PX`.
     """
     if color[:2] != depth[:2]:
         return 'the depth camera has %d x %d pixels, the colour camera %d x %d' % (depth[:2] + color[:2])
@@ -34,7 +44,13 @@ def intrinsics_fault(color, depth):
 
 
 def frames_fault(color_frame, depth_frame):
-    """Whether a depth image says that it was taken in another frame than the colour image; a phrase, or empty."""
+    """Compare the frame_id of a depth image with that of the colour image.
+
+    Returns
+    -------
+    str
+        Description of the difference; empty if the frames are equal or one of them is unknown.
+    """
     if color_frame and depth_frame and color_frame.lstrip('/') != depth_frame.lstrip('/'):
         return 'the depth image is in the frame %s, the colour camera in %s' % (depth_frame, color_frame)
     return ''

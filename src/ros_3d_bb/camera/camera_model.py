@@ -1,8 +1,8 @@
-"""Cameras and rigid transforms.
+"""Pinhole camera model and rigid transforms.
 
 Convention: pixel (u, v) is the centre of the pixel in column u and row v, both counted from 0; a camera optical frame
-has x right, y down, z forward (REP 103); lengths are metres. A transform `b_from_a` is a 4x4 matrix that takes points
-given in frame a to frame b.
+has x right, y down, z forward (REP 103); lengths are in metres. A transform `b_from_a` is a 4x4 matrix that transforms
+points from frame a to frame b.
 """
 from typing import NamedTuple, Tuple
 
@@ -11,21 +11,21 @@ import numpy as np
 from ros_3d_bb.camera.distortion import checked_distortion, distort, undistort
 
 STEEP = 0.34  # sine of the angle between the optical axis and the vertical: 20 degrees
-OPTICAL_ROTATION = (-0.5, 0.5, -0.5, 0.5)  # quaternion of an optical frame that looks along the body's x (REP 103)
+OPTICAL_ROTATION = (-0.5, 0.5, -0.5, 0.5)  # quaternion of an optical frame whose z axis is the body's x axis (REP 103)
 
 
 class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float), ('fy', float), ('cx', float),
                                    ('cy', float), ('distortion_model', str), ('distortion', Tuple[float, ...])])):
-    """Intrinsics of a camera; focal lengths and principal point in pixels.
+    """Intrinsics of a camera; image size, focal lengths and principal point in pixels.
 
-    `distortion_model` and `distortion` are as in sensor_msgs/CameraInfo: see `distortion.MODELS`. A camera without
-    lens distortion has '' and () there, whatever it was made of.
+    `distortion_model` and `distortion` are as in sensor_msgs/CameraInfo, see `distortion.MODELS`. They are normalised:
+    a camera without lens distortion has '' and ().
 
     Raises
     ------
     ValueError
-        If the size is not positive, or a focal length is not positive and finite, or the principal point not finite,
-        or the distortion is none that `checked_distortion` knows.
+        If the size is not positive, a focal length is not positive and finite, the principal point is not finite, or
+        `checked_distortion` rejects the distortion.
     """
 
     __slots__ = ()
@@ -41,7 +41,7 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
         return camera
 
     def deproject(self, pixels, depth_m):
-        """Points in the optical frame that pixels show. Inverse of `project`. Thesis 3.4.1.
+        """Deproject pixels to points in the optical frame (thesis 3.4.1). Inverse of `project`.
 
         Parameters
         ----------
@@ -53,24 +53,24 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
         Returns
         -------
         numpy.ndarray, (..., 3)
-            nan for x and y where the distortion gives the pixel no ray.
+            Metres; x and y are nan for pixels without a ray under the distortion model.
         """
         pixels, depth_m = np.asarray(pixels, float), np.asarray(depth_m, float)
         x, y = (along * depth_m for along in self.rays(pixels[..., 0], pixels[..., 1]))
         return np.stack((x, y, np.broadcast_to(depth_m, x.shape)), axis=-1)
 
     def rays(self, u, v):
-        """x / z and y / z of what the pixels in columns u and rows v show.
+        """Viewing rays x / z and y / z of the pixels in columns u and rows v.
 
         Parameters
         ----------
         u, v : numpy.ndarray
-            Arrays that broadcast to one shape: a row of columns and a column of rows are a grid.
+            Arrays that broadcast to one shape: (1, w) and (h, 1), for example, give a grid.
 
         Returns
         -------
         x, y : numpy.ndarray
-            Arrays that broadcast to the same shape; nan where the distortion gives the pixel no ray.
+            Arrays that broadcast to the same shape; nan for pixels without a ray under the distortion model.
         """
         x, y = (u - self.cx) / self.fx, (v - self.cy) / self.fy
         if not self.distortion_model:
@@ -79,7 +79,7 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
         return tuple(np.moveaxis(undistort(self.distortion_model, self.distortion, pixels), -1, 0))
 
     def project(self, points):
-        """Pixels that show points of the optical frame. Inverse of `deproject`.
+        """Project points in the optical frame to pixels. Inverse of `deproject`.
 
         Parameters
         ----------
@@ -89,7 +89,7 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
         Returns
         -------
         numpy.ndarray, (..., 2)
-            (u, v), also outside the image; nan where the distortion gives the ray no pixel.
+            (u, v), may be outside the image; nan for rays without a pixel under the distortion model.
         """
         points = np.asarray(points, float)
         x, y = points[..., 0] / points[..., 2], points[..., 1] / points[..., 2]
@@ -98,9 +98,9 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
         return np.stack((x * self.fx + self.cx, y * self.fy + self.cy), axis=-1)
 
     def undistort(self, pixels):
-        """Pixels (..., 2) at which a camera without distortion, with the same fx, fy, cx and cy, shows the same.
+        """Undistort pixels (..., 2): their positions in a camera without distortion and the same fx, fy, cx and cy.
 
-        nan where the distortion gives the pixel no ray.
+        nan for pixels without a ray under the distortion model.
         """
         if not self.distortion_model:
             return pixels
@@ -108,12 +108,14 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
 
 
 def transform_from(translation, quaternion):
-    """The 4x4 matrix of a translation (x, y, z) in metres and a quaternion (x, y, z, w), normalised here.
+    """Create a 4x4 matrix from a translation (x, y, z) in metres and a quaternion (x, y, z, w).
+
+    The quaternion is normalised.
 
     Raises
     ------
     ValueError
-        If the quaternion has no direction (zero, nan or inf).
+        If the quaternion cannot be normalised (zero, nan or inf).
     """
     quaternion = np.asarray(quaternion, float)
     norm = np.linalg.norm(quaternion)
@@ -129,10 +131,10 @@ def transform_from(translation, quaternion):
 
 
 def quaternion_from(matrix):
-    """The quaternion (x, y, z, w), w >= 0, of the rotation in a 4x4 matrix. Inverse of `transform_from`."""
+    """Quaternion (x, y, z, w), w >= 0, of the rotation of a 4x4 matrix. Inverse of `transform_from`."""
     m = matrix
     xx, yy, zz = np.diag(m)[:3]
-    # 4 q q^T, whose rows are all multiples of q; the row of the largest component is the most exact one
+    # All rows of 4 q q^T are multiples of q; the row of the largest component is the most accurate.
     squares = np.array([1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz])
     products = np.array([[squares[0], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[2, 1] - m[1, 2]],
                          [m[0, 1] + m[1, 0], squares[1], m[1, 2] + m[2, 1], m[0, 2] - m[2, 0]],
@@ -144,7 +146,7 @@ def quaternion_from(matrix):
 
 
 def upright_turns(fixed_from_camera):
-    """By how many quarter turns clockwise an image has to be turned so that up in it is nearest to up in the world.
+    """Number of clockwise quarter turns after which the image is upright, to the nearest quarter turn.
 
     Parameters
     ----------
@@ -154,8 +156,9 @@ def upright_turns(fixed_from_camera):
     Returns
     -------
     int
-        0 for a camera held upright, 1 where the left edge of the image is up, 2 upside down, 3 for the right edge. 0
-        for a camera that looks up or down within `STEEP`: there, people have no upright direction in the image.
+        0 for an upright camera, 1 if the left edge of the image is up, 2 if the camera is upside down, 3 if the right
+        edge is up. Also 0 for a camera that points up or down within `STEEP`, where people have no upright direction
+        in the image.
     """
     x_up, y_up = fixed_from_camera[2, :2]
     if np.hypot(x_up, y_up) < STEEP:
@@ -166,5 +169,5 @@ def upright_turns(fixed_from_camera):
 
 
 def transform_points(b_from_a, points):
-    """Points (..., 3) given in frame a, in frame b."""
+    """Transform points (..., 3) from frame a to frame b."""
     return np.asarray(points, float).dot(b_from_a[:3, :3].T) + b_from_a[:3, 3]

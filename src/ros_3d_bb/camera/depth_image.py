@@ -1,22 +1,34 @@
-"""Depth images."""
+"""Depth images in the camera's raw units."""
 from typing import NamedTuple
 
 import numpy as np
 
-FARTHEST_M = 100.0  # farther away no depth camera measures anything
+FARTHEST_M = 100.0  # beyond the range of any depth camera
 
 
 class DepthImage(NamedTuple):
-    """A depth image as the camera sent it: `values` (height, width) of any numeric type, times `scale_m` is metres.
+    """A depth image: raw `values` (height, width) of any numeric type; depth in metres is `values` times `scale_m`.
 
-    Zero, negative, nan, inf and more than `FARTHEST_M` mean: no depth measured there.
+    Depths that are zero, negative, nan, inf or greater than `FARTHEST_M` are invalid.
     """
 
     values: np.ndarray
     scale_m: float
 
     def at(self, u, v):
-        """Depth in metres at integer pixels (columns u, rows v: arrays, or slices for a grid), and whether it was
-        measured; arrays of one shape."""
+        """Depth at pixels.
+
+        Parameters
+        ----------
+        u, v : numpy.ndarray of int or slice
+            Columns and rows; slices select a grid.
+
+        Returns
+        -------
+        depth_m : numpy.ndarray
+            Metres.
+        valid : numpy.ndarray of bool
+            Whether depth was measured, with the shape of depth_m.
+        """
         depth_m = self.values[v, u].astype(float) * self.scale_m
         return depth_m, (depth_m > 0) & (depth_m <= FARTHEST_M)

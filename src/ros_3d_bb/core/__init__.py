@@ -1,4 +1,4 @@
-"""Helpers that every room shares: parameters, YAML, stamps, counters, a worker thread, atomic files.
+"""Helpers shared by all folders: parameters, YAML, time synchronization, counters, a worker thread, atomic files.
 
 May import: nothing of this package.
 """

@@ -10,10 +10,10 @@ FILE_NAME = 'frames.json'
 
 @contextlib.contextmanager
 def locked_update(folder):
-    """Update the description of a session: it is locked, and written when the block ends without an error.
+    """Lock the description of a session, and write it when the block ends without an error.
 
-    Other programs wait for the lock, so the viewer can add measurements to a session that is being annotated. The file
-    is replaced atomically: after a crash it contains the old or the new content.
+    Other programs wait for the lock, so that the viewer can add measurements to a session that is being annotated. The
+    file is replaced atomically: after a crash it contains the old or the new content.
 
     Parameters
     ----------

@@ -1,50 +1,57 @@
-"""Whether the stamps of several cameras are of one time, and which cameras are right where they are not."""
+"""Detection of cameras whose clocks differ, and selection of the cameras with the correct time."""
 from typing import NamedTuple
 
 from ros_3d_bb.core.time_sync import JUMP_NS, NS
 
-ALIVE_NS = NS  # a camera without images for longer has no say
-LONGEST_LAG_NS = 4 * NS  # a camera whose stamps are behind by less may have the right time and a slow detector
+ALIVE_NS = NS  # a camera without images for longer is ignored
+LONGEST_LAG_NS = 4 * NS  # a camera that lags by less than this may have the correct time and a slow detector
 NEVER = float('inf')
 
 
 class _Clock(NamedTuple):
-    """The latest image of a camera, and the time of arrival since which its stamps are accepted and have not leapt."""
+    """The latest image of a camera, and the arrival time since which its stamps are accepted without a jump."""
 
     stamp_ns: int
     arrival_ns: int
     since_ns: float = NEVER
 
     def is_near(self, other, limit_ns):
-        """Whether the stamps of two cameras differ by no more than a limit, apart from what their arrival explains."""
+        """Whether the stamps of two cameras, relative to their arrival times, differ by at most `limit_ns`."""
         return abs(self.stamp_ns - self.arrival_ns - other.stamp_ns + other.arrival_ns) <= limit_ns
 
     def leaps_to(self, later):
-        """Whether the stamp of the next image goes back, or forward by more than the time that has passed."""
+        """Whether the stamp of the next image jumps back, or forward by more than the elapsed time."""
         return not -JUMP_NS <= later.stamp_ns - self.stamp_ns <= later.arrival_ns - self.arrival_ns + JUMP_NS
 
 
 class CameraClocks(object):
     """Decides between cameras whose stamps differ by more than `JUMP_NS`.
 
-    Only a camera whose images are tracked can keep others out. Of those that differ,
+    Only a camera whose images are tracked can exclude others. Conflicts are resolved by these rules, in this order:
 
-    - the majority is right, where the difference is longer than a lag;
-    - else the camera that has been accepted without a leap for longest. A new camera is as old as those that it may lag
-      behind, or that may lag behind it;
-    - of equally old ones the camera whose stamps are ahead, as images come late, and never early.
+    - if the difference is longer than `LONGEST_LAG_NS`, the majority of the cameras is correct;
+    - otherwise the camera that has been accepted without a jump for the longest time is correct. A new camera is as old
+      as the cameras that it may lag behind, or that may lag behind it;
+    - of equally old cameras, the one whose stamps are ahead is correct, because images arrive late, never early.
     """
 
     def __init__(self):
-        self._clocks, self._tracked = {}, {}  # by camera: of its latest image, and of the latest that was tracked
+        self._clocks, self._tracked = {}, {}  # by camera: clock of the latest image, and of the latest tracked image
 
     def accept(self, stamp_ns, now_ns, camera):
-        """Take the stamp of an image, which arrived at `now_ns`.
+        """Check the stamp of an image that arrived at `now_ns`.
+
+        Parameters
+        ----------
+        stamp_ns : int
+        now_ns : int
+            Arrival time, see `time_sync.arrival_clock_ns`.
+        camera : str
 
         Returns
         -------
         str or None
-            None where it is accepted; else the camera that is right.
+            None if the image is accepted; otherwise the camera with the correct time.
 
         Raises
         ------
@@ -66,7 +73,7 @@ class CameraClocks(object):
         return None if is_accepted else right
 
     def _continued(self, clock, camera, alive):
-        """The clock of a camera with the time since which it is right, as far as its former images and others tell."""
+        """The clock with `since_ns` from the camera's previous image, or from the other cameras with the same time."""
         former = self._clocks.get(camera)
         if former is not None and former.since_ns != NEVER and not former.leaps_to(clock):
             return clock._replace(since_ns=former.since_ns)
@@ -75,9 +82,9 @@ class CameraClocks(object):
                                             if name != camera and clock.is_near(other, limit_ns)), default=NEVER))
 
     def track(self, camera):
-        """The latest image of a camera was tracked."""
+        """Record that the latest image of a camera was tracked."""
         self._tracked[camera] = self._clocks[camera]
 
     def is_tracked(self, camera, now_ns):
-        """Whether an image of a camera was tracked lately."""
+        """Whether an image of a camera was tracked within the last `ALIVE_NS`."""
         return camera in self._tracked and now_ns - self._tracked[camera].arrival_ns <= ALIVE_NS

@@ -1,4 +1,4 @@
-"""Texts of exceptions for log lines."""
+"""Formatting of exceptions for log lines."""
 
 
 def cause(error):

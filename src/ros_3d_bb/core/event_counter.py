@@ -1,28 +1,28 @@
-"""What became of each input: counted, and said where something was refused or missing."""
+"""Event counters for the inputs of a node: processed, rejected or missing."""
 import collections
 import contextlib
 import threading
 
 
-MOST_LAGS = 10000  # that are kept for a report, where none can be made
+MOST_LAGS = 10000  # maximum number of stored latencies
 
 
 class EventCounter(object):
-    """Counts events, and keeps the first sentence about each.
+    """Counts events, and keeps the first message about each.
 
     Parameters
     ----------
     clock : callable, optional
-        Returns ROS time (genpy.Time), for the latencies that `answered` records.
+        Returns ROS time (genpy.Time), for the latencies of `record_latency`.
 
     Attributes
     ----------
     counts : dict
-        How often each event occurred, in the order in which they came up.
+        Number of occurrences of each event, in the order of first occurrence.
     sentences : dict
-        By event, of those with a sentence.
+        First message of each event that has one.
     received : dict
-        How many inputs of each kind `taking` saw.
+        Number of inputs of each kind that `receiving` counted.
     lags_ns : collections.deque
         Latencies of the newest results, nanoseconds.
     """
@@ -35,39 +35,42 @@ class EventCounter(object):
         self.lags_ns = collections.deque(maxlen=MOST_LAGS)
 
     def count(self, event, amount=1):
-        """Something went as it should."""
+        """Count an expected event."""
         with self._lock:
             self.counts[event] = self.counts.get(event, 0) + amount
 
     def count_all(self, amounts):
-        """Several events at once, by event."""
+        """Count several events at once; `amounts` maps each event to its number."""
         with self._lock:
             for event, amount in amounts.items():
                 self.counts[event] = self.counts.get(event, 0) + amount
 
     def note(self, event, sentence):
-        """Something happened that one should know of."""
+        """Count an event that is worth reporting, and keep its first message."""
         self.count(event)
         self.sentences.setdefault(event, sentence)
 
     def warn(self, event, sentence):
-        """Something was refused or missing; `sentence` says what, why, and what happens next."""
+        """Count rejected or missing input; `sentence` states what failed, why, and what happens next."""
         self.note(event, sentence)
 
     def leave_out(self, parts, faults):
-        """Some parts of an input cannot be used; `faults` has one sentence for each. The others are used."""
+        """Count unusable parts of an input; `faults` has one message for each. The other parts are used."""
         for fault in faults:
             self.warn('%s left out' % parts, '%s; the others in this image are used' % fault)
 
     def receiving(self, inputs):
-        """Around a callback: counts its message as received, so that one sees whether each got an outcome."""
+        """Context manager for a callback: `rejecting`, and count the message as received.
+
+        Comparing both counts shows whether every message had an outcome.
+        """
         with self._lock:
             self.received[inputs] = self.received.get(inputs, 0) + 1
         return self.rejecting(inputs)
 
     @contextlib.contextmanager
     def rejecting(self, inputs):
-        """Around what is done with one input: a ValueError rejects that input, and the next one is processed."""
+        """Context manager for the processing of one input: a ValueError rejects the input and is not raised further."""
         try:
             yield
         except ValueError as error:
@@ -81,5 +84,5 @@ class EventCounter(object):
         return False
 
     def record_latency(self, stamp):
-        """An image of a stamp was answered: its result is published, or it has none. Makes a rate and a latency."""
+        """Record the latency of a processed image, with or without a result, for the reported rate and latency."""
         self.lags_ns.append(self._clock().to_nsec() - stamp.to_nsec())

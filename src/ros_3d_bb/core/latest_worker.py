@@ -1,16 +1,16 @@
-"""Work that is slower than its input."""
+"""Worker thread that processes only the newest input, for work that is slower than its input."""
 import threading
 
 
 class NewestWorker(object):
-    """Runs `work(item)` in a thread of its own, always on the newest item offered; what it replaces is dropped.
+    """Runs `work(item)` in a separate thread, always on the newest item offered; older waiting items are dropped.
 
     Parameters
     ----------
     work : callable
         Called with one item at a time.
     on_error : callable
-        Called with the exception where `work` raised one; the thread goes on with the next item.
+        Called with an exception raised by `work`; the thread continues with the next item.
     """
 
     def __init__(self, work, on_error):
@@ -22,7 +22,7 @@ class NewestWorker(object):
         self._thread.start()
 
     def offer(self, item):
-        """Hand over an item. Returns at once; whether it took the place of one that nobody had worked on yet."""
+        """Offer an item without blocking. Returns whether it replaced an item that was still waiting."""
         with self._news:
             replaced = self._waiting
             self._newest, self._waiting = item, True
@@ -30,7 +30,7 @@ class NewestWorker(object):
         return replaced
 
     def stop(self):
-        """Finish the item at hand and end the thread."""
+        """Finish the current item and stop the thread."""
         with self._news:
             self._stopped = True
             self._news.notify()

@@ -1,4 +1,4 @@
-"""Parameters of a node: a table of what they mean and allow, and from the parameter server to one checked type."""
+"""Parameters of a node: their schema, and conversion of the parameter server's values to validated NamedTuples."""
 import difflib
 from collections import OrderedDict
 from typing import Any, NamedTuple, Tuple, Union
@@ -7,20 +7,20 @@ LARGEST = 1e6
 
 
 class Param(NamedTuple):
-    """One row of a table of parameters: the default of a field of a NamedTuple, and what is known of it.
+    """Schema of one parameter, given as the default of a field of a NamedTuple.
 
     Attributes
     ----------
     default : bool, int, float, str or tuple
     text : str
-        What it means, in sentences. Empty where the `doc=` of the launch argument that sets it says so.
+        Description in full sentences. Empty if the `doc=` of the corresponding launch argument describes it.
     unit : str
     limits : (number, number)
-        Numbers outside are rejected.
+        Values outside this range are rejected.
     choices : tuple of str
-        Other words are rejected; empty where any text is allowed.
+        Other values are rejected; empty if any text is allowed.
     live : bool or (number, number)
-        Whether the node takes changes while it runs. Of a number: how far the slider of rqt_reconfigure goes.
+        Whether the parameter can be changed at run time. For a number: range of the slider in rqt_reconfigure.
     section : str
         Heading in config/*.yaml and group in rqt_reconfigure.
     """
@@ -35,7 +35,7 @@ class Param(NamedTuple):
 
     @property
     def allowed(self):
-        """The values that are not rejected, in words."""
+        """Description of the allowed values."""
         low, high = self.limits
         if self.choices:
             return 'one of ' + ', '.join(self.choices)
@@ -43,7 +43,7 @@ class Param(NamedTuple):
 
     @property
     def facts(self):
-        """Unit, live or not, and what is allowed where that is not every number from 0 on or every text."""
+        """Unit, allowed values unless they are the default (any text, or numbers from 0), and live range."""
         unit = 'Unit: %s.' % self.unit if self.unit else ''
         allowed = 'Allowed: %s.' % self.allowed if self.choices or self.limits != (0, LARGEST) else ''
         live = ('Live.' if self.live is True else 'Live: %g to %g.' % self.live) if self.live else ''
@@ -51,7 +51,7 @@ class Param(NamedTuple):
 
 
 SET_BY_LAUNCH = 'Set by launch files'
-# The same in several nodes.
+# Shared by several nodes.
 DEPTH_SCALE = Param(
     0.0, 'Metres per unit of the depth image. 0: taken from its encoding (REP 118: 16UC1 in millimetres, 32FC1 in '
     'metres).')
@@ -62,9 +62,9 @@ WAIT_FOR_SUBSCRIBERS = Param(0, 'Start once the colour image has this many subsc
 
 
 def parameters(section=''):
-    """Class decorator for a NamedTuple whose fields have a Param in place of their default.
+    """Class decorator for a NamedTuple whose fields have a Param as their default.
 
-    The class keeps them by name, in `PARAMS`. A Param without a section gets the given one.
+    The Params are stored by name in the class attribute `PARAMS`. A Param without a section gets the given one.
     """
     def decorate(kind):
         kind.PARAMS = OrderedDict((name, _in_section(kind._field_defaults[name], section)) for name in kind._fields)
@@ -79,14 +79,14 @@ def _in_section(param, section):
 
 
 def table_of(kinds):
-    """The rows of several types as one table, {name: Param}; a name that they share has one row."""
+    """Merge the schemas of several types into one table, {name: Param}; shared names appear once."""
     return OrderedDict((name, kind.PARAMS[name]) for kind in kinds for name in kind._fields)
 
 
 def params_from(given, *kinds):
-    """Fill NamedTuple types from a flat dictionary; what is not given keeps its default.
+    """Fill NamedTuple types from a flat dictionary; missing keys keep their defaults.
 
-    A float may be given as an int, a str as a number (roslaunch turns `0` into one), a list as `a, b`.
+    A float may be given as an int, a str as a number (roslaunch converts `0` to one), a list as `a, b`.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def params_from(given, *kinds):
     Raises
     ------
     ValueError
-        If a key is unknown (names the nearest known one), or a value has the wrong type or is not allowed.
+        If a key is unknown (the message names the nearest known one), or a value has the wrong type or is not allowed.
     """
     known = [name for kind in kinds for name in kind._fields]
     for name in sorted(given):
@@ -117,12 +117,12 @@ def params_from(given, *kinds):
 
 
 def nearest_name(name, known):
-    """The one of the known names that a wrong one is most like."""
+    """The known name that is most similar to an unknown one."""
     return difflib.get_close_matches(name, known, 1, 0.0)[0]
 
 
 def check(params):
-    """Raise ValueError, naming the parameter, where a value is outside of what its row in the table allows."""
+    """Raise ValueError, naming the parameter, if a value is not allowed by its Param."""
     for name, param in params.PARAMS.items():
         value = getattr(params, name)
         if isinstance(value, (int, float)) and not param.limits[0] <= value <= param.limits[1]:

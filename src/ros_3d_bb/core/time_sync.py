@@ -1,21 +1,21 @@
-"""Pairing by stamp: the last second of messages, and those that wait for one. Stamps are integer nanoseconds."""
+"""Time synchronization of messages by stamp. Stamps are integer nanoseconds."""
 import collections
 import time
 from typing import Any, NamedTuple
 
 NS = 1000000000  # nanoseconds in a second
-MAX_WAITING = 100  # boxes that wait at once; more than any camera sends in a second
-MAX_RATE_HZ = 300  # by stamps; no camera is faster. Closer stamps stand still, and not all of their images are kept
-JUMP_NS = NS  # stamps that are earlier or later than expected by more show a jump in time
+MAX_WAITING = 100  # maximum number of waiting box arrays; more than any camera sends in a second
+MAX_RATE_HZ = 300  # faster than any camera; if stamps are closer, the clock hangs and not all images are kept
+JUMP_NS = NS  # a larger deviation from the expected stamp is a jump in time
 
 
 def arrival_clock_ns():
-    """The machine's clock: tells when something arrived, whatever /clock does; never a stamp."""
+    """Monotonic clock of the machine, for arrival times. It is independent of /clock, and never used as a stamp."""
     return int(time.monotonic() * NS)
 
 
 class Stamped(NamedTuple):
-    """A value with its stamp, and when it arrived here on a clock of the caller's; both integer nanoseconds."""
+    """A value with its stamp and its arrival time on the caller's clock; both integer nanoseconds."""
 
     stamp_ns: int
     arrival_ns: int
@@ -23,15 +23,15 @@ class Stamped(NamedTuple):
 
 
 class MessageCache(object):
-    """The latest values of one topic, as far back as `length_ns` before the newest.
+    """Cache of the latest values of one topic, up to `length_ns` before the newest stamp.
 
-    Their number is bounded, whatever the stamps are: a driver whose clock hangs, or a frozen /clock, must not fill the
-    memory. The bound is a count, as arrival times say nothing where a bag is played slowly.
+    The number of values is bounded for any stamps, so that a driver whose clock hangs or a frozen /clock does not
+    exhaust the memory. The bound is a count, because arrival times are not meaningful when a bag is played slowly.
 
     Attributes
     ----------
     newest_ns : int
-        The newest stamp, None where the cache is empty.
+        The newest stamp, None if the cache is empty.
     """
 
     def __init__(self, length_ns):
@@ -43,19 +43,19 @@ class MessageCache(object):
         return len(self._entries)
 
     def __reversed__(self):
-        """The entries, the newest first."""
+        """Iterate over the entries, newest first."""
         return reversed(self._entries)
 
     def add(self, stamp_ns, arrival_ns, value):
-        """Keep a value.
+        """Add a value.
 
-        One topic brings its stamps in order; where one goes back, time did (a bag looped, somebody sought in it), and
-        the values of the time before are forgotten. Of values with equal stamps the newest is kept.
+        The stamps of a topic are in order. A stamp that goes back means that time jumped back (a bag was looped or
+        rewound); the previous values are then deleted. Of values with equal stamps, the latest is kept.
 
         Returns
         -------
         bool
-            Whether time went back.
+            Whether time jumped back.
         """
         went_back = self.newest_ns is not None and stamp_ns < self.newest_ns
         if went_back:
@@ -69,7 +69,7 @@ class MessageCache(object):
         return went_back
 
     def nearest(self, stamp_ns, tolerance_ns=0):
-        """The entry whose stamp is nearest, within the tolerance; None where there is none."""
+        """The entry with the nearest stamp within the tolerance, None if no entry matches."""
         nearest, nearest_ns = None, tolerance_ns
         for entry in list(self._entries):  # a copy, as another thread may add entries
             distance_ns = abs(entry.stamp_ns - stamp_ns)
@@ -78,64 +78,65 @@ class MessageCache(object):
         return nearest
 
     def arrived_at(self, arrival_ns, tolerance_ns):
-        """The entry that arrived nearest to a time, within the tolerance; None where there is none."""
+        """The entry with the nearest arrival time within the tolerance, None if no entry matches."""
         in_time = [entry for entry in list(self._entries) if abs(entry.arrival_ns - arrival_ns) <= tolerance_ns]
         return min(in_time, key=lambda entry: abs(entry.arrival_ns - arrival_ns), default=None)
 
     def clear(self):
-        """Forget everything."""
+        """Delete all entries."""
         self._entries.clear()
         self.newest_ns = None
 
 
 class StampSynchronizer(object):
-    """Pairs the boxes of a colour image with the depth image and the camera of the same stamp.
+    """Synchronizes the boxes of a colour image with the depth image and the camera_info of the same stamp.
 
-    Boxes arrive later than their depth image by the latency of the detector. Boxes that arrive first wait for the depth
-    image and its camera; where that camera is lost, the one nearest in time is used as soon as a newer message shows
-    that it will not come. Boxes without a stamp are paired by arrival: with the depth image that arrived nearest to
-    `assumed_delay_ns` before them. A camera without a stamp is used for any image: intrinsics do not change with time.
+    Boxes usually arrive after their depth image, by the latency of the detector. Boxes that arrive first wait for the
+    depth image and the camera_info. If that camera_info is lost, the one nearest in time is used as soon as a newer
+    message shows the loss. Boxes without a stamp are matched by arrival time, to the depth image that arrived nearest
+    to `assumed_delay_ns` before them. A camera_info without a stamp is used for all images, because intrinsics do not
+    change with time.
 
-    All boxes end in one of the two callbacks, in the order in which they arrived. Callbacks are called by `add_depth`,
-    `add_camera`, `add_boxes` and `end`.
+    All boxes are passed to exactly one of the two callbacks, in the order of arrival. The callbacks are called by
+    `add_depth`, `add_camera`, `add_boxes` and `end`.
 
     Parameters
     ----------
     length_ns : int
         How long images are kept, and how long boxes wait.
     tolerance_ns : int
-        By how much the stamps of a pair may differ.
+        Largest difference between the stamps of one frame.
     assumed_delay_ns : int
-        Latency of the detector, for boxes without a stamp; an attribute, too.
+        Latency of the detector, for boxes without a stamp; also an attribute.
     on_frame : callable
         Called with boxes, depth and camera of one stamp.
     on_lost : callable
-        Called with boxes that stay without depth or camera, and whether the reason is that time went back.
+        Called with unmatched boxes, and whether they are lost because time jumped back.
     """
 
     def __init__(self, length_ns, tolerance_ns, assumed_delay_ns, on_frame, on_lost):
         self._length_ns, self._tolerance_ns, self.assumed_delay_ns = length_ns, tolerance_ns, assumed_delay_ns
         self._on_frame, self._on_lost = on_frame, on_lost
         self._depths, self._cameras = MessageCache(length_ns), MessageCache(length_ns)
-        self._plain_camera = None  # without a stamp; None where the newest one has a stamp
+        self._plain_camera = None  # camera_info without a stamp; None if the newest one has a stamp
         self._waiting = []
-        self._end_before_ns = 0  # the last stamp before time went back
+        self._end_before_ns = 0  # the last stamp before time jumped back
 
     @property
     def newest_ns(self):
-        """The stamp of the newest depth image, None before the first."""
+        """Stamp of the newest depth image, None before the first."""
         return self._depths.newest_ns
 
     @property
     def has_camera(self):
-        """Whether any camera has arrived."""
+        """Whether a camera_info has arrived."""
         return len(self._cameras) > 0 or self._plain_camera is not None
 
     def add_depth(self, stamp_ns, now_ns, depth):
-        """Add a depth image; where its stamp goes back, everything of the time before is forgotten."""
+        """Add a depth image; if its stamp goes back, all data from before the time jump is deleted."""
         newest_ns = self._depths.newest_ns
         if self._depths.add(stamp_ns, now_ns, depth):
-            if (self._cameras.newest_ns or 0) > stamp_ns + self._length_ns:  # no camera of the new time has come yet
+            if (self._cameras.newest_ns or 0) > stamp_ns + self._length_ns:  # no camera_info of the new time yet
                 self._cameras.clear()
             self._end_before_ns = newest_ns
             forgotten, self._waiting = self._waiting, []
@@ -144,7 +145,7 @@ class StampSynchronizer(object):
         self._settle(now_ns)
 
     def add_camera(self, stamp_ns, now_ns, camera):
-        """Add the camera of an image; `stamp_ns` None where it carries no stamp: it then replaces all others."""
+        """Add a camera_info; if `stamp_ns` is None, it has no stamp and replaces all others."""
         if stamp_ns is None:
             self._cameras.clear()
             self._plain_camera = camera
@@ -154,7 +155,7 @@ class StampSynchronizer(object):
         self._settle(now_ns)
 
     def add_boxes(self, stamp_ns, now_ns, boxes):
-        """Add the boxes of one image; `stamp_ns` None where they carry no stamp."""
+        """Add the boxes of one image; `stamp_ns` is None if they have no stamp."""
         if stamp_ns is None:
             depth = self._depths.arrived_at(now_ns - self.assumed_delay_ns, self._length_ns)
             stamp_ns = None if depth is None else depth.stamp_ns
@@ -163,20 +164,20 @@ class StampSynchronizer(object):
             self._settle(now_ns)
             self._on_lost(boxes, False)
         elif newest_ns is not None and newest_ns + self._length_ns < stamp_ns <= self._end_before_ns:
-            self._on_lost(boxes, True)  # they were still on their way when time went back
+            self._on_lost(boxes, True)  # boxes from before the time jump
             self._settle(now_ns)
         else:
             self._waiting.append(Stamped(stamp_ns, now_ns, boxes))
             self._settle(now_ns)
 
     def end(self):
-        """Nothing more will come: all boxes that still wait are lost."""
+        """Signal the end of the input: all waiting boxes are lost."""
         waiting, self._waiting = self._waiting, []
         for entry in waiting:
             self._on_lost(entry.value, False)
 
     def _settle(self, now_ns):
-        """Hand on the boxes whose frame is complete, and those whose frame will not come."""
+        """Call the callbacks for boxes whose frame is complete or lost."""
         complete_or_lost, waiting = [], []
         for number, entry in enumerate(self._waiting):
             frame = self._frame(entry.stamp_ns)
@@ -194,7 +195,7 @@ class StampSynchronizer(object):
                 self._on_frame(boxes, depth, camera)
 
     def _frame(self, stamp_ns):
-        """Depth and camera of a stamp, None while one of them is missing."""
+        """Depth and camera of a stamp, None if one of them is missing."""
         depth = self._depths.nearest(stamp_ns, self._tolerance_ns)
         if depth is None:
             return None
@@ -206,7 +207,7 @@ class StampSynchronizer(object):
         return None if camera is None else (depth.value, camera.value)
 
     def _is_hopeless(self, entry, now_ns):
-        """Whether boxes have waited too long, or their image was lost or arrived too long ago."""
+        """Whether boxes have waited too long, or their depth image was lost or is no longer cached."""
         newest_ns = self._depths.newest_ns
         is_past = newest_ns is not None and entry.stamp_ns < newest_ns
         is_lost = is_past and self._depths.nearest(entry.stamp_ns, self._tolerance_ns) is None

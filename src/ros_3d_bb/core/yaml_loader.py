@@ -1,13 +1,13 @@
-"""Read YAML that somebody else may have written: data only, and no more of it than is in the file.
+"""Safe loading of untrusted YAML: plain data only, without aliases.
 
-An alias (`*name`) repeats what an anchor named; a few lines of them can stand for more than any memory holds, as soon
-as somebody writes them out. None of our files needs one.
+Nested aliases (`*name`) let a few lines expand to more data than fits into memory ("billion laughs"). None of the
+files of this package needs them.
 """
 import yaml
 
 
 class _Loader(yaml.SafeLoader):
-    """SafeLoader, which makes plain data only, without aliases."""
+    """SafeLoader that rejects aliases."""
 
     def compose_node(self, parent, index):
         if self.check_event(yaml.AliasEvent):
@@ -17,12 +17,12 @@ class _Loader(yaml.SafeLoader):
 
 
 def load_yaml(stream):
-    """The content of a stream of YAML.
+    """Load one YAML document from a stream.
 
     Raises
     ------
     yaml.YAMLError
-        If it is none, has aliases or tags of objects, or is nested too deeply.
+        If the text is not YAML, contains aliases or object tags, or is nested too deeply.
     """
     try:
         return yaml.load(stream, Loader=_Loader)
@@ -30,5 +30,5 @@ def load_yaml(stream):
         raise
     except RecursionError:
         raise yaml.YAMLError('it is nested too deeply')
-    except (ValueError, OverflowError) as error:  # no text, a day that no month has, a number of too many digits
+    except (ValueError, OverflowError) as error:  # not text, an impossible date, a number with too many digits
         raise yaml.YAMLError(str(error))

@@ -1,6 +1,6 @@
-"""From a rectangle in the depth image to a box in space.
+"""3D box estimators: from a rectangle in the depth image to a 3D box.
 
-Convention: a rectangle (x1, y1, x2, y2) holds the pixels x1 <= u < x2, y1 <= v < y2. Positions are in the camera
+Convention: a rectangle (x1, y1, x2, y2) contains the pixels x1 <= u < x2, y1 <= v < y2. Positions are in the camera
 optical frame, metres.
 """
 from typing import Any, NamedTuple, Optional, Tuple
@@ -11,18 +11,18 @@ from ros_3d_bb.core.limits import LARGEST_M, USUAL_HEIGHT_M, USUAL_WIDTH_M
 from ros_3d_bb.estimation.depth_layers import (BODY_HALF_DEPTH_M, complete_truncated_extent, edges,
                                                nearest_dominant_layer, trimmed_mean, within)
 
-# A box whose edge is this close to the image border is taken to be cut by it: detectors round to whole pixels and
-# regress the edge of a cut person a pixel or two inside the image.
+# A box whose edge is this close to the image border counts as truncated: detectors round to whole pixels and regress
+# the edge of a truncated person a pixel or two inside the image.
 BORDER_PX = 2
-SAMPLES_WANTED = 2000  # pixels that the foreground estimator looks at
+SAMPLES_WANTED = 2000  # approximate number of pixels that the foreground estimator samples
 AXIS_BEHIND_SURFACE_M = 0.09  # mean over standing and walking bodies of the simulation, seen from all sides
-LEAST_SUPPORT = 0.1  # what carries less of the samples is no person that anything can be said about
+LEAST_SUPPORT = 0.1  # minimum share of the samples in the person's layer for an estimate
 LEAST_WIDTH_M = 0.05
 
 
 class Samples(NamedTuple):
-    """Depth pixels looked at in one rectangle, a grid: columns (w,), rows (h,), values (h, w), which times
-    `scale_m` is depth_m (h, w), valid (h, w).
+    """Grid of depth samples in one rectangle: columns (w,), rows (h,), raw values (h, w), depth_m (h, w) = values times
+    `scale_m`, and valid (h, w), whether depth was measured.
     """
 
     columns: np.ndarray
@@ -33,22 +33,25 @@ class Samples(NamedTuple):
     valid: np.ndarray
 
     def sorted_depths(self, chosen):
-        """The depths in metres of chosen samples (h, w), nearest first: numpy sorts 16-bit integers in linear time."""
+        """Depths of the samples chosen by a mask (h, w), nearest first, metres.
+
+        The raw values are sorted, because numpy sorts 16-bit integers in linear time.
+        """
         return np.sort(self.values[chosen], kind='mergesort').astype(float) * self.scale_m
 
     @property
     def pixels(self):
-        """(u, v) of the grid, (h, w, 2)."""
+        """Pixel coordinates (u, v) of the grid, (h, w, 2)."""
         return np.stack(np.meshgrid(self.columns, self.rows), axis=-1)
 
 
 class Box3D(NamedTuple):
-    """An upright cylinder in the camera optical frame, and how well it was seen.
+    """An upright cylinder in the camera optical frame, with quality measures.
 
-    `center_m` (3,) and `size_m` (width, height, width), metres; `rect_px` the rectangle it came from; `support` the
-    share 0..1 of the sampled pixels that carried its depth; `truncated_edges` whether the left, the upper, the right
-    and the lower edge of the rectangle touch the image border; `covariance_m2` (3, 3) of the centre, None where
-    unknown.
+    `center_m` (3,) and `size_m` (width, height, width) are in metres; `rect_px` is the source rectangle; `support` is
+    the share 0..1 of the sampled pixels that belong to its depth layer; `truncated_edges` states whether the left,
+    upper, right and lower edge of the rectangle touch the image border; `covariance_m2` (3, 3) is that of the centre,
+    None if unknown.
     """
 
     center_m: np.ndarray
@@ -60,12 +63,18 @@ class Box3D(NamedTuple):
 
     @property
     def truncated(self):
-        """Whether the image border cuts the object."""
+        """Whether the image border truncates the object."""
         return any(self.truncated_edges)
 
 
 def sample_median(depth, rect_px, stride_px=20):
-    """Sample a rectangle on the thesis' grid: every `stride_px` pixels, centred, the part inside the image (3.4.2).
+    """Sample a rectangle on the thesis' centred grid of every `stride_px` pixels, clipped to the image (3.4.2).
+
+    Parameters
+    ----------
+    depth : depth_image.DepthImage
+    rect_px : (x1, y1, x2, y2)
+    stride_px : int
 
     Returns
     -------
@@ -86,15 +95,21 @@ def sample_median(depth, rect_px, stride_px=20):
 
 
 def estimate_median(samples, rect_px, camera, _nearer=()):
-    """The thesis' estimator (3.4.2): per-axis median of the sampled points, size from the box at the median depth.
+    """Estimate a box as in the thesis (3.4.2): per-axis median of the sampled points, size from the box at that depth.
+
+    Parameters
+    ----------
+    samples : Samples
+    rect_px : (x1, y1, x2, y2)
+    camera : camera_model.Camera
 
     Returns
     -------
     Box3D or None
-        None where no sample carries a depth, or the camera sees nothing there.
+        None if no sample has a valid depth and a viewing ray, or the rectangle cannot be undistorted.
     """
     across, down = camera.rays(samples.columns, samples.rows[:, np.newaxis])
-    seen = samples.valid & ~np.isnan(across)  # a pixel that sees nothing has no ray
+    seen = samples.valid & ~np.isnan(across)  # the distortion model does not define a ray for every pixel
     flat_px = _without_distortion(rect_px, camera)
     if flat_px is None or not seen.any():
         return None
@@ -108,7 +123,12 @@ def estimate_median(samples, rect_px, camera, _nearer=()):
 
 
 def sample_foreground(depth, rect_px):
-    """Sample a rectangle on a grid of about `SAMPLES_WANTED` pixels, whatever its size, the part inside the image.
+    """Sample a rectangle on a grid of about `SAMPLES_WANTED` pixels, independent of its size, clipped to the image.
+
+    Parameters
+    ----------
+    depth : depth_image.DepthImage
+    rect_px : (x1, y1, x2, y2)
 
     Returns
     -------
@@ -128,12 +148,12 @@ def sample_foreground(depth, rect_px):
 
 
 def estimate_foreground(samples, rect_px, camera, nearer=()):
-    """The person's own layer of depth: the nearest one that is strong near the middle of the box.
+    """Estimate a box from the person's depth layer: the nearest layer that is dominant near the middle of the box.
 
-    Background seen beside and between the limbs may fill most of a box, and is farther away; so are flying pixels,
-    which fill no bin. The position is that of the body's axis: across the middle between the edges of the layer, and
-    `AXIS_BEHIND_SURFACE_M` behind its mean depth. Where the image border cuts the body, the part that is not seen is
-    taken to be as large as it usually is.
+    Background beside and between the limbs may fill most of a box, but it is farther away. Flying pixels are too sparse
+    to form a layer. The position is that of the body's axis: laterally halfway between the edges of the layer, and
+    `AXIS_BEHIND_SURFACE_M` behind its mean depth. If the image border truncates the body, it is completed to the usual
+    size.
 
     Parameters
     ----------
@@ -141,19 +161,19 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     rect_px : (x1, y1, x2, y2)
     camera : camera_model.Camera
     nearer : sequence of Box3D
-        Of people who may stand in front: their pixels are not taken for this one's.
+        Boxes of possible occluders; their pixels are masked.
 
     Returns
     -------
     Box3D or None
-        None where no sample carries a depth, or less than `LEAST_SUPPORT` of them are in a layer of their own, or the
-        camera sees nothing there.
+        None if no sample has a valid depth and a viewing ray, if the layer contains less than `LEAST_SUPPORT` of the
+        samples, or if the rectangle cannot be undistorted.
     """
     flat_px, columns_px, own = rect_px, samples.columns, samples.valid
     if camera.distortion_model:
         flat_px = _without_distortion(rect_px, camera)
         columns_px = camera.undistort(samples.pixels)[..., 0]
-        own = own & ~np.isnan(columns_px)  # the pixels that see something
+        own = own & ~np.isnan(columns_px)  # the distortion model does not define a ray for every pixel
     if nearer:
         own = _mask_occluders(own, samples, rect_px, nearer)
     if flat_px is None or not own.any():
@@ -182,9 +202,9 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
 
 
 def _without_distortion(rect_px, camera):
-    """The rectangle in the image of the same camera without distortion, by the middles of its edges.
+    """Undistort a rectangle by the midpoints of its edges; None if a midpoint has no undistorted position.
 
-    None where an edge sees nothing. Outside the image, where no distortion is known, it is that of the border.
+    Outside the image, where the distortion is unknown, the distortion at the image border is used.
     """
     if not camera.distortion_model:
         return rect_px
@@ -197,7 +217,7 @@ def _without_distortion(rect_px, camera):
 
 
 def _mask_occluders(own, samples, rect_px, boxes):
-    """The samples of `own` (h, w) without those in the rectangle and the layer of depth of one of the boxes."""
+    """The mask `own` (h, w) without the samples in the rectangle and the depth layer of any of the boxes."""
     own = own.copy()
     left, top, right, bottom = rect_px
     for box in boxes:
@@ -209,8 +229,8 @@ def _mask_occluders(own, samples, rect_px, boxes):
 
 
 class Estimator(NamedTuple):
-    """`sample(depth, rect_px)` gives Samples; `estimate(samples, rect_px, camera, nearer)` makes a Box3D of them, or
-    None, knowing the boxes of those in front.
+    """Pair of functions: `sample(depth, rect_px)` returns Samples; `estimate(samples, rect_px, camera, nearer)` returns
+    a Box3D or None, given the boxes of possible occluders.
     """
 
     sample: Any
@@ -218,12 +238,23 @@ class Estimator(NamedTuple):
 
 
 def estimator_named(name, stride_px=20):
-    """An estimator by name: foreground, or median with its stride.
+    """Create an estimator by name.
+
+    Parameters
+    ----------
+    name : str
+        foreground or median.
+    stride_px : int
+        Grid spacing of the median estimator.
+
+    Returns
+    -------
+    Estimator
 
     Raises
     ------
     ValueError
-        If there is no such one, or the stride is not positive.
+        If the name is unknown or the stride is not positive.
     """
     if stride_px < 1:
         raise ValueError('stride is %d; at least 1 expected' % stride_px)
@@ -235,15 +266,15 @@ def estimator_named(name, stride_px=20):
 
 
 def estimate_boxes(depth, rects_px, camera, estimator):
-    """The 3D boxes of all rectangles of one image, those in front first, so that nobody gets the depth of another.
+    """Estimate the 3D boxes of all rectangles of one image, front to back, so that nearer boxes mask their pixels.
 
-    A box that is not plausible (see `is_plausible`) is returned as well, but it takes no depth from the others.
+    A box that is not plausible (see `is_plausible`) is returned as well, but it does not mask pixels.
 
     Parameters
     ----------
-    depth : DepthImage
+    depth : depth_image.DepthImage
     rects_px : list of (x1, y1, x2, y2)
-        Usable ones, see `check_rect`.
+        Valid rectangles, see `check_rect`.
     camera : camera_model.Camera
     estimator : Estimator
 
@@ -264,31 +295,31 @@ def estimate_boxes(depth, rects_px, camera, estimator):
 
 
 def is_plausible(box):
-    """Whether a Box3D lies at a finite place and has the size of something that can be tracked."""
+    """Whether a Box3D has a finite position and a size between 0 and `LARGEST_M`."""
     return bool(np.isfinite(box.center_m.sum()) and 0 < min(box.size_m) and max(box.size_m) < LARGEST_M)
 
 
 def front_to_back(rects_px):
-    """Numbers of rectangles, those of nearer people first: they stand lower in the image, and are larger."""
+    """Indices of rectangles, nearest person first: nearer people stand lower in the image and are larger."""
     return sorted(range(len(rects_px)), key=lambda number: (-rects_px[number][3], rects_px[number][1], number))
 
 
 def check_rect(rect_px):
-    """Raise ValueError where a rectangle is empty or reversed."""
+    """Raise ValueError if a rectangle is empty or reversed."""
     x1, y1, x2, y2 = rect_px
     if x1 >= x2 or y1 >= y2:
         raise ValueError('box (%d, %d, %d, %d) is empty or reversed: x1 < x2 and y1 < y2 expected' % (x1, y1, x2, y2))
 
 
 def truncated_edges(rect_px, camera):
-    """Whether the left, the upper, the right and the lower edge of a rectangle touch the border of the image."""
+    """Whether the left, upper, right and lower edge of a rectangle touch the image border, (bool, bool, bool, bool)."""
     x1, y1, x2, y2 = rect_px
     return (bool(x1 <= BORDER_PX), bool(y1 <= BORDER_PX), bool(x2 >= camera.width - BORDER_PX),
             bool(y2 >= camera.height - BORDER_PX))
 
 
 def _ticks(low, high, limit, stride):
-    """Slice of multiples of stride centred in low..high, those in 0..limit; exact for ints of any size."""
+    """Slice of positions `stride` apart, centred in low..high and clipped to 0..limit; exact for ints of any size."""
     count = -(-(high - low) // stride)
     first = low + (high - low - (count - 1) * stride - 1) // 2
     first += max(0, -(first // stride)) * stride

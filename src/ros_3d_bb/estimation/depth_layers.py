@@ -1,30 +1,31 @@
-"""The layer of a person among the depths in a box, and its edges.
+"""Segmentation of the depths in a 2D box: the depth layer of the person and its edges.
 
-Depths in metres; where they are `in_order`, from near to far, a layer is a slice of them, and a median an element.
+Depths are in metres. In `sorted_depths_m` (nearest first), a layer is a slice and its median an element.
 """
 import numpy as np
 
-# Depth of a person with stretched arms around its median depth; what lies further off is something else.
+# Half the depth extent of a person with stretched arms; points farther from the median are not part of the person.
 BODY_HALF_DEPTH_M = 0.35
-TRUNK_HALF_DEPTH_M = 0.25  # without arms and legs: a wall close behind must not draw the median
-BIN_M, LAYER_BINS = 0.05, 5  # a layer is the depth in so many bins of a histogram
-MEDIANS = 3  # of the trunk, at most: each is that of what is around the one before
-FIRST_LAYER_SHARE = 0.5  # the nearest layer with this share of the strongest one's weight is the person
-EDGE_PERCENT = 5  # of the pixels of the layer are looked past on the left and on the right: arms, flying pixels
+TRUNK_HALF_DEPTH_M = 0.25  # without arms and legs: a wall close behind must not shift the median
+BIN_M, LAYER_BINS = 0.05, 5  # bin width of the depth histogram, and thickness of a layer in bins
+MEDIANS = 3  # maximum number of iterations of the median of the trunk
+FIRST_LAYER_SHARE = 0.5  # the nearest layer with at least this share of the largest layer weight is the person
+EDGE_PERCENT = 5  # percentage of the layer's pixels ignored at the left and at the right: arms, flying pixels
 
 
 def nearest_dominant_layer(depths_m, weights, sorted_depths_m):
-    """Depth of the trunk of the person: the median of the nearest strong layer of weighted depths.
+    """Depth of the trunk of the person: the median of the nearest dominant layer of the weighted depth histogram.
 
     Parameters
     ----------
     depths_m, weights : numpy.ndarray, (n,)
-    in_order_m : numpy.ndarray, (n,)
+    sorted_depths_m : numpy.ndarray, (n,)
         The same depths, nearest first.
 
     Returns
     -------
     float
+        Metres.
     """
     bins = ((depths_m - sorted_depths_m[0]) / BIN_M).astype(int)
     histogram = np.convolve(np.bincount(bins, weights), np.ones(LAYER_BINS), 'same')
@@ -41,13 +42,13 @@ def nearest_dominant_layer(depths_m, weights, sorted_depths_m):
 
 
 def within(sorted_depths_m, middle_m, half_m):
-    """Those of the depths in order that are at most so far from the middle, a slice."""
+    """The slice of the sorted depths within `half_m` of `middle_m`."""
     offsets_m = sorted_depths_m - middle_m
     return sorted_depths_m[offsets_m.searchsorted(-half_m):offsets_m.searchsorted(half_m, 'right')]
 
 
 def edges(x_m):
-    """Left and right edge of a body of points at x (n,): where they would be if it were as wide everywhere."""
+    """Left and right edge of a body with points at x (n,), metres, under the assumption of a uniform width."""
     last = len(x_m) - 1
     rank, part = divmod(last * EDGE_PERCENT, 100)
     after = min(rank + 1, last)
@@ -59,13 +60,14 @@ def edges(x_m):
 
 
 def trimmed_mean(sorted_depths_m):
-    """The mean without the lowest and the highest tenth: finer than the median, which is one of the camera's steps."""
+    """Mean without the lowest and the highest tenth; finer than the median, which is limited to the depth resolution.
+    """
     tenth = len(sorted_depths_m) // 10
     return sorted_depths_m[tenth:len(sorted_depths_m) - tenth].mean()
 
 
 def complete_truncated_extent(low, high, cut_low, cut_high, usual):
-    """The extent low..high of a body that the image border cuts on one side, where it is at least the usual one."""
+    """Extend low..high of a body that the image border truncates at one end to at least the usual extent."""
     missing = max(0.0, usual - (high - low))
     if cut_low and not cut_high:
         return low - missing, high

@@ -1,10 +1,10 @@
-"""How far off a measured position is: its bias, which is taken out, and its covariance.
+"""Error model of measured positions: bias, which is corrected, and covariance.
 
 Convention: positions (x, y, z) are in the camera optical frame, metres; error = measured - truth. The bias is a
-function of the TRUE position, as in the thesis: the noise is in what the camera measured, not in the tape's truth, and
-a fit the other way round would pull every position towards the middle of the data. A node knows only the measured
-position, so `ErrorModel.corrected` solves measured = truth + bias(truth). The model is fitted by
-ros_3d_bb_lab.evaluation.error_model_fit; its file is described in config/error_models/README.md.
+function of the TRUE position, as in the thesis: the noise is in the camera's measurement, not in the tape measure's
+ground truth, and a fit as a function of the measured position would pull every position towards the middle of the data.
+A node knows only the measured position, so `ErrorModel.corrected` solves measured = truth + bias(truth). The model is
+fitted by ros_3d_bb_lab.evaluation.error_model_fit; its file format is described in config/error_models/README.md.
 """
 from typing import NamedTuple, Optional
 
@@ -14,13 +14,13 @@ import yaml
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
 
-STEEPEST_BIAS = 0.5  # metres a metre; a steeper one has no safe inverse
-NEAREST_SHARE = 0.2  # of a measured range: no correction puts anybody nearer
-SOLVER_STEPS = 20  # each at least halves what is left of the bias: a micrometre of a metre in the end
+STEEPEST_BIAS = 0.5  # m/m; a steeper bias cannot be inverted safely
+NEAREST_SHARE = 0.2  # lower bound of a corrected range, relative to the measured range
+SOLVER_STEPS = 20  # each step at least halves the remaining error: 1 m to 1 µm
 
 
 class XBias(NamedTuple):
-    """Sideways error at true (x, z): slope * x + per_angle_m * x / z + offset_m, metres."""
+    """Lateral bias at the true (x, z): slope * x + per_angle_m * x / z + offset_m, metres."""
 
     slope: float
     per_angle_m: float
@@ -28,11 +28,11 @@ class XBias(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """A standard deviation by range: sqrt(constant_m ** 2 + (growth * z ** 2) ** 2 + (near_m2 / z) ** 2), metres.
+    """Standard deviation over range: sqrt(constant_m ** 2 + (growth * z ** 2) ** 2 + (near_m2 / z) ** 2), metres.
 
-    The second part is the law of stereo, where growth is s / (f * b): pixels of matching error by focal length in
-    pixels times baseline in metres (thesis 5.2). The third falls with range: near people fill the image and are cut by
-    its border.
+    The second term is the depth error of stereo: growth = s / (f * b), with the matching error s in pixels, the focal
+    length f in pixels and the baseline b in metres (thesis 5.2). The third term decreases with range: near people fill
+    the image and are truncated by its border.
     """
 
     constant_m: float
@@ -40,13 +40,13 @@ class Spread(NamedTuple):
     near_m2: float
 
     def at(self, z_m):
-        """The standard deviation at range z_m, metres, of its shape."""
+        """Standard deviation at range z_m, metres, with the shape of z_m."""
         z_m = np.asarray(z_m, float)
         return np.sqrt(self.constant_m ** 2 + (self.growth * z_m ** 2) ** 2 + (self.near_m2 / z_m) ** 2)
 
 
 class MeasuredRange(NamedTuple):
-    """Where there were measurements: z_min_m <= z <= z_max_m, |x| <= x_max_m, and z >= x_z_min_m off the middle."""
+    """Range of the measurements: z_min_m <= z <= z_max_m, |x| <= x_max_m, and z >= x_z_min_m off the optical axis."""
 
     z_min_m: float
     z_max_m: float
@@ -55,8 +55,8 @@ class MeasuredRange(NamedTuple):
 
 
 class Provenance(NamedTuple):
-    """Where a model comes from: files or publication, the estimator that it is for, the camera, date (ISO), and the
-    number of measurements and of different positions."""
+    """Origin of a model: files or publication, the estimator it applies to, the camera, the date (ISO), and the number
+    of measurements and of distinct positions."""
 
     source: str
     estimator: str
@@ -67,8 +67,8 @@ class Provenance(NamedTuple):
 
 
 class Scores(NamedTuple):
-    """What is left, each position corrected by a model of all others: root mean squares in metres, and the share of
-    positions in the 68 % and the 95 % ellipse of the horizontal plane."""
+    """Leave-one-position-out cross-validation: root mean square errors after correction, metres, and the share of
+    measurements inside the 68 % and the 95 % covariance ellipse in the horizontal plane."""
 
     rmse_x_m: float
     rmse_z_m: float
@@ -80,9 +80,9 @@ class Scores(NamedTuple):
 class ErrorModel(NamedTuple):
     """Bias and spread of measured positions.
 
-    `z_bias` are coefficients of a polynomial in z, highest power first; `y_sigma_m` is an assumption, as no ground
-    truth has y; `growth_outside` is how many metres of standard deviation come to each axis for a metre outside of
-    `measured_range`; `cross_validated` is None where nobody measured it.
+    `z_bias` holds the coefficients of a polynomial in z, highest power first; `y_sigma_m` is an assumption, as the
+    ground truth does not include y; `growth_outside` is the standard deviation added to each axis per metre outside
+    `measured_range`, m/m; `cross_validated` is None if not measured.
     """
 
     z_bias: tuple
@@ -96,14 +96,14 @@ class ErrorModel(NamedTuple):
     cross_validated: Optional[Scores]
 
     def corrected(self, position_m):
-        """Measured positions without their bias.
+        """Remove the bias from measured positions. Inverse of `biased`.
 
-        Outside of the measured range the bias stays what it is at the range's end. y goes with z, along the ray.
+        Outside the measured range, the bias is that at the limit of the range. y is scaled with z, along the ray.
 
         Parameters
         ----------
         position_m : array_like, (..., 3)
-            As measured, z > 0.
+            Measured positions, z > 0.
 
         Returns
         -------
@@ -122,7 +122,7 @@ class ErrorModel(NamedTuple):
         return np.stack((self._true_x(x_m, z_m), y_m * z_m / measured_z_m, z_m), axis=-1)
 
     def biased(self, position_m):
-        """What is measured of true positions, (..., 3), but for noise. Inverse of `corrected`."""
+        """Noise-free measurements of true positions, (..., 3). Inverse of `corrected`."""
         x_m, y_m, z_m = np.moveaxis(np.asarray(position_m, float), -1, 0)
         inside_m = np.clip(x_m, -self.measured_range.x_max_m, self.measured_range.x_max_m)
         measured_z_m = z_m + self._z_bias_at(z_m)
@@ -130,19 +130,19 @@ class ErrorModel(NamedTuple):
         return np.stack((measured_x_m, y_m * measured_z_m / z_m, measured_z_m), axis=-1)
 
     def check_estimator(self, name):
-        """Raise ValueError where the model is of another estimator than the named one."""
+        """Raise ValueError if the model was fitted for another estimator."""
         if self.provenance.estimator not in (name, ''):
             raise ValueError('the error model is for the estimator %s, not %s' % (self.provenance.estimator, name))
 
     def covariance(self, position_m):
         """Covariance of corrected positions in the camera optical frame, square metres.
 
-        Diagonal: in the measurements, errors along the ray do not move x with z.
+        The covariance is diagonal: the measurements show no correlation of x and z errors along the ray.
 
         Parameters
         ----------
         position_m : array_like, (..., 3)
-            As `corrected` gives them.
+            Corrected positions, see `corrected`.
 
         Returns
         -------
@@ -154,14 +154,14 @@ class ErrorModel(NamedTuple):
         return (sigmas_m ** 2 + outside_m[..., np.newaxis] ** 2)[..., np.newaxis] * np.eye(3)
 
     def distance_outside(self, position_m):
-        """How far corrected positions (..., 3) are outside of the measured range, metres, (...); 0 inside."""
+        """Distance (...) of corrected positions (..., 3) to the measured range, metres; 0 inside."""
         position_m, limits = np.asarray(position_m, float), self.measured_range
         z_m = position_m[..., 2]
         return (np.maximum(0, np.maximum(limits.z_min_m - z_m, z_m - limits.z_max_m))
                 + np.maximum(0, np.abs(position_m[..., 0]) - limits.x_max_m))
 
     def _z_bias_at(self, z_m):
-        # by hand, as polyval and clip take five times as long for the few boxes of an image
+        # Horner's method: polyval and clip are five times slower for the few boxes of an image.
         inside_m = np.minimum(np.maximum(z_m, self.measured_range.z_min_m), self.measured_range.z_max_m)
         bias_m = 0 * inside_m
         for coefficient in self.z_bias:
@@ -186,7 +186,7 @@ class ErrorModel(NamedTuple):
 
 
 def corrected_boxes(boxes, model):
-    """3D boxes (`box3d_estimator.Box3D`) without their bias and with their covariance."""
+    """Correct the bias of 3D boxes (`box3d_estimator.Box3D`) and set their covariance."""
     if not boxes:
         return []
     centers_m = model.corrected([box.center_m for box in boxes])
@@ -195,7 +195,7 @@ def corrected_boxes(boxes, model):
 
 
 def checked(model):
-    """The model itself. Raises ValueError where it cannot be used: what is wrong, and the value."""
+    """Return the model after validation. Raises ValueError, with the bad value, if the model is unusable."""
     limits = model.measured_range
     if not (0 < limits.z_min_m < limits.z_max_m and limits.z_min_m <= limits.x_z_min_m <= limits.z_max_m
             and limits.x_max_m > 0):
@@ -223,14 +223,19 @@ def checked(model):
 
 
 def read_error_model(path):
-    """Read an error model; nothing in the file is run.
+    """Read an error model from a YAML file; no code in the file is executed.
+
+    Returns
+    -------
+    ErrorModel
 
     Raises
     ------
     ValueError
-        If the file is not YAML, or a key is unknown (names the nearest one), missing, or has a value that cannot be.
+        If the file is not YAML, or a key is unknown (the message names the nearest one), missing, or has an invalid
+        value.
     OSError
-        If there is no such file.
+        If the file cannot be read.
     """
     with open(str(path), encoding='utf-8') as stream:
         try:
@@ -240,7 +245,7 @@ def read_error_model(path):
 
 
 def write_error_model(path, model):
-    """Write an error model that `read_error_model` reads. Raises OSError."""
+    """Write an error model in the format of `read_error_model`. Raises OSError."""
     with open(str(path), 'w', encoding='utf-8') as stream:
         stream.write('# Error model of measured positions; the keys are explained in config/error_models/README.md.\n')
         for name, value in model._asdict().items():
@@ -251,14 +256,14 @@ def write_error_model(path, model):
 
 
 def _line(name, value):
-    """One line of YAML."""
+    """Format one line of YAML."""
     if isinstance(value, tuple):
         return '%s: [%s]\n' % (name, ', '.join(yaml.safe_dump(number).split()[0] for number in value))
     return yaml.safe_dump({name: value}, default_flow_style=False, width=1000, allow_unicode=True)
 
 
 def _filled(kind, content, where):
-    """A value of the kind, a NamedTuple or a plain type, from what YAML gave; `where` is its key."""
+    """Convert YAML content to a value of `kind`, a NamedTuple or a plain type; `where` is its key."""
     if kind == Optional[Scores]:
         return None if content is None else _filled(Scores, content, where)
     if hasattr(kind, '_fields'):

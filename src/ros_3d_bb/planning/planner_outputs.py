@@ -1,4 +1,4 @@
-"""What planner_bridge_node can publish: topics, messages, and the packages that define them."""
+"""Outputs of planner_bridge_node: topics, message types, and the packages that define them."""
 import functools
 import importlib
 from typing import Any, Callable, NamedTuple
@@ -11,16 +11,18 @@ from ros_3d_bb.conversions.planner_msgs import (detections3d_to_msg, objects_to_
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.planning.planner_view import footprint_points, in_frame, ring_points
 
-CLEARING_SPACING_M = 0.025  # half a cell of a usual costmap: the rays from the robot leave out none
-CLEARING_HEIGHT_M = 0.5  # above the robot's frame: where costmaps look
+CLEARING_SPACING_M = 0.025  # half a cell of a typical costmap, so that the clearing rays pass through every cell
+CLEARING_HEIGHT_M = 0.5  # above the robot's frame, within the height range of costmaps
 
 
 class Output(NamedTuple):
-    """One topic. `write(tracks, frame_from_tracks, header)` makes its message from tracks in their own frame.
+    """One published topic.
 
-    `frame`: that of the message's coordinates; empty: that of the tracks, for planners that transform all there is.
-    `to_now`: the planner takes an array for what is now, so positions are predicted to now, and sent again while no
-    new ones come; else they are as of the image. `float32`: coordinates in the message are.
+    `write(tracks, frame_from_tracks, header)` builds the message from tracks in their original frame. `frame` is the
+    frame of the message's coordinates; if empty, the frame of the tracks is used, for planners that transform messages
+    themselves. `to_now` states that the planner ignores the stamp: positions are predicted to the current time, and
+    published again while no new tracks arrive; otherwise positions are those at the stamp of the image. `float32`
+    states that the message stores coordinates as float32.
     """
 
     topic: str
@@ -32,7 +34,7 @@ class Output(NamedTuple):
 
 
 class OptionalOutput(NamedTuple):
-    """An output whose message is defined in a package that is not on every robot."""
+    """An output whose message type is defined in a package that may not be installed."""
 
     topic: str
     package: str
@@ -54,12 +56,16 @@ NAMES = ['costmap'] + sorted(OPTIONAL)
 
 
 def outputs_from(params):
-    """The outputs that the parameters ask for, a list of Output.
+    """Create the outputs that the parameters select.
+
+    Returns
+    -------
+    list of Output
 
     Raises
     ------
     ValueError
-        If one is not known, or the package that it needs is not there; says which.
+        If an output is unknown, or the package that it needs is not installed; the message names it.
     """
     if not params.outputs:
         raise ValueError('parameter ~outputs is empty; some of %s expected' % ', '.join(NAMES))
@@ -88,10 +94,10 @@ def _converted(write, messages, tracks, frame_from_tracks, header):
 
 
 def _costmap_outputs(params):
-    """What to mark in a costmap, and a ring around the robot to which it is cleared first.
+    """Outputs for costmaps: the points to mark, and a ring around the robot up to which the costmap is cleared first.
 
-    Both are in the robot's frame: coordinates are float32, and small there in any map. They are level in the frame of
-    the tracks, however the robot is tilted, as costmaps drop points by their height in the fixed frame.
+    Both are in the robot's frame, because coordinates are float32 and stay small there in any map. They are level in
+    the frame of the tracks even if the robot is tilted, because costmaps filter points by height in the fixed frame.
     """
     outputs = [Output('~points', PointCloud2, functools.partial(_footprints, params), params.robot_frame, float32=True)]
     if params.clearing_range:
@@ -106,5 +112,5 @@ def _footprints(params, tracks, robot_from_tracks, header):
 
 
 def _ring(ring_m, _tracks, robot_from_tracks, header):
-    """Around the robot's origin, level in the frame of the tracks."""
+    """Message with a ring around the robot's origin, level in the frame of the tracks."""
     return points_to_msg(ring_m.dot(robot_from_tracks[:3, :3].T), header)

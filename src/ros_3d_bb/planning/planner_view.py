@@ -1,32 +1,32 @@
-"""Tracks as planners need them: where people are now, in the planner's frame, and what ground they take up.
+"""Tracks for planners: extrapolation to the current time, transformation to the planner's frame, and footprints.
 
-Positions and velocities as in `types.TrackedObject`; points are (n, 3), metres, in the frame of the tracks.
+Positions and velocities are as in `types.TrackedObject`; points are (n, 3), metres, in the frame of the tracks.
 """
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
 
-SWATH_STEP_S = 0.1  # a person at 3 m/s is 0.3 m further on, less than a body is wide: the footprints overlap
+SWATH_STEP_S = 0.1  # a person at 3 m/s moves 0.3 m, less than a body's width, so that the footprints overlap
 SAME_FRAME = np.eye(4)
-LOWEST, HIGHEST = 0.25, 0.75  # of a cylinder's height: well off the floor, and below 2 m, where costmaps stop looking
+LOWEST, HIGHEST = 0.25, 0.75  # fractions of a cylinder's height: off the floor and below 2 m, the limit of costmaps
 
 
 def usable_tracks(tracks):
-    """Separate the tracks that planners can read from broken ones, so that one of those takes no others with it.
+    """Separate valid from invalid tracks, so that an invalid track does not affect the others.
 
     Returns
     -------
     usable : list of types.TrackedObject
     faults : list of str
-        For each other track, what is wrong with it.
+        Description of the fault of each invalid track.
     """
     faults = [_fault_of(track) for track in tracks]
     return [track for track, fault in zip(tracks, faults) if not fault], [fault for fault in faults if fault]
 
 
 def _fault_of(track):
-    """What is wrong with a track: a number is not finite or absurdly large, a size or step is not positive; else ''."""
+    """Fault of a track: a value is not finite or implausibly large, or a size or step is not positive; '' if valid."""
     values = np.concatenate([track.position_m, track.velocity_mps, track.size_m, track.prediction_m.ravel()])
     if not ((np.abs(values) < FARTHEST_M).all() and (0 < track.size_m).all() and (track.size_m < LARGEST_M).all()):
         shown = tuple(np.asarray(value).tolist() for value in (track.position_m, track.velocity_mps, track.size_m,
@@ -42,15 +42,14 @@ def _fault_of(track):
 
 
 def walking_velocity(track):
-    """The velocity (3,) of a track that moves; zero of one that does not: the rest is noise, and planners would take it
-    for a person who walks off.
+    """Velocity (3,) of a moving track, m/s; zero for a track that does not move, because its velocity is noise that
+    planners would extrapolate.
     """
     return track.velocity_mps if track.moving else np.zeros(3)
 
 
 def position_after(track, ahead_s):
-    """Where a track will be, as its tracker predicts: straight between the predicted positions, and beyond the last
-    with its `walking_velocity`.
+    """Interpolate the predicted positions of a track linearly; extrapolate beyond the last with `walking_velocity`.
 
     Parameters
     ----------
@@ -61,6 +60,7 @@ def position_after(track, ahead_s):
     Returns
     -------
     numpy.ndarray, (..., 3)
+        Positions in the frame of the tracks, metres.
     """
     ahead_s = np.asarray(ahead_s, float)
     times_s = track.prediction_step_s * np.arange(len(track.prediction_m) + 1)
@@ -70,19 +70,24 @@ def position_after(track, ahead_s):
 
 
 def predicted_to(tracks, ahead_s):
-    """The tracks some seconds later (see `position_after`) with their `walking_velocity`, without their predictions."""
+    """Predict tracks `ahead_s` seconds ahead (see `position_after`), with `walking_velocity` and without predictions.
+    """
     return [track._replace(position_m=position_after(track, ahead_s), velocity_mps=walking_velocity(track),
                            prediction_m=np.empty((0, 3)), prediction_covariance_m2=None) for track in tracks]
 
 
 def in_frame(tracks, b_from_a):
-    """The tracks of frame a in frame b, without their predictions.
+    """Transform tracks from frame a to frame b, without their predictions.
 
     Parameters
     ----------
     tracks : list of types.TrackedObject
     b_from_a : numpy.ndarray, (4, 4)
         Both frames have z up.
+
+    Returns
+    -------
+    list of types.TrackedObject
     """
     return [track._replace(position_m=transform_points(b_from_a, track.position_m),
                            velocity_mps=b_from_a[:3, :3].dot(track.velocity_mps),
@@ -91,7 +96,7 @@ def in_frame(tracks, b_from_a):
 
 
 def rounding_m(tracks, b_from_a):
-    """By how much the coordinates in frame b of tracks of frame a may be off as float32, metres."""
+    """Largest float32 rounding error of the coordinates in frame b of tracks in frame a, metres."""
     farthest_m = max([np.abs(transform_points(b_from_a, track.position_m)).max() for track in tracks], default=0.0)
     return float(np.spacing(np.float32(farthest_m))) / 2
 
@@ -104,15 +109,15 @@ def _turned(covariance, rotation):
 
 
 def footprint_points(tracks, ahead_s, spacing_m):
-    """Points in people's cylinders, at three heights, and in the discs that they will cover, at half their height.
+    """Sample people's cylinders at three heights, and the discs that they are predicted to cover at half their height.
 
     Parameters
     ----------
     tracks : list of types.TrackedObject
     ahead_s : float
-        How far ahead; 0: where people are only.
+        Prediction time, seconds; 0 for the current positions only.
     spacing_m : float
-        Between points of a disc.
+        Distance between the points of a disc.
 
     Returns
     -------
@@ -129,7 +134,7 @@ def footprint_points(tracks, ahead_s, spacing_m):
 
 
 def disc_points(radius_m, spacing_m):
-    """A flat disc around the origin, (n, 3): its outline, and a grid inside."""
+    """Points (n, 3) of a horizontal disc around the origin: its outline, and a grid inside."""
     side = np.arange(-np.floor(radius_m / spacing_m), np.floor(radius_m / spacing_m) + 1) * spacing_m
     grid = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     inside = grid[np.hypot(grid[:, 0], grid[:, 1]) < radius_m]
@@ -137,6 +142,6 @@ def disc_points(radius_m, spacing_m):
 
 
 def ring_points(radius_m, spacing_m):
-    """A flat circle around the origin, (n, 3), with points `spacing_m` apart or a little less."""
+    """Points (n, 3) of a horizontal circle around the origin, at most `spacing_m` apart."""
     angles = np.linspace(0, 2 * np.pi, int(np.ceil(2 * np.pi * radius_m / spacing_m)), endpoint=False)
     return radius_m * np.column_stack((np.cos(angles), np.sin(angles), np.zeros_like(angles)))

@@ -1,4 +1,4 @@
-"""From 3D boxes in a fixed frame to tracks with velocity, visibility and prediction.
+"""Multi-object tracking: from 3D boxes in a fixed frame to tracks with velocity, visibility and prediction.
 
 May import: camera, core.
 """

@@ -1,18 +1,18 @@
-"""Which detection belongs to which track."""
+"""Data association: assign the detections of an image to tracks."""
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
 
-RECENT_NS = 7 * NS // 10  # tracks matched so recently are associated before those that were missed for longer
-UNSURE_SHARE = 0.1  # the density of new targets is at most this share of that of a detection at its centre
-HEAD_SIGMAS = 2.0  # the top of a head is known this much less well than a height: the camera tilts as the robot drives
-HIDDEN_FEET_COST = 8.0  # of a box whose top fits but not its height: something in front hides the lower part
+RECENT_NS = 7 * NS // 10  # tracks matched less than this ago are associated before the others
+UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection
+HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height: the camera tilts during driving
+HIDDEN_FEET_COST = 8.0  # cost of a box whose top matches but whose height does not: its lower part is occluded
 
 
 def associate(tracks, batch, stamp_ns, params, outliers):
-    """Assign detections to tracks: recently matched ones first, then those missed for longer, then tentative ones.
+    """Assign detections to tracks in a cascade: recently matched, then missed, then tentative tracks.
 
     A pair is allowed only if the track explains the detection better than a new target does.
 
@@ -29,11 +29,11 @@ def associate(tracks, batch, stamp_ns, params, outliers):
     Returns
     -------
     rows, columns : numpy.ndarray of int, (k,)
-        Pairs of a track and a measurement.
+        Row of the track and column of the measurement of each pair.
     """
     cost = kalman_filter.negative_log_likelihood(tracks['mean'], tracks['covariance'], batch.ground, outliers)
     cost += _height_cost(tracks, batch, params.height_sigma)
-    # An uncertain detection hardly tells a track from a new target; the track then gets it.
+    # An uncertain detection fits a new target and a track about equally well; the track takes precedence.
     largest_density = 1 / (2 * np.pi * np.sqrt(np.linalg.det(batch.ground.noise_m2)))
     density = np.minimum(params.new_target_density, UNSURE_SHARE * largest_density)
     cost[cost >= -2 * np.log(2 * np.pi * density)] = np.inf
@@ -50,10 +50,11 @@ def associate(tracks, batch, stamp_ns, params, outliers):
 
 
 def _height_cost(tracks, batch, sigma_m):
-    """What the heights of batch cost in the association, (n, m), as negative log likelihood.
+    """Association cost (n, m) of the height differences, as a negative log likelihood.
 
-    Where the image border cuts a box, or always cut those of a track, the height is not known: the top of the head is
-    compared if both have seen it, else nothing. Furniture hides the lower part of a body and leaves the top as well.
+    The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track. The
+    tops of the heads are then compared if both are known; otherwise the cost is 0. Where the height is known, the cost
+    is at most that of the tops plus `HIDDEN_FEET_COST`, because furniture occludes only the lower part of a body.
     """
     seen, cut = tracks['end_hits'] > 0, batch.vertical_cuts
     cost = ((tracks['size_m'][:, 2:] - batch.sizes_m[:, 2]) / sigma_m) ** 2 / 2
@@ -65,7 +66,7 @@ def _height_cost(tracks, batch, sigma_m):
 
 
 def match_greedily(distances):
-    """Pair rows with columns, nearest pair first, each at most once (thesis 3.6).
+    """Pair rows with columns greedily, in order of distance (thesis 3.6). Each row and column is used at most once.
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ def match_greedily(distances):
     Returns
     -------
     list of (int, int)
-        min(n, m) pairs (row, column), nearest first; ties by row, then column.
+        min(n, m) pairs (row, column) by increasing distance; ties are ordered by row, then column.
     """
     distances = np.asarray(distances, float)
     pairs, rows, columns = [], set(), set()
@@ -87,18 +88,18 @@ def match_greedily(distances):
 
 
 def plane_distances(positions, others):
-    """Distances (n, m) between points (n, 3) and (m, 3) seen from above, in the x-y plane, metres."""
+    """Distances (n, m) in the x-y plane between points (n, 3) and (m, 3), metres."""
     difference = np.asarray(positions, float)[:, None, :2] - np.asarray(others, float)[None, :, :2]
     return np.linalg.norm(difference, axis=2)
 
 
 def assign(costs):
-    """Pair rows with columns so that as many pairs as can be are made and the sum of their costs is least.
+    """Pair rows with columns: the maximum number of allowed pairs, with the minimum total cost.
 
     Parameters
     ----------
     costs : array_like, (n, m)
-        inf where a pair is not allowed.
+        inf for pairs that are not allowed.
 
     Returns
     -------
@@ -115,7 +116,7 @@ def assign(costs):
 
 
 def unmatched(count, numbers):
-    """The numbers (k,) below `count` that are not among `numbers`, in order."""
+    """Indices (k,) below `count` that are not in `numbers`, in increasing order."""
     left = np.ones(count, bool)
     left[numbers] = False
     return np.flatnonzero(left)

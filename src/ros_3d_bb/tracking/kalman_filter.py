@@ -1,8 +1,8 @@
-"""A constant-velocity Kalman filter in the plane, for many objects at once, that expects outliers behind the object.
+"""Constant-velocity Kalman filter in the plane, vectorised over objects, with a model of outliers behind the object.
 
 Convention: a state is (x, y, vx, vy), metres and m/s, in the fixed frame; `mean` is (n, 4), `covariance` (n, 4, 4).
-What is measured is (x, y). Where the depth of a box is not the person's but the background's, the measurement lies
-behind the person on the camera's ray: its error is a mixture of two Gaussians, one of them shifted along the ray.
+A measurement is (x, y). If the depth of a box is that of the background, the measurement lies behind the person on the
+viewing ray. The measurement error is therefore a mixture of two Gaussians, one of them shifted along the ray.
 """
 from typing import NamedTuple
 
@@ -10,8 +10,8 @@ import numpy as np
 
 
 class Measurements(NamedTuple):
-    """Positions (m, 2) seen in one image, their covariances (m, 2, 2), and the directions (m, 2) in which the camera
-    looked at them, of length 1."""
+    """Positions (m, 2) measured in one image, their covariances (m, 2, 2), and the unit vectors (m, 2) of the viewing
+    rays from the camera to them."""
 
     positions_m: np.ndarray
     noise_m2: np.ndarray
@@ -19,19 +19,19 @@ class Measurements(NamedTuple):
 
 
 class Outliers(NamedTuple):
-    """Share of measurements that lie behind the object, and how far behind: mean and standard deviation, metres."""
+    """Probability that a measurement lies behind the object, and mean and standard deviation of the offset, metres."""
 
     probability: float = 0.1
     offset: float = 0.45
     spread: float = 0.3
 
     def components(self):
-        """(weight, offset_m, spread_m) of the measurements as they should be, and of the outliers."""
+        """(weight, offset_m, spread_m) of the inlier and of the outlier component."""
         return (1 - self.probability, 0.0, 0.0), (self.probability, self.offset, self.spread)
 
 
 def predict(mean, covariance, elapsed_s, density):
-    """The states after `elapsed_s` with velocities that wander: white acceleration of `density` m²/s³.
+    """Predict the states `elapsed_s` ahead, with white-noise acceleration of `density` m²/s³.
 
     Returns
     -------
@@ -43,25 +43,26 @@ def predict(mean, covariance, elapsed_s, density):
 
 
 def _white(elapsed_s):
-    """Covariance (4, 4) that white acceleration of density 1 adds in `elapsed_s` (Bar-Shalom et al., 2001, 6.2.2)."""
+    """Process noise (4, 4) of white-noise acceleration of density 1 over `elapsed_s` (Bar-Shalom et al., 2001, 6.2.2).
+    """
     position, both = elapsed_s ** 3 / 3, elapsed_s ** 2 / 2
     return np.array([[position, 0, both, 0], [0, position, 0, both], [both, 0, elapsed_s, 0], [0, both, 0, elapsed_s]])
 
 
 def negative_log_likelihood(mean, covariance, measurements, outliers):
-    """How well each measurement fits each object.
+    """Negative log likelihood of each measurement given each object.
 
     Returns
     -------
     numpy.ndarray, (n, m)
-        -2 log (2 pi times the density, per m², of the measurement if it is of that object).
+        -2 log(2 pi p), where p is the density of the measurement given the object, per m².
     """
     return -2 * np.logaddexp(*(_fit(mean[:, None], covariance[:, None], measurements, component)[0]
                                for component in outliers.components()))
 
 
 def update(mean, covariance, measurements, outliers):
-    """The states after one measurement each: the mixture of what both components say, as one Gaussian.
+    """Update each state with one measurement; the mixture of both components is reduced to one Gaussian.
 
     Returns
     -------
@@ -83,9 +84,9 @@ def update(mean, covariance, measurements, outliers):
 
 
 def _fit(mean, covariance, measurements, component):
-    """Log likelihood, innovation (x, y), and its inverse covariance (xx, xy, yy), of one component.
+    """Log likelihood, innovation (x, y) and inverse innovation covariance (xx, xy, yy) of one mixture component.
 
-    By the elements, as arrays of 2x2 matrices take numpy several times as long.
+    Computed element by element, because numpy is several times slower on stacks of 2x2 matrices.
     """
     weight, offset_m, spread_m = component
     ray_x, ray_y = measurements.rays[..., 0], measurements.rays[..., 1]

@@ -1,4 +1,4 @@
-"""What the detections of one image tell a tracker: where, how sure, from which direction, and how large."""
+"""Measurement model: convert the detections of one image to positions, covariances, viewing rays and sizes."""
 from typing import NamedTuple
 
 import numpy as np
@@ -7,20 +7,20 @@ from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.tracking.kalman_filter import Measurements
 from ros_3d_bb.tracking.occlusion import NEARER_M, wrapped
 
-FLOOR_M = 0.02  # nobody's centre is known better than that: people sway as they walk
+FLOOR_M = 0.02  # lower bound of the standard deviation of a centre: people sway as they walk
 PERSON_WIDTH_M = 0.5
-USUAL_PERIOD_S = 1 / 30.0  # of images, for the first one
-PART_M = 0.3  # a box that the image border cuts and that is narrower shows only a part of the width
+USUAL_PERIOD_S = 1 / 30.0  # image period assumed for the first image of a camera
+PART_M = 0.3  # a truncated box narrower than this shows only a part of the body's width
 MAX_SHIFT_M = 0.2
-CUT_SIGMA_M = 0.08  # what is not seen of a cut person leaves the side open by so much
-NEAR_M = 0.01  # a box closer to the camera is seen from no direction; it is taken to lie straight ahead
-TOUCHING_RAD = 0.03  # a nearer box hides another one if there is not more between them
+CUT_SIGMA_M = 0.08  # additional lateral standard deviation of truncated or partly occluded boxes
+NEAR_M = 0.01  # the viewing ray of a closer box is undefined; the optical axis is used instead
+TOUCHING_RAD = 0.03  # a nearer box occludes another one if the gap between them is smaller than this
 BOX_ERRORS = 'kalman: errors of boxes (their covariance comes from the error model of bbox3d_node)'
 
 
 @parameters(BOX_ERRORS)
 class NoiseParams(NamedTuple):
-    """Errors of the positions of boxes."""
+    """Parameters of the position errors of boxes."""
 
     noise_unknown: float = Param(0.1, 'Standard deviation of boxes without a covariance.', 'm', live=(0, 1))
     noise_correlated: float = Param(
@@ -29,9 +29,8 @@ class NoiseParams(NamedTuple):
 
 
 class MeasurementBatch(NamedTuple):
-    """The detections of one image as arrays: where they are on the ground, extents (n, 3), height of the centre and
-    its variance, (n,), and whether the image border cuts them on the left, at the top, on the right and at the bottom,
-    (n, 4)."""
+    """The detections of one image as arrays: positions on the ground plane, extents (n, 3), height of the centre and
+    its variance, (n,), and whether the image border truncates the box at the left, top, right and bottom, (n, 4)."""
 
     ground: Measurements
     sizes_m: np.ndarray
@@ -41,23 +40,24 @@ class MeasurementBatch(NamedTuple):
 
     @property
     def cut_sideways(self):
-        """Whether the image border hides a part of the width, (n,)."""
+        """Whether the image border truncates the width, (n,)."""
         return self.truncated[:, 0] | self.truncated[:, 2]
 
     @property
     def vertical_cuts(self):
-        """Whether the image border hides the lower and the upper end, (n, 2)."""
+        """Whether the image border truncates the lower and the upper end, (n, 2)."""
         return self.truncated[:, [3, 1]]
 
     def select(self, columns):
-        """Those in `columns` alone."""
+        """The batch reduced to the measurements in `columns`."""
         ground, *others = self
         return MeasurementBatch(Measurements(*(values[columns] for values in ground)),
                                 *(values[columns] for values in others))
 
 
 class _ObservedDetections(NamedTuple):
-    """Detections as the camera saw them: on the ground, (n, 2); distances, bearings, half widths in radians, (n,)."""
+    """Detections relative to the camera in the ground plane: positions and rays (n, 2); distances, bearings and angular
+    half widths (n,), radians."""
 
     positions_m: np.ndarray
     rays: np.ndarray
@@ -67,24 +67,26 @@ class _ObservedDetections(NamedTuple):
 
     @property
     def sides(self):
-        """Directions (n, 2) to the left of the rays."""
+        """Unit vectors (n, 2) perpendicular to the rays, to the left."""
         return np.stack((-self.rays[:, 1], self.rays[:, 0]), axis=1)
 
 
 def measurement_batch_of(detections, view, elapsed_s, params):
-    """The detections of one image, with the noise that a filter may believe.
+    """Convert the detections of one image to measurements for the Kalman filter.
 
-    An error that lasts for several images would be taken for certainty if each image counted as a new opinion. The part
-    of the covariance that lasts is therefore widened by how many images it lasts for, which makes the filter the same
-    at any frame rate. The centre of a person whom somebody nearer hides in part, or of whom the image border leaves
-    only a part of the width, is put half a width behind the edge that is seen. The side of a cut box is less sure.
+    Position errors are correlated from image to image. A filter that treats them as independent underestimates its
+    covariance. The correlated part of the covariance is therefore multiplied by the number of images over which it is
+    correlated, which makes the filter independent of the frame rate.
+
+    If a nearer person partly occludes a detection, or the image border leaves only a part of its width, the centre is
+    shifted to half a person's width from the visible edge. The lateral position of such a box is less certain.
 
     Parameters
     ----------
     detections : sequence of Detection, n
-    view : View
+    view : CameraView
     elapsed_s : float
-        Since the image before of the same camera; 0 for the first.
+        Time since the previous image of the same camera; 0 for the first.
     params : NoiseParams
 
     Returns
@@ -119,7 +121,7 @@ def _seen(positions_m, widths_m, view):
 
 
 def _hidden_side(seen):
-    """On which side somebody nearer hides each in part: 1 left, -1 right, 0 on none, or on both."""
+    """Side on which a nearer detection partly occludes each detection: 1 left, -1 right, 0 neither or both; (n,)."""
     depths_m = seen.distances_m * np.cos(seen.bearings)
     to_left = wrapped(seen.bearings[None, :] - seen.bearings[:, None])
     gaps = np.abs(to_left) - seen.half_widths[None, :] - seen.half_widths[:, None]
@@ -129,7 +131,7 @@ def _hidden_side(seen):
 
 
 def _noise(covariances, seen, cut, elapsed_s, params):
-    """Covariances (n, 2, 2) for the filter, from those of single images."""
+    """Covariances (n, 2, 2) for the filter, from the single-image covariances."""
     images = max(1.0, 2 * params.noise_correlation_time / (elapsed_s or USUAL_PERIOD_S))
     noise = np.zeros(covariances.shape)
     for axes, extra_m2 in ((seen.rays, 0), (seen.sides, cut * CUT_SIGMA_M ** 2)):

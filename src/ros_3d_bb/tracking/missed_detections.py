@@ -1,7 +1,8 @@
-"""What it means for tracks that an image does not show them, where one or several cameras look.
+"""Visibility of tracks without a detection, combined over one or several cameras.
 
-Each camera has its say with its latest image; the best one counts. So whom one camera cannot see is neither out of view
-nor missed while another one sees him, hides him or should see him. A camera that sends nothing more is soon not asked.
+The latest image of each camera classifies each track, and the best result is used. A track that one camera cannot see
+is therefore neither out of view nor missed while another camera detects it, sees it occluded or should detect it. A
+camera that stops sending images is ignored after a short time.
 """
 from typing import NamedTuple
 
@@ -11,17 +12,17 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.occlusion import classify_visibility
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
 
-# better than what `classify_visibility` says of places where nobody was found: VISIBLE, OCCLUDED, OUT_OF_VIEW
+# Detected: ranks before the results of `classify_visibility` for undetected tracks, VISIBLE, OCCLUDED, OUT_OF_VIEW.
 SEEN = -1
-STATUS = np.array([OCCLUDED, OCCLUDED, OUT_OF_VIEW, VISIBLE])  # by that, the last one of SEEN
-LATELY_NS = NS  # a camera whose latest image is older is not asked
-BEHIND_M = 0.45  # no less sure is where somebody is who does not come out from behind something
-HIDING_S = 0.3  # who was missed for longer hides nobody
+STATUS = np.array([OCCLUDED, OCCLUDED, OUT_OF_VIEW, VISIBLE])  # indexed by the result; the last entry is for SEEN
+LATELY_NS = NS  # a camera whose latest image is older is ignored
+BEHIND_M = 0.45  # upper bound of the position's standard deviation of a person who stays behind an occluder
+HIDING_S = 0.3  # a track missed for longer does not occlude others
 
 
 class CameraVisibility(NamedTuple):
-    """The latest image of a camera: its stamp, its view, and what it said of each track (n,): SEEN, or what the camera
-    could see of the place.
+    """The latest image of a camera: its stamp, its view, and the result for each track (n,), SEEN or a visibility of
+    `classify_visibility`.
     """
 
     stamp_ns: int
@@ -30,39 +31,42 @@ class CameraVisibility(NamedTuple):
 
 
 def others_of(looks, view, stamp_ns):
-    """The looks, by camera, of those other than that of a view which looked lately."""
+    """The recent `CameraVisibility` of all cameras other than that of `view`, by camera."""
     return {camera: look for camera, look in looks.items()
             if camera != view.camera and stamp_ns - look.stamp_ns <= LATELY_NS}
 
 
 def carried(looks, kept, begun):
-    """Looks for the tracks that are `kept`, (n,) bool, and `begun` new ones, of which they could say nothing."""
+    """The `CameraVisibility` by camera for the `kept` tracks, (n,) bool, and `begun` new tracks, OUT_OF_VIEW."""
     return {camera: look._replace(places=np.concatenate((look.places[kept], np.full(begun, OUT_OF_VIEW))))
             for camera, look in looks.items()}
 
 
 def mark_missed(tracks, before, rows, view, others, looked_s, farthest_m):
-    """Say why the tracks in `rows` were not seen, and count for how long, and how long of that they should have.
+    """Update the status of the undetected tracks in `rows`, and the times for which they are undetected and missed.
 
-    Who was hidden, should have come out by now and did not, is still behind what hid them.
+    An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
+    track keeps its previous position.
 
     Parameters
     ----------
-    tracks, before : numpy.ndarray of tracker.TRACK, (n,)
-        At the stamp of the image, changed in place; and after the image before.
+    tracks : numpy.ndarray of track.TRACK, (n,)
+        Predicted to the stamp of the image; modified in place.
+    before : numpy.ndarray of track.TRACK, (n,)
+        The same tracks after the previous image.
     rows : numpy.ndarray of int
     view : CameraView
     others : dict
-        Of `others_of`.
+        CameraVisibility of the other cameras, from `others_of`.
     looked_s : float
-        The time that the image answers for.
+        Time that the image accounts for, seconds.
     farthest_m : float
-        People farther from a camera are not found.
+        Range of the detector: people farther from a camera are not detected.
 
     Returns
     -------
     numpy.ndarray of int, (n,)
-        The places of the look.
+        `CameraVisibility.places` of the image.
     """
     said = np.full(len(tracks), SEEN)
     if not len(rows):
@@ -88,7 +92,7 @@ def mark_missed(tracks, before, rows, view, others, looked_s, farthest_m):
 
 
 def _held_by(look, missed, before, rows, places, tracks, farthest_m):
-    """Whom another camera would say to be still behind what hid them, had it looked now."""
+    """Which missed tracks are assumed to stay behind an occluder, from the view of another camera; (k,) bool."""
     held = (look.places[rows] == OCCLUDED) & (missed['status'] == OCCLUDED) & (places != VISIBLE)
     held[held] = _places(missed[held], tracks, look.view, farthest_m) == VISIBLE
     held[held] = _places(before[held], tracks, look.view, farthest_m) == OCCLUDED
@@ -96,7 +100,7 @@ def _held_by(look, missed, before, rows, places, tracks, farthest_m):
 
 
 def _places(missed, tracks, view, farthest_m):
-    """What a camera could see of the places of missed people."""
+    """Visibility (k,) of missed tracks in a camera's view."""
     if not len(missed):
         return np.zeros(0, int)
     hiding = tracks[tracks['confirmed'] & (tracks['missed_s'] < HIDING_S)]
@@ -104,10 +108,10 @@ def _places(missed, tracks, view, farthest_m):
 
 
 def positions_of(tracks):
-    """Centres (n, 3), metres."""
+    """Centres (n, 3) of tracks, metres."""
     return np.column_stack((tracks['mean'][:, :2], tracks['z_m']))
 
 
 def sigma_of(tracks):
-    """Standard deviations (n,) of the positions, along the axis of the frame where they are less sure."""
+    """Standard deviations (n,) of the positions, the larger one of x and y, metres."""
     return np.sqrt(np.maximum(tracks['covariance'][:, 0, 0], tracks['covariance'][:, 1, 1]))

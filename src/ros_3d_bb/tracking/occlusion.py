@@ -1,36 +1,37 @@
-"""Why a person is not seen: hidden by somebody or something, outside the camera's view, or gone."""
+"""Visibility of tracked people in a camera: visible, occluded by a person or an object, or out of view."""
 import numpy as np
 
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 
 EDGE_RAD = 0.04  # people this close to the image border are not detected reliably
 NEAREST_M = 0.45  # nor are people this close to the camera
-LEAST_IN_IMAGE = 0.2  # share of the body axis that has to be in the image for a person to be detected
-AXIS_SAMPLES = np.linspace(-0.48, 0.48, 11)  # points of the body axis that are looked for, in heights from the centre
+LEAST_IN_IMAGE = 0.2  # minimum share of the body axis inside the image for a person to be detected
+AXIS_SAMPLES = np.linspace(-0.48, 0.48, 11)  # samples of the body axis, as fractions of the height from the centre
 BODY_RADIUS_M = 0.27
-NEARER_M = 0.25  # who hides another person is nearer by so much
-SEEN_BESIDE = 0.2  # and leaves so much of a half width to be seen, which is too narrow for a detector
-HIDDEN_BEHIND_M = 0.5  # nearer by so much than the person, measured depth is that of something else
+NEARER_M = 0.25  # an occluding person is at least this much nearer
+SEEN_BESIDE = 0.2  # and leaves at most this share of a half width visible, which is too narrow for a detector
+HIDDEN_BEHIND_M = 0.5  # measured depth nearer than the person by more than this belongs to another object
 HIDDEN_SHARE = 0.5
-ACROSS, ALONG = np.meshgrid((-0.6, 0, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))  # where depth is asked for, in half extents
+ACROSS, ALONG = np.meshgrid((-0.6, 0, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))  # depth sample points, in half extents
 
 
 def classify_visibility(view, positions_m, sizes_m, others_m, farthest_m):
-    """What the camera could see of the places where people are thought to be.
+    """Classify the visibility of people at their estimated positions.
 
     Parameters
     ----------
-    view : View
+    view : CameraView
     positions_m, sizes_m : numpy.ndarray, (n, 3)
+        Centres and extents in the fixed frame.
     others_m : numpy.ndarray, (m, 3)
-        Where people are who may hide them; they themselves may be among those.
+        Centres of possible occluders; may contain the people themselves.
     farthest_m : float
-        People farther away are not found.
+        Range of the detector: people farther away are not detected.
 
     Returns
     -------
     numpy.ndarray of int, (n,)
-        VISIBLE: should have been found there; OCCLUDED: hidden by somebody, or by something nearer in the depth image;
+        VISIBLE: a detection is expected; OCCLUDED: by a person, or by something nearer in the depth image;
         OUT_OF_VIEW.
     """
     distances_m, bearings = view.bearings(positions_m)
@@ -43,22 +44,22 @@ def classify_visibility(view, positions_m, sizes_m, others_m, farthest_m):
 
 
 def share_in_image(view, positions_m, heights_m, margin_rad=0.0):
-    """How much of the axes of upright bodies the image of a camera shows, whatever hides them.
+    """Share of the axes of upright bodies that lies inside the image, regardless of occlusion.
 
     Parameters
     ----------
-    view : View
-        Its intrinsics are known.
+    view : CameraView
+        With intrinsics.
     positions_m : numpy.ndarray, (n, 3)
         Centres in the fixed frame.
     heights_m : numpy.ndarray, (n,)
     margin_rad : float
-        Width of the strip along the image border that does not count, as an angle near the optical axis.
+        Width of an excluded strip along the image border, as an angle near the optical axis.
 
     Returns
     -------
     numpy.ndarray, (n,)
-        0..1. Points to which the lens distortion gives no pixel are not in the image.
+        0..1. Points for which the lens distortion defines no pixel count as outside the image.
     """
     camera, rotation = view.intrinsics, view.fixed_from_camera[:3, :3]  # its inverse is its transpose
     centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
@@ -73,19 +74,19 @@ def share_in_image(view, positions_m, heights_m, margin_rad=0.0):
 
 
 def depths_towards(camera, depth, points):
-    """The depth measured in the direction of points, for `View`.
+    """Depth measured in the direction of points, for `CameraView.depth_at`.
 
     Parameters
     ----------
     camera : camera_model.Camera
-    depth : box3d_estimator.DepthImage
+    depth : depth_image.DepthImage
     points : numpy.ndarray, (k, 3)
         In the optical frame, metres.
 
     Returns
     -------
     numpy.ndarray, (k,)
-        Metres along z; nan where none was measured, and outside the image.
+        Metres along z; nan for points without valid depth and points outside the image.
     """
     in_front = points[:, 2] > 0
     pixels = camera.project(np.where(in_front[:, None], points, (0, 0, 1)))
@@ -98,7 +99,8 @@ def depths_towards(camera, depth, points):
 
 
 def _out_of_view(view, positions_m, sizes_m, distances_m, bearings, farthest_m):
-    """Which people the camera cannot detect: too close, too far, or with too little of the body in the image."""
+    """People that the camera cannot detect, (n,) bool: too close, too far, or with too little of the body in the image.
+    """
     above_m = np.abs(positions_m[:, 2] - view.fixed_from_camera[2, 3]) - sizes_m[:, 2] / 2
     distances_m = np.hypot(distances_m, np.maximum(above_m, 0))
     outside = (distances_m < NEAREST_M) | (distances_m > farthest_m)
@@ -114,17 +116,17 @@ def _behind_others(distances_m, bearings, others_m, others_bearings):
 
 
 def wrapped(angles):
-    """Angles from -pi to pi, radians."""
+    """Wrap angles to -pi..pi, radians."""
     return angles - 2 * np.pi * np.rint(angles / (2 * np.pi))
 
 
 def _half_widths(distances_m):
-    """Of bodies, in radians."""
+    """Angular half widths of bodies at distances in metres, radians."""
     return np.arcsin(np.clip(BODY_RADIUS_M / np.maximum(distances_m, 0.01), 0, 1))
 
 
 def _behind_something(view, positions_m, sizes_m):
-    """Where most of the depth measured towards an upright body ends well before it."""
+    """People occluded by objects, (n,) bool: most of the depth measured towards the body is clearly nearer."""
     rotation = view.fixed_from_camera[:3, :3]  # its inverse is its transpose
     centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
     right = rotation.T.dot((view.ahead[1], -view.ahead[0], 0))

@@ -1,17 +1,17 @@
-"""Images that arrive late or in any order: they are processed in the order of their stamps, with stable IDs."""
+"""Out-of-sequence measurements: process late images in the order of their stamps, with stable track IDs."""
 import collections
 from typing import NamedTuple
 
 from ros_3d_bb.core.time_sync import MAX_RATE_HZ, NS
 from ros_3d_bb.tracking.types import CameraView
 
-LATEST_NS = NS // 2  # images that are older than the newest by more are refused
-MOST_KEPT = LATEST_NS * MAX_RATE_HZ // NS  # images of one camera
-MOST_SKIPPED = 1000  # images without an answer that are remembered
+LATEST_NS = NS // 2  # images that are older than the newest by more than this are rejected
+MOST_KEPT = LATEST_NS * MAX_RATE_HZ // NS  # maximum number of images in the history, per camera
+MOST_SKIPPED = 1000  # maximum number of skipped images in the history
 
 
 class DetectedImage(NamedTuple):
-    """The detections of one image, and what its camera saw."""
+    """The detections of one image and the camera's view."""
 
     stamp_ns: int
     detections: tuple
@@ -19,12 +19,13 @@ class DetectedImage(NamedTuple):
 
     @property
     def order(self):
-        """Images are processed in this order."""
+        """Sort key of the processing order: stamp, then camera."""
         return self.stamp_ns, self.view.camera
 
 
 class Matches(NamedTuple):
-    """Which tracks were matched in an image: their IDs, whether they were confirmed before, and their detections."""
+    """The tracks matched in an image: their IDs, whether they were confirmed before it, and the indices of their
+    detections."""
 
     ids: list
     confirmed: list
@@ -32,21 +33,21 @@ class Matches(NamedTuple):
 
 
 class OutOfSequenceBuffer(object):
-    """Processes images in the order of their stamps, whatever the order in which they arrive.
+    """Processes images in the order of their stamps, independent of the order of arrival.
 
-    The latest images are kept with the state before each. A late image rewinds to its place, and the images after it
-    are replayed. Replayed images start the same tracks under the same IDs.
+    The buffer keeps the latest images and the state before each of them. For a late image, the state is rewound to its
+    stamp and the later images are replayed. Replayed images start the same tracks with the same IDs.
 
     Parameters
     ----------
     step : callable
-        step(state, image, observed_s, id_of) returns the state after an image, and its Matches. A state has `tracks`
-        and `now_ns`. `observed_s` is the time that the image answers for, id_of(column) the ID of the target that a
-        detection starts.
+        step(state, image, observed_s, id_of) returns the state after an image and the image's Matches. A state has
+        `tracks` and `now_ns`. `observed_s` is the time in seconds that the image accounts for; id_of(column) returns
+        the ID of the track that a detection starts.
     state
-        Before the first image.
+        State before the first image.
     last_id : int
-        The last ID that was given.
+        The last assigned ID.
     """
 
     def __init__(self, step, state, last_id=0):
@@ -56,13 +57,13 @@ class OutOfSequenceBuffer(object):
         self._ids = {}  # IDs of new targets by stamp, camera and column of the detection that started them
 
     def insert(self, image):
-        """Process an image. Raises ValueError, and changes nothing, if it comes too late or a second time."""
+        """Process an image. Raises ValueError without any change if the image is too late or a duplicate."""
         self._check(image)
         later = self._rewind(image.order)
         self._replay([image] + later, self.last_id if later else None)
 
     def skip(self, stamp_ns, camera):
-        """Let an image pass that has no answer: tracks do not age for it."""
+        """Skip an image whose detections are unavailable: tracks do not age."""
         self._skipped.append((stamp_ns, camera))
         if any(image.view.camera == camera and (state.now_ns or 0) < stamp_ns < image.stamp_ns
                for state, image in self._history):
@@ -81,7 +82,7 @@ class OutOfSequenceBuffer(object):
                              % (stamp_ns / NS, LATEST_NS / NS, MOST_KEPT, image.view.camera))
 
     def _rewind(self, order):
-        """Go back to the state before the images that come after `order`; returns those, oldest first."""
+        """Rewind to the state before the images after `order`; return those images, oldest first."""
         images = []
         while self._history and self._history[-1][1].order > order:
             self.state, image = self._history.pop()
@@ -89,7 +90,7 @@ class OutOfSequenceBuffer(object):
         return images
 
     def _replay(self, images, known_id):
-        """Process images; `known_id` is the last ID given before a rewind, None if there was none."""
+        """Process images; `known_id` is the last ID assigned before a rewind, None without a rewind."""
         for image in images:
             before = self.state
             self._history.append((before, image))
@@ -99,7 +100,7 @@ class OutOfSequenceBuffer(object):
         self._forget()
 
     def _observed_s(self, image):
-        """The time since the image before, or since a skipped one of the same camera."""
+        """Time since the previous image, or since a later skipped image of the same camera, seconds."""
         stamp_ns, camera = image.stamp_ns, image.view.camera
         before_ns = stamp_ns if self.state.now_ns is None else self.state.now_ns
         skipped_ns = [skipped_ns for skipped_ns, other in self._skipped if other == camera and skipped_ns < stamp_ns]
@@ -115,7 +116,7 @@ class OutOfSequenceBuffer(object):
         return id_of
 
     def _restore_ids(self, image, matches, known_id):
-        """Give a track that a late image started the ID of the track that one of its later detections had started."""
+        """Restore the ID of a track that now starts in a late image, but started in a later image before the rewind."""
         for track_id, was_confirmed, column in zip(*matches):
             key = image.order + (column,)
             if key in self._ids and (track_id > known_id or not was_confirmed):
@@ -128,6 +129,6 @@ class OutOfSequenceBuffer(object):
         oldest_ns = self.state.now_ns - LATEST_NS
         while self._history[0][1].stamp_ns < oldest_ns:
             self._history.popleft()
-        before_ns = self._history[0][0].now_ns or 0  # nothing earlier can count again
+        before_ns = self._history[0][0].now_ns or 0  # earlier entries have no effect any more
         self._skipped = collections.deque((entry for entry in self._skipped if entry[0] > before_ns), MOST_SKIPPED)
         self._ids = {key: number for key, number in self._ids.items() if key[0] >= oldest_ns}

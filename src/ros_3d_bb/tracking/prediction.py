@@ -1,4 +1,4 @@
-"""Where tracked people are and will be, and how sure that is: what is published of a track."""
+"""Current and predicted positions of tracks with their covariances, as they are published."""
 from typing import NamedTuple
 
 import numpy as np
@@ -23,16 +23,16 @@ class PredictionParams(NamedTuple):
 
 
 def objects_of(tracks, params):
-    """What is published of tracks.
+    """Convert tracks to the published objects, with predictions at constant velocity.
 
-    People are predicted to walk on as they do. What looks like a slow walk is mostly noise of somebody who stands: the
-    slower, the less of it is carried on. The filter's covariance does not know of errors that stay the same for
-    seconds, such as that of a wrong calibration: `position_bias` is added for them, and `prediction_acceleration` for
-    the turns that people make.
+    A low velocity is mostly noise of a standing person. The predicted velocity v is therefore scaled by
+    v² / (v² + standing_speed²). The covariance of the filter does not include errors that stay constant for seconds,
+    such as those of a wrong calibration; `position_bias` is added for them. `prediction_acceleration` accounts for
+    turns.
 
     Parameters
     ----------
-    tracks : numpy.ndarray of tracker.TRACK, (n,)
+    tracks : numpy.ndarray of track.TRACK, (n,)
     params : PredictionParams
 
     Returns
@@ -63,7 +63,7 @@ def objects_of(tracks, params):
 
 
 def _ahead(covariance, times_s, params):
-    """Covariances (n, steps, 2, 2) of the positions at times ahead."""
+    """Covariances (n, steps, 2, 2) of the predicted positions."""
     position, velocity, both = covariance[:, None, :2, :2], covariance[:, None, 2:, 2:], covariance[:, None, :2, 2:]
     times = times_s[:, None, None]
     wandered = params.prediction_acceleration * times ** 3 / 3 + params.position_bias ** 2

@@ -1,9 +1,9 @@
-"""The thesis' tracker (3.6): greedy nearest neighbour, smoothed velocity, straight prediction.
+"""The thesis' tracker (3.6): greedy nearest neighbour, smoothed velocity, linear prediction.
 
-Kept from the thesis: matching in the plane seen from above, closest pair first and without a gate; an object that is
-not matched stays where it was and is deleted after a limit; an exponential moving average of the velocity, which
-starts at zero; a prediction along the averaged velocity. Mended: velocities are metres per second by the stamps of the
-images, where the original counted frames; the limit is in seconds; time without an answer (no transform) ages nobody.
+As in the thesis: greedy matching in the ground plane without a gate; an unmatched object keeps its position and is
+deleted after a limit; the velocity is an exponential moving average that starts at zero; positions are predicted along
+the averaged velocity. Different from the original: velocities are in metres per second from the stamps of the images
+instead of per frame; the limit is in seconds; tracks do not age during skipped images (no transform).
 """
 from typing import NamedTuple
 
@@ -32,7 +32,7 @@ class ThesisTrackerParams(NamedTuple):
 
 
 class _Track(object):
-    """One object between its images."""
+    """State of one tracked object."""
 
     def __init__(self, track_id, stamp_ns, detection):
         self.id = track_id
@@ -42,7 +42,7 @@ class _Track(object):
         self.velocity_mps = self.instant_velocity_mps = np.zeros(3)
 
     def update(self, stamp_ns, detection, alpha):
-        """Move to where the object was seen."""
+        """Set the position and size of a detection, and update the velocities."""
         elapsed_s = (stamp_ns - self.last_seen_ns) / float(NS)
         self.instant_velocity_mps = (detection.position_m - self.position_m) / elapsed_s
         self.velocity_mps = alpha * self.instant_velocity_mps + (1 - alpha) * self.velocity_mps
@@ -54,12 +54,12 @@ class ThesisTracker(object):
     """Tracks objects from image to image.
 
     Call `update` with the detections of each image in the order of their stamps, `skip` for an image whose detections
-    could not be used, `reset` where time jumped.
+    are unusable, and `reset` after a jump in time.
 
     Raises
     ------
     ValueError
-        If a parameter makes no sense; names it.
+        If a parameter is invalid; the message names it.
     """
 
     def __init__(self, params=ThesisTrackerParams()):
@@ -69,30 +69,30 @@ class ThesisTracker(object):
         self._now_ns, self._skipped_ns = None, 0
 
     def reconfigure(self, params):
-        """Go on with other parameters and the same tracks. Raises ValueError as at the start, and changes nothing."""
+        """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
         check_steps(params.prediction_time, params.prediction_step)
         self._params = params
 
     def update(self, stamp_ns, detections, view=None):
-        """Take the detections of one image.
+        """Update the tracks with the detections of one image.
 
         Parameters
         ----------
         stamp_ns : int
-            Stamp of the image, later than that of the image before.
+            Stamp of the image, nanoseconds; later than that of the previous image.
         detections : list of Detection
-        view : View, optional
-            Not used here: the thesis' tracker does not ask where the camera looked.
+        view : CameraView, optional
+            Unused: the thesis' tracker does not consider the field of view.
 
         Returns
         -------
         list of TrackedObject
-            By id.
+            Ordered by ID.
 
         Raises
         ------
         ValueError
-            If the stamp is not later; nothing changes then.
+            If the stamp is not later than the previous one; the tracks are unchanged.
         """
         elapsed_ns = self._advance(stamp_ns)
         limit_ns = self._params.disappearance_limit * NS
@@ -113,15 +113,15 @@ class ThesisTracker(object):
         return [self._published(track) for track in self._tracks]
 
     def skip(self, stamp_ns, _camera=''):
-        """Let an image pass whose detections could not be used: nobody ages. Never an error: its stamp may be wrong."""
+        """Skip an image whose detections are unusable: tracks do not age. Never raises, as the stamp may be wrong."""
         self._skipped_ns = max(stamp_ns, self._skipped_ns)
 
     def reset(self):
-        """Forget all tracks, as after a jump in time. Numbers are not used again."""
+        """Delete all tracks, as after a jump in time. IDs are not reused."""
         self._tracks, self._now_ns, self._skipped_ns = [], None, 0
 
     def _advance(self, stamp_ns):
-        """Nanoseconds since the image before, skipped or not; 0 for the first."""
+        """Nanoseconds since the previous image, skipped or not; 0 for the first."""
         if self._now_ns is not None and stamp_ns <= self._now_ns:
             raise ValueError('stamp %.9f is not later than the last, %.9f' % (stamp_ns / NS, self._now_ns / NS))
         elapsed_ns = 0 if self._now_ns is None else max(stamp_ns - max(self._now_ns, self._skipped_ns), 0)

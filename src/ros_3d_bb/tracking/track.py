@@ -1,4 +1,4 @@
-"""Tracks as one structured array, and what detections change in it. Fixed frame, metres, nanoseconds."""
+"""Tracks as a structured array: update of matched tracks and start of new ones. Fixed frame, metres, nanoseconds."""
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
@@ -6,16 +6,16 @@ from ros_3d_bb.tracking import kalman_filter
 from ros_3d_bb.tracking.types import VISIBLE
 
 # `hits` counts the detections of a track, `end_hits` those that showed the lower and the upper end of the body.
-# `unseen_s` is the time since the last detection, `missed_s` the part of it for which it should have been detected.
+# `unseen_s` is the time since the last detection, `missed_s` the part of it during which a detection was expected.
 TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
                   ('size_m', float, 3), ('end_hits', int, 2), ('hits', int), ('first_ns', np.int64),
                   ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float), ('status', int),
                   ('confirmed', bool), ('moving', bool)])
-RECENTLY_MATCHED_NS = NS // 5  # no new target starts near a track that was matched so recently
-SMOOTHING = 0.1  # share of the newest detection in size and height
-CUT_SMOOTHING = 0.02  # the same where the image border cuts the box on a side: the head may be outside
+RECENTLY_MATCHED_NS = NS // 5  # no track starts near a track that was matched less than this ago
+SMOOTHING = 0.1  # weight of the newest detection in size and height
+CUT_SMOOTHING = 0.02  # the same for boxes that the image border truncates sideways: the head may be outside
 LEAST_HEIGHT_M = 0.1
-STILL_MOVING = 0.5  # share of the speed at which a track starts to move below which it stops
+STILL_MOVING = 0.5  # hysteresis: a moving track stops below this share of `moving_speed`
 
 
 def update_matched(tracks, rows, batch, stamp_ns, params, outliers):
@@ -46,7 +46,7 @@ def update_matched(tracks, rows, batch, stamp_ns, params, outliers):
 
 
 def new_targets(tracks, batch, stamp_ns, params):
-    """Tracks of measurements that belong to no track and are no second detection of one.
+    """Start tracks from unmatched measurements, except duplicate detections of recently matched or new tracks.
 
     Parameters
     ----------
@@ -59,9 +59,9 @@ def new_targets(tracks, batch, stamp_ns, params):
     Returns
     -------
     new : numpy.ndarray of TRACK, (k,)
-        Without IDs.
+        New tracks; their IDs are not set.
     kept : list of int
-        The k measurements that they come from.
+        Indices of the measurements that started them.
     """
     new = np.zeros(len(batch.z_m), TRACK)
     new['mean'][:, :2] = batch.ground.positions_m
@@ -80,10 +80,10 @@ def new_targets(tracks, batch, stamp_ns, params):
 
 
 def _update_size(matched, batch):
-    """Smooth the size and the height of tracks by one detection each.
+    """Smooth the size and the height of each track with one detection.
 
-    Lower and upper end are smoothed apart. An end that the image border cuts off moves with the other one, so that the
-    height stays what it was; until it is seen for the first time, it is where the estimator expects it.
+    The lower and the upper end are smoothed separately. A truncated end moves with the other one, so that the height
+    stays constant. An end that has never been visible is placed where the estimator expects it.
     """
     cut = batch.vertical_cuts
     matched['end_hits'] += ~cut

@@ -1,10 +1,11 @@
-"""The multi-object tracker: positions, velocities and predictions of people from the boxes of image after image.
+"""Multi-object tracker: positions, velocities and predictions of people from the 3D boxes of an image sequence.
 
 Each person is tracked by a constant-velocity Kalman filter in the plane (`kalman_filter`). Detections are assigned to
-tracks by the sum of their likelihoods (`association`); a detection that a new target explains better starts a track,
-which is published once it was detected often enough (`track`). Undetected people are not dropped immediately: their
-tracks are published for a moment where the camera should have detected them, for longer where a person or an object
-hides them (`occlusion`, `missed_detections`), and kept for longer still, so that they get their ID back.
+tracks by maximum total likelihood (`association`). A detection that a new target explains better starts a track, which
+is published after a minimum number of detections (`track`). Undetected people are not dropped immediately: their tracks
+stay published for a short time if a camera should detect them, and for longer if a person or an object occludes them
+(`occlusion`, `missed_detections`). Unpublished tracks are kept for longer still, so that people who reappear keep their
+track ID.
 """
 from typing import NamedTuple
 
@@ -21,9 +22,9 @@ from ros_3d_bb.tracking.prediction import PredictionParams, objects_of
 from ros_3d_bb.tracking.track import TRACK, new_targets, update_matched
 from ros_3d_bb.tracking.types import MOVING_SPEED, OUT_OF_VIEW, VISIBLE, check_steps
 
-KNOWN_NS = 60 * NS  # a camera that sent nothing for longer, while others did, is a new one
+KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped
-TENTATIVE_TIMEOUT_S = 0.6  # how long a track that is not confirmed yet is kept without a detection
+TENTATIVE_TIMEOUT_S = 0.6  # how long a tentative track is kept without a detection
 # Sections of the parameters.
 MOTION, ASSOCIATION = 'kalman: how people move', 'kalman: association of boxes with tracks'
 
@@ -70,8 +71,8 @@ class TrackerParams(NamedTuple):
 
 
 class _State(NamedTuple):
-    """What images change: the tracks and the stamp of the latest image; by camera, the stamp of its latest image and
-    its `missed_detections.CameraVisibility`.
+    """State of the tracker after an image: the tracks, the stamp of the latest image, and by camera the stamp of its
+    latest image and its `missed_detections.CameraVisibility`.
     """
 
     tracks: np.ndarray
@@ -83,13 +84,13 @@ class _State(NamedTuple):
 class Tracker(object):
     """Tracks people from image to image.
 
-    Call `update` with the detections of each image, `skip` for an image whose detections could not be used, `reset`
-    where time jumped. Images of several cameras may come in any order, and late.
+    Call `update` with the detections of each image, `skip` for an image whose detections are unusable, and `reset`
+    after a jump in time. Images of several cameras may arrive late and in any order.
 
     Raises
     ------
     ValueError
-        If a parameter makes no sense; names it.
+        If a parameter is invalid; the message names it.
     """
 
     def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams()):
@@ -97,44 +98,44 @@ class Tracker(object):
         self._buffer = OutOfSequenceBuffer(self._step, _State(np.zeros(0, TRACK), None, {}, {}))
 
     def reconfigure(self, params, noise, prediction):
-        """Go on with other parameters and the same tracks. Raises ValueError as at the start, and changes nothing."""
+        """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
         check_steps(prediction.prediction_time, prediction.prediction_step)
         self._params, self._noise, self._prediction = params, noise, prediction
         self._outliers = kalman_filter.Outliers(params.outlier_share, params.outlier_offset, params.outlier_spread)
 
     def reset(self):
-        """Forget all tracks, as after a jump in time. IDs are not used again."""
+        """Delete all tracks, as after a jump in time. IDs are not reused."""
         self._buffer = OutOfSequenceBuffer(self._step, _State(np.zeros(0, TRACK), None, {}, {}), self._buffer.last_id)
 
     def skip(self, stamp_ns, camera=''):
-        """Let an image pass whose detections could not be used: tracks do not age. Never an error: it may be late."""
+        """Skip an image whose detections are unusable: tracks do not age. Never raises, as the image may be late."""
         self._buffer.skip(stamp_ns, camera)
 
     def update(self, stamp_ns, detections, view):
-        """Take the detections of one image.
+        """Update the tracks with the detections of one image.
 
         Parameters
         ----------
         stamp_ns : int
-            Stamp of the image.
+            Stamp of the image, nanoseconds.
         detections : list of Detection
-        view : View
+        view : CameraView
 
         Returns
         -------
         list of TrackedObject
-            By ID, at the stamp of the newest image.
+            Ordered by ID, at the stamp of the newest image.
 
         Raises
         ------
         ValueError
-            If the image comes too late, or a second time; nothing changes then.
+            If the image is too late or a duplicate; the tracks are unchanged.
         """
         self._buffer.insert(DetectedImage(stamp_ns, tuple(detections), view))
         return self.objects()
 
     def objects(self):
-        """The people who are published now, by ID, at the stamp of the newest image."""
+        """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image."""
         tracks, params = self._buffer.state.tracks, self._params
         tracks = tracks[np.argsort(tracks['id'])]
         published = (tracks['missed_s'] <= params.max_missed_time) & (sigma_of(tracks) < params.max_position_std)
@@ -143,7 +144,7 @@ class Tracker(object):
         return objects_of(tracks[tracks['confirmed'] & published], self._prediction)
 
     def _step(self, state, image, observed_s, id_of):
-        """One cycle of the tracker, see OutOfSequenceBuffer: the state after an image, and its Matches."""
+        """One cycle of the tracker: the state after an image and the image's Matches, see OutOfSequenceBuffer."""
         stamp_ns, view, params = image.stamp_ns, image.view, self._params
         tracks = self._predict(state, stamp_ns)
         batch = self._measure(state, image)
@@ -170,7 +171,7 @@ class Tracker(object):
         return _State(tracks, stamp_ns, stamps_ns, looks), matches
 
     def _predict(self, state, stamp_ns):
-        """The tracks (n,) at a stamp."""
+        """The tracks (n,), predicted to a stamp."""
         tracks = state.tracks.copy()
         elapsed_s = 0.0 if state.now_ns is None else (stamp_ns - state.now_ns) / NS
         tracks['mean'], tracks['covariance'] = kalman_filter.predict(tracks['mean'], tracks['covariance'], elapsed_s,
@@ -178,11 +179,11 @@ class Tracker(object):
         return tracks
 
     def _measure(self, state, image):
-        """The detections of an image as measurements, with their noise."""
+        """The detections of an image as a MeasurementBatch."""
         last_ns = state.stamps_ns.get(image.view.camera, image.stamp_ns)
         return measurement_batch_of(image.detections, image.view, (image.stamp_ns - last_ns) / NS, self._noise)
 
     def _is_kept(self, tracks):
-        """Which tracks are kept, (n,); tentative ones only for a moment."""
+        """Which tracks are kept, (n,) bool; tentative ones only for `TENTATIVE_TIMEOUT_S`."""
         limit_s = np.where(tracks['confirmed'], self._params.max_age, TENTATIVE_TIMEOUT_S)
         return (tracks['unseen_s'] < limit_s) & (sigma_of(tracks) < MAX_POSITION_STD_M)

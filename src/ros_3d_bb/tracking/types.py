@@ -1,4 +1,4 @@
-"""What goes into a tracker and what comes out. Positions and sizes in the fixed frame (z up), metres."""
+"""Input and output types of the trackers. Positions and sizes are in the fixed frame (z up), metres."""
 from typing import Callable, NamedTuple, Optional, Tuple
 
 import numpy as np
@@ -8,8 +8,8 @@ from ros_3d_bb.core.limits import USUAL_HEIGHT_M, USUAL_WIDTH_M
 from ros_3d_bb.core.params import Param
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
-MOST_STEPS = 1000  # of a prediction; more only cost memory
-VERTICAL = 0.02  # horizontal part of the optical axis of a camera that looks straight up or down
+MOST_STEPS = 1000  # maximum number of prediction steps, to limit memory
+VERTICAL = 0.02  # upper bound of the horizontal part of the optical axis of a camera that points straight up or down
 # Parameters of both trackers.
 _BOTH = 'both trackers'
 PREDICTION_TIME = Param(
@@ -23,8 +23,8 @@ MOVING_SPEED = Param(
 class Detection(NamedTuple):
     """One object in one image: centre (3,) and extent (3,), x = y = width, z = height.
 
-    `covariance_m2` (3, 3) is that of the centre, None where it is not known. `truncated_edges`: whether the image
-    border cuts the object on its left, at the top, on its right and at the bottom, as seen by a camera held upright.
+    `covariance_m2` (3, 3) is the covariance of the centre, None if unknown. `truncated_edges` states whether the image
+    border truncates the object at the left, top, right and bottom, as seen by a camera held upright.
     """
 
     position_m: np.ndarray
@@ -34,10 +34,10 @@ class Detection(NamedTuple):
 
 
 def detection_from_box(box, fixed_from_camera):
-    """A 3D box of an image as a Detection in the fixed frame.
+    """Convert a 3D box of an image to a Detection in the fixed frame.
 
-    The cylinder is upright in the fixed frame, whichever edge of the image is up: where the camera is mounted in
-    portrait, the box is as wide as it is high in the image.
+    The cylinder is upright in the fixed frame, independent of which edge of the image is up: for a camera mounted in
+    portrait, width and height are swapped.
 
     Parameters
     ----------
@@ -59,11 +59,10 @@ def detection_from_box(box, fixed_from_camera):
 
 
 def _completed_in_portrait(box):
-    """Centre (3,) of a box and its extents along the rows and the columns of an image in which people lie on a side.
+    """Centre (3,) of a box and its extents along the rows and the columns of an image of a camera in portrait.
 
-    The estimator completes a body that the image border cuts as if it stood upright in the image: to the usual width
-    along the rows and to the usual height along the columns. Here it is the other way round. The end that is seen stays
-    in place.
+    The estimator completes a truncated body as if it stood upright in the image: to the usual width along the rows and
+    to the usual height along the columns. In portrait, the two are swapped. The visible end stays in place.
     """
     center_m, extents_m, cut = np.array(box.center_m, float), np.array(box.size_m[:2], float), box.truncated_edges
     was_completed = np.isclose(extents_m[1], USUAL_HEIGHT_M)
@@ -77,11 +76,11 @@ def _completed_in_portrait(box):
 
 
 class CameraView(NamedTuple):
-    """Where the camera of an image was, (4, 4) from its optical frame, and what it sees.
+    """Pose of the camera of an image, (4, 4) from its optical frame to the fixed frame, and its field of view.
 
-    `intrinsics` is None where they are not known. `camera` tells the images of one camera from those of another.
-    `depth_at`, where there is a depth image: a function that takes points (k, 3) of the optical frame and returns the
-    depths (k,) that were measured in their direction, metres, nan where none was.
+    `intrinsics` is None if unknown. `camera` identifies the camera. `depth_at` is None without a depth image; otherwise
+    it is a function that takes points (k, 3) in the optical frame and returns the depths (k,) measured in their
+    direction, metres, nan without valid depth.
     """
 
     fixed_from_camera: np.ndarray
@@ -91,16 +90,16 @@ class CameraView(NamedTuple):
 
     @property
     def ahead(self):
-        """Direction (2,) of the optical axis seen from above, of length 1. For a camera that looks straight up or down
-        it is where the upper edge of its image points."""
+        """Unit vector (2,) of the horizontal direction of the optical axis. For a camera that points straight up or
+        down, it is the direction of the upper edge of the image."""
         ahead = self.fixed_from_camera[:2, 2]
         if ahead.dot(ahead) < VERTICAL ** 2:
             ahead = -self.fixed_from_camera[:2, 1]
         return ahead / np.sqrt(ahead.dot(ahead))
 
     def bearings(self, positions_m):
-        """Distances (n,) of positions (n, 2 or 3) from the camera seen from above, and their bearings (n,): 0 straight
-        `ahead`, positive to the left, radians.
+        """Horizontal distances (n,) of positions (n, 2 or 3) from the camera, metres, and their bearings (n,), radians:
+        0 straight `ahead`, positive to the left.
         """
         ahead = self.ahead
         offsets = np.asarray(positions_m)[:, :2] - self.fixed_from_camera[:2, 3]
@@ -109,12 +108,12 @@ class CameraView(NamedTuple):
 
 
 class TrackedObject(NamedTuple):
-    """One object as the tracker knows it after one image.
+    """State of one tracked object after an image.
 
-    `velocity_mps` (3,) is filtered; `instant_velocity_mps` (3,) is that between the last two sightings, noisy.
-    `prediction_m` (steps, 3) holds positions after 1, 2, 3, ... times `prediction_step_s`. Stamps in nanoseconds.
-    `covariance` (6, 6) is over x, y, z and their velocities; `prediction_covariance_m2` (steps, 3, 3) over the
-    predicted positions; both None for a tracker that does not know them.
+    `velocity_mps` (3,) is filtered; `instant_velocity_mps` (3,) is measured between the last two detections and noisy.
+    `prediction_m` (steps, 3) holds the positions after 1, 2, 3, ... times `prediction_step_s`. Stamps are nanoseconds.
+    `covariance` (6, 6) is that of x, y, z and their velocities; `prediction_covariance_m2` (steps, 3, 3) that of the
+    predicted positions. Both are None for trackers that do not estimate them.
     """
 
     id: int
@@ -133,12 +132,12 @@ class TrackedObject(NamedTuple):
 
 
 def prediction_times_s(time_s, step_s):
-    """The times (steps,) after an image at which positions are predicted: each step up to `time_s`, seconds."""
+    """Prediction times (steps,) after an image: multiples of `step_s` up to `time_s`, seconds."""
     return step_s * np.arange(1, int(round(time_s / step_s)) + 1)
 
 
 def check_steps(time_s, step_s):
-    """Raise ValueError where positions cannot be predicted up to `time_s` in steps of `step_s`, seconds."""
+    """Raise ValueError if a prediction up to `time_s` in steps of `step_s`, seconds, is not possible."""
     if not step_s > 0:
         raise ValueError('prediction_step is %g; more than 0 expected' % step_s)
     if time_s / step_s > MOST_STEPS:
