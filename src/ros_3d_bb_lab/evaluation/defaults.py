@@ -5,7 +5,7 @@ import os
 
 from ros_3d_bb.detection.yolov5.onnx_cache import export_folder
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))  # repo
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))  # repository root
 SCENARIOS = os.path.join(ROOT, 'config', 'scenarios')
 SIMULATED_ERROR_MODEL = os.path.join(ROOT, 'config', 'error_models', 'simulated_d435i.yaml')
 
