@@ -1,5 +1,4 @@
-"""Accuracy of positions in a measurement session: this package's estimator, that of the thesis, and the recorded
-estimates.
+"""Accuracy of positions in a measurement session: our estimator, that of the thesis, and recorded estimates.
 
 Without an error model, each position is corrected by a model fitted to all other positions. The thesis' estimator is
 always corrected in this way if there are enough positions. Recorded estimates are not corrected; frames without a box
@@ -128,8 +127,9 @@ def scores_of(estimates, truth_m, truncated):
 
 
 def _repeatability_m(error_m, truth_m):
-    """Standard deviation of repeated measurements, (2,): root mean square over positions with at least three
-    measurements.
+    """Standard deviation of repeated measurements, (2,).
+
+    It is the root mean square over the positions with at least three measurements.
     """
     variances = [error_m[same].var(axis=0) for same in (
         (truth_m == place).all(axis=1) for place in np.unique(truth_m, axis=0)) if np.count_nonzero(same) > 2]
@@ -168,8 +168,9 @@ def compare(session, boxes, estimator, model=None):
 
 
 def _thesis_estimates(session, boxes):
-    """Estimates of the thesis' estimator, corrected by the other positions, or uncorrected if there are too few of
-    them.
+    """Estimates of the thesis' estimator, corrected by the other positions.
+
+    They are uncorrected if there are too few positions.
     """
     try:
         return estimates_of(session, boxes, estimator_named('median'))

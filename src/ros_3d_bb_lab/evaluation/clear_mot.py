@@ -27,9 +27,7 @@ class Moment(NamedTuple):
 
 
 class MatchedPair(NamedTuple):
-    """Matched person and track in one image; `error_m` (2,) is the track's position minus that of the person, in x and
-    y.
-    """
+    """Matched person and track in one image; `error_m` (2,) is the position error of the track in x and y."""
 
     person: int
     track: int

@@ -25,8 +25,10 @@ NOBODY = Provenance('', '', '', '', 0, 0)
 
 
 class Data(NamedTuple):
-    """Measurements: `measured_m` (n, 3), `truth_m` (n, 2) as (x, z), and `position` (n,), the index of the true
-    position.
+    """Measurements with ground truth.
+
+    `measured_m` (n, 3) is the measured position, `truth_m` (n, 2) the true (x, z), both in metres, and `position` (n,)
+    the index of the true position.
     """
 
     measured_m: np.ndarray
@@ -115,9 +117,7 @@ def scores_of(corrected_m, covariances, truth_m):
 
 
 def coverage(error_m, covariances):
-    """Shares of the errors (n, 2) in x and z that lie in the 68 % and 95 % ellipses of covariances (n, 3, 3). Returns
-    (2,).
-    """
+    """Shares (2,) of the errors (n, 2) in x and z within the 68 % and 95 % ellipses of covariances (n, 3, 3)."""
     in_plane = covariances[:, [0, 2]][:, :, [0, 2]]
     distances = np.einsum('ni,nij,nj->n', error_m, np.linalg.inv(in_plane), error_m)
     return (distances[:, np.newaxis] <= CHI_SQUARE_68_95).mean(axis=0)
@@ -181,11 +181,11 @@ def _fit_bias(data, degree, terms):
 
 
 def _widening(sigmas_m, residuals_m, positions):
-    """Inflation factor, at least 1, for which 95 % ellipses with standard deviations (n, 2) contain 95 % of residuals
-    (n, 2).
+    """Inflation factor, at least 1, with which the 95 % ellipses contain 95 % of the residuals.
 
-    The errors have longer tails than a Gaussian, and planners rely on the 95 % ellipse. The quantile is slightly above
-    95 %, as in conformal prediction, to account for the finite number of positions.
+    `sigmas_m` and `residuals_m` are (n, 2). The errors have longer tails than a Gaussian, and planners rely on the 95 %
+    ellipse. The quantile is slightly above 95 %, as in conformal prediction, to account for the finite number of
+    positions.
     """
     distances = ((residuals_m / sigmas_m) ** 2).sum(axis=1)
     quantile = np.percentile(distances, min(100, 95.0 * (positions + 1) / positions))

@@ -36,8 +36,10 @@ class TrackScore(NamedTuple):
 
 
 def is_in_image(person, map_from_camera, camera):
-    """Whether the axis of a person (`simulator.PersonTruth`) is between the left and right image borders and mostly not
+    """Whether the body axis of a person is between the left and right image borders, and the person is mostly not
     occluded.
+
+    `person` is a `simulator.PersonTruth`.
     """
     x_m, _y, z_m = transform_points(np.linalg.inv(map_from_camera), person.position_m)
     if person.box_px is None or person.hidden > 1 - LEAST_SHOWN or z_m <= 0:

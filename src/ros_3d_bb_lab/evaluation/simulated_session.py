@@ -23,8 +23,9 @@ REPETITIONS = 3
 
 
 def write_simulated_session(folder, ranges_m=RANGES_M, tangents=TANGENTS, repetitions=REPETITIONS):
-    """Write a session of simulated people with exact 2D boxes. People outside the image are skipped. Returns the
-    folder.
+    """Write a session of simulated people with exact 2D boxes. Returns the folder.
+
+    People outside the image are skipped.
     """
     for name in ('color', 'depth'):
         os.makedirs(os.path.join(folder, name), exist_ok=True)
@@ -38,9 +39,7 @@ def write_simulated_session(folder, ranges_m=RANGES_M, tangents=TANGENTS, repeti
 
 
 def _write_frame(folder, number, place):
-    """Render a person at a place (z, x) in the camera frame. Returns the frame's entry, or None if the person is not in
-    the image.
-    """
+    """Render a person at a place (z, x) in the camera frame. Returns None if the person is not in the image."""
     z_m, x_m = place
     simulator = Simulator(_scenario(np.array([ROBOT.pose[0] + ROBOT.mount[0] + z_m, ROBOT.pose[1] - x_m]), number))
     frame = simulator.frame(simulator.frame_count - 1)
@@ -57,7 +56,9 @@ def _write_frame(folder, number, place):
 
 
 def _scenario(place_m, number):
-    """Scenario whose person is at the place (x, y) of the map in the last image; every second person walks across it.
+    """Scenario whose person is at the place (x, y) of the map in the last image.
+
+    People with an even `number` stand; people with an odd `number` walk across the place.
     """
     heading_rad = float(np.random.RandomState(number).uniform(-np.pi, np.pi))
     step_m = WALK_S * SPEED_MPS * np.array([np.cos(heading_rad), np.sin(heading_rad)])

@@ -8,8 +8,7 @@ from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject, predictio
 
 
 class NorfairParams(NamedTuple):
-    """Parameters of Norfair. Its unit of time is the image, with `rate_hz` images per second; its unit of length is the
-    metre.
+    """Parameters of Norfair, in images (`rate_hz` per second) and metres.
 
     They were tuned for HOTA and IDF1 on the recordings eth, hotel, students001 and zara03: `distance_threshold` from
     0.4 to 0.8, `hit_counter_max` (how many images a track survives without detections) from 12 to 90,
@@ -55,8 +54,11 @@ class Norfair(object):
         self._now_ns, self._first_seen_ns = None, {}
 
     def update(self, stamp_ns, detections, view=None):
-        """Update the tracks with the detections of one image, as `ThesisTracker.update`. Returns a list of
-        TrackedObject.
+        """Update the tracks with the detections of one image, as `ThesisTracker.update`.
+
+        Returns
+        -------
+        list of TrackedObject
         """
         period = 1
         if self._now_ns is not None:

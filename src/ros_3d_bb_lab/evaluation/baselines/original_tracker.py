@@ -1,10 +1,11 @@
-"""The thesis' tracker as implemented in its package, including behaviour that the text does not describe and that
-`ros_3d_bb.tracking.thesis_tracker` corrects.
+"""The thesis' tracker as implemented in its package.
 
-Velocities are the displacement between two images times the current rate of arrival. The camera pose is looked up at
-the time at which the boxes arrive, not at the image stamp. Missed images are counted only if there are more tracks than
-boxes. New tracks start only if there are fewer tracks than boxes, and only from boxes that are not as far from a
-matched track as that track's own box. If an exception occurs, the image is skipped, as rospy does.
+It includes behaviour that the text of the thesis does not describe and that `ros_3d_bb.tracking.thesis_tracker`
+corrects. Velocities are the displacement between two images times the current rate of arrival. The camera pose is
+looked up at the time at which the boxes arrive, not at the image stamp. Missed images are counted only if there are
+more tracks than boxes, and lifetimes are in images. New tracks start only if there are fewer tracks than boxes, and
+only from boxes that are not as far from a matched track as that track's own box. If an exception occurs, the image is
+skipped, as rospy does.
 """
 import numpy as np
 
@@ -59,8 +60,11 @@ class OriginalTracker(object):
         self._tracks, self._last_id, self._now_ns, self._rate_hz = [], 0, None, USUAL_RATE_HZ
 
     def update(self, stamp_ns, detections, view=None):
-        """Update the tracks with the detections of one image, as `ThesisTracker.update`. Returns a list of
-        TrackedObject.
+        """Update the tracks with the detections of one image, as `ThesisTracker.update`.
+
+        Returns
+        -------
+        list of TrackedObject
         """
         return [self._published(track) for track in self.step(stamp_ns, detections)]
 
@@ -96,10 +100,9 @@ class OriginalTracker(object):
                     self._tracks.append(_OriginalTrack(self._last_id, self._now_ns, detections[column]))
 
     def _move_matched(self, distances_m, detections):
-        """Match each track with its nearest box in order of distance. A track whose nearest box is already matched gets
-        none.
+        """Match each track with its nearest box in order of distance. Returns {(row, column): distance}.
 
-        Returns {(row, column): distance}.
+        A track whose nearest box is already matched gets none.
         """
         matched_m, taken = {}, set()
         if not len(distances_m):

@@ -14,8 +14,9 @@ FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
 class Paths(NamedTuple):
-    """Paths in the map from above, (n, 2) each, metres: of people by ground-truth ID, of tracks by track ID, and of the
-    robot.
+    """Paths in the map from above, (n, 2) each, metres.
+
+    `people` by ground-truth ID, `tracks` by track ID, and `robot`.
     """
 
     people: dict

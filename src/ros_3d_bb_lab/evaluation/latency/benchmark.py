@@ -23,8 +23,10 @@ TITLES = ('case', 'in Hz', 'out Hz', 'p50 ms', 'p95 ms', 'p99 ms', 'dropped', 'C
 
 
 class Case(NamedTuple):
-    """Case of the benchmark: `name`; `detector` of pipeline.launch; `image_size` of YOLOv5; whether another process
-    loads a core.
+    """Case of the benchmark.
+
+    `detector` is that of pipeline.launch, `image_size` is that of YOLOv5, and `loaded` is whether another process loads
+    a core.
     """
 
     name: str
@@ -68,8 +70,9 @@ def measured(case, arguments, bag, folder):
 
 @contextlib.contextmanager
 def eating_a_core(really):
-    """Context in which another process loads one core, if `really` is true. The process is always terminated at the
-    end.
+    """Context in which another process loads one core, if `really` is true.
+
+    The process ends at the end of the context, or with this process in any case.
     """
     if not really:
         yield
@@ -83,8 +86,7 @@ def eating_a_core(really):
 
 
 def launch(arguments, timeout_s, log):
-    """Run roslaunch latency.launch on a free port until it exits or times out. All its nodes are terminated in any
-    case.
+    """Run roslaunch latency.launch on a free port until it exits or times out. Its nodes are terminated in any case.
 
     roslaunch runs in a separate session, so that a Ctrl-C in the terminal reaches it only once, through this function.
     """

@@ -36,11 +36,10 @@ class LatencyProbeParams(NamedTuple):
 
 
 class LatencyProbeNode(object):
-    """Record stamps, arrival times and the resource usage of each node for a period of time, write the record, and
-    exit.
+    """Record image stamps, arrival times of results, and the resource usage of each node for a period of time.
 
-    Parameters: see `LatencyProbeParams`; launch/latency.launch. Format of the record: see
-    `ros_3d_bb_lab.evaluation.latency.latency_result.result_of`.
+    Afterwards the node writes the record and exits. Parameters: see `LatencyProbeParams`; launch/latency.launch. Format
+    of the record: see `ros_3d_bb_lab.evaluation.latency.latency_result.result_of`.
 
     Subscribes
     ----------

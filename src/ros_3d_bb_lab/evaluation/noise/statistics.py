@@ -132,8 +132,7 @@ def fit_gaussian(values_m):
 
 
 def fit_laplace(values_m):
-    """Log-density function of the maximum-likelihood Laplace distribution, which has a sharper peak and longer tails.
-    """
+    """Log-density function of the maximum-likelihood Laplace distribution (sharper peak, longer tails)."""
     location, scale = stats.laplace.fit(values_m)
     return stats.laplace(location, max(scale, LEAST_SCALE_M)).logpdf
 

@@ -1,5 +1,4 @@
-"""Measurements with ground truth, from tables in the format of the thesis or from measurement sessions, and their
-clusters.
+"""Measurements with ground truth, from tables in the format of the thesis or from sessions, and their clusters.
 
 A table is a CSV file in millimetres with the columns `X measured`, `X true`, `Z measured`, `Z true`. Cells of an axis
 that was not measured are empty, or its columns are missing. The columns `X error` and `Z error` are checked; other

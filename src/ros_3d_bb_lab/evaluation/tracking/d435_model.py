@@ -1,5 +1,4 @@
-"""Model of a D435 on a robot: visibility of people, modelled as vertical cylinders, and errors of their measured
-positions.
+"""Model of a D435 on a robot: visibility of people as vertical cylinders, and errors of their measured positions.
 
 Convention: bearings are relative to the optical axis and positive to the left; `depth` is along the optical axis,
 `range` is the horizontal distance to the person.

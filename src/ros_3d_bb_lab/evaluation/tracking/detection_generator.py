@@ -70,7 +70,8 @@ class Detector(object):
         self._false_m = np.zeros((0, 2))
 
     def advance(self, pose):
-        """Advance to the next image, with the true camera pose `pose`. Call this for each image, including lost ones.
+        """Advance to the next image, taken at the true camera pose `pose`. Call this for each image, including lost
+        ones.
         """
         camera, random = self._camera, self._random
         kept = np.exp(-self._period_s / camera.slow_s)
@@ -108,8 +109,9 @@ class Detector(object):
         return [found[number] for number in self._random.permutation(len(found))]
 
     def _switched(self, on, share, stretch_s):
-        """Next state of a two-state Markov chain that is on for a `share` of the time, in intervals of mean length
-        `stretch_s`.
+        """Next state of a two-state Markov chain.
+
+        The state is on for a `share` of the time, in intervals of the mean length `stretch_s`.
         """
         ends = -np.expm1(-self._period_s / stretch_s)
         drawn = self._random.uniform(size=len(on))

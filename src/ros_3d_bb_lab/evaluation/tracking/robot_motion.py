@@ -55,8 +55,7 @@ def standing(place_m, heading, seconds):
 
 
 def driving(place_m, heading, phase, seconds):
-    """Poses (n, 3) of a robot that drives a figure of eight around a place; `phase` 0..1 is the start position on it.
-    """
+    """Poses (n, 3) of a robot that drives a figure of eight around a place, starting at its fraction `phase` (0..1)."""
     angles = np.linspace(0, 2 * np.pi, 4001)
     eight_m = np.stack((EIGHT_M[0] * np.cos(angles), EIGHT_M[1] * np.sin(2 * angles)), axis=1)
     way_m = np.append(0, np.cumsum(np.linalg.norm(np.diff(eight_m, axis=0), axis=1)))
@@ -90,8 +89,7 @@ def jittered(pose, model, random):
 
 
 def to_frame(pose, points_m):
-    """Transform points (..., 2) of the plane to the frame of a pose: forward and left, metres. Inverse of `from_frame`.
-    """
+    """Transform points (..., 2) of the plane to a pose's frame: forward and left, metres. Inverse of `from_frame`."""
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     return (np.asarray(points_m) - pose[:2]).dot(np.array([[cos, -sin], [sin, cos]]))
 

@@ -52,8 +52,7 @@ class Models(NamedTuple):
 
 
 class RunTruth(NamedTuple):
-    """People around the robot at the time of an image, n in total, in the fixed frame according to the odometry at that
-    time.
+    """The n people around the robot at the time of an image, in the fixed frame according to the odometry at that time.
 
     `status` is VISIBLE (expected to be detected, because enough of the body is in view), OCCLUDED (in view, but mostly
     hidden) or OUT_OF_VIEW (or the recording has just ended); `future_m` (n, horizons, 2) is NaN after the end of the

@@ -26,7 +26,7 @@ def cpu_ms(make_tracker, people):
 
 
 def crowd(people, images):
-    """Yield images (stamp_ns, detections, view) of a crowd in the field of view. Its area grows with the number of
+    """Yield images (stamp_ns, detections, view) of a crowd in the field of view. Its area depends on the number of
     people.
     """
     random, camera = np.random.RandomState(people), CameraModel()

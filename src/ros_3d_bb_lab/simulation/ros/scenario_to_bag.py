@@ -14,8 +14,7 @@ from ros_3d_bb_lab.simulation.simulator import Simulator
 
 
 def scenario_images(scenario, with_boxes=False):
-    """Yield the messages of each image of a scenario for `write_bag`, with ground truth and optionally with 2D boxes.
-    """
+    """Yield the messages of each image of a scenario for `write_bag`, with ground truth and optionally 2D boxes."""
     simulator = Simulator(scenario)
     for number in range(simulator.frame_count):
         frame = simulator.frame(number)

@@ -86,7 +86,7 @@ class SimulatorNode(object):
         self._worker.start()
 
     def _run(self):
-        """Play the scene once or repeatedly. rospy allows publishing from this thread."""
+        """Play the scene once or repeatedly, in a separate thread from which rospy can publish."""
         try:
             self._wait_for_subscribers()
             start_ns = START_NS + CLOCK_LEAD_NS if self._clock_pub is not None else rospy.get_rostime().to_nsec()
@@ -107,8 +107,9 @@ class SimulatorNode(object):
                 rospy.signal_shutdown('the simulation failed')
 
     def _wait_for_subscribers(self):
-        """Wait for subscribers. Time is published meanwhile, because some nodes, such as rosbag, subscribe only after
-        it is valid.
+        """Wait for subscribers, and publish the time meanwhile.
+
+        Some nodes, such as rosbag, subscribe only after the time is valid.
         """
         for camera in self._simulator.cameras:
             wait_for_subscribers(self._pubs[topic_of(camera, COLOR_TOPIC)], self._params.wait_for_subscribers,
