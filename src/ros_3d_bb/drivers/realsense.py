@@ -195,7 +195,7 @@ def librealsense():
 
 
 def check_params(params):
-    """Raise ValueError if the recording does not exist."""
+    """Raise ValueError if `file` is set, but is not the absolute path of a recording."""
     if params.file and not (os.path.isabs(params.file) and os.path.isfile(params.file)):
         raise ValueError('parameter ~file is %r; the absolute path of a recording expected' % params.file)
 

@@ -36,7 +36,7 @@ class TrackScore(NamedTuple):
 
 
 def is_in_image(person, map_from_camera, camera):
-    """Whether the body axis of a person is between the left and right image borders, and the person is mostly not
+    """Whether the body axis of a person is between the left and right image borders, and the body is not mostly
     occluded.
 
     `person` is a `simulator.PersonTruth`.

@@ -1,5 +1,4 @@
-"""CPU time of 3D boxes and tracks by the number of people, for this package and the thesis' algorithms (thesis, Fig.
-4.2).
+"""CPU time of 3D boxes and tracks by the number of people, for our and the thesis' algorithms (thesis, Fig. 4.2).
 
 The benchmark measures the CPU time of the algorithms, from the depth image and the 2D boxes to tracks with predictions,
 without messages and waiting. Estimation computes 3D boxes in the camera's frame. Tracking transforms them to the fixed

@@ -20,12 +20,17 @@ HEIGHT_SIGMA_M = 0.1  # of the centre, as in the error models in config/
 class CameraModel(NamedTuple):
     """Camera with its detector and its calibration.
 
-    `field_of_view` is in radians; the image is sharp from the depth `nearest_m` to the range `farthest_m`. Depth errors
-    consist of the stereo error with `matching_px`, `focal_px` and `baseline_m`, of `depth_floor_m` (independent in each
-    image), and of `slow_depth_m` with the correlation time `slow_s`. Lateral errors consist of `side_floor_m` and
-    `slow_side_m`. `bias_left` is the share of the thesis' bias that remains after calibration. An outlier has a depth
-    error in the interval `outlier_m` (from, to), as from background in the box. `sway_m` is the amplitude of the body
-    sway of a walking person. The fields `..._share` are shares of the time, with intervals of the mean length `..._s`.
+    `field_of_view` is in radians; the image is sharp from the depth `nearest_m` to the range `farthest_m`.
+
+    Depth errors consist of the stereo error with `matching_px`, `focal_px` and `baseline_m`, of `depth_floor_m`
+    (independent in each image), and of `slow_depth_m` with the correlation time `slow_s`. Lateral errors consist of
+    `side_floor_m` and `slow_side_m`. `sway_m` is the amplitude of the lateral sway of a walking person. `bias_left` is
+    the share of the thesis' bias that remains after calibration. An outlier has a depth error in the interval
+    `outlier_m` (from, to), as from background in the box.
+
+    `outlier_share` and `miss_share` are shares of the time, in intervals of the mean length `outlier_s` and `miss_s`.
+    `false_rate` is the probability per image of a new false detection, which lasts for `false_s` on average.
+    `double_share` is the probability that a detection has a duplicate.
     """
 
     field_of_view: float = np.radians(69.0)

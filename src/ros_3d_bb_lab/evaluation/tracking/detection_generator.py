@@ -70,8 +70,9 @@ class Detector(object):
         self._false_m = np.zeros((0, 2))
 
     def advance(self, pose):
-        """Advance to the next image, taken at the true camera pose `pose`. Call this for each image, including lost
-        ones.
+        """Advance to the next image, taken at the true camera pose `pose`.
+
+        This must be called for each image, including lost ones.
         """
         camera, random = self._camera, self._random
         kept = np.exp(-self._period_s / camera.slow_s)

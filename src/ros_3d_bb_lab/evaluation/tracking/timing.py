@@ -26,8 +26,9 @@ def cpu_ms(make_tracker, people):
 
 
 def crowd(people, images):
-    """Yield images (stamp_ns, detections, view) of a crowd in the field of view. Its area depends on the number of
-    people.
+    """Yield images (stamp_ns, detections, view) of a crowd in the field of view.
+
+    The area of the crowd grows with the number of people.
     """
     random, camera = np.random.RandomState(people), CameraModel()
     view = view_of(np.zeros(3), camera)
