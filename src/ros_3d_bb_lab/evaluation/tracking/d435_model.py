@@ -11,10 +11,10 @@ from ros_3d_bb.camera.camera_model import Camera
 
 SIZE_PX = 1280, 720
 BODY_RADIUS_M = 0.25
-BLIND_M = 0.2  # nearer people do not occlude others
+BLIND_M = 0.2  # nearer people do not occlude others: they are above the camera or behind its cover glass
 # Thesis 5.2: measured minus true depth, polynomial of depth in metres. Fitted up to 3 m; proportional to depth beyond.
 THESIS_BIAS, THESIS_BIAS_UP_TO_M = (-0.04, 0.06, 0.008), 3.0
-HEIGHT_SIGMA_M = 0.1  # of the centre, as in the error models in config/
+HEIGHT_SIGMA_M = 0.1  # of the centre, as in the error models in config/error_models
 
 
 class CameraModel(NamedTuple):

@@ -9,7 +9,7 @@ from ros_3d_bb_lab.evaluation.tracking.robot_motion import bearing_of, from_fram
 FALSE, DOUBLE = -1, -2  # instead of the ID of a person
 HARD_TO_SEE, EASY_TO_SEE = 0.3, 0.6  # visible share: no detection below the first, no occlusion misses from the second
 FOUND_WHEN_HARD = 0.4
-BEYOND_M = 0.2  # beyond `farthest_m`, people are still detected up to this distance
+BEYOND_M = 0.2  # people are detected up to this distance beyond `farthest_m`
 STEP_HZ, WALKING_MPS = 0.95, 0.8  # frequency of a gait cycle, and the speed of full body sway
 SIDE_DOUBLE_M, DEEP_DOUBLE_M, DOUBLE_WIDTH_M = 0.12, 0.1, 0.4
 FALSE_RANGE_M, FALSE_HEIGHT_M, FALSE_WIDTH_M = (1.0, 6.0), (0.8, 1.9), (0.2, 0.6)

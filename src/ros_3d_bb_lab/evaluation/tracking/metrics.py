@@ -21,7 +21,7 @@ from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S
 
 PAIRED_M, MATCHED_M = 1.0, 0.5
 FAR_M = 1e3  # cost of an impossible pair
-NOT_ASKED_M = 0.75  # a track within this distance of a person that is not scored is ignored
+NOT_ASKED_M = 0.75  # a track within this distance of a person that is not scored most likely belongs to that person
 BORDER, BORDER_M, NEAREST_M = 0.04, 0.15, 0.5  # margins of the field of view: radians, far end, near end
 WITHIN_95 = 5.991  # 95 % quantile of chi squared with 2 degrees of freedom
 

@@ -21,7 +21,7 @@ CAMERA_HEIGHT_M = 0.5
 START_S = 100.0  # stamp of the first image
 SECONDS = 60.0
 AROUND_M = (0.05, 9.0)  # people in this range of the robot are in the ground truth and occlude others
-STAYS_S = 1.5  # a person stays in the ground truth for this time after the end of the recording
+STAYS_S = 1.5  # after the end of the recording, a track of the person is not an error for this time
 TRIES, LOOKED_AT_S = 25, 3.0  # random starts, and the interval for counting people in view
 OPTICAL_FROM_BODY = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], float)
 

@@ -10,7 +10,7 @@ from ros_3d_bb_lab.evaluation.tracking.run_generator import detection_of, view_o
 
 PEOPLE = (5, 20, 100)
 AREA_M2 = 1.0  # per person
-CIRCLE_M, TURNS_HZ = 0.3, 0.3  # each person walks in a circle
+CIRCLE_M, TURNS_HZ = 0.3, 0.3  # each person walks in a circle around a fixed place
 WARM_UP, MEASURED, RATE_HZ = 15, 45, 30
 SIZE_M = (0.5, 1.7)
 

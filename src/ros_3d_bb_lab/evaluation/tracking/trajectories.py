@@ -12,7 +12,7 @@ from scipy.sparse.linalg import spsolve
 COLUMNS = ('t_s', 'id', 'x_m', 'y_m')
 SMOOTHING = 0.004  # s^3; keeps the head motion of a step, removes the error of manual annotation in video
 LONGEST_GAP_S = 1.3  # a longer gap splits a trajectory into two people
-FEWEST_POINTS = 6  # minimum number of points of a person
+FEWEST_POINTS = 6  # minimum number of points of a person for fitting a curve
 PERIOD_S = 0.4  # of generated trajectories, as in common recordings
 
 
