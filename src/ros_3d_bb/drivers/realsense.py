@@ -46,7 +46,7 @@ class RealSenseParams(NamedTuple):
 
 
 class RgbdFrame(NamedTuple):
-    """Images of one time: `color` (h, w, 3), uint8, RGB, and `depth` aligned to it."""
+    """Images with one stamp: `color` (h, w, 3), uint8, RGB, and `depth` aligned to it."""
 
     stamp_ns: int
     color: np.ndarray
@@ -195,7 +195,7 @@ def librealsense():
 
 
 def check_params(params):
-    """Raise ValueError where there is no such recording."""
+    """Raise ValueError if `file` is set, but is not the absolute path of a recording."""
     if params.file and not (os.path.isabs(params.file) and os.path.isfile(params.file)):
         raise ValueError('parameter ~file is %r; the absolute path of a recording expected' % params.file)
 
@@ -248,8 +248,7 @@ def optical_frame(prefix, stream):
 
 
 def rgb_of(pixels, format_name):
-    """Convert pixels (h, w, 3) to RGB. Raises ValueError for formats that librealsense does not convert to RGB or BGR.
-    """
+    """Convert pixels (h, w, 3) to RGB. Raises ValueError if `format_name` is neither an RGB nor a BGR format."""
     if format_name == 'bgr8':
         return pixels[..., ::-1]
     if format_name != 'rgb8':

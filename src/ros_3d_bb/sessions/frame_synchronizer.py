@@ -18,7 +18,7 @@ class Snapshot(NamedTuple):
 class Snapshots(object):
     """Combines messages of five topics, which may arrive in any order, to snapshots.
 
-    The stamps of boxes must be equal to that of the colour image. Depth and camera are paired as in
+    The stamps of boxes must be equal to that of the colour image. Depth and camera are matched as in
     `StampSynchronizer`. If time jumps back, older messages are dropped.
 
     Parameters
@@ -26,7 +26,7 @@ class Snapshots(object):
     length_ns : int
         How long images are kept while their boxes have not arrived.
     tolerance_ns : int
-        By how much the stamps of colour and depth image may differ.
+        Maximum difference of the stamps of the colour and the depth image.
     on_lost : callable
         Called with the stamp of a colour image whose depth image or camera did not arrive.
     """
@@ -39,15 +39,15 @@ class Snapshots(object):
         self._first_ns = None
 
     def add_color(self, stamp_ns, now_ns, color):
-        """Take a colour image."""
+        """Add a colour image."""
         self._sync.add_boxes(stamp_ns, now_ns, (stamp_ns, color))
 
     def add_depth(self, stamp_ns, now_ns, depth):
-        """Take a depth image."""
+        """Add a depth image."""
         self._sync.add_depth(stamp_ns, now_ns, depth)
 
     def add_camera(self, stamp_ns, now_ns, camera):
-        """Take the camera of an image, as `StampSynchronizer.add_camera`."""
+        """Add the camera of an image, as `StampSynchronizer.add_camera`."""
         self._sync.add_camera(stamp_ns, now_ns, camera)
 
     def add_boxes2d(self, stamp_ns, now_ns, boxes):
@@ -82,7 +82,7 @@ class Snapshots(object):
     def _on_frame(self, stamped_color, depth, camera):
         """Keep the images and the camera of one stamp."""
         stamp_ns, color = stamped_color
-        went_back = self._images.add(stamp_ns, 0, (color, depth, camera))  # its arrival does not matter
+        went_back = self._images.add(stamp_ns, 0, (color, depth, camera))  # the arrival time is not used
         if went_back:
             self._boxes2d.clear()
             self._boxes3d.clear()

@@ -27,8 +27,10 @@ class SessionError(ValueError):
 
 
 class RecordedDetection(NamedTuple):
-    """Person in an image: `box_px` (x1, y1, x2, y2), `estimate_m` (x, y, z) in the optical frame, `size_m` (width,
-    height), `support` and `truncated` as in box3d_estimator.Box3D; None if not stored. `by_hand`: a user drew the box.
+    """Detected person in an image. Values that are not stored are None.
+
+    `box_px` is (x1, y1, x2, y2), `estimate_m` (x, y, z) is in the optical frame, `size_m` is (width, height), `support`
+    and `truncated` are as in box3d_estimator.Box3D. `by_hand`: a user drew the box.
     """
 
     box_px: Optional[Tuple[int, int, int, int]]
@@ -40,9 +42,11 @@ class RecordedDetection(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """One measurement. `person` is the index of the detection that the ground truth belongs to; `truth_m` (x, z) and
-    `truth_y_m` are in the optical frame; None if not annotated. `rejected` is the reason why the measurement is
-    excluded, or None. `stamp_ns` is the stamp of the image, or None if not stored.
+    """One measurement.
+
+    `person` is the index of the detection that the ground truth belongs to; `truth_m` (x, z) and `truth_y_m` are in the
+    optical frame; None if not annotated. `rejected` is the reason why the measurement is excluded, or None. `stamp_ns`
+    is the stamp of the image, or None if not stored.
     """
 
     id: str
@@ -187,8 +191,7 @@ def read_image(path, camera=None):
 
 
 def boxes_of_others(box_px, boxes_px):
-    """Select the 2D boxes that do not belong to the person of `box_px`, as they overlap it by at most SAME_PERSON_IOU.
-    """
+    """Select the 2D boxes of other people, which overlap `box_px` by at most SAME_PERSON_IOU."""
     overlaps = iou(box_px, boxes_px)
     return tuple(other_px for other_px, overlap in zip(boxes_px, overlaps) if overlap <= SAME_PERSON_IOU)
 

@@ -1,4 +1,4 @@
-"""Writer of measurement sessions. Measurements are appended atomically; `measurements` reads them.
+"""Writer of measurement sessions. Measurements are appended atomically; `session_reader` reads them.
 
 Images are written before frames.json, so that frames.json never refers to a missing image. Lengths are in millimetres
 in the file and in metres here.
@@ -18,7 +18,7 @@ from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.sessions.session_reader import read_session
 
 MILLIMETRE = 0.001
-MAX_DEPTH_MM = 65535  # of 16 bits
+MAX_DEPTH_MM = 65535  # largest value in 16 bits
 ID_FORMAT = re.compile(r'(\d+)_\d+_\d{9}$')
 
 

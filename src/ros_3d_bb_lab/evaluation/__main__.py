@@ -1,4 +1,4 @@
-"""The benchmarks: `python3 -m ros_3d_bb_lab.evaluation NAME [OPTION ...]`, which `./run bench` calls."""
+"""Command line of the benchmarks: `python3 -m ros_3d_bb_lab.evaluation NAME [OPTION ...]`, called by `./run bench`."""
 import importlib
 import sys
 
@@ -7,7 +7,7 @@ MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.__main__', 'scenes': 's
 
 
 def main():
-    """Run the benchmark that the first argument names."""
+    """Run the benchmark named by the first argument."""
     name = sys.argv[1] if len(sys.argv) > 1 else ''
     if name not in MODULES:
         sys.stderr.write('./run bench: unknown benchmark %r; %s expected\n' % (name, ', '.join(sorted(MODULES))))

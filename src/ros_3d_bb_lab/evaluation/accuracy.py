@@ -1,7 +1,8 @@
-"""Positions of a measurement session against ground truth: our estimator, the thesis', and what was recorded.
+"""Accuracy of positions in a measurement session: our estimator, that of the thesis, and recorded estimates.
 
-Without an error model each position is corrected by a model of all others, for both estimators; the thesis' always is,
-as far as there are enough positions. The recorded estimates are taken as they are, for the frames that have a box.
+Without an error model, each position is corrected by a model fitted to all other positions. The thesis' estimator is
+always corrected in this way if there are enough positions. Recorded estimates are not corrected; frames without a box
+are skipped.
 """
 import argparse
 import json
@@ -27,8 +28,10 @@ CALIBRATIONS = ('leave-one-position-out', 'error model')
 
 
 class Estimates(NamedTuple):
-    """What one estimator makes of the frames: `raw_m` and `position_m` (corrected), (n, 3), nan where it found nobody;
-    `covariances` (n, 3, 3), None where unknown.
+    """Positions from one estimator.
+
+    `raw_m` and `position_m` (corrected) are (n, 3), NaN for frames without an estimate; `covariances` is (n, 3, 3), or
+    None if unknown.
     """
 
     raw_m: np.ndarray
@@ -37,7 +40,9 @@ class Estimates(NamedTuple):
 
 
 def boxes_of(session, weights=None):
-    """The 2D box of the person in each frame: the recorded one, or, of YOLOv5, the one most like it; None for none.
+    """2D box of the annotated person in each frame, or None.
+
+    Without `weights`, the recorded box is used; otherwise the YOLOv5 box that overlaps it most.
 
     Raises
     ------
@@ -49,7 +54,7 @@ def boxes_of(session, weights=None):
             raise ValueError('frame %s has no 2D box; all frames with ground truth need one' % frame.id)
     if weights is None:
         return [frame.boxes_px[0] for frame in session.frames]
-    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch, which takes seconds
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch (slow)
     from ros_3d_bb.detection.yolov5.detector import Yolov5
     detector, chosen = Yolov5(open_runtime(weights, RuntimeParams(device='cpu'))), []
     for frame in session.frames:
@@ -61,7 +66,9 @@ def boxes_of(session, weights=None):
 
 
 def estimates_of(session, boxes, estimator, model=None):
-    """The positions that an estimator finds, corrected by an error model, or else by models of the other positions.
+    """Estimate positions and correct them by an error model.
+
+    If `model` is None, each position is corrected by a model fitted to the other positions.
 
     Returns
     -------
@@ -79,7 +86,7 @@ def estimates_of(session, boxes, estimator, model=None):
 
 
 def raw_positions(session, boxes, estimator):
-    """The positions that an estimator finds in each frame, (n, 3), nan for none."""
+    """Estimated position in each frame, (n, 3), NaN if there is no estimate."""
     raw_m = np.full((len(boxes), 3), np.nan)
     for number, (frame, rect_px) in enumerate(zip(session.frames, boxes)):
         if rect_px is not None:
@@ -94,14 +101,14 @@ def truth_of(session):
 
 
 def scores_of(estimates, truth_m, truncated):
-    """The scores of design §8 as a dictionary; a missing one is None.
+    """Scores of estimates as a dictionary. A score that cannot be computed is None.
 
     Parameters
     ----------
     estimates : Estimates
     truth_m : numpy.ndarray, (n, 2)
     truncated : numpy.ndarray, (n,), bool
-        Whether the image border cuts the box.
+        Whether the image border truncates the box.
     """
     seen = np.isfinite(estimates.position_m[:, 0])
     error_m = (estimates.position_m[:, [0, 2]] - truth_m)[seen]
@@ -120,14 +127,25 @@ def scores_of(estimates, truth_m, truncated):
 
 
 def _repeatability_m(error_m, truth_m):
-    """Standard deviation within a position, (2,): root mean square over those with three measurements or more."""
+    """Standard deviation of repeated measurements, (2,).
+
+    It is the root mean square over the positions with at least three measurements.
+    """
     variances = [error_m[same].var(axis=0) for same in (
         (truth_m == place).all(axis=1) for place in np.unique(truth_m, axis=0)) if np.count_nonzero(same) > 2]
     return np.sqrt(np.mean(variances, axis=0)) if variances else np.full(2, np.nan)
 
 
 def compare(session, boxes, estimator, model=None):
-    """Compare estimators on a session. Returns the scores and positions of design §8, and our raw positions (n, 3)."""
+    """Compare the estimators on a session.
+
+    Returns
+    -------
+    dict
+        Scores of each estimator, and positions of each frame.
+    numpy.ndarray, (n, 3)
+        Our uncorrected positions.
+    """
     truth_m = truth_of(session)
     truncated = np.array([any(truncated_edges(rect_px or frame.boxes_px[0], session.camera))
                           for rect_px, frame in zip(boxes, session.frames)])
@@ -150,7 +168,10 @@ def compare(session, boxes, estimator, model=None):
 
 
 def _thesis_estimates(session, boxes):
-    """The thesis' estimator, corrected by the other positions; uncorrected where there are too few of them."""
+    """Estimates of the thesis' estimator, corrected by the other positions.
+
+    They are uncorrected if there are too few positions.
+    """
     try:
         return estimates_of(session, boxes, estimator_named('median'))
     except ValueError:
@@ -163,7 +184,7 @@ def _numbers(values):
 
 
 def table(result):
-    """The scores as lines of text."""
+    """Format the scores as lines of text."""
     names = [name for name in ('ours', 'thesis', 'recorded') if result[name] is not None]
     lines = ['%-20s' % '' + ''.join('%12s' % name for name in names)]
     for key in LENGTHS + ('coverage_68', 'coverage_95', 'missed'):
@@ -174,7 +195,7 @@ def table(result):
 
 
 def scenario_scores(path, estimator, every=5):
-    """Errors on a simulated scene with exact boxes and truth, uncorrected: ours and the thesis', as a dictionary."""
+    """Errors of both estimators, uncorrected, on a simulated scene with exact boxes and truth, as a dictionary."""
     simulator, scores = Simulator(read_scenario(path)), {'scenario': os.path.basename(path)}
     for name, one in (('ours', estimator), ('thesis', estimator_named('median'))):
         errors_m = position_errors_m(simulator, one, every)
@@ -187,7 +208,7 @@ def scenario_scores(path, estimator, every=5):
 
 
 def main():
-    """The command `./run bench accuracy`."""
+    """Run the command `./run bench accuracy`."""
     arguments = _arguments()
     try:
         if arguments.scenarios:
@@ -219,7 +240,7 @@ def main():
 
 
 def _bench_scenarios(arguments):
-    """Print, and write, what an estimator makes of simulated scenes."""
+    """Print the errors on simulated scenes, and optionally write them as JSON."""
     results = []
     for path in arguments.scenarios:
         results.append(scenario_scores(path, estimator_named(arguments.estimator)))

@@ -1,9 +1,9 @@
-"""Tracks against ground truth: who got which number, kept it, and how far off was the position.
+"""CLEAR MOT matching of tracks with ground truth: ID switches, coverage and position errors of each person.
 
-In each image, people and tracks within `GATE_M` in the plane seen from above are matched as by TrackEval's CLEAR metric
-(Bernardin and Stiefelhagen 2008), which robots need not have: matches of the image before are kept, as many of the
-others as possible are made, with the least sum of distances. An ID switch is a match with another track than the last
-one. What counts is what the images show: people and tracks whose status is VISIBLE.
+In each image, people and tracks within `GATE_M` in the horizontal plane are matched as in TrackEval's CLEAR metric
+(Bernardin and Stiefelhagen 2008): matches of the previous image are kept, then as many others as possible are added
+with the least sum of distances. TrackEval itself is not required, because it need not be installed on a robot. An ID
+switch is a match with a track other than the last one. Only people and tracks with the status VISIBLE are scored.
 """
 from typing import List, NamedTuple
 
@@ -14,12 +14,12 @@ from ros_3d_bb.tracking.association import assign, plane_distances
 from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
 
 GATE_M = 1.0
-KEPT = 1000  # score of a match that is kept; of another one 0.5 at the gate to 1 at no distance, as in TrackEval
-LONGEST_GAP = 1.5  # in periods between images; where more is missing, a stretch ends
+KEPT = 1000  # score of a kept match; other matches have 0.5 at the gate to 1 at distance 0, as in TrackEval
+LONGEST_GAP = 1.5  # in image periods; a longer gap ends a visible interval
 
 
 class Moment(NamedTuple):
-    """One image: its stamp, the people who are there and the tracks of them, in the same fixed frame."""
+    """Stamp of an image, its ground truth, and the tracks after it, in the same fixed frame."""
 
     stamp_ns: int
     truth: List[TrackedObject]
@@ -27,7 +27,7 @@ class Moment(NamedTuple):
 
 
 class MatchedPair(NamedTuple):
-    """A person and a track in one image; `error_m` is where the track lies, seen from the person, in x and y (2,)."""
+    """Matched person and track in one image; `error_m` (2,) is the position error of the track in x and y."""
 
     person: int
     track: int
@@ -35,9 +35,12 @@ class MatchedPair(NamedTuple):
 
 
 class PersonScore(NamedTuple):
-    """How one person was tracked. `visible_s`: how long the images showed them, `longest_s` without a break;
-    `followed`: share 0..1 of those images with a track; `ids`: the tracks' numbers, each change one entry; `rmse_m`
-    and `worst_m`: position error of the images with a track, nan without any.
+    """Tracking scores of one person.
+
+    `visible_s`: total time in which the person is visible; `longest_s`: longest uninterrupted interval; `followed`:
+    share 0..1 of the images with the person visible that have a matched track; `ids`: track IDs in order, with an entry
+    for each change; `rmse_m` and `worst_m`: RMS and maximum position error of the matched tracks, NaN if there are
+    none.
     """
 
     person: int
@@ -50,12 +53,12 @@ class PersonScore(NamedTuple):
 
     @property
     def switches(self):
-        """How often the number changed."""
+        """Number of ID switches."""
         return max(0, len(self.ids) - 1)
 
 
 class SceneScore(NamedTuple):
-    """How a scene was tracked; `false_share` is the number of visible tracks of nobody, for each image."""
+    """Tracking scores of a scene; `false_share` is the number of visible false tracks per image."""
 
     people: List[PersonScore]
     images: int
@@ -63,12 +66,12 @@ class SceneScore(NamedTuple):
 
 
 def score(moments):
-    """Compare tracks with the truth.
+    """Compare tracks with ground truth.
 
     Parameters
     ----------
     moments : list of Moment
-        In the order of their stamps.
+        Ordered by stamp.
 
     Returns
     -------
@@ -85,13 +88,13 @@ def score(moments):
 
 
 class ClearMatcher(object):
-    """Matches people with tracks, image after image, at most `gate_m` apart."""
+    """Matches people with tracks image by image, at distances of at most `gate_m`."""
 
     def __init__(self, gate_m=GATE_M):
         self._gate_m, self._last_matches = gate_m, {}
 
     def match(self, people, tracks):
-        """The pairs of the next image, a list of Pair: those that are kept, then the others, nearest first."""
+        """Match one image. Returns a list of MatchedPair: kept matches first, then the others by distance."""
         if not people or not tracks:
             return []
         distances_m = plane_distances([person.position_m for person in people], [track.position_m for track in tracks])
@@ -125,14 +128,14 @@ def _person_score(person, moments, pairs):
 
 
 def _stretches_s(shown_ns, all_ns):
-    """How long a person was shown at a time: stamps that follow each other, without longer gaps in the images."""
+    """Durations of the intervals in which a person is visible, without longer gaps between images."""
     period_ns = np.median(np.diff(all_ns)) if len(all_ns) > 1 else 0
     gaps = np.flatnonzero(np.diff(shown_ns) > LONGEST_GAP * period_ns) + 1
     return [(stretch[-1] - stretch[0]) / NS for stretch in np.split(np.array(shown_ns, np.int64), gaps) if len(stretch)]
 
 
 def table(scene_score):
-    """The scores as lines of text."""
+    """Format the scores as lines of text."""
     lines = ['person  visible  followed  switches  numbers     RMSE     worst']
     for person in scene_score.people:
         lines.append('%6d  %5.1f s  %6.0f %%  %8d  %-9s  %6.3f m  %6.3f m'

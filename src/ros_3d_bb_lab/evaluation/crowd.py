@@ -1,4 +1,4 @@
-"""Any number of people in one depth image: those of a measurement session, side by side."""
+"""Synthetic depth images with any number of people, composed of the people of a measurement session."""
 import itertools
 from typing import NamedTuple, Tuple
 
@@ -8,33 +8,38 @@ from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.sessions.session_reader import read_depth
 
-COVERED = 0.2  # of a box, by its neighbour
-JITTER_PX = 2  # of the edges of a detector's box from image to image
+COVERED = 0.2  # share of a box that its neighbour covers
+JITTER_PX = 2  # maximum change of the edges of a box between images
 
 
 class PersonCutout(NamedTuple):
-    """Depth in the box of a person, (height, width), in the camera's units, and the row at which the box begins."""
+    """Depth values in the box of a person, (height, width), in the camera's units, and the top row of the box."""
 
     values: np.ndarray
     top: int
 
 
 class Crowd(NamedTuple):
-    """One wide depth image, the camera that would take it, and the boxes of the people in it."""
+    """Wide depth image, its camera, and the 2D boxes of the people in it."""
 
     depth: DepthImage
     camera: Camera
     rects_px: Tuple[Tuple[int, int, int, int], ...]
 
     def jittered(self, random):
-        """The boxes as a detector would give them in another image of the same. List of (x1, y1, x2, y2)."""
+        """Boxes with random jitter, as a detector returns them for another image of the same scene.
+
+        Returns
+        -------
+        list of (x1, y1, x2, y2)
+        """
         edges = np.array(self.rects_px) + random.randint(-JITTER_PX, JITTER_PX + 1, (len(self.rects_px), 4))
         size = self.camera.width, self.camera.height
         return [tuple(rect_px) for rect_px in np.clip(edges, 0, size + size).tolist()]
 
 
 def people_of(session):
-    """The people of a session, one of each frame that has a box, as the frame shows them. Raises SessionError."""
+    """Cut out the annotated person of each frame that has a box. Raises SessionError."""
     people = []
     for frame in session.frames:
         if frame.boxes_px:
@@ -44,11 +49,12 @@ def people_of(session):
 
 
 def crowd_of(people, count, session):
-    """So many people, one after the other and from the first again; each covers a part of the one on the left.
+    """Place people side by side in one depth image. Each person covers a part of the person to the left.
 
     Parameters
     ----------
     people : sequence of PersonCutout
+        Repeated cyclically if there are fewer than `count`.
     count : int
     session : session_reader.Session
 

@@ -1,23 +1,23 @@
-"""What benchmarks use where nothing is named: the weights in the cache, and the files in config/."""
+"""Default inputs of the benchmarks: the cached weights, and the files in config/."""
 import argparse
 import glob
 import os
 
 from ros_3d_bb.detection.yolov5.onnx_cache import export_folder
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))  # the checkout
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))  # repository root
 SCENARIOS = os.path.join(ROOT, 'config', 'scenarios')
 SIMULATED_ERROR_MODEL = os.path.join(ROOT, 'config', 'error_models', 'simulated_d435i.yaml')
 
 
 def default_weights():
-    """The path of yolov5n.pt in the cache of `./run`; None if there is none."""
+    """Path of yolov5n.pt in the cache of `./run`; None if the file does not exist."""
     path = os.path.join(os.path.dirname(export_folder()), 'weights', 'yolov5n.pt')
     return path if os.path.isfile(path) else None
 
 
 def scenario_path(name):
-    """The path of a scenario, given as the name of one in config/scenarios or as a file; a type for argparse."""
+    """Path of a scenario, given by its name in config/scenarios or by its path. A type for argparse."""
     shipped = os.path.join(SCENARIOS, name if name.endswith('.yaml') else name + '.yaml')
     for path in (shipped, name):
         if os.path.isfile(path):
@@ -27,5 +27,5 @@ def scenario_path(name):
 
 
 def scenario_paths(*patterns):
-    """The paths of the scenarios in config/scenarios whose names match one of the patterns, in their order."""
+    """Paths of the scenarios in config/scenarios whose names match a pattern, in the order of the patterns."""
     return [path for pattern in patterns for path in sorted(glob.glob(os.path.join(SCENARIOS, pattern + '.yaml')))]

@@ -1,24 +1,24 @@
-"""What the detector costs: CPU and wall time of an image, by runtime, size of the input and threads."""
+"""CPU and wall time of the detector per image, by runtime, input size and number of threads."""
 import time
 
 import numpy as np
 
-WARM_UPS = 2  # images searched before the times count
+WARM_UPS = 2  # images that are not timed
 
 
 def detector_speed(images, weights, runtimes=('torch', 'onnxruntime'), sizes=(640, 512), threads=(1,)):
-    """Time the detector on images, from the image to the boxes.
+    """Measure the time of detection, from the image to the boxes.
 
-    With each number of threads, the runtimes and sizes take turns image by image, so that whatever else the machine
-    does weighs on all of them alike, and the ratios between them hold.
+    For each number of threads, all runtimes and sizes process each image in turn, so that other load on the machine
+    affects all of them equally and their ratios remain valid.
 
     Parameters
     ----------
     images : list of numpy.ndarray, (height, width, 3), uint8, RGB
     weights : str
-        A checkpoint (.pt): the one kind of file that every runtime can run.
+        A checkpoint (.pt), the only format that every runtime supports.
     runtimes : sequence of str
-        See `ros_3d_bb.detection.yolov5.backends`. All run on the CPU.
+        See `ros_3d_bb.detection.yolov5.backends`. All runtimes use the CPU.
     sizes : sequence of int
         Longer side of the input, pixels.
     threads : sequence of int
@@ -26,12 +26,12 @@ def detector_speed(images, weights, runtimes=('torch', 'onnxruntime'), sizes=(64
     Returns
     -------
     list of dict
-        runtime, size, threads, cpu_ms (of all threads of this process), wall_ms: medians over the images.
+        runtime, size, threads, cpu_ms (of all threads of this process) and wall_ms. Times are medians over the images.
 
     Raises
     ------
     ValueError
-        If there are no images, or a runtime cannot run these weights.
+        If there are no images, or a runtime does not support these weights.
     """
     if not len(images):
         raise ValueError('there are no images to time the detector on')
@@ -52,7 +52,7 @@ def _detector(weights, runtime, size, threads):
 
 
 def _times_ms(detectors, images):
-    """CPU and wall time of each image with each detector: (images, detectors, 2)."""
+    """CPU and wall time of each detector for each image, (images, detectors, 2)."""
     for image in images[:1] * WARM_UPS:
         for detector in detectors:
             detector.detect(image)

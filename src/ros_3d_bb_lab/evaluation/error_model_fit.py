@@ -1,7 +1,8 @@
-"""Fit an error model to measured positions with ground truth, and say how well it does at positions it never saw.
+"""Fit of error models to measured positions with ground truth, with cross-validation over positions.
 
-In bias and law of the spread a position counts once, however often it was measured: its repetitions share one bias of
-where the person stood. The widening of the spread and the scores count measurements.
+The bias and the law of the standard deviation weight each position equally, independent of the number of its
+measurements: repeated measurements share the error of where the person stood. The inflation of the standard deviations
+and the scores weight each measurement equally.
 """
 from typing import NamedTuple
 
@@ -9,47 +10,53 @@ import numpy as np
 
 from ros_3d_bb.estimation.error_model import ErrorModel, MeasuredRange, Provenance, Scores, Spread, XBias, checked
 
-DEGREES = (0, 1, 2, 3)  # of the polynomial of z_bias
-X_TERMS = ((False, True), (True, False), (True, True))  # whether x_bias has slope, and per_angle_m
-BETTER = 0.95  # a model with more coefficients must be better by so much
+DEGREES = (0, 1, 2, 3)  # of the polynomial z_bias
+X_TERMS = ((False, True), (True, False), (True, True))  # whether x_bias has the terms slope and per_angle_m
+BETTER = 0.95  # maximum cost ratio for accepting a model with more coefficients
 LEAST_SIGMA_M = 0.001
-Y_SIGMA_M = 0.1  # a box whose top or bottom is cut or missed by 0.2 m
-LIKELIER = 2.0  # log likelihood by which a spread that also falls with range has to win
-RATIOS = np.concatenate(([0], 2.0 ** np.arange(-7, 8)))  # of a part of the variance to the constant part
+Y_SIGMA_M = 0.1  # centre of a box whose top or bottom is off by 0.2 m
+LIKELIER = 2.0  # minimum gain in log-likelihood for accepting a term that decreases with range
+RATIOS = np.concatenate(([0], 2.0 ** np.arange(-7, 8)))  # of a variance component to the constant component
 SHARES = np.array([(far / (1 + far + near), near / (1 + far + near)) for far in RATIOS for near in RATIOS])
-GROWTH_OUTSIDE = 0.2  # about the steepest bias that the thesis' data show
+GROWTH_OUTSIDE = 0.2  # approximately the steepest bias in the thesis' data
 OFF_THE_MIDDLE_M = 0.1
-CHI_SQUARE_68_95 = -2 * np.log(1 - np.array([0.68, 0.95]))  # of two axes
+CHI_SQUARE_68_95 = -2 * np.log(1 - np.array([0.68, 0.95]))  # 2 degrees of freedom
 NOBODY = Provenance('', '', '', '', 0, 0)
 
 
 class Data(NamedTuple):
-    """`measured_m` (n, 3), `truth_m` (n, 2) as (x, z), `position` (n,): the number of the position of each."""
+    """Measurements with ground truth.
+
+    `measured_m` (n, 3) is the measured position, `truth_m` (n, 2) the true (x, z), both in metres, and `position` (n,)
+    the index of the true position.
+    """
 
     measured_m: np.ndarray
     truth_m: np.ndarray
     position: np.ndarray
 
     def part(self, mask):
-        """Those that the mask (n,) marks."""
+        """Select the measurements of a mask (n,)."""
         return Data(*(values[mask] for values in self))
 
     def weights(self):
-        """Of each measurement, (n,): 1 in total for each position."""
+        """Weights of the measurements, (n,). The weights of each position sum to 1."""
         return 1.0 / np.bincount(self.position)[self.position]
 
 
 def fit_error_model(measured_m, truth_m, source='', estimator='', camera='', date=''):
-    """The model of measured positions with the fewest coefficients that does about best at positions it never saw.
+    """Fit an error model, selecting the number of coefficients by cross-validation.
+
+    A model with more coefficients is selected only if it predicts held-out positions clearly better.
 
     Parameters
     ----------
     measured_m : array_like, (n, 3)
-        x, y, z as estimated, metres.
+        Estimated x, y, z in metres.
     truth_m : array_like, (n, 2)
-        True x, z. Measurements with the same truth are repetitions at one position.
+        True x, z in metres. Measurements with equal truth are repetitions at one position.
     source, estimator, camera, date : str
-        Kept in the model.
+        Provenance, stored in the model.
 
     Returns
     -------
@@ -58,7 +65,8 @@ def fit_error_model(measured_m, truth_m, source='', estimator='', camera='', dat
     Raises
     ------
     ValueError
-        If there are too few positions, all at one range or all at one x, or the bias is too steep to be undone.
+        If there are too few positions, if all have the same range or the same x, or if the bias is too steep to be
+        inverted.
     """
     data = data_of(measured_m, truth_m)
     model = _fit(data)
@@ -68,7 +76,7 @@ def fit_error_model(measured_m, truth_m, source='', estimator='', camera='', dat
 
 
 def data_of(measured_m, truth_m):
-    """Check measurements, and number their positions. Raises ValueError."""
+    """Validate measurements and index their positions. Raises ValueError."""
     measured_m, truth_m = np.asarray(measured_m, float), np.asarray(truth_m, float)
     if measured_m.shape != (len(truth_m), 3) or truth_m.shape != (len(truth_m), 2):
         raise ValueError('measured %s and truth %s; (n, 3) and (n, 2) expected' % (measured_m.shape, truth_m.shape))
@@ -85,7 +93,7 @@ def data_of(measured_m, truth_m):
 
 
 def held_out(data):
-    """Correct each position by a model of all others.
+    """Correct the measurements of each position by a model fitted to all other positions.
 
     Returns
     -------
@@ -101,7 +109,7 @@ def held_out(data):
 
 
 def scores_of(corrected_m, covariances, truth_m):
-    """How far corrected positions (n, 3) with covariances (n, 3, 3) are from the truth (n, 2), as Scores."""
+    """Scores of corrected positions (n, 3) with covariances (n, 3, 3) against the truth (n, 2)."""
     error_m = corrected_m[:, [0, 2]] - truth_m
     shares = coverage(error_m, covariances)
     rmse_m = np.sqrt((error_m ** 2).mean(axis=0))
@@ -109,14 +117,14 @@ def scores_of(corrected_m, covariances, truth_m):
 
 
 def coverage(error_m, covariances):
-    """Shares of errors (n, 2) in x and z in the 68 % and the 95 % ellipse of their covariances (n, 3, 3), (2,)."""
+    """Shares (2,) of the errors (n, 2) in x and z within the 68 % and 95 % ellipses of covariances (n, 3, 3)."""
     in_plane = covariances[:, [0, 2]][:, :, [0, 2]]
     distances = np.einsum('ni,nij,nj->n', error_m, np.linalg.inv(in_plane), error_m)
     return (distances[:, np.newaxis] <= CHI_SQUARE_68_95).mean(axis=0)
 
 
 def _folds(data):
-    """For each position: the mask (n,) of its measurements, and the data of all others."""
+    """Yield the mask (n,) of the measurements of each position, and the data of all other positions."""
     for number in range(data.position.max() + 1):
         held = data.position == number
         others = data.part(~held)
@@ -124,7 +132,7 @@ def _folds(data):
 
 
 def _fit(data):
-    """A model without provenance and scores."""
+    """Fit a model without provenance and scores."""
     degrees = [degree for degree in DEGREES if degree + 2 <= len(np.unique(data.truth_m[:, 1]))]
     degree = _simplest([(degree, _residuals(data, degree, X_TERMS[0])[:, 1]) for degree in degrees], data)
     terms = _simplest([(terms, _residuals(data, degree, terms)[:, 0]) for terms in X_TERMS], data)
@@ -136,7 +144,10 @@ def _fit(data):
 
 
 def _simplest(candidates, data):
-    """The first of (what, residuals (n,)), simplest first, that is about as good as the best."""
+    """Select the simplest of the candidates (value, residuals (n,)) whose cost is close to the best.
+
+    Candidates are ordered from simple to complex. Returns the value.
+    """
     costs = [np.sqrt(np.average(residuals_m ** 2, weights=data.weights())) for _what, residuals_m in candidates]
     best = 0
     for number, cost in enumerate(costs):
@@ -146,7 +157,7 @@ def _simplest(candidates, data):
 
 
 def _residuals(data, degree, terms):
-    """Errors (n, 2) in x and z that are left at each position after correction by the bias at all others."""
+    """Residuals (n, 2) in x and z at each position after correction by the bias fitted to all other positions."""
     residuals_m = np.empty_like(data.truth_m)
     for held, others in _folds(data):
         corrected_m = _fit_bias(others, degree, terms).corrected(data.measured_m[held])
@@ -155,7 +166,7 @@ def _residuals(data, degree, terms):
 
 
 def _fit_bias(data, degree, terms):
-    """A model with the bias of the data, by weighted least squares."""
+    """Fit the bias by weighted least squares."""
     x_m, z_m = data.truth_m.T
     roots = np.sqrt(data.weights())
     z_bias = np.polyfit(z_m, data.measured_m[:, 2] - z_m, degree, w=roots)
@@ -170,10 +181,11 @@ def _fit_bias(data, degree, terms):
 
 
 def _widening(sigmas_m, residuals_m, positions):
-    """By how much to stretch ellipses of sigmas (n, 2) so that those of 95 % hold their residual (n, 2); at least 1.
+    """Inflation factor, at least 1, with which the 95 % ellipses contain 95 % of the residuals.
 
-    Errors have longer tails than a Gaussian, and planners count on the ellipse of 95 %. The quantile is a little
-    higher than 95 %, as in conformal prediction: the next position is one more than those that are known.
+    `sigmas_m` and `residuals_m` are (n, 2). The errors have longer tails than a Gaussian, and planners rely on the 95 %
+    ellipse. The quantile is slightly above 95 %, as in conformal prediction, to account for the finite number of
+    positions.
     """
     distances = ((residuals_m / sigmas_m) ** 2).sum(axis=1)
     quantile = np.percentile(distances, min(100, 95.0 * (positions + 1) / positions))
@@ -185,7 +197,7 @@ def _wider(spread, factor):
 
 
 def _fit_spread(residuals_m, data):
-    """The law of the spread of residuals (n,) that is likeliest at positions it never saw."""
+    """Fit the Spread of residuals (n,) of one axis, selecting its terms by the log-likelihood of held-out positions."""
     z_m, weights = data.truth_m[:, 1], data.weights()
     likelihoods = [0.0, 0.0]
     for with_near in (False, True):
@@ -197,7 +209,11 @@ def _fit_spread(residuals_m, data):
 
 
 def _spread_of(residuals_m, z_m, weights, with_near):
-    """The likeliest Spread of weighted Gaussian residuals: for each share of its parts the scale is known exactly."""
+    """Maximum-likelihood Spread of weighted Gaussian residuals.
+
+    The shares of the variance components are searched on a grid. For given shares, the scale has a closed-form
+    solution.
+    """
     shares = SHARES if with_near else SHARES[SHARES[:, 1] == 0]
     far, near = shares.T[..., np.newaxis]
     nearest_m, farthest_m = z_m.min(), z_m.max()

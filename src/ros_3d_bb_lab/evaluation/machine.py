@@ -1,4 +1,4 @@
-"""What machine a benchmark ran on."""
+"""Description of the machine that a benchmark runs on."""
 import os
 import platform
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def describe_machine():
-    """Cores, CPU, and versions, in one line."""
+    """Cores, CPU model and software versions as one line of text."""
     fields = {}
     if os.path.exists('/proc/cpuinfo'):
         with open('/proc/cpuinfo') as stream:

@@ -1,4 +1,4 @@
-"""The pipeline on simulated scenes with each detector, against the truth: a table."""
+"""Benchmark of the pipeline on simulated scenes with different detectors, against ground truth."""
 import argparse
 import json
 import os
@@ -17,33 +17,34 @@ from ros_3d_bb_lab.evaluation.scenes import LEAST_SHOWN, run_scene, score_detect
 from ros_3d_bb_lab.simulation.scenario import ScenarioError, read_scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
 
-RANGE_M = {'yolov5': (2.0, 8.0), 'depth': (2.0, 6.0), 'exact': (0.5, 8.0)}  # in which a detector has to find people
-EVERY = {'yolov5': 2, 'depth': 2, 'exact': 1}  # one image of so many is used
-JITTER_PX = 1.0  # standard deviation of the edges of the boxes of `exact`
+RANGE_M = {'yolov5': (2.0, 8.0), 'depth': (2.0, 6.0), 'exact': (0.5, 8.0)}  # evaluated range of each detector
+EVERY = {'yolov5': 2, 'depth': 2, 'exact': 1}  # every n-th image is used
+JITTER_PX = 1.0  # standard deviation of the box edges of the `exact` detector
 COLUMNS = '%-20s %-8s %6s %6s %6s %8s %7s %7s %4s %11s %9s %9s'
 HEADINGS = ('scene', 'detector', 'images', 'recall', 'false', 'switches', 'RMSE', 'worst', 'IDs', 'not visible',
             'velocity', '1 s ahead')
 
 
 def depth_detector(simulator):
-    """The weight-free detector for `run_scene`, which is told the floor as tf would tell it."""
+    """Weight-free detector for `run_scene`. It receives the floor plane that tf provides on a robot."""
     detector = DepthPeople()
     return lambda frame: detector.detect(frame.color, DepthImage(frame.depth_mm, 0.001), simulator.camera,
                                          floor_from_transform(np.linalg.inv(frame.poses.map_from_camera))).boxes
 
 
 def yolov5_detector(weights):
-    """YOLOv5 for `run_scene`, of a checkpoint. Raises ValueError where it cannot be used."""
-    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch, which takes seconds
+    """YOLOv5 detector for `run_scene` from a checkpoint. Raises ValueError if the checkpoint cannot be used."""
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch (slow)
     from ros_3d_bb.detection.yolov5.detector import Yolov5
     detector = Yolov5(open_runtime(weights, RuntimeParams(device='cpu')))
     return lambda frame: detector.detect(frame.color).boxes
 
 
 def exact_detector(simulator):
-    """The true boxes of the people for `run_scene`, each edge off by about `JITTER_PX` as that of a detector.
+    """Detector for `run_scene` that returns the true boxes, with edges jittered by `JITTER_PX`.
 
-    Left out are people of whom too little is shown: see `scene_tracks.is_in_image`, or `LEAST_SHOWN` of the body.
+    People that are mostly occluded or outside the image are left out. A person is returned if
+    `scene_tracks.is_in_image` holds, or if at least `LEAST_SHOWN` of the body is visible.
     """
     seed, camera = simulator.scenario.seed, simulator.camera
 
@@ -59,9 +60,9 @@ def exact_detector(simulator):
 
 
 def result_of(steps, detector, camera=D435I_COLOR):
-    """The scores of a run as a dictionary, see `./run bench scenes`; `detector` yolov5, depth or exact.
+    """Scores of a run as a dictionary, as `./run bench scenes` writes them. `detector` is yolov5, depth or exact.
 
-    Lengths in metres, shares 0..1; errors are those of all people in the scene together.
+    Lengths are in metres and shares are 0..1. Errors are aggregated over all people in the scene.
     """
     found, tracked = score_detections(steps, *RANGE_M[detector]), score([step.moment for step in steps])
     followed = [person for person in tracked.people if person.ids]
@@ -74,7 +75,7 @@ def result_of(steps, detector, camera=D435I_COLOR):
 
 
 def main():
-    """The command `./run bench scenes`."""
+    """Run the command `./run bench scenes`."""
     arguments = _parser().parse_args()
     results = []
     try:
@@ -105,7 +106,7 @@ def _parser():
 
 
 def _run(path, yolov5, error_model, every):
-    """Run and print one scene with each detector. Only the boxes of `exact` pass through the error model."""
+    """Run one scene with each detector and print the results. The error model applies only to the boxes of `exact`."""
     name, simulator, results = os.path.basename(path).replace('.yaml', ''), Simulator(read_scenario(path)), []
     every = EVERY if every is None else dict.fromkeys(EVERY, every)
     for detector, detect, model in (('depth', depth_detector(simulator), None), ('yolov5', yolov5, None),
@@ -118,7 +119,7 @@ def _run(path, yolov5, error_model, every):
 
 
 def _row(result):
-    """The values of a result as they are printed."""
+    """Values of a result as printed in the table."""
     texts = [result['scene'], result['detector'], result['images'], '%.3f' % result['recall'],
              '%.3f' % result['false_boxes'], result['id_switches']]
     texts += [_text(result[key], 'm') for key in ('rmse_m', 'worst_m')] + [result['track_ids'], result['not_visible']]

@@ -1,7 +1,8 @@
-"""How well the tracks of a simulated scene hold: track IDs, images without a track, velocity and prediction.
+"""Track continuity in a simulated scene: track IDs, images without a track, velocity and prediction errors.
 
-`identities` scores people of whom an image shows a quarter of the body or more. Of a person right before the camera it
-shows less, and that is where a robot needs the track most: here a person counts whose middle is in the image.
+Here a person is scored if the body axis is in the image. `clear_mot` scores people of whose body an image shows a
+minimum share. A person directly in front of the camera fills the image and shows less than that, but is the most
+important one for a robot.
 """
 from typing import NamedTuple, Optional
 
@@ -13,19 +14,19 @@ from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.clear_mot import ClearMatcher
 from ros_3d_bb_lab.evaluation.scenes import LEAST_SHOWN
 
-NEAREST_M = 0.5  # distance from the camera in the plane
-HELD_M = 0.5  # a track farther from a person is not of that person
-HORIZON_S = 1.0  # of the prediction
+NEAREST_M = 0.5  # minimum distance from the camera in the plane
+HELD_M = 0.5  # maximum distance between a person and a matching track
+HORIZON_S = 1.0  # evaluated prediction horizon
 ROUNDING_M = 1e-6
 
 
 class TrackScore(NamedTuple):
-    """How well the tracks of a scene hold.
+    """Track continuity in a scene.
 
-    `track_ids` is the number of different IDs of VISIBLE tracks of people. `not_visible` counts, person by person, the
-    images after the first one with a VISIBLE track in which there is none. `velocity_rmse_mps` and `prediction_1s_m`
-    are RMS errors in the plane, of the velocity and of the position after `HORIZON_S`; None without any track of a
-    person.
+    `track_ids` is the number of distinct IDs of VISIBLE tracks near people. `not_visible` is the number of images,
+    summed over people, in which a person has no VISIBLE track after the first match. `velocity_rmse_mps` and
+    `prediction_1s_m` are RMS errors in the plane of the velocity and of the position predicted for `HORIZON_S`; None if
+    no track was matched.
     """
 
     track_ids: int
@@ -35,8 +36,10 @@ class TrackScore(NamedTuple):
 
 
 def is_in_image(person, map_from_camera, camera):
-    """Whether the axis of a person (`simulator.PersonTruth`) is between the left and the right border of the image
-    and others hide little of what the image shows.
+    """Whether the body axis of a person is between the left and right image borders, and the body is not mostly
+    occluded.
+
+    `person` is a `simulator.PersonTruth`.
     """
     x_m, _y, z_m = transform_points(np.linalg.inv(map_from_camera), person.position_m)
     if person.box_px is None or person.hidden > 1 - LEAST_SHOWN or z_m <= 0:
@@ -50,7 +53,7 @@ def score_tracks(steps, camera):
     Parameters
     ----------
     steps : list of scenes.Step
-        In the order of their stamps.
+        Ordered by stamp.
     camera : camera_model.Camera
 
     Returns
@@ -75,7 +78,7 @@ def score_tracks(steps, camera):
 
 
 def _people(step, camera):
-    """The people of an image who count, as tracks of the truth."""
+    """Ground-truth tracks of the people of an image that are scored."""
     map_from_camera = step.frame.poses.map_from_camera
     shown = set(person.id for person in step.frame.people if is_in_image(person, map_from_camera, camera)
                 and _distance(person.position_m, map_from_camera[:3, 3]) >= NEAREST_M - ROUNDING_M)
@@ -83,13 +86,13 @@ def _people(step, camera):
 
 
 def _prediction_errors(track, person):
-    """The error of the position after `HORIZON_S`, a list; empty where the tracker predicts less."""
+    """Error of the position predicted for `HORIZON_S`, as a list; empty if the prediction is shorter."""
     predicted_m, true_m = (_position_after(item, HORIZON_S) for item in (track, person))
     return [_distance(predicted_m, true_m)] if predicted_m is not None and true_m is not None else []
 
 
 def _position_after(track, time_s):
-    """The predicted position (3,) of a track; None where it predicts less."""
+    """Predicted position (3,) of a track after `time_s`; None if the prediction is shorter."""
     number = int(round(time_s / track.prediction_step_s)) - 1 if len(track.prediction_m) else 0
     return track.prediction_m[number] if number < len(track.prediction_m) else None
 
@@ -99,7 +102,7 @@ def _with_id(objects, wanted):
 
 
 def _distance(one, other):
-    """The distance of two vectors (2 or 3,) in the plane."""
+    """Distance of two vectors (2,) or (3,) in the plane."""
     return float(np.hypot(*(np.asarray(one) - other)[:2]))
 
 

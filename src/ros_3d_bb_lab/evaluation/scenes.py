@@ -1,4 +1,4 @@
-"""The pipeline without ROS on a simulated scene: detector, 3D boxes, tracks, image by image."""
+"""Pipeline without ROS on a simulated scene: 2D detection, 3D boxes and tracking, image by image."""
 import functools
 from typing import List, NamedTuple
 
@@ -18,12 +18,12 @@ from ros_3d_bb_lab.evaluation.clear_mot import Moment
 from ros_3d_bb_lab.simulation.ground_truth import truth_at
 from ros_3d_bb_lab.simulation.simulator import SimulatedFrame
 
-LEAST_SHOWN = 0.3  # share of the body; less of it tells nothing of where the person is
-FOUND_IOU = 0.5  # a detection is that of a person where the boxes overlap by so much, else it is false
+LEAST_SHOWN = 0.3  # visible share of the body below which its position cannot be estimated
+FOUND_IOU = 0.5  # minimum IoU of a true positive
 
 
 class Step(NamedTuple):
-    """One image: the frame without its pixels, the 2D boxes (n, 4) found in it, and the tracks after it."""
+    """One image: its frame without pixels, the detected 2D boxes (n, 4), and the truth and tracks after it."""
 
     frame: SimulatedFrame
     boxes: np.ndarray
@@ -31,7 +31,7 @@ class Step(NamedTuple):
 
 
 class SceneImage(NamedTuple):
-    """One image: the frame without its pixels, the 2D boxes (n, 4) found in it, what a tracker gets, and the truth."""
+    """One image: its frame without pixels, the detected 2D boxes (n, 4), the inputs of a tracker, and the truth."""
 
     stamp_ns: int
     frame: SimulatedFrame
@@ -42,7 +42,7 @@ class SceneImage(NamedTuple):
 
 
 class DetectionScore(NamedTuple):
-    """`people` to be found, how many were `found`; `false` boxes in `images`."""
+    """Number of `people` to be detected, of those `found`, of `false` boxes, and of `images`."""
 
     people: int
     found: int
@@ -51,17 +51,17 @@ class DetectionScore(NamedTuple):
 
     @property
     def recall(self):
-        """Share 0..1, 1 where there was nobody to be found."""
+        """Recall 0..1; 1 if there were no people to be detected."""
         return self.found / float(self.people) if self.people else 1.0
 
     @property
     def false_rate(self):
-        """False boxes an image."""
+        """Number of false boxes per image."""
         return self.false / float(max(1, self.images))
 
 
 def look_at_scene(simulator, detect, every=1, estimator=estimator_named('foreground'), error_model=None):
-    """Render a scene and find the people in it, image by image.
+    """Render a scene and detect the people in it, image by image.
 
     Parameters
     ----------
@@ -69,10 +69,10 @@ def look_at_scene(simulator, detect, every=1, estimator=estimator_named('foregro
     detect : callable
         Called with a Frame; returns 2D boxes (n, 4).
     every : int
-        Use one image of so many.
+        Use every n-th image.
     estimator : Estimator
     error_model : ErrorModel, optional
-        Corrects the 3D boxes and gives their covariance, as in bbox3d_node.
+        Corrects the 3D boxes and provides their covariance, as in bbox3d_node.
 
     Yields
     ------
@@ -88,7 +88,7 @@ def look_at_scene(simulator, detect, every=1, estimator=estimator_named('foregro
 
 
 def track_scene(images, trackers):
-    """Let trackers follow the people in the images (SceneImage) of a scene. Returns a list of Step for each tracker."""
+    """Run trackers on the images (SceneImage) of a scene. Returns a list of Step for each tracker."""
     steps = [[] for _tracker in trackers]
     for image in images:
         for tracker, own_steps in zip(trackers, steps):
@@ -98,13 +98,13 @@ def track_scene(images, trackers):
 
 
 def run_scene(simulator, detect, every=1, estimator=estimator_named('foreground'), error_model=None):
-    """Run the pipeline on a scene: `look_at_scene`, and `track_scene` with our tracker. Returns a list of Step."""
+    """Run the pipeline on a scene: `look_at_scene`, then `track_scene` with our tracker. Returns a list of Step."""
     steps, = track_scene(look_at_scene(simulator, detect, every, estimator, error_model), [Tracker()])
     return steps
 
 
 def _detections(frame, boxes, camera, estimator, error_model):
-    """The 2D boxes as bbox3d_node and tracker_node take them: 3D boxes, in the map."""
+    """Convert 2D boxes to detections in the map, as bbox3d_node and tracker_node do."""
     rects_px = [tuple(rect) for rect in np.rint(boxes).astype(int).tolist() if rect[0] < rect[2] and rect[1] < rect[3]]
     estimated = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, camera, estimator)
     found = [box for box in estimated if box is not None and is_plausible(box)]
@@ -114,16 +114,16 @@ def _detections(frame, boxes, camera, estimator, error_model):
 
 
 def _view(frame, camera):
-    """What the tracker is told of the camera, as tracker_node does it."""
+    """Camera view for the tracker, as in tracker_node."""
     depth = DepthImage(frame.depth_mm, 0.001)
     depth_at = functools.partial(depths_towards, camera, depth)
     return CameraView(frame.poses.map_from_camera, camera, frame.camera, depth_at)
 
 
 def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6.0):
-    """Errors in the plane of what an estimator makes of the exact boxes around people in a range of depth, metres.
+    """Position errors in the plane, in metres, of an estimator with exact boxes, for people in a range of depth.
 
-    Whoever shows at least `LEAST_SHOWN` of the body counts; nan where the estimator finds nobody.
+    Only people with at least `LEAST_SHOWN` of the body visible are evaluated. The error is NaN if there is no estimate.
 
     Returns
     -------
@@ -144,9 +144,9 @@ def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6
 
 
 def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):
-    """How many of the people in a range of depth, who are visible enough, the detector found, and what else.
+    """Count true and false detections of sufficiently visible people in a range of depth.
 
-    In each image boxes and people are paired one to one, best overlap first.
+    In each image, boxes and people are matched one to one in order of decreasing IoU.
 
     Returns
     -------

@@ -1,5 +1,7 @@
-"""A measurement session of the simulated camera, with exact truth: people of all builds at places of a grid, standing
-and walking by in all directions. For the error model of the simulated camera: `./run noise` takes it as any other.
+"""Simulated measurement sessions with exact ground truth, for the error model of the simulated camera.
+
+People of different builds stand on a grid of positions or walk across them in random directions. `./run noise` analyses
+the session as any other.
 """
 import argparse
 import json
@@ -13,15 +15,18 @@ from ros_3d_bb_lab.simulation.scenario import Move, Person, Robot, Room, Scenari
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
 
 RANGES_M = (1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0)
-TANGENTS = (-0.4, -0.25, -0.1, 0.0, 0.1, 0.25, 0.4)  # of the angle off the optical axis
+TANGENTS = (-0.4, -0.25, -0.1, 0.0, 0.1, 0.25, 0.4)  # tangent of the angle off the optical axis
 ROOM = Room(bounds=(-2.0, 9.0, -5.0, 5.0))
 ROBOT = Robot()
-WALK_S, SPEED_MPS = 1.0, 1.2  # a walker passes the place so long after the start
+WALK_S, SPEED_MPS = 1.0, 1.2  # a walker passes the position after WALK_S
 REPETITIONS = 3
 
 
 def write_simulated_session(folder, ranges_m=RANGES_M, tangents=TANGENTS, repetitions=REPETITIONS):
-    """Write a session of people whom the image shows, the 2D box being exactly around them; returns the folder."""
+    """Write a session of simulated people with exact 2D boxes. Returns the folder.
+
+    People outside the image are skipped.
+    """
     for name in ('color', 'depth'):
         os.makedirs(os.path.join(folder, name), exist_ok=True)
     places = [(z_m, round(tangent * z_m, 3)) for z_m in ranges_m for tangent in tangents]
@@ -34,7 +39,7 @@ def write_simulated_session(folder, ranges_m=RANGES_M, tangents=TANGENTS, repeti
 
 
 def _write_frame(folder, number, place):
-    """Render somebody at a place (z, x) of the camera; returns the description, None where nobody is seen."""
+    """Render a person at a place (z, x) in the camera frame. Returns None if the person is not in the image."""
     z_m, x_m = place
     simulator = Simulator(_scenario(np.array([ROBOT.pose[0] + ROBOT.mount[0] + z_m, ROBOT.pose[1] - x_m]), number))
     frame = simulator.frame(simulator.frame_count - 1)
@@ -51,7 +56,10 @@ def _write_frame(folder, number, place):
 
 
 def _scenario(place_m, number):
-    """Somebody who is at the place (x, y) of the map in the last image; every other one walks there."""
+    """Scenario whose person is at the place (x, y) of the map in the last image.
+
+    People with an even `number` stand; people with an odd `number` walk across the place.
+    """
     heading_rad = float(np.random.RandomState(number).uniform(-np.pi, np.pi))
     step_m = WALK_S * SPEED_MPS * np.array([np.cos(heading_rad), np.sin(heading_rad)])
     if number % 2:
@@ -59,7 +67,7 @@ def _scenario(place_m, number):
         person = Person(tuple(place_m - step_m), heading_rad, moves=(walk,))
     else:
         person = Person(tuple(place_m), heading_rad)
-    # two images: one at the start, one when the walker passes
+    # two images: at the start, and when the walker passes the place
     return Scenario(duration=2 * WALK_S, rate=1 / WALK_S, seed=number, room=ROOM, robot=ROBOT, people=(person,))
 
 

@@ -1,10 +1,10 @@
-"""What 3D boxes and tracks cost, by the number of people: Fig. 4.2 of the thesis, for this package and the thesis'.
+"""CPU time of 3D boxes and tracks by the number of people, for our and the thesis' algorithms (thesis, Fig. 4.2).
 
-CPU time of the algorithms, from the depth image and the 2D boxes to the tracks with their predictions, without messages
-and without waiting. Estimation: 3D boxes in the camera's frame. Tracking: taking them to the fixed frame, tracking and
-prediction. The people are those of a measurement session, side by side in one wide depth image, in boxes that a jitter
-moves from image to image. Both algorithms take the same image and boxes in turns, so that whatever else the machine
-does weighs on both alike, and the ratio between them holds.
+The benchmark measures the CPU time of the algorithms, from the depth image and the 2D boxes to tracks with predictions,
+without messages and waiting. Estimation computes 3D boxes in the camera's frame. Tracking transforms them to the fixed
+frame, tracks them and predicts. The people of a measurement session are placed side by side in one wide depth image,
+and their boxes are jittered between images. Both algorithms process the same image and boxes alternately, so that other
+load on the machine affects both equally and their ratio remains valid.
 """
 import argparse
 import functools
@@ -31,17 +31,17 @@ from ros_3d_bb_lab.evaluation.machine import describe_machine
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 
 OBJECTS = (1, 2, 5, 10, 20, 50, 100)
-WARM_UPS = 10  # images before the times count: until tracks are confirmed, and caches warm
+WARM_UPS = 10  # images that are not timed, until tracks are confirmed and caches are warm
 PERIOD_NS = NS // 30
 FIXED_FROM_CAMERA = transform_from((0.0, 0.0, 1.0), OPTICAL_ROTATION)
-AHEAD_S = 2.0  # of the thesis' prediction
+AHEAD_S = 2.0  # horizon of the thesis' prediction
 ALGORITHMS, STAGES = ('ours', 'thesis'), ('estimation', 'tracking', 'both')
 DETECTOR_IMAGES = 40
-SIMULATED = (2.0, 4.0), (-0.2, 0.2), 2  # people of the session that is made where none is given
+SIMULATED = (2.0, 4.0), (-0.2, 0.2), 2  # simulated session, used if no session is given
 
 
 class Ours(object):
-    """This package's algorithms, as its nodes call them by default."""
+    """Algorithms of this package with the default parameters of its nodes."""
 
     def __init__(self, crowd):
         self._camera, self._tracker, self._estimator = crowd.camera, Tracker(), estimator_named('foreground')
@@ -49,40 +49,40 @@ class Ours(object):
         self._view = CameraView(FIXED_FROM_CAMERA, crowd.camera, depth_at=depth_at)
 
     def estimate(self, depth, rects_px):
-        """3D boxes in the frame of the camera."""
+        """Estimate 3D boxes in the frame of the camera."""
         return [box for box in estimate_boxes(depth, rects_px, self._camera, self._estimator) if box is not None]
 
     def track(self, stamp_ns, boxes):
-        """The tracks after one image."""
+        """Update the tracks with one image. Returns the tracks."""
         detections = [detection_from_box(box, FIXED_FROM_CAMERA) for box in boxes]
         return self._tracker.update(stamp_ns, detections, self._view)
 
 
 class Theirs(object):
-    """The thesis' algorithms, as its chapter 3 describes their optimised version.
+    """Algorithms of the thesis in the optimised version that its chapter 3 describes.
 
-    One box after the other, each by arrays of its samples (3.4.2): the proof of concept that looped over samples, 2.5
-    times slower by the thesis, is not meant. One object after the other, with distances in one array (3.6), and one
-    prediction along the filtered velocity.
+    Boxes are processed one by one, with arrays for the samples of a box (section 3.4.2). The proof of concept, which
+    loops over samples and is 2.5 times slower according to the thesis, is not used. Objects are processed one by one,
+    with distances in one array (section 3.6), and one prediction along the filtered velocity.
     """
 
     def __init__(self, crowd):
         self._camera, self._tracker = crowd.camera, OriginalTracker()
 
     def estimate(self, depth, rects_px):
-        """3D boxes in the frame of the camera."""
+        """Estimate 3D boxes in the frame of the camera."""
         boxes = [estimate_median(sample_median(depth, rect_px), rect_px, self._camera) for rect_px in rects_px]
         return [box for box in boxes if box is not None]
 
     def track(self, stamp_ns, boxes):
-        """The predicted positions after one image, by id."""
+        """Update the tracks with one image. Returns the predicted positions by ID."""
         detections = [Detection(transform_points(FIXED_FROM_CAMERA, box.center_m), box.size_m) for box in boxes]
         return {track.id: track.position_m + AHEAD_S * track.velocity_mps
                 for track in self._tracker.step(stamp_ns, detections)}
 
 
 def speed(session, counts=OBJECTS, images=60, seed=0):
-    """Time both algorithms.
+    """Measure the CPU time of both algorithms.
 
     Parameters
     ----------
@@ -90,15 +90,17 @@ def speed(session, counts=OBJECTS, images=60, seed=0):
     counts : sequence of int
         Numbers of people.
     images : int
-        So many images of each number are timed.
+        Number of timed images for each number of people.
     seed : int
-        Of the order of the people, and of the jitter.
+        Seed of the order of the people and of the jitter.
 
     Returns
     -------
     dict
-        As in design §8, without the detector; `ratio`: medians of our time over theirs, of both stages, by number;
-        `growth`: our time by number over that for 5, or for the smallest number where there is no 5.
+        `machine`, `people`, `images`, `objects` (= `counts`), and for `ours` and `thesis` the median, mean and standard
+        deviation of the times in ms by stage. `ratio`: median ratio of our time to that of the thesis over both stages,
+        by number of people. `growth`: our time relative to that for 5 people, or for the smallest number of people if 5
+        is not in `counts`.
 
     Raises
     ------
@@ -108,7 +110,7 @@ def speed(session, counts=OBJECTS, images=60, seed=0):
     people, random = people_of(session), np.random.RandomState(seed)
     if not people:
         raise ValueError('no frame of the session has a 2D box')
-    random.shuffle(people)  # sessions go from near to far
+    random.shuffle(people)  # sessions are ordered by range
     times_ms = _times_ms([crowd_of(people, count, session) for count in counts], images, random)
     result = {'machine': describe_machine(), 'people': len(people), 'images': images, 'objects': list(counts)}
     for number, name in enumerate(ALGORITHMS):
@@ -121,7 +123,7 @@ def speed(session, counts=OBJECTS, images=60, seed=0):
 
 
 def _times_ms(crowds, images, random):
-    """CPU time of images, (images, crowds, algorithms, stages)."""
+    """CPU times of the images, (images, crowds, algorithms, stages)."""
     algorithms = [(Ours(crowd), Theirs(crowd)) for crowd in crowds]
     times_ms = np.empty((images + WARM_UPS, len(crowds), len(ALGORITHMS), len(STAGES)))
     for image in range(len(times_ms)):
@@ -151,7 +153,7 @@ def _statistics(times_ms):
 
 
 def table(result):
-    """The times as lines of text."""
+    """Format the times as lines of text."""
     lines = ['CPU time of an image, ms: median (mean ± standard deviation)',
              '%-20s' % 'people' + ''.join('%22d' % count for count in result['objects'])]
     for name in ALGORITHMS:
@@ -168,7 +170,7 @@ def table(result):
 
 
 def main():
-    """The command `./run bench speed`."""
+    """Run the command `./run bench speed`."""
     arguments = _arguments()
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -181,7 +183,7 @@ def main():
             with open(arguments.json, 'w') as stream:
                 json.dump(result, stream, indent=1)
         if arguments.picture:
-            from ros_3d_bb_lab.evaluation.speed_plot import draw_speed  # takes seconds to import
+            from ros_3d_bb_lab.evaluation.speed_plot import draw_speed  # slow import
             draw_speed(result, arguments.picture)
     except (ValueError, OSError) as error:
         sys.exit('./run bench speed: %s' % error)

@@ -1,7 +1,7 @@
-"""Fig. 4.2 of the thesis from the times of `bench speed`."""
+"""Plot of the results of `./run bench speed`, as in Fig. 4.2 of the thesis."""
 import matplotlib
 matplotlib.use('Agg')
-from matplotlib import pyplot  # noqa: E402 (the backend has to be chosen before)
+from matplotlib import pyplot  # noqa: E402 (the backend must be selected first)
 import numpy as np  # noqa: E402
 
 TITLES = (('ours', 'this package'), ('thesis', "the thesis' algorithms"))
@@ -10,21 +10,21 @@ CURVES = (('both', 'both', 'tab:green'), ('estimation', '3D boxes', 'tab:blue'),
 
 
 def draw_speed(result, path):
-    """Draw mean and standard deviation of the CPU time by the number of people.
+    """Plot the mean and the standard deviation of the CPU time by the number of people.
 
     Parameters
     ----------
     result : dict
-        Of `speed.speed`.
+        Result of `speed.speed`.
     path : str
-        Where to write the picture; its ending says in what format.
+        Image file; its suffix selects the format.
     """
     figure, panels = pyplot.subplots(1, 2, sharey=True, figsize=(9, 4))
     for panel, (name, title) in zip(panels, TITLES):
         for stage, label, color in CURVES:
             mean_ms, sd_ms = (np.array(result[name][stage + suffix]) for suffix in ('_mean_ms', '_sd_ms'))
             panel.plot(result['objects'], mean_ms, 'o-', markersize=3, color=color, label=label)
-            low_ms = np.maximum(mean_ms - sd_ms, mean_ms / 10)  # the axis is logarithmic
+            low_ms = np.maximum(mean_ms - sd_ms, mean_ms / 10)  # positive, for the logarithmic axis
             panel.fill_between(result['objects'], low_ms, mean_ms + sd_ms, color=color, alpha=0.2, linewidth=0)
         panel.set(title=title, xlabel='people', xscale='log', yscale='log')
         panel.set_xticks(result['objects'])

@@ -1,4 +1,4 @@
-"""What this package is compared with: the thesis' algorithms, Norfair, and an oracle.
+"""Baselines for comparison: the thesis' algorithms, Norfair, and an oracle.
 
 May import: camera, core, tracking.
 """

@@ -1,4 +1,4 @@
-"""Norfair, a tracking library, behind the interface of our trackers; tuned on the shared recordings."""
+"""Norfair, a tracking library, with the interface of this package's trackers."""
 from typing import NamedTuple
 
 import numpy as np
@@ -8,11 +8,12 @@ from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject, predictio
 
 
 class NorfairParams(NamedTuple):
-    """Norfair's own parameters; it counts in images, of which there are `rate_hz` a second, and in metres.
+    """Parameters of Norfair, in images (`rate_hz` per second) and metres.
 
-    Tuned for HOTA and IDF1 on the recordings eth, hotel, students001 and zara03: `distance_threshold` of 0.4 to 0.8,
-    `hit_counter_max` of 12 to 90 (how long it keeps whom it does not see), `initialization_delay` of 2 to 8 and
-    `process_noise` (Q) of 0.0002 to 0.002. The others are Norfair's defaults.
+    They were tuned for HOTA and IDF1 on the recordings eth, hotel, students001 and zara03: `distance_threshold` from
+    0.4 to 0.8, `hit_counter_max` (how many images a track survives without detections) from 12 to 90,
+    `initialization_delay` from 2 to 8, and `process_noise` (Q) from 0.0002 to 0.002. The other parameters are Norfair's
+    defaults.
     """
 
     distance_threshold: float = 0.5
@@ -29,7 +30,7 @@ class NorfairParams(NamedTuple):
 
 
 class Norfair(object):
-    """Tracks objects in the plane with Norfair's tracker and its Kalman filter of constant velocity.
+    """Tracks objects in the plane with Norfair's tracker and its constant-velocity Kalman filter.
 
     Raises
     ------
@@ -53,7 +54,12 @@ class Norfair(object):
         self._now_ns, self._first_seen_ns = None, {}
 
     def update(self, stamp_ns, detections, view=None):
-        """Take the detections of one image, as `ThesisTracker.update`. Returns a list of TrackedObject."""
+        """Update the tracks with the detections of one image, as `ThesisTracker.update`.
+
+        Returns
+        -------
+        list of TrackedObject
+        """
         period = 1
         if self._now_ns is not None:
             period = max(1, int(round((stamp_ns - self._now_ns) / NS * self._params.rate_hz)))

@@ -1,17 +1,18 @@
-"""What a tracker scores that is told whose each detection is, and remembers people as long as ours."""
+"""Oracle baseline: tracking with perfect data association, and the same maximum track age as our tracker."""
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.tracker import TrackerParams
 
-FORGOTTEN_S = TrackerParams().max_age  # who was not found for so long gets another number
+FORGOTTEN_S = TrackerParams().max_age  # a person without detections for this time gets a new ID
 COASTS_S = 1.0
 
 
 def outputs_with_perfect_association(make_tracker, run):
-    """What is published after each image of a run if each person has a tracker of their own, without false boxes.
+    """Run a separate tracker for each person, without false detections.
 
     Returns
     -------
     list of list of TrackedObject
+        Published tracks after each image.
     """
     followed, last_number, outputs = {}, 0, []
     for image in run.images:
@@ -26,13 +27,13 @@ def outputs_with_perfect_association(make_tracker, run):
 
 
 class _Followed(object):
-    """One person with a number and a tracker."""
+    """Person with a track ID and a tracker."""
 
     def __init__(self, number, tracker):
         self._number, self._tracker, self.seen_ns = number, tracker, None
 
     def update(self, image, detection):
-        """The person as a TrackedObject, None where the tracker publishes nothing."""
+        """Track of the person as a TrackedObject, or None if the tracker publishes none."""
         if detection is not None:
             self.seen_ns = image.stamp_ns
         elif image.stamp_ns - self.seen_ns > COASTS_S * NS:

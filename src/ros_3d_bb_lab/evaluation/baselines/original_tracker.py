@@ -1,9 +1,11 @@
-"""The thesis' tracker as its package ran: with what the text does not tell and `tracking.thesis` mends.
+"""The thesis' tracker as implemented in its package.
 
-Its velocities are those of one image times the rate at which the last images arrived. It asks tf where the camera is
-when the boxes arrive, not where it was. Tracks age only where there are more of them than boxes, and by images; new
-ones come only where there are fewer, and not where a box is as far from another track as that track's own box. Where it
-failed with an exception, rospy went on with the next image.
+It includes behaviour that the text of the thesis does not describe and that `ros_3d_bb.tracking.thesis_tracker`
+corrects. Velocities are the displacement between two images times the current rate of arrival. The camera pose is
+looked up at the time at which the boxes arrive, not at the image stamp. Missed images are counted only if there are
+more tracks than boxes, and lifetimes are in images. New tracks start only if there are fewer tracks than boxes, and
+only from boxes that are not as far from a matched track as that track's own box. If an exception occurs, the image is
+skipped, as rospy does.
 """
 import numpy as np
 
@@ -15,13 +17,13 @@ from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 LONGEST_MISSED = 30  # images
 ALPHA = 0.2
 ALIKE_M = 0.3
-USUAL_RATE_HZ = 30.0  # of the first image
+USUAL_RATE_HZ = 30.0  # assumed for the first image
 PREDICTION_STEP_S, PREDICTIONS = 0.25, 8
 MOVING_MPS = 0.2
 
 
 def as_it_arrived(run):
-    """A run as the original saw it: stamped on arrival, and placed by where the camera is then."""
+    """Transform a run to the inputs of the original: images stamped on arrival, with the camera pose at that time."""
     return run._replace(images=tuple(_as_it_arrived(image) for image in run.images))
 
 
@@ -45,24 +47,29 @@ class _OriginalTrack(object):
         self.seen_ns, self.missed = stamp_ns, 0
 
     def filter_velocity(self, rate_hz):
-        """Average the step to the newest position, which is repeated while the track is not matched."""
+        """Smooth the last displacement, which is repeated while the track is not matched."""
         average_m = self.average_step_m
         self.average_step_m = self.step_m if average_m is None else ALPHA * self.step_m + (1 - ALPHA) * average_m
         self.velocity_mps = self.average_step_m * rate_hz
 
 
 class OriginalTracker(object):
-    """Tracks objects from image to image; takes images as `as_it_arrived` gives them."""
+    """Tracks objects from image to image. Its input is the output of `as_it_arrived`."""
 
     def __init__(self):
         self._tracks, self._last_id, self._now_ns, self._rate_hz = [], 0, None, USUAL_RATE_HZ
 
     def update(self, stamp_ns, detections, view=None):
-        """Take the detections of one image, as `ThesisTracker.update`. Returns a list of TrackedObject."""
+        """Update the tracks with the detections of one image, as `ThesisTracker.update`.
+
+        Returns
+        -------
+        list of TrackedObject
+        """
         return [self._published(track) for track in self.step(stamp_ns, detections)]
 
     def step(self, stamp_ns, detections):
-        """The algorithm without its output. Returns the tracks, with `id`, `position_m` and `velocity_mps`."""
+        """Update the tracks without publishing. Returns the tracks, with `id`, `position_m` and `velocity_mps`."""
         self._rate_hz = USUAL_RATE_HZ if self._now_ns is None else NS / (stamp_ns - self._now_ns)
         self._now_ns = stamp_ns
         try:
@@ -75,7 +82,7 @@ class OriginalTracker(object):
 
     def _match(self, detections):
         if not detections:
-            for track in self._tracks:  # loses every second of those that it deletes here, as the original did
+            for track in self._tracks:  # modified while iterating: every second deletion is skipped, as in the original
                 self._miss(track)
             return
         distances_m = plane_distances(np.reshape([track.position_m for track in self._tracks], (-1, 3)),
@@ -83,7 +90,7 @@ class OriginalTracker(object):
         matched_m = self._move_matched(distances_m, detections)
         taken = set(column for _row, column in matched_m)
         if len(self._tracks) > len(detections):
-            # deletes by place in the list while the list gets shorter; in the order of a set, so that it may fail
+            # indices are in set order and become invalid as the list shrinks, as in the original; may raise IndexError
             for row in reversed(list(set(range(len(self._tracks))) - set(row for row, _column in matched_m))):
                 self._miss(self._tracks[row])
         elif len(self._tracks) < len(detections):
@@ -93,9 +100,9 @@ class OriginalTracker(object):
                     self._tracks.append(_OriginalTrack(self._last_id, self._now_ns, detections[column]))
 
     def _move_matched(self, distances_m, detections):
-        """Give each track its nearest box, nearest pair first; one whose box is taken gets none.
+        """Match each track with its nearest box in order of distance. Returns {(row, column): distance}.
 
-        Returns {(row, column): distance}.
+        A track whose nearest box is already matched gets none.
         """
         matched_m, taken = {}, set()
         if not len(distances_m):

@@ -1,4 +1,4 @@
-"""A picture of how a scene was tracked: images with what was found in them, and the paths from above."""
+"""Image of a tracked scene: camera images with detections, and a top view of the paths."""
 from typing import NamedTuple
 
 import cv2
@@ -14,8 +14,9 @@ FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
 class Paths(NamedTuple):
-    """Paths in the map seen from above, (n, 2) each, metres: of people by their number in the truth, of tracks by
-    theirs, and of the robot.
+    """Paths in the map from above, (n, 2) each, metres.
+
+    `people` by ground-truth ID, `tracks` by track ID, and `robot`.
     """
 
     people: dict
@@ -32,7 +33,7 @@ def scene_picture(panels, paths, lines):
         Images (h, w, 3), uint8, RGB; three in a row.
     paths : Paths
     lines : list of str
-        Text below.
+        Text below the images.
 
     Returns
     -------
@@ -46,7 +47,7 @@ def scene_picture(panels, paths, lines):
 
 
 def top_view(paths):
-    """The map from above, x to the right and y up, with a grid of metres: the truth in grey, tracks in colour."""
+    """Top view of the map, x to the right and y up, with a grid of 1 m: ground truth in grey, tracks in colour."""
     points = [np.reshape(path, (-1, 2)) for path in list(paths.people.values()) + list(paths.tracks.values())
               + [paths.robot]]
     points = np.concatenate(points + [np.zeros((1, 2))])
@@ -111,7 +112,7 @@ def _text(lines):
 
 
 def _words(line):
-    """Yield (column, word): OpenCV's font has no fixed width, and a table needs one."""
+    """Yield (column, word), which keeps tables aligned, because OpenCV's fonts are not monospaced."""
     column = 0
     for word in line.split(' '):
         if word:

@@ -1,4 +1,4 @@
-"""The latency benchmark under roslaunch, with its two rig nodes.
+"""Latency benchmark under roslaunch, with the two nodes that replay images and measure latency.
 
 May import: bags, conversions, core, msg, nodes.common, ros_3d_bb_lab.evaluation.
 """

@@ -1,4 +1,4 @@
-"""How long images take through the whole pipeline, from their stamp to the markers, with detectors and loads."""
+"""Latency of the complete pipeline, from the image stamp to the markers, by detector and CPU load."""
 import argparse
 import contextlib
 import json
@@ -14,16 +14,20 @@ from ros_3d_bb_lab.evaluation.defaults import default_weights, scenario_path
 from ros_3d_bb_lab.evaluation.latency.latency_result import result_of
 from ros_3d_bb_lab.evaluation.machine import describe_machine
 
-IMAGES = 60  # of the scene, played forwards and backwards: two seconds, 90 MB
-ENDING_S = 40.0  # roslaunch gives its nodes 17 s to end
+IMAGES = 60  # first images of the scene, played forwards and backwards: 2 s, 90 MB
+ENDING_S = 40.0  # roslaunch waits up to 17 s for its nodes
 EATS_A_CORE = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    pass'
-HARNESS = ('replay_node', 'latency_probe_node', 'rosout')  # run for the benchmark, not on a robot
+HARNESS = ('replay_node', 'latency_probe_node', 'rosout')  # nodes of the benchmark, which do not run on a robot
 COLUMNS = '%-16s %6s %6s %8s %8s %8s %8s %9s %9s %9s %7s'
 TITLES = ('case', 'in Hz', 'out Hz', 'p50 ms', 'p95 ms', 'p99 ms', 'dropped', 'CPU %', 'camera %', 'memory MB', 'load')
 
 
 class Case(NamedTuple):
-    """`name`; `detector` of pipeline.launch; `image_size` of YOLOv5; whether another process eats a core."""
+    """Case of the benchmark.
+
+    `detector` is that of pipeline.launch, `image_size` is that of YOLOv5, and `loaded` is whether another process loads
+    a core.
+    """
 
     name: str
     detector: str
@@ -32,7 +36,7 @@ class Case(NamedTuple):
 
 
 class CaseFailed(Exception):
-    """A case could not be measured: says why."""
+    """A case could not be measured. The message contains the reason."""
 
 
 DETECTORS = (('free', 'none', 0), ('depth', 'depth', 0), ('yolov5-512', 'yolov5', 512), ('yolov5-640', 'yolov5', 640))
@@ -41,7 +45,7 @@ CASES = [Case(name + ('+load' if loaded else ''), detector, size, loaded)
 
 
 def measured(case, arguments, bag, folder):
-    """Run one case under a ROS master of its own; its figures as in design §8.
+    """Run one case with a separate ROS master. Returns its results as a dictionary, see `latency_result.result_of`.
 
     Raises
     ------
@@ -66,7 +70,10 @@ def measured(case, arguments, bag, folder):
 
 @contextlib.contextmanager
 def eating_a_core(really):
-    """Another process that computes all the time, and ends with this one whatever becomes of it; or nothing."""
+    """Context in which another process loads one core, if `really` is true.
+
+    The process ends at the end of the context, or with this process in any case.
+    """
     if not really:
         yield
         return
@@ -79,9 +86,9 @@ def eating_a_core(really):
 
 
 def launch(arguments, timeout_s, log):
-    """roslaunch benchmark.launch on a free port until it ends by itself; ended with its nodes in any case.
+    """Run roslaunch latency.launch on a free port until it exits or times out. Its nodes are terminated in any case.
 
-    In a session of its own: a Ctrl-C in the terminal reaches it through here, once.
+    roslaunch runs in a separate session, so that a Ctrl-C in the terminal reaches it only once, through this function.
     """
     port = free_port()
     process = subprocess.Popen(['roslaunch', '-p', str(port), 'ros_3d_bb', 'latency.launch'] + arguments, stdout=log,
@@ -90,14 +97,14 @@ def launch(arguments, timeout_s, log):
     try:
         process.wait(timeout_s)
     except subprocess.TimeoutExpired:
-        pass  # there is no record then, which is said
+        pass  # the missing record is reported
     finally:
         if process.poll() is None:
             end(process)
 
 
 def end(roslaunch):
-    """End roslaunch with its nodes."""
+    """Terminate roslaunch with its nodes."""
     roslaunch.send_signal(signal.SIGINT)
     try:
         roslaunch.wait(ENDING_S)
@@ -107,20 +114,20 @@ def end(roslaunch):
 
 
 def free_port():
-    """A TCP port that nobody listens on."""
+    """TCP port that is not in use."""
     with contextlib.closing(socket.socket()) as probe:
         probe.bind(('localhost', 0))
         return probe.getsockname()[1]
 
 
 def make_bag(path, scenario):
-    """The first images of a scene with their true 2D boxes, rendered once."""
+    """Render the first images of a scene, with their true 2D boxes, to a bag."""
     subprocess.check_call(['rosrun', 'ros_3d_bb', 'scenario_to_bag', scenario, path, '--boxes', '--images', str(IMAGES),
                            '--compression', 'none'], stdout=subprocess.DEVNULL)
 
 
 def row(result):
-    """A result as a line of the table."""
+    """Format a result as a line of the table."""
     nodes = [node for node in result['cpu_percent'] if node not in HARNESS]
     times = ['-' if result[key] is None else '%.1f' % result[key] for key in ('p50_ms', 'p95_ms', 'p99_ms')]
     return COLUMNS % ((result['name'], '%.1f' % result['input_hz'], '%.1f' % result['output_hz']) + tuple(times) + (
@@ -130,7 +137,7 @@ def row(result):
 
 
 def details(result):
-    """By node and by stage, and whether anything grew, as lines of text."""
+    """Format the results by node and by stage, and the trend, as text."""
     trend, grew = result['trend'], result['trend']['rss_mb_per_minute']
     lines = ['  %-22s %5.1f %% of a core, %4.0f MB, %+.2f MB a minute'
              % (node, result['cpu_percent'][node], result['rss_mb'][node], grew[node])
@@ -146,9 +153,9 @@ def details(result):
 
 
 def main():
-    """The command `./run bench latency`."""
+    """Run the command `./run bench latency`."""
     arguments, cases = _arguments()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that everything is ended on the way out
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # runs the cleanup, which ends all processes
     print(describe_machine())
     results = []
     try:

@@ -1,4 +1,5 @@
-"""The node that records, for the latency benchmark, when images were sent and answered, and what that took."""
+"""ROS node of the latency benchmark that records image stamps, arrival times of results, and resource usage of nodes.
+"""
 import functools
 import json
 import os
@@ -18,9 +19,9 @@ from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb_lab.evaluation.latency.process_usage import usage_of
 
-START_TIMEOUT_S = 120.0  # a detector may have to export its network first
+START_TIMEOUT_S = 120.0  # includes the time for exporting the network of a detector
 SAMPLE_S = 1.0
-GRACE_S = 1.0  # answers to the last images are waited for so long
+GRACE_S = 1.0  # waiting time for results of the last images
 STAGES = (('boxes_2d', BOXES_TOPIC, Int32MultiArray), ('boxes_3d', 'ros_3d_bb/bb_3d', BoundingBox3DArray),
           ('tracks', TRACKS_TOPIC, TrackedObjectArray), ('markers', 'visualization_marker_array', MarkerArray))
 
@@ -35,15 +36,15 @@ class LatencyProbeParams(NamedTuple):
 
 
 class LatencyProbeNode(object):
-    """Record stamps and arrivals for a while, and what each node uses meanwhile; then write them down and end.
+    """Record image stamps, arrival times of results, and the resource usage of each node for a period of time.
 
-    Parameters: see `LatencyProbeParams`; launch/latency.launch. The record: see
-    `ros_3d_bb_lab.evaluation.latency.latency_result.result_of`.
+    Afterwards the node writes the record and exits. Parameters: see `LatencyProbeParams`; launch/latency.launch. Format
+    of the record: see `ros_3d_bb_lab.evaluation.latency.latency_result.result_of`.
 
     Subscribes
     ----------
     camera/color/camera_info : sensor_msgs/CameraInfo
-        Stands for the images.
+        Represents the images.
     yolo_bounding_box : std_msgs/Int32MultiArray
         2D boxes.
     ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
@@ -70,7 +71,7 @@ class LatencyProbeNode(object):
             arrivals.append((stamp_ns, arrival_s))
 
     def measure(self):
-        """Wait for markers, measure, write the record."""
+        """Wait for markers, measure, and write the record."""
         self._wait_for_markers()
         time.sleep(self._params.warm_up)
         pids, began_s = pids_of_nodes(), time.time()
@@ -100,7 +101,7 @@ class LatencyProbeNode(object):
 
 
 def stamp_in(message):
-    """The stamp of the image that a message answers, integer nanoseconds; None of markers that there are none of."""
+    """Stamp of the image that a message belongs to, in integer nanoseconds; None for an empty MarkerArray."""
     if isinstance(message, MarkerArray):
         return message.markers[0].header.stamp.to_nsec() if message.markers else None
     if isinstance(message, Int32MultiArray):
@@ -109,7 +110,7 @@ def stamp_in(message):
 
 
 def pids_of_nodes():
-    """{name of a node without its slash: its process id} of all nodes of this master."""
+    """Process IDs of all nodes of this master, {name of the node without leading slash: process ID}."""
     master, pids = rospy.get_master(), {}
     _code, _text, state = master.getSystemState()
     for node in sorted(set(node for kind in state for _name, nodes in kind for node in nodes)):
@@ -119,5 +120,5 @@ def pids_of_nodes():
 
 
 def main():
-    """Run the node until it has measured."""
+    """Run the node until the measurement is complete."""
     run_node('latency_probe_node', LatencyProbeNode, LatencyProbeNode.measure)

@@ -1,27 +1,27 @@
-"""From what latency_probe_node recorded to the figures of one case."""
+"""Results of one case of the latency benchmark, computed from the record of latency_probe_node."""
 import numpy as np
 
-STAGES = ('boxes_2d', 'boxes_3d', 'tracks', 'markers')  # in the order in which an image passes them
-EDGE_S = 60.0  # the beginning and the end of a long run that are compared
+STAGES = ('boxes_2d', 'boxes_3d', 'tracks', 'markers')  # in processing order
+EDGE_S = 60.0  # intervals at the start and at the end that are compared in `trend`
 
 
 def result_of(record):
-    """The figures of a case.
+    """Compute the results of a case.
 
     Parameters
     ----------
     record : dict
-        `began_s`, `ended_s`: the window; `sent_ns`: stamps of the images; `arrivals`: by stage, [stamp in ns, arrival
-        in seconds]; `usage`: by node, [time in s, CPU time in s, memory in MB]. One clock for all. Images of which the
-        stamp is in the window count.
+        `began_s`, `ended_s`: start and end of the measurement; `sent_ns`: stamps of the images; `arrivals`: by stage,
+        [stamp in ns, arrival in seconds]; `usage`: by node, [time in s, CPU time in s, memory in MB]. All times are
+        from the same clock. Only images with a stamp during the measurement are evaluated.
 
     Returns
     -------
     dict
-        As in design §8: rates in Hz, latencies from stamp to arrival of the markers in ms, CPU in percent of a core,
-        memory at the end in MB. `stages_ms`: by stage, the median latency. `trend`: `first` and `last` minute (or half
-        of the window, where that is shorter), and by node how fast memory grew, MB in a minute, in the second half: in
-        the first minute caches fill.
+        Rates in Hz, latencies from the stamp to the arrival of the markers in ms, CPU usage in percent of a core,
+        memory at the end in MB. `stages_ms`: median latency by stage. `trend`: `first` and `last` minute (or half of
+        the measurement, if that is shorter), and the memory growth of each node in MB per minute. The growth is that of
+        the second half, because caches are filled in the first minute.
     """
     began_s, ended_s = record['began_s'], record['ended_s']
     window_s = ended_s - began_s
@@ -40,18 +40,18 @@ def result_of(record):
 
 
 def latencies(sent_ns, arrivals):
-    """When images were taken and how long their answers took.
+    """Stamps and latencies of images.
 
     Parameters
     ----------
     sent_ns : list of int
     arrivals : list of (int, float)
-        Stamp in ns and arrival in seconds; the first of several with one stamp counts.
+        Stamp in ns and arrival in seconds. The first arrival of each stamp is used.
 
     Returns
     -------
     numpy.ndarray, (n, 2)
-        Stamp in seconds and latency in ms of the images that were answered.
+        Stamp in seconds and latency in ms of the images with an arrival.
     """
     arrived_s = {}
     for stamp_ns, arrival_s in arrivals:
@@ -61,14 +61,14 @@ def latencies(sent_ns, arrivals):
 
 
 def percentiles(values_ms):
-    """p50_ms, p95_ms and p99_ms of latencies; None of none."""
+    """p50_ms, p95_ms and p99_ms of latencies; None if there are no latencies."""
     if not len(values_ms):
         return {'p50_ms': None, 'p95_ms': None, 'p99_ms': None}
     return {'p%d_ms' % share: float(np.percentile(values_ms, share)) for share in (50, 95, 99)}
 
 
 def _usage(usage):
-    """CPU and memory by node, and how fast that grows."""
+    """CPU usage, memory and memory growth by node."""
     samples = {node: np.array(rows) for node, rows in usage.items() if len(rows) > 1}
     return {'cpu_percent': {node: float(100 * (rows[-1, 1] - rows[0, 1]) / (rows[-1, 0] - rows[0, 0]))
                             for node, rows in samples.items()},
@@ -78,5 +78,5 @@ def _usage(usage):
 
 
 def _growth(rows):
-    """The slope of memory, MB in a minute; `rows` as in a record, at least two."""
+    """Slope of memory in MB per minute; `rows` as in a record, at least two."""
     return float(np.polyfit(rows[:, 0] - rows[0, 0], rows[:, 2], 1)[0] * 60)

@@ -1,4 +1,4 @@
-"""The node that plays the images of a bag from memory, as a camera that costs as little as possible."""
+"""ROS node that plays the images of a bag from memory, as a simulated camera with minimal CPU usage."""
 import itertools
 import threading
 import time
@@ -25,24 +25,24 @@ class ReplayParams(NamedTuple):
 
 
 class ReplayNode(object):
-    """Play the images of a bag forwards and backwards, so that nobody jumps, each stamped with the time it is sent.
+    """Play the images of a bag forwards and backwards, which avoids jumps, with the time of publication as stamp.
 
-    For bags of `scenario_to_bag` and `session_to_bag`. Parameters: see `ReplayParams`; launch/latency.launch.
+    The bag must be from `scenario_to_bag` or `session_to_bag`. Parameters: see `ReplayParams`; launch/latency.launch.
 
     Publishes
     ---------
     camera/color/image_raw : sensor_msgs/Image
-        Colour.
+        Colour image.
     camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth with the pixels of the colour image.
+        Depth image, aligned to colour.
     camera/color/camera_info : sensor_msgs/CameraInfo
-        Of the colour camera.
+        Intrinsics of the colour camera.
     camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
-        The same, as depth is aligned to colour.
+        The same intrinsics, because depth is aligned to colour.
     /tf : tf2_msgs/TFMessage
         From the map to the camera.
     yolo_bounding_box : std_msgs/Int32MultiArray
-        The 2D boxes in the bag; only with ~boxes.
+        2D boxes in the bag; only with ~boxes.
     """
 
     def __init__(self):
@@ -57,7 +57,7 @@ class ReplayNode(object):
         thread.start()
 
     def _run(self):
-        """Publish at the rate; an image that is late by a whole period is left out."""
+        """Publish at the configured rate. Images that are late by more than a period are skipped."""
         period_s, due_s = 1.0 / self._params.rate, time.monotonic()
         for messages in itertools.cycle(self._images + self._images[-2:0:-1]):
             due_s += period_s

@@ -1,4 +1,4 @@
-"""The noise analysis of the thesis' chapter 5, for any measurements: `./run noise`.
+"""Noise analysis of chapter 5 of the thesis for arbitrary measurements: `./run noise`.
 
 May import: estimation, sessions, ros_3d_bb_lab.evaluation.
 """

@@ -9,7 +9,7 @@ from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements, rea
 
 
 def main():
-    """The command `./run noise`."""
+    """Run the command `./run noise`."""
     arguments = _arguments()
     try:
         inputs = _inputs(arguments)
@@ -23,7 +23,7 @@ def main():
 
 
 def _inputs(arguments):
-    """The measurements that the arguments name. Raises ValueError."""
+    """Read the measurements that the arguments name. Raises ValueError."""
     camera = arguments.camera
     if arguments.session:
         estimator = arguments.estimator or 'foreground'

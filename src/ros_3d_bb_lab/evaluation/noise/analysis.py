@@ -1,4 +1,4 @@
-"""The noise analysis as one value: statistics of both axes, the theory, and the error models that come of them."""
+"""Noise analysis: statistics of both axes, comparison with theory, and the resulting error models."""
 import datetime
 import os
 from typing import Any, NamedTuple, Optional
@@ -12,12 +12,14 @@ from ros_3d_bb_lab.evaluation.noise.statistics import AxisStatistics, axis_stati
 from ros_3d_bb_lab.evaluation.noise.tables import MeasurementTable, clusters_of
 
 Z_DEGREE, X_DEGREE = 2, 1
-RMS_FIT_FROM_M = 1.5  # nearer, the error does not go with the square of the distance (thesis 5.2)
+RMS_FIT_FROM_M = 1.5  # below, the error is not quadratic in the distance (thesis 5.2)
 
 
 class Inputs(NamedTuple):
-    """Measurements for z, for x, and for the variance of x (the thesis leaves out people cut by the image's edge), and
-    who made them."""
+    """Measurements for z, for x, and for the variance of x, with the estimator and the camera that produced them.
+
+    The measurements for the variance of x exclude people truncated by the image border, as in the thesis.
+    """
 
     z: MeasurementTable
     x: MeasurementTable
@@ -27,11 +29,14 @@ class Inputs(NamedTuple):
 
 
 class Analysis(NamedTuple):
-    """What `./run noise` found. `x` has the mean error, `x_variance` the variances; `rms_poly` is the curve through the
-    RMS of z from RMS_FIT_FROM_M on, or None; `z_between`, `x_between` see `share_between_positions`.
+    """Results of `./run noise`.
 
-    `model` is the cross-validated error model, None where `no_model` says why; `thesis_form` is the one of the thesis'
-    form: the same polynomials, the largest variance everywhere; None where its bias has no inverse.
+    `x` contains the mean errors, and `x_variance` the variances. `rms_poly` is the polynomial fitted to the RMS error
+    of z from RMS_FIT_FROM_M on, or None; `z_between` and `x_between` are from `share_between_positions`.
+
+    `model` is the cross-validated error model; if it is None, `no_model` is the reason. `thesis_form` is the error
+    model in the form of the thesis, with the same polynomials and the largest variance at all positions; None if its
+    bias is not invertible.
     """
 
     inputs: Inputs
@@ -47,7 +52,7 @@ class Analysis(NamedTuple):
 
 
 def analyse(inputs):
-    """Do the analysis. Raises ValueError where there is too little to analyse."""
+    """Run the analysis. Raises ValueError if there are too few measurements."""
     z, x, x_variance = (axis_statistics(clusters_of(measurements, axis), degree) for measurements, axis, degree in (
         (inputs.z, 'Z', Z_DEGREE), (inputs.x, 'X', X_DEGREE), (inputs.x_variance, 'X', X_DEGREE)))
     thesis_form, reason = _or_reason(_thesis_form, inputs, z, x, x_variance)
@@ -58,7 +63,7 @@ def analyse(inputs):
 
 
 def summary_of(analysis):
-    """The analysis as a dictionary, see design section 8: lengths in metres."""
+    """Summary of the analysis as a dictionary, as stored in summary.json. Lengths are in metres."""
     x = dict(_axis_summary(analysis.x), max_variance_m2=analysis.x_variance.max_variance_m2,
              max_sigma_m=analysis.x_variance.max_sigma_m,
              variance_clusters=_axis_summary(analysis.x_variance)['clusters'])
@@ -75,7 +80,7 @@ def _axis_summary(axis):
 
 
 def _or_reason(function, *arguments):
-    """(what a function returns, '') or (None, why it refuses)."""
+    """Call a function. Returns (result, '') or, if it raises ValueError, (None, message)."""
     try:
         return function(*arguments), ''
     except ValueError as error:
@@ -90,7 +95,7 @@ def _origin(inputs):
 
 
 def _thesis_form(inputs, z, x, x_variance):
-    """The error model that the thesis would publish of these statistics."""
+    """Error model in the form of the thesis, from these statistics."""
     source, camera, date = _origin(inputs)
     z_m, x_m = ([cluster.truth_m for cluster in axis.clusters] for axis in (z, x))
     count = sum(cluster.count for cluster in z.clusters)

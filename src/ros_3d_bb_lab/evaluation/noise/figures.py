@@ -1,4 +1,4 @@
-"""The figures of the thesis' chapter 5, as PNG files."""
+"""Figures of chapter 5 of the thesis as PNG files."""
 import matplotlib
 import numpy as np
 from scipy import stats
@@ -6,7 +6,7 @@ from scipy import stats
 from ros_3d_bb_lab.evaluation.noise import theory
 from ros_3d_bb_lab.evaluation.noise.analysis import RMS_FIT_FROM_M
 
-matplotlib.use('Agg')  # no screen is needed
+matplotlib.use('Agg')  # works without a display
 import matplotlib.pyplot as plt  # noqa: E402
 
 SIZE_IN, DPI = (7.2, 4.2), 110
@@ -16,7 +16,7 @@ MEASURED, FITTED, THEORY, OTHER = 'tab:blue', 'tab:orange', 'tab:green', '0.55'
 
 
 def write_figures(folder, analysis, z_clusters, x_clusters):
-    """Write all figures into a folder; the clusters' errors are for the histograms. Returns nothing."""
+    """Write all figures into a folder. The errors of the clusters are used for the histograms."""
     rms(folder / 'figure_5_2.png', analysis)
     error_by_truth(folder / 'figure_5_3.png', analysis.z, 'Z')
     variances(folder / 'figure_5_4.png', analysis.z, 'Z')
@@ -27,7 +27,7 @@ def write_figures(folder, analysis, z_clusters, x_clusters):
 
 
 def polynomial_text(poly, variable):
-    """A polynomial as people write it: −0.040 z² + 0.060 z + 0.008."""
+    """Format a polynomial in mathematical notation: −0.040 z² + 0.060 z + 0.008."""
     text = ''
     for power, value in zip(range(len(poly) - 1, -1, -1), poly):
         sign = ('−' if value < 0 else '+') if text else ('−' if value < 0 else '')
@@ -37,7 +37,7 @@ def polynomial_text(poly, variable):
 
 
 def rms(path, analysis):
-    """Figure 5.2: RMS of the depth error by distance, against the theory of stereo cameras."""
+    """Figure 5.2: RMS of the depth error by distance, and the theoretical error of stereo cameras."""
     clusters = analysis.z.clusters
     distance_m = np.linspace(0, 1.05 * max(cluster.truth_m for cluster in clusters), 100)
     figure, axes = plt.subplots(figsize=SIZE_IN)
@@ -60,7 +60,7 @@ def rms(path, analysis):
 
 
 def error_by_truth(path, axis, name):
-    """Figures 5.3 and 5.5: mean error by true value, one standard deviation as bars, and the fitted polynomial."""
+    """Figures 5.3 and 5.5: mean error by true value, with bars of one standard deviation, and the fitted polynomial."""
     truth_m = np.array([cluster.truth_m for cluster in axis.clusters])
     figure, axes = plt.subplots(figsize=SIZE_IN)
     axes.axhline(0, color='0.8', linewidth=1)
@@ -74,7 +74,7 @@ def error_by_truth(path, axis, name):
 
 
 def variances(path, axis, name):
-    """Figures 5.4 and 5.6: the variance of each cluster."""
+    """Figures 5.4 and 5.6: variance of each cluster."""
     figure, axes = plt.subplots(figsize=SIZE_IN)
     places = np.arange(len(axis.clusters))
     axes.bar(places, [cluster.variance_m2 for cluster in axis.clusters], color=MEASURED)
@@ -89,7 +89,7 @@ def variances(path, axis, name):
 
 
 def histograms(path, clusters, name):
-    """Figures 5.7 and 5.8: the errors of each cluster as a density, with the best Gaussian."""
+    """Figures 5.7 and 5.8: density of the errors of each cluster, with the fitted Gaussian."""
     rows = -(-len(clusters) // COLUMNS)
     figure, grid = plt.subplots(rows, COLUMNS, figsize=(9, 2.4 * rows), squeeze=False)
     for axes, cluster in zip(grid.ravel(), clusters):

@@ -1,4 +1,4 @@
-"""Pieces of an HTML page: what a person reads."""
+"""Elements of an HTML page."""
 import html
 
 HEAD = '''<!DOCTYPE html>
@@ -12,28 +12,28 @@ img { max-width: 100%%; } figure { margin: 1.5em 0; } figcaption { color: #555; 
 
 
 def page(title, pieces):
-    """A whole page of pieces."""
+    """Complete page with the given elements."""
     return HEAD % html.escape(title) + '<h1>%s</h1>\n' % html.escape(title) + '\n'.join(pieces) + '\n</body></html>\n'
 
 
 def heading(text):
-    """A heading."""
+    """Heading."""
     return '<h2>%s</h2>' % html.escape(text)
 
 
 def paragraph(*sentences):
-    """Sentences, those that are empty left out; no markup."""
+    """Paragraph of sentences without markup. Empty sentences are skipped."""
     return '<p>%s</p>' % html.escape(' '.join(sentence for sentence in sentences if sentence))
 
 
 def table(header, rows):
-    """A table of texts."""
+    """Table of texts."""
     lines = [_row('th', header)] + [_row('td', row) for row in rows]
     return '<table>\n%s\n</table>' % '\n'.join(lines)
 
 
 def figure(name, caption):
-    """An image file beside the page, with what it shows."""
+    """Image file in the folder of the page, with a caption."""
     caption = html.escape(caption)
     return '<figure><img src="%s" alt="%s"><figcaption>%s</figcaption></figure>' % (name, caption, caption)
 

@@ -1,14 +1,14 @@
-"""The noise analysis as a page that a person reads from top to bottom."""
+"""HTML report of the noise analysis."""
 from ros_3d_bb_lab.evaluation.noise import theory
 from ros_3d_bb_lab.evaluation.noise.figures import RMS_FIT_FROM_M, polynomial_text
 from ros_3d_bb_lab.evaluation.noise.html_page import figure, heading, page, paragraph, table
 from ros_3d_bb_lab.evaluation.noise.statistics import DISTRIBUTIONS, LEAST_TO_TEST
 
-SIMILAR = 0.05  # of log likelihood a measurement: less says nothing
+SIMILAR = 0.05  # log-likelihood per measurement; smaller differences are not significant
 
 
 def report_of(analysis):
-    """The report as HTML; its figures are the files of `figures.write_figures` beside it."""
+    """Report as HTML. It refers to the files of `figures.write_figures` in the same folder."""
     return page('Noise analysis', _summary(analysis) + _theory(analysis) + _z(analysis) + _x(analysis)
                 + _distributions(analysis) + _model(analysis))
 
@@ -168,7 +168,7 @@ def _distribution_row(name, cluster):
 
 
 def _best_text(analysis):
-    """Which distribution predicts best, over all clusters by their numbers of measurements."""
+    """Distribution with the highest log-likelihood over all clusters, weighted by their number of measurements."""
     clusters = [cluster for _name, cluster in _all_clusters(analysis) if cluster.tested]
     if not clusters:
         return ''
@@ -198,7 +198,7 @@ def _all_clusters(analysis):
 
 
 def _gaussian_count(analysis):
-    """(number of clusters that could be tested, how many of them neither test rejects)."""
+    """Number of tested clusters, and number of those for which neither test rejects a Gaussian."""
     tested = [cluster for _name, cluster in _all_clusters(analysis) if cluster.tested]
     return len(tested), sum(cluster.looks_gaussian for cluster in tested)
 

@@ -1,4 +1,4 @@
-"""What the noise analysis leaves: a folder with report, figures, summary and error models, and a few lines of text."""
+"""Output of the noise analysis: a folder with report, figures, summary and error models, and a short text."""
 import json
 
 from ros_3d_bb.estimation.error_model import write_error_model
@@ -9,8 +9,9 @@ from ros_3d_bb_lab.evaluation.noise.tables import clusters_of
 
 
 def write_results(folder, analysis):
-    """Write the report with its figures, summary.json and the error models into a folder (pathlib), made where
-    missing. Raises OSError.
+    """Write the report with its figures, summary.json and the error models into a folder (pathlib.Path).
+
+    The folder is created if it does not exist. Raises OSError.
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_figures(folder, analysis, clusters_of(analysis.inputs.z, 'Z'), clusters_of(analysis.inputs.x_variance, 'X'))
@@ -23,7 +24,7 @@ def write_results(folder, analysis):
 
 
 def text_of(analysis):
-    """Mean error and spread of both axes as people write them, a line each."""
+    """Mean error and standard deviation of both axes as text, one line per axis."""
     return '\n'.join(
         'f(%s) = %s, largest variance %.5f m², standard deviation %.4f m'
         % (name, polynomial_text(axis.poly, name), variances.max_variance_m2, variances.max_sigma_m)

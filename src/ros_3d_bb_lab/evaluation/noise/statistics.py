@@ -1,4 +1,4 @@
-"""Clusters of errors in numbers: moments, tests for a Gaussian, and which distribution predicts the errors best."""
+"""Statistics of clusters of errors: moments, normality tests, and held-out likelihoods of distributions."""
 from typing import NamedTuple, Optional
 
 import numpy as np
@@ -6,19 +6,23 @@ from scipy import stats
 
 from ros_3d_bb_lab.evaluation.noise.tables import AXES
 
-LEAST_SCALE_M = 0.001  # values come in whole millimetres: a density must not rise above what that can show
+LEAST_SCALE_M = 0.001  # values are rounded to millimetres: limits the density to what this resolution supports
 FOLDS = 5
 EM_STEPS = 60
-FREEDOMS = (1, 2, 4, 8, 16, 64)  # of Student's t: from long tails to almost a Gaussian
-NARROWEST_PART = 0.25  # of a mixture, in standard deviations of the whole: a part must not settle on one value
+FREEDOMS = (1, 2, 4, 8, 16, 64)  # of Student's t distribution, from heavy tails to nearly Gaussian
+NARROWEST_PART = 0.25  # of a mixture, relative to the total standard deviation; prevents a collapse to one value
 SIGNIFICANCE = 0.05
-LEAST_TO_TEST = 8  # measurements; with fewer the critical values of Anderson-Darling are none
+LEAST_TO_TEST = 8  # measurements; the critical values of Anderson-Darling are undefined below
 
 
 class ClusterStatistics(NamedTuple):
-    """Of one cluster, metres: variance as the thesis has it (divided by n); `shapiro_p` the p value of Shapiro-Wilk;
-    `anderson` the statistic of Anderson-Darling and its critical value at 5 %; `log_likelihoods` of the distributions
-    in DISTRIBUTIONS, a measurement held out. The last four are None where all errors are equal, or fewer than 8."""
+    """Statistics of one cluster, in metres.
+
+    `variance_m2` is divided by n, as in the thesis; `shapiro_p` is the p-value of the Shapiro-Wilk test; `anderson` is
+    the Anderson-Darling statistic, with its critical value at 5 %; `log_likelihoods` are the held-out log-likelihoods
+    per measurement of the distributions in DISTRIBUTIONS. The last four fields are None if all errors are equal, or if
+    there are fewer than 8.
+    """
 
     truth_m: float
     count: int
@@ -37,7 +41,7 @@ class ClusterStatistics(NamedTuple):
 
     @property
     def tested(self):
-        """Whether there was enough to test."""
+        """Whether there were enough measurements for the tests."""
         return self.shapiro_p is not None
 
     @property
@@ -47,24 +51,24 @@ class ClusterStatistics(NamedTuple):
 
 
 class AxisStatistics(NamedTuple):
-    """Of one axis: the polynomial of the clusters' mean error by true value, highest power first, and the clusters."""
+    """Clusters of one axis, and the polynomial of their mean error by true value, highest power first."""
 
     poly: tuple
     clusters: tuple
 
     @property
     def max_variance_m2(self):
-        """The largest variance of all clusters."""
+        """Largest variance of the clusters."""
         return max(cluster.variance_m2 for cluster in self.clusters)
 
     @property
     def max_sigma_m(self):
-        """The largest standard deviation of all clusters."""
+        """Largest standard deviation of the clusters."""
         return float(np.sqrt(self.max_variance_m2))
 
 
 def axis_statistics(clusters, degree):
-    """Statistics of clusters, and the polynomial through their means, each of equal weight (as in the thesis).
+    """Compute the statistics of clusters, and fit a polynomial to their means with equal weights (as in the thesis).
 
     Raises
     ------
@@ -80,8 +84,11 @@ def axis_statistics(clusters, degree):
 
 
 def share_between_positions(measurements, axis):
-    """Share 0..1 of the variance within the clusters of an axis that is between positions with another true value on
-    the other axis; None where not both are known."""
+    """Share 0..1 of the variance within the clusters of an axis that the other axis explains.
+
+    This is the variance between positions with different true values on the other axis. None if no measurement has
+    both.
+    """
     known = measurements.complete()
     number = AXES.index(axis)
     error_m = known.measured_m[:, 2 * number] - known.truth_m[:, number]
@@ -94,13 +101,13 @@ def share_between_positions(measurements, axis):
 
 
 def _variance_within(values, group):
-    """Mean square of values (n,) around the mean of their group (n,)."""
+    """Mean squared deviation of values (n,) from the mean of their group (n,)."""
     counts = np.bincount(group)
     return float(np.mean((values - (np.bincount(group, values) / counts)[group]) ** 2))
 
 
 def cluster_statistics(cluster):
-    """ClusterStatistics of a Cluster."""
+    """Compute the ClusterStatistics of a Cluster."""
     error_m = cluster.error_m
     moments = (cluster.truth_m, len(error_m), float(error_m.mean()), float(error_m.var()),
                float(np.sqrt((error_m ** 2).mean())))
@@ -113,31 +120,31 @@ def cluster_statistics(cluster):
 
 
 def held_out_log_likelihood(values_m, fit):
-    """Mean log density of values, each under the distribution that `fit` makes of the other folds (of five)."""
+    """Mean log-density of values under the distributions that `fit` estimates by five-fold cross-validation."""
     fold = np.random.RandomState(0).permutation(len(values_m)) % FOLDS
     total = sum(fit(values_m[fold != number])(values_m[fold == number]).sum() for number in np.unique(fold))
     return float(total / len(values_m))
 
 
 def fit_gaussian(values_m):
-    """The log density function of the likeliest Gaussian."""
+    """Log-density function of the maximum-likelihood Gaussian."""
     return stats.norm(values_m.mean(), max(values_m.std(), LEAST_SCALE_M)).logpdf
 
 
 def fit_laplace(values_m):
-    """The log density function of the likeliest Laplace distribution: sharper, with longer tails."""
+    """Log-density function of the maximum-likelihood Laplace distribution (sharper peak, longer tails)."""
     location, scale = stats.laplace.fit(values_m)
     return stats.laplace(location, max(scale, LEAST_SCALE_M)).logpdf
 
 
 def fit_student(values_m):
-    """The log density function of the likeliest Student t distribution: a Gaussian with outliers."""
+    """Log-density function of the maximum-likelihood Student t distribution, a Gaussian with outliers."""
     candidates = [stats.t(freedom, *_student_location_scale(values_m, freedom)).logpdf for freedom in FREEDOMS]
     return max(candidates, key=lambda density: density(values_m).sum())
 
 
 def _student_location_scale(values_m, freedom):
-    """The likeliest location and scale for so many degrees of freedom, by expectation maximisation."""
+    """Maximum-likelihood location and scale for given degrees of freedom, by expectation maximisation."""
     location_m, scale_m = np.median(values_m), max(values_m.std(), LEAST_SCALE_M)
     for _ in range(EM_STEPS):
         weights = (freedom + 1) / (freedom + ((values_m - location_m) / scale_m) ** 2)
@@ -147,10 +154,14 @@ def _student_location_scale(values_m, freedom):
 
 
 def fit_mixture(values_m):
-    """The log density function of two Gaussians, by expectation maximisation from the lower and the upper half."""
+    """Log-density function of a mixture of two Gaussians.
+
+    The mixture is fitted by expectation maximisation, which is initialised with the lower and the upper half of the
+    values.
+    """
     upper = values_m > np.median(values_m)
     narrowest_m = max(LEAST_SCALE_M, NARROWEST_PART * values_m.std())
-    share = np.stack((~upper, upper)).astype(float)  # (2, n): of each value in each Gaussian
+    share = np.stack((~upper, upper)).astype(float)  # (2, n): responsibilities
     for _ in range(EM_STEPS):
         weights = np.maximum(share.mean(axis=1), 1e-6)
         means_m = (share * values_m).sum(axis=1) / (weights * len(values_m))

@@ -1,7 +1,8 @@
-"""Measurements with ground truth, from tables of the thesis' form or from a measurement session, in clusters.
+"""Measurements with ground truth, from tables in the format of the thesis or from sessions, and their clusters.
 
-A table is a CSV file in millimetres with the columns `X measured`, `X true`, `Z measured`, `Z true`; cells of an axis
-that was not measured are empty, or its columns missing. Columns `X error`, `Z error` are checked; others are not read.
+A table is a CSV file in millimetres with the columns `X measured`, `X true`, `Z measured`, `Z true`. Cells of an axis
+that was not measured are empty, or its columns are missing. The columns `X error` and `Z error` are checked; other
+columns are ignored.
 """
 import csv
 from typing import NamedTuple
@@ -13,16 +14,19 @@ from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
 AXES = ('X', 'Z')
 LEAST_IN_CLUSTER = 3
-ROUNDING_MM = 1.01  # errors may be differences of values that were rounded afterwards
+ROUNDING_MM = 1.01  # errors may have been computed before the values were rounded
 
 
 class TableError(ValueError):
-    """Measurements that cannot be used: says where, what is wrong and what was expected."""
+    """Measurements that cannot be used. The message contains the place, the fault, and what was expected."""
 
 
 class MeasurementTable(NamedTuple):
-    """`measured_m` (n, 3) as x, y, z, and `truth_m` (n, 2) as x, z, metres; nan where not measured. `name` says where
-    they come from; `cut` (n,) whether the person is cut by the left or right edge of the image, where known."""
+    """Measured positions with ground truth.
+
+    `measured_m` (n, 3) as x, y, z and `truth_m` (n, 2) as x, z are in metres, NaN if not measured. `name` is the source
+    of the measurements. `cut` (n,) is whether the left or right image border truncates the person, if known.
+    """
 
     name: str
     measured_m: np.ndarray
@@ -30,11 +34,14 @@ class MeasurementTable(NamedTuple):
     cut: np.ndarray
 
     def complete(self):
-        """Those with all of x and z."""
+        """Select the measurements with x and z."""
         return self._part(np.isfinite(self.measured_m[:, [0, 2]]).all(axis=1) & np.isfinite(self.truth_m).all(axis=1))
 
     def whole(self):
-        """Those of people who are not cut by the left or right edge, where at least 3 of them share their true x."""
+        """Select the measurements of people that the left and right image borders do not truncate.
+
+        Clusters of true x with fewer than 3 such measurements are left out.
+        """
         whole = self._part(~self.cut)
         values_m, counts = np.unique(whole.truth_m[:, 0], return_counts=True)
         return whole._part(np.isin(whole.truth_m[:, 0], values_m[counts >= LEAST_IN_CLUSTER]))
@@ -44,19 +51,20 @@ class MeasurementTable(NamedTuple):
 
 
 class Cluster(NamedTuple):
-    """Errors (n,) of all measurements with one true value on an axis, metres."""
+    """Errors (n,), in metres, of all measurements with the same true value on one axis."""
 
     truth_m: float
     error_m: np.ndarray
 
 
 def clusters_of(measurements, axis):
-    """The clusters of an axis, 'X' or 'Z', by their true value.
+    """Group the errors of an axis, 'X' or 'Z', by true value.
 
     Raises
     ------
     TableError
-        If there are no measurements of the axis, all are in one cluster, or a cluster has fewer than 3.
+        If there are no measurements of the axis, if there is only one cluster, or if a cluster has fewer than 3
+        measurements.
     """
     number = AXES.index(axis)
     truth_m, measured_m = measurements.truth_m[:, number], measurements.measured_m[:, 2 * number]
@@ -85,7 +93,8 @@ def read_table(path, axis):
     Raises
     ------
     TableError
-        If the file cannot be read, a column is missing, or a cell is no number (names the line).
+        If the file cannot be read, a column is missing, or a cell is not a number. The message contains the line
+        number.
     """
     try:
         with open(path, encoding='utf-8-sig', newline='') as stream:
@@ -107,23 +116,23 @@ def read_table(path, axis):
 
 
 def read_session_measurements(folder, estimator):
-    """What an estimator makes of a measurement session.
+    """Apply an estimator to a measurement session.
 
     Parameters
     ----------
     folder : str
     estimator : str
-        A name for `estimator_named`, or 'recorded': the estimates stored in the session.
+        Name for `estimator_named`, or 'recorded' for the estimates stored in the session.
 
     Returns
     -------
     MeasurementTable
-        Of the frames with ground truth and an estimate.
+        Measurements of the frames with ground truth and an estimate.
 
     Raises
     ------
     ValueError
-        If the session cannot be read, or no frame of it can be used.
+        If the session cannot be read, or none of its frames can be used.
     """
     session = read_session(folder)
     found = [(frame, _estimate(frame, session, estimator)) for frame in session.frames if frame.truth_m is not None]
@@ -136,7 +145,7 @@ def read_session_measurements(folder, estimator):
 
 
 def _estimate(frame, session, name):
-    """Position (3,) of the person of a frame, the first box, or None."""
+    """Position (3,) of the annotated person of a frame, whose box is the first one, or None."""
     if name == 'recorded':
         return frame.estimate_m
     boxes = estimate_boxes(read_depth(frame, session), frame.boxes_px, session.camera, estimator_named(name))
@@ -149,7 +158,7 @@ def _is_cut(frame, camera):
 
 
 def _axis_of(row, axis, where):
-    """(measured, true) of one axis of a row, millimetres; nan where the row has none."""
+    """(measured, true) of one axis of a row, in millimetres; NaN if the row has no values."""
     measured, true, error = (_number(row.get('%s %s' % (axis, kind)), where, '%s %s' % (axis, kind))
                              for kind in ('measured', 'true', 'error'))
     if np.isnan(measured) != np.isnan(true):

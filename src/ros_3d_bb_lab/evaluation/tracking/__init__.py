@@ -1,4 +1,4 @@
-"""The tracking benchmark: trackers on detections of a robot among pedestrians.
+"""Tracking benchmark: trackers on simulated detections from a robot among recorded pedestrians.
 
 May import: camera, core, tracking, ros_3d_bb_lab.evaluation, ros_3d_bb_lab.evaluation.baselines,
 ros_3d_bb_lab.simulation.

@@ -1,6 +1,6 @@
-"""Trackers on detections of a camera on a robot, which stands or drives among recorded pedestrians, against the truth.
+"""Compare trackers on simulated detections from a camera on a standing or driving robot among recorded pedestrians.
 
-Detections have the errors that the thesis measured. Without recordings the package makes some.
+Detection errors are as measured in the thesis. Without recordings, pedestrian trajectories are generated.
 """
 import argparse
 import json
@@ -16,7 +16,7 @@ from ros_3d_bb_lab.simulation.scenario import ScenarioError
 
 
 def main():
-    """The command `./run bench tracking`."""
+    """Run the command `./run bench tracking`."""
     arguments = _arguments()
     try:
         if arguments.scenarios:
@@ -31,7 +31,7 @@ def main():
 
 
 def bench(arguments):
-    """Run and print the comparison. Returns the results of design §8."""
+    """Run the comparison and print it. Returns the settings and the scores of each tracker, as written by --json."""
     sequences = read_sequences(arguments.data) if arguments.data else made_sequences(arguments.seed)
     names = [sequence.name for sequence in sequences]
     print('sequences: %s (%s), seed %d' % (', '.join(names), arguments.data or 'made; no recordings are at hand',
@@ -47,7 +47,7 @@ def bench(arguments):
 
 
 def _say(run, scores):
-    """One line for a run."""
+    """Print one line for a run."""
     print('  %-24s %4d images, HOTA %s' % (run.name, len(run.images), ', '.join(
         '%s %.1f' % (name, tracker['hota']) for name, tracker in scores.items())), flush=True)
 

@@ -1,4 +1,4 @@
-"""Our tracker, the thesis' and a library's on the same detections of robots among pedestrians."""
+"""Comparison of our tracker, the thesis' and Norfair on the same detections from robots among pedestrians."""
 from typing import Any, NamedTuple
 
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
@@ -19,7 +19,11 @@ ROWS = (('hota', '%.1f'), ('assa', '%.1f'), ('deta', '%.1f'), ('mota', '%.1f'), 
 
 
 class Contestant(NamedTuple):
-    """A tracker to be compared: its name in the results, what makes one, and `outputs`, which lets one follow a run."""
+    """Tracker to be compared.
+
+    `name` is its name in the results, `make` creates a tracker, and `outputs(make, run)` returns what it publishes on a
+    run.
+    """
 
     name: str
     make: Any
@@ -27,12 +31,12 @@ class Contestant(NamedTuple):
 
 
 def outputs_of(make_tracker, run):
-    """What a tracker publishes after each image of a run."""
+    """Tracks that a tracker publishes after each image of a run."""
     tracker = make_tracker()
     return [tracker.update(image.stamp_ns, image.detections, image.view) for image in run.images]
 
 
-# `thesis` is the tracker that the thesis' own package ran, `thesis_mended` the one of `~tracker: thesis`.
+# `thesis` is the tracker as implemented in the thesis' package; `thesis_mended` is that of `~tracker: thesis`.
 CONTESTANTS = (Contestant('ours', Tracker, outputs_of),
                Contestant('thesis', OriginalTracker, lambda make, run: outputs_of(make, as_it_arrived(run))),
                Contestant('thesis_mended', ThesisTracker, outputs_of), Contestant('library', Norfair, outputs_of))
@@ -40,7 +44,7 @@ BOUND = Contestant('perfect_association', Tracker, outputs_with_perfect_associat
 
 
 def runs_of(sequences, seed, repetitions, seconds=SECONDS):
-    """The runs of a benchmark, one after the other: each sequence with a robot that stands and one that drives."""
+    """Yield the runs of a benchmark: each sequence with a standing and with a driving robot."""
     for sequence in sequences:
         for motion in (STANDING, DRIVING):
             for repetition in range(repetitions):
@@ -48,19 +52,19 @@ def runs_of(sequences, seed, repetitions, seconds=SECONDS):
 
 
 def compare(runs, contestants, on_run=None):
-    """The scores of design §8 of each tracker, but for `cpu_ms`; {name: scores}.
+    """Score each tracker on all runs. Returns {name: scores}, without `cpu_ms`.
 
     Parameters
     ----------
     runs : iterable of run_generator.Run
     contestants : sequence of Contestant
     on_run : callable, optional
-        Called with each run and {name: scores} of it, once it is done.
+        Called after each run with the run and its {name: scores}.
 
     Raises
     ------
     ValueError
-        If there is no run, or a library is missing.
+        If there are no runs, or an optional library is not installed.
     """
     scores = {contestant.name: [] for contestant in contestants}
     for run in runs:
@@ -78,7 +82,7 @@ def cpu_times(contestants):
 
 
 def table(trackers):
-    """The scores {name: scores} as lines of text."""
+    """Format {name: scores} as lines of text."""
     lines = ['%-22s' % '' + ''.join('%20s' % name for name in trackers)]
     rows = [(key, [form % scores[key] if scores[key] is not None else '-' for scores in trackers.values()])
             for key, form in ROWS]

@@ -1,7 +1,7 @@
-"""What a D435 on a robot shows of people who are upright cylinders, and how far off their measured positions are.
+"""Model of a D435 on a robot: visibility of people as vertical cylinders, and errors of their measured positions.
 
-Convention: the camera looks along its bearing 0, bearings grow to the left; `depth` is along the optical axis, `range`
-along the ground to the person.
+Convention: bearings are relative to the optical axis and positive to the left; `depth` is along the optical axis,
+`range` is the horizontal distance to the person.
 """
 from typing import NamedTuple
 
@@ -11,20 +11,26 @@ from ros_3d_bb.camera.camera_model import Camera
 
 SIZE_PX = 1280, 720
 BODY_RADIUS_M = 0.25
-BLIND_M = 0.2  # who is nearer stands above the camera or behind its glass, and hides nobody
-# Thesis 5.2: what is measured minus what is, by depth in metres; measured up to 3 m, so beyond it grows with depth.
+BLIND_M = 0.2  # nearer people do not occlude others: they are above the camera or behind its cover glass
+# Thesis 5.2: measured minus true depth, polynomial of depth in metres. Fitted up to 3 m; proportional to depth beyond.
 THESIS_BIAS, THESIS_BIAS_UP_TO_M = (-0.04, 0.06, 0.008), 3.0
-HEIGHT_SIGMA_M = 0.1  # of the centre, as the error models that ship with the package say
+HEIGHT_SIGMA_M = 0.1  # of the centre, as in the error models in config/error_models
 
 
 class CameraModel(NamedTuple):
-    """A camera with its detector and its calibration.
+    """Camera with its detector and its calibration.
 
-    `field_of_view` in radians, sharp from `nearest_m` of depth to `farthest_m` of range. Depth errors: the stereo law
-    of `matching_px`, `focal_px` and `baseline_m`, `depth_floor_m` in each image, and `slow_depth_m`, which changes
-    over `slow_s`; sideways `side_floor_m` and `slow_side_m`. `bias_left` is the share of the thesis' bias that
-    calibration leaves. An outlier is `outlier_m` (from, to) too deep, as background in the box makes it.
-    `sway_m` is what a walking body moves sideways by. Shares are of the time, with stretches of the given length.
+    `field_of_view` is in radians; the image is sharp from the depth `nearest_m` to the range `farthest_m`.
+
+    Depth errors consist of the stereo error with `matching_px`, `focal_px` and `baseline_m`, of `depth_floor_m`
+    (independent in each image), and of `slow_depth_m` with the correlation time `slow_s`. Lateral errors consist of
+    `side_floor_m` and `slow_side_m`. `sway_m` is the amplitude of the lateral sway of a walking person. `bias_left` is
+    the share of the thesis' bias that remains after calibration. An outlier has a depth error in the interval
+    `outlier_m` (from, to), as from background in the box.
+
+    `outlier_share` and `miss_share` are shares of the time, in intervals of the mean length `outlier_s` and `miss_s`.
+    `false_rate` is the probability per image of a new false detection, which lasts for `false_s` on average.
+    `double_share` is the probability that a detection has a duplicate.
     """
 
     field_of_view: float = np.radians(69.0)
@@ -51,19 +57,19 @@ class CameraModel(NamedTuple):
 
     @property
     def intrinsics(self):
-        """A camera without distortion that sees as wide, with square pixels and 16:9."""
+        """Camera with this field of view, without distortion, with square pixels and an aspect ratio of 16:9."""
         width, height = SIZE_PX
         focal_px = width / 2.0 / np.tan(self.field_of_view / 2)
         return Camera(width, height, focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0)
 
     def depth_sigma_m(self, depth_m):
-        """Standard deviation of the depth's error from image to image."""
+        """Standard deviation of the depth error that is independent in each image."""
         return np.hypot(self.depth_floor_m, np.square(depth_m) * self.matching_px / (self.focal_px * self.baseline_m))
 
     def covariance_m2(self, bearing, depth_m):
-        """What an error model says of a position: (3, 3) in the optical frame, square metres.
+        """Covariance of a position according to an error model, (3, 3) in the optical frame, square metres.
 
-        Along the ray and across it, each with the slow part, as a fit to many measurements finds them.
+        The errors along and across the ray include the slow part, as in a fit to many measurements.
         """
         along_m2 = self.depth_sigma_m(depth_m) ** 2 + self.slow_depth_m ** 2
         across_m2 = self.side_floor_m ** 2 + self.slow_side_m ** 2
@@ -75,8 +81,10 @@ class CameraModel(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """What an image shows of people (n,): the largest visible `share` of each one's width, 0..1, the bearing of its
-    `middle`, and whether the image border cuts it.
+    """Visibility of people (n,) in an image.
+
+    `share` is the width of the largest visible part relative to the width of the person, 0..1, `middle` is its bearing,
+    and `cut` is whether the image border truncates it.
     """
 
     share: np.ndarray
@@ -85,7 +93,7 @@ class Shown(NamedTuple):
 
 
 def thesis_bias_m(depth_m):
-    """The thesis' error of depth, metres."""
+    """Bias of depth in the thesis, metres."""
     depth_m = np.asarray(depth_m, float)
     at_end_m = np.polyval(THESIS_BIAS, THESIS_BIAS_UP_TO_M)
     return np.where(depth_m <= THESIS_BIAS_UP_TO_M, np.polyval(THESIS_BIAS, depth_m),
@@ -93,12 +101,14 @@ def thesis_bias_m(depth_m):
 
 
 def half_width(range_m):
-    """Half of the angle under which a person is seen."""
+    """Half of the angular width of a person."""
     return np.arcsin(BODY_RADIUS_M / np.maximum(range_m, BODY_RADIUS_M + 0.02))
 
 
 def shown(bearing, half, range_m, half_view):
-    """Who is seen: cylinders of a half width around their bearings, behind nearer ones, in a view of +-`half_view`.
+    """Visible parts of cylinders with angular half-widths around their bearings, occluded by nearer ones.
+
+    The field of view extends from -`half_view` to `half_view`.
 
     Parameters
     ----------
@@ -107,7 +117,7 @@ def shown(bearing, half, range_m, half_view):
     Returns
     -------
     Shown
-        `middle` is the bearing itself where nothing is seen.
+        `middle` is equal to `bearing` for people that are not visible.
     """
     result = Shown(np.zeros(len(bearing)), np.array(bearing, float), np.zeros(len(bearing), bool))
     nearer = []
@@ -125,7 +135,7 @@ def shown(bearing, half, range_m, half_view):
 
 
 def _without(covers, low, high):
-    """The pieces (low, high) of an interval that no cover (low, high) hides."""
+    """Parts (low, high) of an interval that no cover (low, high) hides."""
     pieces = [(low, high)] if high > low else []
     for cover_low, cover_high in covers:
         if cover_high > low and cover_low < high:

@@ -1,4 +1,4 @@
-"""What a detector and bbox3d_node would find of people in an image: 3D boxes with errors, false and double ones."""
+"""Simulated output of a detector and bbox3d_node: 3D boxes with errors, misses, false detections and duplicates."""
 from typing import NamedTuple
 
 import numpy as np
@@ -6,19 +6,21 @@ import numpy as np
 from ros_3d_bb_lab.evaluation.tracking.d435_model import BODY_RADIUS_M, thesis_bias_m
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import bearing_of, from_frame, to_frame
 
-FALSE, DOUBLE = -1, -2  # in place of a person's number
-HARD_TO_SEE, EASY_TO_SEE = 0.3, 0.6  # shares of a person: less is never found; from here on it is not missed for that
+FALSE, DOUBLE = -1, -2  # instead of the ID of a person
+HARD_TO_SEE, EASY_TO_SEE = 0.3, 0.6  # visible share: no detection below the first, no occlusion misses from the second
 FOUND_WHEN_HARD = 0.4
-BEYOND_M = 0.2  # some who are farther than the camera is sharp are found all the same
-STEP_HZ, WALKING_MPS = 0.95, 0.8  # two steps of a person at full swing
+BEYOND_M = 0.2  # people are detected up to this distance beyond `farthest_m`
+STEP_HZ, WALKING_MPS = 0.95, 0.8  # frequency of a gait cycle, and the speed of full body sway
 SIDE_DOUBLE_M, DEEP_DOUBLE_M, DOUBLE_WIDTH_M = 0.12, 0.1, 0.4
 FALSE_RANGE_M, FALSE_HEIGHT_M, FALSE_WIDTH_M = (1.0, 6.0), (0.8, 1.9), (0.2, 0.6)
 FALSE_SIDE_M, FALSE_DEPTH_M = 0.02, 0.04
 
 
 class SimulatedDetection(NamedTuple):
-    """One 3D box: `depth_m` along the optical axis, `bearing`, size in metres, whether the image border cuts it, and
-    the number of whose it is, or FALSE or DOUBLE.
+    """3D box of a simulated detector.
+
+    `depth_m` is along the optical axis, width and height are in metres, `cut` is whether the image border truncates the
+    box, and `source` is the ID of the person, or FALSE or DOUBLE.
     """
 
     bearing: float
@@ -30,8 +32,10 @@ class SimulatedDetection(NamedTuple):
 
 
 class DetectablePerson(NamedTuple):
-    """Who can be found in an image: person's number, the depth of the centre, the range, `middle`, `share` and `cut`
-    as in `d435_model.Shown`, speed in m/s, and the heading seen from the camera.
+    """Person that is visible in an image.
+
+    `person` is the ID, `depth_m` is the depth of the centre, `middle`, `share` and `cut` are as in `d435_model.Shown`,
+    and `heading` is relative to the camera.
     """
 
     person: int
@@ -45,14 +49,14 @@ class DetectablePerson(NamedTuple):
 
 
 class Detector(object):
-    """Finds people (0 .. people - 1) image by image, with errors that last from one image to the next.
+    """Detector of people (0 .. people - 1) with errors that are correlated between images.
 
     Parameters
     ----------
     camera : CameraModel
     people : int
     period_s : float
-        Between images.
+        Interval between images.
     random : numpy.random.RandomState
     """
 
@@ -66,7 +70,10 @@ class Detector(object):
         self._false_m = np.zeros((0, 2))
 
     def advance(self, pose):
-        """Go to the next image, taken at a true pose; call it once for each, also for those that get lost."""
+        """Advance to the next image, taken at the true camera pose `pose`.
+
+        This must be called for each image, including lost ones.
+        """
         camera, random = self._camera, self._random
         kept = np.exp(-self._period_s / camera.slow_s)
         self._slow = kept * self._slow + np.sqrt(1 - kept ** 2) * random.normal(size=self._slow.shape)
@@ -80,18 +87,18 @@ class Detector(object):
             self._false_m = np.concatenate((self._false_m, [place_m]))
 
     def find(self, seen, pose, time_s):
-        """The 3D boxes of an image, in any order.
+        """Detect people in the current image. The detections are in random order.
 
         Parameters
         ----------
         seen : list of DetectablePerson
         pose : numpy.ndarray, (3,)
-            The true one of the camera.
+            True pose of the camera.
         time_s : float
 
         Returns
         -------
-        list of Found
+        list of SimulatedDetection
         """
         found = []
         for person in seen:
@@ -103,7 +110,10 @@ class Detector(object):
         return [found[number] for number in self._random.permutation(len(found))]
 
     def _switched(self, on, share, stretch_s):
-        """A state that is on for a share of the time, in stretches of a length, one image later."""
+        """Next state of a two-state Markov chain.
+
+        The state is on for a `share` of the time, in intervals of the mean length `stretch_s`.
+        """
         ends = -np.expm1(-self._period_s / stretch_s)
         drawn = self._random.uniform(size=len(on))
         return np.where(on, drawn > ends, drawn < ends * share / (1 - share))
@@ -117,7 +127,7 @@ class Detector(object):
         return self._random.uniform() <= FOUND_WHEN_HARD + (1 - FOUND_WHEN_HARD) * ease
 
     def _found(self, seen, time_s):
-        """The 3D box of a person."""
+        """Detection of a person."""
         camera, random, person = self._camera, self._random, seen.person
         sway_m = (camera.sway_m * np.sin(2 * np.pi * STEP_HZ * time_s + self._phase[person])
                   * min(1.0, seen.speed_mps / WALKING_MPS))
@@ -133,7 +143,7 @@ class Detector(object):
         return SimulatedDetection(seen.middle + side_m / seen.range_m, depth_m, width_m, height_m, seen.cut, person)
 
     def _double(self, box):
-        """A second box of the same person."""
+        """Duplicate detection of the same person."""
         random = self._random
         depth_m = box.depth_m + abs(random.normal(0, DEEP_DOUBLE_M))
         side_m = box.depth_m * np.tan(box.bearing) + random.normal(0, SIDE_DOUBLE_M)
@@ -141,7 +151,7 @@ class Detector(object):
                                   self._height_m[box.source] * random.uniform(0.6, 1), box.cut, DOUBLE)
 
     def _false(self, pose):
-        """Boxes of nobody that are in view."""
+        """False detections in the field of view."""
         random, found = self._random, []
         for forward_m, left_m in to_frame(pose, self._false_m):
             if forward_m > 0 and abs(np.arctan2(left_m, forward_m)) < self._camera.field_of_view / 2:

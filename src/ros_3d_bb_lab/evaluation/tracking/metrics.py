@@ -1,10 +1,11 @@
-"""Tracks against the truth of a run: HOTA, CLEAR and identity scores by TrackEval, errors, and coverage.
+"""Tracking metrics on a run: HOTA, CLEAR and identity scores by TrackEval, errors, and coverage of the covariances.
 
-Who counts: the people who are VISIBLE in an image, and every track that is published then, whatever its status. Tracks
-and people are paired one to one within `PAIRED_M`, as many as there can be with the least sum of distances. A track
-farther than `MATCHED_M` from everybody is wrong, but it is left out where the camera cannot tell: at the borders of its
-view, and near somebody who is there and does not count. TrackEval's similarity falls from 1 at no distance to 0
-at `PAIRED_M`; a match needs 0.5, that is `MATCHED_M`. Velocities, predictions and covariances are those of the pairs.
+Scored are the people that are VISIBLE in an image, and all tracks published for it, independent of their status. Tracks
+and people within `PAIRED_M` are matched one to one: as many as possible, with the least sum of distances. A track
+farther than `MATCHED_M` from every person is a false positive. It is ignored if the camera cannot decide this: at the
+borders of the field of view, and near people that are not scored. TrackEval's similarity falls from 1 at distance 0 to
+0 at `PAIRED_M`; a match requires 0.5, which corresponds to `MATCHED_M`. Errors of velocities, predictions and
+covariances are computed from the matched pairs.
 """
 import contextlib
 import io
@@ -19,17 +20,17 @@ from ros_3d_bb_lab.evaluation.tracking.robot_motion import bearing_of, to_frame
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S
 
 PAIRED_M, MATCHED_M = 1.0, 0.5
-FAR_M = 1e3  # what a pair that is none costs
-NOT_ASKED_M = 0.75  # a track so near somebody who does not count is most likely theirs
-BORDER, BORDER_M, NEAREST_M = 0.04, 0.15, 0.5  # of the view: radians, and metres at its far and its near end
-WITHIN_95 = 5.991  # a normal error in the plane has a squared Mahalanobis distance below this for 95 %
+FAR_M = 1e3  # cost of an impossible pair
+NOT_ASKED_M = 0.75  # a track within this distance of a person that is not scored most likely belongs to that person
+BORDER, BORDER_M, NEAREST_M = 0.04, 0.15, 0.5  # margins of the field of view: radians, far end, near end
+WITHIN_95 = 5.991  # 95 % quantile of chi squared with 2 degrees of freedom
 
 
 class Errors(NamedTuple):
-    """What the paired tracks of a run, n in all, are off by: position (n, 2), velocity (n, 2) and prediction
-    (n, horizons, 2), and their squared Mahalanobis distances (n,), (n,) and (n, horizons).
+    """Errors of the n matched tracks of a run, with squared Mahalanobis distances.
 
-    Predictions are nan where nobody knows the truth; the distances are all nan without covariances.
+    Position (n, 2), velocity (n, 2) and prediction (n, horizons, 2); their distances are (n,), (n,) and (n, horizons).
+    Predictions are NaN if the truth is unknown. All distances are NaN for tracks without covariance.
     """
 
     position_m: np.ndarray
@@ -41,7 +42,7 @@ class Errors(NamedTuple):
 
 
 class Scored(NamedTuple):
-    """One image: numbers of the people and of the tracks that count, and how alike they are (people, tracks)."""
+    """One image: IDs of the scored people and tracks, and their similarity (people, tracks)."""
 
     people: np.ndarray
     tracks: np.ndarray
@@ -49,7 +50,7 @@ class Scored(NamedTuple):
 
 
 class RunScore(NamedTuple):
-    """What TrackEval makes of a run, and the errors."""
+    """TrackEval's results of a run, and the errors."""
 
     name: str
     hota: dict
@@ -59,13 +60,13 @@ class RunScore(NamedTuple):
 
 
 def score_run(run, outputs):
-    """The score of a tracker on a run.
+    """Score a tracker on a run.
 
     Parameters
     ----------
     run : run_generator.Run
     outputs : list of list of TrackedObject
-        What the tracker published after each image.
+        Tracks published after each image.
 
     Returns
     -------
@@ -84,9 +85,9 @@ def score_run(run, outputs):
 
 
 def scores_of(run_scores):
-    """All runs together: a dictionary with the keys of design §8 but for `cpu_ms`, and some more.
+    """Combine the scores of all runs to a dictionary, without `cpu_ms`.
 
-    Scores in percent, lengths in metres, coverage as shares; None for what nothing is known of.
+    Scores are in percent, lengths in metres, and coverage is a share 0..1. Values without data are None.
     """
     combined = [metric.combine_sequences({'%d' % number: results[number] for number in range(len(results))})
                 for metric, results in zip(_metrics(), zip(*(score[1:4] for score in run_scores)))]
@@ -102,7 +103,7 @@ def scores_of(run_scores):
 
 
 def error_scores(errors):
-    """The scores of errors, see `scores_of`."""
+    """Scores of errors, in the format of `scores_of`."""
     off_m = np.linalg.norm(errors.prediction_m, axis=2)
     one, two = (int(np.flatnonzero(HORIZONS_S == seconds)[0]) for seconds in (1, 2))
     return {'position_rmse_m': _rms(errors.position_m), 'velocity_rmse_mps': _rms(errors.velocity_mps),
@@ -115,7 +116,7 @@ def error_scores(errors):
 
 
 def _score_image(truth, objects, camera):
-    """A Scored, and the errors of each pair, as Errors of one track each without the first axis."""
+    """Scores of one image, as Scored, and the errors of each matched pair, as Errors without the first axis."""
     counts = truth.status == VISIBLE
     people, rows = truth.ids[counts], np.flatnonzero(counts)
     places_m = np.array([thing.position_m[:2] for thing in objects]).reshape(-1, 2)
@@ -131,7 +132,7 @@ def _score_image(truth, objects, camera):
 
 
 def _asked_for(places_m, truth, camera):
-    """Which places (n, 2) would be wrong for a track if nobody were there; (n,) bool."""
+    """Mask (n,) of the positions (n, 2) at which a track would be a false positive if no person is there."""
     local_m = to_frame(truth.pose, places_m)
     range_m = np.linalg.norm(local_m, axis=1)
     asked = ((np.abs(bearing_of(local_m)) <= camera.field_of_view / 2 - BORDER) & (range_m >= NEAREST_M)
@@ -184,9 +185,9 @@ def _coverage(distances) -> Optional[float]:
 
 
 def _metrics():
-    """TrackEval's HOTA, CLEAR and Identity. Raises ValueError where TrackEval is not installed."""
+    """TrackEval's HOTA, CLEAR and Identity metrics. Raises ValueError if TrackEval is not installed."""
     try:
-        with contextlib.redirect_stdout(io.StringIO()):  # it says which of its data sets cannot be read here
+        with contextlib.redirect_stdout(io.StringIO()):  # it prints the data sets that it cannot import
             from trackeval.metrics import CLEAR, HOTA, Identity
     except ImportError as error:
         raise ValueError('TrackEval cannot be imported (%s); install it: pip install --no-deps trackeval' % error)
@@ -195,7 +196,7 @@ def _metrics():
 
 
 def _data_of(images: List[Scored]):
-    """What TrackEval's metrics take: numbers from 0, without gaps. Raises ValueError without images."""
+    """Input of TrackEval's metrics, with consecutive IDs from 0. Raises ValueError if there are no images."""
     if not images:
         raise ValueError('a run without images; it is too short')
     people, tracks = (np.unique(np.concatenate([image[part] for image in images])) for part in (0, 1))

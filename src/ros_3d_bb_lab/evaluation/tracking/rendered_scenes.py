@@ -1,4 +1,4 @@
-"""Trackers at the end of the whole pipeline, on the rendered scenes of the simulation."""
+"""Comparison of trackers with the complete pipeline, on the rendered scenes of the simulation."""
 import os
 
 from ros_3d_bb_lab.evaluation.scene_benchmark import depth_detector, result_of, yolov5_detector
@@ -12,19 +12,21 @@ COLUMNS = '%-22s %-8s %7s %9s %9s %9s'
 
 
 def compare_scenes(paths, weights=None, every=2):
-    """Run and print scenes with each tracker, on one image of `every`.
+    """Run scenes with each tracker on every n-th image and print the scores.
 
     Parameters
     ----------
     paths : list of str
         Scenario files.
     weights : str, optional
-        Checkpoint or export of YOLOv5; without it people are found by the weight-free detector.
+        Checkpoint or export of YOLOv5. Without it, people are detected by the weight-free detector.
+    every : int
+        Use every n-th image.
 
     Returns
     -------
     list of dict
-        As of `./run bench scenes`, with the name of the tracker as `tracker`.
+        As in `./run bench scenes`, with the name of the tracker as `tracker`.
 
     Raises
     ------

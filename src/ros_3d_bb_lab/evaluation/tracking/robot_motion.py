@@ -1,21 +1,23 @@
-"""How the robot goes among the people, and where its odometry thinks that it is.
+"""Motion of the robot, and its odometry.
 
-Poses are (x, y, heading), metres and radians.
+Poses are (x, y, heading) in metres and radians.
 """
 from typing import NamedTuple
 
 import numpy as np
 
-PERIOD_S = 0.01  # of the odometry
+PERIOD_S = 0.01  # sampling period of the poses
 SPEED_MPS = 0.7
-EIGHT_M = (4.0, 2.5)  # half the length and half the width of the figure of eight that the robot drives
+EIGHT_M = (4.0, 2.5)  # half length and half width of the figure of eight that the robot drives
 STANDING, DRIVING = 'standing', 'driving'
 
 
 class OdometryModel(NamedTuple):
-    """Shares by which distance and turning are off the whole time, and what each pose is off by: metres, radians.
+    """Errors of the odometry.
 
-    `step_m` and `turn` are by the square root of the metres driven.
+    `distance_scale` and `turn_scale` are standard deviations of constant scale errors. `step_m` (metres) and `turn`
+    (radians) are those of the random walk over one metre; they grow with the square root of the distance. `position_m`
+    and `heading` (radians) are those of the noise of a single pose.
     """
 
     distance_scale: float = 0.02
@@ -27,17 +29,17 @@ class OdometryModel(NamedTuple):
 
 
 class Path(NamedTuple):
-    """A robot's poses (n, 3) every `PERIOD_S`: the true ones, and those of its odometry, which start there."""
+    """True and odometry poses of a robot, (n, 3) every `PERIOD_S`. Both start at the same pose."""
 
     true: np.ndarray
     odometry: np.ndarray
 
     def true_at(self, time_s):
-        """The true pose (3,)."""
+        """True pose (3,)."""
         return _at(self.true, time_s)
 
     def odometry_at(self, time_s):
-        """The pose (3,) of the odometry."""
+        """Odometry pose (3,)."""
         return _at(self.odometry, time_s)
 
 
@@ -48,12 +50,12 @@ def _at(poses, time_s):
 
 
 def standing(place_m, heading, seconds):
-    """Poses (n, 3) of a robot that stands."""
+    """Poses (n, 3) of a standing robot."""
     return np.tile(np.append(place_m, heading), (int(round(seconds / PERIOD_S)) + 1, 1))
 
 
 def driving(place_m, heading, phase, seconds):
-    """Poses (n, 3) of a robot that drives a figure of eight around a place; `phase` 0..1 is where on it, to begin."""
+    """Poses (n, 3) of a robot that drives a figure of eight around a place, starting at its fraction `phase` (0..1)."""
     angles = np.linspace(0, 2 * np.pi, 4001)
     eight_m = np.stack((EIGHT_M[0] * np.cos(angles), EIGHT_M[1] * np.sin(2 * angles)), axis=1)
     way_m = np.append(0, np.cumsum(np.linalg.norm(np.diff(eight_m, axis=0), axis=1)))
@@ -66,7 +68,7 @@ def driving(place_m, heading, phase, seconds):
 
 
 def with_odometry(true, model, random):
-    """A Path of true poses (n, 3): the odometry adds up steps that are each a little off."""
+    """Simulate odometry for true poses (n, 3) by integrating noisy steps. Returns a Path."""
     steps = np.diff(true, axis=0)
     cos, sin = np.cos(true[:-1, 2]), np.sin(true[:-1, 2])
     forward_m, left_m = cos * steps[:, 0] + sin * steps[:, 1], cos * steps[:, 1] - sin * steps[:, 0]
@@ -82,23 +84,23 @@ def with_odometry(true, model, random):
 
 
 def jittered(pose, model, random):
-    """What tf says of a pose (3,) of the odometry."""
+    """Odometry pose (3,) with the noise of a single tf lookup."""
     return pose + random.normal(0, (model.position_m, model.position_m, model.heading))
 
 
 def to_frame(pose, points_m):
-    """Points (..., 2) of the plane, seen from a pose: forward and left, metres. Inverse of `from_frame`."""
+    """Transform points (..., 2) of the plane to a pose's frame: forward and left, metres. Inverse of `from_frame`."""
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     return (np.asarray(points_m) - pose[:2]).dot(np.array([[cos, -sin], [sin, cos]]))
 
 
 def from_frame(pose, points_m):
-    """Points (..., 2), forward and left of a pose, in the plane. Inverse of `to_frame`."""
+    """Transform points (..., 2), forward and left of a pose, to the plane. Inverse of `to_frame`."""
     return turned(pose[2], points_m) + pose[:2]
 
 
 def turned(angle, vectors):
-    """Vectors (..., 2) of the plane, turned to the left by an angle."""
+    """Rotate vectors (..., 2) of the plane counterclockwise by an angle."""
     cos, sin = np.cos(angle), np.sin(angle)
     return np.asarray(vectors).dot(np.array([[cos, sin], [-sin, cos]]))
 

@@ -1,6 +1,7 @@
-"""Runs of a robot among recorded pedestrians: what its camera's detections are, image by image, and the truth.
+"""Simulated runs of a robot among recorded pedestrians: detections of its camera for each image, and ground truth.
 
-Figures as the thesis measured them and as a D435 has them. The same sequence, motion and seed give the same run.
+Errors are as measured in the thesis and as specified for the D435. The same sequence, motion and seed give the same
+run.
 """
 import zlib
 from typing import List, NamedTuple, Tuple
@@ -15,20 +16,20 @@ from ros_3d_bb_lab.evaluation.tracking.robot_motion import (PERIOD_S, STANDING, 
                                                             from_frame, jittered, standing, to_frame, turned,
                                                             with_odometry)
 
-HORIZONS_S = np.array([0.5, 1.0, 1.5, 2.0])  # at which predictions are compared with where people went
+HORIZONS_S = np.array([0.5, 1.0, 1.5, 2.0])  # prediction horizons that are evaluated
 CAMERA_HEIGHT_M = 0.5
 START_S = 100.0  # stamp of the first image
 SECONDS = 60.0
-AROUND_M = (0.05, 9.0)  # people in this range of the robot count for occlusion and for what is truth
-STAYS_S = 1.5  # a person whose recording ends does not vanish: a track of them is no error so long
-TRIES, LOOKED_AT_S = 25, 3.0  # the busiest of so many places and times is taken, by a look every so often
+AROUND_M = (0.05, 9.0)  # people in this range of the robot are in the ground truth and occlude others
+STAYS_S = 1.5  # after the end of the recording, a track of the person is not an error for this time
+TRIES, LOOKED_AT_S = 25, 3.0  # random starts, and the interval for counting people in view
 OPTICAL_FROM_BODY = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], float)
 
 
 class Timing(NamedTuple):
-    """When images are taken and their detections arrive; seconds, and shares of the images.
+    """Timing of images and detections, in seconds and shares of the images.
 
-    A stall, with a chance of `stalls_hz`, loses all images for `stall_s`.
+    Stalls occur at the rate `stalls_hz`; a stall loses all images for `stall_s`.
     """
 
     rate_hz: float = 30.0
@@ -43,7 +44,7 @@ class Timing(NamedTuple):
 
 
 class Models(NamedTuple):
-    """All figures of a run."""
+    """Models of camera, odometry and timing of a run."""
 
     camera: CameraModel = CameraModel()
     odometry: OdometryModel = OdometryModel()
@@ -51,11 +52,11 @@ class Models(NamedTuple):
 
 
 class RunTruth(NamedTuple):
-    """The people around the robot when an image was taken, n of them, in the fixed frame as the odometry has it then.
+    """The n people around the robot at the time of an image, in the fixed frame according to the odometry at that time.
 
-    `status` is VISIBLE (to be found: enough of the body in view), OCCLUDED (less than that) or OUT_OF_VIEW (or its
-    recording has just ended); `future_m` (n, horizons, 2) is nan where the recording ends before; `pose` (3,) is that
-    of the robot in the fixed frame.
+    `status` is VISIBLE (expected to be detected, because enough of the body is in view), OCCLUDED (in view, but mostly
+    hidden) or OUT_OF_VIEW (or the recording has just ended); `future_m` (n, horizons, 2) is NaN after the end of the
+    recording; `pose` (3,) is that of the robot in the fixed frame.
     """
 
     ids: np.ndarray
@@ -67,10 +68,10 @@ class RunTruth(NamedTuple):
 
 
 class Image(NamedTuple):
-    """One image that got through: what a tracker is given, and the truth.
+    """Received image: inputs of a tracker, and ground truth.
 
-    `detections` with their `sources`: person's number, or FALSE or DOUBLE. `arrival_ns` is when they arrive, and
-    `arrival_view` where tf says that the camera is then.
+    `sources` are the person IDs of the `detections`, or FALSE or DOUBLE. `arrival_ns` is the time at which the
+    detections arrive, and `arrival_view` is the camera pose from tf at that time.
     """
 
     stamp_ns: int
@@ -83,7 +84,7 @@ class Image(NamedTuple):
 
 
 class Run(NamedTuple):
-    """The images of one robot; `name` says of what, `camera` is the model of its camera."""
+    """Images of one robot; `name` is that of the sequence and the motion, `camera` is the model of the camera."""
 
     name: str
     camera: CameraModel
@@ -91,9 +92,9 @@ class Run(NamedTuple):
 
 
 class _Walks(NamedTuple):
-    """The people of a run at the time of each image: (images, people, 2), nan where they are not.
+    """People of a run at the time of each image: (images, people, 2), NaN if not present.
 
-    `ended` (images, people): the recording is over; `future_m` is (images, people, horizons, 2).
+    `ended` (images, people) is whether the recording has ended; `future_m` is (images, people, horizons, 2).
     """
 
     position_m: np.ndarray
@@ -103,7 +104,7 @@ class _Walks(NamedTuple):
 
 
 def simulate(sequence, motion, seed, models=Models(), seconds=SECONDS):
-    """A run of a robot among the people of a sequence.
+    """Simulate a run of a robot among the people of a sequence.
 
     Parameters
     ----------
@@ -113,7 +114,7 @@ def simulate(sequence, motion, seed, models=Models(), seconds=SECONDS):
     seed : int or sequence of int
     models : Models
     seconds : float
-        How long; less where the recording is shorter.
+        Duration; limited to that of the recording.
 
     Returns
     -------
@@ -132,7 +133,7 @@ def simulate(sequence, motion, seed, models=Models(), seconds=SECONDS):
 
 
 def _busiest(sequence, motion, seconds, camera, random):
-    """When to begin, and the true poses of a robot who sees many people."""
+    """Start time and true poses of the robot, out of random candidates the ones with most people in view."""
     first_s, last_s = sequence.span_s
     low_m, high_m = np.percentile(sequence.points_m, [8, 92], axis=0)
     best = None
@@ -153,7 +154,7 @@ def _busiest(sequence, motion, seconds, camera, random):
 
 
 def _in_view(pedestrians, time_s, pose, camera):
-    """How many people are in view, seen or not."""
+    """Number of people in the field of view, including occluded ones."""
     places_m = [person.position_m(time_s) for person in pedestrians if person.start_s <= time_s <= person.end_s]
     local_m = to_frame(pose, np.reshape(places_m, (-1, 2)))
     range_m = np.linalg.norm(local_m, axis=1)
@@ -162,7 +163,7 @@ def _in_view(pedestrians, time_s, pose, camera):
 
 
 def _walks(pedestrians, times_s):
-    """The _Walks of those who are there at some of the times."""
+    """Sample the people that are present during the run. Returns _Walks."""
     there = [person for person in pedestrians
              if person.start_s <= times_s[-1] and person.end_s + STAYS_S >= times_s[0]]
     shape = (len(times_s), len(there))
@@ -183,7 +184,7 @@ def _walks(pedestrians, times_s):
 
 
 def _images(path, times_s, walks, models, random):
-    """The images that get through, one after the other."""
+    """Yield the received images in order."""
     timing, detector = models.timing, Detector(models.camera, walks.ended.shape[1], 1 / models.timing.rate_hz, random)
     arrived_s, stalled_until_s = -np.inf, -np.inf
     for row, time_s in enumerate(times_s):
@@ -206,7 +207,7 @@ def _images(path, times_s, walks, models, random):
 
 
 def _looked_at(walks, row, pose, odometry, camera):
-    """The Truth of an image, and the list of Seen."""
+    """RunTruth of an image, and its list of DetectablePerson."""
     local_m = to_frame(pose, walks.position_m[row])
     range_m = np.linalg.norm(np.where(np.isfinite(local_m), local_m, np.inf), axis=1)
     ids = np.flatnonzero((range_m > AROUND_M[0]) & (range_m < AROUND_M[1]))
@@ -228,7 +229,7 @@ def _looked_at(walks, row, pose, odometry, camera):
 
 
 def view_of(pose, camera):
-    """The View of the camera on a robot at a pose (3,)."""
+    """CameraView of the camera on a robot at a pose (3,)."""
     fixed_from_camera = np.eye(4)
     body = np.eye(3)
     body[:2, :2] = turned(pose[2], np.eye(2)).T
@@ -238,7 +239,7 @@ def view_of(pose, camera):
 
 
 def detection_of(box, view, camera):
-    """The Detection of a box that a camera with this view found."""
+    """Detection of a box from a camera with this view."""
     rotation = view.fixed_from_camera[:3, :3]
     point_m = (-box.depth_m * np.tan(box.bearing), CAMERA_HEIGHT_M - box.height_m / 2, box.depth_m)
     covariance_m2 = rotation.dot(camera.covariance_m2(box.bearing, box.depth_m)).dot(rotation.T)

@@ -1,4 +1,4 @@
-"""How long a tracker computes for an image with many people in view."""
+"""CPU time of a tracker update by the number of people in view."""
 import time
 
 import numpy as np
@@ -9,14 +9,14 @@ from ros_3d_bb_lab.evaluation.tracking.detection_generator import SimulatedDetec
 from ros_3d_bb_lab.evaluation.tracking.run_generator import detection_of, view_of
 
 PEOPLE = (5, 20, 100)
-AREA_M2 = 1.0  # for each person
-CIRCLE_M, TURNS_HZ = 0.3, 0.3  # each walks in a circle around a place
+AREA_M2 = 1.0  # per person
+CIRCLE_M, TURNS_HZ = 0.3, 0.3  # each person walks in a circle around a fixed place
 WARM_UP, MEASURED, RATE_HZ = 15, 45, 30
 SIZE_M = (0.5, 1.7)
 
 
 def cpu_ms(make_tracker, people):
-    """Median CPU time of an update with so many people, each found in every image; milliseconds."""
+    """Median CPU time of an update, in milliseconds, with `people` people that are detected in every image."""
     tracker, spent_s = make_tracker(), []
     for stamp_ns, detections, view in crowd(people, WARM_UP + MEASURED):
         begin_s = time.process_time()
@@ -26,7 +26,10 @@ def cpu_ms(make_tracker, people):
 
 
 def crowd(people, images):
-    """Images (stamp_ns, detections, view) of a crowd that fills the view of a camera as far as it needs to."""
+    """Yield images (stamp_ns, detections, view) of a crowd in the field of view.
+
+    The area of the crowd grows with the number of people.
+    """
     random, camera = np.random.RandomState(people), CameraModel()
     view = view_of(np.zeros(3), camera)
     farthest_m = np.sqrt(2 * people * AREA_M2 / camera.field_of_view + 1)

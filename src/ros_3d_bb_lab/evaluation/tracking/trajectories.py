@@ -1,4 +1,5 @@
-"""Pedestrians on a plane: recorded ones, smoothed, or made ones where there is no recording."""
+"""Trajectories of pedestrians in the plane: smoothed recordings, or generated trajectories if there are no recordings.
+"""
 import csv
 import os
 from typing import Any, NamedTuple, Tuple
@@ -9,16 +10,16 @@ from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import spsolve
 
 COLUMNS = ('t_s', 'id', 'x_m', 'y_m')
-SMOOTHING = 0.004  # s^3; leaves what a head moves by in a step, takes what a mouse click on a video is off by
-LONGEST_GAP_S = 1.3  # nobody knows where a person was meanwhile: those before and after are two people
-FEWEST_POINTS = 6  # of a person; fewer make no curve
-PERIOD_S = 0.4  # of the made recordings, as of the usual ones
+SMOOTHING = 0.004  # s^3; keeps the head motion of a step, removes the error of manual annotation in video
+LONGEST_GAP_S = 1.3  # a longer gap splits a trajectory into two people
+FEWEST_POINTS = 6  # minimum number of points of a person for fitting a curve
+PERIOD_S = 0.4  # of generated trajectories, as in common recordings
 
 
 class Pedestrian(NamedTuple):
-    """One person, who is there from `start_s` to `end_s`.
+    """Person that is present from `start_s` to `end_s`.
 
-    `position_m` and `velocity_mps` are functions of times (n,) in seconds that give (n, 2).
+    `position_m` and `velocity_mps` are functions of times (n,) in seconds that return (n, 2).
     """
 
     start_s: float
@@ -28,7 +29,7 @@ class Pedestrian(NamedTuple):
 
 
 class Sequence(NamedTuple):
-    """A recording: its name, the people in it, and their recorded points (n, 2), all together."""
+    """Recording: name, people, and all recorded points (n, 2)."""
 
     name: str
     pedestrians: Tuple[Pedestrian, ...]
@@ -36,19 +37,19 @@ class Sequence(NamedTuple):
 
     @property
     def span_s(self):
-        """When the first comes and the last goes, (2,)."""
+        """Start of the first and end of the last trajectory, (2,)."""
         return (min(person.start_s for person in self.pedestrians), max(person.end_s for person in self.pedestrians))
 
 
 def read_sequences(folder):
-    """The recordings of a folder: each `.csv` file, by name.
+    """Read the recordings in a folder: all `.csv` files, sorted by name.
 
     Raises
     ------
     ValueError
-        If there is none, or one cannot be used; names it.
+        If there are no files, or one of them is invalid. The message names the file.
     OSError
-        If there is no such folder.
+        If the folder does not exist.
     """
     names = sorted(name for name in os.listdir(folder) if name.endswith('.csv'))
     if not names:
@@ -57,17 +58,17 @@ def read_sequences(folder):
 
 
 def read_sequence(path):
-    """One recording: CSV with the columns t_s, id, x_m, y_m.
+    """Read a recording: CSV with the columns t_s, id, x_m, y_m.
 
-    A point with a position that is no number is one that was not seen. Of two points of a person at one time the first
-    counts. People with fewer than `FEWEST_POINTS` points without a gap are left out.
+    Points with a NaN or infinite position are treated as missing. If a person has several points at the same time, the
+    first one is used. Segments with fewer than `FEWEST_POINTS` points are left out; gaps separate segments.
 
     Raises
     ------
     ValueError
-        If the file has other columns, a line that cannot be read, or nobody with enough points.
+        If a column is missing, a line cannot be parsed, or no person has enough points.
     OSError
-        If there is no such file.
+        If the file does not exist.
     """
     with open(path, newline='', encoding='utf-8-sig') as stream:
         reader = csv.DictReader(stream)
@@ -92,7 +93,7 @@ def _row(path, number, line):
 
 
 def _sequence(source, name, rows):
-    """A Sequence of rows (id, time_s, x_m, y_m). Raises ValueError where nobody is in it."""
+    """Sequence of rows (id, time_s, x_m, y_m). Raises ValueError if no person has enough points."""
     points = {}
     for identity, time_s, x_m, y_m in rows:
         if np.isfinite(x_m) and np.isfinite(y_m):
@@ -113,15 +114,16 @@ def _sequence(source, name, rows):
 
 
 def pedestrian_of(times_s, points_m):
-    """A Pedestrian on a smooth curve along points (n, 2) at rising times (n,), n > 1."""
+    """Fit a smooth curve through points (n, 2) at increasing times (n,), n > 1. Returns a Pedestrian."""
     curve = CubicSpline(times_s, _smoothed(times_s, points_m), bc_type='natural')
     return Pedestrian(float(times_s[0]), float(times_s[-1]), curve, curve.derivative())
 
 
 def _smoothed(times_s, points_m):
-    """Where the cubic smoothing spline passes: least sum of squares + SMOOTHING * integral of acceleration squared.
+    """Values of the cubic smoothing spline at the given times.
 
-    Reinsch's algorithm; Green and Silverman, Nonparametric Regression and Generalized Linear Models (1994), 2.3.
+    It minimises the sum of squares + SMOOTHING * the integral of the acceleration squared. Reinsch's algorithm; Green
+    and Silverman, Nonparametric Regression and Generalized Linear Models (1994), 2.3.
     """
     if len(times_s) < 3:
         return points_m
@@ -136,9 +138,9 @@ def _smoothed(times_s, points_m):
 
 
 def made_sequences(seed, seconds=90):
-    """Recordings that the package makes: a square with few people and one with many, some in pairs, some standing.
+    """Generate sequences: one with few and one with many people, some of them in pairs, some standing.
 
-    They walk through each other where their ways cross at the same time.
+    People do not avoid each other.
     """
     return [_made('made_%s' % name, np.random.RandomState([seed, people]), people, seconds)
             for name, people in (('sparse', 30), ('dense', 90))]

@@ -1,4 +1,4 @@
-"""Scenarios as bags: the command `scenario_to_bag`."""
+"""Conversion of scenarios to bags: the command `scenario_to_bag`."""
 import itertools
 
 import numpy as np
@@ -14,7 +14,7 @@ from ros_3d_bb_lab.simulation.simulator import Simulator
 
 
 def scenario_images(scenario, with_boxes=False):
-    """Yield the images of a scenario for `write_bag`, with ground truth and optionally with its 2D boxes."""
+    """Yield the messages of each image of a scenario for `write_bag`, with ground truth and optionally 2D boxes."""
     simulator = Simulator(scenario)
     for number in range(simulator.frame_count):
         frame = simulator.frame(number)
@@ -29,7 +29,7 @@ def scenario_images(scenario, with_boxes=False):
 
 
 def scenario_to_bag():
-    """The command `scenario_to_bag`: render a scenario to a bag with ground truth."""
+    """Run the command `scenario_to_bag`: render a scenario to a bag with ground truth."""
     parser = bag_command_parser('scenario_to_bag', scenario_to_bag.__doc__)
     parser.add_argument('scenario', help='scenario file (YAML), see config/scenarios')
     parser.add_argument('bag', help='bag to write')

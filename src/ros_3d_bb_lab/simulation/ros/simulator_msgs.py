@@ -1,4 +1,4 @@
-"""What the simulated robot sends for one frame."""
+"""ROS messages of one frame of the simulator."""
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.depth_image import DepthImage
@@ -11,9 +11,9 @@ MAP_FRAME, ODOM_FRAME, BASE_FRAME = 'map', 'odom', 'base_link'
 
 
 def simulated_messages(simulator, frame, stamp_ns):
-    """The (topic, message) pairs of a frame: tf, camera_info, depth, colour, and the ground truth in the map.
+    """Convert a frame to (topic, message) pairs: tf, camera_info, depth, colour, and ground truth in the map.
 
-    Who is hidden or out of view by the truth is so for the frame's camera.
+    The occlusion status in the ground truth refers to the camera of the frame.
     """
     stamp, frame_id = time_from(stamp_ns), frame_id_of(frame.camera)
     chain = [(MAP_FRAME, ODOM_FRAME, frame.poses.map_from_odom), (ODOM_FRAME, BASE_FRAME, frame.poses.odom_from_base),

@@ -1,4 +1,4 @@
-"""The node that stands in for a robot with a camera among people."""
+"""ROS node that simulates a robot with a camera among people."""
 import sys
 import threading
 import time
@@ -19,14 +19,14 @@ from ros_3d_bb_lab.simulation.ros.simulator_msgs import TRUTH_TOPIC, simulated_m
 from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
-CLOCK_LEAD_NS = NS  # between the time that is told while waiting and the first image
-PAUSE_NS = 3 * NS  # between two rounds of a scene, so that the people of one are not taken for those of the next
-PROGRESS_S = 1.0  # between two lines of the log
+CLOCK_LEAD_NS = NS  # from the time published while waiting for subscribers to the first image
+PAUSE_NS = 3 * NS  # between repetitions of a scene; separates the people of successive repetitions
+PROGRESS_S = 1.0  # between log messages
 
 
 @parameters()
 class SimulatorParams(NamedTuple):
-    """See config/simulator.yaml."""
+    """Parameters of simulator_node, see config/simulator.yaml."""
 
     scenario: str = Param('')
     rate: float = Param(0.0, 'Rate of the images; 0: that of the scenario.', 'Hz')
@@ -45,26 +45,26 @@ class SimulatorParams(NamedTuple):
 class SimulatorNode(object):
     """Play a scenario: colour, aligned depth, camera_info, tf from the map to the camera, and ground truth.
 
-    Where it tells the time (~publish_clock), time waits for images that the machine is too slow for; else they are left
-    out. Of several cameras each has its images below its name, as front/color/image_raw. Parameters:
-    config/simulator.yaml.
+    If the node publishes the time (~publish_clock), time waits for images on slow machines; otherwise late images are
+    skipped. If there are several cameras, the name of the camera precedes its topics, for example
+    front/color/image_raw. Parameters: config/simulator.yaml.
 
     Publishes
     ---------
     camera/color/image_raw : sensor_msgs/Image
-        Colour.
+        Colour image.
     camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth with the pixels of the colour image.
+        Depth image, aligned to colour.
     camera/color/camera_info : sensor_msgs/CameraInfo
-        Of the colour camera.
+        Intrinsics of the colour camera.
     camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
-        The same, as depth is aligned to colour.
+        The same intrinsics, because depth is aligned to colour.
     ground_truth : ros_3d_bb/TrackedObjectArray
-        The people, in the map; their prediction is where they will be.
+        People in the map; their prediction is the true future path.
     /tf : tf2_msgs/TFMessage
         From the map to the camera.
     /clock : rosgraph_msgs/Clock
-        The time; only with ~publish_clock.
+        Simulated time; only with ~publish_clock.
     """
 
     def __init__(self):
@@ -86,7 +86,7 @@ class SimulatorNode(object):
         self._worker.start()
 
     def _run(self):
-        """Play the scene, once or again and again; rospy publishes from any thread but the main one."""
+        """Play the scene once or repeatedly, in a separate thread from which rospy can publish."""
         try:
             self._wait_for_subscribers()
             start_ns = START_NS + CLOCK_LEAD_NS if self._clock_pub is not None else rospy.get_rostime().to_nsec()
@@ -100,20 +100,23 @@ class SimulatorNode(object):
                 else:
                     time.sleep(PAUSE_NS / NS)
                     start_ns = rospy.get_rostime().to_nsec()
-        except Exception as error:  # without this thread the node does nothing: better no node than such a one
+        except Exception as error:  # the node is useless without this thread, so it shuts down
             if not is_ending():
                 self.failed = True
                 rospy.logfatal('the simulation ends: %s: %s', type(error).__name__, error)
                 rospy.signal_shutdown('the simulation failed')
 
     def _wait_for_subscribers(self):
-        """Some of them, rosbag among them, do not even subscribe before there is a time."""
+        """Wait for subscribers, and publish the time meanwhile.
+
+        Some nodes, such as rosbag, subscribe only after the time is valid.
+        """
         for camera in self._simulator.cameras:
             wait_for_subscribers(self._pubs[topic_of(camera, COLOR_TOPIC)], self._params.wait_for_subscribers,
                                  lambda: self._tell_time(START_NS))
 
     def _play(self, start_ns):
-        """One round of the scene, its first image at a stamp."""
+        """Play the scene once, with the first image at `start_ns`."""
         began_s, number = time.monotonic(), 0
         while number < self._simulator.frame_count and not rospy.is_shutdown():
             due_s = began_s + self._simulator.time_s(number) / self._params.speed
@@ -159,5 +162,5 @@ def _scenario(params):
 
 
 def main():
-    """Run the node; the exit status is 1 where the simulation failed."""
+    """Run the node. The exit status is 1 if the simulation fails."""
     sys.exit(run_node('simulator_node', SimulatorNode).failed)
