@@ -28,7 +28,7 @@ START_NS = NS  # published on /clock until the first image of a recording sets t
 
 @parameters()
 class RealSenseNodeParams(NamedTuple):
-    """Parameters of realsense_node beside those of the camera."""
+    """Parameters of realsense_node, except those of the camera."""
 
     frame_prefix: str = Param('camera')
     publish_clock: bool = Param(
