@@ -1,4 +1,4 @@
-"""Bags: read, write, tf of a bag, and the pipeline on a bag.
+"""Reading and writing bags, tf lookup in a bag, and the offline pipeline on a bag.
 
 May import: camera, conversions, core, pipeline, sessions.
 """

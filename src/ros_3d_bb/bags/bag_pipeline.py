@@ -1,4 +1,4 @@
-"""The whole pipeline on a bag without a ROS master: the same bag and parameters give the same bytes."""
+"""Run the pipeline on a bag without a ROS master. Equal input bags and parameters give identical output bags."""
 import collections
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, NamedTuple, Optional
@@ -20,8 +20,10 @@ MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
 
 
 class Waiting(NamedTuple):
-    """A message that was read and waits for its turn: of a node's `topic` (None: of no interest) and a `camera`,
-    `message` where it was needed ahead, and the search in it.
+    """A message that was read ahead of its processing.
+
+    `topic` is the topic of the nodes (None: not used by them), `camera` the namespace, `message` the deserialized
+    message if it was needed ahead, and `search` the detection that was started in it.
     """
 
     raw: Raw
@@ -32,7 +34,7 @@ class Waiting(NamedTuple):
 
 
 class BagRun(object):
-    """One bag on its way through the pipeline."""
+    """A run of the pipeline on one bag."""
 
     def __init__(self, reader, settings, tally):
         self._reader, self._settings, self._tally = reader, settings, tally
@@ -52,7 +54,7 @@ class BagRun(object):
             reader.check_topic(settings.name(needed, camera), INPUTS[needed])
 
     def outputs(self):
-        """Yield (Raw, [(topic, message), ...]): each message of the bag, and what the nodes would publish then."""
+        """Yield (Raw, [(topic, message), ...]): each message of the bag with the messages published by the nodes."""
         static = self._settings.name(STATIC_TOPIC)
         for raw in self._reader.messages([static]):
             with self._tally.rejecting('transforms'):
@@ -63,7 +65,9 @@ class BagRun(object):
         self._pipeline.end()
 
     def _ahead(self, pool):
-        """Yield the messages when later ones have been read: those that a node waits for, images to be searched."""
+        """Yield the messages with a delay, so that transforms within ~tf_timeout and images for the detector are read
+        ahead.
+        """
         ahead_ns = int(self._settings.tracker[0].tf_timeout * NS)
         queue, size, searches = collections.deque(), 0, 0
         for raw in self._reader.messages():
@@ -79,7 +83,7 @@ class BagRun(object):
             yield queue.popleft()
 
     def _begun(self, raw, pool):
-        """A message that was read; what can be done ahead of its turn is begun."""
+        """Start the work that can be done ahead of a message's processing: add transforms, submit detections."""
         (topic, camera), message, search = self._topics.get(raw.topic, (None, '')), None, None
         if topic == TF_TOPIC:
             with self._tally.rejecting('transforms'):
@@ -92,7 +96,7 @@ class BagRun(object):
         return Waiting(raw, topic, camera, message, search)
 
     def _handled(self, waiting):
-        """What the nodes would publish at the turn of a message."""
+        """Process a message and return the messages that the nodes would publish, [(topic, message), ...]."""
         raw, topic, camera, message, search = waiting
         if topic is None or topic == STATIC_TOPIC:
             return []
@@ -118,14 +122,15 @@ class BagRun(object):
 
 
 def process_bag(source, target, settings=Settings(), progress=lambda share: None):
-    """Write a bag with what another one holds, and with what the nodes would publish on it.
+    """Write a bag with the messages of another bag and those that the nodes would publish.
 
     Parameters
     ----------
     source, target : str
+        Paths of the input and output bags.
     settings : Settings
     progress : callable
-        Called with the share 0..1 that is done, message by message.
+        Called after each message with the processed fraction, 0..1.
 
     Returns
     -------
@@ -134,9 +139,9 @@ def process_bag(source, target, settings=Settings(), progress=lambda share: None
     Raises
     ------
     BagError
-        If the source cannot be read; no target is left then.
+        If the source cannot be read; the target is then removed.
     ValueError
-        If a parameter makes no sense.
+        If a parameter is invalid.
     OSError
         If the target cannot be written.
     """
@@ -153,7 +158,7 @@ def process_bag(source, target, settings=Settings(), progress=lambda share: None
 
 
 class Copier(object):
-    """Writes messages of one bag to another as they are, but for those that are made anew."""
+    """Copy messages to another bag unchanged, except on topics that the pipeline writes."""
 
     def __init__(self, bag, settings):
         made = set(settings.name(topic, camera) for topic in OUTPUTS_OF_CAMERA for camera in settings.cameras
@@ -162,16 +167,16 @@ class Copier(object):
         self._keep, self._types = settings.keep, {}
 
     def copy(self, raw):
-        """Write a message, if it is to be kept. Raises BagError where its topic has messages of two types."""
+        """Write a message if it is to be kept. Raises BagError if its topic has messages of two types."""
         if raw.topic in self._made or self._keep is not None and raw.topic.lstrip('/') not in self._keep:
             return
         if self._types.setdefault(raw.topic, raw.md5sum) != raw.md5sum:
             raise BagError('%s has messages of two types' % raw.topic)
-        unused = type('Unused', (), {'_md5sum': raw.md5sum})  # rosbag wants a class, but takes the header
+        unused = type('Unused', (), {'_md5sum': raw.md5sum})  # rosbag requires a class, but uses the connection header
         self._bag.write(raw.topic, (raw.datatype, raw.data, raw.md5sum, unused), raw.time, raw=True,
                         connection_header=raw.connection_header)
 
 
 def _wanted(detector):
-    """The topics of a camera that are of use."""
+    """Return the input topics of a camera that are used with a detector."""
     return set(INPUTS) - {TF_TOPIC, STATIC_TOPIC} - ({COLOR_TOPIC} if detector == 'none' else {BOXES_TOPIC})

@@ -50,7 +50,7 @@ class BagReader(object):
         except rosbag.ROSBagUnindexedException:
             raise BagError('%s has no index, because its recording was interrupted; repair it with: rosbag reindex'
                            % path)
-        except Exception as error:  # a damaged file can raise any exception
+        except Exception as error:  # a damaged file can cause any exception
             raise BagError('%s is not a readable bag (%s)' % (path, cause(error)))
 
     def __enter__(self):

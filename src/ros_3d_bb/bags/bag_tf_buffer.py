@@ -1,4 +1,4 @@
-"""The transforms of a bag, as they are known while its messages are gone through."""
+"""tf2 buffer that is filled from the messages of a bag while they are processed."""
 import collections
 
 import tf2_ros
@@ -8,10 +8,11 @@ from ros_3d_bb.core.time_sync import JUMP_NS
 
 
 class BagTransforms(object):
-    """tf2 without ROS. Like a node that waits for a transform, it knows those that come a little later.
+    """tf2 buffer without ROS, which contains transforms of the near future as for a node that waits for a transform.
 
-    Call `ahead` with each tf message when it is read, and `passed` when its turn comes; between the two lies how long
-    a node would wait. Where time goes back, what comes after that is known only from its turn on.
+    Call `ahead` with each tf message when it is read, and `passed` when it is processed. The time between the two is
+    the time that a node would wait. After a backward jump in time, transforms become available only when they are
+    processed.
     """
 
     def __init__(self):
@@ -20,13 +21,13 @@ class BagTransforms(object):
         self._held = collections.deque()
 
     def set_static(self, message):
-        """Take a message of tf_static; it holds from the beginning to the end. Raises ValueError as `ahead`."""
+        """Add a message of tf_static, which is valid for the whole bag. Raises ValueError as `ahead`."""
         check_transforms(message)
         for transform in message.transforms:
             self._buffer.set_transform_static(transform, 'bag')
 
     def ahead(self, message):
-        """Take a tf message before its turn. Raises ValueError where a stamp is beyond what tf2 can reckon with."""
+        """Add a tf message before it is processed. Raises ValueError if a stamp exceeds the range of tf2."""
         check_transforms(message)
         if self._held or self._goes_back(message):
             self._held.append(message)
@@ -34,26 +35,26 @@ class BagTransforms(object):
             self._set(message)
 
     def passed(self, message):
-        """It is the turn of a message that was taken ahead."""
+        """Process a message that was added by `ahead`."""
         if not self._held or self._held[0] is not message:
             return
-        self._buffer.clear()  # keeps static ones
+        self._buffer.clear()  # keeps static transforms
         self._newest_ns = 0
         self._set(self._held.popleft())
         while self._held and not self._goes_back(self._held[0]):
             self._set(self._held.popleft())
 
     def frames_as_yaml(self):
-        """What is known now, as tf2 says it."""
+        """Return the current frames as YAML text in the format of tf2."""
         return self._buffer.all_frames_as_yaml()
 
     def lookup(self, target_frame, source_frame, stamp):
-        """`target_from_source` at a stamp, a 4x4 matrix. Raises tf2_ros.TransformException."""
+        """Look up `target_from_source` at a stamp, a 4x4 matrix. Raises tf2_ros.TransformException."""
         return transform_from_msg(self._buffer.lookup_transform_core(target_frame.lstrip('/'),
                                                                      source_frame.lstrip('/'), stamp))
 
     def go_back(self):
-        """Nothing to do: the transforms themselves tell."""
+        """Do nothing: backward jumps are detected from the stamps of the transforms."""
 
     def _goes_back(self, message):
         return any(transform.header.stamp.to_nsec() < self._newest_ns - JUMP_NS for transform in message.transforms)

@@ -1,4 +1,4 @@
-"""Bags of what a camera on a robot sends, made of measurement sessions."""
+"""Write bags with the messages of a camera on a robot, for example from measurement sessions."""
 import argparse
 import collections
 import contextlib
@@ -16,13 +16,15 @@ from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_msg, t
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 
-PARTIAL = '.active'  # suffix of incomplete bags, as of rosbag record
+PARTIAL = '.active'  # suffix of incomplete bags, as in rosbag record
 MOUNT_M = (0.17, 0.0, 0.20)  # position of the camera of a Jackal in base_link: forward, left, up (thesis 3.5.1)
 
 
 class SessionBagOptions(NamedTuple):
-    """Options for bags of sessions: frames per second; position of the forward-facing camera in base_link (x forward, y
-    left, z up); whether the 2D boxes of the session are written to yolo_bounding_box.
+    """Options for bags of sessions.
+
+    `rate_hz`: frames per second; `mount_m`: position of the forward-facing camera in base_link (x forward, y left,
+    z up), metres; `with_boxes`: whether the 2D boxes of the session are written to yolo_bounding_box.
     """
 
     rate_hz: float = 30.0
@@ -73,7 +75,12 @@ def remove_partial(path):
 
 
 def images_in(path, topics):
-    """Messages of a bag on some topics, by image: [[(topic, message), ...], ...], topics without a leading slash.
+    """Read the messages of a bag on some topics, grouped by image.
+
+    Returns
+    -------
+    list of list of (topic, message)
+        Topics have no leading slash.
 
     Raises
     ------
@@ -129,7 +136,7 @@ def session_to_bag():
 
 
 def bag_command_parser(name, doc):
-    """The argument parser of a command that writes a bag."""
+    """Create the argument parser of a command that writes a bag."""
     parser = argparse.ArgumentParser(prog=name, description=doc.split(': ', 1)[1])
     parser.add_argument('--compression', choices=('none', 'bz2', 'lz4'), default='lz4', help='default: lz4')
     return parser

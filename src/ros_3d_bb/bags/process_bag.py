@@ -1,4 +1,4 @@
-"""The command `process_bag`: the pipeline on bags, without a ROS master, several at once."""
+"""Command `process_bag`: run the pipeline on one or more bags without a ROS master, in parallel processes."""
 import argparse
 import multiprocessing
 import os
@@ -26,7 +26,7 @@ FILES = (('--yolov5-params', 'yolov5'), ('--depth-params', 'depth'), ('--bbox3d-
 
 
 class Job(NamedTuple):
-    """A bag to be processed: from where, to where, how, and how much memory it may take, bytes."""
+    """A bag to be processed: input and output paths, settings, and memory limit in bytes."""
 
     source: str
     target: str
@@ -35,7 +35,7 @@ class Job(NamedTuple):
 
 
 class Running(NamedTuple):
-    """A job, its process, and where that says how far it is."""
+    """A running job: its process and the connection on which it reports its progress."""
 
     job: Job
     process: Any
@@ -43,7 +43,7 @@ class Running(NamedTuple):
 
 
 def main(arguments=None):
-    """The command. The exit status is 1 where a bag could not be processed."""
+    """Run the command. The exit status is 1 if a bag could not be processed."""
     parser = _parser()
     given = parser.parse_args(arguments)
     try:
@@ -59,7 +59,7 @@ def main(arguments=None):
 
 
 def jobs_from(given):
-    """The jobs that the arguments ask for. Raises ValueError or OSError where they make no sense."""
+    """Return the jobs for the command line arguments. Raises ValueError or OSError if they are invalid."""
     if given.out_dir is None and len(given.bags) != 2:
         raise ValueError('IN and OUT expected, or bags and --out-dir')
     pairs = [tuple(given.bags)] if given.out_dir is None else [
@@ -79,7 +79,7 @@ def jobs_from(given):
 
 
 def settings_from(given):
-    """The settings that the arguments ask for. Raises ValueError, OSError or yaml.YAMLError."""
+    """Return the settings for the command line arguments. Raises ValueError, OSError or yaml.YAMLError."""
     settings = Settings()._replace(detector=given.detector, names=_names(given.remap), compression=given.compression,
                                    keep=None if given.keep is None else tuple(t.lstrip('/') for t in given.keep))
     for option, node in FILES:
@@ -100,13 +100,13 @@ def settings_from(given):
 
 
 def with_tracker(settings, **changed):
-    """Settings with other parameters of the tracker (`tracking_stage.TrackerNodeParams`)."""
+    """Return settings with changed parameters of the tracker (`tracking_stage.TrackerNodeParams`)."""
     params, *others = settings.tracker
     return settings._replace(tracker=(params._replace(**changed),) + tuple(others))
 
 
 def read_params(path, defaults):
-    """The parameters of a node, of its types, from a parameter file; what that does not say is as in `defaults`."""
+    """Read the parameters of a node from a YAML file; missing parameters are taken from `defaults`."""
     if path is None:
         return defaults
     with open(path) as stream:
@@ -122,9 +122,16 @@ def read_params(path, defaults):
 
 
 def run_jobs(jobs, at_once, with_bar):
-    """Process bags, so many at once, each in a process of its own; say what became of each. Returns how many failed."""
+    """Process bags, at most `at_once` in parallel, each in a separate process, and print the result of each.
+
+    Returns
+    -------
+    int
+        Number of failed jobs.
+    """
     context = multiprocessing.get_context('spawn')
-    # A catkin workspace puts the folder of the sources, which lack the messages, in front of what they were found by.
+    # In a catkin workspace, the source folder, which lacks the generated messages, precedes the imported package in the
+    # search path.
     sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(ros_3d_bb.__file__))))
     todo, running, shares, failed = list(jobs), [], {}, 0
     try:
@@ -143,7 +150,7 @@ def run_jobs(jobs, at_once, with_bar):
                 _show(sum(shares.values()) / len(jobs), len(jobs) - len(todo) - len(running), len(jobs))
     finally:
         for one in running:
-            one.process.join()  # it was interrupted, too, and takes its unfinished bag away
+            one.process.join()  # the process was interrupted, too, and removes its incomplete bag
         if with_bar:
             print(file=sys.stderr)
     return failed
@@ -158,7 +165,7 @@ def _started(context, job):
 
 
 def _news_of(one, shares):
-    """Whether a job has succeeded, None while it runs; and what is to be said of it."""
+    """Return whether a job has succeeded (None while it runs) and the text to print."""
     try:
         while one.news.poll():
             kind, content = one.news.recv()
@@ -168,7 +175,7 @@ def _news_of(one, shares):
             one.process.join()
             shares[one.job.target] = 1.0
             return kind == 'done', content
-    except EOFError:  # killed, as by the kernel where memory ran out
+    except EOFError:  # killed, for example by the kernel when out of memory
         one.process.join()
         shares[one.job.target] = 1.0
         remove_partial(one.job.target)
@@ -178,7 +185,7 @@ def _news_of(one, shares):
 
 
 def _work(job, sender):
-    """What the process of a job does."""
+    """Main function of the process of a job."""
     resource.setrlimit(resource.RLIMIT_DATA, (job.memory, resource.getrlimit(resource.RLIMIT_DATA)[1]))
     said_s = [0.0]
 
@@ -191,12 +198,12 @@ def _work(job, sender):
         sender.send(('done', '\n'.join(_summary(job, tally))))
     except KeyboardInterrupt:
         pass
-    except Exception as error:  # one bag must not end the others
+    except Exception as error:  # a failed bag must not stop the others
         sender.send(('failed', '%s; no bag was written' % _reason(job, error)))
 
 
 def _reason(job, error):
-    """Why a job failed, in words that name its bag."""
+    """Return why a job failed, as a sentence that names its bag."""
     if isinstance(error, BagError):
         return str(error)
     if isinstance(error, MemoryError):

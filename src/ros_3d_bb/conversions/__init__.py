@@ -1,4 +1,4 @@
-"""ROS messages to the types of this package and back; no node, no master.
+"""Conversions between ROS messages and the types of this package, without rospy.
 
 May import: camera, core, estimation, msg, tracking.
 """

@@ -1,4 +1,4 @@
-"""What an RGB-D camera on a robot sends: images, camera_info and transforms, with the topics of realsense2_camera."""
+"""Messages of an RGB-D camera on a robot: images, camera_info and transforms, on the topics of realsense2_camera."""
 from typing import Any, NamedTuple, Sequence
 
 import numpy as np
@@ -16,15 +16,17 @@ from ros_3d_bb.core.time_sync import NS
 TF_TOPIC, STATIC_TOPIC = 'tf', 'tf_static'
 COLOR_TOPIC, DEPTH_TOPIC = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
 INFO_TOPICS = ('camera/color/camera_info', 'camera/aligned_depth_to_color/camera_info')
-CAMERA = 'camera'  # namespace of the only camera's topics
+CAMERA = 'camera'  # namespace of the topics of a single camera
 TYPES = {TF_TOPIC: TFMessage, COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPICS[0]: CameraInfo,
          INFO_TOPICS[1]: CameraInfo}
-START_NS = 1600000000 * NS  # when scenes and bags begin: any time will do, but the same each time
+START_NS = 1600000000 * NS  # start of scenes and bags: arbitrary but fixed
 
 
 class CameraFrame(NamedTuple):
-    """One image of a camera. `color` (h, w, 3) uint8 RGB; `transforms`: (parent, child, parent_from_child (4, 4))
-    from the map to the camera's optical frame.
+    """One colour and depth image of a camera.
+
+    `color` has shape (h, w, 3), uint8 RGB; `transforms` is a sequence of (parent, child, parent_from_child (4, 4)) from
+    the map to the optical frame of the camera.
     """
 
     header: Header
@@ -35,10 +37,10 @@ class CameraFrame(NamedTuple):
 
 
 def topic_of(camera, topic):
-    """What a topic is called for one of several cameras, by its namespace; '' is the only camera.
+    """Return the name of a topic for a camera, given by its namespace; '' for a single camera.
 
-    Images are where a driver puts those of a camera of that name: front/color/image_raw. What is made of them is below
-    it, too: front/ros_3d_bb/bb_3d.
+    Images are on the topics of a driver with that camera name (front/color/image_raw). Results are in the same
+    namespace (front/ros_3d_bb/bb_3d).
     """
     if not camera:
         return topic
@@ -46,14 +48,14 @@ def topic_of(camera, topic):
 
 
 def messages_of(frame):
-    """Yield (topic, message) of one image, in the order in which a robot would send them."""
+    """Yield (topic, message) of one CameraFrame, in the order in which a robot publishes them."""
     yield TF_TOPIC, TFMessage(transform_messages(frame.header.stamp, frame.transforms))
     for message in image_messages_of(frame):
         yield message
 
 
 def image_messages_of(frame):
-    """Yield (topic, message) of one image without its transforms."""
+    """Yield (topic, message) of one CameraFrame without its transforms."""
     for topic in INFO_TOPICS:
         yield topic, _camera_info(frame.camera, frame.header)
     yield DEPTH_TOPIC, _depth_image(frame.depth, frame.header)
@@ -61,12 +63,12 @@ def image_messages_of(frame):
 
 
 def transform_messages(stamp, links):
-    """TransformStamped messages of (parent, child, parent_from_child (4, 4)) links."""
+    """Convert (parent, child, parent_from_child (4, 4)) links to a list of TransformStamped."""
     return [_transform(stamp, *link) for link in links]
 
 
 def _depth_image(depth, header):
-    """16UC1 where the camera counts millimetres, else metres as 32FC1 (REP 118)."""
+    """Convert a DepthImage to 16UC1 if its unit is millimetres, otherwise to metres in 32FC1 (REP 118)."""
     if depth.scale_m == 0.001:
         return fill_image(Image(header=header), depth.values, '16UC1')
     return fill_image(Image(header=header), (depth.values * depth.scale_m).astype(np.float32), '32FC1')
@@ -90,5 +92,5 @@ def _transform(stamp, parent, child, parent_from_child):
 
 
 def frame_id_of(camera):
-    """The frame of the images of one of several cameras by its name, '' of the only one."""
+    """Return the frame of the images of a camera, given by its name; '' for a single camera."""
     return '%s_color_optical_frame' % (camera or CAMERA)

@@ -13,14 +13,14 @@ LAYOUTS = {'rgb8': ('u1', 3), 'bgr8': ('u1', 3), 'rgba8': ('u1', 4), 'bgra8': ('
 COLOR_ENCODINGS = ('rgb8', 'bgr8', 'rgba8', 'bgra8', 'mono8', '8UC1', '8UC3')
 # REP 118: depth is in millimetres in 16UC1 (mono16 in Gazebo and some drivers) and in metres in 32FC1.
 DEPTH_SCALES = {'16UC1': 0.001, 'mono16': 0.001, '32FC1': 1.0}
-# Units of depth are judged by the median of a grid of pixels.
+# The unit of depth is checked by the median of a grid of pixels.
 GRID = 16  # rows and columns of the grid
-LEAST_SAMPLES = 8  # fewer valid pixels say nothing
-NEAREST_M, FARTHEST_M = 0.1, 100.0  # no depth camera of people measures outside
+LEAST_SAMPLES = 8  # with fewer valid pixels the unit is not checked
+NEAREST_M, FARTHEST_M = 0.1, 100.0  # plausible range of the median
 
 
 def array_from(message):
-    """Pixels of an image message as a read-only view of its data, with its row step and byte order.
+    """Return the pixels of an image message as a read-only view of its data, with its row step and byte order.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def array_from(message):
 
 
 def imgmsg_to_rgb(message):
-    """Pixels of a colour image message as RGB, (height, width, 3), uint8; a view if the encoding allows it.
+    """Return the pixels of a colour image message as RGB, (height, width, 3), uint8; a view if the encoding allows it.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def imgmsg_to_rgb(message):
 
 
 def imgmsg_to_depth(message, scale_m=None):
-    """Depth image of an image message.
+    """Convert an image message to a depth image.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def imgmsg_to_depth(message, scale_m=None):
 
 
 def checked_depth_from(message, scale_m=None):
-    """As `imgmsg_to_depth`, but raises ValueError also if the values seem to have another unit."""
+    """Convert as `imgmsg_to_depth`, and also raise ValueError if the values seem to have another unit."""
     depth = imgmsg_to_depth(message, scale_m)
     fault = units_fault(depth)
     if fault:
@@ -98,16 +98,16 @@ def checked_depth_from(message, scale_m=None):
 
 
 def units_fault(depth):
-    """Whether a depth image counts in other units than it is read in, by where most of a few hundred pixels lie.
+    """Check the unit of a depth image by the median of a few hundred pixels.
 
     Parameters
     ----------
-    depth : box3d_estimator.DepthImage
+    depth : depth_image.DepthImage
 
     Returns
     -------
     str
-        A sentence, empty where nothing is wrong.
+        A sentence about the fault; empty if the unit is plausible.
     """
     values = depth.values[::max(1, depth.values.shape[0] // GRID), ::max(1, depth.values.shape[1] // GRID)]
     valid = values[np.isfinite(values) & (values > 0)]

@@ -1,4 +1,4 @@
-"""Between ROS messages and the types of this package."""
+"""Conversions between ROS messages and the detections, boxes, tracks and cameras of this package."""
 from typing import NamedTuple, Optional
 
 import genpy
@@ -15,16 +15,16 @@ from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.tracking.types import TrackedObject, detection_from_box
 
 BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC = 'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'
-LATEST_NS = 2 ** 31 * NS  # differences of stamps have to fit into a duration
+LATEST_NS = 2 ** 31 * NS  # limit of stamps, as their differences must fit into a ROS duration
 EDGE_FLAGS = BoundingBox3D.LEFT, BoundingBox3D.TOP, BoundingBox3D.RIGHT, BoundingBox3D.BOTTOM
-ROUNDING = 1e-9  # of the eigenvalues of a covariance, as a share of its largest element where that is more than 1
-MAX_BOXES = 1000  # more in one image are a fault of their sender, and would stall the pipeline
+ROUNDING = 1e-9  # tolerance of eigenvalues of a covariance, relative to its largest element if that exceeds 1
+MAX_BOXES = 1000  # more boxes in one image are an error of the publisher and would stall the pipeline
 
 
 class Boxes2D(NamedTuple):
     """The 2D boxes of one image: (n, 4) integer pixels x1, y1, x2, y2, and the stamp and frame of the image.
 
-    `stamp_ns` is None in a plain array, which does not say what image it belongs to.
+    `stamp_ns` is None for a plain array, which does not identify its image.
     """
 
     boxes: np.ndarray
@@ -33,18 +33,18 @@ class Boxes2D(NamedTuple):
 
 
 def time_from(stamp_ns):
-    """A ROS time of integer nanoseconds."""
+    """Convert integer nanoseconds to a ROS time."""
     return genpy.Time(*divmod(stamp_ns, NS))
 
 
 def stamp_of(message):
-    """The stamp of a message, integer nanoseconds.
+    """Return the stamp of a message in integer nanoseconds.
 
     Raises
     ------
     ValueError
-        If it is zero: such a message cannot be paired or transformed. If it is beyond what tf2 can reckon with: it
-        would end the process.
+        If the stamp is zero, because the message cannot be paired or transformed, or if it exceeds the range of tf2,
+        which would terminate the process.
     """
     stamp_ns = message.header.stamp.to_nsec()
     if stamp_ns == 0:
@@ -57,13 +57,12 @@ def stamp_of(message):
 
 
 def stamp_if_any(message):
-    """As `stamp_of`, but None where the stamp is zero: for what holds at any time, such as a CameraInfo."""
+    """Return the stamp as `stamp_of`, or None if it is zero: for messages without a fixed time, such as CameraInfo."""
     return stamp_of(message) if message.header.stamp else None
 
 
 def check_transforms(message):
-    """Raise ValueError where a transform in a tf2_msgs/TFMessage has a stamp beyond what tf2 can reckon with: it would
-    end the process.
+    """Raise ValueError if a stamp in a tf2_msgs/TFMessage exceeds the range of tf2, which would terminate the process.
     """
     for transform in message.transforms:
         if transform.header.stamp.to_nsec() >= LATEST_NS:
@@ -72,14 +71,14 @@ def check_transforms(message):
 
 
 def boxes2d_to_msg(boxes, header):
-    """2D boxes as std_msgs/Int32MultiArray, with the stamp and frame of their image in the layout.
+    """Convert 2D boxes to std_msgs/Int32MultiArray, with the stamp and frame of their image in the layout.
 
     Parameters
     ----------
     boxes : numpy.ndarray, (n, 4)
-        Rounded to whole pixels here.
+        x1, y1, x2, y2 in pixels; rounded to integers.
     header : std_msgs.msg.Header
-        Of the image.
+        Header of the image.
     """
     message = Int32MultiArray(data=np.rint(boxes).astype(int).ravel().tolist())
     label = 'boxes;stamp=%d.%09d;frame=%s' % (header.stamp.secs, header.stamp.nsecs, header.frame_id)
@@ -89,12 +88,12 @@ def boxes2d_to_msg(boxes, header):
 
 
 def boxes2d_from_msg(message):
-    """The 2D boxes in an Int32MultiArray, with or without a stamp in its layout.
+    """Convert an Int32MultiArray, with or without a stamp in its layout, to Boxes2D.
 
     Raises
     ------
     ValueError
-        If the length is not a multiple of 4, there are too many boxes, or the label carries a damaged stamp.
+        If the length is not a multiple of 4, there are too many boxes, or the stamp in the label is malformed.
     """
     if len(message.data) % 4:
         raise ValueError('2D boxes have %d numbers; a multiple of 4 expected (x1 y1 x2 y2 each)' % len(message.data))
@@ -116,9 +115,9 @@ def boxes2d_from_msg(message):
 
 
 def with_stamp(message, stamp):
-    """The message with another stamp: in its header, its transforms' headers, or the label of its 2D boxes.
+    """Replace the stamp of a message: in its header, the headers of its transforms, or the label of its 2D boxes.
 
-    Its frames are kept. Messages with a header are changed in place, as images are large.
+    Frames are kept. Messages with a header are modified in place, because images are large. Returns the message.
     """
     if hasattr(message, 'layout'):
         boxes = boxes2d_from_msg(message)
@@ -129,15 +128,15 @@ def with_stamp(message, stamp):
 
 
 def camera_from_msg(message):
-    """The intrinsics and the lens distortion in a sensor_msgs/CameraInfo.
+    """Convert a sensor_msgs/CameraInfo to a camera model with intrinsics and lens distortion.
 
-    realsense2_camera names librealsense's inverse Brown-Conrady plumb_bob, which it is but for a few hundredths of a
-    pixel.
+    realsense2_camera labels the inverse Brown-Conrady model of librealsense as plumb_bob; the two differ by a few
+    hundredths of a pixel.
 
     Raises
     ------
     ValueError
-        If they are not usable: an uncalibrated camera has zeros there; or the distortion model is not known.
+        If K is zero, as for an uncalibrated camera, or the distortion model is unknown.
     """
     if not any(message.K):
         raise ValueError('it is empty (all of K is zero): the driver does not know the calibration of the camera')
@@ -146,14 +145,14 @@ def camera_from_msg(message):
 
 
 def transform_from_msg(message):
-    """The 4x4 matrix of a geometry_msgs/TransformStamped: header.frame_id from child_frame_id."""
+    """Convert a geometry_msgs/TransformStamped to a 4x4 matrix, header.frame_id from child_frame_id."""
     translation, rotation = message.transform.translation, message.transform.rotation
     return transform_from((translation.x, translation.y, translation.z),
                           (rotation.x, rotation.y, rotation.z, rotation.w))
 
 
 def boxes3d_to_msg(boxes, header, camera):
-    """3D boxes (`box3d_estimator.Box3D`) as BoundingBox3DArray."""
+    """Convert 3D boxes (`box3d_estimator.Box3D`) to BoundingBox3DArray. Inverse of `boxes3d_from_msg`."""
     return BoundingBox3DArray(header=header, boxes=[_box3d_to_msg(box, camera) for box in boxes])
 
 
@@ -175,7 +174,7 @@ def _box3d_to_msg(box, camera):
 
 
 def boxes3d_from_msg(message):
-    """The 3D boxes in a BoundingBox3DArray, as (`box3d_estimator.Box3D`, ...). Inverse of `boxes3d_to_msg`."""
+    """Convert a BoundingBox3DArray to a tuple of `box3d_estimator.Box3D`. Inverse of `boxes3d_to_msg`."""
     return tuple(_box3d_from_msg(box) for box in message.boxes)
 
 
@@ -184,20 +183,20 @@ def _box3d_from_msg(box):
     rect_px = (roi.x_offset, roi.y_offset, roi.x_offset + roi.width, roi.y_offset + roi.height)
     edges = tuple(bool(box.truncated_edges & flag) for flag in EDGE_FLAGS)
     if box.truncated and not any(edges):
-        edges = (True,) * len(EDGE_FLAGS)  # which of them is not known, so none is trusted
+        edges = (True,) * len(EDGE_FLAGS)  # the truncated edges are unknown, so no edge is trusted
     return Box3D(_xyz(box.center.position), _xyz(box.size), rect_px, box.support, edges,
                  covariance_m2 if covariance_m2.any() else None)
 
 
 def usable_boxes3d(message):
-    """The 3D boxes in a BoundingBox3DArray that can be tracked, and what is wrong with the others.
+    """Select the 3D boxes of a BoundingBox3DArray that can be tracked.
 
     Returns
     -------
     BoundingBox3DArray
-        The message with the usable boxes.
+        The message with the usable boxes only.
     list of str
-        One sentence for each of the others.
+        A sentence about the fault of each other box.
 
     Raises
     ------
@@ -217,8 +216,8 @@ def usable_boxes3d(message):
 
 
 def _check_box3d(box):
-    """Raise ValueError if a centre is not finite, a size not positive, one of them absurdly large, or a covariance
-    none.
+    """Raise ValueError if the centre is not finite, the size is not positive, one of them is implausibly large, or the
+    covariance is not positive semi-definite.
     """
     center = box.center.position
     values = np.array([center.x, center.y, center.z, box.size.x, box.size.y])
@@ -233,13 +232,14 @@ def _check_box3d(box):
 
 
 def detections_from_msg(message, fixed_from_camera):
-    """The 3D boxes in a BoundingBox3DArray as detections in the fixed frame.
+    """Convert the 3D boxes of a BoundingBox3DArray to detections in the fixed frame.
 
     Parameters
     ----------
     message : BoundingBox3DArray
-        With usable boxes only, see `usable_boxes3d`.
+        Usable boxes only, see `usable_boxes3d`.
     fixed_from_camera : numpy.ndarray, (4, 4)
+        Pose of the camera's optical frame in the fixed frame.
 
     Returns
     -------
@@ -249,7 +249,7 @@ def detections_from_msg(message, fixed_from_camera):
 
 
 def tracks_to_msg(tracks, header):
-    """Tracks (`types.TrackedObject`) as TrackedObjectArray."""
+    """Convert tracks (`types.TrackedObject`) to TrackedObjectArray."""
     return TrackedObjectArray(header=header, objects=[_track_to_msg(track) for track in tracks])
 
 
@@ -271,9 +271,10 @@ def _track_to_msg(track):
 
 
 def tracks_from_msg(message):
-    """The tracks in a TrackedObjectArray; the instant velocity is not in the message and is that of the track.
+    """Convert a TrackedObjectArray to a list of `types.TrackedObject`.
 
-    Nor is how position and velocity go together: that part of the covariance is zero.
+    The message contains neither the instantaneous velocity, which is set to the velocity of the track, nor the
+    cross-covariance of position and velocity, which is set to zero.
     """
     return [_track_from_msg(track) for track in message.objects]
 
@@ -292,7 +293,9 @@ def _track_from_msg(track):
 
 
 def _covariance_6x6(covariance):
-    """As in geometry_msgs: the cylinder stands upright and looks the same from all sides, so its rotation is known."""
+    """Return a flattened 6x6 covariance as in geometry_msgs, with zeros for the rotation: an upright cylinder is
+    rotationally symmetric.
+    """
     full = np.zeros((6, 6))
     full[:3, :3] = covariance
     return full.ravel().tolist()
@@ -303,7 +306,7 @@ def _covariance_3x3(with_covariance):
 
 
 def _pose_at(position_m):
-    """A pose without orientation and of unknown covariance."""
+    """Return a pose with identity orientation and unknown covariance (zeros)."""
     pose = PoseWithCovariance()
     _set_xyz(pose.pose.position, position_m)
     pose.pose.orientation.w = 1.0

@@ -1,7 +1,7 @@
-"""Tracks as the messages that planners read.
+"""Conversion of tracks to the input messages of planners.
 
-The classes of a package that is not on every robot come as an argument, the `msg` module of that package. Tracks are
-lists of `types.TrackedObject` along the axes of the header's frame.
+Message classes of optional packages are passed as an argument, the `msg` module of the package. Tracks are lists of
+`types.TrackedObject` in the frame of the header.
 """
 import numpy as np
 from geometry_msgs.msg import Point, Point32, Quaternion
@@ -12,11 +12,11 @@ from ros_3d_bb.msg import TrackedObject
 
 STATUS_NAMES = {TrackedObject.VISIBLE: 'visible', TrackedObject.OCCLUDED: 'occluded',
                 TrackedObject.OUT_OF_VIEW: 'out of view'}
-UNSEEN_RELIABILITY = 0.5  # of a track that the latest image did not show; some planners scale their costs by it
+UNSEEN_RELIABILITY = 0.5  # of tracks that are not visible in the latest image; some planners scale costs by it
 
 
 def people_to_msg(tracks, header, people_msgs):
-    """people_msgs/People; status and size (metres) of a person are in the tags."""
+    """Convert tracks to people_msgs/People; status and size (metres) are in the tags."""
     return people_msgs.People(header=header, people=[people_msgs.Person(
         name=str(track.id), position=Point(*track.position_m), velocity=Point(*track.velocity_mps),
         reliability=_reliability(track), tagnames=['status', 'width', 'height'],
@@ -25,7 +25,7 @@ def people_to_msg(tracks, header, people_msgs):
 
 
 def obstacles_to_msg(tracks, header, costmap_converter):
-    """costmap_converter/ObstacleArrayMsg: one point, float32, and a radius are a circle."""
+    """Convert tracks to costmap_converter/ObstacleArrayMsg: circles given by one point (float32) and a radius."""
     obstacles = []
     for track in tracks_to_msg(tracks, header).objects:
         obstacle = costmap_converter.ObstacleMsg(header=header, id=track.id, radius=track.size.x / 2,
@@ -37,7 +37,7 @@ def obstacles_to_msg(tracks, header, costmap_converter):
 
 
 def objects_to_msg(tracks, header, derived_object_msgs):
-    """derived_object_msgs/ObjectArray: upright cylinders of pedestrians."""
+    """Convert tracks to derived_object_msgs/ObjectArray: upright cylinders, classified as pedestrians."""
     objects = []
     for track in tracks_to_msg(tracks, header).objects:
         item = derived_object_msgs.Object(header=header, id=track.id, pose=track.pose.pose, twist=track.twist.twist,
@@ -51,7 +51,7 @@ def objects_to_msg(tracks, header, derived_object_msgs):
 
 
 def detections3d_to_msg(tracks, header, vision_msgs):
-    """vision_msgs/Detection3DArray of ROS 1: the id of the one hypothesis is the number of the track."""
+    """Convert tracks to vision_msgs/Detection3DArray (ROS 1), with one hypothesis each, whose id is the track ID."""
     detections = []
     for track, message in zip(tracks, tracks_to_msg(tracks, header).objects):
         detection = vision_msgs.Detection3D(header=header, results=[vision_msgs.ObjectHypothesisWithPose(
@@ -66,7 +66,7 @@ def _reliability(track):
 
 
 def points_to_msg(points_m, header):
-    """sensor_msgs/PointCloud2 of points (n, 3): x, y, z as float32."""
+    """Convert points (n, 3), in metres, to sensor_msgs/PointCloud2 with x, y, z as float32."""
     fields = [PointField(name=name, offset=4 * number, datatype=PointField.FLOAT32, count=1)
               for number, name in enumerate('xyz')]
     return PointCloud2(header=header, height=1, width=len(points_m), fields=fields, point_step=12,

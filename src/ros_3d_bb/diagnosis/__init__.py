@@ -1,4 +1,4 @@
-"""What is wrong with a running graph or a bag, and how to fix it.
+"""Diagnosis of a running graph or a bag: observations, checks, and findings with suggested fixes.
 
 May import: bags, camera, conversions, core, msg.
 """

@@ -1,4 +1,4 @@
-"""What is in a bag, for the checks: its first seconds, read as `process_bag` would."""
+"""Observe the first seconds of a bag, as input of the checks."""
 import genpy
 import tf2_ros
 from sensor_msgs.msg import CameraInfo, Image
@@ -18,21 +18,21 @@ from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 
 CLASSES = {COLOR: Image, DEPTH: Image, INFO: CameraInfo, BOXES2D: Int32MultiArray, BOXES3D: BoundingBox3DArray,
            TRACKS: TrackedObjectArray}
-SECONDS = 10.0  # as far as tf2 looks back
+SECONDS = 10.0  # cache length of tf2
 
 
 def observe_bag(path, name_of, target_frame, seconds=SECONDS):
-    """What was seen of a bag.
+    """Read the first seconds of a bag.
 
     Parameters
     ----------
     path : str
     name_of : callable
-        From what the nodes call a topic to what it is called in the bag, with a slash.
+        Maps the name of a topic of the nodes to its name in the bag, with a leading slash.
     target_frame : str
         Fixed frame of the tracks.
     seconds : float
-        So much of it is read.
+        Duration that is read.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def observe_bag(path, name_of, target_frame, seconds=SECONDS):
     Raises
     ------
     BagError
-        If it cannot be read.
+        If the bag cannot be read.
     """
     observed = {key: Observation(key, name_of(role.name)) for key, role in ROLES.items()}
     depth_info = _Newest(name_of(INFO_TOPICS[1]))
@@ -55,7 +55,7 @@ def observe_bag(path, name_of, target_frame, seconds=SECONDS):
 
 
 class _Newest(object):
-    """The newest message of a topic that has no role of its own."""
+    """The newest message of a topic without a role."""
 
     def __init__(self, topic):
         self.topic, self.newest = topic, None
@@ -65,7 +65,7 @@ class _Newest(object):
 
 
 def _read(reader, observed, depth_info, seconds):
-    """Read the first seconds of a bag into the observations. Returns its transforms."""
+    """Read the first seconds of a bag into the observations. Returns the BagTransforms."""
     transforms, begin_ns = BagTransforms(), None
     for raw in reader.messages(['/' + STATIC_TOPIC]):
         _try(lambda: transforms.set_static(message_in(raw, TFMessage)))
@@ -83,7 +83,7 @@ def _read(reader, observed, depth_info, seconds):
 
 
 def _try(take):
-    """Take a message, if it can be: one of another type, or a damaged one, is as good as none."""
+    """Process a message and ignore it if it has another type or is damaged."""
     try:
         take()
     except ValueError:
@@ -91,15 +91,20 @@ def _try(take):
 
 
 def tf_seen(transforms, depth, target_frame, source_frame=''):
-    """Whether the camera is known in the fixed frame at the stamp of an image; None where there is no image.
+    """Look up the pose of the camera in the fixed frame at the stamp of a depth image.
 
     Parameters
     ----------
     transforms
-        Its `lookup` is as of `BagTransforms`, and so is its `frames_as_yaml`.
+        Object with the methods `lookup` and `frames_as_yaml` of `BagTransforms`.
     depth : Observation
     target_frame, source_frame : str
-        The fixed frame, and that of the camera where the image names it wrongly.
+        The fixed frame, and the frame of the camera if the frame_id of the image is wrong.
+
+    Returns
+    -------
+    TfSeen or None
+        None if there is no image.
     """
     if depth.middle_ns is None:
         return None

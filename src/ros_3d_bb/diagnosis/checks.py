@@ -1,6 +1,6 @@
-"""All checks of a graph or a bag: from what was seen to findings, what is wrong first named where it begins.
+"""Checks of a graph or a bag, in the order of the pipeline, so that the first fault found is the likely cause.
 
-A check whose ground is missing is left out: without depth images nothing is said of their units.
+A check is skipped if its input is missing: without depth images, for example, their unit is not checked.
 """
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault, size_fault
 from ros_3d_bb.diagnosis.observations import Finding
@@ -13,11 +13,16 @@ IMAGES = COLOR, DEPTH, INFO
 
 
 def findings(seen):
-    """What is well and what is wrong, a list of Finding.
+    """Run all checks.
 
     Parameters
     ----------
-    seen : Seen
+    seen : Observations
+
+    Returns
+    -------
+    list of Finding
+        Both faults and passed checks.
     """
     found = _clock(seen)
     has_boxes_only = seen.is_bag and has_come(seen, BOXES2D) and not has_come(seen, COLOR)
@@ -28,7 +33,7 @@ def findings(seen):
 
 
 def has_come(seen, key):
-    """Whether messages of the right type came on the topic of a role."""
+    """Whether messages of the correct type arrived on the topic of a role."""
     return key in seen.streams and seen.streams[key].count > 0
 
 
@@ -69,7 +74,7 @@ def _camera(seen):
 
 
 def _alignment(seen):
-    """Depth has to have the pixels, the intrinsics and the frame of colour."""
+    """Check that depth has the image size, intrinsics and frame of colour."""
     if seen.depth is None or seen.color_camera is None or seen.color_camera.camera is None:
         return []
     camera, frame_id, _fault = seen.color_camera
@@ -93,7 +98,7 @@ def _encodings(seen):
 
 
 def _stamps(seen):
-    """Stamps that are missing, or far from now; the first fault is enough."""
+    """Check for missing stamps and stamps far from the current time; only the first fault is reported."""
     for key in IMAGES:
         stream = seen.streams[key]
         if not has_come(seen, key):
@@ -117,7 +122,7 @@ def _stamp_fault(seen, stream):
                 'where a bag is recorded of one that is played, set use_sim_time and play with --clock; process_bag '
                 'takes this one as it is')
     if seen.clock.use_sim_time and not seen.clock.count:
-        return '', ''  # said already
+        return '', ''  # reported by _clock
     return clock_fault(stream, seen.clock.use_sim_time)
 
 
@@ -147,7 +152,7 @@ def _transforms(seen):
 
 
 def _detector(seen):
-    """Images come: then boxes have to, with nobody in view, too."""
+    """Check that 2D boxes arrive if images do; detectors also publish empty arrays."""
     if has_come(seen, BOXES2D):
         return [Finding('detector', '%s, %.1f Hz' % (seen.streams[BOXES2D].topic, seen.streams[BOXES2D].rate_hz))]
     if not has_come(seen, COLOR) or seen.is_bag:
@@ -177,7 +182,7 @@ def _pairs_of_boxes(seen):
 
 
 def _results(seen):
-    """3D boxes and tracks, as far as what they are made of came."""
+    """Check that 3D boxes and tracks arrive if their inputs do."""
     found = []
     can_lift = all(has_come(seen, key) for key in (DEPTH, INFO, BOXES2D))
     can_track = has_come(seen, BOXES3D) and seen.tf is not None and not seen.tf.fault
@@ -191,7 +196,7 @@ def _results(seen):
 
 
 def _nodes(seen, is_explained):
-    """What nodes say of themselves; of what is wrong only where no other check has said why."""
+    """Report the status of each node; faults only if no other check has found a cause."""
     found = []
     for name, (level, sentence) in sorted(seen.nodes.items()):
         if level == 0:

@@ -1,4 +1,4 @@
-"""From messages to what was seen of them, the same for a running graph and for a bag."""
+"""Convert received messages to observations, for running graphs and bags alike."""
 import collections
 
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb, units_fault
@@ -7,16 +7,16 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.observations import CameraSeen, ImageSeen, Stream
 from ros_3d_bb.diagnosis.topic_roles import ROLES
 
-KEPT = 1000  # stamps of a topic
+KEPT = 1000  # stamps per topic
 
 
 class Observation(object):
-    """The messages of one topic: how many, their stamps, when they came, and the newest.
+    """Statistics of the messages of one topic: their count, stamps and arrival times, and the newest message.
 
     Parameters
     ----------
     key : str
-        A role, see `topic_roles.ROLES`.
+        Key of the role, see `topic_roles.ROLES`.
     topic : str
     """
 
@@ -26,30 +26,39 @@ class Observation(object):
         self._stamps_ns, self._lags_s = collections.deque(maxlen=KEPT), (None, None)
 
     def take(self, message, ros_ns, machine_s=None):
-        """Take a message that came at a ROS time, and at a time of the machine's clock."""
+        """Record a message.
+
+        Parameters
+        ----------
+        message : genpy.Message
+        ros_ns : int
+            Arrival in ROS time, nanoseconds; 0 before the first /clock message.
+        machine_s : float, optional
+            Arrival by the clock of the machine, seconds.
+        """
         self._count += 1
         self._first_ns, self._last_ns = ros_ns if self._first_ns is None else self._first_ns, ros_ns
         self.newest = message
         stamp_ns = _stamp_in(message)
         if stamp_ns:
             self._stamps_ns.append(stamp_ns)
-        if stamp_ns and ros_ns:  # 0 before the first /clock
+        if stamp_ns and ros_ns:
             self._lags_s = (ros_ns - stamp_ns) / NS, None if machine_s is None else machine_s - stamp_ns / NS
 
     @property
     def middle_ns(self):
-        """A stamp from the middle of the time, for which transforms must have come; None where there is none."""
+        """The middle one of the stamps, for which transforms must have arrived; None without stamps."""
         return self._stamps_ns[len(self._stamps_ns) // 2] if self._stamps_ns else None
 
     def stream(self, published_kind, publishers=()):
-        """The Stream that was seen."""
-        passed_s = (self._last_ns - self._first_ns) / NS if self._count > 1 else 0.0  # less than 0 where time jumps
+        """Return the observations as a Stream."""
+        passed_s = (self._last_ns - self._first_ns) / NS if self._count > 1 else 0.0  # negative after a jump in time
         return Stream(self.role, self.topic, published_kind, publishers, self._count,
                       (self._count - 1) / passed_s if passed_s > 0 else 0.0, tuple(self._stamps_ns), *self._lags_s)
 
 
 def _stamp_in(message):
-    """The stamp of a message, or of the image that it is about; None where it carries none that can be read."""
+    """Return the stamp of a message, or of the image of 2D boxes, in nanoseconds; None if it has no valid stamp."""
     if hasattr(message, 'header'):
         return message.header.stamp.to_nsec()
     try:
@@ -59,7 +68,7 @@ def _stamp_in(message):
 
 
 def camera_seen(message):
-    """The CameraSeen of a CameraInfo, None of None."""
+    """Convert a CameraInfo, or None, to CameraSeen, or None."""
     if message is None:
         return None
     try:
@@ -69,12 +78,12 @@ def camera_seen(message):
 
 
 def color_seen(message):
-    """The ImageSeen of a colour image, None of None."""
+    """Convert a colour image, or None, to ImageSeen, or None."""
     return _image_seen(message, imgmsg_to_rgb, lambda _pixels: '')
 
 
 def depth_seen(message):
-    """The ImageSeen of a depth image, None of None."""
+    """Convert a depth image, or None, to ImageSeen, or None."""
     return _image_seen(message, imgmsg_to_depth, units_fault)
 
 

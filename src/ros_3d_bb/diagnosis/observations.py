@@ -1,12 +1,12 @@
-"""What was observed of a running graph, or of a bag. Stamps are integer nanoseconds, clocks seconds."""
+"""Data types of the observations of a running graph or a bag. Stamps are integer nanoseconds, times are seconds."""
 from typing import Any, Dict, NamedTuple, Optional, Tuple
 
 
 class Role(NamedTuple):
     """A topic of the pipeline.
 
-    `title`: what comes on it; `name`: what the nodes call it; `kind`: its type; `argument`: the launch argument that
-    renames it, empty where there is none; `source`: what publishes it; `when_silent`: what to do where that is silent.
+    `title`: content of the topic; `name`: its name in the nodes; `kind`: its type; `argument`: the launch argument that
+    renames it, or empty; `source`: its publisher; `when_silent`: what to do if the publisher is silent.
     """
 
     title: str
@@ -18,18 +18,18 @@ class Role(NamedTuple):
 
 
 class Publisher(NamedTuple):
-    """A node that publishes a topic; `problem` says why nothing of it can come here, empty where it can."""
+    """A node that publishes a topic; `problem` states why it cannot be received here, empty if it can."""
 
     node: str
     problem: str = ''
 
 
 class Stream(NamedTuple):
-    """What was seen on the topic of a role.
+    """Observations on the topic of a role.
 
-    `topic`: its full name here; `published_kind`: the type it is published with, empty where nobody does; `stamps_ns`:
-    of the messages that carry one; `lag_s`: ROS time minus the stamp when the newest came, None where there is none;
-    `machine_lag_s`: the same by the machine's clock.
+    `topic`: its resolved name; `published_kind`: its published type, empty without publishers; `stamps_ns`: stamps
+    of the messages that have one; `lag_s`: ROS time minus stamp at the arrival of the newest message, None if unknown;
+    `machine_lag_s`: the same by the clock of the machine.
     """
 
     role: Role
@@ -44,7 +44,7 @@ class Stream(NamedTuple):
 
 
 class CameraSeen(NamedTuple):
-    """A camera_info: `camera` (`geometry.Camera`), or None and why it cannot be used."""
+    """A camera_info: `camera` is a `camera_model.Camera`, or None if it cannot be used; `fault` states why."""
 
     camera: Any
     frame_id: str
@@ -52,7 +52,7 @@ class CameraSeen(NamedTuple):
 
 
 class ImageSeen(NamedTuple):
-    """The newest image of a topic; `fault`: why it cannot be used, or empty."""
+    """The newest image of a topic; `fault` states why it cannot be used, empty if it can."""
 
     width: int
     height: int
@@ -62,7 +62,10 @@ class ImageSeen(NamedTuple):
 
 
 class TfSeen(NamedTuple):
-    """`links`: {frame: `tf_tree.Link`}; `fault`: why there is no transform at a stamp, empty where there is one."""
+    """Result of a tf lookup at a stamp.
+
+    `links`: {frame: `tf_tree.Link`}; `fault`: why there is no transform, empty if there is one.
+    """
 
     target: str
     source: str
@@ -72,17 +75,17 @@ class TfSeen(NamedTuple):
 
 
 class Clock(NamedTuple):
-    """Whether the graph is told the time, and how often that came."""
+    """Whether the graph uses simulated time, and the number of received /clock messages."""
 
     use_sim_time: bool
     count: int
 
 
 class Observations(NamedTuple):
-    """All that was observed; None where nothing was. `clock` is None of a bag.
+    """All observations; fields are None if nothing was received. `clock` is None for a bag.
 
-    `topics`: {name: type} of all that is published; `nodes`: {name: (level, sentence)} of what nodes say of themselves;
-    `seconds`: for how long it was listened.
+    `topics`: {name: type} of all published topics; `nodes`: {name: (level, sentence)} from the diagnostics of nodes;
+    `seconds`: duration of the observation.
     """
 
     streams: Dict[str, Stream]
@@ -101,7 +104,7 @@ class Observations(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """What a check says: about what, and what is wrong (empty: nothing) with its fix, or what is well."""
+    """Result of a check: its subject, and either a fault with its fix or a fact. `fault` is empty if there is none."""
 
     subject: str
     fact: str = ''
@@ -110,12 +113,12 @@ class Finding(NamedTuple):
 
     @property
     def is_wrong(self):
-        """Whether something is wrong."""
+        """Whether the check found a fault."""
         return bool(self.fault)
 
     @property
     def lines(self):
-        """As it is printed."""
+        """The finding as printed lines."""
         if self.is_wrong:
             return ['wrong  %s: %s' % (self.subject, self.fault), '       fix: %s' % self.fix]
         return ['ok     %s: %s' % (self.subject, self.fact)]

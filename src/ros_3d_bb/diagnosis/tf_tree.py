@@ -1,4 +1,4 @@
-"""What tf knows, in a sentence: which frames, which link is missing, which one stands still."""
+"""Explain why a tf lookup fails: unknown frames, disconnected trees, outdated transforms."""
 from typing import NamedTuple
 
 from yaml import YAMLError
@@ -6,11 +6,11 @@ from yaml import YAMLError
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
 
-NAMED = 8  # frames that a sentence names
+NAMED = 8  # frames listed in a sentence
 
 
 class Link(NamedTuple):
-    """A frame's parent, and the time between whose stamps the transform is known, seconds; 0 and 0: always."""
+    """The parent of a frame, and the oldest and newest stamp of their transform, seconds; (0, 0) if it is static."""
 
     parent: str
     oldest_s: float
@@ -18,12 +18,12 @@ class Link(NamedTuple):
 
     @property
     def is_static(self):
-        """Whether it is known for all times."""
+        """Whether the transform is valid at all times."""
         return self.newest_s == 0
 
 
 def links_in(text):
-    """The links {frame: Link} in what tf2's all_frames_as_yaml says; none where a frame's name makes it no YAML."""
+    """Parse the output of all_frames_as_yaml (tf2) to {frame: Link}. Empty if a frame name makes it invalid YAML."""
     try:
         entries = load_yaml(text) or {}
     except YAMLError:
@@ -34,7 +34,7 @@ def links_in(text):
 
 
 def chain(links, frame):
-    """A frame, its parent, and so on to the root."""
+    """Return the list of frames from a frame to the root."""
     found = [frame]
     while found[-1] in links and links[found[-1]].parent not in found:
         found.append(links[found[-1]].parent)
@@ -42,12 +42,21 @@ def chain(links, frame):
 
 
 def why_missing(links, target, source, stamp_s):
-    """Why there is no transform from a camera's frame to the fixed frame of the tracks at a stamp.
+    """Explain why there is no transform from the camera's frame to the fixed frame of the tracks at a stamp.
+
+    Parameters
+    ----------
+    links : dict
+        {frame: Link}
+    target, source : str
+        The fixed frame and the frame of the camera.
+    stamp_s : float
+        Stamp of the image, seconds; 0 for the latest transform.
 
     Returns
     -------
     str, str
-        What is wrong, and what to do. Empty where the links say nothing against it.
+        The fault and its fix; both empty if the links show no fault.
     """
     frames = set(links) | set(link.parent for link in links.values())
     if not frames:
@@ -83,7 +92,7 @@ def _missing_link(frames, root, target):
 
 
 def _why_untimely(links, up, down, stamp_s):
-    """Of frames in one tree: the link between them that is not known at the stamp; 0 asks for the newest."""
+    """Find the link between two frames of one tree that has no transform at the stamp; 0 means the latest."""
     if not stamp_s:
         return '', ''
     between = [frame for frame in up if frame not in down] + [frame for frame in down if frame not in up]

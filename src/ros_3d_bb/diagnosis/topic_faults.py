@@ -1,28 +1,33 @@
-"""Topics on which nothing comes, stamps that are far from now, and stamps that do not pair."""
+"""Faults of topics: silence, stamps far from the current time, and stamps that do not match."""
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.time_sync import NS
 
-LATE_S, EARLY_S = 5.0, 2.0  # by so much a stamp may be before and after ROS time
-LEAST_RATE_HZ = 4.0  # of images; people who walk are lost between slower ones
-LEAST_PAIRED = 0.5  # share of boxes that find their depth image
+LATE_S, EARLY_S = 5.0, 2.0  # tolerated time of a stamp before and after ROS time
+LEAST_RATE_HZ = 4.0  # of images; tracks of walking people are lost at lower rates
+LEAST_PAIRED = 0.5  # required fraction of boxes with a depth image of the same stamp
 STANDSTILL = ('/use_sim_time is set and nothing comes on /clock: time stands still',
               'play the bag with rosbag play --clock, or rosparam set use_sim_time false, and start the nodes again')
 
 
 def silence_fault(stream, topics, taken=(), seconds=5.0, is_bag=False):
-    """Why nothing came on a topic, and what to do: (fault, fix).
+    """Explain why no messages arrived on a topic.
 
     Parameters
     ----------
     stream : Stream
     topics : dict
-        {name: type} of all that is published.
+        {name: type} of all published topics.
     taken : collection of str
-        Topics that have another role already and are not suggested.
+        Topics that already have another role and are not suggested.
     seconds : float
-        How long it was waited for.
+        Duration of the observation.
     is_bag : bool
         Whether the topics are those of a bag.
+
+    Returns
+    -------
+    str, str
+        The fault and its fix.
     """
     role, topic = stream.role, stream.topic
     if stream.published_kind != role.kind:
@@ -51,7 +56,13 @@ def _rename(stream, topics, taken, start):
 
 
 def clock_fault(stream, use_sim_time):
-    """Why the stamps on a topic are far from ROS time, and what to do: (fault, fix); empty where they are not."""
+    """Explain why the stamps on a topic are far from ROS time.
+
+    Returns
+    -------
+    str, str
+        The fault and its fix; both empty if the stamps are within the tolerance.
+    """
     lag_s = stream.lag_s
     if lag_s is None or -EARLY_S <= lag_s <= LATE_S:
         return '', ''
@@ -69,7 +80,7 @@ def clock_fault(stream, use_sim_time):
 
 
 def span(seconds):
-    """A time in words that one can grasp."""
+    """Format a duration in a suitable unit, from seconds to days."""
     for unit, length_s in (('days', 86400.0), ('hours', 3600.0), ('minutes', 60.0)):
         if seconds >= 2 * length_s:
             return '%.1f %s' % (seconds / length_s, unit)
@@ -77,12 +88,14 @@ def span(seconds):
 
 
 def paired_share(stamps_ns, among_ns, tolerance_s):
-    """The share of stamps that have a partner among others, of those from the time that the others cover.
+    """Return the fraction of stamps that match one of `among_ns` within a tolerance.
+
+    Only stamps in the time range of `among_ns` are counted.
 
     Returns
     -------
     float or None
-        None where that time has none.
+        None if there are no stamps in that range.
     """
     others = sorted(among_ns)
     tolerance_ns = int(tolerance_s * NS)

@@ -1,4 +1,4 @@
-"""The topics of the pipeline, by role."""
+"""Table of the topics of the pipeline by role."""
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
 from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS
@@ -21,7 +21,7 @@ ROLES = {
 
 
 def role_named(name, kind):
-    """The Role of what a node calls a topic; a plain one where it is none of the pipeline's."""
+    """Return the Role of a topic by its name in the nodes; a generic Role for topics outside the pipeline."""
     for role in ROLES.values():
         if role.name == name:
             return role

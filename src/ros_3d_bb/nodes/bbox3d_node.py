@@ -1,4 +1,4 @@
-"""The node that estimates 3D boxes from 2D boxes and the depth image of the same stamp."""
+"""ROS node that estimates 3D bounding boxes from 2D bounding boxes and the depth image with the same stamp."""
 import threading
 
 import rospy
@@ -19,24 +19,24 @@ from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
 
 
 class Bbox3dNode(object):
-    """Lift 2D boxes into the camera's optical frame.
+    """Estimate 3D boxes from 2D boxes and depth images.
 
-    Each array of 2D boxes meets the depth image of its own stamp, however long the detector takes. Parameters:
-    config/bbox3d.yaml; some can be changed while it runs.
+    Each array of 2D boxes is paired with the depth image of the same stamp, regardless of the detector's latency.
+    Parameters: config/bbox3d.yaml; some can be changed at run time.
 
     Subscribes
     ----------
     yolo_bounding_box : std_msgs/Int32MultiArray
         2D boxes.
     camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth with the pixels of the colour image.
+        Depth image, aligned to the colour image.
     camera/color/camera_info : sensor_msgs/CameraInfo
-        Of the colour camera.
+        Calibration of the colour camera.
 
     Publishes
     ---------
     ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
-        In the camera's optical frame, with the stamp of the image that the boxes were found in.
+        3D boxes in the optical frame of the camera, with the stamp of the image in which they were detected.
     """
 
     def __init__(self):
@@ -52,7 +52,7 @@ class Bbox3dNode(object):
                                     self._diagnostics)
         self._alignment = DepthCameraCheck(with_frames=not params.frame_id)
         self._diagnostics.check(self._alignment.faults)
-        # Each depth image is kept for boxes that may come for it later, so none may be dropped on the way.
+        # Depth images are cached until their boxes arrive, so the subscriber queues must not drop any.
         subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
         subscribe(BOXES_TOPIC, Int32MultiArray, self._on_boxes)
@@ -78,7 +78,7 @@ class Bbox3dNode(object):
             self._estimation_stage.add_boxes(message, arrival_clock_ns())
 
     def _on_frame(self, boxes2d, depth_msg, camera):
-        """Publish the 3D boxes of one image: 2D boxes, depth image and camera of one stamp have arrived."""
+        """Publish the 3D boxes of one image, once its 2D boxes, depth image and camera model have arrived."""
         with self._diagnostics.rejecting('2D boxes'):
             header, depth, boxes3d = self._estimation_stage.estimate(boxes2d, depth_msg, camera)
             self._boxes_pub.publish(boxes3d_to_msg(boxes3d, header, camera))

@@ -1,4 +1,4 @@
-"""The node that finds people without a trained network's weights, in depth and colour."""
+"""ROS node that detects people in depth and colour images without a trained network."""
 import threading
 
 import rospy
@@ -18,22 +18,22 @@ from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, RgbdDetectio
 
 
 class DepthDetectorNode(object):
-    """Find people in depth and colour.
+    """Detect people in depth and colour images.
 
-    It needs no weights. Parameters: config/depth_detector.yaml; most can be changed while it runs.
+    No network weights are required. Parameters: config/depth_detector.yaml; most can be changed at run time.
 
     Subscribes
     ----------
     camera/color/image_raw : sensor_msgs/Image
-        Colour.
+        Colour image.
     camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth with the pixels of the colour image.
+        Depth image, aligned to the colour image.
     camera/color/camera_info : sensor_msgs/CameraInfo
-        Of the colour camera.
+        Calibration of the colour camera.
     /tf : tf2_msgs/TFMessage
-        Where the floor is; not with an empty ~floor_frame.
+        Transform from ~floor_frame to the camera, which locates the floor. Not used if ~floor_frame is empty.
     /tf_static : tf2_msgs/TFMessage
-        The same.
+        As /tf.
     """
 
     def __init__(self):
@@ -70,7 +70,7 @@ class DepthDetectorNode(object):
             self._search.add_color(message, arrival_clock_ns())
 
     def _on_frame(self, color_msg, depth_msg, camera):
-        """Hand the images and the camera of one stamp to the worker."""
+        """Pass the images and the camera model of one stamp to the worker thread."""
         if not self._switch.on:
             self._diagnostics.count('images while paused')
             return
@@ -80,7 +80,7 @@ class DepthDetectorNode(object):
 
     def _work(self, frame):
         with self._diagnostics.rejecting('images'), self._switch.searching(), self._searching:
-            if not self._switch.on:  # it may have been paused meanwhile
+            if not self._switch.on:  # the detector may have been paused in the meantime
                 self._diagnostics.count('images while paused')
                 return
             color_msg, depth_msg, camera = frame

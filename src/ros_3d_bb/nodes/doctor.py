@@ -1,4 +1,4 @@
-"""The command `doctor`: what keeps a running pipeline, or a bag, from working, and the fix of each."""
+"""Command `doctor`: find the faults of a running pipeline or of a bag, and suggest a fix for each."""
 import argparse
 import os
 import socket
@@ -22,7 +22,7 @@ LOCAL = 'localhost', '127.0.0.1', '127.0.1.1', '::1'
 
 
 def main():
-    """The command. The exit status is 0 where all is well, 1 where something is wrong."""
+    """Run the command. The exit status is 0 if no fault is found and 1 otherwise."""
     arguments = _parser().parse_args(rospy.myargv()[1:])
     if arguments.bag:
         found = bag_findings(arguments)
@@ -46,7 +46,7 @@ def main():
 
 
 def bag_findings(arguments):
-    """The findings about a bag."""
+    """Return the findings about a bag."""
     names = dict(remapping.split(':=') for remapping in sys.argv if ':=' in remapping)
 
     def name_of(topic):
@@ -60,9 +60,16 @@ def bag_findings(arguments):
 
 
 def graph_findings(arguments):
-    """The findings about the running graph: listen again as long as something is wrong and there is patience.
+    """Return the findings about the running graph.
 
-    Raises KeyboardInterrupt where it is stopped, one of `master.NO_ANSWER` where the master is.
+    The graph is observed repeatedly until no fault is found or `arguments.patience` seconds have passed.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If the command is interrupted.
+    `master.NO_ANSWER`
+        If the master stops.
     """
     deadline_s = time.monotonic() + arguments.patience
     while True:
@@ -80,19 +87,19 @@ def graph_findings(arguments):
 
 
 def tracked_cameras():
-    """The namespaces of the cameras that the tracker takes, a list; of a single camera ['']."""
+    """Return the list of namespaces of the tracker's cameras; [''] for a single camera."""
     given = tracker_param('cameras')
     if not given:
         return ['']
     try:
         tracker, = params_from({'cameras': given}, TrackerNodeParams)
         return [str(camera) for camera in tracker.cameras] or ['']
-    except ValueError:  # the tracker says so
+    except ValueError:  # reported by the tracker itself
         return ['']
 
 
 def _sleep(seconds):
-    """Sleep by the machine's clock. Raises KeyboardInterrupt where it is stopped: rospy takes the signal itself."""
+    """Sleep in wall-clock time. Raises KeyboardInterrupt on Ctrl-C, because rospy handles the signal itself."""
     until_s = time.monotonic() + seconds
     while time.monotonic() < until_s:
         time.sleep(0.05)
@@ -101,13 +108,13 @@ def _sleep(seconds):
 
 
 def machine_findings():
-    """Whether there is a master, and whether others can reach this machine by the name that it goes by."""
+    """Check that a master is running and that other machines can reach this one by its host name."""
     uri = os.environ.get('ROS_MASTER_URI', '')
     fix = ('roscore, or roslaunch, starts one on this machine; of a robot: export ROS_MASTER_URI=http://ROBOT:11311')
     try:
         address = urlparse(uri)
         is_address = address.hostname and address.port
-    except ValueError:  # http://HOST:PORT, literally
+    except ValueError:  # the literal text http://HOST:PORT
         is_address = False
     if not is_address:
         return [Finding('master', '', 'ROS_MASTER_URI is %r; http://HOST:11311 expected' % uri, fix)]
@@ -124,7 +131,7 @@ def machine_findings():
 
 
 def _own_name(master_host):
-    """Others connect to this machine by that name."""
+    """Check the host name under which other machines connect to this one."""
     name = rosgraph.network.get_host_name()
     try:
         socket.getaddrinfo(name, None)

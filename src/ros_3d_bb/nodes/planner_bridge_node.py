@@ -1,4 +1,4 @@
-"""The node that hands tracks on to planners, as the messages that they read."""
+"""ROS node that converts tracks to the input messages of local planners and costmaps."""
 import threading
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.planning.planner_outputs import outputs_from
 from ros_3d_bb.planning.planner_view import SAME_FRAME, predicted_to, rounding_m, usable_tracks
 
-MOST_ROUNDING_M = 0.005  # of coordinates: a tenth of a cell of a usual costmap
+MOST_ROUNDING_M = 0.005  # largest rounding error of a coordinate: a tenth of a typical costmap cell
 
 
 @parameters()
@@ -46,8 +46,10 @@ class PlannerBridgeParams(NamedTuple):
 
 
 class News(NamedTuple):
-    """The latest tracks, in their own frame. `transforms`: 4x4 matrices from it to the frames of outputs, by frame;
-    without those that tf does not know.
+    """The latest tracks, in the frame in which they were received.
+
+    `transforms` maps the frame of each output to the 4x4 matrix from the tracks' frame to it; frames that are unknown
+    to tf are omitted.
     """
 
     stamp_ns: int
@@ -58,7 +60,9 @@ class News(NamedTuple):
 
 
 class Sent(NamedTuple):
-    """What was published last on a topic: when its tracks had come, and its frame (a 4x4 matrix from theirs)."""
+    """The last message published on a topic: arrival time of its tracks, its frame, and the 4x4 matrix from the
+    tracks' frame to it.
+    """
 
     arrival_ns: int
     frame_id: str
@@ -66,7 +70,7 @@ class Sent(NamedTuple):
 
 
 class PlannerTopic(object):
-    """A topic. `sent` is None where its planner keeps nobody."""
+    """An output topic. `sent` is None if the planner currently holds no tracks from it."""
 
     def __init__(self, output):
         self.output = output
@@ -89,26 +93,27 @@ class PlannerTopic(object):
 
 
 class PlannerBridgeNode(object):
-    """Hand tracks on to planners.
+    """Publish tracks in the message formats of planners.
 
-    ~outputs says which of the topics there are. Where no tracks come for ~timeout, each is emptied once. Parameters:
-    config/planner_bridge.yaml.
+    ~outputs selects the published topics. If no tracks arrive for ~timeout, an empty array is published once on each.
+    Parameters: config/planner_bridge.yaml.
 
     Subscribes
     ----------
     ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
         Tracks.
     /tf : tf2_msgs/TFMessage
-        From the frame of the tracks to ~robot_frame (`costmap`) and ~planner_frame (`teb`, `mpc`).
+        Transforms from the frame of the tracks to ~robot_frame (`costmap`) and ~planner_frame (`teb`, `mpc`).
     /tf_static : tf2_msgs/TFMessage
-        The same.
+        As /tf.
 
     Publishes
     ---------
     ~points : sensor_msgs/PointCloud2
-        `costmap`: people now and soon, as points for an obstacle layer.
+        `costmap`: current and predicted footprints of people, as points for an obstacle layer.
     ~clearing_points : sensor_msgs/PointCloud2
-        `costmap`: a ring around the robot, to which the costmap is cleared before; not with ~clearing_range 0.
+        `costmap`: ring of points around the robot up to which the costmap is cleared before people are marked. Not
+        published if ~clearing_range is 0.
     /people : people_msgs/People
         `people`: for social_navigation_layers.
     ~obstacles : costmap_converter/ObstacleArrayMsg
@@ -116,7 +121,7 @@ class PlannerBridgeNode(object):
     ~objects : derived_object_msgs/ObjectArray
         `mpc`: for mpc_planner_jackal.
     ~detections : vision_msgs/Detection3DArray
-        `vision`: for readers of 3D detections.
+        `vision`: for consumers of vision_msgs.
     """
 
     def __init__(self):
@@ -143,7 +148,7 @@ class PlannerBridgeNode(object):
             self._diagnostics.record_latency(message.header.stamp)
 
     def _read(self, message):
-        """The news in a message. Raises ValueError where a planner should not see them."""
+        """Convert a message to `News`. Raises ValueError if the tracks must not be passed to planners."""
         stamp_ns, now_ns = stamp_of(message), _now_ns()
         if abs(now_ns - stamp_ns) > self._params.timeout * NS:
             raise ValueError('their stamp is %.3f s before the clock, more than ~timeout (%g s); a bag needs '
@@ -156,7 +161,7 @@ class PlannerBridgeNode(object):
         return News(stamp_ns, now_ns, message.header.frame_id, tracks, self._transforms_at(message.header))
 
     def _transforms_at(self, header):
-        """The transforms to the frames of the outputs that tf knows at the stamp of the tracks, by frame."""
+        """Return {frame: 4x4 matrix} from the tracks' frame to the output frames known to tf at the tracks' stamp."""
         transforms = {header.frame_id: SAME_FRAME}
         for frame in sorted(set(topic.output.frame for topic in self._topics) - {'', header.frame_id}):
             try:
@@ -168,7 +173,9 @@ class PlannerBridgeNode(object):
         return transforms
 
     def _send(self, topic, now_ns):
-        """Send the news to one topic, as its planner needs them; not without the transform that it needs."""
+        """Publish the latest tracks on one topic, in the form its planner requires. Does nothing if the required
+        transform is unknown.
+        """
         news, tracks, stamp_ns = self._news, self._news.tracks, self._news.stamp_ns
         frame_id = topic.output.frame or news.frame_id
         if frame_id not in news.transforms:
@@ -188,7 +195,7 @@ class PlannerBridgeNode(object):
                                    % (topic.output.topic, off_m, frame_id))
 
     def _on_timer(self, _event):
-        """Send again what planners take for now; empty what is out of date."""
+        """Republish the outputs that planners interpret as current, and empty the outdated ones."""
         with self._diagnostics.rejecting('outputs'), self._lock:
             now_ns = _now_ns()
             for topic in self._topics:
@@ -203,7 +210,7 @@ class PlannerBridgeNode(object):
                     self._send(topic, now_ns)
 
     def _empty_all(self):
-        """The node ends: no planner must keep the people of its last array."""
+        """Publish empty arrays at shutdown, so that no planner keeps the people of the last one."""
         with self._lock:
             for topic in self._topics:
                 if topic.sent is not None:
@@ -211,7 +218,7 @@ class PlannerBridgeNode(object):
 
 
 def _now_ns():
-    """The time to which positions are predicted; stamps of images are on this clock."""
+    """Return the ROS time to which positions are predicted; image stamps use the same clock."""
     return rospy.get_rostime().to_nsec()
 
 

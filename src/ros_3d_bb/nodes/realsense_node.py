@@ -1,4 +1,4 @@
-"""The node that reads a RealSense, or a recording of one, without the driver realsense2_camera."""
+"""ROS node that reads a RealSense camera or recording through librealsense, without realsense2_camera."""
 import contextlib
 import sys
 import threading
@@ -22,13 +22,13 @@ from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.wait_for_subscribers import wait_for_subscribers
 
 RETRY_S = 2.0
-CLOSING_S = 5.0  # at most
-START_NS = NS  # the time that is told until the first image of a recording says another
+CLOSING_S = 5.0  # upper limit
+START_NS = NS  # published on /clock until the first image of a recording sets the time
 
 
 @parameters()
 class RealSenseNodeParams(NamedTuple):
-    """Parameters of realsense_node beside those of the camera."""
+    """Parameters of realsense_node, except those of the camera."""
 
     frame_prefix: str = Param('camera')
     publish_clock: bool = Param(
@@ -39,22 +39,22 @@ class RealSenseNodeParams(NamedTuple):
 class RealSenseNode(object):
     """Publish colour, depth aligned to it, and camera_info, with the topics and frames of realsense2_camera.
 
-    A camera that is not there, or is unplugged, is waited for. Parameters: config/realsense.yaml.
+    If the camera is missing or unplugged, the node waits for it. Parameters: config/realsense.yaml.
 
     Publishes
     ---------
     camera/color/image_raw : sensor_msgs/Image
-        Colour.
+        Colour image.
     camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth with the pixels of the colour image.
+        Depth image, aligned to the colour image.
     camera/color/camera_info : sensor_msgs/CameraInfo
-        Of the colour camera.
+        Calibration of the colour camera.
     camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
-        The same, as depth is aligned to colour.
+        As camera/color/camera_info, because depth is aligned to colour.
     /tf_static : tf2_msgs/TFMessage
-        The frames of the camera, below the frame ~frame_prefix + "_link".
+        Frames of the camera, as children of the frame ~frame_prefix + "_link".
     /clock : rosgraph_msgs/Clock
-        The time of a recording; only with ~publish_clock.
+        Time of a recording; only with ~publish_clock.
     """
 
     def __init__(self):
@@ -73,12 +73,15 @@ class RealSenseNode(object):
         rospy.on_shutdown(self._wait)
 
     def _wait(self):
-        """Let the camera be closed: librealsense must not be torn down while it is read."""
+        """Wait until the camera is closed: librealsense must not be torn down during a read."""
         if threading.current_thread() is not self._worker:
             self._worker.join(CLOSING_S)
 
     def _run(self):
-        """Read the camera until the end, whenever it is there; rospy publishes from any thread but the main one."""
+        """Read the camera until shutdown, reconnecting whenever it is lost.
+
+        This runs in a worker thread because rospy publishes from any thread except the main one.
+        """
         try:
             wait_for_subscribers(self._pubs[COLOR_TOPIC], self._params.wait_for_subscribers,
                                  lambda: self._tell_time(START_NS))
@@ -90,7 +93,7 @@ class RealSenseNode(object):
                 except CameraLost as error:
                     self._diagnostics.warn('camera lost', '%s; trying again every %.0f s' % (error, RETRY_S))
                     time.sleep(RETRY_S)
-        except Exception as error:  # without this thread the node does nothing: better no node than such a one
+        except Exception as error:  # without this thread the node is useless, so it is shut down
             if not is_ending():
                 self.failed = True
                 rospy.logfatal('the camera is read no more: %s', error)
@@ -103,7 +106,7 @@ class RealSenseNode(object):
                 pair = camera.read()
                 if pair is not None:
                     self._publish(camera, pair, links)
-                    links = ()  # they are latched
+                    links = ()  # /tf_static is latched
         if camera.is_over:
             rospy.loginfo('the recording is over')
             rospy.signal_shutdown('the recording is over')
@@ -125,5 +128,5 @@ class RealSenseNode(object):
 
 
 def main():
-    """Run the node; the exit status is 1 where the camera or the recording could not be read."""
+    """Run the node. The exit status is 1 if the camera or the recording could not be read."""
     sys.exit(run_node('realsense_node', RealSenseNode).failed)

@@ -1,4 +1,4 @@
-"""The node that makes tracks of 3D boxes in a fixed frame."""
+"""ROS node that tracks 3D boxes in a fixed frame."""
 import functools
 import threading
 
@@ -23,9 +23,9 @@ from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerW
 class TrackerNode(object):
     """Track 3D boxes in a fixed frame.
 
-    Without a transform at the stamp of the boxes nothing is published and nobody ages. Parameters:
-    config/tracker.yaml; many can be changed while it runs. With ~cameras it subscribes to boxes, camera_info and depth
-    of each: for the camera front to front/ros_3d_bb/bb_3d, front/color/camera_info and
+    If there is no transform at the stamp of the boxes, nothing is published and tracks do not age. Parameters:
+    config/tracker.yaml; many can be changed at run time. With ~cameras, the node subscribes to the boxes, camera_info
+    and depth images of each camera: for the camera front these are front/ros_3d_bb/bb_3d, front/color/camera_info and
     front/aligned_depth_to_color/image_raw.
 
     Subscribes
@@ -33,20 +33,20 @@ class TrackerNode(object):
     ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
         3D boxes.
     camera/color/camera_info : sensor_msgs/CameraInfo
-        Tells who is out of view; not with ~tracker thesis.
+        Calibration, used to determine which tracks are out of view; not with ~tracker thesis.
     camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Tells whom something hides; not with ~tracker thesis or without ~use_depth.
+        Depth image, used to determine which tracks are occluded; not with ~tracker thesis or without ~use_depth.
     /tf : tf2_msgs/TFMessage
-        Where the camera is in ~target_frame.
+        Pose of the camera in ~target_frame.
     /tf_static : tf2_msgs/TFMessage
-        The same.
+        As /tf.
 
     Publishes
     ---------
     ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
-        In ~target_frame, with the stamp of the newest image.
+        Tracks in ~target_frame, with the stamp of the newest image.
     visualization_marker_array : visualization_msgs/MarkerArray
-        The same for RViz, while somebody subscribes.
+        The tracks as markers for RViz; published only if there are subscribers.
     """
 
     def __init__(self):
@@ -89,7 +89,7 @@ class TrackerNode(object):
 
     def _on_boxes(self, message, camera):
         with self._diagnostics.receiving('3D boxes'):
-            # One camera's wait for a transform holds up no other.
+            # Not under the lock: waiting for the transform of one camera must not delay the others.
             located = self._tracking_stage.locate(message, arrival_clock_ns(), camera)
             if located is None:
                 return

@@ -1,4 +1,4 @@
-"""The node that shows what the camera and the pipeline see, and takes measurements."""
+"""ROS node that displays images and boxes, and stores measurements in a session."""
 import os
 import threading
 import time
@@ -52,25 +52,25 @@ class ViewerParams(NamedTuple):
 
 
 class Color(NamedTuple):
-    """A colour image, RGB, and the frame of its camera."""
+    """A colour image (RGB) and the frame of its camera."""
 
     pixels: Any
     frame_id: str
 
 
 class ViewerNode(object):
-    """Show colour, depth and boxes of one image, and append it to a measurement session.
+    """Show the colour image, depth image and boxes of one stamp, and append them to a measurement session.
 
-    Parameters: config/viewer.yaml; ~label is read at each measurement.
+    Parameters: config/viewer.yaml; ~label is read for each measurement.
 
     Subscribes
     ----------
     camera/color/image_raw : sensor_msgs/Image
-        Colour.
+        Colour image.
     camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth with the pixels of the colour image.
+        Depth image, aligned to the colour image.
     camera/color/camera_info : sensor_msgs/CameraInfo
-        Of the colour camera.
+        Calibration of the colour camera.
     yolo_bounding_box : std_msgs/Int32MultiArray
         2D boxes.
     ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
@@ -79,12 +79,13 @@ class ViewerNode(object):
     Services
     --------
     ~capture : std_srvs/Trigger
-        Appends what is newest to the session, as the key `s`; answers as what, or why not.
+        Appends the newest image and its boxes to the session, as the key `s` does. The response names the stored
+        measurement or the reason for the failure.
 
     Calls
     -----
     detector/enable : std_srvs/SetBool
-        Pauses the detector, and lets it go on: the key `p`.
+        Pauses and resumes the detector, by the key `p`.
     """
 
     def __init__(self):
@@ -140,22 +141,22 @@ class ViewerNode(object):
             self._is_said = False
 
     def _note(self, topic):
-        """A message of the camera arrived on a topic."""
+        """Record the arrival of a camera message on a topic."""
         self._came.add(topic)
         self._diagnostics.count('messages of the camera')
 
     def _on_lost(self, stamp_ns):
-        """A colour image stays without depth."""
+        """Warn that no depth image arrived for a colour image."""
         self._diagnostics.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f '
                                'of the colour image came; waiting for the next' % (stamp_ns / NS))
 
     def capture(self):
-        """Append what is newest to the session.
+        """Append the newest image and its boxes to the session.
 
         Returns
         -------
         bool, str
-            Whether it is stored, and a sentence: as what, or why not.
+            Whether the measurement was stored, and a message with its ID or the reason for the failure.
         """
         with self._capture_lock:
             try:
@@ -168,7 +169,7 @@ class ViewerNode(object):
             return done, self._answer
 
     def _stored(self):
-        """Store the newest snapshot. Returns a sentence about it; raises ValueError or OSError where it is not."""
+        """Store the newest snapshot and return a message about it. Raises ValueError or OSError on failure."""
         if not self._params.session:
             raise ValueError('no session is given; start the viewer with session:=FOLDER')
         snapshot = self._snapshot_to_store()
@@ -183,7 +184,10 @@ class ViewerNode(object):
                                                    self._params.session)
 
     def _snapshot_to_store(self):
-        """The newest snapshot. Raises ValueError where there is none to store, or it lacks boxes and nobody knows."""
+        """Return the newest snapshot.
+
+        Raises ValueError if there is nothing to store, or if the boxes are missing and the user has not been warned.
+        """
         with self._lock:
             snapshot, is_early = self._snapshots.newest, self._snapshots.is_early
         if snapshot is None:
@@ -206,7 +210,7 @@ class ViewerNode(object):
         return 'no depth image with the stamp of a colour image has come on %s' % rospy.resolve_name(DEPTH_TOPIC)
 
     def pause_or_resume(self):
-        """Pause the detector, or let it go on; what became of it is said in the window."""
+        """Pause or resume the detector, and show the result in the window."""
         try:
             answer = rospy.ServiceProxy(ENABLE_SERVICE, SetBool)(self._is_paused)
         except rospy.ServiceException as error:
@@ -217,14 +221,14 @@ class ViewerNode(object):
         self._answer = answer.message
         if answer.success:
             self._is_paused = not self._is_paused
-            self._is_said = self._is_paused  # who paused it knows that there are no boxes
+            self._is_said = self._is_paused  # the user paused the detector and expects no boxes
 
     def run(self):
-        """Show the window until it is closed or ROS shuts down. In the main thread, which must publish nothing."""
+        """Show the window until it is closed or ROS shuts down. Runs in the main thread, which must not publish."""
         if self._window is None:
             rospy.spin()
             return
-        with ThreadPoolExecutor(1) as others:  # at the end it waits for what is being stored
+        with ThreadPoolExecutor(1) as others:  # on exit, waits for measurements that are being stored
             actions = {'s': self.capture, 'p': self.pause_or_resume}
             shown, key = None, ''
             while not (rospy.is_shutdown() or key == 'q' or self._window.is_closed):
@@ -240,7 +244,7 @@ class ViewerNode(object):
             rospy.signal_shutdown('the window was closed')
 
     def _show(self, shown):
-        """Draw what is new since `shown`, the last return value."""
+        """Redraw the window if its content differs from `shown`, the previous return value."""
         with self._lock:
             snapshot, is_early = self._snapshots.newest, self._snapshots.is_early
             rate_hz = self._rate.at(arrival_clock_ns())
@@ -271,7 +275,7 @@ class ViewerNode(object):
 
 
 def _check(params):
-    """Raise ValueError where a parameter cannot be meant."""
+    """Raise ValueError if a parameter is invalid."""
     if params.session and not os.path.isabs(params.session):
         raise ValueError('parameter ~session is %r; an absolute path expected' % params.session)
 
@@ -284,7 +288,7 @@ def _window():
 
 
 def _complain(future):
-    """Say what went wrong on a key that nobody foresaw."""
+    """Log an unexpected exception of a key's action."""
     if future.exception() is not None:
         rospy.logerr('the key did nothing: %r', future.exception())
 

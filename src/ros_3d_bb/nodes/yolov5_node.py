@@ -1,4 +1,4 @@
-"""The node that finds people in colour images with YOLOv5."""
+"""ROS node that detects people in colour images with YOLOv5."""
 import rospy
 from sensor_msgs.msg import Image
 
@@ -15,15 +15,15 @@ from ros_3d_bb.pipeline.detection_stage import Yolov5NodeParams, opened_yolov5, 
 
 
 class Yolov5Node(object):
-    """Find people in colour images.
+    """Detect people in colour images.
 
-    Only the newest image is searched; those that come meanwhile are skipped. Parameters: config/yolov5.yaml; some can
-    be changed while it runs.
+    Only the newest image is processed; images that arrive during a detection are skipped, except for the newest.
+    Parameters: config/yolov5.yaml; some can be changed at run time.
 
     Subscribes
     ----------
     camera/color/image_raw : sensor_msgs/Image
-        Colour.
+        Colour image.
     """
 
     def __init__(self):
@@ -40,7 +40,7 @@ class Yolov5Node(object):
         self._tuning = ReconfigureServer(given, self._tune)
 
     def _tune(self, _params, detection, _running):
-        self._detector = self._detector.with_params(detection)  # an image is searched with the one or the other
+        self._detector = self._detector.with_params(detection)  # each image uses either old or new parameters
 
     def _on_image(self, message):
         with self._diagnostics.receiving('colour images'):
@@ -55,7 +55,7 @@ class Yolov5Node(object):
         with self._diagnostics.rejecting('images'), self._switch.searching():
             if self._switch.on:
                 self._detect(message)
-            else:  # it was paused since the image came
+            else:  # the detector was paused after the image arrived
                 self._diagnostics.count('images while paused')
 
     def _detect(self, message):

@@ -1,4 +1,4 @@
-"""The stages of the pipeline: ROS messages in, results out; and all of them as one object.
+"""The stages of the pipeline (detection, estimation, tracking) without rospy, and the offline pipeline.
 
 May import: camera, conversions, core, detection, detection.depth, detection.yolov5, estimation, tracking,
 visualization.

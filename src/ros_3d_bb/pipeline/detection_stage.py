@@ -1,4 +1,4 @@
-"""From images to 2D boxes: what the detector nodes and process_bag do with messages."""
+"""Detection stage: 2D bounding boxes from image messages, shared by the detector nodes and process_bag."""
 import os
 from typing import NamedTuple
 
@@ -16,12 +16,12 @@ from ros_3d_bb.detection.yolov5.backends import open_runtime
 from ros_3d_bb.detection.yolov5.detector import Yolov5
 
 CACHE_NS = NS  # how long images wait for each other
-NEWEST = genpy.Time(0)  # what tf takes it for
+NEWEST = genpy.Time(0)  # tf returns the latest transform for stamp 0
 
 
 @parameters()
 class Yolov5NodeParams(NamedTuple):
-    """Parameters of yolov5_node beside those of the network and its runtime."""
+    """Parameters of yolov5_node, except those of the network and its runtime."""
 
     weights: str = Param('')
     enabled: bool = ENABLED
@@ -30,7 +30,7 @@ class Yolov5NodeParams(NamedTuple):
 
 @parameters()
 class DepthDetectorParams(NamedTuple):
-    """Parameters of depth_detector_node beside those of the detector."""
+    """Parameters of depth_detector_node, except those of the detector."""
 
     floor_frame: str = Param('base_link')
     floor_height: float = Param(
@@ -43,7 +43,26 @@ class DepthDetectorParams(NamedTuple):
 
 
 def opened_yolov5(weights, detection, running, warn):
-    """The YOLOv5 detector of a path, ready to be used at full speed. Raises ValueError where it cannot be used."""
+    """Load and warm up a YOLOv5 detector.
+
+    Parameters
+    ----------
+    weights : str
+        Path of the checkpoint or exported network.
+    detection : detector.DetectionParams
+    running : backends.RuntimeParams
+    warn : callable
+        Called with the text of each warning.
+
+    Returns
+    -------
+    Yolov5
+
+    Raises
+    ------
+    ValueError
+        If no weights are given or the network cannot be used.
+    """
     if not weights:
         raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
                          'checkpoint such as yolov5n.pt')
@@ -53,12 +72,12 @@ def opened_yolov5(weights, detection, running, warn):
 
 
 def search_color(detector, message):
-    """Find objects in a colour image with a `detector.Yolov5`.
+    """Detect objects in a colour image with a `detector.Yolov5`.
 
     Returns
     -------
     (numpy.ndarray, ros_3d_bb.detection.boxes.Detections)
-        The image, RGB, and what is in it.
+        The RGB image, (height, width, 3), and its detections.
 
     Raises
     ------
@@ -71,10 +90,11 @@ def search_color(detector, message):
 
 
 class RgbdDetectionStage(object):
-    """Pairs colour images with depth and camera of their stamp, and detects people in them.
+    """Pair colour images with the depth image and camera model of the same stamp, and detect people in them.
 
-    Each `add_` validates a message and hands it to the synchronizer, with its arrival (integer nanoseconds, see
-    `time_sync.StampSynchronizer`). `on_frame` then gets a colour image with its depth and camera, for `search`.
+    Each `add_` method validates a message and passes it to the synchronizer together with its arrival time (integer
+    nanoseconds, see `time_sync.StampSynchronizer`). The synchronizer calls `on_frame` with each complete frame, which
+    the caller passes to `search`.
 
     Parameters
     ----------
@@ -84,12 +104,12 @@ class RgbdDetectionStage(object):
     on_frame : callable
         Called with two sensor_msgs/Image, colour and depth, and a `camera_model.Camera` of one stamp.
     transforms
-        As for `tracking_stage.TrackingStage`; None where no frame of the floor is given.
+        As for `tracking_stage.TrackingStage`; None if no floor frame is given.
 
     Raises
     ------
     ValueError
-        If a parameter makes no sense.
+        If a parameter is invalid.
     """
 
     names = ('person',)
@@ -100,28 +120,28 @@ class RgbdDetectionStage(object):
         self._sync = StampSynchronizer(CACHE_NS, int(params.stamp_tolerance * NS), 0, on_frame, self._on_lost)
 
     def reconfigure(self, params, people):
-        """Search the next images with another floor height and other people.
+        """Use another floor height and other `people` parameters for the next images.
 
-        Raises ValueError, and keeps the old ones, where they make no sense.
+        Raises ValueError and keeps the old parameters if the new ones are invalid.
         """
         self._detector.reconfigure(people)
         self._params = params
 
     def add_camera_info(self, message, now_ns):
-        """Add a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
+        """Add a sensor_msgs/CameraInfo. Raises ValueError if it cannot be used."""
         camera = camera_from_msg(message)
         self._sync.add_camera(stamp_if_any(message), now_ns, camera)
 
     def add_depth(self, message, now_ns):
-        """Add a depth image. Raises ValueError where it carries no stamp."""
+        """Add a depth image. Raises ValueError if it has no stamp."""
         self._sync.add_depth(stamp_of(message), now_ns, message)
 
     def add_color(self, message, now_ns):
-        """Add a colour image. Raises ValueError where it carries no stamp."""
+        """Add a colour image. Raises ValueError if it has no stamp."""
         self._sync.add_boxes(stamp_of(message), now_ns, message)
 
     def end(self):
-        """Nothing more will come. Reports the colour images that still wait for their depth image."""
+        """Report the colour images that still wait for their depth image. Call at the end of the input."""
         self._sync.end()
 
     def _on_lost(self, color_msg, of_time_before):
@@ -132,12 +152,17 @@ class RgbdDetectionStage(object):
                          'colour image came; waiting for the next' % (stamp_of(color_msg) / NS))
 
     def search(self, color_msg, depth_msg, camera):
-        """Find people in a frame.
+        """Detect people in a frame.
+
+        Parameters
+        ----------
+        color_msg, depth_msg : sensor_msgs.msg.Image
+        camera : camera_model.Camera
 
         Returns
         -------
         (numpy.ndarray, ros_3d_bb.detection.boxes.Detections) or None
-            The image, RGB, and the people in it. None while no floor is known.
+            The RGB image, (height, width, 3), and the people detected in it. None while the floor is unknown.
 
         Raises
         ------
@@ -156,9 +181,9 @@ class RgbdDetectionStage(object):
         return image, found
 
     def _floor(self, camera_frame):
-        """The floor where tf says it is; None where it does not, so that it is fitted.
+        """Return the floor plane from tf, or None if it is unknown, so that the detector fits it.
 
-        The newest transform serves: the camera stands still in the robot, and nothing has to be waited for.
+        The latest transform is used: the camera is fixed to the robot, so no wait for the image stamp is necessary.
         """
         if self._transforms is None:
             return None

@@ -1,4 +1,4 @@
-"""From 2D boxes, depth images and camera_info to 3D boxes: the stage that bbox3d_node and process_bag share."""
+"""Estimation stage: 3D boxes from 2D boxes, depth images and camera_info, shared by bbox3d_node and process_bag."""
 from typing import NamedTuple
 
 from std_msgs.msg import Header
@@ -49,11 +49,11 @@ class EstimatedBoxes(NamedTuple):
 
 
 class EstimationStage(object):
-    """Pairs arrays of 2D boxes with depth and camera of their stamp, and estimates their 3D boxes.
+    """Pair arrays of 2D boxes with the depth image and camera model of the same stamp, and estimate 3D boxes.
 
-    Each `add_` validates a message and hands it to the synchronizer, with its arrival (integer nanoseconds, see
-    `time_sync.StampSynchronizer`). `on_frame` then gets the boxes of one image with their depth and camera, for
-    `estimate`. What is rejected is counted by the tally.
+    Each `add_` method validates a message and passes it to the synchronizer together with its arrival time (integer
+    nanoseconds, see `time_sync.StampSynchronizer`). The synchronizer calls `on_frame` with each complete frame, which
+    the caller passes to `estimate`. `tally` counts rejected inputs.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class EstimationStage(object):
     on_frame : callable
         Called with `perception_msgs.Boxes2D`, sensor_msgs/Image and `camera_model.Camera` of one stamp.
     depth_topic, info_topic : str
-        Where depth images and camera_info come from, for messages about missing ones.
+        Topics of the depth images and camera_info, for error messages about missing ones.
 
     Raises
     ------
@@ -79,9 +79,9 @@ class EstimationStage(object):
         self.reconfigure(params)
 
     def reconfigure(self, params):
-        """Use another estimator, stride or assumed delay from the next boxes on.
+        """Use another estimator, stride or assumed delay for the next boxes.
 
-        Raises ValueError, and keeps the old ones, where they make no sense.
+        Raises ValueError and keeps the old parameters if the new ones are invalid.
         """
         estimator = estimator_named(params.estimator, params.stride)
         if self._error_model is not None:
@@ -91,20 +91,20 @@ class EstimationStage(object):
 
     @property
     def sample(self):
-        """See `box3d_estimator.Estimator`."""
+        """The sampling function of the estimator, see `box3d_estimator.Estimator`."""
         return self._estimator.sample
 
     def add_camera_info(self, message, now_ns):
-        """Add a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
+        """Add a sensor_msgs/CameraInfo. Raises ValueError if it cannot be used."""
         camera = camera_from_msg(message)
         self._sync.add_camera(stamp_if_any(message), now_ns, camera)
 
     def add_depth(self, message, now_ns):
-        """Add a depth image. Raises ValueError where it carries no stamp."""
+        """Add a depth image. Raises ValueError if it has no stamp."""
         self._sync.add_depth(stamp_of(message), now_ns, message)
 
     def add_boxes(self, message, now_ns):
-        """Add an Int32MultiArray of 2D boxes. Raises ValueError where it is none."""
+        """Add 2D boxes, a std_msgs/Int32MultiArray. Raises ValueError if the array is malformed."""
         boxes = boxes2d_from_msg(message)
         if boxes.stamp_ns is None and not self._said_plain:
             self._said_plain = True
@@ -115,11 +115,13 @@ class EstimationStage(object):
         self._sync.add_boxes(boxes.stamp_ns, now_ns, boxes)
 
     def end(self):
-        """Nothing more will come. Reports the boxes that still wait for their depth image."""
+        """Report the boxes that still wait for their depth image. Call at the end of the input."""
         self._sync.end()
 
     def estimate(self, boxes2d, depth_msg, camera):
-        """The 3D boxes of one image: of the 2D boxes that are usable, show depth of their own and give a plausible box.
+        """Estimate the 3D boxes of one image.
+
+        A 2D box yields no 3D box if it is empty or reversed, has no depth of its own, or gives an implausible size.
 
         Parameters
         ----------
@@ -134,7 +136,7 @@ class EstimationStage(object):
         Raises
         ------
         ValueError
-            If the depth image cannot be read, or cannot belong to the camera.
+            If the depth image cannot be read, or its size differs from that of the camera.
         """
         depth = checked_depth_from(depth_msg, self._params.depth_scale)
         height, width = depth.values.shape
@@ -155,7 +157,7 @@ class EstimationStage(object):
         return EstimatedBoxes(Header(stamp=stamp, frame_id=frame_id), depth, boxes3d)
 
     def _usable_rects(self, boxes2d):
-        """The rectangles (x1, y1, x2, y2) that are neither empty nor reversed."""
+        """Return the rectangles (x1, y1, x2, y2), in pixels, that are neither empty nor reversed."""
         usable_px = []
         for rect_px in map(tuple, boxes2d.boxes.tolist()):
             try:
@@ -166,7 +168,7 @@ class EstimationStage(object):
         return usable_px
 
     def _plausible(self, estimates):
-        """The 3D boxes, without None, that have the size of something that can be tracked."""
+        """Return the 3D boxes of plausible size; None entries are removed."""
         plausible = []
         for box in estimates:
             if box is None:
@@ -188,7 +190,7 @@ class EstimationStage(object):
             raise ValueError(self._why_no_frame(boxes2d))
 
     def _why_no_frame(self, boxes):
-        """What did not come, and on which topic it was expected."""
+        """Return an error message that names the missing input and its topic."""
         newest_ns, kept_s = self._sync.newest_ns, self._params.cache_length
         if newest_ns is None:
             return 'no depth image has come on %s' % self._depth_topic
@@ -204,7 +206,10 @@ class EstimationStage(object):
 
 
 def error_model_of(params):
-    """The error model that the parameters name; None where they name none. Raises ValueError where it is unusable."""
+    """Read the error model named in the parameters.
+
+    Returns None if no error model is configured. Raises ValueError if the model is unusable.
+    """
     if not params.error_model:
         return None
     try:

@@ -1,4 +1,4 @@
-"""The whole pipeline as one object: detector, 3D boxes and tracks, message by message, without ROS around it."""
+"""Offline pipeline: detection, estimation and tracking in one object, driven message by message without ROS."""
 import contextlib
 import functools
 from typing import NamedTuple, Optional, Tuple
@@ -27,8 +27,10 @@ DETECTORS = 'yolov5', 'depth', 'none'
 
 
 class Settings(NamedTuple):
-    """How bags are processed: the detector, the parameters of each node, `names` of topics that differ from the
-    nodes', the topics to `keep` (None: all), how many images are searched at once.
+    """Settings for processing bags: the detector and the parameters of each node.
+
+    `names` maps topics of the nodes to topics of the bag; `keep` lists the topics to copy (None: all); `searches` is
+    the number of images that are searched concurrently.
     """
 
     detector: str = 'yolov5'
@@ -43,23 +45,24 @@ class Settings(NamedTuple):
 
     @property
     def cameras(self):
-        """The namespaces of the cameras, '' of the only one."""
+        """Namespaces of the cameras; '' for a single camera."""
         return tuple(self.tracker[0].cameras) or ('',)
 
     def name(self, topic, camera=''):
-        """What a topic of the nodes, those of a camera, is called in the bag."""
+        """Return the name in the bag of a topic of a camera's nodes."""
         topic = topic_of(camera, topic)
         return '/' + self.names.get(topic, topic).lstrip('/')
 
 
 class Pipeline(object):
-    """Detectors and 3D boxes of each camera, and tracks. Give it messages with `take`; it returns what the nodes would
-    publish.
+    """Detection and estimation stages of each camera and one tracking stage.
+
+    `take` accepts a message and returns the messages that the nodes would publish.
 
     Raises
     ------
     ValueError
-        If a parameter makes no sense.
+        If a parameter is invalid.
     """
 
     def __init__(self, settings, tally, transforms):
@@ -80,10 +83,10 @@ class Pipeline(object):
                                                          functools.partial(self._on_images, camera),
                                                          transforms) for camera in settings.cameras}
             self._publish_empty = params.publish_empty
-        self._now_ns, self._outputs = 0, []  # of the message that is being processed
+        self._now_ns, self._outputs = 0, []  # time and outputs of the message that is being processed
 
     def take(self, topic, message, now_ns, camera=''):
-        """Take a message of a topic of the nodes, recorded at a time. Returns [(topic, message), ...]."""
+        """Process a message recorded at `now_ns` on an input topic of the nodes. Returns [(topic, message), ...]."""
         self._now_ns, self._outputs = now_ns, []
         search, lifter = self._searches.get(camera), self._estimation_stages[camera]
         with_camera, with_depth = self._tracking_stage.looks
@@ -106,27 +109,27 @@ class Pipeline(object):
         return self._outputs
 
     def found(self, header, found, now_ns, camera=''):
-        """Take what a detector found in the image of a header. Returns as `take`."""
+        """Process the detections of an image with the given header. Returns as `take`."""
         self._now_ns, self._outputs = now_ns, []
         self._on_detections(camera, header, found)
         return self._outputs
 
     @contextlib.contextmanager
     def searching(self):
-        """Around the search in one image: whatever it raises, the next one is searched."""
+        """Context manager for the detection in one image. Exceptions are reported and do not stop the pipeline."""
         try:
             with self._tally.rejecting('images'):
                 yield
-        except Exception as error:  # as the nodes' workers do
+        except Exception as error:  # as in the worker threads of the nodes
             self._tally.warn('searches failed', 'the detector failed: %s; waiting for the next image' % cause(error))
 
     def end(self):
-        """Nothing more will come."""
+        """Report inputs that are still waiting for others. Call at the end of the input."""
         for part in list(self._searches.values()) + list(self._estimation_stages.values()):
             part.end()
 
     def _on_images(self, camera, color_msg, depth_msg, camera_model):
-        """As depth_detector_node: detect people in the images of one stamp."""
+        """Detect people in the images of one stamp, as depth_detector_node does."""
         with self.searching():
             found = self._searches[camera].search(color_msg, depth_msg, camera_model)
             if found is not None:
@@ -134,7 +137,7 @@ class Pipeline(object):
                 self._on_detections(camera, color_msg.header, detections)
 
     def _on_detections(self, camera, header, detections):
-        """As the detector nodes: publish 2D boxes."""
+        """Output 2D boxes, as the detector nodes do."""
         if not len(detections.boxes) and not self._publish_empty:
             return
         message = boxes2d_to_msg(detections.boxes, header)
@@ -142,7 +145,7 @@ class Pipeline(object):
         self._estimation_stages[camera].add_boxes(message, self._now_ns)
 
     def _on_frame(self, camera, boxes2d, depth_msg, camera_model):
-        """As bbox3d_node: publish the 3D boxes of one image."""
+        """Output the 3D boxes of one image, as bbox3d_node does."""
         with self._tally.rejecting('2D boxes'):
             header, _depth, boxes3d = self._estimation_stages[camera].estimate(boxes2d, depth_msg, camera_model)
             message = boxes3d_to_msg(boxes3d, header, camera_model)
@@ -150,7 +153,7 @@ class Pipeline(object):
             self._on_boxes3d(camera, message)
 
     def _on_boxes3d(self, camera, message):
-        """As tracker_node: publish tracks and markers."""
+        """Output tracks and markers, as tracker_node does."""
         with self._tally.rejecting('3D boxes'):
             followed = self._tracking_stage.add_boxes(message, self._now_ns, camera)
             if followed is not None:

@@ -1,4 +1,4 @@
-"""From 3D boxes and transforms to tracks: what tracker_node and process_bag do with messages."""
+"""Tracking stage: tracks from 3D boxes and transforms, shared by tracker_node and process_bag."""
 import functools
 import re
 import threading
@@ -22,13 +22,13 @@ from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import CameraView
 
 TRACKING_PARAMS = ThesisTrackerParams, TrackerParams, NoiseParams, PredictionParams
-TRACKERS = {'thesis': (ThesisTracker, slice(0, 1)), 'kalman': (Tracker, slice(1, 4))}  # with their part of those
+TRACKERS = {'thesis': (ThesisTracker, slice(0, 1)), 'kalman': (Tracker, slice(1, 4))}  # and their TRACKING_PARAMS
 NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/\w+)*$')
 
 
 @parameters()
 class TrackerNodeParams(NamedTuple):
-    """Parameters of tracker_node beside those of the trackers and of the markers."""
+    """Parameters of tracker_node, except those of the trackers and markers."""
 
     tracker: str = Param(
         'kalman', 'Tracking algorithm. kalman: a Kalman filter for each person, which weighs boxes by their '
@@ -45,8 +45,10 @@ class TrackerNodeParams(NamedTuple):
 
 
 class LocatedBoxes(NamedTuple):
-    """A BoundingBox3DArray of a camera (its namespace, '' for the only one) whose transform is known, (4, 4), and how
-    often time had gone back until it came.
+    """A BoundingBox3DArray with the transform of its camera at the stamp.
+
+    `camera` is the namespace of the camera, '' for a single one; `fixed_from_camera` has shape (4, 4); `jumps` counts
+    the backward jumps in time before the message arrived.
     """
 
     message: Any
@@ -56,17 +58,18 @@ class LocatedBoxes(NamedTuple):
 
 
 class TrackingResult(NamedTuple):
-    """The tracks (`types.TrackedObject`) after one image; the header has the newest stamp and the fixed frame."""
+    """The tracks (`types.TrackedObject`) after an update; the header has the newest stamp and the fixed frame."""
 
     header: Header
     tracks: list
 
 
 class TrackingStage(object):
-    """Follow 3D boxes in a fixed frame. Without a transform at their stamp there is no answer and nobody ages.
+    """Track 3D boxes in a fixed frame.
 
-    Each message comes with the namespace of its camera, '' for the only one; boxes and depth also with when they
-    arrived, `now_ns` on a clock of the caller's. Methods may be called from any thread.
+    If there is no transform at the stamp of the boxes, no result is returned and tracks do not age. Each message is
+    passed with the namespace of its camera, '' for a single one; boxes and depth images also with their arrival time
+    `now_ns` (integer nanoseconds) on a clock chosen by the caller. The methods are thread-safe.
 
     Parameters
     ----------
@@ -76,12 +79,12 @@ class TrackingStage(object):
     tally : event_counter.EventCounter
     transforms
         Its `lookup(target_frame, source_frame, stamp)` returns target_from_source (4, 4) or raises
-        tf2_ros.TransformException; `go_back()` is called where time went back.
+        tf2_ros.TransformException; `go_back()` is called after a backward jump in time.
 
     Raises
     ------
     ValueError
-        If a parameter makes no sense.
+        If a parameter is invalid.
     """
 
     def __init__(self, params, tracking, tally, transforms):
@@ -90,61 +93,66 @@ class TrackingStage(object):
         self._tracker = _trackers_of(tracking)[params.tracker]
         self._images_lock, self._tracks_lock = threading.Lock(), threading.Lock()
         self._clocks = CameraClocks()
-        self._newest_ns = {}  # by camera, of the images that were tracked
-        self._jumps = 0  # how often time has gone back
+        self._newest_ns = {}  # newest stamp of the tracked images, by camera
+        self._jumps = 0  # number of backward jumps in time
         self._frames = {}  # by camera
         self._intrinsics = {}
         self._depths = {camera: MessageCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
 
     @property
     def cameras(self):
-        """The namespaces of the cameras."""
+        """Namespaces of the cameras."""
         return tuple(self._params.cameras) or ('',)
 
     def reconfigure(self, tracking):
-        """Take the next boxes with other parameters of tracking; tracks go on. Raises ValueError as at the start."""
-        _trackers_of(tracking)  # also what the other one would refuse is refused
+        """Use other tracking parameters for the next boxes; tracks are kept. Raises ValueError as the constructor."""
+        _trackers_of(tracking)  # validates the parameters of both trackers
         with self._tracks_lock:
             self._tracker.reconfigure(*tracking[TRACKERS[self._params.tracker][1]])
 
     @property
     def looks(self):
-        """Whether camera_info is of use, and depth images."""
-        with_camera = self._params.tracker != 'thesis'  # which does not ask where the camera looks
+        """Whether camera_info is used, and whether depth images are used."""
+        with_camera = self._params.tracker != 'thesis'  # the thesis tracker does not use the field of view
         return with_camera, with_camera and self._params.use_depth
 
     def add_camera_info(self, message, camera=''):
-        """Take a sensor_msgs/CameraInfo. Raises ValueError where it cannot be used."""
+        """Add a sensor_msgs/CameraInfo. Raises ValueError if it cannot be used."""
         self._intrinsics[camera] = camera_from_msg(message)
 
     def add_depth(self, message, now_ns, camera=''):
-        """Take a depth image. Raises ValueError where it carries no stamp."""
+        """Add a depth image. Raises ValueError if it has no stamp."""
         with self._images_lock:
             self._depths[camera].add(stamp_of(message), now_ns, message)
 
     def add_boxes(self, message, now_ns, camera=''):
-        """Take a BoundingBox3DArray: `locate` it and `follow` what is in it.
+        """Process a BoundingBox3DArray: `locate` it, then `follow` its boxes.
 
         Returns
         -------
         TrackingResult or None
-            None where there is no transform for it, or where its stamp is not of the time of the other cameras.
+            None if the transform is missing, or if the stamp is inconsistent with those of the other cameras.
 
         Raises
         ------
         ValueError
-            If it cannot be used.
+            If the message cannot be used.
         """
         located = self.locate(message, now_ns, camera)
         return None if located is None else self.follow(located)
 
     def locate(self, message, now_ns, camera=''):
-        """Find out where the camera of a BoundingBox3DArray was, which may have to be waited for.
+        """Look up the pose of the camera at the stamp of a BoundingBox3DArray. The lookup may wait for tf.
 
         Returns
         -------
         LocatedBoxes or None
-            As of `add_boxes`, and ValueError, too.
+            None under the same conditions as in `add_boxes`.
+
+        Raises
+        ------
+        ValueError
+            If the message cannot be used.
         """
         stamp_ns = stamp_of(message)
         frame_id = self._params.camera_frame or message.header.frame_id
@@ -168,12 +176,21 @@ class TrackingStage(object):
             return None
 
     def follow(self, located):
-        """Track what is in a Located.
+        """Update the tracks with located boxes.
+
+        Parameters
+        ----------
+        located : LocatedBoxes
 
         Returns
         -------
         TrackingResult or None
-            None where time went back since it was located. Raises ValueError as `add_boxes`.
+            None if time jumped back after the boxes were located.
+
+        Raises
+        ------
+        ValueError
+            If none of the boxes can be used.
         """
         message, camera, fixed_from_camera, jumps = located
         stamp_ns = stamp_of(message)
@@ -181,7 +198,7 @@ class TrackingStage(object):
             self._check_frame(message.header.frame_id, camera)
         usable, faults = usable_boxes3d(message)
         self._tally.leave_out('3D boxes', faults)
-        if faults and not usable.boxes:  # not the same as an image without people
+        if faults and not usable.boxes:  # differs from an image without people
             with self._tracks_lock:
                 self._tracker.skip(stamp_ns, camera or message.header.frame_id)
             raise ValueError('none of their %d boxes can be used; tracks are kept as they are' % len(faults))
@@ -199,7 +216,7 @@ class TrackingStage(object):
         return TrackingResult(Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame), tracks)
 
     def _view(self, stamp_ns, located):
-        """What the camera saw at a stamp, as far as it is known."""
+        """Return the CameraView at a stamp, with intrinsics and depth if they are known."""
         name = located.camera or located.message.header.frame_id
         camera = self._intrinsics.get(located.camera)
         if camera is None:
@@ -208,20 +225,20 @@ class TrackingStage(object):
             entry = self._depths[located.camera].nearest(stamp_ns, int(self._params.stamp_tolerance * NS))
         depth_at = None
         if entry is not None:
-            with self._tally.rejecting('depth images'):  # the boxes are good without
+            with self._tally.rejecting('depth images'):  # the boxes are usable without depth
                 depth = imgmsg_to_depth(entry.value, self._params.depth_scale)
-                if depth.values.shape == (camera.height, camera.width):  # bbox3d_node says what is wrong with others
+                if depth.values.shape == (camera.height, camera.width):  # otherwise bbox3d_node reports the fault
                     depth_at = functools.partial(depths_towards, camera, depth)
         return CameraView(located.fixed_from_camera, camera, name, depth_at)
 
     def _is_jump_back(self, stamp_ns, now_ns, camera):
-        """Whether time went back with an image that was accepted; not where a camera lags behind one that has ended."""
+        """Whether an accepted image is a backward jump in time, and not a camera that lags behind an ended one."""
         ahead = {other: newest_ns for other, newest_ns in self._newest_ns.items() if stamp_ns < newest_ns - JUMP_NS}
         return (camera in ahead or any(self._clocks.is_tracked(other, now_ns) for other in ahead)
                 or stamp_ns < max(ahead.values(), default=stamp_ns) - LONGEST_LAG_NS)
 
     def _go_back(self, stamp_ns):
-        """Forget tracks and transforms: a bag looped, or somebody sought in it."""
+        """Discard tracks and transforms after a backward jump in time, as when a bag is looped or rewound."""
         self._tally.note('jumps back in time', 'time went back from %.3f to %.3f: tracks and transforms of the '
                          'time before are forgotten' % (max(self._newest_ns.values()) / NS, stamp_ns / NS))
         self._tracker.reset()
@@ -230,7 +247,7 @@ class TrackingStage(object):
         self._jumps += 1
 
     def _leave_out(self, stamp_ns, camera, right):
-        """Warn that boxes are not of the time of the camera that is right."""
+        """Warn that the stamp of boxes is inconsistent with `right`, the camera whose clock is trusted."""
         newest_ns = max(self._newest_ns.values(), default=stamp_ns)
         event = 'images ahead of other cameras' if stamp_ns > newest_ns else 'images of the time before'
         self._tally.warn(event, 'boxes of %s at %.3f are left out: their stamp is %.3f s from the newest one, '
@@ -238,7 +255,7 @@ class TrackingStage(object):
                          % (camera, stamp_ns / NS, (stamp_ns - newest_ns) / NS, right))
 
     def _check_frame(self, frame_id, camera):
-        """Say so where two cameras have one frame: tf then takes them to be in one place."""
+        """Report cameras that share a frame, because tf then places them at the same position."""
         if self._frames.get(camera) == frame_id:
             return
         self._frames[camera] = frame_id
@@ -250,7 +267,7 @@ class TrackingStage(object):
 
 
 def _trackers_of(tracking):
-    """New trackers by name. Raises ValueError where the parameters of one of them make no sense."""
+    """Create all trackers, {name: tracker}. Raises ValueError if the parameters of one of them are invalid."""
     return {name: make(*tracking[own]) for name, (make, own) in TRACKERS.items()}
 
 

@@ -1,4 +1,4 @@
-"""What nodes share: parameters, subscribers, tf lookup, diagnostics, reconfigure, the master.
+"""Modules shared by the nodes: parameters, subscribers, tf lookup, diagnostics, reconfigure, ROS master.
 
 May import: camera, conversions, core, diagnosis, msg, pipeline, visualization.
 """

@@ -1,4 +1,4 @@
-"""Whether depth is aligned to colour, by what the cameras of both say."""
+"""Check from camera_info and frame_id that depth images are aligned to colour images."""
 import rospy
 from sensor_msgs.msg import CameraInfo
 
@@ -8,16 +8,17 @@ from ros_3d_bb.conversions.perception_msgs import camera_from_msg
 
 
 class DepthCameraCheck(object):
-    """Compares the camera_info beside the depth image with that of colour.
+    """Compare the camera_info of the depth camera with that of the colour camera.
 
-    The node sets what came last: `color`, a CameraInfo, and `depth_frame`. `with_frames`: whether the names of their
-    frames can be relied on. The topic stays subscribed: at a new subscription rospy would wait for a master that is
-    away, and hold up all that asks it.
+    The node sets the attributes `color` (the latest CameraInfo) and `depth_frame`. `with_frames` states whether the
+    frame names are reliable. The topic stays subscribed: on a new subscription, rospy would wait for an unreachable
+    master and block all other requests to it.
 
     Subscribes
     ----------
     camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
-        Of the depth image: what is beside that, whatever it is called. It is compared with that of the colour camera.
+        Calibration of the depth image, in the namespace of its topic (remapped or not). It is compared with that of
+        the colour camera.
     """
 
     def __init__(self, with_frames):
@@ -28,7 +29,7 @@ class DepthCameraCheck(object):
         rospy.Subscriber(topic, CameraInfo, self._on_depth_camera, queue_size=1)
 
     def faults(self):
-        """(event, sentence) of what is wrong now. Asked once a second."""
+        """Yield (event, sentence) for each current fault. Called once per second."""
         color = self.color
         if color is None:
             return
@@ -43,7 +44,7 @@ class DepthCameraCheck(object):
             return ''
         try:
             return intrinsics_fault(camera_from_msg(color), camera_from_msg(depth))
-        except ValueError:  # of colour the node says so; many drivers leave that of depth empty
+        except ValueError:  # the node reports colour; many drivers leave depth's K empty
             return ''
 
     def _on_depth_camera(self, message):

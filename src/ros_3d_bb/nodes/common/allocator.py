@@ -1,23 +1,23 @@
-"""How this process takes memory from the system and gives it back."""
+"""Memory allocator settings of the process (glibc malloc)."""
 import ctypes
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # glibc's malloc.h
-LARGEST_BYTES = 32 * 2 ** 20  # glibc takes no more
+LARGEST_BYTES = 32 * 2 ** 20  # limit of glibc
 
 
 def reuse_freed_memory():
-    """Let the C library use the memory of freed images for the next ones.
+    """Let the C library reuse the memory of freed images.
 
-    By default it returns such large blocks to the system and asks for them anew, and the system clears them page by
-    page: for a rospy node two thirds of what it costs to receive an image. What is kept is no more than what was in use
-    at once, as all threads share one heap: rospy has one for each connection, and glibc would give each a heap of its
-    own, so that a node keeps more with each subscriber that comes and goes. Does nothing where the C library is not
-    glibc.
+    By default, glibc returns large blocks to the system and requests them again, and the kernel clears them page by
+    page. For a rospy node this is two thirds of the cost of receiving an image. All threads share one heap, so the
+    retained memory does not exceed the peak use: rospy starts one thread per connection, and with one heap per thread
+    (glibc's default) the memory of a node would grow with each subscriber that connects and disconnects. The function
+    has no effect with other C libraries.
 
     Returns
     -------
     bool
-        Whether that worked.
+        Whether the settings were applied.
     """
     try:
         mallopt = ctypes.CDLL(None).mallopt

@@ -1,4 +1,4 @@
-"""Images of what bbox3d_node works on, made only while somebody looks at them."""
+"""Debug images of bbox3d_node, generated only if there are subscribers."""
 import rospy
 from sensor_msgs.msg import Image
 
@@ -12,21 +12,21 @@ from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_samples, dept
 
 
 class SampleImages(object):
-    """What the 3D boxes of an image were made of.
+    """Publish the images and depth samples from which 3D boxes were estimated.
 
     Subscribes
     ----------
     camera/color/image_raw : sensor_msgs/Image
-        Colour; only while somebody looks at ros_3d_bb/raw or ros_3d_bb/color.
+        Colour image; subscribed only while ros_3d_bb/raw or ros_3d_bb/color has subscribers.
 
     Publishes
     ---------
     ros_3d_bb/raw : sensor_msgs/Image
-        The colour image that the boxes belong to, while somebody subscribes.
+        Colour image of the boxes; published only if there are subscribers.
     ros_3d_bb/color : sensor_msgs/Image
-        The same with boxes and depth samples (thesis Fig. 3.5), while somebody subscribes.
+        Colour image with boxes and depth samples (thesis Fig. 3.5); published only if there are subscribers.
     ros_3d_bb/depth : sensor_msgs/Image
-        The depth image in grey, while somebody subscribes.
+        Depth image in grey; published only if there are subscribers.
     """
 
     def __init__(self, cache_ns, sample, depth_range_m, diagnostics):
@@ -36,17 +36,17 @@ class SampleImages(object):
         self._raw_pub, self._color_pub, self._depth_pub = (
             rospy.Publisher('ros_3d_bb/' + name, Image, queue_size=1) for name in ('raw', 'color', 'depth'))
         self._colors, self._subscriber = None, None
-        # In a thread of its own, as a master that does not answer must not hold up the 3D boxes.
+        # In a separate thread, because an unresponsive master must not block the 3D boxes.
         self._tracking_stage = NewestWorker(self._follow, self._on_error)
 
     def reconfigure(self, sample, depth_range_m):
-        """Draw the next images with these samples, and this depth as black."""
+        """Set the sampling function and the depth (metres) drawn as black for the next images."""
         self._sample, self._depth_range_m = sample, depth_range_m
 
     def publish(self, header, depth, boxes):
-        """Publish the images of one set of 3D boxes that have subscribers.
+        """Publish the debug images of one set of 3D boxes on the topics that have subscribers.
 
-        A colour image that cannot be shown is rejected here: it must not keep back the next 3D boxes.
+        An unusable colour image is rejected here, so that it does not affect the 3D boxes.
         """
         needs_raw, needs_color = self._raw_pub.get_num_connections() > 0, self._color_pub.get_num_connections() > 0
         if (needs_raw or needs_color) != (self._subscriber is not None):
@@ -74,8 +74,8 @@ class SampleImages(object):
         return image
 
     def _follow(self, wanted):
-        """Subscribe colour, or no more."""
-        patient_master().getPid()  # raises where there is none: rospy would hold a lock until one comes, also at Ctrl-C
+        """Subscribe to colour images or unsubscribe from them."""
+        patient_master().getPid()  # raises if there is no master, for which rospy would hold a lock, even at Ctrl-C
         if wanted and self._subscriber is None:
             self._colors = MessageCache(self._cache_ns)
             self._subscriber = subscribe('camera/color/image_raw', Image, self._on_color, KEPT_AT_ONCE)

@@ -1,4 +1,4 @@
-"""What every 2D detector offers: boxes, a picture of them, and a switch."""
+"""Common interface of the 2D detector nodes: published boxes and image, and the service that pauses them."""
 import contextlib
 import time
 
@@ -11,18 +11,18 @@ from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg
 from ros_3d_bb.visualization.image_overlay import draw_boxes
 
-SILENT_S = 5.0  # an image waits so long for its search to end
+SILENT_S = 5.0  # time without a completed detection after which a fault is reported
 
 
 class BoxesOutput(object):
-    """What a detector found, for bbox3d_node and for people.
+    """Publish detections for bbox3d_node and as an annotated image.
 
     Publishes
     ---------
     yolo_bounding_box : std_msgs/Int32MultiArray
-        x1, y1, x2, y2 of each person, pixels; stamp and frame of the image in `layout.dim[0].label`.
+        x1, y1, x2, y2 of each person, in pixels; stamp and frame of the image are in `layout.dim[0].label`.
     yolo_result_out : sensor_msgs/Image
-        The colour image with the 2D boxes, while somebody subscribes.
+        Colour image with the 2D boxes; published only if there are subscribers.
     """
 
     def __init__(self, publish_empty):
@@ -31,7 +31,7 @@ class BoxesOutput(object):
         self._image_pub = rospy.Publisher('yolo_result_out', Image, queue_size=1)
 
     def publish(self, header, image, found, names):
-        """The detections in an RGB image with a header; `names` of the classes by number."""
+        """Publish the detections in an RGB image with a header; `names` maps class indices to names."""
         if len(found.boxes) or self._publish_empty:
             self._boxes_pub.publish(boxes2d_to_msg(found.boxes, header))
         if self._image_pub.get_num_connections():
@@ -41,31 +41,33 @@ class BoxesOutput(object):
 
 
 class Switch(object):
-    """Whether the detector works.
+    """State of the detector: enabled or paused.
 
-    The diagnostics say so, and complain where an image was handed over and no search ends.
+    The state is shown in the diagnostics, with a warning if an image was accepted and no detection completes.
 
     Services
     --------
     ~enable : std_srvs/SetBool
-        Pauses the detector, and lets it go on.
+        Enables (true) or pauses (false) the detector.
     """
 
     def __init__(self, on, diagnostics):
         self.on = on
-        self._waits_since_s = None  # the oldest image since a search ended
+        self._waits_since_s = None  # arrival of the oldest image since the last completed detection
         diagnostics.show('detector', lambda: 'working' if self.on else 'paused')
         diagnostics.check(self._faults)
         rospy.Service('~enable', SetBool, self._on_request)
 
     def offered(self):
-        """An image is handed over to be searched."""
+        """Record that an image was passed to the detector."""
         if self._waits_since_s is None:
             self._waits_since_s = time.monotonic()
 
     @contextlib.contextmanager
     def searching(self):
-        """Around a search. Whatever comes of it, boxes, no floor or a refused image, the detector is at work."""
+        """Context manager for one detection. Any outcome (boxes, no floor, rejected image) shows that the detector
+        is working.
+        """
         try:
             yield
         finally:

@@ -1,4 +1,4 @@
-"""What a node did with its input, on /diagnostics and in the log."""
+"""Diagnostics of a node: outcome of its inputs, rates, latency and faults, on /diagnostics and in the log."""
 import collections
 import threading
 import time
@@ -13,27 +13,27 @@ from ros_3d_bb.nodes.common.input_monitor import InputWatch, unheard
 
 PERIOD_S = 1.0
 WARNING_LASTS_S = 5.0
-REMINDER_S = 30.0  # between two lines of the log about what stays wrong
-UNHEARD_S = 5.0  # without subscribers; they may be starting, too
+REMINDER_S = 30.0  # between two log lines about a persistent fault
+UNHEARD_S = 5.0  # without subscribers, which may still be starting
 
 
 def is_ending():
-    """Whether rospy shuts down. It closes the publishers first, under callbacks at work, and then says is_shutdown."""
+    """Whether rospy is shutting down. rospy closes publishers during running callbacks before it sets is_shutdown."""
     return rospy.is_shutdown() or rospy.core.is_shutdown_requested()
 
 
 class Diagnostics(EventCounter):
-    """Counts the messages that came and what happened to each, and publishes that on /diagnostics once a second, with
-    rates, latency and what else the node shows.
+    """Count received messages and their outcomes, and publish the counters on /diagnostics once per second, with
+    rates, latency and further values of the node.
 
-    A warning is logged at most every `WARNING_LASTS_S` for one cause, and shown as the node's state for as long. What
-    is wrong around it (see `check`) is its state while it lasts. Timed by the machine's clock: a paused bag must not
-    silence it.
+    Warnings with the same cause are logged at most every `WARNING_LASTS_S`, and determine the status of the node for
+    the same time. External faults (see `check`) determine it while they last. Wall-clock time is used, so that a
+    paused bag does not stop the reports.
 
     Publishes
     ---------
     /diagnostics : diagnostic_msgs/DiagnosticArray
-        What the node did with its input, and what it is missing, once a second.
+        Counters of processed and rejected inputs, rates, latency and missing inputs, once per second.
     """
 
     def __init__(self):
@@ -51,26 +51,26 @@ class Diagnostics(EventCounter):
         thread.start()
 
     def note(self, event, sentence):
-        """Something happened that one should know of."""
+        """Count an event and log `sentence` as information."""
         rospy.loginfo('%s', sentence)
         super(Diagnostics, self).note(event, sentence)
 
     def warn(self, event, sentence):
-        """Something was refused or missing; `sentence` says what, why, and what happens next."""
+        """Count a rejected or missing input; `sentence` states what failed, why, and what happens next."""
         self.count(event)
         self._warning, self._warned_at = sentence, time.monotonic()
         self._log(event, sentence, WARNING_LASTS_S)
 
     def show(self, name, text):
-        """Add a value to what is published: `text()` is asked for it once a second."""
+        """Add a value to the published status; `text()` is called once per second and returns it."""
         self._shown.append(lambda: [(name, text())])
 
     def check(self, faults):
-        """Ask `faults()` once a second what is wrong now: (event, sentence) pairs."""
+        """Register a check; `faults()` is called once per second and yields (event, sentence) for current faults."""
         self._checks.append(faults)
 
     def is_harmless(self, error):
-        """rospy closes publishers under callbacks that still run when it shuts down."""
+        """Whether an exception results from shutdown, when rospy closes publishers during running callbacks."""
         return isinstance(error, rospy.ROSException) and is_ending()
 
     def _report(self, status):
@@ -92,12 +92,12 @@ class Diagnostics(EventCounter):
         return status
 
     def counters(self):
-        """What is published of the input: (event, how often), and (inputs received, how many)."""
+        """Return the published counters: a list of (event, count) and ('<inputs> received', count)."""
         return list(self.counts.items()) + [('%s received' % inputs, amount)
                                             for inputs, amount in list(self.received.items())]
 
     def _lasting(self):
-        """The sentences about what is wrong now; each is logged when it begins, and now and then."""
+        """Return the sentences about current faults. Each is logged when it first occurs and then every REMINDER_S."""
         faults = [fault for check in self._checks for fault in check()]
         before, self._lasted = self._lasted, set(event for event, _sentence in faults)
         for event, sentence in faults:
@@ -105,14 +105,14 @@ class Diagnostics(EventCounter):
         return [sentence for _event, sentence in faults]
 
     def _log(self, event, sentence, pause_s):
-        """Log a warning, unless the last one about the event is less than a pause ago."""
+        """Log a warning, unless the last one about the same event was less than `pause_s` ago."""
         now_s = time.monotonic()
         if now_s - self._logged_at.get(event, float('-inf')) >= pause_s:
             self._logged_at[event] = now_s
             rospy.logwarn('%s', sentence)
 
     def _note_unheard(self):
-        """Say once that nobody subscribes, and again after somebody did: that is no fault of the node."""
+        """Log once if the results have no subscribers, and again after subscribers left. This is not a fault."""
         now_s, topics = time.monotonic(), unheard()
         if not topics:
             self._heard_s = now_s
@@ -121,7 +121,7 @@ class Diagnostics(EventCounter):
             rospy.loginfo('nobody subscribes %s: nobody sees what this node finds', ' or '.join(topics))
 
     def _answers(self):
-        """(name, text) of what was answered since the last report."""
+        """Return (name, text) of the rate and latency of the results since the last report."""
         lags_ns, self.lags_ns = self.lags_ns, collections.deque(maxlen=MOST_LAGS)
         now_s = time.monotonic()
         passed_s, self._looked_s = max(now_s - self._looked_s, 1e-3), now_s
@@ -135,7 +135,7 @@ class Diagnostics(EventCounter):
         while not rospy.is_shutdown():
             try:
                 self._updater.force_update()
-            except Exception as error:  # one report must not end the thread
+            except Exception as error:  # a failed report must not end the thread
                 if not is_ending():
                     self._log('no report', 'what this node did cannot be reported on /diagnostics (%r); trying again'
                               % error, WARNING_LASTS_S)

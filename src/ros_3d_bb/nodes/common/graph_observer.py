@@ -1,4 +1,4 @@
-"""What goes on in a running graph, for the checks: its topics, listened to for some seconds."""
+"""Observe the topics of a running ROS graph for some seconds, as input of the checks."""
 import functools
 import os
 import time
@@ -21,15 +21,15 @@ from ros_3d_bb.nodes.common.topic_publishers import published_topics, publishers
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams
 
-NAMES_S = 1.5  # nodes say once a second what their topics are called
-OURS = ': pipeline'  # ends the names of our nodes' diagnostics
+NAMES_S = 1.5  # nodes publish the names of their topics once per second
+OURS = ': pipeline'  # suffix of the diagnostics of the nodes of this package
 
 
 class GraphObserver(object):
-    """Listens to the graph; `seen` says what came.
+    """Subscribe to the topics of the graph; `observations` returns what was received.
 
-    Names of topics: those that doctor is given as remappings, else those that the running nodes say they use. `camera`
-    is the namespace of the one of several to look at.
+    Topic names are taken from the remappings of doctor, or else from the diagnostics of the running nodes. `camera` is
+    the namespace of the observed camera if there are several.
     """
 
     def __init__(self, target_frame='', camera=''):
@@ -49,13 +49,13 @@ class GraphObserver(object):
         self._subscribe(os.path.dirname(self._observed[DEPTH].topic) + '/camera_info', CameraInfo, self._on_depth_info)
 
     def close(self):
-        """Listen no more."""
+        """Unsubscribe from all topics."""
         self._listener.unregister()
         for subscriber in self._subscribers:
             subscriber.unregister()
 
     def observations(self):
-        """What was seen until now, a Seen."""
+        """Return the Observations up to now."""
         self._topics.update(published_topics())
         streams = {key: one.stream(self._topics.get(one.topic, ''), self._publishers(one))
                    for key, one in self._observed.items()}
@@ -70,11 +70,11 @@ class GraphObserver(object):
             cache_length_s=self._bbox3d_param('cache_length'))
 
     def lookup(self, target_frame, source_frame, stamp):
-        """As of `BagTransforms`."""
+        """Look up a transform, as `BagTransforms.lookup`."""
         return self._buffer.lookup_transform(target_frame.lstrip('/'), source_frame.lstrip('/'), stamp)
 
     def frames_as_yaml(self):
-        """As of `BagTransforms`."""
+        """Return all frames, as `BagTransforms.frames_as_yaml`."""
         return self._buffer.all_frames_as_yaml()
 
     def _tf(self, boxes3d):
@@ -90,12 +90,12 @@ class GraphObserver(object):
         return () if one.newest is not None or one.topic not in self._topics else publishers_of(one.topic, False)
 
     def _topic_of(self, name):
-        """What a topic of the nodes is called in this graph."""
+        """Return the name of a topic of the nodes in this graph."""
         wanted = name_for(self._camera, name)
         resolved = rospy.resolve_name(wanted)
         if resolved != rospy.get_namespace() + wanted:
             return resolved
-        beside = (rospy.get_namespace() + self._camera).strip('/') + '/'  # nodes of this camera only
+        beside = (rospy.get_namespace() + self._camera).strip('/') + '/'  # prefix of the nodes of this camera
         said = [values.get('input ' + (name if node.startswith(beside) else wanted), '')
                 for node, (_level, _sentence, values) in list(self._statuses.items())]
         return next((text.split()[0] for text in said if text), resolved)
@@ -110,7 +110,7 @@ class GraphObserver(object):
         self._depth_info = message
 
     def _on_diagnostics(self, message):
-        prefix = rospy.get_namespace()[1:]  # ends in a slash: robot1 has nothing of robot10
+        prefix = rospy.get_namespace()[1:]  # ends in a slash, so that robot1 does not match robot10
         for status in message.status:
             if status.name.endswith(OURS) and status.name.startswith(prefix):
                 values = {entry.key: entry.value for entry in status.values}
@@ -118,12 +118,12 @@ class GraphObserver(object):
 
 
 def name_for(camera, topic):
-    """What a topic of the pipeline is called for one of several cameras; the tracks are of all."""
+    """Return the name of a pipeline topic for one of several cameras; the tracks are common to all cameras."""
     return topic if topic == TRACKS_TOPIC else topic_of(camera, topic)
 
 
 def tracker_param(name):
-    """A parameter of the tracker, its default where it is not set."""
+    """Return a parameter of the tracker, or its default if it is not set."""
     return _param('tracker_node', name, TrackerNodeParams())
 
 
@@ -132,5 +132,5 @@ def _param(node, name, defaults):
 
 
 def _to_be_suggested(topics):
-    """Without our own images, which no camera sends."""
+    """Remove the debug images of this package, which are not camera images."""
     return {name: kind for name, kind in topics.items() if '/ros_3d_bb/' not in name or not kind.endswith('/Image')}

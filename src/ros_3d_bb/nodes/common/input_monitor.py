@@ -1,4 +1,4 @@
-"""What a node's topics say of what is wrong around it: silence, stamps far from now, time that stands still."""
+"""Detect external faults from the inputs of a node: silent topics, wrong stamps, a stopped clock."""
 import time
 import weakref
 
@@ -13,20 +13,20 @@ from ros_3d_bb.nodes.common.subscribers import inputs
 from ros_3d_bb.nodes.common.topic_publishers import published_topics, publishers_of
 
 SILENT_S = 5.0
-ASKED_S = 10.0  # between two questions to the master about one topic
+ASKED_S = 10.0  # between two requests to the master about one topic
 NO_RESULTS = '/rosout', '/diagnostics', '/clock', '/tf', '/tf_static'
 
 
 class InputWatch(object):
-    """Looks at the inputs once a second; costs their callbacks nothing but a note of each message."""
+    """Check the inputs once per second. The only cost for their callbacks is to record each message."""
 
     def __init__(self):
         self._began_s, self._looked_s = time.monotonic(), time.monotonic()
         self._counts, self._silences = weakref.WeakKeyDictionary(), weakref.WeakKeyDictionary()
-        self._vain_s, self._vain = -ASKED_S, None  # when the master was last asked in vain, and how it ended
+        self._vain_s, self._vain = -ASKED_S, None  # time and error of the last failed request to the master
 
     def values(self):
-        """(name, text) of each input: its topic, and its rate since the last call."""
+        """Yield (name, text) of each input: its topic and its rate since the last call."""
         now_s = time.monotonic()
         passed_s, self._looked_s = max(now_s - self._looked_s, 1e-3), now_s
         for noted in inputs():
@@ -35,7 +35,7 @@ class InputWatch(object):
             yield 'input ' + noted.name, '%s %.1f Hz' % (noted.subscriber.resolved_name, new / passed_s)
 
     def faults(self):
-        """(event, sentence) of what is wrong now."""
+        """Yield (event, sentence) for each current fault."""
         now_s = time.monotonic()
         if now_s - self._began_s > SILENT_S and not rospy.get_rostime():
             yield 'time stands still', '%s; %s' % STANDSTILL
@@ -49,7 +49,7 @@ class InputWatch(object):
                     yield 'clocks', '%s; %s' % fault
 
     def _silence(self, noted, now_s):
-        """Why nothing comes; the master is not asked about it each time."""
+        """Return why an input is silent. The master is queried at most every ASKED_S per topic."""
         asked_s, sentence = self._silences.get(noted, (-ASKED_S, ''))
         if now_s - asked_s < ASKED_S:
             return sentence
@@ -62,7 +62,7 @@ class InputWatch(object):
         return 'nothing comes on %s, and the master does not answer (%s)' % (_stream(noted).topic, self._vain)
 
     def _reason(self, noted, now_s):
-        """A sentence on why nothing comes. Raises one of `NO_ANSWER`."""
+        """Return a sentence with the cause of the silence. Raises one of `NO_ANSWER`."""
         others = inputs()
         taken = set(other.subscriber.resolved_name for other in others if other.count) | set(get_topic_manager().pubs)
         topics = published_topics()
@@ -73,7 +73,7 @@ class InputWatch(object):
 
 
 def unheard():
-    """The results of this node, where nobody subscribes any of them; empty where somebody does."""
+    """Return the result topics of this node if none of them has subscribers, otherwise an empty list."""
     tuning = rospy.get_name() + '/parameter_'
     results = [(topic, publisher) for topic, publisher in sorted(get_topic_manager().pubs.items())
                if topic not in NO_RESULTS and not topic.startswith(tuning)]

@@ -1,14 +1,14 @@
-"""Live parameters of a node, from its table (`params.Param`) to what the protocol of dynamic_reconfigure knows."""
+"""Convert the parameter table of a node (`params.Param`) to the dynamic_reconfigure protocol."""
 from collections import OrderedDict
 from typing import NamedTuple
 
 from ros_3d_bb.core.params import table_of
 
-TYPES = {bool: 'bool', int: 'int', float: 'double', str: 'str', tuple: 'str'}  # the protocol knows no lists
+TYPES = {bool: 'bool', int: 'int', float: 'double', str: 'str', tuple: 'str'}  # the protocol has no lists
 
 
 class Description(NamedTuple):
-    """Live parameters as `dynamic_reconfigure.encoding.encode_description` takes them: groups, and values by name."""
+    """Live parameters as expected by `dynamic_reconfigure.encoding.encode_description`: groups, and values by name."""
 
     config_description: dict
     min: dict
@@ -17,12 +17,12 @@ class Description(NamedTuple):
 
 
 def live_in(kinds):
-    """The live parameters of NamedTuple types, {name: Param}."""
+    """Return the live parameters of NamedTuple types, {name: Param}."""
     return OrderedDict((name, param) for name, param in table_of(kinds).items() if param.live)
 
 
 def description_of(kinds):
-    """Describe the live parameters of NamedTuple types, with a group for each section. Returns Description."""
+    """Return the Description of the live parameters of NamedTuple types, with a group for each section."""
     live = live_in(kinds)
     groups = [_group(0, 'Default', '', live)]
     for section in sorted(set(param.section for param in live.values()) - {''}):
@@ -34,13 +34,13 @@ def description_of(kinds):
 
 
 def plain_values(params):
-    """Values by name of NamedTuples, as the protocol knows them: lists are text with commas."""
+    """Return {name: value} of NamedTuples in the types of the protocol: lists become comma-separated text."""
     return {name: ', '.join(map(str, value)) if isinstance(value, (list, tuple)) else value
             for each in params for name, value in each._asdict().items()}
 
 
 def _slider(param):
-    """The least and the largest value; texts have none."""
+    """Return the minimum and maximum of a parameter; empty strings for text."""
     kind = type(param.default)
     if kind is bool:
         return False, True
@@ -55,7 +55,7 @@ def _group(number, title, section, live):
 
 
 def _choice(param):
-    """The words to choose from, as text of a Python dictionary: so it is in the protocol. Empty where any will do."""
+    """Return the choices as the text of a Python dictionary, as the protocol requires; empty without choices."""
     if not param.choices or not isinstance(param.default, str):
         return ''
     words = [{'name': word, 'type': 'str', 'value': word, 'description': ''} for word in param.choices]

@@ -1,6 +1,6 @@
-"""Questions to the ROS master that end, also where its machine has gone from the network.
+"""Requests to the ROS master with a timeout, for use when its machine may have left the network.
 
-rospy's own wait for as long as TCP does, minutes, and keep all others of this process waiting meanwhile.
+Requests of rospy block until the TCP timeout (minutes) and block all other requests of the process meanwhile.
 """
 import http.client
 import xmlrpc.client
@@ -9,9 +9,9 @@ import rospy
 from rosgraph.masterapi import Master, MasterException
 from rospy.impl.paramserver import get_param_server_cache
 
-PATIENCE_S = 2.0  # for a connection, or an answer, within one network
+PATIENCE_S = 2.0  # timeout of a connection or a response within one network
 TOPICS_LEFT_OUT = '/rosout_disable_topics_generation'
-# of a master that is not there
+# Exceptions raised if the master is unreachable.
 NO_ANSWER = OSError, http.client.HTTPException, xmlrpc.client.Error, rospy.ROSException, MasterException
 
 
@@ -23,9 +23,10 @@ class _PatientTransport(xmlrpc.client.Transport):
 
 
 def patient_master():
-    """A rosgraph Master with a connection of its own, for one thread.
+    """Return a rosgraph Master with a separate connection, for use in one thread.
 
-    Its calls raise MasterError where the master refuses, another of `NO_ANSWER` where it does not answer in time.
+    Its methods raise MasterError if the master rejects the request, and another exception of `NO_ANSWER` if it does
+    not respond in time.
     """
     master = Master(rospy.get_name())
     master.handle = xmlrpc.client.ServerProxy(master.master_uri, transport=_PatientTransport())
@@ -33,9 +34,9 @@ def patient_master():
 
 
 def log_without_asking():
-    """Have rospy write lines of the log without a question to the master.
+    """Let rospy write log lines without a request to the master.
 
-    Where the parameter is not set it asks for it at each line, and each thread that logs waits for the answer.
+    If the parameter is not set, rospy requests it for each log line, and each logging thread waits for the response.
     """
-    left_out = rospy.get_param_cached(TOPICS_LEFT_OUT, False)  # subscribes it, too: rospy hears where that changes
+    left_out = rospy.get_param_cached(TOPICS_LEFT_OUT, False)  # also subscribes to changes of the parameter
     get_param_server_cache().set(TOPICS_LEFT_OUT, left_out)

@@ -1,7 +1,7 @@
-"""Registering again with a ROS master that was restarted, as rospy itself does not do.
+"""Register the node again after a restart of the ROS master, which rospy does not do.
 
-Nodes that are connected go on without a master, and after its restart: messages do not pass through it. But a new
-master knows nobody, so whoever comes later would find nothing, and has lost all parameters.
+Connected nodes continue without a master and after its restart, because messages do not pass through it. A new master,
+however, has no registrations and no parameters, so nodes that start later would not find the existing ones.
 """
 import threading
 import time
@@ -19,16 +19,17 @@ _functions = []
 
 
 def on_new_master(function):
-    """Have a function called after each registration with a new master, in the thread that does it; again where it, or
-    one after it, raised an exception.
+    """Register a function to be called after each registration with a new master.
+
+    It is called in the thread of `Registration`, and called again if it or a later function raised an exception.
     """
     _functions.append(function)
 
 
 class Registration(object):
-    """Looks once a second whether the master still knows this node, and registers it again where it does not.
+    """Check once per second whether this node is registered with the master, and register it again if not.
 
-    Its topics, services and private parameters, and /use_sim_time, are then as before.
+    The registration restores the topics, services and private parameters of the node, and /use_sim_time.
     """
 
     def __init__(self):
@@ -46,7 +47,7 @@ class Registration(object):
             time.sleep(PERIOD_S)
             try:
                 self._look()
-            except Exception as error:  # OSError and all that rosgraph and xmlrpc raise: the next second may be better
+            except Exception as error:  # OSError and those of rosgraph and xmlrpc; tried again in a second
                 self._say_away(error)
 
     def _look(self):
@@ -61,9 +62,9 @@ class Registration(object):
             rospy.loginfo('the ROS master answers again')
 
     def _is_known(self):
-        """Not whether it knows the node, as it does after the first call that rospy itself tried again."""
+        """Whether the node's service is registered. The node name is no evidence: retried rospy calls register it."""
         try:
-            self._master.lookupService(rospy.get_name() + '/get_loggers')  # registered by init_node, and never again
+            self._master.lookupService(rospy.get_name() + '/get_loggers')  # registered only once, by init_node
             return True
         except MasterError:
             return False
@@ -77,7 +78,7 @@ class Registration(object):
             self._master.registerPublisher(topic, kind, uri)
         for topic, kind in get_topic_manager().get_subscriptions():
             publishers = self._master.registerSubscriber(topic, kind, uri)
-            ServerProxy(uri).publisherUpdate('/master', topic, publishers)  # what the master does when more come
+            ServerProxy(uri).publisherUpdate('/master', topic, publishers)  # as the master does for new publishers
         for service, service_uri in get_service_manager().get_services():
             self._master.registerService(service, service_uri, uri)
         for function in _functions:

@@ -1,4 +1,4 @@
-"""The label of the measurements to come, which people set while the viewer runs."""
+"""Label of the next measurements, which can be set while the viewer runs."""
 import contextlib
 
 import rospy
@@ -9,12 +9,14 @@ from ros_3d_bb.nodes.common.master_registration import on_new_master
 
 
 class Label(object):
-    """The parameter ~label; as it was before where no master answers, and a new master is told it.
+    """The parameter ~label.
+
+    Its last value is kept if the master does not respond, and is set again on a restarted master.
 
     Parameters
     ----------
     first : str
-        What it is where the parameter is not set.
+        Value if the parameter is not set.
     """
 
     def __init__(self, first):
@@ -22,21 +24,21 @@ class Label(object):
         on_new_master(self._restore)
 
     def asked(self):
-        """As the master has it: rospy's cache hears of a label some time after it was set."""
+        """Request the label from the master, because rospy's cache is updated with a delay."""
         with contextlib.suppress(*NO_ANSWER):
             try:
                 self._newest = str(patient_master().getParam(rospy.resolve_name('~label')))
-            except MasterError:  # it is not set
+            except MasterError:  # the parameter is not set
                 self._newest = self._first
         return self._newest
 
     def heard(self):
-        """As rospy's cache has it, which costs the master nothing."""
+        """Return the label from rospy's cache, without a request to the master."""
         with contextlib.suppress(*NO_ANSWER):
             self._newest = str(rospy.get_param_cached('~label', self._first))
         return self._newest
 
     def _restore(self):
-        # rospy believes that it has subscribed the parameter, and a new master knows nothing of that
+        # rospy assumes that its subscription to the parameter persists, but a new master has lost it.
         patient_master().subscribeParam(rospy.get_node_uri(), rospy.resolve_name('~label'))
         rospy.set_param('~label', self._newest)

@@ -1,18 +1,19 @@
-"""Numbers of tracks that stay unique when the tracker is killed and started again."""
+"""Track IDs that remain unique when the tracker is killed and restarted."""
 import rospy
 
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.nodes.common.master_registration import on_new_master
 
-RESERVED = 1000  # numbers at a time: whoever is started again goes on with the next thousand
-LARGEST = 2 ** 31 - 1  # that a ROS parameter holds
+RESERVED = 1000  # IDs per reservation: a restarted tracker continues with the next thousand
+LARGEST = 2 ** 31 - 1  # largest integer of a ROS parameter
 
 
 class PersistentTrackIds(object):
-    """Adds to the numbers that a tracker gives those that were given before it was started.
+    """Offset the IDs of a tracker by the IDs that were assigned before it was started.
 
-    The parameter server, which outlives the node, remembers up to where numbers are reserved; the parameter is beside
-    the node's own ones (`/tracker_node_numbers`), as roslaunch clears those. Without the master numbers go on.
+    The upper limit of the reserved IDs is stored on the parameter server, which outlives the node. The parameter is
+    outside the node's namespace (`/tracker_node_numbers`), because roslaunch clears private parameters. IDs are also
+    assigned while the master is unreachable.
 
     Parameters
     ----------
@@ -21,7 +22,7 @@ class PersistentTrackIds(object):
     Raises
     ------
     ValueError
-        If the parameter holds something else.
+        If the parameter is not a valid ID.
     """
 
     def __init__(self, diagnostics):
@@ -33,11 +34,11 @@ class PersistentTrackIds(object):
         self._reserved = self._before + RESERVED
         rospy.set_param(self._name, self._reserved)
         on_new_master(lambda: self._worker.offer(self._reserved))
-        # In a thread of its own, as a master that does not answer must not hold up the tracks.
+        # In a separate thread, because an unresponsive master must not block the tracks.
         self._worker = NewestWorker(self._reserve, self._on_error)
 
     def assign(self, tracks):
-        """The tracks, a list of `types.TrackedObject`, with their numbers among all."""
+        """Return the tracks, a list of `types.TrackedObject`, with persistent IDs."""
         tracks = [track._replace(id=self._before + track.id) for track in tracks]
         newest = max([track.id for track in tracks], default=0)
         if newest > self._reserved - RESERVED // 2:

@@ -1,4 +1,4 @@
-"""Parameters that are changed while a node runs, by the tools of dynamic_reconfigure."""
+"""Server for changing the parameters of a running node with the dynamic_reconfigure tools."""
 import threading
 
 import rospy
@@ -12,30 +12,31 @@ from ros_3d_bb.nodes.common.master_registration import on_new_master
 
 
 class ReconfigureServer(object):
-    """Takes changes of those parameters of a node that its table marks as live (see `ros_3d_bb.core.params.Param`).
+    """Accept changes of the parameters that are marked as live in the table (see `ros_3d_bb.core.params.Param`).
 
-    The description that dynamic_reconfigure generates code for is made from that table. A request with a value that is
-    not allowed is rejected as a whole, where dynamic_reconfigure's own server would clamp the value. The response has
-    the values in force: an error would end rqt_reconfigure's thread.
+    The description, for which dynamic_reconfigure generates code, is built from that table. A request with an invalid
+    value is rejected as a whole, where the server of dynamic_reconfigure would clamp the value. The response contains
+    the current values, because an error would end the thread of rqt_reconfigure.
 
     Parameters
     ----------
     params : list of NamedTuple
-        All parameters of the node, as `startup.read_params` returned them.
+        All parameters of the node, as returned by `startup.read_params`.
     take : callable
-        Called with changed ones, in the same order; raises ValueError, and changes nothing, where they make no sense.
+        Called with the changed parameters, in the same order. Raises ValueError without changing anything if they are
+        invalid.
 
     Publishes
     ---------
     ~parameter_descriptions : dynamic_reconfigure/ConfigDescription
-        What can be changed while the node runs, within what limits; latched.
+        Parameters that can be changed at run time and their limits; latched.
     ~parameter_updates : dynamic_reconfigure/Config
-        What is in force; latched.
+        Current values; latched.
 
     Services
     --------
     ~set_parameters : dynamic_reconfigure/Reconfigure
-        Changes parameters that are marked Live, as rqt_reconfigure does.
+        Changes the parameters that are marked Live, as used by rqt_reconfigure.
     """
 
     def __init__(self, params, take):
@@ -63,7 +64,7 @@ class ReconfigureServer(object):
             for name in self._keep_in_step(before):
                 rospy.loginfo('~%s is %s now, %s before', name, self._values()[name], before[name])
             message = self._message()
-            self._updates_pub.publish(message)  # also where nothing changed: sliders go back to what is in force
+            self._updates_pub.publish(message)  # also if nothing changed, to reset the sliders
             return ReconfigureResponse(message)
 
     def _change(self, given):
@@ -75,12 +76,12 @@ class ReconfigureServer(object):
         self._params = params
 
     def _values(self):
-        """By name, as the parameter server has them: lists, where defaults are tuples."""
+        """Return {name: value} in the types of the parameter server, with lists instead of tuples."""
         return {name: list(value) if isinstance(value, tuple) else value
                 for each in self._params for name, value in each._asdict().items()}
 
     def _keep_in_step(self, known):
-        """Tell the parameter server which live parameters differ from those known. Returns their names."""
+        """Set the live parameters that differ from `known` on the parameter server. Returns their names."""
         values = self._values()
         changed = [name for name in self._names if name not in known or known[name] != values[name]]
         for name in changed:
@@ -88,6 +89,6 @@ class ReconfigureServer(object):
         return changed
 
     def _message(self):
-        """What is in force."""
+        """Return the current values as a Config message."""
         values = plain_values(self._params)
         return encode_config(dict({name: values[name] for name in self._names}, groups=self._groups))

@@ -1,4 +1,4 @@
-"""What every node does first: read its parameters, or say why it cannot start."""
+"""Start-up of a node: read its parameters, create it, and report errors."""
 import sys
 
 import rospy
@@ -9,14 +9,14 @@ from ros_3d_bb.nodes.common.master_registration import Registration
 
 
 def read_params(*kinds):
-    """The node's private parameters as instances of NamedTuple types. Raises ValueError, see `params_from`."""
+    """Read the node's private parameters as instances of NamedTuple types. Raises ValueError, see `params_from`."""
     return params_from(rospy.get_param('~', {}), *kinds)
 
 
 def run_node(name, node_class, run=lambda _node: rospy.spin()):
-    """Make a node and `run` it, by default until ROS shuts down; return it.
+    """Create a node, `run` it (by default until ROS shuts down) and return it.
 
-    A ValueError at its start is a fault of the set-up: it is said, and the exit status is 1.
+    A ValueError of the constructor is a configuration error: it is logged, and the exit status is 1.
     """
     reuse_freed_memory()
     rospy.init_node(name)

@@ -1,30 +1,30 @@
-"""How nodes subscribe: without delay, and with queues that keep the newest."""
+"""Subscribers of the nodes, without TCP delay and with queues that keep the newest messages."""
 import threading
 import time
 
 import rospy
 from sensor_msgs.msg import Image
 
-# What is kept for others that come later must not be lost on the way: so many messages may come at once, after the
-# machine was busy; of more, only the newest are taken.
+# Queue size for messages that are cached until others arrive and must not be lost: this many may arrive at once after
+# the machine was busy. If more arrive, only the newest are kept.
 KEPT_AT_ONCE = 10
-AT_ONCE = 5  # the same for what is worked on: it bounds how old that can get
-IMAGE_BUFFER = 2 ** 24  # bytes; less than the images that come at once, and rospy takes old ones for new
+AT_ONCE = 5  # queue size for messages that are processed directly; limits their age
+IMAGE_BUFFER = 2 ** 24  # bytes; if smaller than the images that arrive at once, rospy delivers outdated images
 SMALL_BUFFER = 2 ** 16  # rospy's default
 
 
-_inputs, _lock = [], threading.Lock()  # of this process, which is one node
+_inputs, _lock = [], threading.Lock()  # of the process, which is one node
 
 
 class Input(object):
-    """What came on a topic that a node subscribes.
+    """Statistics of the messages received on a topic of the node.
 
     Attributes
     ----------
     name, kind : str, class
-        As the node calls the topic, before any remapping, and its messages.
+        Name of the topic before remapping, and its message class.
     count, came_s : int, float
-        How many messages came, and when the newest did on time.monotonic(); None before the first.
+        Number of received messages, and arrival of the newest on time.monotonic(); None before the first.
     subscriber : rospy.Subscriber
     """
 
@@ -34,7 +34,7 @@ class Input(object):
         self.subscriber = None
 
     def take(self, message):
-        """Note that a message came, and hand it on."""
+        """Record a message and pass it to the callback."""
         self.count += 1
         self.came_s = time.monotonic()
         header = getattr(message, 'header', None)
@@ -44,8 +44,9 @@ class Input(object):
 
     @property
     def lags_s(self):
-        """How long before it came the stamp of the newest message was, by ROS time and by the machine's clock, seconds;
-        None and None where it carries none, or came before the first /clock.
+        """Age of the newest message at its arrival, in seconds, by ROS time and by the clock of the machine.
+
+        (None, None) if it has no stamp, or arrived before the first /clock message.
         """
         if self._newest is None or not self._newest[0] or not self._newest[1]:
             return None, None
@@ -54,10 +55,10 @@ class Input(object):
 
 
 def subscribe(topic, kind, callback, at_once=AT_ONCE):
-    """A rospy.Subscriber to whom the publisher sends at once (TCP_NODELAY).
+    """Create a rospy.Subscriber with TCP_NODELAY.
 
-    Without that the kernel keeps small messages back until the ones before are acknowledged, up to 40 ms. What comes is
-    noted: see `inputs`.
+    Without it, the kernel delays small messages by up to 40 ms, until previous ones are acknowledged. Received messages
+    are recorded, see `inputs`.
     """
     noted = Input(topic, kind, callback)
     noted.subscriber = rospy.Subscriber(topic, kind, noted.take, queue_size=at_once, tcp_nodelay=True,
@@ -68,7 +69,7 @@ def subscribe(topic, kind, callback, at_once=AT_ONCE):
 
 
 def inputs():
-    """The Input of each topic that is subscribed now."""
+    """Return the Input of each topic that is currently subscribed."""
     with _lock:
         _inputs[:] = [noted for noted in _inputs if noted.subscriber.impl is not None]
         return list(_inputs)

@@ -1,4 +1,4 @@
-"""Transforms at the stamp of an image, waited for, but not for long."""
+"""tf2 lookup at the stamp of an image, with a bounded wait."""
 import threading
 import time
 
@@ -8,16 +8,16 @@ import tf2_ros
 from ros_3d_bb.conversions.perception_msgs import check_transforms, transform_from_msg
 from ros_3d_bb.diagnosis.tf_tree import links_in, why_missing
 
-LONGEST_WAIT_S = 0.05  # without news; shutting down takes no longer
-EXPLAINED_S = 2.0  # between two looks at the whole tree for one pair of frames; each takes as long as some images
-CACHE_S = 10.0  # tf2's buffer refuses transforms that are older than the newest of their frame by more
-ASKED_S = 10.0  # so long a pair of frames is shown after it was asked for
+LONGEST_WAIT_S = 0.05  # without new transforms; bounds the delay of a shutdown
+EXPLAINED_S = 2.0  # between two searches of the whole tree for a pair of frames, as each costs as much as some images
+CACHE_S = 10.0  # the tf2 buffer rejects transforms that are older than the newest one of their frame by more
+ASKED_S = 10.0  # time for which the age of a pair of frames is shown after its last lookup
 
 
 class _Listener(tf2_ros.TransformListener):
-    """Takes transforms, and notifies the threads that wait for them.
+    """Receive transforms and notify the threads that wait for them.
 
-    `has_refused` becomes true where a transform is too old for tf2, beside the newest of its frame.
+    `has_refused` becomes true if a transform is rejected by tf2 as too old compared with the newest of its frame.
     """
 
     def __init__(self, buffer):
@@ -26,11 +26,11 @@ class _Listener(tf2_ros.TransformListener):
         tf2_ros.TransformListener.__init__(self, buffer, tcp_nodelay=True)
 
     def clear(self):
-        """The buffer was cleared."""
+        """Reset the state after the buffer was cleared."""
         self.has_refused, self._newest_s = False, {}  # by child frame
 
     def callback(self, data):
-        """Of /tf."""
+        """Process a message of /tf."""
         if not _are_usable(data):
             return
         for transform in data.transforms:
@@ -41,7 +41,7 @@ class _Listener(tf2_ros.TransformListener):
         self._tell()
 
     def static_callback(self, data):
-        """Of /tf_static."""
+        """Process a message of /tf_static."""
         if not _are_usable(data):
             return
         tf2_ros.TransformListener.static_callback(self, data)
@@ -62,22 +62,26 @@ def _are_usable(message):
 
 
 class Transforms(object):
-    """tf2 with a wait that is bounded by the machine's clock, so that a stopped /clock cannot hang the node."""
+    """tf2 lookup with a timeout in wall-clock time, so that a stopped /clock cannot block the node."""
 
     def __init__(self, wait_s):
         self._wait_s = wait_s
         self._buffer = tf2_ros.Buffer(debug=False)
         self._from_before = False
         self._listener = _Listener(self._buffer)
-        self._asked, self._explanations = {}, {}  # by (target, source): when; (sentence, when)
+        self._asked, self._explanations = {}, {}  # by (target, source): time; (sentence, time)
 
     def lookup(self, target_frame, source_frame, stamp):
-        """`target_from_source` at a stamp, a 4x4 matrix.
+        """Look up `target_from_source` at a stamp.
+
+        Returns
+        -------
+        numpy.ndarray, (4, 4)
 
         Raises
         ------
         tf2_ros.TransformException
-            If tf does not know it within the wait; says which frames and what tf knows.
+            If the transform is not available within the timeout. The message names the frames and the state of tf.
         """
         asked = target_frame.lstrip('/'), source_frame.lstrip('/')
         self._asked[asked] = time.monotonic()
@@ -103,15 +107,15 @@ class Transforms(object):
                 self._listener.news.wait(min(left_s, LONGEST_WAIT_S))
 
     def go_back(self):
-        """Time went back: transforms of the time before may keep new ones out of the buffer. It is cleared if the next
-        lookup fails.
+        """Handle a backward jump in time: the buffer is cleared if the next lookup fails.
 
-        Where /clock tells the time, tf2 forgets them by itself, and clearing now would lose the new ones.
+        Transforms from before the jump may prevent new ones from entering the buffer. With /clock, tf2 discards them
+        itself, and clearing the buffer at once would lose the new ones.
         """
         self._from_before = True
 
     def age(self):
-        """How old the newest transform is that was asked for, in words: of each camera."""
+        """Return the age of the newest transform of each recently requested pair of frames, as text."""
         latest_s = max(list(self._asked.values()), default=0.0)
         for asked, when_s in list(self._asked.items()):
             if when_s < latest_s - ASKED_S:
@@ -127,9 +131,9 @@ class Transforms(object):
         return '%.3f s' % (rospy.get_rostime() - newest).to_sec() if newest else 'static'
 
     def _explained(self, asked, stamp):
-        """Why there is no transform, from all that tf knows; empty where that says nothing.
+        """Return why a transform is missing, from the whole tf tree; empty if no cause is found.
 
-        It takes its time: not under the lock, where other cameras would wait for it.
+        The search is slow, so it must not run under the lock, where other cameras would wait for it.
         """
         now_s = time.monotonic()
         recent = {frames: said for frames, said in list(self._explanations.items()) if now_s - said[1] < EXPLAINED_S}

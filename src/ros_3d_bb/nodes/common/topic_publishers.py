@@ -1,4 +1,4 @@
-"""What the master knows of a topic: who publishes it, with what type; and whether those can be reached."""
+"""Query the master for the types and publishers of topics, and test whether the publishers are reachable."""
 import socket
 from urllib.parse import urlparse
 
@@ -9,14 +9,27 @@ from ros_3d_bb.nodes.common.master import PATIENCE_S, patient_master
 
 
 def published_topics():
-    """{name: type} of all topics that somebody publishes. Raises one of `master.NO_ANSWER` without a master."""
+    """Return {name: type} of all published topics. Raises one of `master.NO_ANSWER` without a master."""
     return dict(patient_master().getPublishedTopics('/'))
 
 
 def publishers_of(topic, is_connected):
-    """Who publishes a topic, a tuple of Publisher; of those that send nothing here, what keeps them from it.
+    """Return the publishers of a topic, with the connection problem of each.
 
-    Raises one of `master.NO_ANSWER` without a master.
+    Parameters
+    ----------
+    topic : str
+    is_connected : bool
+        Whether the subscriber is connected; if so, no problems are searched for.
+
+    Returns
+    -------
+    tuple of Publisher
+
+    Raises
+    ------
+    `master.NO_ANSWER`
+        If the master does not respond.
     """
     master = patient_master()
     publishing, _subscribing, _services = master.getSystemState()

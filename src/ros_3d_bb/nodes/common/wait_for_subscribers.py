@@ -1,20 +1,20 @@
-"""Waiting for those who should not miss the beginning."""
+"""Wait for the subscribers that must receive the first message."""
 import time
 
 import rospy
 
 POLL_S = 0.05
-SETTLING_S = 1.0  # who has subscribed one topic still connects to the others
-LONGEST_WAIT_S = 60.0  # those who have not come by then will not come
+SETTLING_S = 1.0  # a node that has connected to one topic may still be connecting to the others
+LONGEST_WAIT_S = 60.0  # after this time, missing subscribers are an error
 
 
 def wait_for_subscribers(publisher, wanted, meanwhile):
-    """Wait until a publisher has `wanted` subscribers, calling `meanwhile` again and again.
+    """Wait until a publisher has `wanted` subscribers, and call `meanwhile` repeatedly.
 
     Raises
     ------
     RuntimeError
-        If they do not come.
+        If there are fewer subscribers after LONGEST_WAIT_S.
     """
     began_s = time.monotonic()
     while publisher.get_num_connections() < wanted and not rospy.is_shutdown():
