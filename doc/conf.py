@@ -47,7 +47,8 @@ def _prepare(_app, name, source):
     if name == root_doc:
         first = ['doc/' + page for page in FIRST]
         others = [other for other in _names('doc') + _names('config/**') if other not in first + [root_doc]]
-        for caption, names in (('How it works', ['README', 'CONTRIBUTING'] + first), ('More', others), ('Nodes', _names('doc/nodes'))):
+        for caption, names in (('How it works', ['README', 'CONTRIBUTING'] + first), ('More', others),
+                               ('Nodes', _names('doc/nodes'))):
             pages = '\n'.join('/' + page for page in names)
             source[0] += '\n```{toctree}\n:hidden:\n:caption: %s\n\n%s\n```\n' % (caption, pages)
 
