@@ -206,14 +206,13 @@ def test_time_that_goes_back_ends_all_tracks_and_goes_on(rig, tracks, now):
 
 
 def test_boxes_that_cannot_be_used_are_refused_and_the_next_work(rig, tracks, now):
-    rig.send(now, (0.0, 0.0, float('nan')))  # left out: an image without people
+    rig.send(now, (0.0, 0.0, float('nan')))  # not an image without people: it is not answered
     rig.send(now + PERIOD, (0.0, 0.0, 3.0))
-    stamps = [message.header.stamp for message in tracks.wait_for(2)]
-    assert stamps == [time_from(now), time_from(now + PERIOD)]
+    assert tracks.wait_for(1)[0].header.stamp == time_from(now + PERIOD)
     rig.send(now + PERIOD, (0.0, 0.0, 3.0))  # a second time
     rig.boxes.publish(BoundingBox3DArray())  # no stamp
     rig.send(now + 2 * PERIOD, (0.0, 0.0, 3.0))
-    assert tracks.wait_for(3)[2].header.stamp == time_from(now + 2 * PERIOD)
+    assert tracks.wait_for(2)[1].header.stamp == time_from(now + 2 * PERIOD)
     level, sentence, counts = diagnostics_of('tracker_node')
     assert level == 1 and '3D boxes refused' in sentence and counts['3D boxes left out'] == 1
 

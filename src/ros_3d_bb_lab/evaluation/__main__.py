@@ -3,7 +3,7 @@ import importlib
 import sys
 
 MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.__main__', 'scenes': 'scene_benchmark', 'speed': 'speed',
-           'latency': 'latency'}
+           'latency': 'latency.benchmark'}
 
 
 def main():
