@@ -13,7 +13,6 @@ no real lens stretches that much.
 import functools
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 from numpy.polynomial import Polynomial
 
@@ -21,7 +20,6 @@ PLUMB_BOB, RATIONAL_POLYNOMIAL, EQUIDISTANT = 'plumb_bob', 'rational_polynomial'
 INVERSE_BROWN_CONRADY = 'inverse_brown_conrady'  # of librealsense
 LARGEST = 1e6  # upper bound of a coefficient, beyond that of any lens; larger ones overflow
 WIDEST = np.tan(np.radians(89))  # upper bound of the distance from the axis in a planar image
-UNTIL = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-11)  # termination criteria of OpenCV
 STEPS = 10  # maximum number of corrections of OpenCV's solution
 STEPS_BEFORE_3_3_1 = 100  # the same for OpenCV before 3.3.1, which iterates only five times
 EXACT = 1e-10  # error at which the corrections stop: 1e-7 pixels
@@ -80,7 +78,7 @@ def undistort(model, coefficients, images):
     OpenCV's solution is corrected until `distort` maps it to the images. One step suffices if OpenCV is exact; more are
     needed if its lens model differs slightly, and before OpenCV 3.3.1, which stops after five iterations.
     """
-    steps = STEPS if hasattr(cv2, 'undistortPointsIter') else STEPS_BEFORE_3_3_1
+    steps = STEPS if hasattr(_opencv(), 'undistortPointsIter') else STEPS_BEFORE_3_3_1
     targets = images = np.asarray(images, float)
     if not images.size:
         return images  # OpenCV rejects empty arrays
@@ -105,9 +103,11 @@ def distort_brown(rays, coefficients):
 
 def undistort_brown(images, coefficients):
     """Undistort images (n, 1, 2) to rays (n, 1, 2). Inverse of `distort_brown`."""
+    cv2 = _opencv()
     if not hasattr(cv2, 'undistortPointsIter'):  # OpenCV before 3.3.1, as in Ubuntu 18.04
         return cv2.undistortPoints(images, UNIT, np.array(coefficients))
-    return cv2.undistortPointsIter(images, UNIT, np.array(coefficients), None, None, UNTIL)
+    until = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-11)
+    return cv2.undistortPointsIter(images, UNIT, np.array(coefficients), None, None, until)
 
 
 def distort_inverse_brown_conrady(rays, coefficients):
@@ -127,7 +127,7 @@ def distort_equidistant(rays, coefficients):
 
     Source: OpenCV, calib3d, "Fisheye camera model"; sensor_msgs/distortion_models.h.
     """
-    return cv2.fisheye.distortPoints(rays.reshape(-1, 1, 2), UNIT, np.array(coefficients)).reshape(rays.shape)
+    return _opencv().fisheye.distortPoints(rays.reshape(-1, 1, 2), UNIT, np.array(coefficients)).reshape(rays.shape)
 
 
 def undistort_equidistant(images, coefficients):
@@ -137,7 +137,7 @@ def undistort_equidistant(images, coefficients):
     which `undistort` rejects.
     """
     next_to_axis = np.abs(images).max(axis=-1, keepdims=True) <= ON_AXIS
-    return np.where(next_to_axis, images, cv2.fisheye.undistortPoints(images, UNIT, np.array(coefficients)))
+    return np.where(next_to_axis, images, _opencv().fisheye.undistortPoints(images, UNIT, np.array(coefficients)))
 
 
 class Model(NamedTuple):
@@ -192,3 +192,9 @@ def _turning_point(numerator, denominator, limit):
     roots = np.concatenate([polynomial.trim(1e-12).roots() for polynomial in (slope, d)])
     real = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0)]
     return min([limit] + (np.sqrt(real) * (1 - 1e-6)).tolist())  # short of the pole
+
+
+def _opencv():
+    """The module cv2. It takes 100 MB, which nodes save whose camera has no distortion."""
+    import cv2
+    return cv2
