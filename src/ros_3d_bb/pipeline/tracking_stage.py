@@ -198,16 +198,15 @@ class TrackingStage(object):
             self._check_frame(message.header.frame_id, camera)
         usable, faults = usable_boxes3d(message)
         self._tally.leave_out('3D boxes', faults)
-        if faults and not usable.boxes:  # differs from an image without people
-            with self._tracks_lock:
-                self._tracker.skip(stamp_ns, camera or message.header.frame_id)
-            raise ValueError('none of their %d boxes can be used; tracks are kept as they are' % len(faults))
         detections = detections_from_msg(usable, fixed_from_camera)
         with self._tracks_lock:
             if jumps != self._jumps:
                 self._tally.warn('images of the time before', 'boxes at %.3f are left out: time went back while their '
                                  'transform was waited for' % (stamp_ns / NS))
                 return None
+            if faults and not usable.boxes:  # differs from an image without people
+                self._tracker.skip(stamp_ns, camera or message.header.frame_id)
+                raise ValueError('none of their %d boxes can be used; tracks are kept as they are' % len(faults))
             tracks = self._tracker.update(stamp_ns, detections, self._view(stamp_ns, located))
             self._clocks.track(camera)
             self._newest_ns[camera] = max(stamp_ns, self._newest_ns.get(camera, stamp_ns))

@@ -36,17 +36,17 @@ class MeasurementBatch(NamedTuple):
     sizes_m: np.ndarray
     z_m: np.ndarray
     z_m2: np.ndarray
-    truncated: np.ndarray
+    truncated_edges: np.ndarray
 
     @property
     def cut_sideways(self):
         """Whether the image border truncates the width, (n,)."""
-        return self.truncated[:, 0] | self.truncated[:, 2]
+        return self.truncated_edges[:, 0] | self.truncated_edges[:, 2]
 
     @property
     def vertical_cuts(self):
         """Whether the image border truncates the lower and the upper end, (n, 2)."""
-        return self.truncated[:, [3, 1]]
+        return self.truncated_edges[:, [3, 1]]
 
     def select(self, columns):
         """The batch reduced to the measurements in `columns`."""
@@ -95,20 +95,20 @@ def measurement_batch_of(detections, view, elapsed_s, params):
     """
     positions_m = np.array([detection.position_m for detection in detections]).reshape(-1, 3)
     sizes_m = np.array([detection.size_m for detection in detections]).reshape(-1, 3)
-    truncated = np.array([detection.truncated_edges for detection in detections], bool).reshape(-1, 4)
+    truncated_edges = np.array([detection.truncated_edges for detection in detections], bool).reshape(-1, 4)
     unknown = np.eye(3) * params.noise_unknown ** 2
     covariances = np.array([unknown if detection.covariance_m2 is None else detection.covariance_m2
                             for detection in detections]).reshape(-1, 3, 3)
     seen = _seen(positions_m[:, :2], sizes_m[:, 0], view)
     hidden = _hidden_side(seen)
     is_part = sizes_m[:, 0] < PART_M
-    cut_left, cut_right = truncated[:, 0], truncated[:, 2]
+    cut_left, cut_right = truncated_edges[:, 0], truncated_edges[:, 2]
     cut = cut_left | cut_right
     side = np.where(cut, (cut_left.astype(int) - cut_right) * is_part, hidden)
     shift_m = np.clip((PERSON_WIDTH_M - sizes_m[:, 0]) / 2, 0, MAX_SHIFT_M)
     noise_m2 = _noise(covariances[:, :2, :2], seen, cut | (hidden != 0), elapsed_s, params)
     ground = Measurements(seen.positions_m + (side * shift_m)[:, None] * seen.sides, noise_m2, seen.rays)
-    return MeasurementBatch(ground, sizes_m, positions_m[:, 2], covariances[:, 2, 2], truncated)
+    return MeasurementBatch(ground, sizes_m, positions_m[:, 2], covariances[:, 2, 2], truncated_edges)
 
 
 def _seen(positions_m, widths_m, view):
