@@ -2,7 +2,7 @@
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.estimation.box3d_estimator import sample_median
+from ros_3d_bb.estimation.box3d_estimator import sample_depth
 from ros_3d_bb.visualization.image_overlay import (BOX_COLOR, INVALID_COLOR, VALID_COLOR, draw_boxes, draw_samples,
                                                    depth_to_grey)
 
@@ -21,7 +21,7 @@ def test_samples_show_where_depth_was_measured():
     values = np.full((60, 60), 2000, np.uint16)
     values[:, 30:] = 0
     rect = (5, 5, 55, 55)
-    samples = sample_median(DepthImage(values, 0.001), rect, 10)
+    samples = sample_depth(DepthImage(values, 0.001), rect, 10)
     image = draw_samples(np.zeros((60, 60, 3), np.uint8), rect, samples)
     for (u, v), valid in zip(samples.pixels.reshape(-1, 2), samples.valid.ravel()):
         assert image[v, u].tolist() == list(VALID_COLOR if valid else INVALID_COLOR)

@@ -66,7 +66,7 @@ def intrinsics(number, value):
 IMAGES = [(fields(step=1), 'image data is too short'), (truncated, 'image data is too short: 100 bytes'),
           (fields(width=0, height=0, step=0, data=b''), 'image is empty: 0 x 0 pixels'),
           (fields(encoding='9UC7'), "has encoding '9UC7'; expected one of"),
-          (fields(header__stamp=genpy.Time()), 'carries no stamp (zero)')]
+          (fields(header__stamp=genpy.Time()), 'has no stamp (zero)')]
 CAMERAS = [(intrinsics(0, 0.0), 'fx=0 fy=60'), (intrinsics(4, float('nan')), 'fy=nan'),
            (fields(width=0, height=0), 'camera size 0 x 0 is not positive'), (stamped(0), None),
            (stamped(START_NS + HOUR_NS), None), (stamped(START_NS - 900 * NS), None)]
@@ -75,7 +75,7 @@ CASES = [('bbox3d_node', BOXES_TOPIC) + case for case in (
     (boxes2d(38, 44, 26, 8), '(38, 44, 26, 8) is empty or reversed'), (boxes2d(26, 8, 26, 8), 'is empty or reversed'),
     (boxes2d(*[10] * 10 ** 6), '250000 2D boxes in one image; at most 1000 expected'),
     (boxes2d(), None), (boxes2d(200, 200, 300, 300), None), (boxes2d(*[-2 ** 31] * 2 + [2 ** 31 - 1] * 2), None),
-    (label('boxes;stamp=x'), "2D boxes carry the label 'boxes;stamp=x'"),
+    (label('boxes;stamp=x'), "2D boxes have the label 'boxes;stamp=x'"),
     (label('boxes;stamp=0.000000000;frame=camera'), 'no depth image with their stamp 0.000'),
     (label('boxes;stamp=5.000000000;frame=camera'), 'no depth image with their stamp 5.000'),
     (label('boxes;stamp=4600.000000000;frame=camera'), None))]  # they wait for their image, for ~cache_length
@@ -100,7 +100,7 @@ CASES += [('tracker_node', BOXES3D_TOPIC) + case for case in (
     (fields(boxes__0__position_covariance=[-1.0] * 9), 'positive semi-definite matrix'),
     (fields(boxes__0__position_covariance=[float('nan')] * 9), 'positive semi-definite matrix'),
     (fields(boxes__0__center__orientation__w=2.0), None),  # a cylinder's orientation is not read
-    (fields(header__stamp=genpy.Time()), 'carries no stamp (zero)'),
+    (fields(header__stamp=genpy.Time()), 'has no stamp (zero)'),
     (fields(header__stamp=time_from(START_NS + HOUR_NS)), 'no transform from camera to map at 4600.000'),
     (fields(header__stamp=time_from(START_NS - 900 * NS)), 'no transform from camera to map at 100.000'),
     (fields(header__frame_id=''), 'no transform'), (fields(header__frame_id='nowhere'), 'no transform from nowhere'))]

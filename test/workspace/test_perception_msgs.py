@@ -88,7 +88,7 @@ def test_arrays_of_the_wrong_length_are_refused(count, reason):
 
 
 def test_a_stamp_of_zero_is_refused():
-    with pytest.raises(ValueError, match="BoundingBox3DArray of frame 'camera' carries no stamp"):
+    with pytest.raises(ValueError, match="BoundingBox3DArray of frame 'camera' has no stamp"):
         stamp_of(BoundingBox3DArray(header=Header(frame_id='camera')))
 
 
