@@ -1,7 +1,10 @@
 """3D box estimators: from a rectangle in the depth image to a 3D box.
 
-Convention: a rectangle (x1, y1, x2, y2) contains the pixels x1 <= u < x2, y1 <= v < y2. Positions are in the camera
-optical frame, metres. In `sorted_depths_m` (nearest first), a layer of depth is a slice and its median an element.
+Conventions: a rectangle (x1, y1, x2, y2) contains the pixels x1 <= u < x2, y1 <= v < y2. Positions are in the camera
+optical frame, metres. The level frame of a camera has the same origin, x horizontally to the right, y down and z
+horizontally ahead; `level_from_camera` (3, 3) rotates the optical frame to it. Depth layers are layers of z in the
+level frame, because people stand upright there. In `sorted_depths_m` (nearest first), a layer is a slice and its median
+an element.
 """
 import functools
 from typing import Any, NamedTuple, Optional, Tuple
@@ -11,13 +14,19 @@ import numpy as np
 from ros_3d_bb.camera.depth_image import FARTHEST_M as FARTHEST_DEPTH_M
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M, USUAL_HEIGHT_M, USUAL_WIDTH_M
 
-# A box whose edge is this close to the image border counts as truncated: detectors round to whole pixels and regress
-# the edge of a truncated person a pixel or two inside the image.
-BORDER_PX = 2
+# A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated:
+# detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person
+# who is not truncated there loses little, because only boxes of less than the usual size are completed.
+BORDER_PX, BORDER_SHARE = 4, 0.02
+# Nearer people stand lower in the image. The lower edges of truncated boxes are compared at this height.
+CUT_ROWS = 1 / 30.0  # share of the image height
 SAMPLES_WANTED = 2000  # approximate number of pixels that the foreground estimator samples
 AXIS_BEHIND_SURFACE_M = 0.09  # mean over standing and walking bodies of the simulation, seen from all sides
-LEAST_SUPPORT = 0.1  # minimum share of the samples in the person's layer for an estimate
+LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the person's layer for an estimate
 LEAST_WIDTH_M = 0.05
+LEVEL = np.eye(3)  # of a camera that is held level
+MAX_TILT_RAD, MAX_ROLL_RAD = np.radians(65), np.radians(45)
+LEAST_AHEAD = 0.05  # lower bound of the horizontal part of a ray
 
 # Half the depth extent of a person with stretched arms; points farther from the median are not part of the person.
 BODY_HALF_DEPTH_M = 0.35
@@ -29,28 +38,21 @@ EDGE_PERCENT = 5  # percentage of the layer's pixels ignored at the left and at 
 
 
 class Samples(NamedTuple):
-    """Grid of depth samples in one rectangle: columns (w,), rows (h,), raw values (h, w), depth_m (h, w) = values times
-    `scale_m`, and valid (h, w), whether depth was measured.
+    """Grid of depth samples in one rectangle: columns (w,), rows (h,), depth_m (h, w), metres, and valid (h, w),
+    whether depth was measured.
     """
 
     columns: np.ndarray
     rows: np.ndarray
-    values: np.ndarray
-    scale_m: float
     depth_m: np.ndarray
     valid: np.ndarray
 
-    @property
-    def pixels(self):
-        """Pixel coordinates (u, v) of the grid, (h, w, 2)."""
-        return np.stack(np.meshgrid(self.columns, self.rows), axis=-1)
-
 
 class Box3D(NamedTuple):
-    """An upright cylinder in the camera optical frame, with quality measures.
+    """An upright cylinder, with quality measures.
 
-    `center_m` (3,) and `size_m` (width, height, width) are in metres; `rect_px` is the source rectangle; `support` is
-    the share 0..1 of the sampled pixels that belong to its depth layer; `truncated_edges` states whether the left,
+    `center_m` (3,) in the camera optical frame and `size_m` (width, height, width) are in metres; `rect_px` is the
+    source rectangle; `support` is the share 0..1 of the samples with depth that belong to its depth layer; `truncated_edges` states whether the left,
     upper, right and lower edge of the rectangle touch the image border; `covariance_m2` (3, 3) is that of the centre,
     None if unknown.
     """
@@ -99,17 +101,16 @@ def sample_depth(depth, rect_px, stride_px=None):
         visible_px = max(0, visible_columns) * max(0, visible_rows)
         stride_px = max(1, int(np.sqrt(visible_px / SAMPLES_WANTED)))
     columns, rows = _ticks(x1, x2, width, stride_px), _ticks(y1, y2, height, stride_px)
-    values = depth.values[rows, columns]
-    depth_m = values.astype(float) * depth.scale_m
+    depth_m = depth.values[rows, columns].astype(float) * depth.scale_m
     valid = (depth_m > 0) & (depth_m <= FARTHEST_DEPTH_M)
-    return Samples(np.arange(width)[columns], np.arange(height)[rows], values, depth.scale_m, depth_m, valid)
+    return Samples(np.arange(width)[columns], np.arange(height)[rows], depth_m, valid)
 
 
-def estimate_median(samples, rect_px, camera, _nearer=()):
+def estimate_median(samples, rect_px, camera, _nearer=(), _level_from_camera=None):
     """Estimate a box as in the thesis (3.4.2): per-axis median of the sampled points, size from the box at that depth.
 
-    Parameters and return value are those of `estimate_foreground`; nearer boxes are ignored, and there is no minimum
-    support.
+    Parameters and return value are those of `estimate_foreground`; nearer boxes and the tilt of the camera are ignored,
+    and there is no minimum support.
     """
     across, down = camera.rays(samples.columns, samples.rows[:, np.newaxis])
     seen = samples.valid & ~np.isnan(across)  # the distortion model does not define a ray for every pixel
@@ -121,17 +122,17 @@ def estimate_median(samples, rect_px, camera, _nearer=()):
     center_m = np.median(points, axis=0)
     width_m, height_m = (x2 - x1) / camera.fx * center_m[2], (y2 - y1) / camera.fy * center_m[2]
     on_body = np.abs(samples.depth_m[samples.valid] - center_m[2]) <= BODY_HALF_DEPTH_M
-    return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px),
-                 np.count_nonzero(on_body) / float(samples.valid.size), truncated_edges(rect_px, camera))
+    return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px), on_body.mean(),
+                 truncated_edges(rect_px, camera))
 
 
-def estimate_foreground(samples, rect_px, camera, nearer=()):
+def estimate_foreground(samples, rect_px, camera, nearer=(), level_from_camera=LEVEL):
     """Estimate a box from the person's depth layer: the nearest layer that is dominant near the middle of the box.
 
     Background beside and between the limbs may fill most of a box, but it is farther away. Flying pixels are too sparse
     to form a layer. The position is that of the body's axis: laterally halfway between the edges of the layer, and
     `AXIS_BEHIND_SURFACE_M` behind its mean depth. If the image border truncates the body, it is completed to the usual
-    size.
+    size. All of this is done in the level frame.
 
     Parameters
     ----------
@@ -139,47 +140,84 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     rect_px : (x1, y1, x2, y2)
     camera : camera_model.Camera
     nearer : sequence of Box3D
-        Boxes of possible occluders; their pixels are masked.
+        Boxes of possible occluders; in their rectangles, pixels that are not behind them are masked.
+    level_from_camera : numpy.ndarray, (3, 3)
+        See `level_rotation`.
 
     Returns
     -------
     Box3D or None
         None if no sample has a valid depth and a viewing ray, if the layer contains less than `LEAST_SUPPORT` of the
-        samples, or if the rectangle cannot be undistorted.
+        samples with depth, or if the rectangle cannot be undistorted.
     """
-    flat_px, columns_px, own = rect_px, samples.columns, samples.valid
-    if camera.distortion_model:
-        flat_px = _without_distortion(rect_px, camera)
-        columns_px = camera.undistort(samples.pixels)[..., 0]
-        own = own & ~np.isnan(columns_px)  # the distortion model does not define a ray for every pixel
+    across_m, ahead_m = _level_coordinates(samples, camera, level_from_camera)
+    own = samples.valid & (ahead_m > 0)  # nan: the distortion model does not define a ray for every pixel
+    measured = np.count_nonzero(own)
     if nearer:
-        own = _mask_occluders(own, samples, rect_px, nearer)
+        own = own & ~_occluders(samples, ahead_m, rect_px, nearer, level_from_camera)
+    flat_px = _without_distortion(rect_px, camera)
     if flat_px is None or not own.any():
         return None
 
     x1, y1, x2, y2 = rect_px
     in_middle = np.exp(-0.5 * ((samples.columns - (x1 + x2) / 2.0) / ((x2 - x1) / 4.0)) ** 2)
-    # The raw values are sorted, because numpy sorts 16-bit integers in linear time.
-    depths_m = np.sort(samples.values[own], kind='mergesort').astype(float) * samples.scale_m
-    layer_m = nearest_dominant_layer(samples.depth_m[own], np.broadcast_to(in_middle, own.shape)[own], depths_m)
+    depths_m = np.sort(ahead_m[own])
+    layer_m = nearest_dominant_layer(ahead_m[own], np.broadcast_to(in_middle, own.shape)[own], depths_m)
     body_m = within(depths_m, layer_m, BODY_HALF_DEPTH_M)
-    support = len(body_m) / float(own.size)
+    support = len(body_m) / float(measured)
     if support < LEAST_SUPPORT:
         return None
 
-    on_body = own & (np.abs(samples.depth_m - layer_m) <= BODY_HALF_DEPTH_M)
-    across_m = (columns_px - camera.cx) / camera.fx * samples.depth_m
+    on_body = own & (np.abs(ahead_m - layer_m) <= BODY_HALF_DEPTH_M)
     left_m, right_m = edges(across_m[on_body])
     layer_m = trimmed_mean(body_m)
-    _left_px, top_px, _right_px, bottom_px = flat_px
-    top_m, bottom_m = (top_px - camera.cy) / camera.fy * layer_m, (bottom_px - camera.cy) / camera.fy * layer_m
+    top_m, bottom_m = layer_m * _slopes_down(flat_px, camera, level_from_camera)
     cut_left, cut_top, cut_right, cut_bottom = cut = truncated_edges(rect_px, camera)
     left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, USUAL_WIDTH_M)
     top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, USUAL_HEIGHT_M)
     surface_m = np.array([(left_m + right_m) / 2, (top_m + bottom_m) / 2, layer_m])
+    center_m = level_from_camera.T.dot(surface_m * (1 + AXIS_BEHIND_SURFACE_M / layer_m))
     width_m = max(right_m - left_m, LEAST_WIDTH_M)
-    return Box3D(surface_m * (1 + AXIS_BEHIND_SURFACE_M / layer_m), np.array([width_m, bottom_m - top_m, width_m]),
-                 tuple(rect_px), support, cut)
+    return Box3D(center_m, np.array([width_m, bottom_m - top_m, width_m]), tuple(rect_px), support, cut)
+
+
+def level_rotation(up):
+    """Rotation (3, 3) from the optical frame to the level frame.
+
+    Parameters
+    ----------
+    up : array_like, (3,)
+        Unit vector in the optical frame.
+
+    Returns
+    -------
+    numpy.ndarray, (3, 3)
+        `LEVEL` if the camera points so steeply up or down, or is rolled so far, that people do not stand upright in the
+        image (`MAX_TILT_RAD`, `MAX_ROLL_RAD`).
+    """
+    down = -np.asarray(up, float)
+    if abs(down[2]) > np.sin(MAX_TILT_RAD) or down[1] < np.cos(MAX_ROLL_RAD) * np.hypot(down[0], down[1]):
+        return LEVEL
+    ahead = np.array([0.0, 0.0, 1.0]) - down[2] * down
+    ahead /= np.linalg.norm(ahead)
+    return np.stack((np.cross(down, ahead), down, ahead))
+
+
+def _level_coordinates(samples, camera, level_from_camera):
+    """x and z (h, w) of the samples in the level frame, metres; nan for pixels without a ray."""
+    right, _down, ahead = level_from_camera
+    x, y = camera.rays(samples.columns, samples.rows[:, np.newaxis])
+    return ((right[0] * x + right[1] * y + right[2]) * samples.depth_m,
+            (ahead[0] * x + ahead[1] * y + ahead[2]) * samples.depth_m)
+
+
+def _slopes_down(flat_px, camera, level_from_camera):
+    """y / z in the level frame of the rays through the middles of the upper and the lower edge, (2,)."""
+    left_px, top_px, right_px, bottom_px = flat_px
+    x = ((left_px + right_px) / 2.0 - camera.cx) / camera.fx
+    rays = np.array([(x, (row_px - camera.cy) / camera.fy, 1.0) for row_px in (top_px, bottom_px)])
+    _across, down, ahead = level_from_camera.dot(rays.T)
+    return down / np.maximum(ahead, LEAST_AHEAD)
 
 
 def _without_distortion(rect_px, camera):
@@ -197,16 +235,19 @@ def _without_distortion(rect_px, camera):
     return None if np.isnan(flat_px).any() else flat_px
 
 
-def _mask_occluders(own, samples, rect_px, boxes):
-    """The mask `own` (h, w) without the samples in the rectangle and the depth layer of any of the boxes."""
-    own = own.copy()
+def _occluders(samples, ahead_m, rect_px, boxes, level_from_camera):
+    """Samples (h, w) in the rectangle of any of the boxes that are not behind its body.
+
+    What is nearer than that body is masked as well: parts of it may be far in front of its layer.
+    """
+    masked = np.zeros(ahead_m.shape, bool)
     left, top, right, bottom = rect_px
     for box in boxes:
         x1, y1, x2, y2 = box.rect_px
         if x1 < right and x2 > left and y1 < bottom and y2 > top:
             part = (slice(*samples.rows.searchsorted((y1, y2))), slice(*samples.columns.searchsorted((x1, x2))))
-            own[part] &= np.abs(samples.depth_m[part] - box.center_m[2]) > BODY_HALF_DEPTH_M
-    return own
+            masked[part] |= ahead_m[part] <= level_from_camera[2].dot(box.center_m) + BODY_HALF_DEPTH_M
+    return masked
 
 
 def nearest_dominant_layer(depths_m, weights, sorted_depths_m):
@@ -267,8 +308,8 @@ def _median(sorted_depths_m):
 
 
 class Estimator(NamedTuple):
-    """Pair of functions: `sample(depth, rect_px)` returns Samples; `estimate(samples, rect_px, camera, nearer)` returns
-    a Box3D or None, given the boxes of possible occluders.
+    """Pair of functions: `sample(depth, rect_px)` returns Samples; `estimate(samples, rect_px, camera, nearer,
+    level_from_camera)` returns a Box3D or None, given the boxes of possible occluders.
     """
 
     sample: Any
@@ -289,7 +330,7 @@ def estimator_named(name, stride_px=20):
     raise ValueError('estimator is %r; foreground or median expected' % name)
 
 
-def estimate_boxes(depth, rects_px, camera, estimator, implausible=None):
+def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_from_camera=LEVEL):
     """Estimate the 3D boxes of all rectangles of one image, front to back, so that nearer boxes mask their pixels.
 
     Parameters
@@ -300,6 +341,8 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None):
     estimator : Estimator
     implausible : list, optional
         Estimates that are not plausible (see `Box3D.is_plausible`) are appended. They do not mask pixels.
+    level_from_camera : numpy.ndarray, (3, 3), optional
+        Rotation to the level frame, see `level_rotation`. By default the camera is held level.
 
     Returns
     -------
@@ -307,10 +350,9 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None):
         In the order of the rectangles; None without a plausible estimate.
     """
     boxes, nearer = [None] * len(rects_px), []
-    _left, top, _right, bottom = np.reshape(rects_px, (-1, 4)).T
-    for number in np.lexsort((top, -bottom)).tolist():  # nearer people stand lower in the image and are larger
+    for number in front_to_back(rects_px, camera):
         rect_px = rects_px[number]
-        box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, camera, nearer)
+        box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, camera, nearer, level_from_camera)
         if box is None:
             continue
         if box.is_plausible:
@@ -319,6 +361,13 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None):
         elif implausible is not None:
             implausible.append(box)
     return boxes
+
+
+def front_to_back(rects_px, camera):
+    """Indices of rectangles, nearest person first: nearer people stand lower in the image, and appear wider."""
+    left, _top, right, bottom = np.reshape(rects_px, (-1, 4)).T
+    lowest = np.minimum(bottom, camera.height * (1 - CUT_ROWS))
+    return np.lexsort((left - right, -lowest)).tolist()
 
 
 def check_rect(rect_px):
@@ -331,8 +380,9 @@ def check_rect(rect_px):
 def truncated_edges(rect_px, camera):
     """Whether the left, upper, right and lower edge of a rectangle touch the image border, (bool, bool, bool, bool)."""
     x1, y1, x2, y2 = rect_px
-    return (bool(x1 <= BORDER_PX), bool(y1 <= BORDER_PX), bool(x2 >= camera.width - BORDER_PX),
-            bool(y2 >= camera.height - BORDER_PX))
+    across_px, down_px = BORDER_PX + BORDER_SHARE * (x2 - x1), BORDER_PX + BORDER_SHARE * (y2 - y1)
+    return (bool(x1 <= across_px), bool(y1 <= down_px), bool(x2 >= camera.width - across_px),
+            bool(y2 >= camera.height - down_px))
 
 
 def _ticks(low, high, limit, stride):
