@@ -27,6 +27,7 @@ LEAST_WIDTH_M = 0.05
 LEVEL = np.eye(3)  # of a camera that is held level
 MAX_TILT_RAD, MAX_ROLL_RAD = np.radians(65), np.radians(45)
 LEAST_AHEAD = 0.05  # lower bound of the horizontal part of a ray
+LOOKS_DOWN, FEET_M = np.sin(np.radians(10)), 0.3  # a camera with more tilt sees the floor beside the feet, this high
 
 # Half the depth extent of a person with stretched arms; points farther from the median are not part of the person.
 BODY_HALF_DEPTH_M = 0.35
@@ -150,7 +151,7 @@ def estimate_foreground(samples, rect_px, camera, nearer=(), level_from_camera=L
         None if no sample has a valid depth and a viewing ray, if the layer contains less than `LEAST_SUPPORT` of the
         samples with depth, or if the rectangle cannot be undistorted.
     """
-    across_m, ahead_m = _level_coordinates(samples, camera, level_from_camera)
+    across_m, down_m, ahead_m = _level_coordinates(samples, camera, level_from_camera)
     own = samples.valid & (ahead_m > 0)  # nan: the distortion model does not define a ray for every pixel
     measured = np.count_nonzero(own)
     if nearer:
@@ -169,9 +170,12 @@ def estimate_foreground(samples, rect_px, camera, nearer=(), level_from_camera=L
         return None
 
     on_body = own & (np.abs(ahead_m - layer_m) <= BODY_HALF_DEPTH_M)
-    left_m, right_m = edges(across_m[on_body])
     layer_m = trimmed_mean(body_m)
     top_m, bottom_m = layer_m * _slopes_down(flat_px, camera, level_from_camera)
+    above_feet = on_body & (down_m < bottom_m - FEET_M)
+    if level_from_camera[1, 2] > LOOKS_DOWN and above_feet.any():
+        on_body = above_feet  # the floor beside the feet is as far away as the body
+    left_m, right_m = edges(across_m[on_body])
     cut_left, cut_top, cut_right, cut_bottom = cut = truncated_edges(rect_px, camera)
     left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, USUAL_WIDTH_M)
     top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, USUAL_HEIGHT_M)
@@ -205,10 +209,8 @@ def level_rotation(up):
 
 def _level_coordinates(samples, camera, level_from_camera):
     """x and z (h, w) of the samples in the level frame, metres; nan for pixels without a ray."""
-    right, _down, ahead = level_from_camera
     x, y = camera.rays(samples.columns, samples.rows[:, np.newaxis])
-    return ((right[0] * x + right[1] * y + right[2]) * samples.depth_m,
-            (ahead[0] * x + ahead[1] * y + ahead[2]) * samples.depth_m)
+    return ((to_x * x + to_y * y + to_z) * samples.depth_m for to_x, to_y, to_z in level_from_camera)
 
 
 def _slopes_down(flat_px, camera, level_from_camera):
@@ -377,12 +379,34 @@ def check_rect(rect_px):
         raise ValueError('box (%d, %d, %d, %d) is empty or reversed: x1 < x2 and y1 < y2 expected' % (x1, y1, x2, y2))
 
 
-def truncated_edges(rect_px, camera):
-    """Whether the left, upper, right and lower edge of a rectangle touch the image border, (bool, bool, bool, bool)."""
+def measured_area(depth):
+    """Rectangle (x1, y1, x2, y2) of the image without its black border, where registration leaves no depth.
+
+    A border of more than `WIDEST_BLACK` of the width or height is not the border of the depth image but far background.
+    """
+    height, width = depth.values.shape
+    area = []
+    for axis, extent in ((0, width), (1, height)):
+        lines = depth.values[::BLACK_STEP] if axis == 0 else depth.values[:, ::BLACK_STEP]
+        measured = (lines > 0).any(axis=axis)
+        black = measured.argmax(), measured[::-1].argmax()
+        area.append([line if line <= WIDEST_BLACK * extent else 0 for line in black])
+    (left, right), (top, bottom) = area
+    return left, top, width - right, height - bottom
+
+
+def truncated_edges(rect_px, area_px):
+    """Whether the left, upper, right and lower edge of a rectangle touch the border of an area, see `measured_area`.
+
+    Returns
+    -------
+    (bool, bool, bool, bool)
+    """
     x1, y1, x2, y2 = rect_px
+    left, top, right, bottom = area_px
     across_px, down_px = BORDER_PX + BORDER_SHARE * (x2 - x1), BORDER_PX + BORDER_SHARE * (y2 - y1)
-    return (bool(x1 <= across_px), bool(y1 <= down_px), bool(x2 >= camera.width - across_px),
-            bool(y2 >= camera.height - down_px))
+    return (bool(x1 <= left + across_px), bool(y1 <= top + down_px), bool(x2 >= right - across_px),
+            bool(y2 >= bottom - down_px))
 
 
 def _ticks(low, high, limit, stride):
