@@ -23,15 +23,10 @@ class Stamped(NamedTuple):
 
 
 class MessageCache(object):
-    """Cache of the latest values of one topic, up to `length_ns` before the newest stamp.
+    """Cache of the latest values of one topic, up to `length_ns` before the newest stamp, `newest_ns`, if any.
 
     The number of values is bounded for any stamps, so that a driver whose clock hangs or a frozen /clock does not
     exhaust the memory. The bound is a count, because arrival times are not meaningful when a bag is played slowly.
-
-    Attributes
-    ----------
-    newest_ns : int
-        The newest stamp, None if the cache is empty.
     """
 
     def __init__(self, length_ns):
@@ -47,15 +42,10 @@ class MessageCache(object):
         return reversed(self._entries)
 
     def add(self, stamp_ns, arrival_ns, value):
-        """Add a value.
+        """Add a value, or replace that of the same stamp. Returns whether time jumped back.
 
         The stamps of a topic are in order. A stamp that goes back means that time jumped back (a bag was looped or
-        rewound); the previous values are then deleted. Of values with equal stamps, the latest is kept.
-
-        Returns
-        -------
-        bool
-            Whether time jumped back.
+        rewound); the previous values are then deleted.
         """
         went_back = self.newest_ns is not None and stamp_ns < self.newest_ns
         if went_back:
@@ -69,7 +59,7 @@ class MessageCache(object):
         return went_back
 
     def nearest(self, stamp_ns, tolerance_ns=0):
-        """The entry with the nearest stamp within the tolerance, None if no entry matches."""
+        """The entry with the nearest stamp within the tolerance, or None."""
         nearest, nearest_ns = None, tolerance_ns
         for entry in list(self._entries):  # a copy, as another thread may add entries
             distance_ns = abs(entry.stamp_ns - stamp_ns)
@@ -78,7 +68,7 @@ class MessageCache(object):
         return nearest
 
     def arrived_at(self, arrival_ns, tolerance_ns):
-        """The entry with the nearest arrival time within the tolerance, None if no entry matches."""
+        """The entry with the nearest arrival time within the tolerance, or None."""
         in_time = [entry for entry in list(self._entries) if abs(entry.arrival_ns - arrival_ns) <= tolerance_ns]
         return min(in_time, key=lambda entry: abs(entry.arrival_ns - arrival_ns), default=None)
 
@@ -97,8 +87,7 @@ class StampSynchronizer(object):
     to `assumed_delay_ns` before them. A camera_info without a stamp is used for all images, because intrinsics do not
     change with time.
 
-    All boxes are passed to exactly one of the two callbacks, in the order of arrival. The callbacks are called by
-    `add_depth`, `add_camera`, `add_boxes` and `end`.
+    All boxes are passed to exactly one of the two callbacks, in the order of arrival, by the methods `add_` and `end`.
 
     Parameters
     ----------
@@ -139,9 +128,7 @@ class StampSynchronizer(object):
             if (self._cameras.newest_ns or 0) > stamp_ns + self._length_ns:  # no camera_info of the new time yet
                 self._cameras.clear()
             self._end_before_ns = newest_ns
-            forgotten, self._waiting = self._waiting, []
-            for entry in forgotten:
-                self._on_lost(entry.value, True)
+            self._lose_waiting(True)
         self._settle(now_ns)
 
     def add_camera(self, stamp_ns, now_ns, camera):
@@ -172,9 +159,12 @@ class StampSynchronizer(object):
 
     def end(self):
         """Signal the end of the input: all waiting boxes are lost."""
-        waiting, self._waiting = self._waiting, []
-        for entry in waiting:
-            self._on_lost(entry.value, False)
+        self._lose_waiting(False)
+
+    def _lose_waiting(self, before_jump):
+        lost, self._waiting = self._waiting, []
+        for entry in lost:
+            self._on_lost(entry.value, before_jump)
 
     def _settle(self, now_ns):
         """Call the callbacks for boxes whose frame is complete or lost."""
@@ -191,8 +181,7 @@ class StampSynchronizer(object):
             if frame is None:
                 self._on_lost(boxes, False)
             else:
-                depth, camera = frame
-                self._on_frame(boxes, depth, camera)
+                self._on_frame(boxes, *frame)
 
     def _frame(self, stamp_ns):
         """Depth and camera of a stamp, None if one of them is missing."""
