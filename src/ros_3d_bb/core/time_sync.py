@@ -167,37 +167,31 @@ class StampSynchronizer(object):
             self._on_lost(entry.value, before_jump)
 
     def _settle(self, now_ns):
-        """Call the callbacks for boxes whose frame is complete or lost."""
-        complete_or_lost, waiting = [], []
+        """Call the callbacks for boxes whose frame is complete, is lost, or did not arrive in time."""
+        settled, waiting = [], []
+        newest_ns = self._depths.newest_ns
         for number, entry in enumerate(self._waiting):
-            frame = self._frame(entry.stamp_ns)
-            crowded = len(self._waiting) - number > MAX_WAITING
-            if frame is not None or crowded or self._is_hopeless(entry, now_ns):
-                complete_or_lost.append((entry.value, frame))
+            depth = self._depths.nearest(entry.stamp_ns, self._tolerance_ns)
+            camera = None if depth is None else self._camera_at(depth.stamp_ns)
+            is_lost = depth is None and newest_ns is not None and entry.stamp_ns < newest_ns
+            is_late = now_ns - entry.arrival_ns > self._length_ns
+            is_crowded = len(self._waiting) - number > MAX_WAITING
+            if camera is not None or is_lost or is_late or is_crowded:
+                settled.append((entry.value, depth, camera))
             else:
                 waiting.append(entry)
         self._waiting = waiting
-        for boxes, frame in complete_or_lost:
-            if frame is None:
+        for boxes, depth, camera in settled:
+            if camera is None:
                 self._on_lost(boxes, False)
             else:
-                self._on_frame(boxes, *frame)
+                self._on_frame(boxes, depth.value, camera)
 
-    def _frame(self, stamp_ns):
-        """Depth and camera of a stamp, None if one of them is missing."""
-        depth = self._depths.nearest(stamp_ns, self._tolerance_ns)
-        if depth is None:
-            return None
+    def _camera_at(self, stamp_ns):
+        """The camera of a depth image, or the nearest one as soon as a newer message shows that its own is lost."""
         if self._plain_camera is not None:
-            return depth.value, self._plain_camera
-        camera = self._cameras.nearest(depth.stamp_ns, self._tolerance_ns)
-        if camera is None and max(self._depths.newest_ns, self._cameras.newest_ns or 0) > depth.stamp_ns:
-            camera = self._cameras.nearest(depth.stamp_ns, float('inf'))
-        return None if camera is None else (depth.value, camera.value)
-
-    def _is_hopeless(self, entry, now_ns):
-        """Whether boxes have waited too long, or their depth image was lost or is no longer cached."""
-        newest_ns = self._depths.newest_ns
-        is_past = newest_ns is not None and entry.stamp_ns < newest_ns
-        is_lost = is_past and self._depths.nearest(entry.stamp_ns, self._tolerance_ns) is None
-        return is_lost or now_ns - entry.arrival_ns > self._length_ns
+            return self._plain_camera
+        camera = self._cameras.nearest(stamp_ns, self._tolerance_ns)
+        if camera is None and max(self._depths.newest_ns, self._cameras.newest_ns or 0) > stamp_ns:
+            camera = self._cameras.nearest(stamp_ns, float('inf'))
+        return None if camera is None else camera.value

@@ -237,7 +237,7 @@ def _filled(kind, content, where):
         content = float(content)
     if not isinstance(content, kind) or isinstance(content, bool) or (kind is float and not np.isfinite(content)):
         raise ValueError('%s is %r; %s expected' % (where, content, {
-            tuple: 'a list of numbers', float: 'a number', int: 'a whole number', str: 'text'}[kind]))
+            tuple: 'a list of numbers', float: 'a number', int: 'an integer', str: 'text'}[kind]))
     return content
 
 

@@ -4,7 +4,6 @@ from typing import NamedTuple
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
-from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from_msg, stamp_if_any, stamp_of,
@@ -40,14 +39,6 @@ class Bbox3dParams(NamedTuple):
         0.05, 'Processing time of the detector, used where its boxes have no stamp.', 's', live=(0, 1))
     depth_image_range: float = Param(
         6.0, 'Depth that is black in the grey image on ros_3d_bb/depth.', 'm', live=(1, 20))
-
-
-class EstimatedBoxes(NamedTuple):
-    """The 3D boxes (`box3d_estimator.Box3D`) of one image, its header and its depth image."""
-
-    header: Header
-    depth: DepthImage
-    boxes: list
 
 
 class EstimationStage(object):
@@ -126,8 +117,15 @@ class EstimationStage(object):
         """Estimate the 3D boxes of one image, whose parts are those that `on_frame` was called with.
 
         A 2D box yields no 3D box if it is empty or reversed, has no depth of its own, or gives an implausible size.
-        Returns EstimatedBoxes. Raises ValueError if the depth image cannot be read, or its size differs from that of
-        the camera.
+
+        Returns
+        -------
+        (std_msgs.msg.Header, DepthImage, list of Box3D)
+
+        Raises
+        ------
+        ValueError
+            If the depth image cannot be read, or its size differs from that of the camera.
         """
         depth = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
         height, width = depth.values.shape
@@ -152,7 +150,7 @@ class EstimationStage(object):
 
         stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
         frame_id = self._params.frame_id or depth_msg.header.frame_id
-        return EstimatedBoxes(Header(stamp=stamp, frame_id=frame_id), depth, boxes3d)
+        return Header(stamp=stamp, frame_id=frame_id), depth, boxes3d
 
     def _usable_rects(self, boxes2d):
         """Return the rectangles (x1, y1, x2, y2), in pixels, that are neither empty nor reversed."""
@@ -171,19 +169,18 @@ class EstimationStage(object):
             return
         with self._tally.rejecting('2D boxes'):
             self._tally.count('arrays without a depth image')
-            raise ValueError(self._why_no_frame(boxes2d))
+            raise ValueError(self._why_no_frame(boxes2d.stamp_ns))
 
-    def _why_no_frame(self, boxes):
+    def _why_no_frame(self, stamp_ns):
         """Return an error message that names the missing input and its topic."""
         newest_ns, kept_s = self._sync.newest_ns, self._params.cache_length
         if newest_ns is None:
             return 'no depth image received on %s' % self._depth_topic
         if not self._sync.has_camera:
             return 'no camera_info received on %s' % self._info_topic
-        if boxes.stamp_ns is None:
+        if stamp_ns is None:
             return 'no depth image received on %s within %.1f s' % (self._depth_topic, kept_s)
-        late_s = (newest_ns - boxes.stamp_ns) / NS
-        return ('no depth image with their stamp %.3f received on %s; the newest has %.3f, and %.1f s are kept '
-                '(~cache_length)%s' % (boxes.stamp_ns / NS, self._depth_topic, newest_ns / NS, kept_s,
-                                       ': the boxes are %.1f s too old; the detector is slower than that'
-                                       % (late_s - kept_s) if late_s > kept_s else ''))
+        text = ('no depth image with their stamp %.3f received on %s; the newest has %.3f, and %.1f s are kept '
+                '(~cache_length)' % (stamp_ns / NS, self._depth_topic, newest_ns / NS, kept_s))
+        too_old_s = (newest_ns - stamp_ns) / NS - kept_s
+        return text if too_old_s <= 0 else text + ': the detector is %.1f s slower than that' % too_old_s
