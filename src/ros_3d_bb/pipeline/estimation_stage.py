@@ -46,12 +46,12 @@ class EstimationStage(object):
 
     Each `add_` method validates a message, raising ValueError, and passes it to the synchronizer together with its
     arrival time (integer nanoseconds, see `time_sync.StampSynchronizer`). The synchronizer calls `on_frame` with each
-    complete frame, which the caller passes to `estimate`. `tally` counts rejected inputs.
+    complete frame, which the caller passes to `estimate`. `events` counts rejected inputs.
 
     Parameters
     ----------
     params : Bbox3dParams
-    tally : event_counter.EventCounter
+    events : event_counter.EventCounter
     on_frame : callable
         Called with `perception_msgs.Boxes2D`, sensor_msgs/Image and `camera_model.Camera` of one stamp.
     depth_topic, info_topic : str
@@ -63,8 +63,8 @@ class EstimationStage(object):
         If the error model cannot be used.
     """
 
-    def __init__(self, params, tally, on_frame, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
-        self._tally, self._depth_topic, self._info_topic = tally, depth_topic, info_topic
+    def __init__(self, params, events, on_frame, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
+        self._events, self._depth_topic, self._info_topic = events, depth_topic, info_topic
         self._error_model = None
         if params.error_model:
             try:
@@ -103,10 +103,10 @@ class EstimationStage(object):
     def add_boxes(self, message, now_ns):
         """Add 2D boxes, a std_msgs/Int32MultiArray."""
         boxes = boxes2d_from_msg(message)
-        if boxes.stamp_ns is None and UNSTAMPED not in self._tally.counts:
-            self._tally.note(UNSTAMPED, 'the 2D boxes have no stamp: each array is paired with the depth image that '
-                             'arrived nearest to %.3f s before it (~assumed_delay)' % self._params.assumed_delay)
-        self._tally.count('arrays of 2D boxes')
+        if boxes.stamp_ns is None and UNSTAMPED not in self._events.counts:
+            self._events.note(UNSTAMPED, 'the 2D boxes have no stamp: each array is paired with the depth image that '
+                              'arrived nearest to %.3f s before it (~assumed_delay)' % self._params.assumed_delay)
+        self._events.count('arrays of 2D boxes')
         self._sync.add_boxes(boxes.stamp_ns, now_ns, boxes)
 
     def end(self):
@@ -136,9 +136,9 @@ class EstimationStage(object):
         estimates = estimate_boxes(depth, rects_px, camera, self._estimator, implausible)
         boxes3d = list(filter(None, estimates))
         for box in implausible:
-            self._tally.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
-                             '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
-                             % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
+            self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
+                              '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
+                              % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
         counts = {'boxes estimated': len(boxes3d),
                   'boxes without depth': len(estimates) - len(boxes3d) - len(implausible)}
         if self._error_model is not None and boxes3d:
@@ -146,7 +146,7 @@ class EstimationStage(object):
             outside_m = self._error_model.distance_outside([box.center_m for box in boxes3d])
             counts['boxes outside of the measured range'] = int((outside_m > 0).sum())
         counts['images estimated'] = 1
-        self._tally.count_all(counts)
+        self._events.count_all(counts)
 
         stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
         frame_id = self._params.frame_id or depth_msg.header.frame_id
@@ -160,15 +160,15 @@ class EstimationStage(object):
                 check_rect(rect_px)
                 usable_px.append(rect_px)
             except ValueError as error:
-                self._tally.warn('boxes rejected', '2D %s; the others in this image are used' % error)
+                self._events.warn('boxes rejected', '2D %s; the others in this image are used' % error)
         return usable_px
 
     def _on_lost(self, boxes2d, before_jump):
         if before_jump:
-            self._tally.count('2D boxes from before a time jump')
+            self._events.count('2D boxes from before a time jump')
             return
-        with self._tally.rejecting('2D boxes'):
-            self._tally.count('arrays without a depth image')
+        with self._events.rejecting('2D boxes'):
+            self._events.count('arrays without a depth image')
             raise ValueError(self._why_no_frame(boxes2d.stamp_ns))
 
     def _why_no_frame(self, stamp_ns):
