@@ -20,7 +20,7 @@ MODELS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.
 
 
 @pytest.fixture
-def tally():
+def events():
     return EventCounter()
 
 
@@ -32,7 +32,7 @@ def scene(wall_m, person_m=PERSON_M):
     return depth_m
 
 
-def estimate(depth_m, rects_px, tally, estimator='foreground'):
+def estimate(depth_m, rects_px, events, estimator='foreground'):
     """The 3D boxes of an image. All of them can be tracked."""
     results = []
 
@@ -40,7 +40,7 @@ def estimate(depth_m, rects_px, tally, estimator='foreground'):
         header, _depth, boxes3d = stage.estimate(boxes2d, depth_msg, camera)
         assert not usable_boxes3d(boxes3d_to_msg(boxes3d, header, camera))[1]
         results.extend(boxes3d)
-    stage = EstimationStage(Bbox3dParams(estimator=estimator), tally, on_frame)
+    stage = EstimationStage(Bbox3dParams(estimator=estimator), events, on_frame)
     stage.add_camera_info(CameraInfo(header=HEADER, width=640, height=480, K=INTRINSICS), 0)
     stage.add_depth(fill_image(Image(header=HEADER), depth_m, '32FC1'), 0)
     stage.add_boxes(boxes2d_to_msg(np.array(rects_px), HEADER), 0)
@@ -48,26 +48,26 @@ def estimate(depth_m, rects_px, tally, estimator='foreground'):
 
 
 @pytest.mark.parametrize('estimator', ['foreground', 'median'])
-def test_an_implausibly_large_box_is_dropped_and_the_other_is_kept(estimator, tally):
+def test_an_implausibly_large_box_is_dropped_and_the_other_is_kept(estimator, events):
     depth_m = scene(wall_m=14.0)
     depth_m[:, 230:][np.random.RandomState(0).rand(480, 410) > 0.2] = 0  # too near to be measured
-    box, = estimate(depth_m, [PERSON_PX, NEAR_PX], tally, estimator)
+    box, = estimate(depth_m, [PERSON_PX, NEAR_PX], events, estimator)
     assert box.rect_px == PERSON_PX and box.center_m[2] == pytest.approx(PERSON_M, abs=0.1)
-    assert tally.counts['boxes of impossible size'] == 1
-    assert tally.counts['boxes estimated'] == 1 and tally.counts['boxes without depth'] == 0
+    assert events.counts['boxes of impossible size'] == 1
+    assert events.counts['boxes estimated'] == 1 and events.counts['boxes without depth'] == 0
 
 
-def test_an_implausible_box_does_not_mask_the_pixels_of_others(tally):
+def test_an_implausible_box_does_not_mask_the_pixels_of_others(events):
     """The person stands 0.2 m in front of the wall that fills the large box: in its layer of depth."""
-    box, = estimate(scene(wall_m=14.0, person_m=13.8), [(0, 0, 640, 480), PERSON_PX], tally)
-    assert box.rect_px == PERSON_PX and tally.counts['boxes of impossible size'] == 1
+    box, = estimate(scene(wall_m=14.0, person_m=13.8), [(0, 0, 640, 480), PERSON_PX], events)
+    assert box.rect_px == PERSON_PX and events.counts['boxes of impossible size'] == 1
 
 
-def test_rectangles_with_extreme_or_reversed_edges(tally):
+def test_rectangles_with_extreme_or_reversed_edges(events):
     rects_px = [(-2 ** 31, -2 ** 31, 2 ** 31 - 1, 2 ** 31 - 1), (5, 5, 5, 9), PERSON_PX]
-    box, = estimate(scene(wall_m=5.0), rects_px, tally, 'median')
+    box, = estimate(scene(wall_m=5.0), rects_px, events, 'median')
     assert box.rect_px == PERSON_PX
-    assert tally.counts['boxes of impossible size'] == 1 and tally.counts['boxes rejected'] == 1
+    assert events.counts['boxes of impossible size'] == 1 and events.counts['boxes rejected'] == 1
 
 
 def params(model, estimator):

@@ -4,7 +4,6 @@ from typing import NamedTuple
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
-from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from_msg, stamp_if_any, stamp_of,
@@ -42,25 +41,17 @@ class Bbox3dParams(NamedTuple):
         6.0, 'Depth that is black in the grey image on ros_3d_bb/depth.', 'm', live=(1, 20))
 
 
-class EstimatedBoxes(NamedTuple):
-    """The 3D boxes (`box3d_estimator.Box3D`) of one image, its header and its depth image."""
-
-    header: Header
-    depth: DepthImage
-    boxes: list
-
-
 class EstimationStage(object):
     """Pair arrays of 2D boxes with the depth image and camera model of the same stamp, and estimate 3D boxes.
 
     Each `add_` method validates a message, raising ValueError, and passes it to the synchronizer together with its
     arrival time (integer nanoseconds, see `time_sync.StampSynchronizer`). The synchronizer calls `on_frame` with each
-    complete frame, which the caller passes to `estimate`. `tally` counts rejected inputs.
+    complete frame, which the caller passes to `estimate`. `events` counts rejected inputs.
 
     Parameters
     ----------
     params : Bbox3dParams
-    tally : event_counter.EventCounter
+    events : event_counter.EventCounter
     on_frame : callable
         Called with `perception_msgs.Boxes2D`, sensor_msgs/Image and `camera_model.Camera` of one stamp.
     depth_topic, info_topic : str
@@ -72,8 +63,8 @@ class EstimationStage(object):
         If the error model cannot be used.
     """
 
-    def __init__(self, params, tally, on_frame, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
-        self._tally, self._depth_topic, self._info_topic = tally, depth_topic, info_topic
+    def __init__(self, params, events, on_frame, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
+        self._events, self._depth_topic, self._info_topic = events, depth_topic, info_topic
         self._error_model = None
         if params.error_model:
             try:
@@ -112,10 +103,10 @@ class EstimationStage(object):
     def add_boxes(self, message, now_ns):
         """Add 2D boxes, a std_msgs/Int32MultiArray."""
         boxes = boxes2d_from_msg(message)
-        if boxes.stamp_ns is None and UNSTAMPED not in self._tally.counts:
-            self._tally.note(UNSTAMPED, 'the 2D boxes have no stamp: each array is paired with the depth image that '
-                             'arrived nearest to %.3f s before it (~assumed_delay)' % self._params.assumed_delay)
-        self._tally.count('arrays of 2D boxes')
+        if boxes.stamp_ns is None and UNSTAMPED not in self._events.counts:
+            self._events.note(UNSTAMPED, 'the 2D boxes have no stamp: each array is paired with the depth image that '
+                              'arrived nearest to %.3f s before it (~assumed_delay)' % self._params.assumed_delay)
+        self._events.count('arrays of 2D boxes')
         self._sync.add_boxes(boxes.stamp_ns, now_ns, boxes)
 
     def end(self):
@@ -126,8 +117,15 @@ class EstimationStage(object):
         """Estimate the 3D boxes of one image, whose parts are those that `on_frame` was called with.
 
         A 2D box yields no 3D box if it is empty or reversed, has no depth of its own, or gives an implausible size.
-        Returns EstimatedBoxes. Raises ValueError if the depth image cannot be read, or its size differs from that of
-        the camera.
+
+        Returns
+        -------
+        (std_msgs.msg.Header, DepthImage, list of Box3D)
+
+        Raises
+        ------
+        ValueError
+            If the depth image cannot be read, or its size differs from that of the camera.
         """
         depth = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
         height, width = depth.values.shape
@@ -138,9 +136,9 @@ class EstimationStage(object):
         estimates = estimate_boxes(depth, rects_px, camera, self._estimator, implausible)
         boxes3d = list(filter(None, estimates))
         for box in implausible:
-            self._tally.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
-                             '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
-                             % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
+            self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
+                              '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
+                              % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
         counts = {'boxes estimated': len(boxes3d),
                   'boxes without depth': len(estimates) - len(boxes3d) - len(implausible)}
         if self._error_model is not None and boxes3d:
@@ -148,11 +146,11 @@ class EstimationStage(object):
             outside_m = self._error_model.distance_outside([box.center_m for box in boxes3d])
             counts['boxes outside of the measured range'] = int((outside_m > 0).sum())
         counts['images estimated'] = 1
-        self._tally.count_all(counts)
+        self._events.count_all(counts)
 
         stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
         frame_id = self._params.frame_id or depth_msg.header.frame_id
-        return EstimatedBoxes(Header(stamp=stamp, frame_id=frame_id), depth, boxes3d)
+        return Header(stamp=stamp, frame_id=frame_id), depth, boxes3d
 
     def _usable_rects(self, boxes2d):
         """Return the rectangles (x1, y1, x2, y2), in pixels, that are neither empty nor reversed."""
@@ -162,28 +160,27 @@ class EstimationStage(object):
                 check_rect(rect_px)
                 usable_px.append(rect_px)
             except ValueError as error:
-                self._tally.warn('boxes rejected', '2D %s; the others in this image are used' % error)
+                self._events.warn('boxes rejected', '2D %s; the others in this image are used' % error)
         return usable_px
 
     def _on_lost(self, boxes2d, before_jump):
         if before_jump:
-            self._tally.count('2D boxes from before a time jump')
+            self._events.count('2D boxes from before a time jump')
             return
-        with self._tally.rejecting('2D boxes'):
-            self._tally.count('arrays without a depth image')
-            raise ValueError(self._why_no_frame(boxes2d))
+        with self._events.rejecting('2D boxes'):
+            self._events.count('arrays without a depth image')
+            raise ValueError(self._why_no_frame(boxes2d.stamp_ns))
 
-    def _why_no_frame(self, boxes):
+    def _why_no_frame(self, stamp_ns):
         """Return an error message that names the missing input and its topic."""
         newest_ns, kept_s = self._sync.newest_ns, self._params.cache_length
         if newest_ns is None:
             return 'no depth image received on %s' % self._depth_topic
         if not self._sync.has_camera:
             return 'no camera_info received on %s' % self._info_topic
-        if boxes.stamp_ns is None:
+        if stamp_ns is None:
             return 'no depth image received on %s within %.1f s' % (self._depth_topic, kept_s)
-        late_s = (newest_ns - boxes.stamp_ns) / NS
-        return ('no depth image with their stamp %.3f received on %s; the newest has %.3f, and %.1f s are kept '
-                '(~cache_length)%s' % (boxes.stamp_ns / NS, self._depth_topic, newest_ns / NS, kept_s,
-                                       ': the boxes are %.1f s too old; the detector is slower than that'
-                                       % (late_s - kept_s) if late_s > kept_s else ''))
+        text = ('no depth image with their stamp %.3f received on %s; the newest has %.3f, and %.1f s are kept '
+                '(~cache_length)' % (stamp_ns / NS, self._depth_topic, newest_ns / NS, kept_s))
+        too_old_s = (newest_ns - stamp_ns) / NS - kept_s
+        return text if too_old_s <= 0 else text + ': the detector is %.1f s slower than that' % too_old_s
