@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Optional, Tuple
 
 import numpy as np
 
+from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import FARTHEST_M as FARTHEST_DEPTH_M
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M, USUAL_HEIGHT_M, USUAL_WIDTH_M
 
@@ -18,6 +19,7 @@ from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M, USUAL_HEIGHT_M, USUAL_W
 # detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person
 # who is not truncated there loses little, because only boxes of less than the usual size are completed.
 BORDER_PX, BORDER_SHARE = 4, 0.02
+WIDEST_BORDER, BORDER_STEP = 0.05, 4  # of depth images without depth: share of the image; pixels between samples
 # Nearer people stand lower in the image. The lower edges of truncated boxes are compared at this height.
 CUT_ROWS = 1 / 30.0  # share of the image height
 SAMPLES_WANTED = 2000  # approximate number of pixels that the foreground estimator samples
@@ -47,6 +49,16 @@ class Samples(NamedTuple):
     rows: np.ndarray
     depth_m: np.ndarray
     valid: np.ndarray
+
+
+class ImageGeometry(NamedTuple):
+    """Geometry of one image: its camera, the part of it with depth (see `measured_area`), and the rotation (3, 3) from
+    the optical frame to the level frame (see `level_rotation`).
+    """
+
+    camera: Camera
+    area_px: Tuple[int, int, int, int]
+    level_from_camera: np.ndarray = LEVEL
 
 
 class Box3D(NamedTuple):
@@ -107,12 +119,13 @@ def sample_depth(depth, rect_px, stride_px=None):
     return Samples(np.arange(width)[columns], np.arange(height)[rows], depth_m, valid)
 
 
-def estimate_median(samples, rect_px, camera, _nearer=(), _level_from_camera=None):
+def estimate_median(samples, rect_px, geometry, _nearer=()):
     """Estimate a box as in the thesis (3.4.2): per-axis median of the sampled points, size from the box at that depth.
 
     Parameters and return value are those of `estimate_foreground`; nearer boxes and the tilt of the camera are ignored,
     and there is no minimum support.
     """
+    camera = geometry.camera
     across, down = camera.rays(samples.columns, samples.rows[:, np.newaxis])
     seen = samples.valid & ~np.isnan(across)  # the distortion model does not define a ray for every pixel
     flat_px = _without_distortion(rect_px, camera)
@@ -124,10 +137,10 @@ def estimate_median(samples, rect_px, camera, _nearer=(), _level_from_camera=Non
     width_m, height_m = (x2 - x1) / camera.fx * center_m[2], (y2 - y1) / camera.fy * center_m[2]
     on_body = np.abs(samples.depth_m[samples.valid] - center_m[2]) <= BODY_HALF_DEPTH_M
     return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px), on_body.mean(),
-                 truncated_edges(rect_px, camera))
+                 truncated_edges(rect_px, geometry.area_px))
 
 
-def estimate_foreground(samples, rect_px, camera, nearer=(), level_from_camera=LEVEL):
+def estimate_foreground(samples, rect_px, geometry, nearer=()):
     """Estimate a box from the person's depth layer: the nearest layer that is dominant near the middle of the box.
 
     Background beside and between the limbs may fill most of a box, but it is farther away. Flying pixels are too sparse
@@ -139,11 +152,9 @@ def estimate_foreground(samples, rect_px, camera, nearer=(), level_from_camera=L
     ----------
     samples : Samples
     rect_px : (x1, y1, x2, y2)
-    camera : camera_model.Camera
+    geometry : ImageGeometry
     nearer : sequence of Box3D
         Boxes of possible occluders; in their rectangles, pixels that are not behind them are masked.
-    level_from_camera : numpy.ndarray, (3, 3)
-        See `level_rotation`.
 
     Returns
     -------
@@ -151,6 +162,7 @@ def estimate_foreground(samples, rect_px, camera, nearer=(), level_from_camera=L
         None if no sample has a valid depth and a viewing ray, if the layer contains less than `LEAST_SUPPORT` of the
         samples with depth, or if the rectangle cannot be undistorted.
     """
+    camera, level_from_camera = geometry.camera, geometry.level_from_camera
     across_m, down_m, ahead_m = _level_coordinates(samples, camera, level_from_camera)
     own = samples.valid & (ahead_m > 0)  # nan: the distortion model does not define a ray for every pixel
     measured = np.count_nonzero(own)
@@ -176,7 +188,7 @@ def estimate_foreground(samples, rect_px, camera, nearer=(), level_from_camera=L
     if level_from_camera[1, 2] > LOOKS_DOWN and above_feet.any():
         on_body = above_feet  # the floor beside the feet is as far away as the body
     left_m, right_m = edges(across_m[on_body])
-    cut_left, cut_top, cut_right, cut_bottom = cut = truncated_edges(rect_px, camera)
+    cut_left, cut_top, cut_right, cut_bottom = cut = truncated_edges(rect_px, geometry.area_px)
     left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, USUAL_WIDTH_M)
     top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, USUAL_HEIGHT_M)
     surface_m = np.array([(left_m + right_m) / 2, (top_m + bottom_m) / 2, layer_m])
@@ -310,8 +322,8 @@ def _median(sorted_depths_m):
 
 
 class Estimator(NamedTuple):
-    """Pair of functions: `sample(depth, rect_px)` returns Samples; `estimate(samples, rect_px, camera, nearer,
-    level_from_camera)` returns a Box3D or None, given the boxes of possible occluders.
+    """Pair of functions: `sample(depth, rect_px)` returns Samples; `estimate(samples, rect_px, geometry, nearer)` returns
+    a Box3D or None, given the boxes of possible occluders.
     """
 
     sample: Any
@@ -352,9 +364,10 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_f
         In the order of the rectangles; None without a plausible estimate.
     """
     boxes, nearer = [None] * len(rects_px), []
+    geometry = ImageGeometry(camera, measured_area(depth), level_from_camera)
     for number in front_to_back(rects_px, camera):
         rect_px = rects_px[number]
-        box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, camera, nearer, level_from_camera)
+        box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, geometry, nearer)
         if box is None:
             continue
         if box.is_plausible:
@@ -382,17 +395,18 @@ def check_rect(rect_px):
 def measured_area(depth):
     """Rectangle (x1, y1, x2, y2) of the image without its black border, where registration leaves no depth.
 
-    A border of more than `WIDEST_BLACK` of the width or height is not the border of the depth image but far background.
+    A border of more than `WIDEST_BORDER` of the width or height is not due to registration: its background is far away.
     """
     height, width = depth.values.shape
-    area = []
-    for axis, extent in ((0, width), (1, height)):
-        lines = depth.values[::BLACK_STEP] if axis == 0 else depth.values[:, ::BLACK_STEP]
-        measured = (lines > 0).any(axis=axis)
-        black = measured.argmax(), measured[::-1].argmax()
-        area.append([line if line <= WIDEST_BLACK * extent else 0 for line in black])
-    (left, right), (top, bottom) = area
+    left, right = _black_ends((depth.values[::BORDER_STEP] > 0).any(axis=0))
+    top, bottom = _black_ends((depth.values[:, ::BORDER_STEP] > 0).any(axis=1))
     return left, top, width - right, height - bottom
+
+
+def _black_ends(measured):
+    """Number of lines without depth at both ends, given which of the lines (n,) have depth."""
+    ends = int(measured.argmax()), int(measured[::-1].argmax())
+    return [count if count <= WIDEST_BORDER * len(measured) else 0 for count in ends]
 
 
 def truncated_edges(rect_px, area_px):
