@@ -16,6 +16,10 @@ from ros_3d_bb.core.yaml_loader import load_yaml
 
 STEEPEST_BIAS = 0.5  # m/m; a steeper bias cannot be inverted safely
 NEAREST_SHARE = 0.2  # lower bound of a corrected range, relative to the measured range
+UNCALIBRATED_SIGMA_M = 0.1  # of positions without an error model
+# Additional standard deviation below this support: growth per unit of support; and across the view of boxes at the
+# image border. Fitted to 700 images of simulated crowds of six and eight people (camera 0.27 m and 1.0 m high).
+WELL_SUPPORTED, LATERAL_GROWTH_M, DEPTH_GROWTH_M, TRUNCATED_SIGMA_M = 0.65, 0.4, 0.25, 0.05
 SOLVER_STEPS = 20  # each step at least halves the remaining error: 1 m to 1 µm
 
 
@@ -159,13 +163,25 @@ class ErrorModel(NamedTuple):
         return self.x_bias.slope + self.x_bias.per_angle_m / np.clip(z_m, nearest_m, farthest_m)
 
 
-def corrected_boxes(boxes, model):
-    """Correct the bias of 3D boxes (`box3d_estimator.Box3D`) and set their covariance."""
+def corrected_boxes(boxes, model=None):
+    """Correct the bias of 3D boxes (`box3d_estimator.Box3D`) and set their covariance.
+
+    Boxes with little support or at the image border are less certain than those to which an error model is fitted.
+    Without a model, positions are not corrected, and their standard deviation is `UNCALIBRATED_SIGMA_M`.
+    """
     if not boxes:
         return []
-    centers_m = model.corrected([box.center_m for box in boxes])
+    centers_m = np.array([box.center_m for box in boxes])
+    covariances_m2 = np.full((len(boxes), 1, 1), UNCALIBRATED_SIGMA_M ** 2) * np.eye(3)
+    if model is not None:
+        centers_m = model.corrected(centers_m)
+        covariances_m2 = model.covariance(centers_m)
+    unsupported = np.maximum(0, WELL_SUPPORTED - np.array([box.support for box in boxes]))
+    truncated = np.array([box.truncated for box in boxes])
+    covariances_m2[:, 0, 0] += (LATERAL_GROWTH_M * unsupported) ** 2 + truncated * TRUNCATED_SIGMA_M ** 2
+    covariances_m2[:, 2, 2] += (DEPTH_GROWTH_M * unsupported) ** 2
     return [box._replace(center_m=center_m, covariance_m2=covariance_m2)
-            for box, center_m, covariance_m2 in zip(boxes, centers_m, model.covariance(centers_m))]
+            for box, center_m, covariance_m2 in zip(boxes, centers_m, covariances_m2)]
 
 
 def checked(model):

@@ -141,8 +141,8 @@ class EstimationStage(object):
                               % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
         counts = {'boxes estimated': len(boxes3d),
                   'boxes without depth': len(estimates) - len(boxes3d) - len(implausible)}
+        boxes3d = corrected_boxes(boxes3d, self._error_model)
         if self._error_model is not None and boxes3d:
-            boxes3d = corrected_boxes(boxes3d, self._error_model)
             outside_m = self._error_model.distance_outside([box.center_m for box in boxes3d])
             counts['boxes outside of the measured range'] = int((outside_m > 0).sum())
         counts['images estimated'] = 1
