@@ -17,9 +17,9 @@ from ros_3d_bb.core.yaml_loader import load_yaml
 STEEPEST_BIAS = 0.5  # m/m; a steeper bias cannot be inverted safely
 NEAREST_SHARE = 0.2  # lower bound of a corrected range, relative to the measured range
 UNCALIBRATED_SIGMA_M = 0.1  # of positions without an error model
-# Additional standard deviation below this support: growth per unit of support; and across the view of boxes at the
-# image border. Fitted to 700 images of simulated crowds of six and eight people (camera 0.27 m and 1.0 m high).
-WELL_SUPPORTED, LATERAL_GROWTH_M, DEPTH_GROWTH_M, TRUNCATED_SIGMA_M = 0.65, 0.4, 0.25, 0.05
+# Additional standard deviations across and along the optical axis: per unit of support below the first value, and of
+# boxes at the image border. Fitted to simulated crowds of six and eight people, with the camera 0.27 m and 1 m high.
+WELL_SUPPORTED, SUPPORT_SIGMAS_M, TRUNCATED_SIGMAS_M = 0.65, np.array([0.4, 0, 0.25]), np.array([0.06, 0, 0.03])
 SOLVER_STEPS = 20  # each step at least halves the remaining error: 1 m to 1 µm
 
 
@@ -172,14 +172,14 @@ def corrected_boxes(boxes, model=None):
     if not boxes:
         return []
     centers_m = np.array([box.center_m for box in boxes])
-    covariances_m2 = np.full((len(boxes), 1, 1), UNCALIBRATED_SIGMA_M ** 2) * np.eye(3)
+    covariances_m2 = UNCALIBRATED_SIGMA_M ** 2 * np.eye(3)
     if model is not None:
         centers_m = model.corrected(centers_m)
         covariances_m2 = model.covariance(centers_m)
-    unsupported = np.maximum(0, WELL_SUPPORTED - np.array([box.support for box in boxes]))
+    unsupported = np.array([max(0.0, WELL_SUPPORTED - box.support) for box in boxes])
     truncated = np.array([box.truncated for box in boxes])
-    covariances_m2[:, 0, 0] += (LATERAL_GROWTH_M * unsupported) ** 2 + truncated * TRUNCATED_SIGMA_M ** 2
-    covariances_m2[:, 2, 2] += (DEPTH_GROWTH_M * unsupported) ** 2
+    variances_m2 = np.outer(unsupported ** 2, SUPPORT_SIGMAS_M ** 2) + np.outer(truncated, TRUNCATED_SIGMAS_M ** 2)
+    covariances_m2 = covariances_m2 + variances_m2[..., np.newaxis] * np.eye(3)
     return [box._replace(center_m=center_m, covariance_m2=covariance_m2)
             for box, center_m, covariance_m2 in zip(boxes, centers_m, covariances_m2)]
 
