@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 NS = 1000000000  # nanoseconds in a second
 MAX_WAITING = 100  # maximum number of waiting box arrays; more than any camera sends in a second
 MAX_RATE_HZ = 300  # faster than any camera; if stamps are closer, the clock hangs and not all images are kept
+SAME_NS = NS // 200  # the stamps of one image differ by less
+JITTER = 0.05  # variation of the period of images, relative to the period
 JUMP_NS = NS  # a larger deviation from the expected stamp is a jump in time
 
 
@@ -58,6 +60,15 @@ class MessageCache(object):
             self._entries.popleft()
         return went_back
 
+    @property
+    def half_period_ns(self):
+        """Tolerance for the stamps of a stream that is not synchronized with this one: half of the median period of the
+        cached values, and a margin for its variation. At least `SAME_NS`, for stamps that should be equal.
+        """
+        stamps_ns = [entry.stamp_ns for entry in list(self._entries)]
+        periods_ns = sorted(later - earlier for earlier, later in zip(stamps_ns, stamps_ns[1:]))
+        return max(SAME_NS, int(periods_ns[len(periods_ns) // 2] * (0.5 + JITTER))) if periods_ns else SAME_NS
+
     def nearest(self, stamp_ns, tolerance_ns=0):
         """The entry with the nearest stamp within the tolerance, or None."""
         nearest, nearest_ns = None, tolerance_ns
@@ -94,7 +105,7 @@ class StampSynchronizer(object):
     length_ns : int
         How long images are kept, and how long boxes wait.
     tolerance_ns : int
-        Largest difference between the stamps of one frame.
+        Largest difference between the stamps of one frame; 0: `MessageCache.half_period_ns` of the depth images.
     assumed_delay_ns : int
         Latency of the detector, for boxes without a stamp; also an attribute.
     on_frame : callable
@@ -115,6 +126,11 @@ class StampSynchronizer(object):
     def newest_ns(self):
         """Stamp of the newest depth image, None before the first."""
         return self._depths.newest_ns
+
+    def gap_ns(self, stamp_ns):
+        """Difference between a stamp and that of the nearest depth image, None if there is no depth image."""
+        depth = self._depths.nearest(stamp_ns, float('inf'))
+        return None if depth is None else abs(depth.stamp_ns - stamp_ns)
 
     @property
     def has_camera(self):
@@ -168,10 +184,13 @@ class StampSynchronizer(object):
 
     def _settle(self, now_ns):
         """Call the callbacks for boxes whose frame is complete, is lost, or did not arrive in time."""
+        if not self._waiting:
+            return
         settled, waiting = [], []
         newest_ns = self._depths.newest_ns
+        tolerance_ns = self._tolerance_ns or self._depths.half_period_ns
         for number, entry in enumerate(self._waiting):
-            depth = self._depths.nearest(entry.stamp_ns, self._tolerance_ns)
+            depth = self._depths.nearest(entry.stamp_ns, tolerance_ns)
             camera = None if depth is None else self._camera_at(depth.stamp_ns)
             is_lost = depth is None and newest_ns is not None and entry.stamp_ns < newest_ns
             is_late = now_ns - entry.arrival_ns > self._length_ns
@@ -191,7 +210,7 @@ class StampSynchronizer(object):
         """The camera of a depth image, or the nearest one as soon as a newer message shows that its own is lost."""
         if self._plain_camera is not None:
             return self._plain_camera
-        camera = self._cameras.nearest(stamp_ns, self._tolerance_ns)
+        camera = self._cameras.nearest(stamp_ns, self._tolerance_ns or SAME_NS)
         if camera is None and max(self._depths.newest_ns, self._cameras.newest_ns or 0) > stamp_ns:
             camera = self._cameras.nearest(stamp_ns, float('inf'))
         return None if camera is None else camera.value

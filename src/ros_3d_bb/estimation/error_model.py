@@ -20,6 +20,7 @@ UNCALIBRATED_SIGMA_M = 0.1  # of positions without an error model
 # Additional standard deviations across and along the optical axis: per unit of support below the first value, and of
 # boxes at the image border. Fitted to simulated crowds of six and eight people, with the camera 0.27 m and 1 m high.
 WELL_SUPPORTED, SUPPORT_SIGMAS_M, TRUNCATED_SIGMAS_M = 0.65, np.array([0.4, 0, 0.25]), np.array([0.06, 0, 0.03])
+WALKING_MPS = np.array([0.8, 0, 0.8])  # standard deviation of the velocity of people
 SOLVER_STEPS = 20  # each step at least halves the remaining error: 1 m to 1 µm
 
 
@@ -163,11 +164,12 @@ class ErrorModel(NamedTuple):
         return self.x_bias.slope + self.x_bias.per_angle_m / np.clip(z_m, nearest_m, farthest_m)
 
 
-def corrected_boxes(boxes, model=None):
+def corrected_boxes(boxes, model=None, gap_s=0.0):
     """Correct the bias of 3D boxes (`box3d_estimator.Box3D`) and set their covariance.
 
     Boxes with little support or at the image border are less certain than those to which an error model is fitted.
-    Without a model, positions are not corrected, and their standard deviation is `UNCALIBRATED_SIGMA_M`.
+    Without a model, positions are not corrected, and their standard deviation is `UNCALIBRATED_SIGMA_M`. `gap_s` is the
+    time between the colour and the depth image, in which people move.
     """
     if not boxes:
         return []
@@ -179,6 +181,7 @@ def corrected_boxes(boxes, model=None):
     unsupported = np.array([max(0.0, WELL_SUPPORTED - box.support) for box in boxes])
     truncated = np.array([box.truncated for box in boxes])
     variances_m2 = np.outer(unsupported ** 2, SUPPORT_SIGMAS_M ** 2) + np.outer(truncated, TRUNCATED_SIGMAS_M ** 2)
+    variances_m2 += (gap_s * WALKING_MPS) ** 2
     covariances_m2 = covariances_m2 + variances_m2[..., np.newaxis] * np.eye(3)
     return [box._replace(center_m=center_m, covariance_m2=covariance_m2)
             for box, center_m, covariance_m2 in zip(boxes, centers_m, covariances_m2)]

@@ -1,6 +1,7 @@
 """Estimation stage: 3D boxes from 2D boxes, depth images and camera_info, shared by bbox3d_node and process_bag."""
 from typing import NamedTuple
 
+import numpy as np
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
@@ -132,6 +133,8 @@ class EstimationStage(object):
         if (width, height) != (camera.width, camera.height):
             raise ValueError('%s; depth must be aligned to colour: %s' % (size_fault(camera, width, height), ALIGN))
 
+        stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
+        gap_s = abs((stamp - depth_msg.header.stamp).to_sec())
         implausible, rects_px = [], self._usable_rects(boxes2d)
         estimates = estimate_boxes(depth, rects_px, camera, self._estimator, implausible)
         boxes3d = list(filter(None, estimates))
@@ -141,14 +144,13 @@ class EstimationStage(object):
                               % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
         counts = {'boxes estimated': len(boxes3d),
                   'boxes without depth': len(estimates) - len(boxes3d) - len(implausible)}
-        boxes3d = corrected_boxes(boxes3d, self._error_model)
+        boxes3d = corrected_boxes(boxes3d, self._error_model, gap_s)
         if self._error_model is not None and boxes3d:
             outside_m = self._error_model.distance_outside([box.center_m for box in boxes3d])
             counts['boxes outside of the measured range'] = int((outside_m > 0).sum())
         counts['images estimated'] = 1
         self._events.count_all(counts)
 
-        stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
         frame_id = self._params.frame_id or depth_msg.header.frame_id
         return Header(stamp=stamp, frame_id=frame_id), depth, boxes3d
 
@@ -180,7 +182,11 @@ class EstimationStage(object):
             return 'no camera_info received on %s' % self._info_topic
         if stamp_ns is None:
             return 'no depth image received on %s within %.1f s' % (self._depth_topic, kept_s)
-        text = ('no depth image with their stamp %.3f received on %s; the newest has %.3f, and %.1f s are kept '
-                '(~cache_length)' % (stamp_ns / NS, self._depth_topic, newest_ns / NS, kept_s))
         too_old_s = (newest_ns - stamp_ns) / NS - kept_s
-        return text if too_old_s <= 0 else text + ': the detector is %.1f s slower than that' % too_old_s
+        if too_old_s > 0:
+            return ('no depth image with their stamp %.3f received on %s; the newest has %.3f, and %.1f s are kept '
+                    '(~cache_length): the detector is %.1f s slower than that'
+                    % (stamp_ns / NS, self._depth_topic, newest_ns / NS, kept_s, too_old_s))
+        gap_s = self._sync.gap_ns(stamp_ns) / NS
+        return ('no depth image with their stamp %.3f received on %s: colour and depth are %.3f s apart at best; to pair '
+                'them, set ~stamp_tolerance: %.2f' % (stamp_ns / NS, self._depth_topic, gap_s, np.ceil(100 * gap_s) / 100))
