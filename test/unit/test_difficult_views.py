@@ -1,0 +1,127 @@
+"""Positions where cameras are tilted, people overlap, or the image border truncates them, on simulated scenes."""
+import numpy as np
+import pytest
+
+from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.estimation.box3d_estimator import LEVEL, estimate_boxes, estimator_named, level_rotation
+from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
+from ros_3d_bb.tracking.tracker import Tracker
+from ros_3d_bb.tracking.types import CameraView, detection_from_box
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL
+from ros_3d_bb_lab.simulation.scenario import scenario_from
+from ros_3d_bb_lab.simulation.simulator import Simulator
+
+SCATTER = 0.015  # standard deviation of the edges of detected boxes, relative to the box
+CHI_SQUARE_95 = 5.991  # 2 degrees of freedom
+
+pytestmark = pytest.mark.slow
+
+
+def simulator_of(people, height_m, tilt_deg=0, seconds=0.2, rate=5.0, seed=0):
+    robot = {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': -np.radians(tilt_deg)}
+    return Simulator(scenario_from({'duration': seconds, 'rate': rate, 'seed': seed, 'robot': robot, 'people': people,
+                                    'room': {'bounds': [-4.0, 14.0, -7.0, 7.0], 'height': 4.0}}))
+
+
+def overlapping_people(count, nearest_m, farthest_m, random):
+    """People who walk a metre or two in any direction."""
+    people = []
+    while len(people) < count:
+        x_m = random.uniform(nearest_m, farthest_m)
+        position_m = np.array([x_m, random.uniform(-0.25, 0.25) * x_m])
+        if all(np.linalg.norm(position_m - other['start']) > 0.6 for other in people):
+            people.append({'start': position_m.tolist(), 'facing': random.uniform(-3, 3),
+                           'moves': [{'to': (position_m + random.uniform(-1, 1, 2)).tolist()}]})
+    return people
+
+
+def detected_boxes(frame, camera, random, least_visible):
+    """Visible people and their 2D boxes as a detector draws them."""
+    people = [person for person in frame.people if person.box_px is not None and person.visible >= least_visible]
+    boxes_px = np.array([person.box_px for person in people], float).reshape(-1, 4)
+    extents_px = np.tile(boxes_px[:, 2:] - boxes_px[:, :2], 2)
+    boxes_px += random.normal(0, SCATTER, boxes_px.shape) * extents_px
+    boxes_px = np.rint(np.clip(boxes_px, 0, [camera.width, camera.height] * 2)).astype(int)
+    return people, [tuple(box_px) for box_px in boxes_px.tolist()]
+
+
+def estimates(scenes, knows_tilt, least_visible=0.3):
+    """(person, Box3D, camera_from_map) of all people for whom there is an estimate, with the number of the others."""
+    found, missed, random = [], 0, np.random.RandomState(3)
+    for simulator in scenes:
+        for number in range(simulator.frame_count):
+            frame = simulator.frame(number)
+            camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
+            people, rects_px = detected_boxes(frame, simulator.camera, random, least_visible)
+            level = level_rotation(camera_from_map[:3, 2]) if knows_tilt else LEVEL
+            boxes = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, simulator.camera,
+                                   estimator_named('foreground'), level_from_camera=level)
+            found += [(person, box, camera_from_map) for person, box in zip(people, boxes) if box is not None]
+            missed += boxes.count(None)
+    return found, missed
+
+
+def plane_errors_m(found):
+    return np.array([np.linalg.norm((transform_points(np.linalg.inv(camera_from_map), box.center_m)
+                                     - person.position_m)[:2]) for person, box, camera_from_map in found])
+
+
+@pytest.mark.parametrize('tilt_deg,median_m', [(20, 0.05), (28, 0.05), (45, 0.07)])
+def test_positions_of_overlapping_people_below_a_tilted_camera(tilt_deg, median_m):
+    scenes = [simulator_of(overlapping_people(4, 1.6, 4.5, np.random.RandomState(seed)), 2.35, tilt_deg, 2.0, 1.0, seed)
+              for seed in range(6)]
+    found, missed = estimates(scenes, knows_tilt=True)
+    errors_m = plane_errors_m(found)
+    assert missed <= 0.02 * len(found)
+    assert np.median(errors_m) < median_m and errors_m.max() < 0.4
+    level_errors_m = plane_errors_m(estimates(scenes, knows_tilt=False)[0])
+    assert np.median(level_errors_m) > 1.5 * np.median(errors_m)
+
+
+def test_heights_below_a_tilted_camera():
+    scenes = [simulator_of([{'start': [3.4, 0.4 * side], 'facing': 3.0, 'height': 1.75}], 2.35, 28, seed=seed)
+              for seed, side in enumerate((-2, -1, 0, 1, 2))]
+    found, missed = estimates(scenes, knows_tilt=True, least_visible=0.95)
+    assert len(found) == 5 and missed == 0
+    for person, box, camera_from_map in found:
+        up_m = transform_points(np.linalg.inv(camera_from_map), box.center_m)[2]
+        assert abs(up_m - person.position_m[2]) < 0.1 and abs(box.size_m[1] - 1.75) < 0.2
+
+
+def test_covariances_hold_for_any_support():
+    """95 % ellipses in each third of support, about 90 people each, in crowds to which the covariance was not fitted."""
+    model = read_error_model(SIMULATED_ERROR_MODEL)
+    scenes = [simulator_of(overlapping_people(7, 1.2, 7.0, np.random.RandomState(100 + seed)), 0.6, seconds=3.0, rate=1.0,
+                           seed=seed) for seed in range(14)]
+    found, _missed = estimates(scenes, knows_tilt=True, least_visible=0.1)
+    distances, supports = [], []
+    for person, box, camera_from_map in found:
+        corrected, = corrected_boxes([box], model)
+        error_m = (corrected.center_m - transform_points(camera_from_map, person.position_m))[[0, 2]]
+        covariance_m2 = corrected.covariance_m2[np.ix_([0, 2], [0, 2])]
+        distances.append(error_m.dot(np.linalg.solve(covariance_m2, error_m)))
+        supports.append(box.support)
+    third = np.digitize(supports, np.quantile(supports, [1 / 3, 2 / 3]))
+    coverage = [np.mean(np.array(distances)[third == number] < CHI_SQUARE_95) for number in range(3)]
+    assert all(0.88 <= share < 1 for share in coverage), coverage
+
+
+def test_a_person_cut_at_the_hips_is_one_track_of_one_height():
+    simulator = simulator_of([{'start': [1.6, 0.1], 'facing': 3.1, 'height': 1.75}], 1.5, -2, 3.4, 30.0)
+    tracker, random, heights_m, ids = Tracker(), np.random.RandomState(5), [], set()
+    for number in range(100):
+        frame = simulator.frame(number)
+        (left, top, right, bottom), = [person.box_px for person in frame.people]
+        assert bottom == 480
+        rect_px = left, top, right, bottom - random.randint(0, 9)
+        box, = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [rect_px], simulator.camera,
+                              estimator_named('foreground'))
+        map_from_camera = frame.poses.map_from_camera
+        tracks = tracker.update(int(frame.time_s * NS), [detection_from_box(box, map_from_camera)],
+                                CameraView(map_from_camera, simulator.camera))
+        ids |= {track.id for track in tracks}
+        heights_m += [track.size_m[2] for track in tracks]
+    assert len(ids) == 1 and len(heights_m) > 90
+    assert np.ptp(heights_m) < 0.1
