@@ -1,4 +1,4 @@
-"""Cameras and transforms: inverses undo each other, and bad values are named."""
+"""Cameras and transforms: inverses and rejected values."""
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -19,13 +19,13 @@ def test_project_undoes_deproject(pixels, depth_m):
 
 def test_deprojection_of_known_pixels():
     """Thesis 3.4.1: x = (X - cx) / fx * z."""
-    points = D435I.deproject([(319.199, 242.08), (319.199 + 614.686, 242.08), (319.199, 242.08 - 614.842)], [2, 2, 3])
-    np.testing.assert_allclose(points, [(0, 0, 2), (2, 0, 2), (0, -3, 3)], atol=1e-12)
+    points = D435I.deproject([(319.199, 242.08), (319.199 + 614.686, 242.08 - 614.842)], [2, 3])
+    np.testing.assert_allclose(points, [(0, 0, 2), (3, -3, 3)], atol=1e-12)
 
 
 @pytest.mark.parametrize('field,value', [('width', 0), ('height', -1), ('fx', 0), ('fy', float('nan')),
                                          ('fx', float('inf')), ('cx', float('nan'))])
-def test_unusable_intrinsics_are_refused(field, value):
+def test_unusable_intrinsics_are_rejected(field, value):
     with pytest.raises(ValueError, match='camera'):
         Camera(**dict(D435I._asdict(), **{field: value}))
 
@@ -49,18 +49,13 @@ def test_the_quaternion_of_a_transform_is_the_one_it_was_made_from(quaternion):
     np.testing.assert_allclose(found * np.sign(found.dot(expected)), expected, atol=1e-9)
 
 
-def test_optical_frame_of_a_camera_that_looks_ahead():
+def test_optical_frame_of_a_camera_that_points_ahead():
     """REP 103: in the body frame x is forward, y left, z up; the optical z is forward, x right, y down."""
     body_from_optical = transform_from((0.17, 0, 0.2), OPTICAL_ROTATION)
     np.testing.assert_allclose(transform_points(body_from_optical, [(1, 2, 3)]), [(3.17, -1, -1.8)], atol=1e-12)
 
 
 @pytest.mark.parametrize('quaternion', [(0, 0, 0, 0), (float('nan'), 0, 0, 1), (float('inf'), 0, 0, 0)])
-def test_quaternions_without_direction_are_refused(quaternion):
+def test_quaternions_without_direction_are_rejected(quaternion):
     with pytest.raises(ValueError, match='quaternion'):
         transform_from((0, 0, 0), quaternion)
-
-
-def test_quaternions_are_normalised():
-    np.testing.assert_allclose(transform_from((0, 0, 0), (0, 0, 3, 3)), transform_from((0, 0, 0), (0, 0, 1, 1)),
-                               atol=1e-15)
