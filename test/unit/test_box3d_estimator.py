@@ -9,12 +9,10 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.estimation.box3d_estimator import (AXIS_BEHIND_SURFACE_M, EDGE_PERCENT, check_rect,
                                                   complete_truncated_extent, edges, estimate_boxes,
                                                   estimate_foreground, estimate_median, estimator_named,
-                                                  nearest_dominant_layer, sample_depth, trimmed_mean, truncated_edges,
-                                                  within)
+                                                  nearest_dominant_layer, sample_depth, truncated_edges, within)
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
-METRES = st.floats(0.3, 9.0)
 MILLIMETRES = hnp.arrays(int, st.integers(1, 60), elements=st.integers(300, 9000))
 
 
@@ -26,11 +24,11 @@ def test_reproduces_the_recorded_positions(session_folder):
     """Within 1 mm an axis, plus the rounding of the record to whole millimetres."""
     session = read_session(session_folder)
     errors_m = []
-    for frame in session.frames:
+    for frame in session.frames[::2]:
         samples = sample_depth(read_depth(frame, session), frame.boxes_px[0], 20)
         box = estimate_median(samples, frame.boxes_px[0], session.camera)
         errors_m.append(np.abs(box.center_m - frame.estimate_m))
-    assert len(errors_m) >= 80
+    assert len(errors_m) >= 40
     assert np.max(errors_m) <= 0.0015
 
 
@@ -114,7 +112,7 @@ def test_foreground_masks_pixels_of_occluders():
 
 def test_foreground_ignores_flying_pixels():
     depth = flat(2000)
-    depth.values[:, 30:34] = np.linspace(2000, 4000, 4).astype(np.uint16)
+    depth.values[:, 30:34] = 2000, 2200, 3000, 4000  # the second one is in the layer of the person
     depth.values[:, 34:] = 4000
     box = foreground(depth, (14, 4, 50, 44))
     assert box.center_m[2] == pytest.approx(2.0 + AXIS_BEHIND_SURFACE_M)
@@ -211,8 +209,7 @@ def test_the_median_is_that_of_undistorted_points(camera):
     """The rectangle of a small plate, and depth that fills it, so that the median is in its middle."""
     center_m = np.array([1.5, 0.3, 3.0])
     _depth, rect = plate_in(camera, center_m, (0.1, 0.1))
-    depth, _rect = plate_in(camera, center_m, (1, 1))
-    box = estimate_median(sample_depth(depth, rect, 1), rect, camera)
+    box = estimate_median(sample_depth(DepthImage(np.full((480, 640), 3.0), 1.0), rect, 1), rect, camera)
     np.testing.assert_allclose(box.center_m, center_m, atol=0.01)  # a pixel
     np.testing.assert_allclose(box.size_m, 0.1, atol=0.03)
 
@@ -248,15 +245,6 @@ def test_within_holds_its_bounds_as_the_rounded_difference_does(depths_mm, middl
     depths_m, middle_m, half_m = np.sort(depths_mm) * 0.001, middle_mm * 0.001, half_mm * 0.001
     expected_m = depths_m[np.abs(depths_m - middle_m) <= half_m]
     np.testing.assert_array_equal(within(depths_m, middle_m, half_m), expected_m)
-
-
-@given(hnp.arrays(float, st.integers(1, 60), elements=METRES))
-def test_the_trimmed_mean_looks_past_a_tenth_on_both_sides(depths_m):
-    sorted_depths_m, tenth = np.sort(depths_m), len(depths_m) // 10
-    spoilt_m = sorted_depths_m.copy()
-    spoilt_m[:tenth], spoilt_m[len(spoilt_m) - tenth:] = 0, 100
-    assert trimmed_mean(sorted_depths_m) == trimmed_mean(spoilt_m)
-    assert sorted_depths_m[0] - 1e-9 <= trimmed_mean(sorted_depths_m) <= sorted_depths_m[-1] + 1e-9
 
 
 @given(MILLIMETRES, st.integers(0, 100))

@@ -30,10 +30,7 @@ def test_any_row_step_and_byte_order(height, width, padding, big_endian, layout)
     depth = imgmsg_to_depth(message_of(pixels, encoding, padding, big_endian))
     np.testing.assert_array_equal(depth.values, pixels)
     assert depth.scale_m == (1.0 if encoding == '32FC1' else 0.001)
-
-
-def test_depth_scale_can_be_given():
-    assert imgmsg_to_depth(message_of(np.ones((2, 2), np.uint16), '16UC1'), 0.00025).scale_m == 0.00025
+    assert imgmsg_to_depth(message_of(pixels, encoding), 0.00025).scale_m == 0.00025
 
 
 @pytest.mark.parametrize('encoding,channels', [('rgb8', [0, 1, 2]), ('bgr8', [2, 1, 0]), ('rgba8', [0, 1, 2]),

@@ -170,7 +170,9 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
     on_body = own & (np.abs(samples.depth_m - layer_m) <= BODY_HALF_DEPTH_M)
     across_m = (columns_px - camera.cx) / camera.fx * samples.depth_m
     left_m, right_m = edges(across_m[on_body])
-    layer_m = trimmed_mean(body_m)
+    # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
+    tenth = len(body_m) // 10
+    layer_m = body_m[tenth:len(body_m) - tenth].mean()
     _left_px, top_px, _right_px, bottom_px = flat_px
     top_m, bottom_m = (top_px - camera.cy) / camera.fy * layer_m, (bottom_px - camera.cy) / camera.fy * layer_m
     cut_left, cut_top, cut_right, cut_bottom = cut = truncated_edges(rect_px, camera)
@@ -244,13 +246,6 @@ def edges(x_m):
     high_m = in_place_m[last - rank] - (in_place_m[last - rank] - in_place_m[last - after]) * part / 100.0
     beyond_m = (high_m - low_m) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
     return low_m - beyond_m, high_m + beyond_m
-
-
-def trimmed_mean(sorted_depths_m):
-    """Mean without the lowest and the highest tenth; finer than the median, which is limited to the depth resolution.
-    """
-    tenth = len(sorted_depths_m) // 10
-    return sorted_depths_m[tenth:len(sorted_depths_m) - tenth].mean()
 
 
 def complete_truncated_extent(low, high, cut_low, cut_high, usual):
