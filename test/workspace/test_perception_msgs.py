@@ -160,12 +160,8 @@ def test_detections_are_upright_in_the_fixed_frame():
     np.testing.assert_allclose(detection.position_m, (3, -0.5, 0.9))
     np.testing.assert_allclose(detection.size_m, (0.6, 0.6, 1.8))
     np.testing.assert_allclose(detection.covariance_m2, np.diag([0.09, 0.01, 0.04]), atol=1e-12)
-
-
-def test_no_edge_is_trusted_if_the_truncated_edges_are_unknown():
-    box = box_of()
-    box.truncated = True
-    assert detection_of(box).truncated_edges == (True,) * 4
+    unknown = BoundingBox3D(truncated=True)  # no edge is trusted if the truncated edges are unknown
+    assert detection_of(unknown).truncated_edges == (True,) * 4
 
 
 @pytest.mark.parametrize('roll_deg,size_m,edge', [

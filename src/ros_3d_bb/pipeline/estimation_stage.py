@@ -56,11 +56,6 @@ class EstimationStage(object):
         Called with `perception_msgs.Boxes2D`, sensor_msgs/Image and `camera_model.Camera` of one stamp.
     depth_topic, info_topic : str
         Topics of the depth images and camera_info, for error messages about missing ones.
-
-    Raises
-    ------
-    ValueError
-        If the error model cannot be used.
     """
 
     def __init__(self, params, events, on_frame, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
@@ -78,7 +73,7 @@ class EstimationStage(object):
     def reconfigure(self, params):
         """Use another estimator, stride or assumed delay for the next boxes.
 
-        Raises ValueError and keeps the old parameters if the new ones are invalid.
+        Raises ValueError, as the constructor, and keeps the old parameters if the new ones are invalid.
         """
         estimator = estimator_named(params.estimator, params.stride)
         if self._error_model is not None:
@@ -93,8 +88,7 @@ class EstimationStage(object):
 
     def add_camera_info(self, message, now_ns):
         """Add a sensor_msgs/CameraInfo."""
-        camera = camera_from_msg(message)
-        self._sync.add_camera(stamp_if_any(message), now_ns, camera)
+        self._sync.add_camera(stamp_if_any(message), now_ns, camera_from_msg(message))
 
     def add_depth(self, message, now_ns):
         """Add a depth image."""
@@ -117,15 +111,8 @@ class EstimationStage(object):
         """Estimate the 3D boxes of one image, whose parts are those that `on_frame` was called with.
 
         A 2D box yields no 3D box if it is empty or reversed, has no depth of its own, or gives an implausible size.
-
-        Returns
-        -------
-        (std_msgs.msg.Header, DepthImage, list of Box3D)
-
-        Raises
-        ------
-        ValueError
-            If the depth image cannot be read, or its size differs from that of the camera.
+        Returns the header, the DepthImage and a list of Box3D. Raises ValueError if the depth image cannot be read, or
+        its size differs from that of the camera.
         """
         depth = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
         height, width = depth.values.shape
