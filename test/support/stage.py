@@ -61,9 +61,9 @@ class Stage(object):
         """Move the clock, backwards if negative."""
         self.now_ns += elapsed_ns
         self._round += elapsed_ns < 0
-        self.tell(self.now_ns)
+        self.publish_time(self.now_ns)
 
-    def tell(self, time_ns):
+    def publish_time(self, time_ns):
         """Publish a time on /clock once."""
         self._clock_pub.publish(Clock(time_from(time_ns)))
 

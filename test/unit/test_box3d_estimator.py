@@ -20,7 +20,7 @@ def flat(depth, scale_m=0.001, dtype=np.uint16):
     return DepthImage(np.full((48, 64), depth, dtype), scale_m)
 
 
-def test_reproduces_the_recorded_positions(session_folder):
+def test_the_median_reproduces_the_recorded_positions(session_folder):
     """Within 1 mm an axis, plus the rounding of the record to whole millimetres."""
     session = read_session(session_folder)
     errors_m = []
@@ -33,7 +33,7 @@ def test_reproduces_the_recorded_positions(session_folder):
 
 
 @given(st.integers(-90, 80), st.integers(-90, 80), st.integers(1, 200), st.integers(1, 200), st.integers(1, 30))
-def test_grid_is_the_centred_one_cut_at_the_border(x1, y1, width, height, stride):
+def test_the_grid_is_centred_and_clipped_to_the_image(x1, y1, width, height, stride):
     samples = sample_depth(flat(1000), (x1, y1, x1 + width, y1 + height), stride)
     expected = []
     columns, rows = -(-width // stride), -(-height // stride)
@@ -86,7 +86,7 @@ def foreground(depth, rect, nearer=()):
 
 
 @given(st.integers(500, 5000), st.floats(0.4, 1), st.integers(400, 3000))
-def test_foreground_is_the_person_however_much_background_the_box_holds(person_mm, share, behind_mm):
+def test_foreground_is_the_person_for_any_share_of_background(person_mm, share, behind_mm):
     """A plate before a wall that fills up to two thirds of the box: the median would be the wall."""
     depth = flat(person_mm + behind_mm)
     half = max(2, int(30 * share / 2))
@@ -229,7 +229,7 @@ def test_a_rectangle_beyond_the_image_of_a_distorting_lens_has_an_estimate():
 
 
 @given(hnp.arrays(float, st.integers(1, 50), elements=st.floats(-5, 5)))
-def test_edges_are_where_percentiles_say(x_m):
+def test_edges_are_extrapolated_percentiles(x_m):
     low_m, high_m = np.percentile(x_m, [EDGE_PERCENT, 100 - EDGE_PERCENT])
     beyond_m = (high_m - low_m) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
     np.testing.assert_allclose(edges(x_m), (low_m - beyond_m, high_m + beyond_m), atol=1e-9)
@@ -241,14 +241,14 @@ def test_edges_of_a_uniform_body():
 
 
 @given(MILLIMETRES, st.integers(0, 9000), st.integers(0, 500))
-def test_within_holds_its_bounds_as_the_rounded_difference_does(depths_mm, middle_mm, half_mm):
+def test_within_includes_its_bounds_as_the_rounded_difference_does(depths_mm, middle_mm, half_mm):
     depths_m, middle_m, half_m = np.sort(depths_mm) * 0.001, middle_mm * 0.001, half_mm * 0.001
     expected_m = depths_m[np.abs(depths_m - middle_m) <= half_m]
     np.testing.assert_array_equal(within(depths_m, middle_m, half_m), expected_m)
 
 
 @given(MILLIMETRES, st.integers(0, 100))
-def test_the_layer_is_among_the_depths_in_whatever_order_they_come(depths_mm, seed):
+def test_the_layer_is_in_the_range_of_the_depths_in_any_order(depths_mm, seed):
     depths_m = depths_mm * 0.001
     sorted_depths_m, even = np.sort(depths_m), np.ones(len(depths_m))
     layer_m = nearest_dominant_layer(depths_m, even, sorted_depths_m)

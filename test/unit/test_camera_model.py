@@ -11,7 +11,7 @@ COORDINATE = st.floats(-100, 100)
 
 
 @given(hnp.arrays(float, (5, 2), elements=st.floats(-2000, 3000)), st.floats(0.1, 20))
-def test_project_undoes_deproject(pixels, depth_m):
+def test_project_is_the_inverse_of_deproject(pixels, depth_m):
     points = D435I.deproject(pixels, np.full(5, depth_m))
     np.testing.assert_allclose(points[:, 2], depth_m)
     np.testing.assert_allclose(D435I.project(points), pixels, atol=1e-6)
@@ -33,7 +33,7 @@ def test_unusable_intrinsics_are_rejected(field, value):
 @given(st.tuples(COORDINATE, COORDINATE, COORDINATE),
        st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1),
        hnp.arrays(float, (4, 3), elements=COORDINATE))
-def test_transforms_are_rigid_and_can_be_undone(translation, quaternion, points):
+def test_transforms_are_rigid_and_invertible(translation, quaternion, points):
     b_from_a = transform_from(translation, quaternion)
     moved = transform_points(b_from_a, points)
     np.testing.assert_allclose(transform_points(np.linalg.inv(b_from_a), moved), points, atol=1e-9)
@@ -42,7 +42,7 @@ def test_transforms_are_rigid_and_can_be_undone(translation, quaternion, points)
 
 
 @given(st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1))
-def test_the_quaternion_of_a_transform_is_the_one_it_was_made_from(quaternion):
+def test_quaternion_from_is_the_inverse_of_transform_from(quaternion):
     found = quaternion_from(transform_from((1, 2, 3), quaternion))
     expected = np.array(quaternion) / np.linalg.norm(quaternion)
     assert found[3] >= 0

@@ -40,14 +40,14 @@ def named(camera):
 
 
 def every_pixel(camera, step=1):
-    """(n, 2), with the corners whatever the step."""
+    """(n, 2), including the corners."""
     u, v = np.meshgrid(*(np.unique(np.append(np.arange(0, size, step), size - 1)) for size in camera[:2]))
     return np.stack((u, v), axis=-1).reshape(-1, 2).astype(float)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize('camera', CAMERAS, ids=named)
-def test_project_undoes_deproject_at_every_pixel(camera):
+def test_project_is_the_inverse_of_deproject_at_every_pixel(camera):
     pixels = every_pixel(camera, camera.width // 640)
     points = camera.deproject(pixels, 2.5)
     assert (points[:, 2] == 2.5).all()
@@ -89,7 +89,7 @@ def test_equals_librealsense(camera):
 
 
 @pytest.mark.parametrize('camera', CAMERAS, ids=named)
-def test_an_opencv_without_termination_criteria_gives_the_same_rays(camera, monkeypatch):
+def test_opencv_before_3_3_1_gives_the_same_rays(camera, monkeypatch):
     """Ubuntu 18.04 has OpenCV 3.2; undistortPointsIter came with 3.3.1."""
     pixels = every_pixel(camera, 29)
     expected = camera.undistort(pixels)
@@ -119,7 +119,7 @@ EXTREME = st.one_of(*[st.tuples(st.just(model), st.tuples(*[ANY_NUMBER] * count)
 
 @pytest.mark.slow
 @given(st.one_of(MODERATE, EXTREME), st.sampled_from(SIZES))
-def test_a_pixel_comes_back_or_has_no_ray(lens, size):
+def test_a_pixel_is_restored_or_has_no_ray(lens, size):
     camera = camera_of((70,) + lens, size)
     pixels = every_pixel(camera, 40)
     points = camera.deproject(pixels, 1.0)
@@ -128,7 +128,7 @@ def test_a_pixel_comes_back_or_has_no_ray(lens, size):
 
 
 @given(MODERATE, st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4)))
-def test_rays_before_any_fold_come_back(lens, ray):
+def test_rays_before_any_fold_are_restored(lens, ray):
     camera = camera_of((70,) + lens, SIZES[0])
     np.testing.assert_allclose(camera.deproject(camera.project(ray + (1,)), 3.0), np.array(ray + (1,)) * 3, atol=1e-8)
 

@@ -20,12 +20,12 @@ models = st.builds(lambda z, x, angle, offset: MODEL._replace(z_bias=z, x_bias=X
 
 
 @given(models, st.lists(positions, min_size=1, max_size=5))
-def test_correction_undoes_the_bias(model, true_m):
+def test_correction_is_the_inverse_of_the_bias(model, true_m):
     assert np.allclose(checked(model).corrected(model.biased(true_m)), true_m, atol=1e-5)
 
 
 @given(positions)
-def test_boxes_are_corrected_alone_as_they_are_together(measured_m):
+def test_positions_are_corrected_independently(measured_m):
     together = MODEL.corrected([[measured_m, (0.1, 0.2, 1.0)]])
     assert together.shape == (1, 2, 3)
     assert np.array_equal(MODEL.corrected(measured_m), together[0, 0])
@@ -83,7 +83,7 @@ def test_the_steepest_bias_is_corrected():
 
 @settings(max_examples=30)
 @given(models, st.one_of(st.none(), st.builds(Scores, *[st.floats(0, 1)] * 5)))
-def test_files_hold_the_whole_model(tmp_path_factory, model, scores):
+def test_models_survive_a_file(tmp_path_factory, model, scores):
     path = str(tmp_path_factory.getbasetemp() / 'model.yaml')
     write_error_model(path, model._replace(cross_validated=scores))
     assert read_error_model(path) == model._replace(cross_validated=scores)

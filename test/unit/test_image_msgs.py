@@ -73,7 +73,7 @@ def test_fill_image_rejects_pixels_of_the_wrong_type():
 
 
 @given(IMAGES)
-def test_an_image_has_its_pixels_or_is_refused(message):
+def test_an_image_is_readable_or_rejected(message):
     for read in (array_from, imgmsg_to_rgb, lambda image: imgmsg_to_depth(image).values):
         try:
             pixels = read(message)
@@ -84,7 +84,7 @@ def test_an_image_has_its_pixels_or_is_refused(message):
 
 
 @given(st.sampled_from(sorted(LAYOUTS)), st.integers(1, 9), st.integers(1, 9), st.integers(0, 255))
-def test_pixels_survive_an_image_message_and_a_byte_less_is_refused(encoding, height, width, value):
+def test_pixels_survive_an_image_message_and_missing_bytes_are_rejected(encoding, height, width, value):
     kind, channels = LAYOUTS[encoding]
     pixels = np.full((width, height) + ((channels,) if channels > 1 else ()), value, kind).swapaxes(0, 1)
     message = fill_image(SimpleNamespace(), pixels, encoding)

@@ -13,7 +13,7 @@ PLAIN = st.recursive(st.none() | st.booleans() | st.integers() | st.floats(allow
 
 
 @given(st.text())
-def test_any_text_is_yaml_or_refused(text):
+def test_any_text_is_yaml_or_rejected(text):
     try:
         load_yaml(text)
     except yaml.YAMLError:
@@ -22,7 +22,7 @@ def test_any_text_is_yaml_or_refused(text):
 
 @pytest.mark.slow
 @given(st.dictionaries(st.sampled_from(DepthPeopleParams._fields) | st.text(), PLAIN, max_size=3))
-def test_parameters_have_their_types_or_are_refused(given_params):
+def test_parameters_have_their_types_or_are_rejected(given_params):
     try:
         params, = params_from(given_params, DepthPeopleParams)
     except ValueError:

@@ -107,7 +107,7 @@ def box_of(width_m=0.5, height_m=1.7, x_m=0.0, y_m=0.0, edge='', covariance_m2=n
 
 
 def detection_of(box, roll_deg=0, pitch_deg=0, yaw_deg=0):
-    """The detection of a camera 1 m above the map that looks along x, rolled clockwise as seen by the camera."""
+    """The detection of a camera 1 m above the map that points along x, rolled clockwise as seen by the camera."""
     map_from_camera = transform_from((0, 0, 1), (0, 0, 0, 1))
     for axis, angle in ((2, np.radians(yaw_deg)), (1, np.radians(pitch_deg)), (0, np.radians(roll_deg))):
         quaternion = np.eye(4)[axis] * np.sin(angle / 2) + np.eye(4)[3] * np.cos(angle / 2)
@@ -145,7 +145,7 @@ def test_an_unusable_3d_box_does_not_affect_the_others(wrong):
 
 
 @given(st.integers(0, 2 ** 32 - 1), st.floats(-6, 7.9), st.integers(1, 3))
-def test_a_covariance_of_any_size_and_rank_is_usable_and_one_with_a_negative_variance_is_not(seed, power, rank):
+def test_covariances_are_usable_unless_a_variance_is_negative(seed, power, rank):
     factor = np.random.RandomState(seed).normal(size=(3, rank))
     covariance_m2 = factor.dot(factor.T) * 10 ** power / np.abs(factor.dot(factor.T)).max()
     boxes = [box_of(covariance_m2=covariance_m2), box_of(covariance_m2=covariance_m2 - 3.1 * 10 ** power * np.eye(3))]
