@@ -136,15 +136,6 @@ def test_a_jump_back_in_time(rig, output, now):
     assert len(output.messages) == 2
 
 
-def test_unusable_boxes_are_dropped_and_the_others_are_kept(rig, output, now):
-    rig.send_camera(now)
-    rig.send_boxes(now, [[40, 10, 20, 38], [5, 5, 5, 9], [1000, 1000, 1100, 1100], [-2 ** 31, 0, 2 ** 31 - 1, 48],
-                         [-9, 0, 70, 48], [20, 10, 44, 38]])
-    boxes = output.wait_for(1)[0].boxes
-    assert [(box.roi.x_offset, box.roi.width) for box in boxes] == [(0, 64), (20, 24)]
-    assert [box.truncated for box in boxes] == [True, False]
-
-
 def test_a_changed_estimator_is_used_from_the_next_image(rig, output, now):
     """Less than half of the box is a person at 2 m, the rest is wall: the median is that of the wall."""
     depth_mm = np.full((48, 64), 5000, np.uint16)

@@ -1,5 +1,4 @@
 """3D box estimators: recorded positions and grid of the thesis, depth layers, distortion, and invalid input."""
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -10,12 +9,10 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.estimation.box3d_estimator import (AXIS_BEHIND_SURFACE_M, EDGE_PERCENT, check_rect,
                                                   complete_truncated_extent, edges, estimate_boxes,
                                                   estimate_foreground, estimate_median, estimator_named,
-                                                  nearest_dominant_layer, sample_depth, trimmed_mean, truncated_edges,
-                                                  within)
+                                                  nearest_dominant_layer, sample_depth, truncated_edges, within)
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
-METRES = st.floats(0.3, 9.0)
 MILLIMETRES = hnp.arrays(int, st.integers(1, 60), elements=st.integers(300, 9000))
 
 
@@ -23,20 +20,20 @@ def flat(depth, scale_m=0.001, dtype=np.uint16):
     return DepthImage(np.full((48, 64), depth, dtype), scale_m)
 
 
-def test_reproduces_the_recorded_positions(session_folder):
+def test_the_median_reproduces_the_recorded_positions(session_folder):
     """Within 1 mm an axis, plus the rounding of the record to whole millimetres."""
     session = read_session(session_folder)
     errors_m = []
-    for frame in session.frames:
+    for frame in session.frames[::2]:
         samples = sample_depth(read_depth(frame, session), frame.boxes_px[0], 20)
         box = estimate_median(samples, frame.boxes_px[0], session.camera)
         errors_m.append(np.abs(box.center_m - frame.estimate_m))
-    assert len(errors_m) >= 80
+    assert len(errors_m) >= 40
     assert np.max(errors_m) <= 0.0015
 
 
 @given(st.integers(-90, 80), st.integers(-90, 80), st.integers(1, 200), st.integers(1, 200), st.integers(1, 30))
-def test_grid_is_the_centred_one_cut_at_the_border(x1, y1, width, height, stride):
+def test_the_grid_is_centred_and_clipped_to_the_image(x1, y1, width, height, stride):
     samples = sample_depth(flat(1000), (x1, y1, x1 + width, y1 + height), stride)
     expected = []
     columns, rows = -(-width // stride), -(-height // stride)
@@ -47,18 +44,13 @@ def test_grid_is_the_centred_one_cut_at_the_border(x1, y1, width, height, stride
     assert [tuple(pixel) for pixel in samples.pixels.reshape(-1, 2).tolist()] == expected
 
 
-def test_rectangles_of_any_size_have_no_more_samples_than_the_image():
-    big = 2 ** 31 - 1
-    samples = sample_depth(flat(1000), (-big - 1, -big - 1, big, big), 20)
-    assert 0 < samples.valid.size <= 12
-    assert sample_depth(flat(1000), (big - 50, big - 50, big, big), 20).valid.size == 0
-
-
-@pytest.mark.parametrize('rect', [(10, 10, 10, 20), (20, 10, 10, 20), (10, 20, 20, 10)])
-def test_empty_and_reversed_rectangles_have_no_samples_and_fail_the_check(rect):
-    assert sample_depth(flat(1000), rect).valid.size == sample_depth(flat(1000), rect, 7).valid.size == 0
-    with pytest.raises(ValueError, match=r'box \(%d, %d, %d, %d\)' % rect):
-        check_rect(rect)
+@pytest.mark.parametrize('stride', [None, 7])
+@pytest.mark.parametrize('rect', [(10, 10, 10, 20), (20, 10, 10, 20), (10, 20, 20, 10), (10 ** 9, 0, 2 * 10 ** 9, 9)])
+def test_rectangles_without_samples(rect, stride):
+    assert sample_depth(flat(1000), rect, stride).valid.size == 0
+    if rect[0] < 64:
+        with pytest.raises(ValueError, match=r'box \(%d, %d, %d, %d\)' % rect):
+            check_rect(rect)
 
 
 @pytest.mark.parametrize('depth,scale_m,dtype', [(0, 0.001, np.uint16), (np.nan, 1, np.float32),
@@ -94,7 +86,7 @@ def foreground(depth, rect, nearer=()):
 
 
 @given(st.integers(500, 5000), st.floats(0.4, 1), st.integers(400, 3000))
-def test_foreground_is_the_person_however_much_background_the_box_holds(person_mm, share, behind_mm):
+def test_foreground_is_the_person_for_any_share_of_background(person_mm, share, behind_mm):
     """A plate before a wall that fills up to two thirds of the box: the median would be the wall."""
     depth = flat(person_mm + behind_mm)
     half = max(2, int(30 * share / 2))
@@ -120,7 +112,7 @@ def test_foreground_masks_pixels_of_occluders():
 
 def test_foreground_ignores_flying_pixels():
     depth = flat(2000)
-    depth.values[:, 30:34] = np.linspace(2000, 4000, 4).astype(np.uint16)
+    depth.values[:, 30:34] = 2000, 2200, 3000, 4000  # the second one is in the layer of the person
     depth.values[:, 34:] = 4000
     box = foreground(depth, (14, 4, 50, 44))
     assert box.center_m[2] == pytest.approx(2.0 + AXIS_BEHIND_SURFACE_M)
@@ -129,8 +121,8 @@ def test_foreground_ignores_flying_pixels():
 def test_foreground_samples_about_as_many_pixels_in_every_box():
     depth = DepthImage(np.full((480, 640), 1000, np.uint16), 0.001)
     rects = ((0, 0, 640, 480), (100, 100, 260, 400), (-5000, -5000, 5000, 5000), (300, 200, 350, 240))
-    counts = [sample_depth(depth, rect).valid.size for rect in rects]
-    assert all(1500 <= count <= 4500 for count in counts)
+    assert all(1500 <= sample_depth(depth, rect).valid.size <= 4500 for rect in rects)
+    assert sample_depth(flat(1000), (-2 ** 31, -2 ** 31, 2 ** 31 - 1, 2 ** 31 - 1), 20).valid.size <= 12
     assert sample_depth(depth, (300, 200, 310, 220)).valid.size == 200
 
 
@@ -186,24 +178,16 @@ FISHEYE = Camera(640, 480, 306, 306, 319.5, 239.5, 'equidistant', (-0.0022, 0.03
 
 
 def plate_in(camera, center_m, size_m):
-    """Depth image of an upright plate before a wall at 6 m, and the rectangle around the plate, by OpenCV."""
-    matrix, lens = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]]), camera.distortion
+    """Depth image of an upright plate in front of a wall at 6 m, and the rectangle around the plate."""
     v, u = np.mgrid[:camera.height, :camera.width]
-    pixels = np.stack((u, v), axis=-1).reshape(-1, 1, 2).astype(float)
+    across, down = camera.rays(u, v)
+    on_plate = ((np.abs(across * center_m[2] - center_m[0]) <= size_m[0] / 2)
+                & (np.abs(down * center_m[2] - center_m[1]) <= size_m[1] / 2))
     sides = np.linspace(-0.5, 0.5, 200)
     outline = np.array([edge for side in sides for edge in ((side, -0.5), (side, 0.5), (-0.5, side), (0.5, side))])
-    outline = np.append(outline * size_m + center_m[:2], np.full((len(outline), 1), center_m[2]), axis=1)[:, None]
-    if camera.distortion_model == 'equidistant':
-        rays = cv2.fisheye.undistortPoints(pixels, matrix, np.array(lens))
-        seen = cv2.fisheye.projectPoints(outline, np.zeros(3), np.zeros(3), matrix, np.array(lens))[0]
-    else:
-        until = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-12)
-        rays = cv2.undistortPointsIter(pixels, matrix, np.array(lens), None, None, until)
-        seen = cv2.projectPoints(outline, np.zeros(3), np.zeros(3), matrix, np.array(lens))[0]
-    on_plate = (np.abs(rays[:, 0] * center_m[2] - center_m[:2]) <= np.array(size_m) / 2).all(axis=1)
-    depth_m = np.where(on_plate, center_m[2], 6.0).reshape(v.shape)
-    low, high = np.floor(seen.min(axis=(0, 1))).astype(int), np.ceil(seen.max(axis=(0, 1))).astype(int)
-    return DepthImage(depth_m, 1.0), tuple(low.tolist() + high.tolist())
+    outline_px = camera.project(np.insert(outline * size_m + center_m[:2], 2, center_m[2], axis=1))
+    rect_px = np.floor(outline_px.min(axis=0)).tolist() + np.ceil(outline_px.max(axis=0)).tolist()
+    return DepthImage(np.where(on_plate, center_m[2], 6.0), 1.0), tuple(map(int, rect_px))
 
 
 @pytest.mark.parametrize('camera', [WIDE, FISHEYE], ids=['plumb_bob', 'equidistant'])
@@ -225,8 +209,7 @@ def test_the_median_is_that_of_undistorted_points(camera):
     """The rectangle of a small plate, and depth that fills it, so that the median is in its middle."""
     center_m = np.array([1.5, 0.3, 3.0])
     _depth, rect = plate_in(camera, center_m, (0.1, 0.1))
-    depth, _rect = plate_in(camera, center_m, (1, 1))
-    box = estimate_median(sample_depth(depth, rect, 1), rect, camera)
+    box = estimate_median(sample_depth(DepthImage(np.full((480, 640), 3.0), 1.0), rect, 1), rect, camera)
     np.testing.assert_allclose(box.center_m, center_m, atol=0.01)  # a pixel
     np.testing.assert_allclose(box.size_m, 0.1, atol=0.03)
 
@@ -246,7 +229,7 @@ def test_a_rectangle_beyond_the_image_of_a_distorting_lens_has_an_estimate():
 
 
 @given(hnp.arrays(float, st.integers(1, 50), elements=st.floats(-5, 5)))
-def test_edges_are_where_percentiles_say(x_m):
+def test_edges_are_extrapolated_percentiles(x_m):
     low_m, high_m = np.percentile(x_m, [EDGE_PERCENT, 100 - EDGE_PERCENT])
     beyond_m = (high_m - low_m) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
     np.testing.assert_allclose(edges(x_m), (low_m - beyond_m, high_m + beyond_m), atol=1e-9)
@@ -258,23 +241,14 @@ def test_edges_of_a_uniform_body():
 
 
 @given(MILLIMETRES, st.integers(0, 9000), st.integers(0, 500))
-def test_within_holds_its_bounds_as_the_rounded_difference_does(depths_mm, middle_mm, half_mm):
+def test_within_includes_its_bounds_as_the_rounded_difference_does(depths_mm, middle_mm, half_mm):
     depths_m, middle_m, half_m = np.sort(depths_mm) * 0.001, middle_mm * 0.001, half_mm * 0.001
     expected_m = depths_m[np.abs(depths_m - middle_m) <= half_m]
     np.testing.assert_array_equal(within(depths_m, middle_m, half_m), expected_m)
 
 
-@given(hnp.arrays(float, st.integers(1, 60), elements=METRES))
-def test_the_trimmed_mean_looks_past_a_tenth_on_both_sides(depths_m):
-    sorted_depths_m, tenth = np.sort(depths_m), len(depths_m) // 10
-    spoilt_m = sorted_depths_m.copy()
-    spoilt_m[:tenth], spoilt_m[len(spoilt_m) - tenth:] = 0, 100
-    assert trimmed_mean(sorted_depths_m) == trimmed_mean(spoilt_m)
-    assert sorted_depths_m[0] - 1e-9 <= trimmed_mean(sorted_depths_m) <= sorted_depths_m[-1] + 1e-9
-
-
 @given(MILLIMETRES, st.integers(0, 100))
-def test_the_layer_is_among_the_depths_in_whatever_order_they_come(depths_mm, seed):
+def test_the_layer_is_in_the_range_of_the_depths_in_any_order(depths_mm, seed):
     depths_m = depths_mm * 0.001
     sorted_depths_m, even = np.sort(depths_m), np.ones(len(depths_m))
     layer_m = nearest_dominant_layer(depths_m, even, sorted_depths_m)

@@ -1,6 +1,6 @@
 """Synchronization by stamp: exact at any delay, in any order of arrival, and after a jump back in time."""
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.core.time_sync import MAX_RATE_HZ, MAX_WAITING, NS, MessageCache, StampSynchronizer
 
@@ -11,19 +11,19 @@ PERIOD = 33 * MS
 class Recorder(object):
     """A synchronizer with the `frames` (boxes, depth, camera) of its callbacks, depth and camera None for lost boxes.
 
-    `forgotten` are the boxes from before a time jump.
+    `dropped` are the boxes from before a time jump.
     """
 
     def __init__(self, length_ns=NS, tolerance_ns=5 * MS, assumed_delay_ns=0):
         self.sync = StampSynchronizer(length_ns, tolerance_ns, assumed_delay_ns, self._on_frame, self._on_lost)
-        self.frames, self.forgotten = [], []
+        self.frames, self.dropped = [], []
 
     def _on_frame(self, *frame):
         self.frames.append(frame)
 
     def _on_lost(self, boxes, before_jump):
         if before_jump:
-            self.forgotten.append(boxes)
+            self.dropped.append(boxes)
         else:
             self.frames.append((boxes, None, None))
 
@@ -49,7 +49,7 @@ def play(delay_ns, stamped=True, frames=60, recorder=None, info_delay_ns=0):
 
 
 @given(st.integers(-900 * MS, 900 * MS), st.integers(-100 * MS, 100 * MS))
-def test_every_array_gets_its_own_frame_at_any_delay(delay_ns, info_delay_ns):
+def test_boxes_are_paired_with_their_frame_at_any_delay(delay_ns, info_delay_ns):
     """Depth always its own; the camera too, unless it comes later than the next depth image."""
     settled = play(delay_ns, info_delay_ns=info_delay_ns)
     assert all(boxes == depth for boxes, depth, _camera in settled)
@@ -122,7 +122,7 @@ def test_boxes_from_before_a_time_jump_are_dropped(recorder):
     recorder.add('depth', 3600 * NS, 0, 'end')
     recorder.add('depth', PERIOD, 1, 'start')
     assert recorder.add('boxes', 3600 * NS, 2, 'boxes') == []
-    assert recorder.add('depth', 2 * PERIOD, 9 * NS, 'two') == [] and recorder.forgotten == ['boxes']
+    assert recorder.add('depth', 2 * PERIOD, 9 * NS, 'two') == [] and recorder.dropped == ['boxes']
 
 
 def test_the_number_of_waiting_boxes_is_bounded(recorder):
@@ -139,32 +139,27 @@ def test_a_jump_back_in_time_clears_everything():
 
 @given(st.lists(st.tuples(st.sampled_from(['depth', 'camera', 'boxes', 'plain boxes']), st.integers(1, 200)),
                 max_size=80))
-def test_boxes_are_settled_or_counted_as_forgotten_whatever_comes(events):
+def test_all_boxes_are_matched_or_lost_for_any_messages(events):
     recorder, sent = Recorder(assumed_delay_ns=50 * MS), 0
     for number, (kind, stamp) in enumerate(events):
         sent += 'boxes' in kind
         stamp_ns = None if kind == 'plain boxes' else stamp * PERIOD
         recorder.add('boxes' if 'boxes' in kind else kind, stamp_ns, number * PERIOD, number)
     recorder.sync.end()
-    ended = [boxes for boxes, _depth, _camera in recorder.frames] + recorder.forgotten
+    ended = [boxes for boxes, _depth, _camera in recorder.frames] + recorder.dropped
     assert len(ended) == sent and len(set(ended)) == sent
     recorder.sync.end()
-    assert len(recorder.frames) + len(recorder.forgotten) == sent
+    assert len(recorder.frames) + len(recorder.dropped) == sent
 
 
 @given(st.lists(st.integers(0, 5 * NS), min_size=1, max_size=50))
-def test_the_cache_keeps_no_more_than_its_length_in_order(stamps):
+def test_the_cache_is_ordered_and_not_longer_than_its_length(stamps):
     cache = MessageCache(NS)
     for stamp_ns in stamps:
         newest_ns = cache.newest_ns
         assert cache.add(stamp_ns, 0, stamp_ns) == (newest_ns is not None and stamp_ns < newest_ns)
         kept = [entry.stamp_ns for entry in cache._entries]
         assert kept == sorted(kept) and kept[-1] - kept[0] <= NS and cache.nearest(stamp_ns).value == stamp_ns
-
-
-def test_an_empty_cache():
-    cache = MessageCache(NS)
-    assert cache.newest_ns is None and cache.nearest(0, NS) is None and cache.arrived_at(0, NS) is None
 
 
 def test_the_newest_value_of_equal_stamps_is_kept():
@@ -184,25 +179,16 @@ def test_the_number_of_cached_values_is_bounded_for_creeping_stamps(length_ns):
     assert len(kept) == length_ns * MAX_RATE_HZ // NS + 1 and kept == list(range(3999, 3999 - len(kept), -1))
 
 
-@pytest.mark.parametrize('rate_hz,length_ns', [(90, NS), (120, 10 * NS), (300, NS), (30, 60 * NS)])
-def test_the_images_of_real_cameras_are_cached_for_the_whole_length(rate_hz, length_ns):
-    """Independent of the arrival times: a bag may be played slowly."""
-    cache = MessageCache(length_ns)
-    for number in range(70 * rate_hz):
-        cache.add(number * NS // rate_hz, 3600 * NS * number, number)
-    oldest = [entry for entry in reversed(cache)][-1]
-    assert cache.newest_ns - oldest.stamp_ns > length_ns - NS // rate_hz
-
-
 def held_by(sync):
     return len(sync._depths), len(sync._cameras), len(sync._waiting)
 
 
 @pytest.mark.slow
+@settings(max_examples=25)
 @given(st.lists(st.tuples(st.sampled_from(['depth', 'camera', 'boxes']),
                           st.sampled_from([0, 0, 1, 2, MS, PERIOD, -1, -PERIOD, 3600 * NS, -3600 * NS])),
                 min_size=200, max_size=600))
-def test_a_synchronizer_holds_a_bounded_number_whatever_the_stamps_are(steps):
+def test_the_memory_of_the_synchronizer_is_bounded_for_any_stamps(steps):
     """Stamps stand still, creep, leap and go back."""
     recorder, stamp_ns = Recorder(NS // 10), 10000 * NS
     for number, (kind, step_ns) in enumerate(steps):

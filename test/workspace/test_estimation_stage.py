@@ -33,12 +33,14 @@ def scene(wall_m, person_m=PERSON_M):
 
 
 def estimate(depth_m, rects_px, events, estimator='foreground'):
-    """The 3D boxes of an image. All of them can be tracked."""
+    """The 3D boxes of an image. All of them can be tracked, and their regions are inside the image."""
     results = []
 
     def on_frame(boxes2d, depth_msg, camera):
         header, _depth, boxes3d = stage.estimate(boxes2d, depth_msg, camera)
-        assert not usable_boxes3d(boxes3d_to_msg(boxes3d, header, camera))[1]
+        message = boxes3d_to_msg(boxes3d, header, camera)
+        assert not usable_boxes3d(message)[1]
+        assert all(box.roi.x_offset + box.roi.width <= 640 for box in message.boxes)
         results.extend(boxes3d)
     stage = EstimationStage(Bbox3dParams(estimator=estimator), events, on_frame)
     stage.add_camera_info(CameraInfo(header=HEADER, width=640, height=480, K=INTRINSICS), 0)
@@ -64,10 +66,12 @@ def test_an_implausible_box_does_not_mask_the_pixels_of_others(events):
 
 
 def test_rectangles_with_extreme_or_reversed_edges(events):
-    rects_px = [(-2 ** 31, -2 ** 31, 2 ** 31 - 1, 2 ** 31 - 1), (5, 5, 5, 9), PERSON_PX]
-    box, = estimate(scene(wall_m=5.0), rects_px, events, 'median')
-    assert box.rect_px == PERSON_PX
-    assert events.counts['boxes of impossible size'] == 1 and events.counts['boxes rejected'] == 1
+    rects_px = [(-2 ** 31, -2 ** 31, 2 ** 31 - 1, 2 ** 31 - 1), (5, 5, 5, 9), (9, 5, 5, 9), (1000, 900, 1100, 990),
+                (-9, 100, 650, 480), PERSON_PX]
+    wide, person = estimate(scene(wall_m=5.0), rects_px, events, 'median')
+    assert person.rect_px == PERSON_PX and wide.truncated_edges == (True, False, True, True)
+    assert events.counts['boxes of impossible size'] == 1 and events.counts['boxes rejected'] == 2
+    assert events.counts['boxes without depth'] == 1
 
 
 def params(model, estimator):

@@ -7,7 +7,8 @@ A distortion polynomial increases up to some distance from the axis and then fol
 model is not calibrated beyond that distance: rays there have no image, and images that only such rays would have, have
 no ray. Both are nan. OpenCV inverts the models. Its fixed-point iteration diverges for images whose distance from the
 axis grows more than twice as fast as in proportion to that of their rays; they have no ray either. Inside the image,
-no real lens stretches that much.
+no real lens stretches that much. OpenCV is imported only where it is used: it takes 100 MB, which nodes save whose
+camera has no distortion.
 """
 import functools
 
@@ -25,29 +26,17 @@ FOUND = 1e-9  # largest error of a solution: 1e-6 pixels
 ON_AXIS = 1e-8  # `cv2.fisheye` treats smaller values as 0
 UNIT = np.eye(3)  # camera matrix of dimensionless images
 
-
 # Model: minimum and maximum number of coefficients, and their order.
 MODELS = {PLUMB_BOB: (4, 5, 'k1, k2, p1, p2, k3'), RATIONAL_POLYNOMIAL: (8, 8, 'k1, k2, p1, p2, k3, k4, k5, k6'),
           INVERSE_BROWN_CONRADY: (5, 5, 'k1, k2, p1, p2, k3'), EQUIDISTANT: (4, 4, 'k1, k2, k3, k4')}
 
 
 def checked_distortion(model, coefficients):
-    """Validate and normalise a distortion for `camera_model.Camera`.
+    """Validate a distortion for `camera_model.Camera`. Returns the model and all of its coefficients.
 
-    Coefficients that are all zero mean no distortion, except for the equidistant model, which is a fisheye even then.
-    Zeros beyond the coefficients of the model, which some drivers append, are removed.
-
-    Returns
-    -------
-    model : str
-        Empty if there is no distortion.
-    coefficients : tuple of float
-        All coefficients of the model; empty if there is no distortion.
-
-    Raises
-    ------
-    ValueError
-        If the model is not one of `MODELS`, or its coefficients are too few, too many, or not below `LARGEST`.
+    Coefficients that are all zero mean no distortion, '' and (), except for the equidistant model, which is a fisheye
+    even then. Zeros beyond the coefficients of the model, which some drivers append, are removed. Raises ValueError if
+    the model is not one of `MODELS`, or its coefficients are too few, too many, or not below `LARGEST`.
     """
     coefficients = tuple(float(coefficient) for coefficient in coefficients)
     if not any(coefficients) and not (model == EQUIDISTANT and coefficients):
@@ -78,7 +67,8 @@ def distort(model, coefficients, rays):
     radius = np.hypot(rays[..., 0], rays[..., 1])
     with np.errstate(all='ignore'):  # rays without an image may overflow
         if model == EQUIDISTANT:
-            images = _opencv().fisheye.distortPoints(rays.reshape(-1, 1, 2), UNIT, np.array(coefficients))
+            import cv2
+            images = cv2.fisheye.distortPoints(rays.reshape(-1, 1, 2), UNIT, np.array(coefficients))
             images = images.reshape(rays.shape)
         else:
             images = _distort_brown(rays, coefficients, model == INVERSE_BROWN_CONRADY)
@@ -94,7 +84,8 @@ def undistort(model, coefficients, images):
     targets = images = np.asarray(images, float)
     if not images.size:
         return images  # OpenCV rejects empty arrays
-    for _step in range(STEPS if hasattr(_opencv(), 'undistortPointsIter') else STEPS_BEFORE_3_3_1):
+    import cv2
+    for _step in range(STEPS if hasattr(cv2, 'undistortPointsIter') else STEPS_BEFORE_3_3_1):
         rays = _solved_by_opencv(model, np.array(coefficients), targets.reshape(-1, 1, 2)).reshape(images.shape)
         errors = images - distort(model, coefficients, rays)
         if not np.any(np.abs(errors) > EXACT):
@@ -122,7 +113,7 @@ def _distort_brown(rays, coefficients, is_inverse):
 
 def _solved_by_opencv(model, coefficients, images):
     """Undistort images (n, 1, 2) to rays (n, 1, 2)."""
-    cv2 = _opencv()
+    import cv2
     if model == EQUIDISTANT:
         # OpenCV returns 0 next to the axis, and wrong rays for images farther than pi/2, which `undistort` rejects.
         next_to_axis = np.abs(images).max(axis=-1, keepdims=True) <= ON_AXIS
@@ -154,9 +145,3 @@ def _turning_point(numerator, denominator, limit):
     roots = np.concatenate([polynomial.trim(1e-12).roots() for polynomial in (slope, d)])
     real = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0)]
     return min([limit] + (np.sqrt(real) * (1 - 1e-6)).tolist())  # short of the pole
-
-
-def _opencv():
-    """The module cv2. It takes 100 MB, which nodes save whose camera has no distortion."""
-    import cv2
-    return cv2

@@ -192,9 +192,7 @@ def _box3d_fault(message):
     if not box.is_plausible:
         return ('centre (%g, %g, %g) and size (%g, %g); finite numbers and sizes of more than 0 and less than %g m '
                 'expected' % (tuple(box.center_m) + tuple(box.size_m[:2]) + (LARGEST_M,)))
-    covariance_m2 = box.covariance_m2
-    if covariance_m2 is None:
-        return ''
+    covariance_m2 = np.reshape(message.position_covariance, (3, 3))
     if not ((np.abs(covariance_m2) < FARTHEST_M).all()
             and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T).min() > -ROUNDING * max(1, covariance_m2.max())):
         return ('the position_covariance %s; a finite, positive semi-definite matrix, or zeros where it is not known, '

@@ -182,7 +182,9 @@ def estimate_foreground(samples, rect_px, geometry, nearer=()):
         return None
 
     on_body = own & (np.abs(ahead_m - layer_m) <= BODY_HALF_DEPTH_M)
-    layer_m = trimmed_mean(body_m)
+    # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
+    tenth = len(body_m) // 10
+    layer_m = body_m[tenth:len(body_m) - tenth].mean()
     top_m, bottom_m = layer_m * _slopes_down(flat_px, camera, level_from_camera)
     above_feet = on_body & (down_m < bottom_m - FEET_M)
     if level_from_camera[1, 2] > LOOKS_DOWN and above_feet.any():
@@ -299,13 +301,6 @@ def edges(x_m):
     high_m = in_place_m[last - rank] - (in_place_m[last - rank] - in_place_m[last - after]) * part / 100.0
     beyond_m = (high_m - low_m) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
     return low_m - beyond_m, high_m + beyond_m
-
-
-def trimmed_mean(sorted_depths_m):
-    """Mean without the lowest and the highest tenth; finer than the median, which is limited to the depth resolution.
-    """
-    tenth = len(sorted_depths_m) // 10
-    return sorted_depths_m[tenth:len(sorted_depths_m) - tenth].mean()
 
 
 def complete_truncated_extent(low, high, cut_low, cut_high, usual):

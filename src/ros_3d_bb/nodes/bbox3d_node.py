@@ -144,11 +144,11 @@ class SampleImages(object):
     """
 
     def __init__(self, cache_ns, sample, depth_range_m, diagnostics):
-        self._cache_ns, self._diagnostics = cache_ns, diagnostics
+        self._diagnostics = diagnostics
         self.reconfigure(sample, depth_range_m)
         self._raw_pub, self._color_pub, self._depth_pub = (
             rospy.Publisher('ros_3d_bb/' + name, Image, queue_size=1) for name in ('raw', 'color', 'depth'))
-        self._colors, self._subscriber = None, None
+        self._cache_ns, self._colors, self._subscriber = cache_ns, MessageCache(cache_ns), None
         # In a separate thread, because an unresponsive master must not block the 3D boxes.
         self._subscription = NewestWorker(self._subscribe, self._on_error)
 
@@ -164,8 +164,7 @@ class SampleImages(object):
         if self._depth_pub.get_num_connections():
             grey = depth_to_grey(depth, self._depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))
-        colors = self._colors
-        color = colors.nearest(header.stamp.to_nsec()) if colors is not None else None
+        color = self._colors.nearest(header.stamp.to_nsec())
         if color is None:
             return
         if needs_raw:
@@ -183,21 +182,18 @@ class SampleImages(object):
         """Subscribe to colour images or unsubscribe from them."""
         patient_master().getPid()  # raises if there is no master, for which rospy would hold a lock, even at Ctrl-C
         if wanted and self._subscriber is None:
-            self._colors = MessageCache(self._cache_ns)
             self._subscriber = subscribe(COLOR_TOPIC, Image, self._on_color, KEPT_AT_ONCE)
         elif not wanted and self._subscriber is not None:
             self._subscriber.unregister()
-            self._subscriber, self._colors = None, None
+            self._subscriber, self._colors = None, MessageCache(self._cache_ns)
 
     def _on_error(self, error):
         self._diagnostics.warn('colour images not subscribed', 'the ROS master does not respond (%s): the subscription '
                                'of colour images for ros_3d_bb/color and raw is unchanged; trying again' % error)
 
     def _on_color(self, message):
-        colors = self._colors
-        if colors is not None:
-            with self._diagnostics.rejecting('colour images'):
-                colors.add(stamp_of(message), 0, message)
+        with self._diagnostics.rejecting('colour images'):
+            self._colors.add(stamp_of(message), 0, message)
 
 
 def main():

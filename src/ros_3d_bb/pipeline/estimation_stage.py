@@ -1,7 +1,9 @@
 """Estimation stage: 3D boxes from 2D boxes, depth images and camera_info, shared by bbox3d_node and process_bag."""
 from typing import NamedTuple
 
+import genpy
 import numpy as np
+import tf2_ros
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
@@ -12,10 +14,11 @@ from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from
 from ros_3d_bb.core.limits import LARGEST_M
 from ros_3d_bb.core.params import DEPTH_SCALE, LARGEST, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
-from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import LEVEL, check_rect, estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
 
 UNSTAMPED = '2D boxes without a stamp'  # event, reported once
+TILT_UNKNOWN = 'tilt of the camera unknown'
 
 
 @parameters()
@@ -36,6 +39,7 @@ class Bbox3dParams(NamedTuple):
         1.0, 'How long depth images wait for their boxes, and boxes for their depth image. More than the detector '
         'ever takes.', 's')
     stamp_tolerance: float = STAMP_TOLERANCE
+    floor_frame: str = Param('base_link')
     assumed_delay: float = Param(
         0.05, 'Processing time of the detector, used where its boxes have no stamp.', 's', live=(0, 1))
     depth_image_range: float = Param(
@@ -55,17 +59,15 @@ class EstimationStage(object):
     events : event_counter.EventCounter
     on_frame : callable
         Called with `perception_msgs.Boxes2D`, sensor_msgs/Image and `camera_model.Camera` of one stamp.
+    transforms
+        As for `tracking_stage.TrackingStage`; they tell the tilt of the camera.
     depth_topic, info_topic : str
         Topics of the depth images and camera_info, for error messages about missing ones.
-
-    Raises
-    ------
-    ValueError
-        If the error model cannot be used.
     """
 
-    def __init__(self, params, events, on_frame, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
+    def __init__(self, params, events, on_frame, transforms, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
         self._events, self._depth_topic, self._info_topic = events, depth_topic, info_topic
+        self._transforms = transforms if params.floor_frame else None
         self._error_model = None
         if params.error_model:
             try:
@@ -79,7 +81,7 @@ class EstimationStage(object):
     def reconfigure(self, params):
         """Use another estimator, stride or assumed delay for the next boxes.
 
-        Raises ValueError and keeps the old parameters if the new ones are invalid.
+        Raises ValueError, as the constructor, and keeps the old parameters if the new ones are invalid.
         """
         estimator = estimator_named(params.estimator, params.stride)
         if self._error_model is not None:
@@ -94,8 +96,7 @@ class EstimationStage(object):
 
     def add_camera_info(self, message, now_ns):
         """Add a sensor_msgs/CameraInfo."""
-        camera = camera_from_msg(message)
-        self._sync.add_camera(stamp_if_any(message), now_ns, camera)
+        self._sync.add_camera(stamp_if_any(message), now_ns, camera_from_msg(message))
 
     def add_depth(self, message, now_ns):
         """Add a depth image."""
@@ -118,15 +119,8 @@ class EstimationStage(object):
         """Estimate the 3D boxes of one image, whose parts are those that `on_frame` was called with.
 
         A 2D box yields no 3D box if it is empty or reversed, has no depth of its own, or gives an implausible size.
-
-        Returns
-        -------
-        (std_msgs.msg.Header, DepthImage, list of Box3D)
-
-        Raises
-        ------
-        ValueError
-            If the depth image cannot be read, or its size differs from that of the camera.
+        Returns the header, the DepthImage and a list of Box3D. Raises ValueError if the depth image cannot be read, or
+        its size differs from that of the camera.
         """
         depth = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
         height, width = depth.values.shape
@@ -136,7 +130,9 @@ class EstimationStage(object):
         stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
         gap_s = abs((stamp - depth_msg.header.stamp).to_sec())
         implausible, rects_px = [], self._usable_rects(boxes2d)
-        estimates = estimate_boxes(depth, rects_px, camera, self._estimator, implausible)
+        frame_id = self._params.frame_id or depth_msg.header.frame_id
+        estimates = estimate_boxes(depth, rects_px, camera, self._estimator, implausible,
+                                   self._level_from_camera(frame_id))
         boxes3d = list(filter(None, estimates))
         for box in implausible:
             self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
@@ -151,8 +147,23 @@ class EstimationStage(object):
         counts['images estimated'] = 1
         self._events.count_all(counts)
 
-        frame_id = self._params.frame_id or depth_msg.header.frame_id
         return Header(stamp=stamp, frame_id=frame_id), depth, boxes3d
+
+    def _level_from_camera(self, frame_id):
+        """Return the rotation to the level frame, see `box3d_estimator.level_rotation`; `LEVEL` if the tilt is unknown.
+
+        The latest transform is used: the camera is fixed to the robot, so no wait for the image stamp is necessary.
+        """
+        if self._transforms is None:
+            return LEVEL
+        try:
+            return level_rotation(self._transforms.lookup(frame_id, self._params.floor_frame, genpy.Time(0))[:3, 2])
+        except tf2_ros.TransformException as error:
+            if TILT_UNKNOWN not in self._events.counts:
+                self._events.note(TILT_UNKNOWN, 'the tilt of the camera is unknown, as there is no transform from %s to '
+                                  '%s: %s; it is assumed to be level (~floor_frame)'
+                                  % (self._params.floor_frame, frame_id, error))
+            return LEVEL
 
     def _usable_rects(self, boxes2d):
         """Return the rectangles (x1, y1, x2, y2), in pixels, that are neither empty nor reversed."""
