@@ -3,17 +3,13 @@ import collections
 import contextlib
 import threading
 
-
 MOST_LAGS = 10000  # maximum number of stored latencies
 
 
 class EventCounter(object):
     """Counts events, and keeps the first message about each.
 
-    Parameters
-    ----------
-    clock : callable, optional
-        Returns ROS time (genpy.Time), for the latencies of `record_latency`.
+    `clock` returns ROS time (genpy.Time), for `record_latency`.
 
     Attributes
     ----------

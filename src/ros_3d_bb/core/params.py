@@ -67,15 +67,15 @@ def parameters(section=''):
     The Params are stored by name in the class attribute `PARAMS`. A Param without a section gets the given one.
     """
     def decorate(kind):
-        kind.PARAMS = OrderedDict((name, _in_section(kind._field_defaults[name], section)) for name in kind._fields)
+        kind.PARAMS = OrderedDict()
+        for name in kind._fields:
+            param = kind._field_defaults[name]
+            own_section = param.section or (section if param.text else SET_BY_LAUNCH)
+            kind.PARAMS[name] = param._replace(section=own_section)
         kind._field_defaults = {name: param.default for name, param in kind.PARAMS.items()}
         kind.__new__.__defaults__ = tuple(kind._field_defaults[name] for name in kind._fields)
         return kind
     return decorate
-
-
-def _in_section(param, section):
-    return param._replace(section=param.section or (section if param.text else SET_BY_LAUNCH))
 
 
 def table_of(kinds):
@@ -84,20 +84,10 @@ def table_of(kinds):
 
 
 def params_from(given, *kinds):
-    """Fill NamedTuple types from a flat dictionary; missing keys keep their defaults.
+    """Fill types decorated with `parameters` from a flat dictionary; missing keys keep their defaults.
 
-    A float may be given as an int, a str as a number (roslaunch converts `0` to one), a list as `a, b`.
-
-    Parameters
-    ----------
-    given : dict
-    *kinds : NamedTuple classes
-        Decorated with `parameters`; fields annotated with bool, int, float, str or list.
-
-    Returns
-    -------
-    list
-        One instance of each class.
+    A float may be given as an int, a str as a number (roslaunch converts `0` to one), a list as `a, b`. Returns a list
+    with one instance of each type.
 
     Raises
     ------
