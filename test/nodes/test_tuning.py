@@ -11,7 +11,7 @@ from dynamic_reconfigure.srv import Reconfigure
 from rosgraph_msgs.msg import Log
 
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
-from ros_3d_bb.nodes.common.live_parameters import live_in
+from ros_3d_bb.nodes.common.reconfigure_server import live_in
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams

@@ -113,7 +113,7 @@ def test_a_scene_is_simulated_and_shown_and_the_doctor_finds_nothing_wrong(reade
         graph.shows('RViz')
         graph.hears(TRACKS, 'ground_truth:objects')
         said = reader.types(DOCTOR, appended=' --patience 60', ROS_MASTER_URI=graph.environment['ROS_MASTER_URI'])
-    assert 'doctor: all is well' in said
+    assert 'doctor: no faults found' in said
 
 
 def test_the_pipeline_runs_beside_gazebo(reader, camera_bag):

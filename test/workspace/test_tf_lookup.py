@@ -39,7 +39,7 @@ def why_not(transforms, camera):
 
 def test_each_camera_is_told_of_its_own_frame(transforms):
     for camera in CAMERAS + CAMERAS:
-        assert 'tf knows no frame %s;' % camera in why_not(transforms, camera)
+        assert 'tf has no frame %s;' % camera in why_not(transforms, camera)
 
 
 def test_the_age_is_that_of_each_camera(transforms):

@@ -62,10 +62,7 @@ class ImageSeen(NamedTuple):
 
 
 class TfSeen(NamedTuple):
-    """Result of a tf lookup at a stamp.
-
-    `links`: {frame: `tf_tree.Link`}; `fault`: why there is no transform, empty if there is one.
-    """
+    """Result of a tf lookup at a stamp: all links, {frame: `tf_tree.Link`}, and why the transform is missing, if so."""
 
     target: str
     source: str
@@ -74,18 +71,11 @@ class TfSeen(NamedTuple):
     fault: str
 
 
-class Clock(NamedTuple):
-    """Whether the graph uses simulated time, and the number of received /clock messages."""
-
-    use_sim_time: bool
-    count: int
-
-
 class Observations(NamedTuple):
-    """All observations; fields are None if nothing was received. `clock` is None for a bag.
+    """All observations; fields are None if nothing was received.
 
     `topics`: {name: type} of all published topics; `nodes`: {name: (level, sentence)} from the diagnostics of nodes;
-    `seconds`: duration of the observation.
+    `seconds`: duration of the observation; `clock_count`: number of /clock messages.
     """
 
     streams: Dict[str, Stream]
@@ -97,14 +87,15 @@ class Observations(NamedTuple):
     color: Optional[ImageSeen] = None
     depth: Optional[ImageSeen] = None
     tf: Optional[TfSeen] = None
-    clock: Optional[Clock] = None
+    use_sim_time: bool = False
+    clock_count: int = 0
     nodes: dict = {}
     stamp_tolerance_s: float = 0.005
     cache_length_s: float = 1.0
 
 
 class Finding(NamedTuple):
-    """Result of a check: its subject, and either a fault with its fix or a fact. `fault` is empty if there is none."""
+    """Result of a check: its subject, and either a fact or a fault with its fix."""
 
     subject: str
     fact: str = ''
@@ -112,13 +103,8 @@ class Finding(NamedTuple):
     fix: str = ''
 
     @property
-    def is_wrong(self):
-        """Whether the check found a fault."""
-        return bool(self.fault)
-
-    @property
     def lines(self):
         """The finding as printed lines."""
-        if self.is_wrong:
+        if self.fault:
             return ['wrong  %s: %s' % (self.subject, self.fault), '       fix: %s' % self.fix]
         return ['ok     %s: %s' % (self.subject, self.fact)]

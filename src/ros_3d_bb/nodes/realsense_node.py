@@ -17,9 +17,9 @@ from ros_3d_bb.core.params import SET_BY_LAUNCH, WAIT_FOR_SUBSCRIBERS, Param, pa
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.drivers.realsense import (CameraLost, RealSense, RealSenseParams, check_params, frame_links,
                                          librealsense, optical_frame)
-from ros_3d_bb.nodes.common.diagnostics import Diagnostics, is_ending
-from ros_3d_bb.nodes.common.startup import read_params, run_node
-from ros_3d_bb.nodes.common.wait_for_subscribers import wait_for_subscribers
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.master import is_ending
+from ros_3d_bb.nodes.common.startup import read_params, run_node, wait_for_subscribers
 
 RETRY_S = 2.0
 CLOSING_S = 5.0  # upper limit

@@ -4,8 +4,7 @@ import contextlib
 import rospy
 from rosgraph.masterapi import MasterError
 
-from ros_3d_bb.nodes.common.master import NO_ANSWER, patient_master
-from ros_3d_bb.nodes.common.master_registration import on_new_master
+from ros_3d_bb.nodes.common.master import NO_ANSWER, on_new_master, patient_master
 
 
 class Label(object):

@@ -2,7 +2,7 @@
 import rospy
 
 from ros_3d_bb.core.latest_worker import NewestWorker
-from ros_3d_bb.nodes.common.master_registration import on_new_master
+from ros_3d_bb.nodes.common.master import on_new_master
 
 RESERVED = 1000  # IDs per reservation: a restarted tracker continues with the next thousand
 LARGEST = 2 ** 31 - 1  # largest integer of a ROS parameter

@@ -1,11 +1,16 @@
-"""Start-up of a node: read its parameters, create it, and report errors."""
+"""Start-up of a node: read its parameters, create it, report errors, and wait for subscribers."""
 import sys
+import time
 
 import rospy
 
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.nodes.common.allocator import reuse_freed_memory
-from ros_3d_bb.nodes.common.master_registration import Registration
+from ros_3d_bb.nodes.common.master import Registration
+
+POLL_S = 0.05
+SETTLING_S = 1.0  # a node that has connected to one topic may still be connecting to the others
+LONGEST_WAIT_S = 60.0  # after this time, missing subscribers are an error
 
 
 def read_params(*kinds):
@@ -28,3 +33,19 @@ def run_node(name, node_class, run=lambda _node: rospy.spin()):
         sys.exit(1)
     run(node)
     return node
+
+
+def wait_for_subscribers(publisher, wanted, meanwhile):
+    """Wait until a publisher has `wanted` subscribers, and call `meanwhile` repeatedly.
+
+    Raises RuntimeError if there are fewer after LONGEST_WAIT_S.
+    """
+    began_s = time.monotonic()
+    while publisher.get_num_connections() < wanted and not rospy.is_shutdown():
+        if time.monotonic() - began_s > LONGEST_WAIT_S:
+            raise RuntimeError('%s has %d subscribers after %.0f s; %d expected (~wait_for_subscribers)' % (
+                publisher.resolved_name, publisher.get_num_connections(), LONGEST_WAIT_S, wanted))
+        meanwhile()
+        time.sleep(POLL_S)
+    if wanted:
+        time.sleep(SETTLING_S)

@@ -12,9 +12,9 @@ from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.params import WAIT_FOR_SUBSCRIBERS, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
-from ros_3d_bb.nodes.common.diagnostics import Diagnostics, is_ending
-from ros_3d_bb.nodes.common.startup import read_params, run_node
-from ros_3d_bb.nodes.common.wait_for_subscribers import wait_for_subscribers
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.master import is_ending
+from ros_3d_bb.nodes.common.startup import read_params, run_node, wait_for_subscribers
 from ros_3d_bb_lab.simulation.ros.simulator_msgs import TRUTH_TOPIC, simulated_messages
 from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
 from ros_3d_bb_lab.simulation.simulator import Simulator
