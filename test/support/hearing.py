@@ -7,8 +7,7 @@ import sys
 import time
 
 import rospy
-
-from support.ros_types import message_class
+from genpy.message import get_message_class
 
 
 def wait_for(wanted, seconds):
@@ -20,7 +19,7 @@ def wait_for(wanted, seconds):
         for name in sorted(missing - set(subscribers)):
             topic, _colon, field = name.partition(':')
             if rospy.resolve_name(topic) in kinds:
-                subscribers[name] = rospy.Subscriber(topic, message_class(kinds[rospy.resolve_name(topic)]),
+                subscribers[name] = rospy.Subscriber(topic, get_message_class(kinds[rospy.resolve_name(topic)]),
                                                      _checker(name, field, missing), buff_size=2 ** 24)
         time.sleep(0.1)
     return sorted(missing)
