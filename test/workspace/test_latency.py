@@ -11,7 +11,7 @@ import pytest
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
-from support.running import processes_naming
+from support.processes import processes_naming
 
 NODES = {'replay_node', 'latency_probe_node', 'bbox3d_node', 'tracker_node'}
 

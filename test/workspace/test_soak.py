@@ -22,7 +22,7 @@ from soak.invariants import it_recovers
 from soak.records import INTERRUPTED
 from soak.rig import Interrupted, Rig
 from support.launching import loaded
-from support.running import processes_naming
+from support.processes import processes_naming
 
 TEST = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 SCENE = {'duration': 2.0, 'rate': 5.0, 'people': [{'start': [3.0, 0.6], 'facing': 3.1, 'repeat': True, 'moves': [
