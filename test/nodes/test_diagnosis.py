@@ -12,14 +12,15 @@ import pytest
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import TransformStamped
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, boxes2d_to_msg
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
+from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.doctor import graph_findings
 from ros_3d_bb_lab.evaluation.latency.benchmark import end, free_port
@@ -27,15 +28,16 @@ from support.ros import Recorder, camera_info, depth_message, header_at, wait_un
 
 COLOR, DEPTH = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
 INFO, DEPTH_INFO, BOXES = 'camera/color/camera_info', 'camera/aligned_depth_to_color/camera_info', 'yolo_bounding_box'
-KINDS = {'/tf': TFMessage, INFO: CameraInfo, DEPTH_INFO: CameraInfo, DEPTH: Image, COLOR: Image, BOXES: Int32MultiArray}
+KINDS = {'tf': TFMessage, INFO: CameraInfo, DEPTH_INFO: CameraInfo, DEPTH: Image, COLOR: Image, BOXES: Int32MultiArray}
+MAP_FROM_CAMERA = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])
 PERIOD_S = 0.1
-TWO_YEARS_S = 63000000
+TWO_YEARS_NS = 63000000 * NS
 
 
 class Rig(object):
-    """A camera and a detector; `change(topic, message)` returns what is sent instead of a message, or None.
+    """A camera and a detector, and the log and the status of the nodes.
 
-    `log` and `status_of` are the log lines and the status of the nodes.
+    `change` maps the stamp to the messages that are sent instead, {topic: message or None}.
     """
 
     def __init__(self):
@@ -65,76 +67,49 @@ class Rig(object):
     def _run(self):
         while not rospy.is_shutdown():
             stamp_ns = int(time.time() * NS)
-            for topic in KINDS:
-                message = self.change(topic, made(topic, stamp_ns))
+            for topic, message in dict(messages_at(stamp_ns), **self.change(stamp_ns)).items():
                 if message is not None and topic in self.pubs:
                     self.pubs[topic].publish(message)
             time.sleep(PERIOD_S)
 
 
-def unchanged(_topic, message):
-    return message
+def unchanged(_stamp_ns):
+    return {}
 
 
-def made(topic, stamp_ns):
-    if topic == '/tf':
-        transform = TransformStamped(header=header_at(stamp_ns, 'map'), child_frame_id='camera_color_optical_frame')
-        turn = transform.transform.rotation
-        turn.x, turn.y, turn.z, turn.w = -0.5, 0.5, -0.5, 0.5
-        return TFMessage([transform])
-    if topic in (INFO, DEPTH_INFO):
-        return camera_info(stamp_ns)
-    if topic == DEPTH:
-        return depth_message(stamp_ns, 2000)
-    if topic == COLOR:
-        return fill_image(Image(header=header_at(stamp_ns)), np.zeros((48, 64, 3), np.uint8), 'rgb8')
-    return boxes2d_to_msg(np.array([[20, 10, 44, 38]]), header_at(stamp_ns))
+def messages_at(stamp_ns):
+    """{topic: message} of an image and its boxes, in the order in which they are sent."""
+    header, depth = header_at(stamp_ns), DepthImage(np.full((48, 64), 2000, np.uint16), 0.001)
+    messages = dict(messages_of(CameraFrame(header, Camera(64, 48, 60.0, 60.0, 31.5, 23.5),
+                                            np.zeros((48, 64, 3), np.uint8), depth,
+                                            [('map', header.frame_id, MAP_FROM_CAMERA)])))
+    messages[BOXES] = boxes2d_to_msg(np.array([[20, 10, 44, 38]]), header)
+    return messages
 
 
-def without(missing):
-    return lambda topic, message: None if topic == missing else message
-
-
-def replaced(replaced_topic, make):
-    return lambda topic, message: make(message) if topic == replaced_topic else message
-
-
-def depth_like(depth_mm, shape):
-    return replaced(DEPTH, lambda message: depth_message(message.header.stamp.to_nsec(), depth_mm, shape))
-
-
-def two_years_ago(_topic, message):
-    """As from an old bag that is played without its clock."""
-    if isinstance(message, Int32MultiArray):
-        boxes = boxes2d_from_msg(message)
-        return boxes2d_to_msg(boxes.boxes, header_at(boxes.stamp_ns - TWO_YEARS_S * NS))
-    for part in getattr(message, 'transforms', [message]):
-        part.header.stamp = part.header.stamp - rospy.Duration(TWO_YEARS_S)
-    return message
-
-
-# The fault; the node that reports it and words of its report; words of doctor, and of its fix.
+# The messages that are sent instead, by the stamp of the others; the node that reports the fault and words of its report;
+# words of doctor, and of its fix.
 REJECTED = {
-    'no tf': (without('/tf'), 'tracker_node',
+    'no tf': (lambda _stamp_ns: {'tf': None}, 'tracker_node',
               'the transform from camera_color_optical_frame to map ends', 'tf has no frames', 'robot_state_publisher'),
-    'depth of another size': (depth_like(2000, (24, 32)), 'bbox3d_node', 'depth must be aligned to colour',
-                              'the depth image has 32 x 24 pixels, the colour camera 64 x 48', 'realsense.launch'),
-    'metres in a 16UC1': (depth_like(2, (48, 64)), 'bbox3d_node', 'metres in a 16UC1', 'metres in a 16UC1',
-                          'depth_scale'),
-    'empty camera_info': (replaced(INFO, lambda message: CameraInfo(header=message.header)), 'bbox3d_node',
+    'depth of another size': (
+        lambda stamp_ns: {DEPTH: depth_message(stamp_ns, 2000, (24, 32))}, 'bbox3d_node',
+        'depth must be aligned to colour', 'the depth image has 32 x 24 pixels, the colour camera 64 x 48',
+        'realsense.launch'),
+    'metres in a 16UC1': (lambda stamp_ns: {DEPTH: depth_message(stamp_ns, 2)}, 'bbox3d_node', 'metres in a 16UC1',
+                          'metres in a 16UC1', 'depth_scale'),
+    'empty camera_info': (lambda stamp_ns: {INFO: CameraInfo(header=header_at(stamp_ns))}, 'bbox3d_node',
                           'camera_info rejected: it is empty', 'it is empty', 'camera_calibration'),
-    'boxes older than the cache': (replaced(BOXES, lambda _message: made(BOXES, int((time.time() - 3) * NS))),
-                                   'bbox3d_node', 's too old; the detector is slower', 'the 2D boxes arrive 3.',
-                                   'cache_length')}
+    'boxes older than the cache': (lambda stamp_ns: {BOXES: messages_at(stamp_ns - 3 * NS)[BOXES]}, 'bbox3d_node',
+                                   's too old; the detector is slower', 'the 2D boxes arrive 3.', 'cache_length')}
 LASTING = {
-    'depth of another camera': (replaced(DEPTH_INFO, lambda message: camera_info(message.header.stamp.to_nsec(),
-                                                                                 focal=45.0)),
-                                'bbox3d_node', 'depth is not aligned to colour: the intrinsics',
+    'depth of another camera': (lambda stamp_ns: {DEPTH_INFO: camera_info(stamp_ns, focal=45.0)}, 'bbox3d_node',
+                                'depth is not aligned to colour: the intrinsics',
                                 'intrinsics fx fy cx cy of depth are 45.0', 'align_depth:=true'),
-    'stamps of two years ago': (two_years_ago, 'bbox3d_node', '729.2 days before ROS time',
-                                '729.2 days before ROS time', 'use_sim_time'),
-    'no boxes': (without(BOXES), 'bbox3d_node', 'no messages on /yolo_bounding_box',
-                 'images arrive, but no 2D boxes', 'enable')}
+    'stamps of two years ago': (lambda stamp_ns: messages_at(stamp_ns - TWO_YEARS_NS), 'bbox3d_node',
+                                '729.2 days before ROS time', '729.2 days before ROS time', 'use_sim_time'),
+    'no boxes': (lambda _stamp_ns: {BOXES: None}, 'bbox3d_node', 'no messages on /yolo_bounding_box',
+                 'no messages on /yolo_bounding_box', 'enable')}
 
 
 @pytest.fixture(scope='module', autouse=True)

@@ -54,22 +54,11 @@ class Immediately(object):
 
 
 class Connections(object):
-    """Connections of the nodes that were created in `masterless`.
-
-    Attributes
-    ----------
-    publishers, subscribers : dict
-        By topic.
-    services : dict
-        Types by name.
-    buffers, timers : list
-        tf buffers, and callbacks.
-    now : genpy.Time
-        ROS time.
-    """
+    """Connections of the nodes that were created in `masterless`, and ROS time."""
 
     def __init__(self):
-        self.publishers, self.subscribers, self.services, self.buffers, self.timers = {}, {}, {}, [], []
+        self.publishers, self.subscribers = {}, {}  # by topic
+        self.services, self.buffers, self.timers = {}, [], []  # types by name, tf buffers, and callbacks
         self.now = genpy.Time(1)
 
     def send(self, topic, message):

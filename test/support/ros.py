@@ -53,7 +53,7 @@ class Recorder(object):
         self._subscriber.unregister()
 
     def emptied(self):
-        """Itself, without the messages so far: a connection that lasts for several tests misses nothing at its start."""
+        """Itself, without the messages so far. A connection that lasts for several tests misses no message."""
         self.messages = []
         return self
 

@@ -1,4 +1,6 @@
 """From observations to faults and their fixes: each fault alone in a working pipeline."""
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.image_msgs import units_fault
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS, findings
-from ros_3d_bb.diagnosis.observations import (CameraSeen, ImageSeen, Observations, Publisher, Role, Stream, TfSeen)
+from ros_3d_bb.diagnosis.observations import Newest, Observations, Publisher, Role, Stream, TfSeen
 from ros_3d_bb.diagnosis.tf_tree import Link, links_in, why_missing
 from ros_3d_bb.diagnosis.topic_faults import paired_share
 
@@ -25,6 +27,15 @@ LINKS = {'odom': Link('map', 990, 1010), 'base_link': Link('odom', 990, 1010), '
          'optical': Link('camera_link', 0, 0)}
 
 
+def info_seen(camera, fault=''):
+    return Newest(SimpleNamespace(header=SimpleNamespace(frame_id='optical')), camera, fault)
+
+
+def image_seen(encoding, width=640, frame_id='optical', fault=''):
+    header = SimpleNamespace(frame_id=frame_id)
+    return Newest(SimpleNamespace(header=header, width=width, height=480, encoding=encoding), None, fault)
+
+
 def sound_stream(key, **changes):
     role = ROLES[key]
     stream = Stream(role, '/' + role.name, role.kind, (Publisher('/node'),), 50, 10.0, STAMPS, 0.05, 0.05)
@@ -35,10 +46,9 @@ def sound(**changes):
     """Observations of a working pipeline, with some fields changed."""
     streams = {key: sound_stream(key) for key in ROLES}
     topics = {stream.topic: stream.role.kind for stream in streams.values()}
-    seen = Observations(streams, topics, 5.0, color_camera=CameraSeen(CAMERA, 'optical'),
-                        depth_camera=CameraSeen(CAMERA, 'optical'), color=ImageSeen(640, 480, 'rgb8', 'optical'),
-                        depth=ImageSeen(640, 480, '16UC1', 'optical'), tf=TfSeen('map', 'optical', 1000.0, LINKS, ''),
-                        nodes={'tracker_node': (0, 'working')})
+    seen = Observations(streams, topics, 5.0, color_info=info_seen(CAMERA), depth_info=info_seen(CAMERA),
+                        color=image_seen('rgb8'), depth=image_seen('16UC1'),
+                        tf=TfSeen('map', 'optical', 1000.0, LINKS, ''), nodes={'tracker_node': (0, 'working')})
     return seen._replace(**changes)
 
 
@@ -78,13 +88,13 @@ CASES = [
      '/driver publishes it, but it cannot be reached at robot', 'ROS_IP'),
     (silent(DEPTH), 'depth images', 'no messages on /camera/depth for 5 s, although /node publishes it', 'wake it'),
     (with_stream(COLOR, rate_hz=1.5), 'colour images', 'only 1.5 Hz', 'USB 3'),
-    (sound(color_camera=CameraSeen(None, 'optical', 'it is empty')), 'camera', 'it is empty', 'camera_calibration'),
-    (sound(depth=ImageSeen(848, 480, '16UC1', 'optical')), 'alignment', '848 x 480 pixels', 'align_depth:=true'),
-    (sound(depth_camera=CameraSeen(CAMERA._replace(fx=385.0), 'optical')), 'alignment', '385.0', 'align_depth:=true'),
-    (sound(depth=ImageSeen(640, 480, '16UC1', 'depth_optical')), 'alignment', 'frame depth_optical', 'align_depth'),
-    (sound(depth=ImageSeen(640, 480, '16UC1', 'optical', 'metres in a 16UC1')), 'depth encoding', 'metres in a 16UC1',
+    (sound(color_info=info_seen(None, 'it is empty')), 'camera', 'it is empty', 'camera_calibration'),
+    (sound(depth=image_seen('16UC1', width=848)), 'alignment', '848 x 480 pixels', 'align_depth:=true'),
+    (sound(depth_info=info_seen(CAMERA._replace(fx=385.0))), 'alignment', '385.0', 'align_depth:=true'),
+    (sound(depth=image_seen('16UC1', frame_id='depth_optical')), 'alignment', 'frame depth_optical', 'align_depth'),
+    (sound(depth=image_seen('16UC1', fault='metres in a 16UC1')), 'depth encoding', 'metres in a 16UC1',
      'depth_scale'),
-    (sound(color=ImageSeen(640, 480, 'yuv422', 'optical', "has encoding 'yuv422'")), 'colour encoding', 'yuv422',
+    (sound(color=image_seen('yuv422', fault="has encoding 'yuv422'")), 'colour encoding', 'yuv422',
      'rgb8'),
     (with_stream(DEPTH, stamps_ns=(), lag_s=None), 'stamps', 'no stamp (zero)', 'set it to the time'),
     (with_stream(DEPTH, lag_s=9e6), 'stamps', '104.2 days before ROS time', 'use_sim_time true'),
@@ -101,7 +111,7 @@ CASES = [
      'the transform from base_link to odom ends 5.000 s before', 'publisher of base_link'),
     (without_tf(dict(LINKS, odom=Link('map', 1003, 1010)), 1000.0), 'transforms',
      'the transform from odom to map begins 3.000 s after', 'clocks'),
-    (silent(BOXES2D), 'detector', 'images arrive, but no 2D boxes', 'wake it up'),
+    (silent(BOXES2D), '2D boxes', 'no messages on /camera/boxes2d', 'wake it up'),
     (with_stream(BOXES2D, stamps_ns=moved(STAMPS, 0.05)), 'boxes and depth', 'only 0 %', 'label'),
     (with_stream(BOXES2D, lag_s=1.6), 'boxes and depth', '1.6 s after their depth image', 'cache_length'),
     (silent(BOXES3D), '3D boxes', 'no messages on /camera/boxes3d', 'wake it up'),
@@ -165,7 +175,7 @@ def test_a_bag_needs_no_boxes_and_one_with_boxes_no_colour():
 
 
 @pytest.mark.parametrize('seen, fault, fix', [
-    (silent(INFO, published_kind='')._replace(color_camera=None), 'there is no /camera/info in the bag', 'record it'),
+    (silent(INFO, published_kind='')._replace(color_info=None), 'there is no /camera/info in the bag', 'record it'),
     (silent(INFO), 'no messages on /camera/info in the first 5 s', 'record it'),
     (with_stream(DEPTH, lag_s=7300.0), 'the stamps on /camera/depth are 2.0 hours from the time', 'process_bag')])
 def test_a_fault_of_a_bag_is_reported_with_its_fix(seen, fault, fix):

@@ -11,7 +11,6 @@ from fuzz import hostile
 from fuzz.nodes import TARGETS
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.realsense_node import RealSenseNode
-from ros_3d_bb.tracking.thesis_tracker import ThesisTrackerParams
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import LatencyProbeNode
 from ros_3d_bb_lab.evaluation.latency.replay_node import ReplayNode
 from ros_3d_bb_lab.simulation.ros.simulator_node import SimulatorNode
@@ -77,15 +76,6 @@ def test_a_node_connects_to_the_topics_and_services_of_its_docstring(name):
         if hasattr(node, 'pause_or_resume'):
             node.pause_or_resume()
         assert {call[0][0]: call[0][1]._type for call in proxy.call_args_list} == documented(name, 'Calls')
-
-
-def test_parameters_have_their_defaults_and_descriptions():
-    parameters = {parameter.name: parameter for parameter in node_pages.parameters_of(NODES['tracker_node'])}
-    assert parameters['alpha'] == node_pages.Parameter(
-        'alpha', 'float', '0.2', ThesisTrackerParams.PARAMS['alpha'].text, 'Allowed: 1e-06 to 1. Live: 0.01 to 1.',
-        'thesis')
-    assert parameters['target_frame'].default == 'map'
-    assert parameters['target_frame'].meaning.endswith('(`frame_world:=`)')
 
 
 def test_a_parameter_without_description_is_an_error():

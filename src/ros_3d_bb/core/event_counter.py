@@ -10,25 +10,15 @@ class EventCounter(object):
     """Counts events, and keeps the first message about each.
 
     `clock` returns ROS time (genpy.Time), for `record_latency`.
-
-    Attributes
-    ----------
-    counts : dict
-        Number of occurrences of each event, in the order of first occurrence.
-    sentences : dict
-        First message of each event that has one.
-    received : dict
-        Number of inputs of each kind that `receiving` counted.
-    lags_ns : collections.deque
-        Latencies of the newest results, nanoseconds.
     """
 
     def __init__(self, clock=None):
         self._lock = threading.Lock()  # a topic with two publishers has two threads
         self._clock = clock
-        self.counts, self.received = collections.OrderedDict(), collections.OrderedDict()
-        self.sentences = {}
-        self.lags_ns = collections.deque(maxlen=MOST_LAGS)
+        self.counts = collections.OrderedDict()  # by event, in the order of first occurrence
+        self.received = collections.OrderedDict()  # number of inputs of each kind
+        self.sentences = {}  # first message of each event that has one
+        self.lags_ns = collections.deque(maxlen=MOST_LAGS)  # latencies of the newest results
 
     def count(self, event, amount=1):
         """Count an expected event."""

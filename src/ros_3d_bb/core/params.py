@@ -7,31 +7,15 @@ LARGEST = 1e6
 
 
 class Param(NamedTuple):
-    """Schema of one parameter, given as the default of a field of a NamedTuple.
+    """Schema of one parameter, given as the default of a field of a NamedTuple."""
 
-    Attributes
-    ----------
-    default : bool, int, float, str or tuple
-    text : str
-        Description in full sentences. Empty if the `doc=` of the corresponding launch argument describes it.
-    unit : str
-    limits : (number, number)
-        Values outside this range are rejected.
-    choices : tuple of str
-        Other values are rejected; empty if any text is allowed.
-    live : bool or (number, number)
-        Whether the parameter can be changed at run time. For a number: range of the slider in rqt_reconfigure.
-    section : str
-        Heading in config/*.yaml and group in rqt_reconfigure.
-    """
-
-    default: Any
-    text: str = ''
+    default: Any  # bool, int, float, str or tuple
+    text: str = ''  # description in sentences; empty if the `doc=` of the corresponding launch argument describes it
     unit: str = ''
-    limits: Tuple[float, float] = (0, LARGEST)
-    choices: Tuple[str, ...] = ()
-    live: Union[bool, Tuple[float, float]] = False
-    section: str = ''
+    limits: Tuple[float, float] = (0, LARGEST)  # values outside this range are rejected
+    choices: Tuple[str, ...] = ()  # other values are rejected; empty if any text is allowed
+    live: Union[bool, Tuple[float, float]] = False  # whether it can be changed at run time; for numbers, slider range
+    section: str = ''  # heading in config/*.yaml and group in rqt_reconfigure
 
     @property
     def allowed(self):

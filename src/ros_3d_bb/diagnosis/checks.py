@@ -15,8 +15,8 @@ IMAGES = COLOR, DEPTH, INFO
 
 def findings(seen):
     """Run all checks of an `Observations`. Returns a list of Finding."""
-    checks = (_clock, _images, _camera, _alignment, _encodings, _stamps, _pairs_of_images, _transforms, _detector,
-              _pairs_of_boxes, _results)
+    checks = (_clock, _images, _camera, _alignment, _encodings, _stamps, _pairs_of_images, _transforms, _pairs_of_boxes,
+              _results)
     found = [finding for check in checks for finding in check(seen)]
     return found + list(_nodes(seen, any(finding.fault for finding in found)))
 
@@ -54,27 +54,27 @@ def _images(seen):
 
 
 def _camera(seen):
-    if seen.color_camera is None:
+    if seen.color_info is None:
         return
-    camera, frame_id, fault = seen.color_camera
-    if camera is None:
+    info, camera, fault = seen.color_info
+    if fault:
         yield Finding('camera', '', '%s: %s' % (seen.streams[INFO].topic, fault),
-                      'a RealSense publishes its own calibration; calibrate other cameras (camera_calibration), and '
-                      'pass the file to the driver')
+                      'calibrate the camera (camera_calibration), and pass the file to the driver; a RealSense has its '
+                      'own calibration')
     else:
-        yield Finding('camera', '%d x %d pixels, focal length %.0f, frame %s' % (camera[:3] + (frame_id,)))
+        yield Finding('camera', '%d x %d pixels, focal length %.0f, frame %s' % (camera[:3] + (info.header.frame_id,)))
 
 
 def _alignment(seen):
     """Check that depth has the image size, intrinsics and frame of colour."""
-    if seen.depth is None or seen.color_camera is None or seen.color_camera.camera is None:
+    if seen.depth is None or seen.color_info is None or seen.color_info.fault:
         return
-    camera, frame_id, _fault = seen.color_camera
-    fault = size_fault(camera, seen.depth.width, seen.depth.height)
-    if not fault and seen.depth_camera is not None and seen.depth_camera.camera is not None:
-        fault = intrinsics_fault(camera, seen.depth_camera.camera)
-    yield Finding('alignment', 'depth has the pixels and the frame of colour',
-                  fault or frames_fault(frame_id, seen.depth.frame_id), ALIGN)
+    depth, camera = seen.depth.message, seen.color_info.converted
+    fault = size_fault(camera, depth.width, depth.height)
+    if not fault and seen.depth_info is not None and not seen.depth_info.fault:
+        fault = intrinsics_fault(camera, seen.depth_info.converted)
+    fault = fault or frames_fault(seen.color_info.message.header.frame_id, depth.header.frame_id)
+    yield Finding('alignment', 'depth has the pixels and the frame of colour', fault, ALIGN)
 
 
 def _encodings(seen):
@@ -83,7 +83,7 @@ def _encodings(seen):
             ('depth', seen.depth, 'correct the driver, or set depth_scale to metres per unit in config/bbox3d.yaml and '
              'config/tracker.yaml: 1.0 for metres, 0.001 for millimetres')):
         if image is not None:
-            fact = '%s, %d x %d pixels' % (image.encoding, image.width, image.height)
+            fact = '%s, %d x %d pixels' % (image.message.encoding, image.message.width, image.message.height)
             yield Finding(subject + ' encoding', fact, image.fault, fix)
 
 
@@ -139,16 +139,6 @@ def _transforms(seen):
         yield Finding('transforms', '%s to %s is available at the stamp of the image' % (source, target))
 
 
-def _detector(seen):
-    """Check that 2D boxes arrive if images do; detectors also publish empty arrays."""
-    boxes = seen.streams[BOXES2D]
-    if boxes.count:
-        yield Finding('detector', '%s, %.1f Hz' % (boxes.topic, boxes.rate_hz))
-    elif _has_messages(seen, COLOR) and not seen.is_bag:
-        fault, fix = silence_fault(boxes, seen.topics, (), seen.seconds)
-        yield Finding('detector', '', 'images arrive, but no 2D boxes: %s' % fault, fix)
-
-
 def _pairs_of_boxes(seen):
     boxes, depth, subject = seen.streams[BOXES2D], seen.streams[DEPTH], 'boxes and depth'
     if not (boxes.count and depth.count):
@@ -172,10 +162,11 @@ def _pairs_of_boxes(seen):
 
 
 def _results(seen):
-    """Check that 3D boxes and tracks arrive if their inputs do."""
-    has_inputs = {BOXES3D: all(_has_messages(seen, key) for key in (DEPTH, INFO, BOXES2D)),
+    """Check that boxes and tracks arrive if their inputs do; detectors also publish empty arrays."""
+    has_inputs = {BOXES2D: _has_messages(seen, COLOR),
+                  BOXES3D: all(_has_messages(seen, key) for key in (DEPTH, INFO, BOXES2D)),
                   TRACKS: _has_messages(seen, BOXES3D) and seen.tf is not None and not seen.tf.fault}
-    for key in (BOXES3D, TRACKS):
+    for key in (BOXES2D, BOXES3D, TRACKS):
         stream = seen.streams[key]
         if stream.count:
             yield Finding(stream.role.title, '%s, %.1f Hz' % (stream.topic, stream.rate_hz))

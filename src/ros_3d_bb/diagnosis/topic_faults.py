@@ -78,10 +78,12 @@ def paired_share(stamps_ns, among_ns, tolerance_s):
 
     Only stamps in the time range of `among_ns` are counted. Returns None if there are none.
     """
-    others, tolerance_ns = np.sort(np.array(among_ns, np.int64)), int(tolerance_s * NS)
-    covered = [stamp for stamp in stamps_ns if len(others) and others[0] <= stamp <= others[-1]]
-    if not covered:
+    if not among_ns:
         return None
-    next_at = np.searchsorted(others, np.array(covered) - tolerance_ns)
-    is_paired = others[np.minimum(next_at, len(others) - 1)] <= np.array(covered) + tolerance_ns
-    return float(np.mean(is_paired))
+    stamps, others, tolerance_ns = np.array(stamps_ns, np.int64), np.sort(among_ns), int(tolerance_s * NS)
+    covered = stamps[(others[0] <= stamps) & (stamps <= others[-1])]
+    if not covered.size:
+        return None
+    first = np.searchsorted(others, covered - tolerance_ns)  # candidates in the tolerance are others[first:end]
+    end = np.searchsorted(others, covered + tolerance_ns, 'right')
+    return float(np.mean(first < end))

@@ -3,6 +3,7 @@ import argparse
 import os
 import socket
 import sys
+import threading
 import time
 from urllib.parse import urlparse
 
@@ -11,11 +12,11 @@ import rospy
 
 from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.core.params import params_from
-from ros_3d_bb.diagnosis.bag_observer import observe_bag
 from ros_3d_bb.diagnosis.checks import findings
+from ros_3d_bb.diagnosis.message_observer import observe_bag
 from ros_3d_bb.diagnosis.observations import Finding
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver, name_for, tracker_param
-from ros_3d_bb.nodes.common.master import NO_ANSWER, TIMEOUT_S, is_ending, patient_master
+from ros_3d_bb.nodes.common.master import NO_ANSWER, TIMEOUT_S, patient_master
 from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams
 
 LOCAL = 'localhost', '127.0.0.1', '127.0.1.1', '::1'
@@ -64,11 +65,14 @@ def graph_findings(arguments):
     The graph is observed repeatedly until no fault is found or `arguments.patience` seconds have passed.
     """
     deadline_s = time.monotonic() + arguments.patience
+    shutdown = threading.Event()
+    rospy.on_shutdown(shutdown.set)  # on Ctrl-C, because rospy handles the signal itself
     while True:
         cameras = tracked_cameras()
         camera = arguments.camera or cameras[0]
         observer = GraphObserver(arguments.target_frame, camera)
-        _sleep(arguments.seconds)
+        if shutdown.wait(arguments.seconds):
+            raise KeyboardInterrupt
         found = findings(observer.observations())
         observer.close()
         if len(cameras) > 1:
@@ -86,15 +90,6 @@ def tracked_cameras():
     except ValueError:  # reported by the tracker itself
         return ['']
     return [str(camera) for camera in tracker.cameras] or ['']
-
-
-def _sleep(seconds):
-    """Sleep in wall-clock time. Raises KeyboardInterrupt on Ctrl-C, because rospy handles the signal itself."""
-    until_s = time.monotonic() + seconds
-    while time.monotonic() < until_s:
-        time.sleep(0.05)
-        if is_ending():
-            raise KeyboardInterrupt
 
 
 def machine_findings():
@@ -141,11 +136,9 @@ def _parser():
     parser.add_argument('bag', nargs='?', help='a bag; without it, the running graph is checked')
     parser.add_argument('--seconds', type=float, default=5.0, metavar='S', help='duration of a check (default: 5)')
     parser.add_argument('--patience', type=float, default=0.0, metavar='S',
-                        help='repeat the checks for this time while there are faults: nodes may be starting '
-                        '(default: 0)')
+                        help='repeat the checks for this time while there are faults (default: 0)')
     parser.add_argument('--camera', default='', metavar='NAME',
-                        help='namespace of the camera that is checked, if there are several (default: the first one of '
-                        'tracker_node; none for a bag)')
+                        help='namespace of the camera (default: the first one of tracker_node; none for a bag)')
     parser.add_argument('--target-frame', default='', metavar='FRAME',
                         help='fixed frame of the tracks (default: that of tracker_node; map for a bag)')
     return parser

@@ -1,5 +1,4 @@
 """Observe the topics of a running ROS graph for some seconds, as input of the checks."""
-import functools
 import os
 import time
 
@@ -58,24 +57,17 @@ class GraphObserver(object):
         """Return the Observations up to now."""
         self._topics.update(published_topics())
         boxes3d = self._observed[BOXES3D].newest
-        target = self._target_frame or tracker_param('target_frame')
-        source = tracker_param('camera_frame') or (
+        target_frame = self._target_frame or tracker_param('target_frame')
+        camera_frame = tracker_param('camera_frame') or (
             boxes3d.header.frame_id if boxes3d is not None else self._bbox3d_param('frame_id'))
         return observations_of(
             self._observed, self._depth_info, self._topics, time.monotonic() - self._began_s, self._publishers_of,
-            tf=self._observed[DEPTH].tf_seen(self, target, source),
+            tf=self._observed[DEPTH].tf_seen(self._buffer.lookup_transform, self._buffer.all_frames_as_yaml,
+                                             target_frame, camera_frame),
             use_sim_time=bool(rospy.get_param('/use_sim_time', False)), clock_count=len(self._clocks),
             nodes={name: status[:2] for name, status in list(self._statuses.items())},
             stamp_tolerance_s=self._bbox3d_param('stamp_tolerance'),
             cache_length_s=self._bbox3d_param('cache_length'))
-
-    def lookup(self, target_frame, source_frame, stamp):
-        """Look up a transform, as `BagTransforms.lookup`."""
-        return self._buffer.lookup_transform(target_frame.lstrip('/'), source_frame.lstrip('/'), stamp)
-
-    def frames_as_yaml(self):
-        """Return all frames, as `BagTransforms.frames_as_yaml`."""
-        return self._buffer.all_frames_as_yaml()
 
     def _bbox3d_param(self, name):
         return _param(topic_of(self._camera, 'bbox3d_node'), name, Bbox3dParams())
@@ -95,11 +87,9 @@ class GraphObserver(object):
         return next((text.split()[0] for text in reported if text), resolved)
 
     def _subscribe(self, one, kind):
-        self._subscribers.append(rospy.Subscriber(one.topic, kind, functools.partial(self._on_message, one),
-                                                  queue_size=10, buff_size=IMAGE_BUFFER))
-
-    def _on_message(self, one, message):
-        one.take(message, rospy.get_rostime().to_nsec(), time.time())
+        def take(message):
+            one.take(message, rospy.get_rostime().to_nsec(), time.time())
+        self._subscribers.append(rospy.Subscriber(one.topic, kind, take, queue_size=10, buff_size=IMAGE_BUFFER))
 
     def _on_diagnostics(self, message):
         prefix = rospy.get_namespace()[1:]  # ends in a slash, so that robot1 does not match robot10

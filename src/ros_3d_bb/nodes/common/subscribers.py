@@ -24,16 +24,11 @@ _inputs, _lock = [], threading.Lock()  # of the process, which is one node
 
 
 class Input(object):
-    """Statistics of the messages received on a topic of the node.
-
-    `name` is the topic before remapping, `count` the number of received messages, and `received_s` the arrival of the
-    newest on time.monotonic(), None before the first.
-    """
+    """Statistics of the messages received on a topic of the node."""
 
     def __init__(self, name, kind, callback):
-        self.name, self._kind, self._callback = name, kind, callback
-        self.count, self.received_s, self._newest = 0, None, None
-        self.subscriber = None
+        self.name, self._kind, self._callback, self.subscriber = name, kind, callback, None
+        self.count, self.received_s, self._newest = 0, None, None  # `received_s` on time.monotonic()
         self.reported_count = 0  # at the last report of the rate
         self.silence, self.queried_s = '', -QUERY_PERIOD_S  # cause of a silence, and when the master was asked for it
 
