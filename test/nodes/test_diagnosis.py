@@ -87,9 +87,8 @@ def messages_at(stamp_ns):
     return messages
 
 
-# The messages that are sent instead, by the stamp of the others; the node that reports the fault and words of its report;
-# words of doctor, and of its fix.
-REJECTED = {
+# The fault (see Rig.change); the node that reports it and words of its report; words of doctor, and of its fix.
+FAULTS = {
     'no tf': (lambda _stamp_ns: {'tf': None}, 'tracker_node',
               'the transform from camera_color_optical_frame to map ends', 'tf has no frames', 'robot_state_publisher'),
     'depth of another size': (
@@ -101,8 +100,7 @@ REJECTED = {
     'empty camera_info': (lambda stamp_ns: {INFO: CameraInfo(header=header_at(stamp_ns))}, 'bbox3d_node',
                           'camera_info rejected: it is empty', 'it is empty', 'camera_calibration'),
     'boxes older than the cache': (lambda stamp_ns: {BOXES: messages_at(stamp_ns - 3 * NS)[BOXES]}, 'bbox3d_node',
-                                   's too old; the detector is slower', 'the 2D boxes arrive 3.', 'cache_length')}
-LASTING = {
+                                   's too old; the detector is slower', 'the 2D boxes arrive 3.', 'cache_length'),
     'depth of another camera': (lambda stamp_ns: {DEPTH_INFO: camera_info(stamp_ns, focal=45.0)}, 'bbox3d_node',
                                 'depth is not aligned to colour: the intrinsics',
                                 'intrinsics fx fy cx cy of depth are 45.0', 'align_depth:=true'),
@@ -110,6 +108,7 @@ LASTING = {
                                 '729.2 days before ROS time', '729.2 days before ROS time', 'use_sim_time'),
     'no boxes': (lambda _stamp_ns: {BOXES: None}, 'bbox3d_node', 'no messages on /yolo_bounding_box',
                  'no messages on /yolo_bounding_box', 'enable')}
+LASTING = 'depth of another camera', 'stamps of two years ago', 'no boxes'
 
 
 @pytest.fixture(scope='module', autouse=True)
@@ -164,26 +163,20 @@ def test_nodes_show_rates_latency_and_the_age_of_transforms(healthy):
     wait_until(lambda: abs(float(healthy.status_of('tracker_node')[2]['tf age'].split()[0])) < 5, 'a recent transform')
 
 
-def check_reports(fault, rig):
-    """Check that a node reports a fault in its log and as its status, and doctor reports it with its fix."""
+@pytest.mark.parametrize('name', FAULTS)
+def test_a_fault_is_reported_until_it_ends(rig, name):
+    """By a node, in its log and as its status, and by doctor, with its fix.
+
+    The end of rejected messages is awaited only once: a warning is the status for 5 s, unless another one follows.
+    """
     rig.log.emptied()
-    rig.change, node, words, found, fix = fault
+    rig.change, node, words, found, fix = FAULTS[name]
     output = diagnosed()  # meanwhile, the node waits before it warns
     rig.wait_for_line(node, words)
     wait_until(lambda: rig.status_of(node)[0] == 1 and words in rig.status_of(node)[1], 'the status of ' + node)
     assert found in output and fix in output, output
-
-
-@pytest.mark.parametrize('name', sorted(REJECTED))
-def test_causes_of_rejected_messages_are_reported(rig, name):
-    """Without a pause: the newest warning is the status of a node for 5 s, unless another one follows."""
-    check_reports(REJECTED[name], rig)
-
-
-@pytest.mark.parametrize('name', sorted(LASTING))
-def test_lasting_faults_are_reported_until_they_end(healthy, name):
-    """So are rejected messages: the nodes are healthy before the first of these."""
-    check_reports(LASTING[name], healthy)
+    if name in LASTING:
+        rig.wait_until_healthy()
 
 
 @contextlib.contextmanager

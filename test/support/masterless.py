@@ -39,18 +39,12 @@ class Buffer(tf2_ros.BufferCore):
     lookup_transform = tf2_ros.BufferCore.lookup_transform_core
 
 
-class Immediately(object):
-    """Replaces the worker thread: works at once, and raises errors, which a worker would only count."""
-
-    def __init__(self, work, _on_error):
-        self._work = work
-
-    def offer(self, item):
-        self._work(item)
+def immediate_worker(work, _on_error):
+    """Replaces NewestWorker: works at once, and raises errors, which a worker would only count."""
+    def offer(item):
+        work(item)
         return False
-
-    def stop(self):
-        pass
+    return mock.Mock(offer=offer)
 
 
 class Connections(object):
@@ -94,10 +88,10 @@ def masterless(params=()):
         'rospy.logwarn_throttle': lambda _period_s, text, *arguments: text % arguments,
         'tf2_ros.Buffer': connections._buffer,
         'diagnostic_updater.Updater': mock.Mock(),
-        'ros_3d_bb.nodes.yolov5_node.NewestWorker': Immediately,
-        'ros_3d_bb.nodes.depth_detector_node.NewestWorker': Immediately,
-        'ros_3d_bb.nodes.common.persistent_track_ids.NewestWorker': Immediately,
-        'ros_3d_bb.nodes.common.debug_images.NewestWorker': Immediately,
+        'ros_3d_bb.nodes.yolov5_node.NewestWorker': immediate_worker,
+        'ros_3d_bb.nodes.depth_detector_node.NewestWorker': immediate_worker,
+        'ros_3d_bb.nodes.common.persistent_track_ids.NewestWorker': immediate_worker,
+        'ros_3d_bb.nodes.common.debug_images.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.common.debug_images.patient_master': mock.Mock()}
     for level in ('loginfo', 'logwarn', 'loginfo_once'):
         replaced['rospy.' + level] = lambda text, *arguments: text % arguments

@@ -41,7 +41,8 @@ class Recorder(object):
 
     def __init__(self, topic, kind, publisher_expected=True):
         self.topic, self.messages = topic, []
-        self._subscriber = rospy.Subscriber(topic, kind, self._keep, queue_size=1000, buff_size=2 ** 26)
+        self._subscriber = rospy.Subscriber(topic, kind, lambda message: self.messages.append(message),
+                                            queue_size=1000, buff_size=2 ** 26)
         if publisher_expected:
             wait_until(lambda: self._subscriber.get_num_connections() > 0, 'a publisher on ' + topic)
             time.sleep(0.3)  # the publisher counts a connection a moment later than the subscriber
@@ -56,9 +57,6 @@ class Recorder(object):
         """Itself, without the messages so far. A connection that lasts for several tests misses no message."""
         self.messages = []
         return self
-
-    def _keep(self, message):
-        self.messages.append(message)
 
     def wait_for(self, count, timeout_s=TIMEOUT_S):
         """Wait for the first `count` messages."""

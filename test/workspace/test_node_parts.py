@@ -89,13 +89,12 @@ def test_an_input_subscribed_while_the_others_are_listed_is_kept():
         assert [each.name for each in subscribers.inputs()] == ['first', 'second']
 
 
-@pytest.mark.parametrize('name', ['/parameter_descriptions', '/parameter_updates'])
-def test_topics_of_dynamic_reconfigure_are_no_results(name):
+def test_topics_of_dynamic_reconfigure_are_no_results():
     """They have subscribers while rqt_reconfigure is open."""
     tracks, parameters = mock.Mock(), mock.Mock()
     tracks.has_connections.return_value, parameters.has_connections.return_value = False, True
     with mock.patch('ros_3d_bb.nodes.common.diagnostics.get_topic_manager') as manager:
-        manager.return_value.pubs = {'/ros_3d_bb/tracks': tracks, rospy.get_name() + name: parameters}
+        manager.return_value.pubs = {'/ros_3d_bb/tracks': tracks, rospy.get_name() + '/parameter_updates': parameters}
         assert unsubscribed_results() == ['/ros_3d_bb/tracks']
         tracks.has_connections.return_value = True
         assert unsubscribed_results() == []
