@@ -52,8 +52,6 @@ def sound(**changes):
 def with_stream(key, **changes):
     seen = sound()
     seen.streams[key] = sound_stream(key, **changes)
-    if changes.get('count') == 0 and not changes.get('published_kind', 'some'):
-        del seen.topics['/' + ROLES[key].name]
     return seen
 
 

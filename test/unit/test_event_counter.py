@@ -1,6 +1,6 @@
 """Event counters: counts, first messages, and rejected inputs."""
+import concurrent.futures
 import sys
-import threading
 from unittest import mock
 
 import pytest
@@ -50,11 +50,9 @@ def test_no_count_is_lost_between_threads(events):
     """rospy has a thread for each publisher of a topic."""
     interval_s = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
-    threads = [threading.Thread(target=lambda: [events.count('images') for _ in range(5000)]) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        for _thread in range(4):
+            pool.submit(lambda: [events.count('images') for _ in range(5000)])
     sys.setswitchinterval(interval_s)
     assert events.counts == {'images': 20000}
 

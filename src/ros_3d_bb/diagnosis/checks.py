@@ -21,10 +21,6 @@ def findings(seen):
     return found + list(_nodes(seen, any(finding.fault for finding in found)))
 
 
-def _has_messages(seen, key):
-    return seen.streams[key].count > 0
-
-
 def _clock(seen):
     if seen.is_bag:
         return
@@ -38,17 +34,16 @@ def _clock(seen):
 
 
 def _images(seen):
-    needs_no_color = seen.is_bag and _has_messages(seen, BOXES2D) and not _has_messages(seen, COLOR)
+    needs_no_color = seen.is_bag and seen.streams[BOXES2D].count and not seen.streams[COLOR].count
     for key in (DEPTH, INFO) if needs_no_color else IMAGES:
         stream = seen.streams[key]
         title, fact = stream.role.title, '%s, %.1f Hz' % (stream.topic, stream.rate_hz)
         if not stream.count:
-            taken = [other.topic for other in seen.streams.values() if other.count]
-            yield Finding(title, '', *silence_fault(stream, seen.topics, taken, seen.seconds, seen.is_bag))
+            used = [other.topic for other in seen.streams.values() if other.count]
+            yield Finding(title, '', *silence_fault(stream, seen.topics, used, seen.seconds, seen.is_bag))
         elif key != INFO and 0 < stream.rate_hz < MIN_RATE_HZ:
             yield Finding(title, fact, 'only %.1f Hz on %s' % (stream.rate_hz, stream.topic),
-                          'use USB 3, a wired network, or a lower resolution or rate of the camera (realsense.launch '
-                          'fps:=15)')
+                          'use USB 3, a wired network, or a lower resolution or rate (realsense.launch fps:=15)')
         else:
             yield Finding(title, fact)
 
@@ -101,7 +96,7 @@ def _stamps(seen):
         if fault:
             yield Finding('stamps', '', fault, fix)
             return
-    if _has_messages(seen, DEPTH) and seen.streams[DEPTH].lag_s is not None:
+    if seen.streams[DEPTH].count and seen.streams[DEPTH].lag_s is not None:
         yield Finding('stamps', 'depth images arrive %s after their stamp' % span(max(0.0, seen.streams[DEPTH].lag_s)))
 
 
@@ -163,9 +158,9 @@ def _pairs_of_boxes(seen):
 
 def _results(seen):
     """Check that boxes and tracks arrive if their inputs do; detectors also publish empty arrays."""
-    has_inputs = {BOXES2D: _has_messages(seen, COLOR),
-                  BOXES3D: all(_has_messages(seen, key) for key in (DEPTH, INFO, BOXES2D)),
-                  TRACKS: _has_messages(seen, BOXES3D) and seen.tf is not None and not seen.tf.fault}
+    has_inputs = {BOXES2D: seen.streams[COLOR].count,
+                  BOXES3D: all(seen.streams[key].count for key in (DEPTH, INFO, BOXES2D)),
+                  TRACKS: seen.streams[BOXES3D].count and seen.tf is not None and not seen.tf.fault}
     for key in (BOXES2D, BOXES3D, TRACKS):
         stream = seen.streams[key]
         if stream.count:

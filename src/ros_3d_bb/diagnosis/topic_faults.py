@@ -11,10 +11,10 @@ NO_CLOCK = ('/use_sim_time is set, but there are no messages on /clock: ROS time
             'play the bag with rosbag play --clock, or rosparam set use_sim_time false, and restart the nodes')
 
 
-def silence_fault(stream, topics, taken=(), seconds=5.0, is_bag=False):
+def silence_fault(stream, topics, used=(), seconds=5.0, is_bag=False):
     """Return why no messages arrived on the topic of a Stream, and the fix.
 
-    `topics` is {name: type} of all published topics, or of those of a bag; those in `taken` have another role and are
+    `topics` is {name: type} of all published topics, or of those of a bag; those in `used` have another role and are
     not suggested as replacement. `seconds` is the duration of the observation.
     """
     role, topic = stream.role, stream.topic
@@ -22,7 +22,7 @@ def silence_fault(stream, topics, taken=(), seconds=5.0, is_bag=False):
         missing = 'there is no %s in the bag' if is_bag else 'no publishers on %s'
         wrong_type = '%s has the type %s; %s expected' % (topic, stream.published_kind, role.kind)
         return (wrong_type if stream.published_kind else missing % topic,
-                _rename(stream, topics, taken, 'record it' if is_bag else 'start ' + role.source))
+                _rename(stream, topics, used, 'record it' if is_bag else 'start ' + role.source))
     if is_bag:
         return 'no messages on %s in the first %.0f s' % (topic, seconds), 'record it from the start'
     for publisher in stream.publishers:
@@ -34,10 +34,10 @@ def silence_fault(stream, topics, taken=(), seconds=5.0, is_bag=False):
     return 'no messages on %s for %.0f s, although %s publishes it' % (topic, seconds, names), role.when_silent
 
 
-def _rename(stream, topics, taken, start):
+def _rename(stream, topics, used, start):
     role = stream.role
     others = sorted(name for name, kind in topics.items()
-                    if kind == role.kind and name != stream.topic and name not in taken
+                    if kind == role.kind and name != stream.topic and name not in used
                     and not ('/ros_3d_bb/' in name and kind.endswith('/Image')))  # debug images of this package
     if not others:
         return '%s; there is no other topic of the type %s' % (start, role.kind)
