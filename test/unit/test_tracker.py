@@ -9,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
-from ros_3d_bb.tracking.prediction import PredictionParams
+from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, Detection
 

@@ -16,8 +16,8 @@ from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameter
 from ros_3d_bb.core.time_sync import JUMP_NS, NS, MessageCache
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.occlusion import depths_towards
-from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
+from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import CameraView
 

@@ -10,14 +10,15 @@ import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.occlusion import classify_visibility
+from ros_3d_bb.tracking.track import position_std_of
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
 
 # Detected: ranks before the results of `classify_visibility` for undetected tracks, VISIBLE, OCCLUDED, OUT_OF_VIEW.
 SEEN = -1
 STATUS = np.array([OCCLUDED, OCCLUDED, OUT_OF_VIEW, VISIBLE])  # indexed by the result; the last entry is for SEEN
-LATELY_NS = NS  # a camera whose latest image is older is ignored
+RECENT_NS = NS  # a camera whose latest image is older is ignored
 BEHIND_M = 0.45  # upper bound of the position's standard deviation of a person who stays behind an occluder
-HIDING_S = 0.3  # a track missed for longer does not occlude others
+OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
 
 
 class CameraVisibility(NamedTuple):
@@ -27,22 +28,10 @@ class CameraVisibility(NamedTuple):
 
     stamp_ns: int
     view: CameraView
-    places: np.ndarray
+    visibility: np.ndarray
 
 
-def others_of(looks, view, stamp_ns):
-    """The recent `CameraVisibility` of all cameras other than that of `view`, by camera."""
-    return {camera: look for camera, look in looks.items()
-            if camera != view.camera and stamp_ns - look.stamp_ns <= LATELY_NS}
-
-
-def carried(looks, kept, begun):
-    """The `CameraVisibility` by camera for the `kept` tracks, (n,) bool, and `begun` new tracks, OUT_OF_VIEW."""
-    return {camera: look._replace(places=np.concatenate((look.places[kept], np.full(begun, OUT_OF_VIEW))))
-            for camera, look in looks.items()}
-
-
-def mark_missed(tracks, before, rows, view, others, looked_s, farthest_m):
+def mark_missed(tracks, before, rows, cameras, camera, observed_s, max_range_m):
     """Update the status of the undetected tracks in `rows`, and the times for which they are undetected and missed.
 
     An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
@@ -55,63 +44,47 @@ def mark_missed(tracks, before, rows, view, others, looked_s, farthest_m):
     before : numpy.ndarray of track.TRACK, (n,)
         The same tracks after the previous image.
     rows : numpy.ndarray of int
-    view : CameraView
-    others : dict
-        CameraVisibility of the other cameras, from `others_of`.
-    looked_s : float
+    cameras : dict
+        CameraVisibility by camera; the `visibility` of the image's camera is modified in place.
+    camera : str
+        The camera of the image.
+    observed_s : float
         Time that the image accounts for, seconds.
-    farthest_m : float
+    max_range_m : float
         Range of the detector: people farther from a camera are not detected.
-
-    Returns
-    -------
-    numpy.ndarray of int, (n,)
-        `CameraVisibility.places` of the image.
     """
-    said = np.full(len(tracks), SEEN)
-    if not len(rows):
-        return said
-    missed, before = tracks[rows], before[rows]
-    places = _places(missed, tracks, view, farthest_m)
-    held = (places == VISIBLE) & (missed['status'] == OCCLUDED)
-    held[held] = _places(before[held], tracks, view, farthest_m) == OCCLUDED
-    places[held] = OCCLUDED
-    best = places.copy()
-    for look in others.values():
-        held |= _held_by(look, missed, before, rows, places, tracks, farthest_m)
-        best = np.minimum(best, look.places[rows])
+    image, missed, before = cameras[camera], tracks[rows], before[rows]
+    visibility = _visibility(missed, tracks, image.view, max_range_m)
+    held = (visibility == VISIBLE) & (missed['status'] == OCCLUDED)
+    held[held] = _visibility(before[held], tracks, image.view, max_range_m) == OCCLUDED
+    visibility[held] = OCCLUDED
+    image.visibility[rows] = visibility
+    best = visibility
+    for name, other in cameras.items():
+        if name != camera and image.stamp_ns - other.stamp_ns <= RECENT_NS:
+            # The person may also stay behind what occludes the view of another camera.
+            hidden = (other.visibility[rows] == OCCLUDED) & (missed['status'] == OCCLUDED) & (visibility != VISIBLE)
+            hidden[hidden] = _visibility(missed[hidden], tracks, other.view, max_range_m) == VISIBLE
+            hidden[hidden] = _visibility(before[hidden], tracks, other.view, max_range_m) == OCCLUDED
+            held |= hidden
+            best = np.minimum(best, other.visibility[rows])
     held &= best == OCCLUDED
     missed['mean'][held] = before['mean'][held]
-    held &= sigma_of(missed) > BEHIND_M
+    held &= position_std_of(missed) > BEHIND_M
     missed['covariance'][held] = before['covariance'][held]
-    missed['unseen_s'] += np.where(best == SEEN, 0, looked_s)
-    missed['missed_s'] += np.where(best == VISIBLE, looked_s, 0)
+    missed['unseen_s'] += np.where(best == SEEN, 0, observed_s)
+    missed['missed_s'] += np.where(best == VISIBLE, observed_s, 0)
     missed['status'] = STATUS[best]
-    tracks[rows], said[rows] = missed, places
-    return said
+    tracks[rows] = missed
 
 
-def _held_by(look, missed, before, rows, places, tracks, farthest_m):
-    """Which missed tracks are assumed to stay behind an occluder, from the view of another camera; (k,) bool."""
-    held = (look.places[rows] == OCCLUDED) & (missed['status'] == OCCLUDED) & (places != VISIBLE)
-    held[held] = _places(missed[held], tracks, look.view, farthest_m) == VISIBLE
-    held[held] = _places(before[held], tracks, look.view, farthest_m) == OCCLUDED
-    return held
-
-
-def _places(missed, tracks, view, farthest_m):
+def _visibility(missed, tracks, view, max_range_m):
     """Visibility (k,) of missed tracks in a camera's view."""
     if not len(missed):
         return np.zeros(0, int)
-    hiding = tracks[tracks['confirmed'] & (tracks['missed_s'] < HIDING_S)]
-    return classify_visibility(view, positions_of(missed), missed['size_m'], positions_of(hiding), farthest_m)
+    occluding = tracks[tracks['confirmed'] & (tracks['missed_s'] < OCCLUDING_S)]
+    return classify_visibility(view, _positions_of(missed), missed['size_m'], _positions_of(occluding), max_range_m)
 
 
-def positions_of(tracks):
-    """Centres (n, 3) of tracks, metres."""
+def _positions_of(tracks):
     return np.column_stack((tracks['mean'][:, :2], tracks['z_m']))
-
-
-def sigma_of(tracks):
-    """Standard deviations (n,) of the positions, the larger one of x and y, metres."""
-    return np.sqrt(np.maximum(tracks['covariance'][:, 0, 0], tracks['covariance'][:, 1, 1]))

@@ -54,7 +54,7 @@ class ThesisTracker(object):
     """Tracks objects from image to image.
 
     Call `update` with the detections of each image in the order of their stamps, `skip` for an image whose detections
-    are unusable, and `reset` after a jump in time.
+    are unusable, and `reset` after a jump in time. The IDs of tracks are greater than `last_id`.
 
     Raises
     ------
@@ -62,11 +62,10 @@ class ThesisTracker(object):
         If a parameter is invalid; the message names it.
     """
 
-    def __init__(self, params=ThesisTrackerParams()):
+    def __init__(self, params=ThesisTrackerParams(), last_id=0):
         self.reconfigure(params)
-        self._tracks = []
-        self._last_id = 0
-        self._now_ns, self._skipped_ns = None, 0
+        self._last_id = last_id
+        self.reset()
 
     def reconfigure(self, params):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
