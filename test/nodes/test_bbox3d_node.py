@@ -209,7 +209,7 @@ def test_depth_that_cannot_be_used_is_named_and_the_next_works(rig, output, now,
 
 def test_an_uncalibrated_camera_is_named(rig, output, now):
     rig.info.publish(camera_info(now, focal=0.0))
-    wait_until(lambda: 'camera_info refused' in diagnostics_of('bbox3d_node')[1], 'a warning')
+    wait_until(lambda: 'camera_info rejected' in diagnostics_of('bbox3d_node')[1], 'a warning')
     rig.send_camera(now + PERIOD)
     rig.send_boxes(now + PERIOD)
     output.wait_for(1)

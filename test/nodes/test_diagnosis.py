@@ -120,7 +120,7 @@ REFUSED = {
                               'the depth image has 32 x 24 pixels, the colour camera 64 x 48', 'realsense.launch'),
     'metres in a 16UC1': (replaced(DEPTH, metres), 'bbox3d_node', 'metres in a 16UC1', 'metres in a 16UC1',
                           'depth_scale'),
-    'empty camera_info': (replaced(INFO, empty), 'bbox3d_node', 'camera_info refused: it is empty', 'it is empty',
+    'empty camera_info': (replaced(INFO, empty), 'bbox3d_node', 'camera_info rejected: it is empty', 'it is empty',
                           'camera_calibration'),
     'boxes older than the cache': (replaced(BOXES, old_boxes), 'bbox3d_node', 's too old; the detector is slower',
                                    'the 2D boxes come 3.', 'cache_length')}

@@ -190,7 +190,7 @@ def test_without_transform_the_planner_keeps_nobody_and_the_others_go_on(rig, re
 
 def test_tracks_that_are_too_old_are_refused_and_broken_ones_dropped(rig, recorders):
     rig.send(now_ns() - 3 * NS, (1.0, 2.0, 0.85))
-    wait_until(lambda: diagnostics_of('planner_bridge_node')[2].get('tracks refused') == 1, 'a refusal')
+    wait_until(lambda: diagnostics_of('planner_bridge_node')[2].get('tracks rejected') == 1, 'a refusal')
     assert all(recorder.messages == [] for recorder in recorders.values())
     rig.send(now_ns() - LATENCY_NS, (float('nan'), 2.0, 0.85), (1.0, 2.0, 0.85))
     assert [person.name for person in recorders['people'].wait_for(1)[0].people] == ['2']

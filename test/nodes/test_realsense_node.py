@@ -136,4 +136,4 @@ def test_a_camera_that_is_unplugged_is_waited_for_and_bad_images_are_left_out(re
                                                                                                0] == pytest.approx(0.25)
     assert abs(color.messages[-1].header.stamp.to_nsec() - rospy.get_rostime().to_nsec()) < 60 * NS
     _level, _message, counts = diagnostics_of('test_realsense_node')
-    assert counts['camera lost'] >= 3 and counts['images refused'] >= 1
+    assert counts['camera lost'] >= 3 and counts['images rejected'] >= 1

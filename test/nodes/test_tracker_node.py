@@ -214,7 +214,7 @@ def test_boxes_that_cannot_be_used_are_refused_and_the_next_work(rig, tracks, no
     rig.send(now + 2 * PERIOD, (0.0, 0.0, 3.0))
     assert tracks.wait_for(2)[1].header.stamp == time_from(now + 2 * PERIOD)
     level, sentence, counts = diagnostics_of('tracker_node')
-    assert level == 1 and '3D boxes refused' in sentence and counts['3D boxes left out'] == 1
+    assert level == 1 and '3D boxes rejected' in sentence and counts['3D boxes dropped'] == 1
 
 
 def test_boxes_that_come_late_are_taken_in_and_nothing_is_stamped_older(rig, tracks, now):

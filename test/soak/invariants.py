@@ -38,14 +38,14 @@ class Balance(NamedTuple):
 
 BALANCES = {
     'yolov5_node': Balance('colour images', 'images searched', (
-        'images refused', 'images skipped for a newer one', 'images while paused', 'searches failed')),
+        'images rejected', 'images skipped for a newer one', 'images while paused', 'searches failed')),
     'depth_detector_node': Balance('colour images', 'images searched', (
-        'colour images refused', 'colour images without depth', 'colour images of a time before', 'images refused',
+        'colour images rejected', 'colour images without depth', 'colour images of a time before', 'images rejected',
         'images skipped for a newer one', 'images without floor', 'images while paused', 'searches failed')),
-    'bbox3d_node': Balance('2D boxes', 'images lifted', ('2D boxes refused', '2D boxes of a time before')),
+    'bbox3d_node': Balance('2D boxes', 'images lifted', ('2D boxes rejected', '2D boxes of a time before')),
     'tracker_node': Balance('3D boxes', 'images tracked', (
-        '3D boxes refused', 'no transform', 'images of the time before', 'images ahead of other cameras')),
-    'planner_bridge_node': Balance('tracks', 'tracks handed on', ('tracks refused',))}
+        '3D boxes rejected', 'no transform', 'images of the time before', 'images ahead of other cameras')),
+    'planner_bridge_node': Balance('tracks', 'tracks handed on', ('tracks rejected',))}
 
 
 def balance_of(status):

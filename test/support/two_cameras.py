@@ -36,9 +36,9 @@ class Rig(object):
 
     def __init__(self):
         self.now_ns = 0
-        self.transforms, self.tally = Transforms(), EventCounter()
+        self.transforms, self.events = Transforms(), EventCounter()
         params = TrackerNodeParams(cameras=['front', 'rear'])
-        self.follower = TrackingStage(params, [kind() for kind in TRACKING_PARAMS], self.tally, self.transforms)
+        self.follower = TrackingStage(params, [kind() for kind in TRACKING_PARAMS], self.events, self.transforms)
 
     def send(self, stamp_ns, camera, frame_id=None, count=1):
         return self.follower.add_boxes(boxes(stamp_ns, frame_id or camera, count), self.now_ns, camera)
@@ -48,7 +48,7 @@ class Play(object):
     """Cameras that send boxes of somebody while time passes. `answers` are (now_ns, camera, Followed or None)."""
 
     def __init__(self, *cameras, periods_ns=PERIODS_NS):
-        self.tally, self.transforms, self.now_ns, self.answers = EventCounter(), Transforms(), 0, []
+        self.events, self.transforms, self.now_ns, self.answers = EventCounter(), Transforms(), 0, []
         self.cameras, self.ahead_ns, self._due_ns = set(cameras), 0, {camera: 0 for camera in cameras}
         self._periods_ns = periods_ns
         self.faults = {}  # by camera: returns how far its stamps are ahead of what is right
@@ -57,7 +57,7 @@ class Play(object):
     def respawn(self):
         """Go on with another Follower, as where tracker_node ends and is started again."""
         params = TrackerNodeParams(cameras=sorted(self.cameras) if len(self.cameras) > 1 else [])
-        self.follower = TrackingStage(params, [kind() for kind in TRACKING_PARAMS], self.tally, self.transforms)
+        self.follower = TrackingStage(params, [kind() for kind in TRACKING_PARAMS], self.events, self.transforms)
 
     def run(self, seconds, cameras=None, count=1, lags_ns=None):
         """Let time pass. `lags_ns`: by camera, how long its boxes take."""
@@ -78,7 +78,7 @@ class Play(object):
         """One image; how far its stamp is ahead of what is right."""
         message = boxes(START_NS + self.now_ns + self.ahead_ns + ahead_ns, camera, count)
         followed = None
-        with self.tally.rejecting('boxes'):
+        with self.events.rejecting('boxes'):
             followed = self.follower.add_boxes(message, self.now_ns, camera if self.follower.cameras != ('',) else '')
         self.answers.append((self.now_ns, camera, followed))
         return followed

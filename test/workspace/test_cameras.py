@@ -120,11 +120,11 @@ def test_a_stamp_of_the_future_in_a_bag_keeps_the_other_camera_out_of_nothing(ba
                 shift(message, 3600)
             left += topic == '/left/yolo_bounding_box' and elapsed_s > 0.9
             changed.write(topic, message, time)
-    tally = process_bag(path, str(tmp_path / 'out.bag'), BOTH)
+    events = process_bag(path, str(tmp_path / 'out.bag'), BOTH)
     with rosbag.Bag(str(tmp_path / 'out.bag')) as bag:
         answered = [time for _topic, _message, time in bag.read_messages('/ros_3d_bb/tracks')
                     if time.to_sec() - start > 0.9]
-    assert len(answered) == left > 10 and tally.counts['images ahead of other cameras'] >= 1
+    assert len(answered) == left > 10 and events.counts['images ahead of other cameras'] >= 1
 
 
 def shift(message, seconds):
@@ -171,7 +171,7 @@ def test_a_camera_that_is_far_behind_the_other_is_no_jump_in_time(rig):
     for number in range(30):
         followed = rig.send(START_NS + number * PERIOD_NS, 'front')
         assert rig.send(START_NS + (number - 15) * PERIOD_NS, 'rear') is None
-    assert rig.tally.counts['images of the time before'] == 30
+    assert rig.events.counts['images of the time before'] == 30
     assert not rig.transforms.jumps and [track.id for track in followed.tracks] == [1]
 
 
@@ -180,7 +180,7 @@ def test_a_camera_without_a_transform_leaves_the_other_to_go_on(rig):
     for number in range(20):
         followed = rig.send(START_NS + number * PERIOD_NS, 'front', count=int(number < 10))
         assert rig.send(START_NS + number * PERIOD_NS + PERIOD_NS // 2, 'rear') is None
-    assert followed.tracks == [] and rig.tally.counts['no transform'] == 20
+    assert followed.tracks == [] and rig.events.counts['no transform'] == 20
 
 
 def test_cameras_with_the_same_frame_are_taken_and_pointed_out(rig):
@@ -188,8 +188,8 @@ def test_cameras_with_the_same_frame_are_taken_and_pointed_out(rig):
         for camera in ('front', 'rear'):
             followed = rig.send(START_NS + number * PERIOD_NS, camera, frame_id='camera_color_optical_frame')
     assert [track.id for track in followed.tracks] == [1]
-    assert rig.tally.counts['cameras with one frame'] == 1
-    assert 'front and rear are all in the frame camera_color' in rig.tally.sentences['cameras with one frame']
+    assert rig.events.counts['cameras with one frame'] == 1
+    assert 'front and rear are all in the frame camera_color' in rig.events.sentences['cameras with one frame']
 
 
 @pytest.mark.parametrize('params,complaint', [

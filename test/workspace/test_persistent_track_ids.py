@@ -65,11 +65,11 @@ def test_whatever_it_has_given_is_below_what_the_next_one_gives(parameters):
 
 
 def test_without_the_master_numbers_go_on_and_it_is_said(parameters):
-    tally = EventCounter()
-    numbers = PersistentTrackIds(tally)
+    events = EventCounter()
+    numbers = PersistentTrackIds(events)
     parameters['fails'] = True
     assert given(numbers, 5 * RESERVED) == [5 * RESERVED]
-    assert 'Connection refused' in tally.sentences['numbers not reserved'] and NAME in tally.sentences[
+    assert 'Connection refused' in events.sentences['numbers not reserved'] and NAME in events.sentences[
         'numbers not reserved']
     del parameters['fails']
     given(numbers, 5 * RESERVED + 1)

@@ -71,13 +71,13 @@ def run_tool(*arguments):
 
 
 def test_people_are_tracked_and_the_input_is_kept(scene, tmp_path):
-    tally = process_bag(scene, str(tmp_path / 'out.bag'), DEPTH)
+    events = process_bag(scene, str(tmp_path / 'out.bag'), DEPTH)
     before, after = messages_in(scene), messages_in(tmp_path / 'out.bag')
     assert {topic: after[topic] for topic in before} == before
     assert set(after) - set(before) == {'/yolo_bounding_box', '/ros_3d_bb/bb_3d', '/ros_3d_bb/tracks',
                                         '/visualization_marker_array'}
-    assert tally.counts['images searched'] == tally.counts['images tracked'] == len(after['/ros_3d_bb/tracks']) == 15
-    assert not tally.sentences
+    assert events.counts['images searched'] == events.counts['images tracked'] == len(after['/ros_3d_bb/tracks']) == 15
+    assert not events.sentences
     truth = {message.header.stamp: tracks_from_msg(message) for message in before['/ground_truth']}
     last = after['/ros_3d_bb/tracks'][-1]
     found = tracks_from_msg(last)
@@ -149,8 +149,8 @@ def test_without_transforms_nobody_is_tracked_and_the_summary_says_so(scene, tmp
 
 def test_without_depth_every_image_is_accounted_for(scene, tmp_path):
     rewritten(scene, tmp_path / 'in.bag', lambda topic, *rest: None if 'aligned' in topic else (topic,) + rest)
-    tally = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
-    assert tally.counts['colour images without depth'] == 15
+    events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
+    assert events.counts['colour images without depth'] == 15
 
 
 def test_time_that_jumps_back_begins_anew_with_other_numbers(scene, tmp_path):
@@ -166,8 +166,8 @@ def test_time_that_jumps_back_begins_anew_with_other_numbers(scene, tmp_path):
                 stamped.header.stamp = back(stamped.header.stamp)
         return topic, message, time
     rewritten(scene, tmp_path / 'in.bag', change)
-    tally = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
-    assert tally.counts['jumps back in time'] == 1 and 'no transform' not in tally.counts
+    events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
+    assert events.counts['jumps back in time'] == 1 and 'no transform' not in events.counts
     tracks = messages_in(tmp_path / 'out.bag')['/ros_3d_bb/tracks']
     assert len(tracks) == 15
     early, late = (set(track.id for message in tracks for track in message.objects
@@ -180,8 +180,8 @@ def test_transforms_that_come_later_than_the_image_are_waited_for(scene, tmp_pat
     for delay_ns, is_known in ((NS // 10, True), (NS // 2, False)):
         rewritten(scene, tmp_path / 'in.bag', lambda topic, message, time: (
             topic, message, time_from(time.to_nsec() + (delay_ns if topic == '/tf' else 0))))
-        tally = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
-        assert ('no transform' not in tally.counts) == is_known
+        events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
+        assert ('no transform' not in events.counts) == is_known
 
 
 def test_static_transforms_hold_after_a_jump():

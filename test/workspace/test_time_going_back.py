@@ -24,7 +24,7 @@ def test_time_goes_back_once_all_cameras_have_gone_back(rig):
     for number in range(200, 220):
         front, rear = send(number, 'front'), send(number - 3, 'rear')
         assert rear and (front is None) == (number <= 203)
-    assert rig.transforms.jumps == 1 and rig.tally.counts['images of the time before'] == 4
+    assert rig.transforms.jumps == 1 and rig.events.counts['images of the time before'] == 4
     assert [track.id for track in front.tracks] == [2] and stamp_of(rear) == START_NS + 19 * PERIOD_NS
 
 
@@ -38,7 +38,7 @@ def test_a_camera_whose_stamps_alone_go_back_is_refused_until_they_are_right(rig
         followed = rig.send(START_NS + rig.now_ns - (10 * NS + 1 if goes_back else 0), camera)
         assert (followed is None) == goes_back
         assert [track.id for track in rig.send(START_NS + rig.now_ns, other).tracks] == [1] or number < 5
-    assert rig.transforms.jumps == 0 and rig.tally.counts['images of the time before'] == 100
+    assert rig.transforms.jumps == 0 and rig.events.counts['images of the time before'] == 100
 
 
 def test_time_goes_back_twice(rig):
@@ -60,7 +60,7 @@ def test_an_image_that_waits_for_its_transform_while_time_goes_back_is_left_out(
     assert rig.send(START_NS + 200 * PERIOD_NS, 'rear') is None
     for number in range(1, 20):
         front = rig.send(START_NS + number * PERIOD_NS, 'front')
-    assert rig.transforms.jumps == 1 and rig.tally.counts['images of the time before'] == 1
+    assert rig.transforms.jumps == 1 and rig.events.counts['images of the time before'] == 1
     assert [track.id for track in front.tracks] == [2]
 
 

@@ -37,13 +37,13 @@ def transforms():
 
 
 @pytest.fixture
-def tally():
+def events():
     return EventCounter()
 
 
 @pytest.fixture
-def follower(transforms, tally):
-    return TrackingStage(TrackerNodeParams(), [kind() for kind in TRACKING_PARAMS], tally, transforms)
+def follower(transforms, events):
+    return TrackingStage(TrackerNodeParams(), [kind() for kind in TRACKING_PARAMS], events, transforms)
 
 
 def boxes(stamp_ns, z=3.0, count=1):
@@ -85,21 +85,21 @@ def test_a_stamp_far_ahead_that_cannot_be_used_ends_nobody(follower, transforms)
     assert [track.id for track in after.tracks] == [track.id for track in before.tracks] and not transforms.jumps
 
 
-def test_time_that_goes_back_is_followed_once(follower, transforms, tally):
+def test_time_that_goes_back_is_followed_once(follower, transforms, events):
     stamp_ns, before = stand(follower)
     transforms.missing.add(stamp_ns - 20 * NS)
     follower.add_boxes(boxes(stamp_ns - 20 * NS), 0)
     assert follower.add_boxes(boxes(stamp_ns - 19 * NS), 0).tracks == []
-    assert transforms.jumps == 1 and tally.counts['jumps back in time'] == 1
+    assert transforms.jumps == 1 and events.counts['jumps back in time'] == 1
     assert follower.add_boxes(boxes(stamp_ns - 19 * NS + NS // 30), 0).header.stamp < before.header.stamp
 
 
-def test_a_depth_image_that_cannot_be_used_does_not_keep_the_boxes_out(follower, tally):
+def test_a_depth_image_that_cannot_be_used_does_not_keep_the_boxes_out(follower, events):
     follower.add_camera_info(CameraInfo(header=header(START_NS), width=4, height=3, K=[4, 0, 2, 0, 4, 1, 0, 0, 1]))
     depth = Image(header=header(START_NS), width=4, height=3, encoding='nonsense', step=8, data=b'0' * 24)
     follower.add_depth(depth, 0)
     assert follower.add_boxes(boxes(START_NS), 0) is not None
-    assert tally.counts['depth images refused'] == 1
+    assert events.counts['depth images rejected'] == 1
 
 
 def test_more_boxes_than_people_can_be_are_refused(follower):
@@ -108,7 +108,7 @@ def test_more_boxes_than_people_can_be_are_refused(follower):
     assert np.isfinite(follower.add_boxes(boxes(START_NS), 0).header.stamp.to_sec())
 
 
-def test_a_box_that_cannot_be_used_takes_no_other_with_it(follower, tally):
+def test_a_box_that_cannot_be_used_takes_no_other_with_it(follower, events):
     """A box as wide as a wall, and one without a place, come with each image of a person who stands there."""
     _stamp_ns, alone = stand(follower)
     for frame in range(30, 60):
@@ -118,11 +118,11 @@ def test_a_box_that_cannot_be_used_takes_no_other_with_it(follower, tally):
         message.boxes = [wall, nowhere] + message.boxes
         track, = follower.add_boxes(message, 0).tracks
     assert track.id == alone.tracks[0].id and track.status == VISIBLE
-    assert tally.counts['3D boxes left out'] == 60 and tally.counts['images tracked'] == 60
-    assert '3D boxes refused' not in tally.counts
+    assert events.counts['3D boxes dropped'] == 60 and events.counts['images tracked'] == 60
+    assert '3D boxes rejected' not in events.counts
 
 
-def test_an_image_none_of_whose_boxes_can_be_used_does_not_age_tracks(follower, tally):
+def test_an_image_none_of_whose_boxes_can_be_used_does_not_age_tracks(follower, events):
     """It does not say that there are no people. The track is still published after a second of such images."""
     stamp_ns, before = stand(follower)
     for number in range(1, 31):
@@ -130,4 +130,4 @@ def test_an_image_none_of_whose_boxes_can_be_used_does_not_age_tracks(follower, 
             follower.add_boxes(boxes(stamp_ns + number * NS // 30, z=float('nan')), 0)
     after = follower.add_boxes(boxes(stamp_ns + 31 * NS // 30), 0)
     assert [track.id for track in after.tracks] == [before.tracks[0].id]
-    assert tally.counts['3D boxes left out'] == 30
+    assert events.counts['3D boxes dropped'] == 30

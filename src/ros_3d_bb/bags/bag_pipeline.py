@@ -36,18 +36,18 @@ class Waiting(NamedTuple):
 class BagRun(object):
     """A run of the pipeline on one bag."""
 
-    def __init__(self, reader, settings, tally):
-        self._reader, self._settings, self._tally = reader, settings, tally
+    def __init__(self, reader, settings, events):
+        self._reader, self._settings, self._events = reader, settings, events
         self._topics = {settings.name(topic): (topic, '') for topic in (TF_TOPIC, STATIC_TOPIC)}
         self._topics.update((settings.name(topic, camera), (topic, camera)) for camera in settings.cameras
                             for topic in _wanted(settings.detector))
         self._transforms = BagTransforms()
-        self._pipeline = Pipeline(settings, tally, self._transforms)
+        self._pipeline = Pipeline(settings, events, self._transforms)
         self._detect = None
         if settings.detector == 'yolov5':
             params, detection, running = settings.yolov5
             self._detector = opened_yolov5(params.weights, detection, running,
-                                           lambda line: tally.note('remarks of the detector', line))
+                                           lambda line: events.note('remarks of the detector', line))
             self._detect = lambda message: search_color(self._detector, message)[1]
         needed = BOXES_TOPIC if settings.detector == 'none' else COLOR_TOPIC
         for camera in settings.cameras:
@@ -57,7 +57,7 @@ class BagRun(object):
         """Yield (Raw, [(topic, message), ...]): each message of the bag with the messages published by the nodes."""
         static = self._settings.name(STATIC_TOPIC)
         for raw in self._reader.messages([static]):
-            with self._tally.rejecting('transforms'):
+            with self._events.rejecting('transforms'):
                 self._transforms.set_static(message_in(raw, TFMessage))
         with ThreadPoolExecutor(self._settings.searches) as pool:
             for waiting in self._ahead(pool):
@@ -86,11 +86,11 @@ class BagRun(object):
         """Start the work that can be done ahead of a message's processing: add transforms, submit detections."""
         (topic, camera), message, search = self._topics.get(raw.topic, (None, '')), None, None
         if topic == TF_TOPIC:
-            with self._tally.rejecting('transforms'):
+            with self._events.rejecting('transforms'):
                 message = message_in(raw, TFMessage)
                 self._transforms.ahead(message)
         elif topic == COLOR_TOPIC and self._detect is not None:
-            with self._tally.rejecting('images'):
+            with self._events.rejecting('images'):
                 message = message_in(raw, Image)
                 search = pool.submit(self._detect, message)
         return Waiting(raw, topic, camera, message, search)
@@ -100,12 +100,12 @@ class BagRun(object):
         raw, topic, camera, message, search = waiting
         if topic is None or topic == STATIC_TOPIC:
             return []
-        self._tally.count('messages on %s' % raw.topic)
+        self._events.count('messages on %s' % raw.topic)
         if topic == TF_TOPIC:
             if message is not None:
                 self._transforms.passed(message)
             return []
-        with self._tally.rejecting('messages on %s' % raw.topic):
+        with self._events.rejecting('messages on %s' % raw.topic):
             if topic == COLOR_TOPIC and self._detect is not None:
                 return self._found(message, search, raw.time.to_nsec(), camera)
             return self._pipeline.take(topic, message_in(raw, INPUTS[topic]), raw.time.to_nsec(), camera)
@@ -116,7 +116,7 @@ class BagRun(object):
             return []
         with self._pipeline.searching():
             found = search.result()
-            self._tally.count('images searched')
+            self._events.count('images searched')
             return self._pipeline.found(message.header, found, now_ns, camera)
         return []
 
@@ -145,16 +145,16 @@ def process_bag(source, target, settings=Settings(), progress=lambda share: None
     OSError
         If the target cannot be written.
     """
-    tally = EventCounter()
+    events = EventCounter()
     with BagReader(source) as reader, new_bag(target, settings.compression) as bag:
-        run, copier = BagRun(reader, settings, tally), Copier(bag, settings)
+        run, copier = BagRun(reader, settings, events), Copier(bag, settings)
         start_ns, end_ns = reader.span_ns
         for raw, outputs in run.outputs():
             copier.copy(raw)
             for topic, message in outputs:
                 bag.write(settings.name(topic), message, raw.time)
             progress((raw.time.to_nsec() - start_ns) / float(max(end_ns - start_ns, 1)))
-    return tally
+    return events
 
 
 class Copier(object):

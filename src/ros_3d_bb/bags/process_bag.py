@@ -194,8 +194,8 @@ def _work(job, sender):
             said_s[0] = time.monotonic()
             sender.send(('share', share))
     try:
-        tally = process_bag(job.source, job.target, job.settings, progress)
-        sender.send(('done', '\n'.join(_summary(job, tally))))
+        events = process_bag(job.source, job.target, job.settings, progress)
+        sender.send(('done', '\n'.join(_summary(job, events))))
     except KeyboardInterrupt:
         pass
     except Exception as error:  # a failed bag must not stop the others
@@ -213,10 +213,10 @@ def _reason(job, error):
     return '%s: %s: %s' % (job.source, type(error).__name__, cause(error))
 
 
-def _summary(job, tally):
+def _summary(job, events):
     yield '%s:' % job.target
-    for event, count in tally.counts.items():
-        said = tally.sentences.get(event)
+    for event, count in events.counts.items():
+        said = events.sentences.get(event)
         yield '  %7d  %s%s' % (count, event, '. The first: %s' % said if said else '')
 
 

@@ -54,10 +54,10 @@ class EventCounter(object):
         """Count rejected or missing input; `sentence` states what failed, why, and what happens next."""
         self.note(event, sentence)
 
-    def leave_out(self, parts, faults):
+    def count_dropped(self, parts, faults):
         """Count unusable parts of an input; `faults` has one message for each. The other parts are used."""
         for fault in faults:
-            self.warn('%s left out' % parts, '%s; the others in this image are used' % fault)
+            self.warn('%s dropped' % parts, '%s; the others in this image are used' % fault)
 
     def receiving(self, inputs):
         """Context manager for a callback: `rejecting`, and count the message as received.
@@ -74,7 +74,7 @@ class EventCounter(object):
         try:
             yield
         except ValueError as error:
-            self.warn('%s refused' % inputs, '%s refused: %s; waiting for the next' % (inputs, error))
+            self.warn('%s rejected' % inputs, '%s rejected: %s; waiting for the next' % (inputs, error))
         except Exception as error:
             if not self.is_harmless(error):
                 raise

@@ -136,7 +136,7 @@ class ViewerNode(object):
     def _on_boxes3d(self, message):
         with self._diagnostics.receiving('3D boxes'), self._lock:
             usable, faults = usable_boxes3d(message)
-            self._diagnostics.leave_out('3D boxes', faults)
+            self._diagnostics.count_dropped('3D boxes', faults)
             self._snapshots.add_boxes3d(stamp_of(message), arrival_clock_ns(), boxes3d_from_msg(usable))
             self._is_said = False
 

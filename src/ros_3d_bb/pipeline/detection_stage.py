@@ -100,7 +100,7 @@ class RgbdDetectionStage(object):
     ----------
     params : DepthDetectorParams
     people : DepthPeopleParams
-    tally : event_counter.EventCounter
+    events : event_counter.EventCounter
     on_frame : callable
         Called with two sensor_msgs/Image, colour and depth, and a `camera_model.Camera` of one stamp.
     transforms
@@ -114,8 +114,8 @@ class RgbdDetectionStage(object):
 
     names = ('person',)
 
-    def __init__(self, params, people, tally, on_frame, transforms):
-        self._params, self._tally, self._transforms = params, tally, transforms
+    def __init__(self, params, people, events, on_frame, transforms):
+        self._params, self._events, self._transforms = params, events, transforms
         self._detector = DepthPeople(people)
         self._sync = StampSynchronizer(CACHE_NS, int(params.stamp_tolerance * NS), 0, on_frame, self._on_lost)
 
@@ -146,10 +146,10 @@ class RgbdDetectionStage(object):
 
     def _on_lost(self, color_msg, of_time_before):
         if of_time_before:
-            self._tally.count('colour images of a time before')
+            self._events.count('colour images of a time before')
             return
-        self._tally.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f of the '
-                         'colour image came; waiting for the next' % (stamp_of(color_msg) / NS))
+        self._events.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f of the '
+                          'colour image came; waiting for the next' % (stamp_of(color_msg) / NS))
 
     def search(self, color_msg, depth_msg, camera):
         """Detect people in a frame.
@@ -174,10 +174,10 @@ class RgbdDetectionStage(object):
         depth = checked_depth_from(depth_msg)
         found = self._detector.detect(image, depth, camera, self._floor(camera_frame))
         if found is None:
-            self._tally.warn('images without floor', 'no floor is known from tf nor seen in the depth image: nobody is '
-                             'looked for; waiting for the next image')
+            self._events.warn('images without floor', 'no floor is known from tf nor seen in the depth image: no '
+                              'people are detected; waiting for the next image')
             return None
-        self._tally.count('images searched')
+        self._events.count('images searched')
         return image, found
 
     def _floor(self, camera_frame):
@@ -190,8 +190,8 @@ class RgbdDetectionStage(object):
         try:
             camera_from_base = self._transforms.lookup(camera_frame, self._params.floor_frame, NEWEST)
         except tf2_ros.TransformException as error:
-            self._tally.warn('images without transform', 'no transform from %s to %s: %s; the floor is looked for in '
-                             'the depth image' % (self._params.floor_frame, camera_frame, error))
+            self._events.warn('images without transform', 'no transform from %s to %s: %s; the floor is looked for in '
+                              'the depth image' % (self._params.floor_frame, camera_frame, error))
             return None
         base_from_floor = transform_from((0, 0, self._params.floor_height), (0, 0, 0, 1))
         return floor_from_transform(camera_from_base.dot(base_from_floor))

@@ -53,12 +53,12 @@ class EstimationStage(object):
 
     Each `add_` method validates a message and passes it to the synchronizer together with its arrival time (integer
     nanoseconds, see `time_sync.StampSynchronizer`). The synchronizer calls `on_frame` with each complete frame, which
-    the caller passes to `estimate`. `tally` counts rejected inputs.
+    the caller passes to `estimate`. `events` counts rejected inputs.
 
     Parameters
     ----------
     params : Bbox3dParams
-    tally : event_counter.EventCounter
+    events : event_counter.EventCounter
     on_frame : callable
         Called with `perception_msgs.Boxes2D`, sensor_msgs/Image and `camera_model.Camera` of one stamp.
     depth_topic, info_topic : str
@@ -70,8 +70,8 @@ class EstimationStage(object):
         If the error model cannot be used.
     """
 
-    def __init__(self, params, tally, on_frame, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
-        self._tally, self._depth_topic, self._info_topic = tally, depth_topic, info_topic
+    def __init__(self, params, events, on_frame, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
+        self._events, self._depth_topic, self._info_topic = events, depth_topic, info_topic
         self._error_model = error_model_of(params)
         cache_ns, tolerance_ns = int(params.cache_length * NS), int(params.stamp_tolerance * NS)
         self._sync = StampSynchronizer(cache_ns, tolerance_ns, int(params.assumed_delay * NS), on_frame, self._on_lost)
@@ -108,10 +108,10 @@ class EstimationStage(object):
         boxes = boxes2d_from_msg(message)
         if boxes.stamp_ns is None and not self._said_plain:
             self._said_plain = True
-            self._tally.note('2D boxes without a stamp', 'the 2D boxes carry no stamp: each array is paired with the '
-                             'depth image that came nearest to %.3f s before it (~assumed_delay)'
-                             % self._params.assumed_delay)
-        self._tally.count('arrays of 2D boxes')
+            self._events.note('2D boxes without a stamp', 'the 2D boxes carry no stamp: each array is paired with the '
+                              'depth image that came nearest to %.3f s before it (~assumed_delay)'
+                              % self._params.assumed_delay)
+        self._events.count('arrays of 2D boxes')
         self._sync.add_boxes(boxes.stamp_ns, now_ns, boxes)
 
     def end(self):
@@ -151,7 +151,7 @@ class EstimationStage(object):
             outside_m = self._error_model.distance_outside([box.center_m for box in boxes3d])
             counts['boxes outside of the measured range'] = int((outside_m > 0).sum())
         counts['images lifted'] = 1
-        self._tally.count_all(counts)
+        self._events.count_all(counts)
         stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
         frame_id = self._params.frame_id or depth_msg.header.frame_id
         return EstimatedBoxes(Header(stamp=stamp, frame_id=frame_id), depth, boxes3d)
@@ -164,7 +164,7 @@ class EstimationStage(object):
                 check_rect(rect_px)
                 usable_px.append(rect_px)
             except ValueError as error:
-                self._tally.warn('boxes refused', '2D %s; the others in this image are used' % error)
+                self._events.warn('boxes rejected', '2D %s; the others in this image are used' % error)
         return usable_px
 
     def _plausible(self, estimates):
@@ -176,17 +176,17 @@ class EstimationStage(object):
             if is_plausible(box):
                 plausible.append(box)
                 continue
-            self._tally.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
-                             '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
-                             % (tuple(box.rect_px) + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
+            self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
+                              '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
+                              % (tuple(box.rect_px) + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
         return plausible
 
     def _on_lost(self, boxes2d, of_time_before):
         if of_time_before:
-            self._tally.count('2D boxes of a time before')
+            self._events.count('2D boxes of a time before')
             return
-        with self._tally.rejecting('2D boxes'):
-            self._tally.count('arrays without a depth image')
+        with self._events.rejecting('2D boxes'):
+            self._events.count('arrays without a depth image')
             raise ValueError(self._why_no_frame(boxes2d))
 
     def _why_no_frame(self, boxes):

@@ -65,12 +65,12 @@ class Pipeline(object):
         If a parameter is invalid.
     """
 
-    def __init__(self, settings, tally, transforms):
-        self._tally = tally
+    def __init__(self, settings, events, transforms):
+        self._events = events
         follower, marker_params, *tracking = settings.tracker
-        self._tracking_stage, self._markers = TrackingStage(follower, tracking, tally,
+        self._tracking_stage, self._markers = TrackingStage(follower, tracking, events,
                                                             transforms), MarkerWriter(marker_params)
-        self._estimation_stages = {camera: EstimationStage(settings.bbox3d[0], tally,
+        self._estimation_stages = {camera: EstimationStage(settings.bbox3d[0], events,
                                                            functools.partial(self._on_frame, camera),
                                                            settings.name(DEPTH_TOPIC, camera),
                                                            settings.name(INFO_TOPIC, camera))
@@ -79,7 +79,7 @@ class Pipeline(object):
         if settings.detector == 'depth':
             params, people = settings.depth
             transforms = transforms if params.floor_frame else None
-            self._searches = {camera: RgbdDetectionStage(params, people, tally,
+            self._searches = {camera: RgbdDetectionStage(params, people, events,
                                                          functools.partial(self._on_images, camera),
                                                          transforms) for camera in settings.cameras}
             self._publish_empty = params.publish_empty
@@ -118,10 +118,10 @@ class Pipeline(object):
     def searching(self):
         """Context manager for the detection in one image. Exceptions are reported and do not stop the pipeline."""
         try:
-            with self._tally.rejecting('images'):
+            with self._events.rejecting('images'):
                 yield
         except Exception as error:  # as in the worker threads of the nodes
-            self._tally.warn('searches failed', 'the detector failed: %s; waiting for the next image' % cause(error))
+            self._events.warn('searches failed', 'the detector failed: %s; waiting for the next image' % cause(error))
 
     def end(self):
         """Report inputs that are still waiting for others. Call at the end of the input."""
@@ -146,7 +146,7 @@ class Pipeline(object):
 
     def _on_frame(self, camera, boxes2d, depth_msg, camera_model):
         """Output the 3D boxes of one image, as bbox3d_node does."""
-        with self._tally.rejecting('2D boxes'):
+        with self._events.rejecting('2D boxes'):
             header, _depth, boxes3d = self._estimation_stages[camera].estimate(boxes2d, depth_msg, camera_model)
             message = boxes3d_to_msg(boxes3d, header, camera_model)
             self._outputs.append((topic_of(camera, BOXES3D_TOPIC), message))
@@ -154,7 +154,7 @@ class Pipeline(object):
 
     def _on_boxes3d(self, camera, message):
         """Output tracks and markers, as tracker_node does."""
-        with self._tally.rejecting('3D boxes'):
+        with self._events.rejecting('3D boxes'):
             followed = self._tracking_stage.add_boxes(message, self._now_ns, camera)
             if followed is not None:
                 self._outputs.append((TRACKS_TOPIC, tracks_to_msg(followed.tracks, followed.header)))

@@ -76,7 +76,7 @@ class TrackingStage(object):
     params : TrackerNodeParams
     tracking : list
         One instance of each of `TRACKING_PARAMS`.
-    tally : event_counter.EventCounter
+    events : event_counter.EventCounter
     transforms
         Its `lookup(target_frame, source_frame, stamp)` returns target_from_source (4, 4) or raises
         tf2_ros.TransformException; `go_back()` is called after a backward jump in time.
@@ -87,9 +87,9 @@ class TrackingStage(object):
         If a parameter is invalid.
     """
 
-    def __init__(self, params, tracking, tally, transforms):
+    def __init__(self, params, tracking, events, transforms):
         _check(params)
-        self._params, self._tally, self._transforms = params, tally, transforms
+        self._params, self._events, self._transforms = params, events, transforms
         self._tracker = _trackers_of(tracking)[params.tracker]
         self._images_lock, self._tracks_lock = threading.Lock(), threading.Lock()
         self._clocks = CameraClocks()
@@ -171,8 +171,8 @@ class TrackingStage(object):
             with self._tracks_lock:
                 if jumps == self._jumps:
                     self._tracker.skip(stamp_ns, camera or message.header.frame_id)
-            self._tally.warn('no transform', 'no transform from %s to %s at %.3f: %s; tracks are kept as they are'
-                             % (frame_id, self._params.target_frame, stamp_ns / NS, error))
+            self._events.warn('no transform', 'no transform from %s to %s at %.3f: %s; tracks are kept as they are'
+                              % (frame_id, self._params.target_frame, stamp_ns / NS, error))
             return None
 
     def follow(self, located):
@@ -197,12 +197,12 @@ class TrackingStage(object):
         if camera:
             self._check_frame(message.header.frame_id, camera)
         usable, faults = usable_boxes3d(message)
-        self._tally.leave_out('3D boxes', faults)
+        self._events.count_dropped('3D boxes', faults)
         detections = detections_from_msg(usable, fixed_from_camera)
         with self._tracks_lock:
             if jumps != self._jumps:
-                self._tally.warn('images of the time before', 'boxes at %.3f are left out: time went back while their '
-                                 'transform was waited for' % (stamp_ns / NS))
+                self._events.warn('images of the time before', 'boxes at %.3f are left out: time went back while their '
+                                  'transform was waited for' % (stamp_ns / NS))
                 return None
             if faults and not usable.boxes:  # differs from an image without people
                 self._tracker.skip(stamp_ns, camera or message.header.frame_id)
@@ -211,7 +211,7 @@ class TrackingStage(object):
             self._clocks.track(camera)
             self._newest_ns[camera] = max(stamp_ns, self._newest_ns.get(camera, stamp_ns))
             newest_ns = max(self._newest_ns.values())
-        self._tally.count('images tracked')
+        self._events.count('images tracked')
         return TrackingResult(Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame), tracks)
 
     def _view(self, stamp_ns, located):
@@ -224,7 +224,7 @@ class TrackingStage(object):
             entry = self._depths[located.camera].nearest(stamp_ns, int(self._params.stamp_tolerance * NS))
         depth_at = None
         if entry is not None:
-            with self._tally.rejecting('depth images'):  # the boxes are usable without depth
+            with self._events.rejecting('depth images'):  # the boxes are usable without depth
                 depth = imgmsg_to_depth(entry.value, self._params.depth_scale)
                 if depth.values.shape == (camera.height, camera.width):  # otherwise bbox3d_node reports the fault
                     depth_at = functools.partial(depths_towards, camera, depth)
@@ -238,8 +238,8 @@ class TrackingStage(object):
 
     def _go_back(self, stamp_ns):
         """Discard tracks and transforms after a backward jump in time, as when a bag is looped or rewound."""
-        self._tally.note('jumps back in time', 'time went back from %.3f to %.3f: tracks and transforms of the '
-                         'time before are forgotten' % (max(self._newest_ns.values()) / NS, stamp_ns / NS))
+        self._events.note('jumps back in time', 'time went back from %.3f to %.3f: tracks and transforms of the '
+                          'time before are forgotten' % (max(self._newest_ns.values()) / NS, stamp_ns / NS))
         self._tracker.reset()
         self._transforms.go_back()
         self._newest_ns = {}
@@ -249,9 +249,9 @@ class TrackingStage(object):
         """Warn that the stamp of boxes is inconsistent with `right`, the camera whose clock is trusted."""
         newest_ns = max(self._newest_ns.values(), default=stamp_ns)
         event = 'images ahead of other cameras' if stamp_ns > newest_ns else 'images of the time before'
-        self._tally.warn(event, 'boxes of %s at %.3f are left out: their stamp is %.3f s from the newest one, '
-                         'and %s has the right time; such boxes are tracked if that camera follows or ends'
-                         % (camera, stamp_ns / NS, (stamp_ns - newest_ns) / NS, right))
+        self._events.warn(event, 'boxes of %s at %.3f are left out: their stamp is %.3f s from the newest one, '
+                          'and %s has the right time; such boxes are tracked if that camera follows or ends'
+                          % (camera, stamp_ns / NS, (stamp_ns - newest_ns) / NS, right))
 
     def _check_frame(self, frame_id, camera):
         """Report cameras that share a frame, because tf then places them at the same position."""
@@ -260,9 +260,9 @@ class TrackingStage(object):
         self._frames[camera] = frame_id
         cameras = [other for other in self.cameras if self._frames.get(other) == frame_id]
         if len(cameras) > 1:
-            self._tally.note('cameras with one frame', 'the boxes of %s are all in the frame %s: they are taken for '
-                             'those of cameras in one place; each camera needs a frame of its own'
-                             % (' and '.join(cameras), frame_id))
+            self._events.note('cameras with one frame', 'the boxes of %s are all in the frame %s: they are taken for '
+                              'those of cameras in one place; each camera needs a frame of its own'
+                              % (' and '.join(cameras), frame_id))
 
 
 def _trackers_of(tracking):

@@ -60,7 +60,7 @@ class ReconfigureServer(object):
             try:
                 self._change(decode_config(request.config))
             except ValueError as error:
-                rospy.logwarn('change of parameters refused: %s; all stay as they are', error)
+                rospy.logwarn('parameter change rejected: %s; all stay as they are', error)
             for name in self._keep_in_step(before):
                 rospy.loginfo('~%s is %s now, %s before', name, self._values()[name], before[name])
             message = self._message()

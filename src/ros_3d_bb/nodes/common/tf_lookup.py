@@ -57,7 +57,7 @@ def _are_usable(message):
         check_transforms(message)
         return True
     except ValueError as error:
-        rospy.logwarn_throttle(5.0, 'transforms refused: %s; waiting for the next' % error)
+        rospy.logwarn_throttle(5.0, 'transforms rejected: %s; waiting for the next' % error)
         return False
 
 
