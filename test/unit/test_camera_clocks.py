@@ -12,7 +12,7 @@ def accepted(clocks, stamp_ns, now_ns, camera):
     """The answer to an image that is tracked if it is accepted."""
     right = clocks.accept(stamp_ns, now_ns, camera)
     if right is None:
-        clocks.track(camera)
+        clocks.track(stamp_ns, camera)
     return right
 
 
@@ -73,7 +73,7 @@ def test_a_camera_that_returns_after_a_pause_is_right_and_one_that_took_over_is_
 
 
 def test_the_latest_tracked_stamp_is_refused_once_more(clocks):
-    with pytest.raises(ValueError, match='second time'):
+    with pytest.raises(ValueError, match='duplicate'):
         clocks.accept(9 * NS, 1, 'front')
     assert clocks.accept(9 * NS + 1, 2, 'front') is None
     assert clocks.accept(9 * NS + 1, 3, 'front') is None  # it was not tracked

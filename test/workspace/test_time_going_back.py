@@ -1,4 +1,4 @@
-"""Time that goes back for one of several cameras, or for all, without a master."""
+"""Backward jumps in time of one of several cameras, or of all, without a master."""
 import pytest
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped
 
@@ -11,7 +11,7 @@ from support.two_cameras import PERIOD_NS, START_NS, Rig, Transforms, boxes
 
 @pytest.fixture
 def rig():
-    return Rig()
+    return Rig('front', 'rear')
 
 
 def test_time_goes_back_once_all_cameras_have_gone_back(rig):
@@ -24,7 +24,7 @@ def test_time_goes_back_once_all_cameras_have_gone_back(rig):
     for number in range(200, 220):
         front, rear = send(number, 'front'), send(number - 3, 'rear')
         assert rear and (front is None) == (number <= 203)
-    assert rig.transforms.jumps == 1 and rig.events.counts['images of the time before'] == 4
+    assert rig.transforms.jumps == 1 and rig.events.counts['images behind other cameras'] == 4
     assert [track.id for track in front.tracks] == [2] and stamp_of(rear) == START_NS + 19 * PERIOD_NS
 
 
@@ -35,10 +35,10 @@ def test_a_camera_whose_stamps_alone_go_back_is_refused_until_they_are_right(rig
     for number in range(300):
         rig.now_ns = number * PERIOD_NS
         goes_back = 100 <= number < 200
-        followed = rig.send(START_NS + rig.now_ns - (10 * NS + 1 if goes_back else 0), camera)
-        assert (followed is None) == goes_back
+        result = rig.send(START_NS + rig.now_ns - (10 * NS + 1 if goes_back else 0), camera)
+        assert (result is None) == goes_back
         assert [track.id for track in rig.send(START_NS + rig.now_ns, other).tracks] == [1] or number < 5
-    assert rig.transforms.jumps == 0 and rig.events.counts['images of the time before'] == 100
+    assert rig.transforms.jumps == 0 and rig.events.counts['images behind other cameras'] == 100
 
 
 def test_time_goes_back_twice(rig):
@@ -60,7 +60,7 @@ def test_an_image_that_waits_for_its_transform_while_time_goes_back_is_left_out(
     assert rig.send(START_NS + 200 * PERIOD_NS, 'rear') is None
     for number in range(1, 20):
         front = rig.send(START_NS + number * PERIOD_NS, 'front')
-    assert rig.transforms.jumps == 1 and rig.events.counts['images of the time before'] == 1
+    assert rig.transforms.jumps == 1 and rig.events.counts['images behind other cameras'] == 1
     assert [track.id for track in front.tracks] == [2]
 
 
