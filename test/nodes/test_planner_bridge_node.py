@@ -194,7 +194,7 @@ def test_tracks_that_are_too_old_are_refused_and_broken_ones_dropped(rig, record
     assert all(recorder.messages == [] for recorder in recorders.values())
     rig.send(now_ns() - LATENCY_NS, (float('nan'), 2.0, 0.85), (1.0, 2.0, 0.85))
     assert [person.name for person in recorders['people'].wait_for(1)[0].people] == ['2']
-    assert diagnostics_of('planner_bridge_node')[2]['broken tracks'] == 1
+    assert diagnostics_of('planner_bridge_node')[2]['tracks dropped'] == 1
 
 
 def bridge(name, before, *arguments):

@@ -1,4 +1,4 @@
-"""planner_bridge_node without a master: broken tracks, missing transforms, clocks that jump; in frames and numbers."""
+"""planner_bridge_node without a master: tracks dropped, missing transforms, clocks that jump; in frames and numbers."""
 import contextlib
 import sys
 from unittest import mock
@@ -93,7 +93,7 @@ def test_a_broken_track_is_dropped_and_counted_and_the_others_are_handed_on():
         bridge.send(START_NS, person(1, 2, 0), person(2, float('nan'), 0), person(3, 4, 0))
         assert [found.name for found in bridge.newest(PEOPLE)[1]] == ['1', '3']
         assert len(bridge.newest(POINTS)[1])
-        assert (bridge.counts['broken tracks'], bridge.counts['tracks handed on']) == (1, 1)
+        assert (bridge.counts['tracks dropped'], bridge.counts['tracks forwarded']) == (1, 1)
 
 
 def test_costmap_points_are_in_the_robots_frame():
