@@ -43,7 +43,7 @@ def test_each_camera_is_told_of_its_own_frame(transforms):
 
 
 def test_the_age_is_that_of_each_camera(transforms):
-    assert transforms.age() == 'not asked for yet'
+    assert transforms.age() == 'not requested yet'
     why_not(transforms, 'rear')
     assert transforms.age() == 'none from rear to map'
     why_not(transforms, 'front')

@@ -45,24 +45,10 @@ class CameraClocks(object):
         return max(self._newest_ns.values(), default=None)
 
     def accept(self, stamp_ns, now_ns, camera):
-        """Check the stamp of an image that arrived at `now_ns`.
+        """Check the stamp of an image that arrived at `now_ns`, see `time_sync.arrival_clock_ns`.
 
-        Parameters
-        ----------
-        stamp_ns : int
-        now_ns : int
-            Arrival time, see `time_sync.arrival_clock_ns`.
-        camera : str
-
-        Returns
-        -------
-        str or None
-            None if the image is accepted; otherwise the camera with the correct time.
-
-        Raises
-        ------
-        ValueError
-            If the latest tracked image of the camera has this stamp.
+        Returns None if the image is accepted; otherwise the camera with the correct time. Raises ValueError if the
+        latest tracked image of the camera has this stamp.
         """
         if camera in self._tracked and stamp_ns == self._tracked[camera].stamp_ns:
             raise ValueError('duplicate stamp %.9f of camera %r' % (stamp_ns / NS, camera))

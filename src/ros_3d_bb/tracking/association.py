@@ -64,16 +64,9 @@ def _height_cost(tracks, measurements, sigma_m):
 
 
 def match_greedily(distances):
-    """Pair rows with columns greedily, in order of distance (thesis 3.6). Each row and column is used at most once.
+    """Pair rows with columns of `distances` (n, m) greedily (thesis 3.6). Each row and column is used at most once.
 
-    Parameters
-    ----------
-    distances : array_like, (n, m)
-
-    Returns
-    -------
-    list of (int, int)
-        min(n, m) pairs (row, column) by increasing distance; ties are ordered by row, then column.
+    Returns a list of min(n, m) pairs (row, column) by increasing distance; ties are ordered by row, then column.
     """
     distances = np.asarray(distances, float)
     pairs, rows, columns = [], set(), set()
@@ -92,16 +85,8 @@ def plane_distances(positions, others):
 
 
 def assign(costs):
-    """Pair rows with columns: the maximum number of allowed pairs, with the minimum total cost.
-
-    Parameters
-    ----------
-    costs : numpy.ndarray, (n, m)
-        inf for pairs that are not allowed.
-
-    Returns
-    -------
-    rows, columns : numpy.ndarray of int, (k,)
+    """Rows and columns (k,) of the maximum number of allowed pairs with the minimum total cost; `costs` (n, m) are inf
+    for pairs that are not allowed.
     """
     allowed = np.isfinite(costs)
     forbidden = 1e6 + np.abs(costs[allowed]).sum()

@@ -24,15 +24,6 @@ class DetectedImage(NamedTuple):
         return self.stamp_ns, self.view.camera
 
 
-class Matches(NamedTuple):
-    """The tracks matched in an image: their IDs, whether they were confirmed before it, and the indices of their
-    detections."""
-
-    ids: list
-    confirmed: list
-    columns: list
-
-
 class OutOfSequenceBuffer(object):
     """Processes images in the order of their stamps, independent of the order of arrival.
 
@@ -42,9 +33,9 @@ class OutOfSequenceBuffer(object):
     Parameters
     ----------
     step : callable
-        step(state, image, observed_s, id_of) returns the state after an image and the image's Matches. A state has
-        `tracks` and `now_ns`. `observed_s` is the time in seconds that the image accounts for; id_of(column) returns
-        the ID of the track that a detection starts.
+        step(state, image, observed_s, id_of) returns the state after an image, which has `tracks` and `now_ns`, and the
+        matches: (track ID, whether the track was confirmed before, index of the detection). `observed_s` is the time
+        in seconds that the image accounts for; id_of(column) returns the ID of the track that a detection starts.
     state
         State before the first image.
     last_id : int
@@ -115,7 +106,7 @@ class OutOfSequenceBuffer(object):
 
     def _restore_ids(self, order, matches, known_id):
         """Restore the ID of a track that now starts in a late image, but started in a later image before the rewind."""
-        for track_id, was_confirmed, column in zip(*matches):
+        for track_id, was_confirmed, column in matches:
             key = order + (column,)
             if key in self._ids and (track_id > known_id or not was_confirmed):
                 former = self._ids.pop(key)

@@ -17,7 +17,7 @@ from ros_3d_bb.tracking import kalman_filter
 from ros_3d_bb.tracking.association import associate
 from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
 from ros_3d_bb.tracking.missed_detections import SEEN, CameraVisibility, mark_missed
-from ros_3d_bb.tracking.out_of_sequence import DetectedImage, Matches, OutOfSequenceBuffer
+from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
 from ros_3d_bb.tracking.track import TRACK, PredictionParams, new_targets, objects_of, position_std_of, update_matched
 from ros_3d_bb.tracking.types import MOVING_SPEED, OUT_OF_VIEW, VISIBLE, check_steps
 
@@ -145,7 +145,7 @@ class Tracker(object):
         return objects_of(tracks[tracks['confirmed'] & published], self._prediction)
 
     def _step(self, state, image, observed_s, id_of):
-        """One cycle of the tracker: the state after an image and the image's Matches, see OutOfSequenceBuffer."""
+        """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
         stamp_ns, detections, view = image
         params, camera = self._params, view.camera
         tracks = state.tracks.copy()
@@ -156,7 +156,7 @@ class Tracker(object):
         period_s = (stamp_ns - state.cameras[camera].stamp_ns) / NS if camera in state.cameras else 0.0
         measurements = measurements_of(detections, view, period_s, self._noise)
         rows, columns = associate(tracks, measurements, stamp_ns, params)
-        matches = Matches(tracks['id'][rows].tolist(), tracks['confirmed'][rows].tolist(), columns.tolist())
+        matches = list(zip(tracks['id'][rows].tolist(), tracks['confirmed'][rows].tolist(), columns.tolist()))
         update_matched(tracks, rows, measurements[columns], stamp_ns, params)
 
         cameras = {name: latest for name, latest in state.cameras.items() if stamp_ns - latest.stamp_ns <= KNOWN_NS}
