@@ -105,15 +105,6 @@ def test_outputs_of_the_image_carry_its_stamp(rig, recorders):
     assert (place.x, place.y, place.z) == pytest.approx((1, 2, 0.85))
 
 
-def test_points_are_where_people_are_from_the_robot(rig, recorders):
-    """The person at (8, 1) of odom is 3 m ahead, and walks to the left."""
-    rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85))
-    message, = recorders['points'].wait_for(1)
-    x, y, z = np.array(list(point_cloud2.read_points(message, ('x', 'y', 'z')))).T
-    assert (x.min(), x.max(), y.min(), y.max()) == pytest.approx((2.7, 3.3, -0.3, 0.3 + 0.5 * SPEED_MPS), abs=0.01)
-    assert (z.min(), z.max()) == pytest.approx((0.425, 1.275), abs=1e-5)
-
-
 def test_outputs_for_now_carry_the_time_that_they_are_predicted_to(rig, recorders):
     stamp_ns = now_ns() - 3 * LATENCY_NS
     rig.send(stamp_ns, (1.0, 2.0, 0.85))
@@ -121,22 +112,6 @@ def test_outputs_for_now_carry_the_time_that_they_are_predicted_to(rig, recorder
     age_s = message.header.stamp.to_sec() - stamp_ns / NS
     assert 0.3 <= age_s < TIMEOUT_S and message.header.frame_id == 'map'
     assert message.people[0].position.x == pytest.approx(1 + SPEED_MPS * age_s, abs=1e-6)
-
-
-@pytest.mark.parametrize('name', ['teb', 'mpc'])
-def test_planners_that_do_not_transform_get_position_and_velocity_in_their_frame(rig, recorders, name):
-    """x of the map is y of odom: a person at (1, 2) is at (8, 1) and walks along y."""
-    stamp_ns = now_ns() - LATENCY_NS
-    rig.send(stamp_ns, (1.0, 2.0, 0.85))
-    message = recorders[name].wait_for(1)[0]
-    age_s = message.header.stamp.to_sec() - stamp_ns / NS
-    assert message.header.frame_id == 'odom'
-    if name == 'teb':
-        place, twist = message.obstacles[0].polygon.points[0], message.obstacles[0].velocities.twist
-    else:
-        place, twist = message.objects[0].pose.position, message.objects[0].twist
-    assert (place.x, place.y) == pytest.approx((8, 1 + SPEED_MPS * age_s), abs=1e-5)
-    assert (twist.linear.x, twist.linear.y) == pytest.approx((0, SPEED_MPS), abs=1e-9)
 
 
 def test_what_planners_keep_is_sent_again_further_on_and_then_emptied_once(rig, recorders):
@@ -155,37 +130,6 @@ def test_what_planners_keep_is_sent_again_further_on_and_then_emptied_once(rig, 
     assert counts == {name: len(recorder.messages) for name, recorder in recorders.items()}
     level, sentence, _counts = diagnostics_of('planner_bridge_node')
     assert level == 1 and 'no tracks that can be handed on for 1 s' in sentence
-
-
-def test_an_empty_array_of_tracks_empties_every_output(rig, recorders):
-    rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85), (3.0, 2.0, 0.85))
-    for name in ('people', 'teb', 'mpc', 'vision'):
-        assert people_in(name, recorders[name].wait_for(1)[0]) == 2
-    rig.send(now_ns() - LATENCY_NS)
-    for name, recorder in recorders.items():
-        wait_until(lambda: people_in(name, recorder.messages[-1]) == 0, 'an empty message of ' + name)
-
-
-def test_the_costmap_is_cleared_around_the_robot_at_the_stamp_of_the_tracks(rig, recorders):
-    with Recorder('planner_bridge_node/clearing_points', PointCloud2) as clearing:
-        stamp_ns = now_ns() - LATENCY_NS
-        rig.send(stamp_ns)
-        message = clearing.wait_for(1)[0]
-    assert message.header.frame_id == 'base_link' and message.header.stamp == time_from(stamp_ns)
-    assert message.width > 2000
-
-
-def test_without_transform_the_planner_keeps_nobody_and_the_others_go_on(rig, recorders):
-    """No transform for 2 s, after one that was there: TEB's array and the points are emptied while tracks come."""
-    rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85))
-    recorders['teb'].wait_for(1)
-    for _again in range(8):
-        rig.send(now_ns() - LATENCY_NS, (1.0, 2.0, 0.85), tf=False)
-        time.sleep(0.25)
-    assert people_in('teb', recorders['teb'].messages[-1]) == people_in('points', recorders['points'].messages[-1]) == 0
-    assert people_in('people', recorders['people'].messages[-1]) == 1
-    level, sentence, counts = diagnostics_of('planner_bridge_node')
-    assert level == 1 and counts['no transform'] >= 8
 
 
 def test_tracks_that_are_too_old_are_refused_and_broken_ones_dropped(rig, recorders):

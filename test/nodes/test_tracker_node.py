@@ -114,17 +114,6 @@ def test_a_person_who_stands_still_has_no_speed_though_the_robot_drives(rig, tra
     assert abs(track.twist.twist.linear.x) < 0.01 and not track.moving
 
 
-def test_velocity_and_prediction_are_in_metres_and_seconds(rig, tracks, now):
-    """1 m/s to the right of the camera is -y in the map."""
-    for frame in range(40):
-        rig.send(now + frame * PERIOD, (0.1 * frame - 2, 0.0, 4.0))
-        tracks.wait_for(frame + 1)
-    track, = tracks.wait_for(40)[-1].objects
-    assert track.twist.twist.linear.y == pytest.approx(-1, abs=0.02) and track.moving
-    last = track.prediction[-1].pose.position
-    assert last.y - track.pose.pose.position.y == pytest.approx(-2, abs=0.08)
-
-
 def test_without_transform_nothing_is_published_and_nobody_ages(rig, tracks, now):
     """Nothing for 1 s by the stamps, three times as long as somebody unseen is published; the track lives on."""
     number = rig.stand(tracks, now, frames=30)
@@ -171,31 +160,6 @@ def test_markers_are_made_only_while_somebody_subscribes(rig, tracks, now):
             assert ('history' in [marker.ns for marker in message.markers]) == (frame > 50)
 
 
-def test_markers_are_those_of_the_thesis_and_more(rig, markers, tracks, now):
-    """A translucent cylinder, its number above, a red velocity and a green prediction arrow; history and ellipse."""
-    for frame in range(20):
-        rig.send(now + frame * PERIOD, (0.0, 0.1, 2.0 + 0.1 * frame))
-        tracks.wait_for(frame + 1)
-    number = tracks.wait_for(20)[-1].objects[0].id
-    drawn = {marker.ns: marker for marker in markers.wait_for(20)[-1].markers}
-    assert set(drawn) == {'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse'}
-    for marker in drawn.values():
-        assert marker.id == number and marker.action == Marker.ADD and marker.header.frame_id == 'map'
-        assert marker.header.stamp == time_from(now + 19 * PERIOD) and marker.pose.orientation.w == 1.0
-    cylinder, text = drawn['cylinder'], drawn['id']
-    assert cylinder.type == Marker.CYLINDER and 0.2 < cylinder.color.a < 0.8
-    assert (cylinder.scale.x, cylinder.scale.y, cylinder.scale.z) == pytest.approx((0.5, 0.5, 1.7))
-    assert text.type == Marker.TEXT_VIEW_FACING and text.text == str(number) and text.color.g > 0.8
-    assert text.pose.position.z > cylinder.pose.position.z + cylinder.scale.z / 2
-    walk_x = [drawn['history'].pose.position.x + point.x for point in drawn['history'].points]
-    assert walk_x[0] == pytest.approx(2.3, abs=0.1)  # the fourth image, when the track began
-    assert walk_x[-1] == pytest.approx(cylinder.pose.position.x)
-    red, green = drawn['velocity'], drawn['prediction']
-    assert red.type == green.type == Marker.ARROW and red.color.r > 0.8 and green.color.g > 0.8
-    assert red.points[1].x - red.points[0].x == pytest.approx(1.0, abs=0.05)
-    assert green.points[1].x - green.points[0].x == pytest.approx(2.0, abs=0.1)
-
-
 def test_time_that_goes_back_ends_all_tracks_and_goes_on(rig, tracks, now):
     """The transforms of the time before are forgotten too, so they are sent until the boxes have met one."""
     number = rig.stand(tracks, now)
@@ -215,36 +179,6 @@ def test_boxes_that_cannot_be_used_are_refused_and_the_next_work(rig, tracks, no
     assert tracks.wait_for(2)[1].header.stamp == time_from(now + 2 * PERIOD)
     level, sentence, counts = diagnostics_of('tracker_node')
     assert level == 1 and '3D boxes rejected' in sentence and counts['3D boxes dropped'] == 1
-
-
-def test_boxes_that_come_late_are_taken_in_and_nothing_is_stamped_older(rig, tracks, now):
-    """Two images swapped on the way: the track has seen both."""
-    rig.stand(tracks, now)
-    rig.send(now + 11 * PERIOD, (0.0, 0.0, 3.0))
-    tracks.wait_for(11)
-    rig.send(now + 10 * PERIOD, (0.0, 0.0, 3.0))
-    late = tracks.wait_for(12)[-1]
-    assert late.header.stamp == time_from(now + 11 * PERIOD) and len(late.objects) == 1
-
-
-def test_somebody_behind_a_pillar_is_occluded_and_keeps_the_number(rig, tracks, now):
-    """The depth image shows the pillar 1.5 m ahead while nobody is found for 1.5 s."""
-    info = publisher('camera/color/camera_info', CameraInfo)
-    depth = publisher('camera/aligned_depth_to_color/image_raw', Image)
-    number = rig.stand(tracks, now)
-    for frame in range(10, 25):
-        stamp_ns = now + frame * PERIOD
-        info.publish(CameraInfo(header=header_at(stamp_ns), width=64, height=48, K=[60, 0, 32, 0, 60, 24, 0, 0, 1]))
-        pillar = np.full((48, 64), 1500, np.uint16)
-        depth.publish(Image(header=header_at(stamp_ns), width=64, height=48, encoding='16UC1', step=128,
-                            data=pillar.tobytes()))
-        time.sleep(0.02)  # another topic: nothing says that it comes first
-        rig.send(stamp_ns)
-        message = tracks.wait_for(frame + 1)[-1]
-    track, = message.objects
-    assert track.id == number and track.status == TrackedObject.OCCLUDED
-    rig.send(now + 25 * PERIOD, (0.0, 0.0, 3.0))
-    assert [track.id for track in tracks.wait_for(26)[-1].objects] == [number]
 
 
 @pytest.fixture

@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings, strategies as st
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.tracking.occlusion import classify_visibility, depths_towards
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
+from support.cylinders import mounted
 
 CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
-LOOK = transform_from((0, 0, 1), OPTICAL_ROTATION)
+LOOK = mounted(1.0)
 PLAIN = CameraView(LOOK, CAMERA)
 
 
@@ -47,16 +48,6 @@ FOLDING = Camera(640, 480, 280, 280, 320, 240, 'plumb_bob', (-0.35, 0.12, 0, 0, 
     (3, 0, VISIBLE), (3, 2.5, VISIBLE), (-3, 0, OUT_OF_VIEW), (0.5, 3, OUT_OF_VIEW)])
 def test_a_camera_whose_distortion_folds_before_the_border_has_a_view_with_an_end(x, y, expected):
     assert place(x, y, CameraView(LOOK, FOLDING)) == expected
-
-
-def mounted(height, pitch, roll=0.0):
-    """The transform of a camera at a height, looking along x, then pitched down and rolled clockwise, degrees."""
-    transform = transform_from((0, 0, height), (0, 0, 0, 1))
-    for axis, angle in ((1, pitch), (0, roll)):
-        half = np.radians(angle) / 2
-        quaternion = np.eye(4)[axis] * np.sin(half) + np.eye(4)[3] * np.cos(half)
-        transform = transform.dot(transform_from((0, 0, 0), quaternion))
-    return transform.dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
 
 
 @pytest.mark.parametrize('height,pitch,x,expected', [

@@ -63,14 +63,6 @@ def test_velocity_is_metres_per_second_at_any_rate(rate_hz):
     assert track.moving
 
 
-def test_velocity_survives_irregular_and_dropped_images():
-    tracker, random, time_s = ThesisTracker(), np.random.RandomState(0), 0.0
-    for _ in range(200):
-        time_s += random.choice([0.02, 0.033, 0.1, 0.3])
-        track, = tracker.update(seconds(time_s), [at(0.8 * time_s, 0)])
-    np.testing.assert_allclose(track.velocity_mps, [0.8, 0, 0], atol=0.001)
-
-
 def test_velocity_is_averaged_with_alpha():
     """v' = alpha * v_new + (1 - alpha) * v, from zero."""
     tracker = ThesisTracker(ThesisTrackerParams(alpha=0.25))
@@ -146,10 +138,6 @@ def test_a_late_or_repeated_image_is_refused_and_changes_nothing(stamp_s):
     assert [track.id for track in tracker.update(seconds(1.1), [at(0, 0)])] == [1]
 
 
-def test_nobody_is_tracked_where_nobody_was_seen():
-    assert ThesisTracker().update(0, []) == []
-
-
 @given(st.lists(st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), max_size=5), max_size=12))
 def test_each_detection_belongs_to_exactly_one_track(frames):
     tracker, seen = ThesisTracker(), set()
@@ -159,12 +147,6 @@ def test_each_detection_belongs_to_exactly_one_track(frames):
         assert ids == sorted(set(ids)) and sum(track.status == VISIBLE for track in tracks) == len(places)
         assert all(id_ in seen or id_ > max(seen, default=0) for id_ in ids)
         seen.update(ids)
-
-
-@pytest.mark.parametrize('name,value', [('prediction_step', 0.0), ('prediction_step', 1e-6)])
-def test_parameters_that_make_no_sense_are_named(name, value):
-    with pytest.raises(ValueError, match=name):
-        ThesisTracker(ThesisTrackerParams()._replace(**{name: value}))
 
 
 def test_other_parameters_work_from_the_next_image_on_and_tracks_go_on():
@@ -179,8 +161,9 @@ def test_other_parameters_work_from_the_next_image_on_and_tracks_go_on():
     assert (track.id, track.first_seen_ns) == (before.id, before.first_seen_ns)
 
 
-def test_parameters_that_are_refused_leave_the_old_ones():
+@pytest.mark.parametrize('step_s', [0.0, 1e-6])
+def test_rejected_parameters_leave_the_old_ones(step_s):
     tracker = ThesisTracker()
     with pytest.raises(ValueError, match='prediction_step'):
-        tracker.reconfigure(ThesisTrackerParams(prediction_step=0.0, prediction_time=1.0))
+        tracker.reconfigure(ThesisTrackerParams(prediction_step=step_s, prediction_time=1.0))
     assert len(tracker.update(0, [at(0, 0)])[0].prediction_m) == 8

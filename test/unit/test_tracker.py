@@ -116,21 +116,6 @@ def test_somebody_hidden_is_published_as_occluded_for_long_and_keeps_the_number(
     assert [track.status for track in walk[-1]] == [VISIBLE, VISIBLE]
 
 
-def test_somebody_who_does_not_come_out_from_behind_something_is_still_there():
-    """Walks at 1 m/s behind a screen that hides y = 0 to 1 m, stops there for 1.5 s, and goes on."""
-    def depth_at(points):
-        behind_screen = (points[:, 0] / points[:, 2] < 0) & (points[:, 0] / points[:, 2] > -1 / 4.0)
-        return np.where(behind_screen, 1.5, 6.0)
-
-    def walk(time_s):
-        y_m = min(time_s - 1.5, max(0.5, time_s - 3))
-        return [] if -0.2 < y_m < 1.2 else [at(4, y_m)]
-    published = play(Tracker(), 5, walk, view=VIEW._replace(depth_at=depth_at))
-    assert all(objects[0].status == OCCLUDED for objects in published[42:125])
-    assert all(0 < objects[0].position_m[1] < 1.1 for objects in published[60:125])
-    assert ids(published[-1]) == [1] and published[-1][0].status == VISIBLE
-
-
 def test_somebody_who_is_gone_is_not_published_for_longer_than_the_limit():
     walk = play(Tracker(TrackerParams(max_missed_time=0.35)), 2, lambda time_s: [at(3, 0)] if time_s < 1 else [])
     assert [bool(objects) for objects in walk[30:]] == [frame < 10 for frame in range(30)]
@@ -230,37 +215,6 @@ def test_size_is_smoothed():
     assert np.std(heights_m) < 0.025 and np.mean(heights_m) == pytest.approx(1.7, abs=0.03)
 
 
-@pytest.mark.slow
-@settings(max_examples=20)
-@given(st.permutations(range(6)))
-def test_images_in_another_order_give_the_same_tracks(order):
-    def image(number):
-        time_s = 1 + number / 15
-        return START_NS + int(time_s * NS), [at(3, 0.8 * time_s - 1), at(4, 1 - 0.8 * time_s)], VIEW
-    expected, shuffled = Tracker(), Tracker()
-    for tracker, numbers in ((expected, range(6)), (shuffled, order)):
-        play(tracker, 1, lambda time_s: [at(3, 0.8 * time_s - 1), at(4, 1 - 0.8 * time_s)])
-        for number in numbers:
-            objects = tracker.update(*image(number))
-    wanted = expected.objects()
-    assert ids(objects) == ids(wanted)
-    for got, want in zip(objects, wanted):
-        np.testing.assert_allclose(got.covariance, want.covariance, rtol=1e-9)
-        np.testing.assert_allclose(got.position_m, want.position_m, rtol=1e-9)
-
-
-def test_a_late_image_after_a_pause_is_believed_as_if_it_had_come_in_time():
-    """After the pause errors of the boxes are others than before, whichever image comes first."""
-    def after_pause(times_s):
-        tracker = Tracker()
-        play(tracker, 1, standing((3, 0)))
-        for time_s in times_s:
-            tracker.update(START_NS + int(time_s * NS), [at(3, 0)], VIEW)
-        return tracker.objects()[0]
-    in_time, late = after_pause([1.9, 2.1]), after_pause([2.1, 1.9])
-    assert late.covariance.tobytes() == in_time.covariance.tobytes()
-
-
 def test_what_was_published_keeps_its_number_when_a_late_image_shows_somebody_more():
     tracker = Tracker()
     play(tracker, 1, standing((3, 0)))
@@ -279,26 +233,6 @@ def test_an_image_that_comes_again_or_too_late_is_refused_and_changes_nothing(la
         tracker.update(START_NS + int(round((29 / 30 - late_s) * NS)), [at(3, 1)], VIEW)
     np.testing.assert_array_equal(tracker.objects()[0].covariance, before[0].covariance)
     assert ids(tracker.update(START_NS + NS, [at(3, 0)], VIEW)) == [1]
-
-
-def test_two_cameras_with_the_same_stamp_are_both_taken():
-    tracker = Tracker()
-    for frame in range(30):
-        stamp_ns = START_NS + frame * NS // 30
-        tracker.update(stamp_ns, [at(3, 0)], VIEW._replace(camera='front'))
-        objects = tracker.update(stamp_ns, [at(3.02, 0)], VIEW._replace(camera='side'))
-    assert ids(objects) == [1] and objects[0].position_m[0] == pytest.approx(3.01, abs=0.02)
-
-
-@pytest.mark.parametrize('later_ns', [1, NS // 1000, NS // 60])
-def test_a_second_camera_is_believed_whenever_its_images_come(later_ns):
-    """Only that one sees the person."""
-    tracker = Tracker()
-    for frame in range(30):
-        stamp_ns = START_NS + frame * NS // 30
-        tracker.update(stamp_ns, [], VIEW._replace(camera='front'))
-        objects = tracker.update(stamp_ns + later_ns, [at(3, 0.03 * frame - 0.5)], VIEW._replace(camera='side'))
-    assert objects[0].velocity_mps[1] == pytest.approx(0.9, abs=0.1)
 
 
 def test_somebody_seen_is_published_however_unsure_the_boxes_are():
@@ -349,26 +283,6 @@ def test_whatever_comes_tracks_are_sane(images):
             assert np.isfinite(track.prediction_m).all() and np.linalg.eigvalsh(track.covariance).min() > -1e-9
             assert track.first_seen_ns <= track.last_seen_ns <= START_NS + number * NS // 10
     assert len(known) <= sum(len(image) for image in images)
-
-
-def test_the_same_images_give_the_same_tracks_to_the_bit():
-    def run():
-        random = np.random.RandomState(5)
-        return play(Tracker(), 2, lambda time_s: [at(3 + random.normal(0, 0.05), time_s - 1 + random.normal(0, 0.05))])
-    for one, other in zip(run(), run()):
-        assert [track.position_m.tobytes() for track in one] == [track.position_m.tobytes() for track in other]
-
-
-def test_prediction_goes_as_far_and_in_such_steps_as_asked_for():
-    tracker = Tracker(prediction=PredictionParams(prediction_time=3.0, prediction_step=0.5))
-    track, = play(tracker, 1, standing((3, 0)))[-1]
-    assert track.prediction_m.shape == (6, 3) and track.prediction_covariance_m2.shape == (6, 3, 3)
-
-
-@pytest.mark.parametrize('step_s', [0.0, 1e-6])
-def test_a_step_that_gives_too_many_predictions_is_rejected(step_s):
-    with pytest.raises(ValueError, match='prediction_step'):
-        Tracker(prediction=PredictionParams(prediction_step=step_s))
 
 
 def test_other_parameters_work_from_the_next_image_on_and_tracks_go_on():

@@ -77,15 +77,6 @@ def test_teb_plans_from_now_so_positions_are_predicted_to_now():
     assert [velocity is None for _centre, _radius, velocity in teb.obstacles()] == [False, True]
 
 
-def test_teb_keeps_an_array_until_an_empty_one_comes():
-    teb = TebReplica({})
-    teb.receive(received(obstacles_to_msg([walker(3, [1, 2, 0.9], [0, 0, 0])], header_in('odom'),
-                                          package('costmap_converter'))))
-    assert len(teb.obstacles()) == 1
-    teb.receive(received(obstacles_to_msg([], header_in('odom'), package('costmap_converter'))))
-    assert teb.obstacles() == []
-
-
 def test_obstacles_keep_number_and_velocity_covariance():
     obstacle, = received(obstacles_to_msg(in_frame([walker(3, [1, 2, 0.9], [1, 0, 0])], QUARTER), header_in('odom'),
                                           package('costmap_converter'))).obstacles
@@ -202,13 +193,6 @@ def test_the_obstacle_layer_marks_who_is_there_and_clears_where_they_were():
     assert (np.abs(marks - [3, 3]) <= [0.35, 0.35 + 0.5]).all() and marks[:, 1].min() > 2.6
     show(layer, sources, [])
     assert len(layer.lethal()) == 0
-
-
-def test_without_the_clearing_points_the_obstacle_layer_keeps_a_trail():
-    sources = {'people': people_layer()['people']}
-    layer = costmap(sources)
-    walk_past(layer, sources)
-    assert layer.lethal()[:, 1].min() < -2.9
 
 
 @pytest.mark.parametrize('sensor_frame', ['base_link', ''])

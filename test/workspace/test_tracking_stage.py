@@ -1,11 +1,12 @@
 """From 3D boxes and transforms to tracks, without a master: effects of one invalid or untimely message on the next."""
+import numpy as np
 import pytest
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.types import VISIBLE
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
 from support.two_cameras import START_NS, Rig, boxes
 
 PERIOD_NS = NS // 30
@@ -49,10 +50,24 @@ def test_a_backward_jump_in_time_is_handled_once(rig):
     assert rig.send(stamp_ns - 19 * NS + PERIOD_NS).header.stamp < time_from(stamp_ns)
 
 
+def add_images(rig, stamp_ns, encoding='16UC1'):
+    """camera_info, and a depth image of a wall 1.5 m ahead."""
+    header, depth_mm = Header(stamp=time_from(stamp_ns), frame_id='camera'), np.full((48, 64), 1500, '<u2')
+    rig.add_camera_info(CameraInfo(header=header, width=64, height=48, K=[60, 0, 32, 0, 60, 24, 0, 0, 1]))
+    rig.add_depth(Image(header=header, width=64, height=48, encoding=encoding, step=128, data=depth_mm.tobytes()), 0)
+
+
+def test_a_person_behind_something_in_the_depth_image_is_occluded(rig):
+    """The person is not detected for a second, which is longer than a missed person is published."""
+    stamp_ns, before = stand(rig)
+    for number in range(1, 31):
+        add_images(rig, stamp_ns + number * PERIOD_NS)
+        result = rig.send(stamp_ns + number * PERIOD_NS, count=0)
+    assert ids(result) == before and result.tracks[0].status == OCCLUDED
+
+
 def test_boxes_are_tracked_without_their_depth_image_if_it_is_invalid(rig):
-    header = Header(stamp=time_from(START_NS), frame_id='camera')
-    rig.add_camera_info(CameraInfo(header=header, width=4, height=3, K=[4, 0, 2, 0, 4, 1, 0, 0, 1]))
-    rig.add_depth(Image(header=header, width=4, height=3, encoding='nonsense', step=8, data=b'0' * 24), 0)
+    add_images(rig, START_NS, encoding='nonsense')
     assert rig.send(START_NS) is not None
     assert rig.events.counts['depth images rejected'] == 1
 

@@ -4,7 +4,7 @@ Each person is tracked by a constant-velocity Kalman filter in the plane (`kalma
 tracks by maximum total likelihood (`association`). A detection that a new target explains better starts a track, which
 is published after a minimum number of detections (`track`). Undetected people are not dropped immediately: their tracks
 stay published for a short time if a camera should detect them, and for longer if a person or an object occludes them
-(`occlusion`, `missed_detections`). Unpublished tracks are kept for longer still, so that people who reappear keep their
+(`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep their
 track ID.
 """
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
 from ros_3d_bb.tracking.association import associate
 from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
-from ros_3d_bb.tracking.missed_detections import SEEN, CameraVisibility, mark_missed
+from ros_3d_bb.tracking.occlusion import SEEN, CameraVisibility, mark_missed
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
 from ros_3d_bb.tracking.track import TRACK, PredictionParams, new_targets, objects_of, position_std_of, update_matched
 from ros_3d_bb.tracking.types import MOVING_SPEED, OUT_OF_VIEW, VISIBLE, check_steps
