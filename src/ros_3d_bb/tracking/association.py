@@ -12,22 +12,10 @@ HIDDEN_FEET_COST = 8.0  # cost of a box whose top matches but whose height does 
 
 
 def associate(tracks, measurements, stamp_ns, params):
-    """Assign detections to tracks in a cascade: recently matched, then missed, then tentative tracks.
+    """Assign measurements to tracks (arrays of TRACK and MEASUREMENT) in a cascade: recently matched, then missed, then
+    tentative tracks. Returns the rows of the tracks and the columns of the measurements of the pairs.
 
     A pair is allowed only if the track explains the detection better than a new target does.
-
-    Parameters
-    ----------
-    tracks : numpy.ndarray of track.TRACK, (n,)
-        Predicted to the stamp.
-    measurements : numpy.ndarray of measurement_model.MEASUREMENT, (m,)
-    stamp_ns : int
-    params : tracker.TrackerParams
-
-    Returns
-    -------
-    rows, columns : numpy.ndarray of int, (k,)
-        Row of the track and column of the measurement of each pair.
     """
     cost = kalman_filter.negative_log_likelihood(tracks['mean'], tracks['covariance'], measurements, params)
     cost += _height_cost(tracks, measurements, params.height_sigma)

@@ -19,13 +19,7 @@ def predict(mean, covariance, elapsed_s, density):
 
 
 def negative_log_likelihood(mean, covariance, measurements, params):
-    """Negative log likelihood of each measurement given each object.
-
-    Returns
-    -------
-    numpy.ndarray, (n, m)
-        -2 log(2 pi p), where p is the density of the measurement given the object, per m².
-    """
+    """-2 log(2 pi p) (n, m), where p is the density of each measurement given each object, per m²."""
     logs = [_fit(mean[:, None], covariance[:, None], measurements, component)[0] for component in _components(params)]
     return -2 * np.logaddexp(*logs)
 

@@ -32,22 +32,11 @@ class NoiseParams(NamedTuple):
 
 
 def measurements_of(detections, view, elapsed_s, params):
-    """Convert the detections of one image to measurements for the Kalman filter.
+    """Convert the detections of one image to an array of MEASUREMENT; `elapsed_s` is the time since the previous image
+    of the same camera, 0 for the first.
 
     If a nearer person partly occludes a detection, or the image border leaves only a part of its width, the centre is
     shifted to half a person's width from the visible edge. The lateral position of such a box is less certain.
-
-    Parameters
-    ----------
-    detections : sequence of Detection, n
-    view : CameraView
-    elapsed_s : float
-        Time since the previous image of the same camera; 0 for the first.
-    params : NoiseParams
-
-    Returns
-    -------
-    numpy.ndarray of MEASUREMENT, (n,)
     """
     measurements = np.zeros(len(detections), MEASUREMENT)
     if not len(detections):

@@ -31,9 +31,7 @@ OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
 
 
 class CameraVisibility(NamedTuple):
-    """The latest image of a camera: its stamp, its view, and the result for each track (n,), SEEN or a visibility of
-    `classify_visibility`.
-    """
+    """The latest image of a camera, and SEEN or the result of `classify_visibility` for each track (n,)."""
 
     stamp_ns: int
     view: CameraView
@@ -46,21 +44,9 @@ def mark_missed(tracks, before, rows, cameras, camera, observed_s, max_range_m):
     An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
     track keeps its previous position.
 
-    Parameters
-    ----------
-    tracks : numpy.ndarray of track.TRACK, (n,)
-        Predicted to the stamp of the image; modified in place.
-    before : numpy.ndarray of track.TRACK, (n,)
-        The same tracks after the previous image.
-    rows : numpy.ndarray of int
-    cameras : dict
-        CameraVisibility by camera; the `visibility` of the image's camera is modified in place.
-    camera : str
-        The camera of the image.
-    observed_s : float
-        Time that the image accounts for, seconds.
-    max_range_m : float
-        Range of the detector: people farther from a camera are not detected.
+    `tracks` are predicted to the stamp of the image, `before` are the same tracks after the previous image. `cameras`
+    maps each camera to its CameraVisibility; `camera` is that of the image, which accounts for `observed_s` seconds.
+    Modifies `tracks` and the `visibility` of the image.
     """
     image, missed, before = cameras[camera], tracks[rows], before[rows]
     visibility = _visibility(missed, tracks, image.view, max_range_m)
@@ -100,23 +86,10 @@ def _positions_of(tracks):
 
 
 def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
-    """Classify the visibility of people at their estimated positions.
+    """Classify the visibility (n,) of people with centres and extents (n, 3) in a CameraView.
 
-    Parameters
-    ----------
-    view : CameraView
-    positions_m, sizes_m : numpy.ndarray, (n, 3)
-        Centres and extents in the fixed frame.
-    others_m : numpy.ndarray, (m, 3)
-        Centres of possible occluders; may contain the people themselves.
-    max_range_m : float
-        Range of the detector: people farther away are not detected.
-
-    Returns
-    -------
-    numpy.ndarray of int, (n,)
-        VISIBLE: a detection is expected; OCCLUDED: by a person, or by something nearer in the depth image;
-        OUT_OF_VIEW.
+    VISIBLE: a detection is expected. OCCLUDED: by a person at one of the centres `others_m` (m, 3), which may contain
+    the people themselves, or by something nearer in the depth image. OUT_OF_VIEW: also beyond the detector's range.
     """
     distances_m, bearings = view.bearings(positions_m)
     visibility = np.full(len(positions_m), VISIBLE)

@@ -54,25 +54,10 @@ class ThesisTracker(object):
         self._params = params
 
     def update(self, stamp_ns, detections, view=None):
-        """Update the tracks with the detections of one image.
+        """Update the tracks with the detections of one image, as `Tracker.update`.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Stamp of the image, nanoseconds; later than that of the previous image.
-        detections : list of Detection
-        view : CameraView, optional
-            Unused: the thesis' tracker does not consider the field of view.
-
-        Returns
-        -------
-        list of TrackedObject
-            Ordered by ID.
-
-        Raises
-        ------
-        ValueError
-            If the stamp is not later than the previous one; the tracks are unchanged.
+        The thesis' tracker does not consider the view. Raises ValueError without any change if the stamp is not later
+        than the previous one.
         """
         params, elapsed_ns = self._params, self._advance(stamp_ns)
         tracks = [(track, unseen_ns + elapsed_ns) for track, unseen_ns in self._tracks

@@ -41,16 +41,7 @@ class PredictionParams(NamedTuple):
 
 
 def update_matched(tracks, rows, measurements, stamp_ns, params):
-    """Update the tracks in `rows` in place, which are predicted to the stamp, with one measurement each.
-
-    Parameters
-    ----------
-    tracks : numpy.ndarray of TRACK, (n,)
-    rows : numpy.ndarray of int, (m,)
-    measurements : numpy.ndarray of measurement_model.MEASUREMENT, (m,)
-    stamp_ns : int
-    params : tracker.TrackerParams
-    """
+    """Update the tracks in `rows` in place, which are predicted to the stamp, with one measurement each."""
     matched = tracks[rows]
     matched['mean'], matched['covariance'] = kalman_filter.update(matched['mean'], matched['covariance'], measurements,
                                                                   params)
@@ -67,12 +58,7 @@ def update_matched(tracks, rows, measurements, stamp_ns, params):
 def new_targets(tracks, measurements, stamp_ns, params):
     """Start tracks from unmatched measurements, except duplicate detections of recently matched or new tracks.
 
-    Returns
-    -------
-    new : numpy.ndarray of TRACK, (k,)
-        New tracks; their IDs are not set.
-    kept : list of int
-        Indices of the measurements that started them.
+    Returns the new tracks, whose IDs are not set, and the indices of the measurements that started them.
     """
     new = np.zeros(len(measurements), TRACK)
     new['mean'][:, :2] = measurements['position_m']

@@ -82,8 +82,8 @@ class CameraView(NamedTuple):
 
     @property
     def ahead(self):
-        """Unit vector (2,) of the horizontal direction of the optical axis. For a camera that points straight up or
-        down, it is the direction of the upper edge of the image."""
+        """Unit vector (2,) of the horizontal direction of the optical axis; of the upper edge of the image for a camera
+        that points straight up or down."""
         ahead = self.fixed_from_camera[:2, 2]
         if ahead.dot(ahead) < VERTICAL ** 2:
             ahead = -self.fixed_from_camera[:2, 1]

@@ -110,7 +110,8 @@ class Transforms(object):
         for frames, when_s in list(self._requested.items()):
             if when_s < latest_s - REQUESTED_S:
                 self._requested.pop(frames)
-        ages = ['%s from %s to %s' % (self._age_of(*frames), frames[1], frames[0]) for frames in sorted(self._requested)]
+        ages = ['%s from %s to %s' % (self._age_of(target, source), source, target)
+                for target, source in sorted(self._requested)]
         return ', '.join(ages) or 'not requested yet'
 
     def _age_of(self, target_frame, source_frame):
