@@ -64,9 +64,6 @@ def test_a_broken_track_takes_no_others_with_it(changed):
     assert usable_tracks(good)[1] == []
 
 
-STANDS = track_at([3, 0, 0.85], [0.19, 0, 0], np.empty((0, 3)), moving=False)  # 0.19 m/s: noise of one who stands
-
-
 coordinates = st.floats(-1e6, 1e6)
 speeds = st.floats(-3, 3)
 
@@ -134,13 +131,6 @@ def test_a_change_of_frame_keeps_distances_and_speeds_on_large_maps(track, yaw, 
     np.testing.assert_allclose(there.position_m - here.position_m, expected, rtol=0, atol=1e-6)
     assert np.linalg.norm(here.velocity_mps) == pytest.approx(
         np.linalg.norm(track.velocity_mps) if track.moving else 0, abs=1e-9)
-
-
-@given(coordinates, coordinates)
-def test_rounding_is_the_most_that_float32_is_off(x, y):
-    """Of all places with such coordinates; the one given is off by no more."""
-    most_m = rounding_m([track_at([x, y, 0.9], [0, 0, 0])], np.eye(4))
-    assert np.abs(np.array([x, y]) - np.float32([x, y]).astype(float)).max() <= most_m
 
 
 def test_rounding_is_a_quarter_of_a_metre_in_utm_coordinates_and_none_near_the_robot():
