@@ -3,19 +3,18 @@ import itertools
 import threading
 import time
 
-import numpy as np
 import pytest
 import rospy
 from dynamic_reconfigure.client import Client
-from geometry_msgs.msg import Point, TransformStamped
-from sensor_msgs.msg import CameraInfo, Image
+from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
+from ros_3d_bb.msg import BoundingBox3DArray, TrackedObject, TrackedObjectArray
 from support.ros import TIMEOUT_S, Recorder, diagnostics_of, header_at, publisher, wait_until
+from support.two_cameras import boxes
 
 PERIOD = NS // 10
 _stamps = itertools.count(1000 * NS, 100 * NS)
@@ -48,14 +47,7 @@ class Rig(object):
         return messages[-1].objects[0].id
 
     def send_boxes(self, stamp_ns, *centers):
-        message = BoundingBox3DArray(header=header_at(stamp_ns))
-        for center in centers:
-            box = BoundingBox3D()
-            box.center.position = Point(*center)
-            box.center.orientation.w = 1.0
-            box.size.x, box.size.y, box.size.z = 0.5, 1.7, 0.5
-            message.boxes.append(box)
-        self.boxes.publish(message)
+        self.boxes.publish(boxes(stamp_ns, 'camera_color_optical_frame', centers))
 
 
 @pytest.fixture(scope='module')
@@ -189,21 +181,6 @@ def tuned(rig):
     yield client.update_configuration
     client.update_configuration(before)
     client.close()
-
-
-def test_changed_parameters_work_from_the_next_image_on_and_numbers_are_kept(rig, tracks, markers, tuned, now):
-    number = rig.stand(tracks, now)
-    tuned({'prediction_time': 3.0, 'max_missed_time': 2.0, 'marker_namespaces': 'cylinder'})
-    rig.send(now + 10 * PERIOD)
-    track, = tracks.wait_for(11)[-1].objects
-    assert track.id == number and len(track.prediction) == 12
-    for frame in range(11, 20):  # by the old limit gone after 0.35 s
-        rig.send(now + frame * PERIOD)
-        assert [track.id for track in tracks.wait_for(frame + 1)[-1].objects] == [number]
-    rig.send(now + 20 * PERIOD, (0.0, 0.0, 3.0))
-    assert [track.id for track in tracks.wait_for(21)[-1].objects] == [number]
-    drawn = markers.wait_for(21)[-1].markers
-    assert [(marker.ns, marker.id) for marker in drawn if marker.action == Marker.ADD] == [('cylinder', number)]
 
 
 def test_parameters_that_are_changed_together_change_together(rig, tracks, tuned, now):

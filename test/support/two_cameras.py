@@ -2,6 +2,7 @@
 from typing import NamedTuple
 
 import tf2_ros
+from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
@@ -46,9 +47,9 @@ class Rig(TrackingStage):
         super().__init__(TrackerNodeParams(cameras=list(cameras), **params), [kind() for kind in TRACKING_PARAMS],
                          self.events, self.transforms, lambda *result: self._results.append(Result(*result)))
 
-    def send(self, stamp_ns, camera='', frame_id=None, **content):
-        """Boxes of one image. Returns the Result, or None."""
-        self.add_boxes(boxes(stamp_ns, frame_id or camera or 'camera', **content), self.now_ns, camera)
+    def send(self, stamp_ns, camera='', frame_id=None, count=1, z=3.0):
+        """Equal boxes of one image. Returns the Result, or None."""
+        self.add_boxes(boxes(stamp_ns, frame_id or camera or 'camera', [(0.0, 0.0, z)] * count), self.now_ns, camera)
         return self._results.pop() if self._results else None
 
 
@@ -101,8 +102,11 @@ class Play(object):
         return [track.id for track in [result for _now_ns, _camera, result in self.results if result][-1].tracks]
 
 
-def boxes(stamp_ns, frame_id='camera', count=1, z=3.0):
-    box = BoundingBox3D()
-    box.center.position.z = z
-    box.size.x, box.size.y, box.size.z = 0.5, 1.7, 0.5
-    return BoundingBox3DArray(header=Header(stamp=time_from(stamp_ns), frame_id=frame_id), boxes=[box] * count)
+def boxes(stamp_ns, frame_id='camera', centers_m=((0.0, 0.0, 3.0),)):
+    """A BoundingBox3DArray with boxes of people at positions (right, down, forward) in a camera."""
+    message = BoundingBox3DArray(header=Header(stamp=time_from(stamp_ns), frame_id=frame_id))
+    for center_m in centers_m:
+        box = BoundingBox3D(size=Vector3(0.5, 1.7, 0.5))
+        box.center.position, box.center.orientation.w = Point(*center_m), 1.0
+        message.boxes.append(box)
+    return message

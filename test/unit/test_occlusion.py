@@ -50,13 +50,6 @@ def test_a_camera_whose_distortion_folds_before_the_border_has_a_view_with_an_en
     assert place(x, y, CameraView(LOOK, FOLDING)) == expected
 
 
-@pytest.mark.parametrize('height,pitch,x,expected', [
-    (2.5, 45, 2.5, VISIBLE), (2.5, 45, 6, OUT_OF_VIEW), (2.5, 45, 0.3, OUT_OF_VIEW), (3, 90, 0, VISIBLE),
-    (3, 90, 2.5, OUT_OF_VIEW), (0.3, -40, 5, OUT_OF_VIEW), (0.3, -40, 1.2, VISIBLE)])
-def test_the_upper_and_the_lower_border_of_the_image_count(height, pitch, x, expected):
-    assert place(x, 0, CameraView(mounted(height, pitch), CAMERA)) == expected
-
-
 def pixels_on_axis(camera, fixed_from_camera, x, y):
     """Share of the axis of a 1.7 m tall person at (x, y) in the image, by homogeneous coordinates: the oracle."""
     axis = np.array([(x, y, z, 1) for z in np.linspace(0.02, 1.68, 200)])

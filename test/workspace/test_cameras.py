@@ -146,23 +146,6 @@ def test_stamps_of_tracks_never_go_back_whichever_camera_is_late(rig):
     assert stamps == sorted(stamps) and [track.id for track in result.tracks] == [1]
 
 
-def test_a_camera_that_is_far_behind_the_other_is_no_jump_in_time(rig):
-    """By 1.5 s: its images are refused, and the tracks go on."""
-    for number in range(30):
-        result = rig.send(START_NS + number * PERIOD_NS, 'front')
-        assert rig.send(START_NS + (number - 15) * PERIOD_NS, 'rear') is None
-    assert rig.events.counts['images behind other cameras'] == 30
-    assert not rig.transforms.jumps and [track.id for track in result.tracks] == [1]
-
-
-def test_a_camera_without_a_transform_leaves_the_other_to_go_on(rig):
-    rig.transforms.missing.add('rear')
-    for number in range(20):
-        result = rig.send(START_NS + number * PERIOD_NS, 'front', count=int(number < 10))
-        assert rig.send(START_NS + number * PERIOD_NS + PERIOD_NS // 2, 'rear') is None
-    assert result.tracks == [] and rig.events.counts['no transform'] == 20
-
-
 def test_cameras_with_the_same_frame_are_taken_and_pointed_out(rig):
     for number in range(10):
         for camera in ('front', 'rear'):

@@ -3,10 +3,9 @@ import contextlib
 import sys
 from unittest import mock
 
-import genpy
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseWithCovariance, TransformStamped
+from geometry_msgs.msg import TransformStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from std_msgs.msg import Header
@@ -14,10 +13,11 @@ from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.msg import TrackedObject, TrackedObjectArray
+from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeNode
 from support.masterless import masterless
 from support.planner_definitions import package
+from support.planners import person
 
 START_NS = 1000 * NS
 PACKAGES = 'people_msgs', 'costmap_converter', 'derived_object_msgs', 'vision_msgs'
@@ -70,21 +70,6 @@ def bridge_with(outputs, **params):
     with mock.patch.dict(sys.modules, stand_ins), mock.patch('threading.Thread.start'), \
             masterless(dict(params, outputs=outputs, tf_timeout=0.0)) as found:
         yield Bridge(found)
-
-
-def person(number, x, y, moving=True, speed=1.0, steps=1):
-    """Somebody who walks along x of the map."""
-    track = TrackedObject(id=number, moving=moving, prediction_step=genpy.Duration(2))
-    place = track.pose.pose.position
-    place.x, place.y, place.z = x, y, 0.85
-    track.size.x = track.size.y = 0.6
-    track.size.z = 1.7
-    track.twist.twist.linear.x = speed
-    for step in range(1, steps + 1):
-        pose = PoseWithCovariance()
-        pose.pose.position.x, pose.pose.position.y, pose.pose.position.z = x + 2 * step * speed, y, 0.85
-        track.prediction.append(pose)
-    return track
 
 
 def test_a_broken_track_is_dropped_and_counted_and_the_others_are_handed_on():

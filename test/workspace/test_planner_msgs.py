@@ -58,8 +58,9 @@ def obstacles(tracks, frame_id='map'):
 def test_teb_does_not_turn_velocities_so_they_are_sent_in_its_own_frame():
     teb = TebReplica({'map': QUARTER})
     tracks = [walker(3, [1, 2, 0.9], [1.2, 0, 0])]
-    for message, expected_mps in ((obstacles(in_frame(tracks, QUARTER), 'odom'), [0, 1.2]), (obstacles(tracks), [1.2, 0])):
-        teb.receive(message)
+    turned = in_frame(tracks, QUARTER)
+    for sent_tracks, frame_id, expected_mps in ((turned, 'odom', [0, 1.2]), (tracks, 'map', [1.2, 0])):
+        teb.receive(obstacles(sent_tracks, frame_id))
         (centre, radius, velocity), = teb.obstacles()
         np.testing.assert_allclose(centre, [8, 6], atol=1e-6)
         np.testing.assert_allclose(velocity, expected_mps, atol=1e-9)

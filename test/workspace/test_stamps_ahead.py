@@ -28,24 +28,6 @@ def test_one_stamp_of_the_future_costs_the_other_camera_nothing(play, ahead_ns, 
     assert play.transforms.jumps == 0
 
 
-def test_it_is_taken_where_the_others_have_ended(play):
-    """They are gone for a second: then it is the only one, and its time counts."""
-    play.run(2)
-    play.ahead_ns = HOUR_NS
-    play.run(3, {'rear'})
-    answered_ns = [now_ns for now_ns, camera, result in play.results if camera == 'rear' and result]
-    assert min(now_ns for now_ns in answered_ns if now_ns > 2 * NS) < 3 * NS + PERIODS_NS['rear']
-
-
-def test_a_camera_that_begins_with_a_stamp_of_the_future_and_ends_blinds_the_other_for_a_second(play):
-    play.send('rear', HOUR_NS)
-    play.run(10, {'front'})
-    assert play.lost('front', NS + PERIODS_NS['front'] + 1) == 0 and play.lost('front') == 31
-    assert play.counts[BACK] == 1 and len(play.ids) == 1
-    play.run(10)
-    assert play.lost('rear', play.now_ns - 10 * NS) == 0 and play.counts[BACK] == 1
-
-
 @pytest.mark.parametrize('seconds', [2, 100, 3600])
 def test_somebody_seeks_forward(play, seconds):
     """The camera that comes first loses an image, or what it sends until the other one follows."""

@@ -28,19 +28,6 @@ def test_time_goes_back_once_all_cameras_have_gone_back(rig):
     assert [track.id for track in front.tracks] == [2] and stamp_of(rear) == START_NS + 19 * PERIOD_NS
 
 
-@pytest.mark.parametrize('camera', ['front', 'rear'])
-def test_a_camera_whose_stamps_alone_go_back_is_refused_until_they_are_right(rig, camera):
-    """The other one loses no image and no track."""
-    other, = {'front', 'rear'} - {camera}
-    for number in range(300):
-        rig.now_ns = number * PERIOD_NS
-        goes_back = 100 <= number < 200
-        result = rig.send(START_NS + rig.now_ns - (10 * NS + 1 if goes_back else 0), camera)
-        assert (result is None) == goes_back
-        assert [track.id for track in rig.send(START_NS + rig.now_ns, other).tracks] == [1] or number < 5
-    assert rig.transforms.jumps == 0 and rig.events.counts['images behind other cameras'] == 100
-
-
 def test_time_goes_back_twice(rig):
     """Somebody seeks in a bag, and once more, before the rear camera's detector is ready."""
     for number in range(200):

@@ -76,10 +76,8 @@ def test_invalid_boxes_do_not_affect_the_others(rig):
     """A box as wide as a wall, and one without a position, are in each image of a person."""
     _stamp_ns, before = stand(rig)
     for frame in range(30, 60):
-        message = boxes(START_NS + frame * PERIOD_NS)
-        wall, nowhere = boxes(0).boxes + boxes(0, z=float('nan')).boxes
-        wall.size.x, wall.size.y = 9.34, 10.93
-        message.boxes = [wall, nowhere] + message.boxes
+        message = boxes(START_NS + frame * PERIOD_NS, 'camera', [(0, 0, 3), (0, 0, float('nan')), (0, 0, 3)])
+        message.boxes[0].size.x, message.boxes[0].size.y = 9.34, 10.93
         rig.add_boxes(message, 0)
     result = rig.send(START_NS + 60 * PERIOD_NS)
     assert ids(result) == before and result.tracks[0].status == VISIBLE
