@@ -89,7 +89,7 @@ def test_outputs_of_the_image_carry_its_stamp(rig, recorders):
         assert message.header.frame_id == frame_id and message.header.stamp == time_from(stamp_ns)
         assert people_in(name, message) > 0
     place = recorders['vision'].messages[0].detections[0].bbox.center.position
-    assert (place.x, place.y, place.z) == pytest.approx((1, 2))
+    assert (place.x, place.y, place.z) == pytest.approx((1, 2, 0.85))
 
 
 def test_what_planners_keep_is_sent_again_further_on_and_then_emptied_once(rig, recorders):
@@ -106,8 +106,8 @@ def test_what_planners_keep_is_sent_again_further_on_and_then_emptied_once(rig, 
         'points': 'base_link', 'people': 'map', 'teb': 'odom', 'mpc': 'odom', 'vision': 'map'}
     time.sleep(0.5)
     assert counts == {name: len(recorder.messages) for name, recorder in recorders.items()}
-    level, sentence, _counts = diagnostics_of('planner_bridge_node')
-    assert level == 1 and 'no tracks that can be handed on for 1 s' in sentence
+    level, _sentence, event_counts = diagnostics_of('planner_bridge_node')
+    assert level == 1 and event_counts['outputs emptied'] > 0
 
 
 def test_tracks_that_are_too_old_are_refused_and_broken_ones_dropped(rig, recorders):

@@ -14,7 +14,7 @@ import numpy as np
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
-from ros_3d_bb.tracking.association import associate
+from ros_3d_bb.tracking.association import associate, unmatched
 from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
 from ros_3d_bb.tracking.occlusion import SEEN, CameraVisibility, mark_missed
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
@@ -161,17 +161,20 @@ class Tracker(object):
 
         cameras = {name: latest for name, latest in state.cameras.items() if stamp_ns - latest.stamp_ns <= KNOWN_NS}
         cameras[camera] = CameraVisibility(stamp_ns, view, np.full(len(tracks), SEEN))
-        missed = np.delete(np.arange(len(tracks)), rows)
+        missed = unmatched(len(tracks), rows)
         if len(missed):
             mark_missed(tracks, state.tracks, missed, cameras, camera, observed_s, params.max_range)
 
         # Tentative tracks are kept for a short time only.
         max_unseen_s = np.where(tracks['confirmed'], params.max_age, TENTATIVE_TIMEOUT_S)
         kept = (tracks['unseen_s'] < max_unseen_s) & (position_std_of(tracks) < MAX_POSITION_STD_M)
-        unmatched = np.delete(np.arange(len(detections)), columns)
-        new, started = new_targets(tracks[kept], measurements[unmatched], stamp_ns, params)
-        new['id'] = [id_of(column) for column in unmatched[started].tolist()]
+        tracks, unmatched_columns = tracks[kept], unmatched(len(detections), columns)
+        new = tracks[:0]
+        if len(unmatched_columns):
+            new, started = new_targets(tracks, measurements[unmatched_columns], stamp_ns, params)
+            new['id'] = [id_of(column) for column in unmatched_columns[started].tolist()]
+            tracks = np.concatenate((tracks, new))
         for name, latest in cameras.items():
             added = np.full(len(new), SEEN if name == camera else OUT_OF_VIEW)
             cameras[name] = latest._replace(visibility=np.concatenate((latest.visibility[kept], added)))
-        return _State(np.concatenate((tracks[kept], new)), stamp_ns, cameras), matches
+        return _State(tracks, stamp_ns, cameras), matches
