@@ -1,4 +1,4 @@
-"""planner_bridge_node on made tracks. Needs a master because it predicts to ROS time and asks tf2 for a transform.
+"""planner_bridge_node with generated tracks. Needs a master because of ROS time and tf2.
 
 Stamps are the clock's, as from a camera: a tenth of a second old. What the planners make of the messages is in
 test/workspace/test_planner_msgs.py; here it is which message comes when, with which stamp and frame.
@@ -92,7 +92,7 @@ def test_outputs_of_the_image_carry_its_stamp(rig, recorders):
     assert (place.x, place.y, place.z) == pytest.approx((1, 2, 0.85))
 
 
-def test_what_planners_keep_is_sent_again_further_on_and_then_emptied_once(rig, recorders):
+def test_outputs_that_planners_keep_are_resent_predicted_and_emptied_once(rig, recorders):
     rig.send(now_ns() - LATENCY_NS, (1.0, 2.0))
     wait_until(lambda: all(people_in(name, recorder.messages[-1]) == 0 if recorder.messages else False
                            for name, recorder in recorders.items()), 'every output emptied')
@@ -110,7 +110,7 @@ def test_what_planners_keep_is_sent_again_further_on_and_then_emptied_once(rig, 
     assert level == 1 and event_counts['outputs emptied'] > 0
 
 
-def test_tracks_that_are_too_old_are_refused_and_broken_ones_dropped(rig, recorders):
+def test_outdated_tracks_are_rejected_and_invalid_ones_dropped(rig, recorders):
     rig.send(now_ns() - 3 * NS, (1.0, 2.0))
     wait_until(lambda: diagnostics_of('planner_bridge_node')[2].get('tracks rejected') == 1, 'a refusal')
     assert all(recorder.messages == [] for recorder in recorders.values())
@@ -126,13 +126,13 @@ def bridge(name, before, *arguments):
                             stderr=subprocess.STDOUT, universal_newlines=True)
 
 
-def test_a_missing_package_is_said_at_the_start(rig):
+def test_a_missing_package_is_reported_at_the_start(rig):
     process = bridge('without_vision', 'import sys; sys.modules["vision_msgs"] = None', '_outputs:=vision')
     said = process.communicate()[0]
     assert process.returncode == 1 and 'output vision needs the package vision_msgs' in said
 
 
-def test_a_node_that_ends_leaves_no_people_behind(rig):
+def test_a_node_that_ends_empties_its_outputs(rig):
     process = bridge('second_bridge', 'pass', '_outputs:=teb')
     try:
         with Recorder('second_bridge/obstacles', TOPICS['teb'][1]) as recorder:

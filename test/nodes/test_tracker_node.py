@@ -1,4 +1,4 @@
-"""tracker_node on made 3D boxes. Needs a master because it asks tf2 for the camera at the stamp of each image."""
+"""tracker_node with generated 3D boxes. Needs a master because of tf2."""
 import itertools
 import threading
 import time
@@ -21,7 +21,7 @@ _stamps = itertools.count(1000 * NS, 100 * NS)
 
 
 class Rig(object):
-    """A camera that looks along x of the map, and a robot that carries it."""
+    """A camera that points along x of the map, on a robot."""
 
     def __init__(self):
         self.boxes = publisher('ros_3d_bb/bb_3d', BoundingBox3DArray)
@@ -40,7 +40,7 @@ class Rig(object):
         self.send_boxes(stamp_ns, *centers)
 
     def stand(self, tracks, stamp_ns, frames=10):
-        """Images of somebody who stands 3 m ahead; returns their number."""
+        """Images of a person 3 m ahead; returns the track ID."""
         for frame in range(frames):
             self.send(stamp_ns + frame * PERIOD, (0.0, 0.0, 3.0))
             messages = tracks.wait_for(frame + 1)
@@ -97,7 +97,7 @@ def test_tracks_are_in_the_map_at_the_stamp_of_the_image(rig, tracks, now):
     assert track.pose.covariance[0] < track.prediction[0].covariance[0] < track.prediction[-1].covariance[0]
 
 
-def test_a_person_who_stands_still_has_no_speed_though_the_robot_drives(rig, tracks, now):
+def test_a_standing_person_has_no_speed_while_the_robot_drives(rig, tracks, now):
     for frame in range(20):
         rig.send(now + frame * PERIOD, (0.0, 0.0, 5.0 - 0.1 * frame), x=0.1 * frame)
         tracks.wait_for(frame + 1)
@@ -106,8 +106,8 @@ def test_a_person_who_stands_still_has_no_speed_though_the_robot_drives(rig, tra
     assert abs(track.twist.twist.linear.x) < 0.01 and not track.moving
 
 
-def test_without_transform_nothing_is_published_and_nobody_ages(rig, tracks, now):
-    """Nothing for 1 s by the stamps, three times as long as somebody unseen is published; the track lives on."""
+def test_without_transform_nothing_is_published_and_tracks_do_not_age(rig, tracks, now):
+    """For 1 s by the stamps, three times as long as a missed person is published; the track is kept."""
     number = rig.stand(tracks, now, frames=30)
     before = diagnostics_of('tracker_node')[2].get('no transform', 0)
     for quarter in range(4):
@@ -120,7 +120,7 @@ def test_without_transform_nothing_is_published_and_nobody_ages(rig, tracks, now
     assert [(track.id, track.status) for track in tracks.wait_for(31)[-1].objects] == [(number, TrackedObject.OCCLUDED)]
 
 
-def test_a_transform_that_comes_a_little_late_is_waited_for(rig, tracks, now):
+def test_a_late_transform_is_awaited(rig, tracks, now):
     rig.send_boxes(now, (0.0, 0.0, 3.0))
     time.sleep(0.02)
     rig.send_tf(now)
@@ -140,7 +140,7 @@ def test_tracks_end_after_the_limit_and_their_markers_are_deleted(rig, tracks, m
         (namespace, number) for namespace in ('cylinder', 'ellipse', 'history', 'id')]
 
 
-def test_markers_are_made_only_while_somebody_subscribes(rig, tracks, now):
+def test_markers_are_created_only_for_subscribers(rig, tracks, now):
     """The writer keeps the histories: none is there when it is asked for the first time in 5 s."""
     for frame in range(50):
         rig.send(now + frame * PERIOD, (0.0, 0.0, 3.0))
@@ -152,7 +152,7 @@ def test_markers_are_made_only_while_somebody_subscribes(rig, tracks, now):
             assert ('history' in [marker.ns for marker in message.markers]) == (frame > 50)
 
 
-def test_time_that_goes_back_ends_all_tracks_and_goes_on(rig, tracks, now):
+def test_a_backward_jump_in_time_deletes_all_tracks(rig, tracks, now):
     """The transforms of the time before are forgotten too, so they are sent until the boxes have met one."""
     number = rig.stand(tracks, now)
     rig.send_boxes(now - 5 * NS, (0.0, 0.0, 3.0))
@@ -161,7 +161,7 @@ def test_time_that_goes_back_ends_all_tracks_and_goes_on(rig, tracks, now):
     assert rig.stand(tracks.emptied(), now - 4 * NS) > number
 
 
-def test_boxes_that_cannot_be_used_are_refused_and_the_next_work(rig, tracks, now):
+def test_invalid_boxes_are_rejected_and_the_next_are_tracked(rig, tracks, now):
     rig.send(now, (0.0, 0.0, float('nan')))  # not an image without people: it is not answered
     rig.send(now + PERIOD, (0.0, 0.0, 3.0))
     assert tracks.wait_for(1)[0].header.stamp == time_from(now + PERIOD)
@@ -183,7 +183,7 @@ def tuned(rig):
     client.close()
 
 
-def test_parameters_that_are_changed_together_change_together(rig, tracks, tuned, now):
+def test_parameters_that_are_set_together_change_together(rig, tracks, tuned, now):
     """While images come as fast as they are tracked, two pairs of values take turns: no message mixes them."""
     pairs = [{'prediction_time': 1.0, 'prediction_step': 0.1}, {'prediction_time': 3.0, 'prediction_step': 0.5}]
     both, turns, seen, over = {(10, 0.1), (6, 0.5)}, [], set(), threading.Event()

@@ -45,7 +45,7 @@ def test_without_outliers_it_is_the_textbook_filter(x, y, sigma):
     np.testing.assert_allclose(got_covariance[0], (np.eye(4) - gain.dot(matrix)).dot(covariance[0]), atol=1e-9)
 
 
-def test_a_measurement_behind_the_person_is_not_believed_and_one_beside_is():
+def test_a_measurement_behind_the_person_is_an_outlier_and_one_beside_is_not():
     """0.8 m behind is what a background pixel looks like; 0.8 m beside no background explains."""
     sure = state(spread=0.1)
     behind, _covariance = update(*sure, measurements=measured_at([(0.8, 0.0)]), params=OUTLIERS)

@@ -1,4 +1,4 @@
-"""Where people are now, in which frame, and what ground they take up; all against places known beforehand."""
+"""Positions of people at the current time, frames and footprints, against known positions."""
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -56,7 +56,7 @@ def test_a_disc_has_its_outline_and_nothing_outside(radius_m, spacing_m):
                                      {'size_m': np.array([0, 0, 1.7])}, {'size_m': np.array([0.5, 0.5, 10.0])},
                                      {'prediction_m': np.full((1, 3), np.nan)}, {'prediction_step_s': 0.0},
                                      {'covariance': np.diag([1, 1, 1, 1, 1, np.nan])}])
-def test_a_broken_track_takes_no_others_with_it(changed):
+def test_an_invalid_track_does_not_affect_the_others(changed):
     good = [track_at([number, 0, 1], [1, 0, 0], number=number) for number in (1, 2)]
     broken = track_at([0, 0, 1], [1, 0, 0], number=7)._replace(**changed)
     usable, faults = usable_tracks([good[0], broken, good[1]])

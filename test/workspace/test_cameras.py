@@ -22,7 +22,7 @@ from support.launching import loaded
 from support.masterless import masterless, on_the_wire
 from support.two_cameras import PERIOD_NS, START_NS, Rig
 
-# Somebody walks from the view of the front camera into that of the left one; somebody stands where both see them.
+# A person walks from the view of the front camera into that of the left one; another one stands in both views.
 SCENE = {'duration': 3.2, 'rate': 6.0, 'robot': {'cameras': [{'name': 'front'}, {'name': 'left', 'yaw': 0.6}]},
          'people': [{'start': [3.0, -0.2], 'moves': [{'to': [2.4, 2.2], 'speed': 0.9}]}, {'start': [4.6, 1.4]}]}
 BOTH = with_tracker(Settings(detector='none'), cameras=['front', 'left'])
@@ -30,7 +30,7 @@ BOTH = with_tracker(Settings(detector='none'), cameras=['front', 'left'])
 
 @pytest.fixture(scope='module')
 def bags(tmp_path_factory):
-    """A bag of the scene with its 2D boxes, and what process_bag makes of it."""
+    """A bag of the scene with its 2D boxes, and the output of process_bag."""
     folder = tmp_path_factory.mktemp('bags')
     write_bag(scenario_images(scenario_from(SCENE), with_boxes=True), str(folder / 'in.bag'))
     process_bag(str(folder / 'in.bag'), str(folder / 'out.bag'), BOTH)
@@ -42,7 +42,7 @@ def messages_on(bag_path, topic):
         return [message for _topic, message, _time in bag.read_messages('/' + topic)]
 
 
-def test_everybody_is_one_track_wherever_they_are_seen(bags):
+def test_each_person_is_one_track_in_both_views(bags):
     with rosbag.Bag(bags[1]) as bag:
         recording = read_recording(bag)
     assert len(recording.moments) == recording.answered == 39
@@ -79,7 +79,7 @@ def test_the_same_bag_gives_the_same_bytes(bags, tmp_path):
     assert digests[0] == digests[1]
 
 
-def test_a_camera_that_a_bag_does_not_have_is_named(bags, tmp_path):
+def test_a_camera_missing_in_a_bag_is_named(bags, tmp_path):
     with pytest.raises(BagError, match='no std_msgs/Int32MultiArray on /rear/yolo_bounding_box; did you mean'):
         process_bag(bags[0], str(tmp_path / 'out.bag'), with_tracker(BOTH, cameras=['front', 'rear']))
 
@@ -135,7 +135,7 @@ def rig():
     return Rig('front', 'rear')
 
 
-def test_stamps_of_tracks_never_go_back_whichever_camera_is_late(rig):
+def test_stamps_of_tracks_never_decrease(rig):
     random, stamps = np.random.RandomState(3), []
     for number in range(40):
         for camera, late in (('front', 0), ('rear', 3)):
@@ -146,7 +146,7 @@ def test_stamps_of_tracks_never_go_back_whichever_camera_is_late(rig):
     assert stamps == sorted(stamps) and [track.id for track in result.tracks] == [1]
 
 
-def test_cameras_with_the_same_frame_are_taken_and_pointed_out(rig):
+def test_cameras_with_the_same_frame_are_tracked_and_reported(rig):
     for number in range(10):
         for camera in ('front', 'rear'):
             result = rig.send(START_NS + number * PERIOD_NS, camera, frame_id='camera_color_optical_frame')
@@ -159,7 +159,7 @@ def test_cameras_with_the_same_frame_are_taken_and_pointed_out(rig):
     ({'cameras': ['front camera']}, 'different namespaces expected'), ({'cameras': [1]}, 'different namespaces'),
     ({'cameras': ['front', 'rear'], 'camera_frame': 'mount'}, 'expected with a single camera only'),
     ({'cameras': ['front'], 'tracker': 'thesis'}, 'supports a single camera only')])
-def test_parameters_that_make_no_sense_are_refused(params, complaint):
+def test_inconsistent_parameters_are_rejected(params, complaint):
     with pytest.raises(ValueError, match=complaint):
         Rig(*params.pop('cameras'), **params)
 

@@ -1,4 +1,4 @@
-"""planner_bridge_node without a master: tracks dropped, missing transforms, clocks that jump; in frames and numbers."""
+"""planner_bridge_node without a master: invalid tracks, missing transforms and jumps of the clock."""
 import contextlib
 import sys
 from unittest import mock
@@ -32,9 +32,9 @@ class Bridge(object):
         self._connections = connections
         self.node = PlannerBridgeNode()
         self.counts = self.node._diagnostics.counts
-        self.tell(START_NS)
+        self.set_time(START_NS)
 
-    def tell(self, now_ns):
+    def set_time(self, now_ns):
         self.now_ns, self._connections.now = now_ns, time_from(now_ns)
 
     def tick(self):
@@ -72,7 +72,7 @@ def bridge_with(outputs, **params):
         yield Bridge(found)
 
 
-def test_a_broken_track_is_dropped_and_counted_and_the_others_are_handed_on():
+def test_an_invalid_track_is_dropped_and_the_others_are_forwarded():
     with bridge_with('people, costmap') as bridge:
         bridge.send_tf(START_NS, 'base_link', (0, 0, 0))
         bridge.send(START_NS, person(1, 2, 0), person(2, float('nan'), 0), person(3, 4, 0))
@@ -104,7 +104,7 @@ def test_an_output_waits_for_the_transform_of_its_own_frame_only():
         assert (frame_id, place.x, place.y) == ('odom', pytest.approx(0), pytest.approx(-2))
         assert (twist.linear.x, twist.linear.y) == pytest.approx((0, -1))
         bridge.send_tf(START_NS + NS // 10, 'base_link', (0, 0, 0))
-        bridge.tell(START_NS + NS // 10)
+        bridge.set_time(START_NS + NS // 10)
         bridge.send(START_NS + NS // 10, person(1, 2, 0))
         assert [bridge.count(topic) for topic in (POINTS, RING, PEOPLE, TEB)] == [1, 1, 2, 1]
         assert bridge.counts['no transform'] == 2
@@ -115,7 +115,7 @@ def test_without_transform_each_output_is_emptied_once_in_the_frame_of_its_last_
         bridge.send_tf(START_NS, 'base_link', (0, 0, 0))
         bridge.send(START_NS, person(1, 2, 0))
         for step in range(1, 15):
-            bridge.tell(START_NS + step * NS // 10)
+            bridge.set_time(START_NS + step * NS // 10)
             bridge.send(bridge.now_ns, person(1, 2, 0))
             bridge.tick()
         assert bridge.count(POINTS) == bridge.count(RING) == 2 and bridge.counts['outputs emptied'] == 2
@@ -125,11 +125,11 @@ def test_without_transform_each_output_is_emptied_once_in_the_frame_of_its_last_
 
 
 @pytest.mark.parametrize('jump_s', [-100.0, -0.5, 1.5, 100.0])
-def test_a_jump_of_the_clock_empties_every_output_and_the_next_tracks_are_handed_on(jump_s):
+def test_a_jump_of_the_clock_empties_every_output_until_the_next_tracks(jump_s):
     with bridge_with('people, costmap') as bridge:
         bridge.send_tf(START_NS, 'base_link', (0, 0, 0))
         bridge.send(START_NS, person(1, 2, 0))
-        bridge.tell(START_NS + int(jump_s * NS))
+        bridge.set_time(START_NS + int(jump_s * NS))
         bridge.tick()
         bridge.tick()
         assert len(bridge.newest(POINTS)[1]) == len(bridge.newest(PEOPLE)[1]) == 0
@@ -141,7 +141,7 @@ def test_a_jump_of_the_clock_empties_every_output_and_the_next_tracks_are_handed
 
 
 @pytest.mark.parametrize('planner_frame, counted', [('', True), ('odom', False)])
-def test_obstacles_of_a_large_map_are_warned_of_unless_the_planner_has_a_frame_near_them(planner_frame, counted):
+def test_rounded_coordinates_are_reported_unless_the_planner_frame_is_near(planner_frame, counted):
     with bridge_with('teb', planner_frame=planner_frame) as bridge:
         bridge.send_tf(START_NS, 'odom', (448262.0, 5411933.0, 0))
         bridge.send(START_NS, person(1, 448265.0, 5411934.0))
@@ -159,7 +159,7 @@ def test_planners_keep_people_for_as_long_as_their_tracks_are_of_now_whatever_th
     with bridge_with('people') as bridge:
         arrival_ns = stamp_ns = shown_m = None
         for what, jump_s, off_s in steps:
-            bridge.tell(bridge.now_ns + int(jump_s * NS))
+            bridge.set_time(bridge.now_ns + int(jump_s * NS))
             now_ns, off_ns = bridge.now_ns, int(off_s * NS)
             if what == 'tracks':
                 bridge.send(now_ns + off_ns, person(1, 0, 0))

@@ -1,4 +1,4 @@
-"""Stamps of the future from one of several cameras, without a master: what they cost the others, and for how long."""
+"""Stamps of the future from one of several cameras, without a master: which images of the others are lost."""
 import collections
 
 import pytest
@@ -19,7 +19,7 @@ def play():
 
 @pytest.mark.parametrize('goes_on', [True, False])
 @pytest.mark.parametrize('ahead_ns', [HOUR_NS, 10 * NS, 3 * NS // 2])
-def test_one_stamp_of_the_future_costs_the_other_camera_nothing(play, ahead_ns, goes_on):
+def test_one_stamp_of_the_future_costs_the_other_camera_no_image(play, ahead_ns, goes_on):
     play.run(2)
     assert play.send('rear', ahead_ns) is None
     play.run(10, {'front', 'rear'} if goes_on else {'front'})
@@ -29,45 +29,22 @@ def test_one_stamp_of_the_future_costs_the_other_camera_nothing(play, ahead_ns, 
 
 
 @pytest.mark.parametrize('seconds', [2, 100, 3600])
-def test_somebody_seeks_forward(play, seconds):
-    """The camera that comes first loses an image, or what it sends until the other one follows."""
+def test_a_forward_seek_costs_one_image(play, seconds):
+    """The camera that is first after the seek loses it."""
     play.run(3)
     play.ahead_ns += seconds * NS
     play.run(3)
     assert play.counts[AHEAD] == 1 == play.lost('front') + play.lost('rear') and play.transforms.jumps == 0
 
 
-@pytest.mark.parametrize('seconds', [-2, -100])
-def test_somebody_seeks_back_or_a_bag_loops(play, seconds):
-    play.run(3, count=0)
-    play.ahead_ns += seconds * NS
-    play.run(3)
-    assert play.lost('front') + play.lost('rear') == play.counts[BEHIND] == 1
-    assert play.counts[BACK] == play.transforms.jumps == 1 and AHEAD not in play.counts
-
-
 @pytest.mark.parametrize('seconds', [0.5, 1.5, 10])
-@pytest.mark.parametrize('who', [{'front'}, {'rear'}, set()])
-def test_a_pause_of_one_camera_or_both_costs_no_image(play, seconds, who):
-    """`who` goes on meanwhile."""
-    play.run(2, count=0).run(seconds, who, count=0).run(2, count=0)
+@pytest.mark.parametrize('others, bag_pauses', [({'front'}, False), ({'rear'}, False), (set(), False), (set(), True)])
+def test_a_pause_of_a_camera_or_of_the_bag_costs_no_image(play, seconds, others, bag_pauses):
+    """The other cameras continue meanwhile. If the bag is paused, stamps stand still."""
+    play.run(2, count=0).run(seconds, others, count=0)
+    play.ahead_ns -= int(seconds * NS) if bag_pauses else 0
+    play.run(2, count=0)
     assert play.lost('front') + play.lost('rear') == 0 and set(play.counts) == {'images tracked'}
-
-
-@pytest.mark.parametrize('seconds', [1.5, 10, 100])
-def test_a_bag_that_is_paused_costs_no_image(play, seconds):
-    """Stamps stand still meanwhile."""
-    play.run(2).run(seconds, set())
-    play.ahead_ns -= int(seconds * NS)
-    play.run(2)
-    assert play.lost('front') + play.lost('rear') == 0 and play.ids == [1]
-
-
-@pytest.mark.parametrize('late_ns', [600 * MS, 2 * NS])
-def test_a_camera_that_is_always_late_does_not_refuse_the_other_after_a_pause(play, late_ns):
-    lags_ns = {'rear': late_ns}
-    play.run(3, lags_ns=lags_ns).run(1.5, {'rear'}, lags_ns=lags_ns).run(3, lags_ns=lags_ns)
-    assert play.lost('front') == 0
 
 
 def test_a_camera_without_a_transform_neither_loses_nor_costs_images(play):
@@ -82,7 +59,7 @@ def test_a_camera_without_a_transform_neither_loses_nor_costs_images(play):
 
 
 @pytest.mark.parametrize('ahead_ns', [HOUR_NS, 700 * MS])
-def test_a_single_camera_goes_on_after_one_stamp_of_the_future(ahead_ns):
+def test_a_single_camera_continues_after_one_stamp_of_the_future(ahead_ns):
     """By less than a second the next images are late, and refused for no longer than that."""
     play = Play('front')
     play.run(2)

@@ -9,6 +9,16 @@ from ros_3d_bb.nodes.tracker_node import RESERVED_IDS, TrackIdReservation
 NAME = '/tracker_node_numbers'
 
 
+def immediately(work, on_error):
+    """In place of the worker thread."""
+    def offer(item):
+        try:
+            work(item)
+        except OSError as error:
+            on_error(error)
+    return mock.Mock(offer=offer)
+
+
 @pytest.fixture
 def parameters(monkeypatch):
     """The parameters; if 'fails' is among them, the master accepts no others."""
@@ -22,21 +32,8 @@ def parameters(monkeypatch):
     monkeypatch.setattr('rospy.get_param', lambda name, default: parameters.get(name, default))
     monkeypatch.setattr('rospy.set_param', set_param)
     monkeypatch.setattr('ros_3d_bb.nodes.tracker_node.on_new_master', lambda _function: None)
-    monkeypatch.setattr('ros_3d_bb.nodes.tracker_node.NewestWorker', Immediately)
+    monkeypatch.setattr('ros_3d_bb.nodes.tracker_node.NewestWorker', immediately)
     return parameters
-
-
-class Immediately(object):
-    """In place of the thread."""
-
-    def __init__(self, work, on_error):
-        self._work, self._on_error = work, on_error
-
-    def offer(self, item):
-        try:
-            self._work(item)
-        except OSError as error:
-            self._on_error(error)
 
 
 def test_a_restarted_tracker_continues_after_all_ids_assigned_before(parameters):

@@ -1,4 +1,4 @@
-"""One of several cameras has a wrong clock, lags or hangs: when the images of the others are tracked again."""
+"""Recovery of the other cameras when the clock of one camera is wrong, lags or hangs."""
 import pytest
 
 from ros_3d_bb.core.time_sync import NS

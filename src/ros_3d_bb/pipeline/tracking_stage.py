@@ -115,12 +115,7 @@ class TrackingStage(object):
 
     def add_boxes(self, message, now_ns, camera=''):
         """Process a BoundingBox3DArray: `on_tracks` is called unless the transform is missing, or the stamp is
-        inconsistent with those of the other cameras.
-
-        Raises
-        ------
-        ValueError
-            If the message is invalid, or none of its boxes is valid.
+        inconsistent with those of the other cameras. Raises ValueError if the message or each of its boxes is invalid.
         """
         stamp_ns, camera_name = stamp_of(message), camera or message.header.frame_id
         frame_id, target_frame = self._params.camera_frame or message.header.frame_id, self._params.target_frame
@@ -163,7 +158,7 @@ class TrackingStage(object):
         intrinsics, depth_at = self._intrinsics.get(camera), None
         entry = self._depths[camera].nearest(stamp_ns, int(self._params.stamp_tolerance * NS))
         if intrinsics is not None and entry is not None:
-            # Otherwise bbox3d_node reports the fault.
+            # bbox3d_node reports a depth image of another size.
             if entry.value.values.shape == (intrinsics.height, intrinsics.width):
                 depth_at = functools.partial(depths_towards, intrinsics, entry.value)
         return CameraView(fixed_from_camera, intrinsics, camera_name, depth_at)
