@@ -44,8 +44,8 @@ BALANCES = {
         'images skipped for a newer one', 'images without floor', 'images while paused', 'searches failed')),
     'bbox3d_node': Balance('2D boxes', 'images lifted', ('2D boxes rejected', '2D boxes of a time before')),
     'tracker_node': Balance('3D boxes', 'images tracked', (
-        '3D boxes rejected', 'no transform', 'images of the time before', 'images ahead of other cameras')),
-    'planner_bridge_node': Balance('tracks', 'tracks handed on', ('tracks rejected',))}
+        '3D boxes rejected', 'no transform', 'images behind other cameras', 'images ahead of other cameras')),
+    'planner_bridge_node': Balance('tracks', 'tracks forwarded', ('tracks rejected',))}
 
 
 def balance_of(status):

@@ -1,7 +1,6 @@
-"""As a command: wait until each of some topics has brought something, in a field of its message where one is named.
+"""Command that waits for messages: `hearing.py SECONDS TOPIC[:FIELD] ...`.
 
-`hearing.py SECONDS TOPIC[:FIELD] ...` ends with 0 once something that is not empty came on all of them, else with 1 and
-what is missing.
+The exit status is 0 once a message, with a field that is not empty, has arrived on each topic; otherwise 1.
 """
 import sys
 import time

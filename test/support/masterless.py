@@ -90,7 +90,7 @@ def masterless(params=()):
         'diagnostic_updater.Updater': mock.Mock(),
         'ros_3d_bb.nodes.yolov5_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.depth_detector_node.NewestWorker': immediate_worker,
-        'ros_3d_bb.nodes.common.persistent_track_ids.NewestWorker': immediate_worker,
+        'ros_3d_bb.nodes.tracker_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.common.debug_images.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.common.debug_images.patient_master': mock.Mock()}
     for level in ('loginfo', 'logwarn', 'loginfo_once'):

@@ -67,9 +67,9 @@ class Pipeline(object):
 
     def __init__(self, settings, events, transforms):
         self._events = events
-        follower, marker_params, *tracking = settings.tracker
-        self._tracking_stage, self._markers = TrackingStage(follower, tracking, events,
-                                                            transforms), MarkerWriter(marker_params)
+        tracker_params, marker_params, *tracking = settings.tracker
+        self._tracking_stage = TrackingStage(tracker_params, tracking, events, transforms, self._on_tracks)
+        self._markers = MarkerWriter(marker_params)
         self._estimation_stages = {camera: EstimationStage(settings.bbox3d[0], events,
                                                            functools.partial(self._on_frame, camera),
                                                            settings.name(DEPTH_TOPIC, camera),
@@ -89,15 +89,14 @@ class Pipeline(object):
         """Process a message recorded at `now_ns` on an input topic of the nodes. Returns [(topic, message), ...]."""
         self._now_ns, self._outputs = now_ns, []
         search, lifter = self._searches.get(camera), self._estimation_stages[camera]
-        with_camera, with_depth = self._tracking_stage.looks
         if topic == INFO_TOPIC:
-            if with_camera:
+            if self._tracking_stage.uses_camera_info:
                 self._tracking_stage.add_camera_info(message, camera)
             if search is not None:
                 search.add_camera_info(message, now_ns)
             lifter.add_camera_info(message, now_ns)
         elif topic == DEPTH_TOPIC:
-            if with_depth:
+            if self._tracking_stage.uses_depth:
                 self._tracking_stage.add_depth(message, now_ns, camera)
             if search is not None:
                 search.add_depth(message, now_ns)
@@ -150,12 +149,10 @@ class Pipeline(object):
             header, _depth, boxes3d = self._estimation_stages[camera].estimate(boxes2d, depth_msg, camera_model)
             message = boxes3d_to_msg(boxes3d, header, camera_model)
             self._outputs.append((topic_of(camera, BOXES3D_TOPIC), message))
-            self._on_boxes3d(camera, message)
+            with self._events.rejecting('3D boxes'):
+                self._tracking_stage.add_boxes(message, self._now_ns, camera)
 
-    def _on_boxes3d(self, camera, message):
+    def _on_tracks(self, tracks, header):
         """Output tracks and markers, as tracker_node does."""
-        with self._events.rejecting('3D boxes'):
-            followed = self._tracking_stage.add_boxes(message, self._now_ns, camera)
-            if followed is not None:
-                self._outputs.append((TRACKS_TOPIC, tracks_to_msg(followed.tracks, followed.header)))
-                self._outputs.append((MARKERS_TOPIC, self._markers.write(followed.tracks, followed.header)))
+        self._outputs += [(TRACKS_TOPIC, tracks_to_msg(tracks, header)),
+                          (MARKERS_TOPIC, self._markers.write(tracks, header))]

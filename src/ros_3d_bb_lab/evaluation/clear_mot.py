@@ -101,7 +101,7 @@ class ClearMatcher(object):
         near = distances_m <= self._gate_m
         kept = np.array([[self._last_matches.get(person.id) == track.id for track in tracks] for person in people])
         scores = np.where(near, KEPT * kept + 1 - distances_m / (2 * self._gate_m), 0)
-        matches = sorted((match for match in assign(-scores) if near[match]), key=lambda match: -scores[match])
+        matches = sorted((match for match in zip(*assign(-scores)) if near[match]), key=lambda match: -scores[match])
         pairs = [MatchedPair(people[row].id, tracks[column].id,
                              tracks[column].position_m[:2] - people[row].position_m[:2])
                  for row, column in matches]
