@@ -111,7 +111,7 @@ def test_time_jumps(stage, seconds):
 @pytest.mark.parametrize('seconds', [-3600, 3600])
 def test_the_clock_is_wrong_once(stage, seconds):
     """The stamps of the images are correct."""
-    stage.tell(stage.now_ns + seconds * NS)
+    stage.publish_time(stage.now_ns + seconds * NS)
     stage.recovered('/clock wrong by %d s, once' % seconds)
 
 

@@ -42,7 +42,7 @@ BALANCES = {
     'depth_detector_node': Balance('colour images', 'images searched', (
         'colour images rejected', 'colour images without depth', 'colour images of a time before', 'images rejected',
         'images skipped for a newer one', 'images without floor', 'images while paused', 'searches failed')),
-    'bbox3d_node': Balance('2D boxes', 'images lifted', ('2D boxes rejected', '2D boxes of a time before')),
+    'bbox3d_node': Balance('2D boxes', 'images estimated', ('2D boxes rejected', '2D boxes from before a time jump')),
     'tracker_node': Balance('3D boxes', 'images tracked', (
         '3D boxes rejected', 'no transform', 'images behind other cameras', 'images ahead of other cameras')),
     'planner_bridge_node': Balance('tracks', 'tracks forwarded', ('tracks rejected',))}

@@ -1,4 +1,4 @@
-"""Error models with known numbers, and measurements made by them."""
+"""An error model with known numbers, and simulated measurements with its errors."""
 import numpy as np
 
 from ros_3d_bb.estimation.error_model import ErrorModel, MeasuredRange, Provenance, Spread, XBias
@@ -13,7 +13,7 @@ PLACES_M = np.array([(x, z) for z in (0.5, 1.0, 1.7, 2.5, 3.2, 4.0)
 
 
 def measure(model, repetitions, seed=1, noise=1.0):
-    """What a camera with these errors measures at PLACES_M: measured (n, 3), truth (n, 2), metres."""
+    """Simulated measurements at PLACES_M: measured (n, 3), truth (n, 2), metres."""
     random = np.random.RandomState(seed)
     truth_m = np.repeat(PLACES_M, repetitions, axis=0)
     true_m = np.stack((truth_m[:, 0], np.full(len(truth_m), 0.1), truth_m[:, 1]), axis=1)

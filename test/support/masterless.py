@@ -91,8 +91,8 @@ def masterless(params=()):
         'ros_3d_bb.nodes.yolov5_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.depth_detector_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.tracker_node.NewestWorker': immediate_worker,
-        'ros_3d_bb.nodes.common.debug_images.NewestWorker': immediate_worker,
-        'ros_3d_bb.nodes.common.debug_images.patient_master': mock.Mock()}
+        'ros_3d_bb.nodes.bbox3d_node.NewestWorker': immediate_worker,
+        'ros_3d_bb.nodes.bbox3d_node.patient_master': mock.Mock()}
     for level in ('loginfo', 'logwarn', 'loginfo_once'):
         replaced['rospy.' + level] = lambda text, *arguments: text % arguments
     with contextlib.ExitStack() as stack:

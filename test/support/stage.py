@@ -1,10 +1,9 @@
-"""A simulated camera whose images, time and transforms a test stops, and a witness of what the pipeline makes of them.
+"""A simulated camera whose images, time and transforms a test can stop, and checks of the resulting tracks.
 
-The clock of the stage moves with each image, so how fast the machine is does not matter: what is told in seconds of
-the stage is told in images.
+The clock of the stage advances with each image, so that the speed of the machine does not matter: durations in seconds
+of the stage are numbers of images.
 """
 import time
-from typing import Any, NamedTuple
 
 import numpy as np
 import rospy
@@ -18,96 +17,82 @@ from ros_3d_bb.msg import TrackedObject, TrackedObjectArray
 from ros_3d_bb_lab.simulation.ros.simulator_msgs import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
-from support.ros import TIMEOUT_S, Recorder, publisher, wait_until
+from support.ros import TIMEOUT_S, Recorder, publisher
 
 TOPICS = INFO_TOPICS[0], DEPTH_TOPIC, COLOR_TOPIC, TF_TOPIC
 PERIOD_NS = NS // 10
 RECOVERY_IMAGES = 20  # 2 s
-IMPATIENCE_S = 1.0  # for the answer to an image that a node may miss as it starts
+IMPATIENCE_S = 1.0  # timeout of an image that a starting node may miss
 STAYING = {'start': [5.0, -0.9], 'facing': 1.6, 'height': 1.7}
 SCENES = ([STAYING, {'start': [4.0, 0.8], 'facing': 3.1, 'height': 1.8}],
-          [STAYING, {'start': [3.0, -1.2], 'facing': 3.1, 'height': 1.8}])  # the second has left, a third has come
+          [STAYING, {'start': [3.0, -1.2], 'facing': 3.1, 'height': 1.8}])  # the second person is replaced
 NEAR_M = 0.5  # people are 1.7 m apart and more
-SHOWN_S = 0.5  # for how long people are published who should be seen and are not (~max_missed_time, and an image)
-
-
-class Moment(NamedTuple):
-    """When an image was sent: how often time had gone back before, and who was there, {name: position in the map}."""
-
-    round: int
-    people: Any
+SHOWN_S = 0.5  # how long undetected people in view are published (~max_missed_time, and an image)
 
 
 class Stage(object):
     """Camera, tf and clock; collects the tracks.
 
-    Attributes
-    ----------
-    scene : int
-        Which of SCENES the camera sees.
-    now_ns : int
-        Stamp of the newest image.
-    rows : list
-        What was measured, lines of text.
+    `scene` is the index of the current one of SCENES, `now_ns` the stamp of the newest image, and `rows` are lines of
+    text with the measured recovery times.
     """
 
     def __init__(self):
         self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=10)
         self.scene, self.now_ns, self._round, self.rows = 0, START_NS, 0, []
         self._scenes = [_scene(number) for number in range(len(SCENES))]
-        self._moments = {}  # by stamp
+        self._sent = {}  # stamp: (number of previous jumps back, {name: position of a person})
         self._checked, self._newest, self._names = 0, (0, 0), {}
         self._pubs = {topic: publisher('/tf' if topic == TF_TOPIC else topic, TYPES[topic]) for topic in TOPICS}
         self.tracks = Recorder('ros_3d_bb/tracks', TrackedObjectArray)
         self.points = Recorder('planner_bridge_node/points', PointCloud2)
 
     def send(self, without=()):
-        """Send the next image, but for some topics; returns its stamp."""
+        """Send the next image, except for some topics; returns its stamp."""
         self.pass_time(PERIOD_NS)
         messages, people = self._scenes[self.scene]
-        self._moments[self.now_ns] = Moment(self._round, people)
+        self._sent[self.now_ns] = self._round, people
         for topic, message in messages:
             if topic not in without:
                 self._pubs[topic].publish(with_stamp(message, time_from(self.now_ns)))
         return self.now_ns
 
     def pass_time(self, elapsed_ns):
-        """Move the clock; back, where that is negative."""
+        """Move the clock, backwards if negative."""
         self.now_ns += elapsed_ns
         self._round += elapsed_ns < 0
-        self.tell(self.now_ns)
+        self.publish_time(self.now_ns)
 
-    def tell(self, time_ns):
-        """Say that it is some time, once."""
+    def publish_time(self, time_ns):
+        """Publish a time on /clock once."""
         self._clock_pub.publish(Clock(time_from(time_ns)))
 
     def pause(self, seconds, speed=10.0):
-        """Let time pass without images, faster than by the machine's clock."""
+        """Let time pass without images, faster than real time."""
         for _tick in range(int(10 * seconds)):
             self.pass_time(NS // 10)
             time.sleep(0.1 / speed)
 
     def step(self):
-        """Send the next image, and wait until its tracks come."""
-        stamp = time_from(self.send())
-        wait_until(lambda: _is_newest(stamp, self.tracks.messages), 'tracks of the image of %.3f' % stamp.to_sec())
+        """Send the next image, and wait for its tracks."""
+        assert self.tries(TIMEOUT_S), 'no tracks of the image of %.3f' % (self.now_ns / NS)
 
-    def tries(self, patience_s):
-        """Send the next image, which a node may miss; whether its tracks come."""
+    def tries(self, timeout_s):
+        """Send the next image, which a node may miss. Returns whether its tracks arrive."""
         stamp = time_from(self.send())
-        return _within(patience_s, lambda: _is_newest(stamp, self.tracks.messages))
+        return _within(timeout_s, lambda: self.tracks.messages and self.tracks.messages[-1].header.stamp == stamp)
 
     def recovered(self, fault, limit=RECOVERY_IMAGES):
-        """Send images until all who are there are followed, and handed to planners; measure how many it takes.
+        """Send images until all people are tracked and sent to planners, and measure how many it takes.
 
-        Until one is answered, an image may be missed; from then on each is waited for, however slow the machine is.
+        The first images may be missed; after the first answer, each image is waited for. Returns {name: track ID}.
         """
         began_s, sent = time.monotonic(), set()
         for count in range(1, limit + 1):
-            is_answered = self.tries(_patience_s(self.tracks.messages, sent))
+            is_answered = self.tries(_timeout_s(self.tracks.messages, sent))
             sent.add(self.now_ns)
             if is_answered and self._is_complete(sent):
-                self.rows.append('%-66s %2d images (%.1f s of the stage), %.1f s by the machine' % (
+                self.rows.append('%-66s %2d images (%.1f s of the stage), %.1f s of real time' % (
                     fault, count, count * PERIOD_NS / NS, time.monotonic() - began_s))
                 self.check()
                 return self.ids()
@@ -115,59 +100,53 @@ class Stage(object):
             fault, limit, self.tracks.messages[-1:]))
 
     def ids(self):
-        """The numbers of the people, {name: id}."""
+        """The track IDs of the people, {name: id}."""
         message = self.tracks.messages[-1]
-        people = self._moments[message.header.stamp.to_nsec()].people
+        _round, people = self._sent[message.header.stamp.to_nsec()]
         return {_name_of(track, people): track.id for track in message.objects}
 
     def _is_complete(self, sent):
-        people = self._moments[self.now_ns].people
-        tracks = self.tracks.messages[-1].objects
-        if not (all(track.status == TrackedObject.VISIBLE for track in tracks)
-                and sorted(_name_of(track, people) or '' for track in tracks) == sorted(people)):
-            return False
-        stamp = time_from(self.now_ns)
-        return _within(_patience_s(self.points.messages, sent), lambda: any(
-            message.header.stamp == stamp and message.width for message in self.points.messages[-5:]))
+        _round, people = self._sent[self.now_ns]
+        tracks, stamp = self.tracks.messages[-1].objects, time_from(self.now_ns)
+        return (all(track.status == TrackedObject.VISIBLE for track in tracks)
+                and sorted(_name_of(track, people) or '' for track in tracks) == sorted(people)
+                and _within(_timeout_s(self.points.messages, sent), lambda: any(
+                    message.header.stamp == stamp and message.width for message in self.points.messages[-5:])))
 
     def check(self):
-        """Of the tracks that came: stamps are of images, in order; nobody is there who is not; numbers are of one."""
+        """Check new tracks: stamps are those of images, in order; each track is a person, and keeps to that person."""
         messages = self.tracks.messages[self._checked:]
         self._checked += len(messages)
         for message in messages:
             stamp_ns = message.header.stamp.to_nsec()
-            assert stamp_ns in self._moments, 'stamped %.3f, when no image was taken' % (stamp_ns / NS)
-            now = (self._moments[stamp_ns].round, stamp_ns)
-            assert now >= self._newest, 'stamped %.3f after %.3f' % (stamp_ns / NS, self._newest[1] / NS)
-            self._newest, people = now, self._seen_lately(stamp_ns)
+            assert stamp_ns in self._sent, 'tracks at %.3f, without an image' % (stamp_ns / NS)
+            now = self._sent[stamp_ns][0], stamp_ns
+            assert now >= self._newest, 'tracks at %.3f after %.3f' % (stamp_ns / NS, self._newest[1] / NS)
+            self._newest, people = now, self._recent_people(stamp_ns)
             for track in message.objects:
                 name = _name_of(track, people)
-                assert name, 'a ghost at %.3f: %s' % (stamp_ns / NS, track)
-                assert self._names.setdefault(track.id, name) == name, 'number %d was %s and is %s' % (
+                assert name, 'a false track at %.3f: %s' % (stamp_ns / NS, track)
+                assert self._names.setdefault(track.id, name) == name, 'track %d was %s and is %s' % (
                     track.id, self._names[track.id], name)
 
-    def _seen_lately(self, stamp_ns):
-        """Who was in an image of the last moments, {name: position}."""
-        now, people = self._moments[stamp_ns].round, {}
+    def _recent_people(self, stamp_ns):
+        """People in the latest images, {name: position}."""
+        people = {}
         for other_ns in range(stamp_ns, stamp_ns - int(SHOWN_S * NS), -PERIOD_NS):
-            moment = self._moments.get(other_ns)
-            if moment is not None and moment.round == now:
-                people.update(moment.people)
+            other_round, others = self._sent.get(other_ns, (None, {}))
+            if other_round == self._sent[stamp_ns][0]:
+                people.update(others)
         return people
 
 
-def _is_newest(stamp, messages):
-    return bool(messages) and messages[-1].header.stamp == stamp
-
-
-def _patience_s(messages, sent):
-    """How long to wait for the next answer: not long before one of the images sent has any, as they may be missed."""
+def _timeout_s(messages, sent):
+    """How long to wait for the next answer: shortly as long as the images that were sent may have been missed."""
     return TIMEOUT_S if any(message.header.stamp.to_nsec() in sent for message in messages[-5:]) else IMPATIENCE_S
 
 
-def _within(seconds, condition):
-    """Whether a condition comes to hold within seconds of the machine's clock."""
-    deadline_s = time.monotonic() + seconds
+def _within(timeout_s, condition):
+    """Whether a condition becomes true within a timeout in real time."""
+    deadline_s = time.monotonic() + timeout_s
     while not condition():
         if time.monotonic() > deadline_s:
             return False
@@ -176,17 +155,17 @@ def _within(seconds, condition):
 
 
 def _scene(number):
-    """The messages of a picture without their stamps, and who is where."""
+    """The messages of an image without their stamps, and {name: position} of the people."""
     simulator = Simulator(scenario_from({'rate': 10.0, 'people': SCENES[number]}))
     frame = simulator.frame(0)
     messages = [entry for entry in simulated_messages(simulator, frame, START_NS) if entry[0] in TOPICS]
-    names = ('who stays', 'who is only in scene %d' % number)
+    names = 'the person in both scenes', 'the person in scene %d' % number
     return messages, {name: person.position_m for name, person in zip(names, frame.people)}
 
 
 def _name_of(track, people):
-    """Who a track is, by position; None where it is nobody."""
-    place = track.pose.pose.position
+    """Name of the person at the position of a track, or None."""
+    position = track.pose.pose.position
     near = [name for name, position_m in people.items()
-            if np.hypot(place.x - position_m[0], place.y - position_m[1]) < NEAR_M]
+            if np.hypot(position.x - position_m[0], position.y - position_m[1]) < NEAR_M]
     return near[0] if near else None

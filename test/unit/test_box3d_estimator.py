@@ -1,38 +1,40 @@
-"""The estimators: the thesis' recorded positions and grid, the person's layer, and what cannot be used."""
-import cv2
+"""3D box estimators: recorded positions and grid of the thesis, depth layers, distortion, and invalid input."""
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from hypothesis.extra import numpy as hnp
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.estimation.box3d_estimator import (AXIS_BEHIND_SURFACE_M, estimate_boxes, estimate_foreground,
-                                                  estimate_median, estimator_named, front_to_back, sample_foreground,
-                                                  sample_median, truncated_edges)
+from ros_3d_bb.estimation.box3d_estimator import (AXIS_BEHIND_SURFACE_M, EDGE_PERCENT, check_rect,
+                                                  complete_truncated_extent, edges, estimate_boxes,
+                                                  estimate_foreground, estimate_median, estimator_named,
+                                                  nearest_dominant_layer, sample_depth, truncated_edges, within)
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+MILLIMETRES = hnp.arrays(int, st.integers(1, 60), elements=st.integers(300, 9000))
 
 
 def flat(depth, scale_m=0.001, dtype=np.uint16):
     return DepthImage(np.full((48, 64), depth, dtype), scale_m)
 
 
-def test_reproduces_the_recorded_positions(session_folder):
+def test_the_median_reproduces_the_recorded_positions(session_folder):
     """Within 1 mm an axis, plus the rounding of the record to whole millimetres."""
     session = read_session(session_folder)
     errors_m = []
-    for frame in session.frames:
-        samples = sample_median(read_depth(frame, session), frame.boxes_px[0])
+    for frame in session.frames[::2]:
+        samples = sample_depth(read_depth(frame, session), frame.boxes_px[0], 20)
         box = estimate_median(samples, frame.boxes_px[0], session.camera)
         errors_m.append(np.abs(box.center_m - frame.estimate_m))
-    assert len(errors_m) >= 80
+    assert len(errors_m) >= 40
     assert np.max(errors_m) <= 0.0015
 
 
 @given(st.integers(-90, 80), st.integers(-90, 80), st.integers(1, 200), st.integers(1, 200), st.integers(1, 30))
-def test_grid_is_the_centred_one_cut_at_the_border(x1, y1, width, height, stride):
-    samples = sample_median(flat(1000), (x1, y1, x1 + width, y1 + height), stride)
+def test_the_grid_is_centred_and_clipped_to_the_image(x1, y1, width, height, stride):
+    samples = sample_depth(flat(1000), (x1, y1, x1 + width, y1 + height), stride)
     expected = []
     columns, rows = -(-width // stride), -(-height // stride)
     for v in range(y1 + (height - (rows - 1) * stride - 1) // 2, y1 + height, stride):
@@ -42,39 +44,31 @@ def test_grid_is_the_centred_one_cut_at_the_border(x1, y1, width, height, stride
     assert [tuple(pixel) for pixel in samples.pixels.reshape(-1, 2).tolist()] == expected
 
 
-def test_boxes_of_any_size_cost_no_more_than_the_image():
-    big = 2 ** 31 - 1
-    samples = sample_median(flat(1000), (-big - 1, -big - 1, big, big))
-    assert 0 < samples.valid.size <= 12
-    assert sample_median(flat(1000), (big - 50, big - 50, big, big)).valid.size == 0
-
-
-@pytest.mark.parametrize('rect', [(10, 10, 10, 20), (20, 10, 10, 20), (10, 20, 20, 10)])
-def test_empty_and_reversed_boxes_are_refused(rect):
-    with pytest.raises(ValueError, match=r'box \(%d, %d, %d, %d\)' % rect):
-        sample_median(flat(1000), rect)
+@pytest.mark.parametrize('stride', [None, 7])
+@pytest.mark.parametrize('rect', [(10, 10, 10, 20), (20, 10, 10, 20), (10, 20, 20, 10), (10 ** 9, 0, 2 * 10 ** 9, 9)])
+def test_rectangles_without_samples(rect, stride):
+    assert sample_depth(flat(1000), rect, stride).valid.size == 0
+    if rect[0] < 64:
+        with pytest.raises(ValueError, match=r'box \(%d, %d, %d, %d\)' % rect):
+            check_rect(rect)
 
 
 @pytest.mark.parametrize('depth,scale_m,dtype', [(0, 0.001, np.uint16), (np.nan, 1, np.float32),
                                                  (np.inf, 1, np.float32), (-1, 1, np.float32)])
-def test_no_answer_without_measured_depth(depth, scale_m, dtype):
-    samples = sample_median(flat(depth, scale_m, dtype), (0, 0, 64, 48))
-    assert not samples.valid.any()
-    assert estimate_median(samples, (0, 0, 64, 48), CAMERA) is None
+def test_no_estimate_without_valid_depth(depth, scale_m, dtype):
+    image = flat(depth, scale_m, dtype)
+    assert not sample_depth(image, (0, 0, 64, 48)).valid.any()
+    for name in ('foreground', 'median'):
+        outside = estimate_boxes(flat(2000), [(70, 10, 90, 20)], CAMERA, estimator_named(name))
+        assert estimate_boxes(image, [(0, 0, 64, 48)], CAMERA, estimator_named(name)) == outside == [None]
 
 
-def test_size_is_that_of_the_box_at_the_median_depth():
+@pytest.mark.parametrize('depth', [flat(3000), flat(3.0, 1.0, np.float32)])
+def test_size_is_that_of_the_box_at_the_median_depth(depth):
     rect = (10, 10, 40, 40)
-    box = estimate_median(sample_median(flat(3000), rect, 5), rect, CAMERA)
+    box = estimate_median(sample_depth(depth, rect, 5), rect, CAMERA)
     np.testing.assert_allclose(box.size_m, [30 / 60 * 3, 30 / 60 * 3, 30 / 60 * 3])
-    assert box.support == 1.0 and not box.truncated and box.rect_px == rect
-
-
-def test_units_do_not_matter():
-    rect = (10, 10, 40, 44)
-    millimetres = estimate_median(sample_median(flat(2500), rect, 5), rect, CAMERA)
-    metres = estimate_median(sample_median(flat(2.5, 1.0, np.float32), rect, 5), rect, CAMERA)
-    np.testing.assert_allclose(millimetres.center_m, metres.center_m, atol=1e-6)
+    assert box.support == 1.0 and not box.truncated and box.rect_px == rect and box.center_m[2] == 3.0
 
 
 def test_support_is_the_share_of_samples_on_the_body():
@@ -82,17 +76,17 @@ def test_support_is_the_share_of_samples_on_the_body():
     depth.values[:, 40:] = 4000
     depth.values[:10] = 0
     rect = (0, 0, 64, 48)
-    box = estimate_median(sample_median(depth, rect, 1), rect, CAMERA)
+    box = estimate_median(sample_depth(depth, rect, 1), rect, CAMERA)
     assert box.center_m[2] == pytest.approx(2.0)
     assert box.support == pytest.approx((40 / 64) * (38 / 48))
 
 
 def foreground(depth, rect, nearer=()):
-    return estimate_foreground(sample_foreground(depth, rect), rect, CAMERA, nearer)
+    return estimate_foreground(sample_depth(depth, rect), rect, CAMERA, nearer)
 
 
 @given(st.integers(500, 5000), st.floats(0.4, 1), st.integers(400, 3000))
-def test_foreground_is_the_person_however_much_background_the_box_holds(person_mm, share, behind_mm):
+def test_foreground_is_the_person_for_any_share_of_background(person_mm, share, behind_mm):
     """A plate before a wall that fills up to two thirds of the box: the median would be the wall."""
     depth = flat(person_mm + behind_mm)
     half = max(2, int(30 * share / 2))
@@ -104,8 +98,8 @@ def test_foreground_is_the_person_however_much_background_the_box_holds(person_m
     assert box.size_m[1] == pytest.approx(40 / 60 * person_mm * 0.001)
 
 
-def test_foreground_leaves_pixels_to_somebody_in_front():
-    """A person half hidden by a nearer one, with boxes around what is seen of each."""
+def test_foreground_masks_pixels_of_occluders():
+    """A person half hidden by a nearer one, with boxes around the visible part of each."""
     depth = flat(5000)
     depth.values[10:40, 30:50] = 3000
     depth.values[5:45, 10:34] = 2000
@@ -118,35 +112,29 @@ def test_foreground_leaves_pixels_to_somebody_in_front():
 
 def test_foreground_ignores_flying_pixels():
     depth = flat(2000)
-    depth.values[:, 30:34] = np.linspace(2000, 4000, 4).astype(np.uint16)
+    depth.values[:, 30:34] = 2000, 2200, 3000, 4000  # the second one is in the layer of the person
     depth.values[:, 34:] = 4000
     box = foreground(depth, (14, 4, 50, 44))
     assert box.center_m[2] == pytest.approx(2.0 + AXIS_BEHIND_SURFACE_M)
 
 
-def test_foreground_looks_at_about_as_many_pixels_in_every_box():
+def test_foreground_samples_about_as_many_pixels_in_every_box():
     depth = DepthImage(np.full((480, 640), 1000, np.uint16), 0.001)
     rects = ((0, 0, 640, 480), (100, 100, 260, 400), (-5000, -5000, 5000, 5000), (300, 200, 350, 240))
-    counts = [sample_foreground(depth, rect).valid.size for rect in rects]
-    assert all(1500 <= count <= 4500 for count in counts)
-    assert sample_foreground(depth, (300, 200, 310, 220)).valid.size == 200
+    assert all(1500 <= sample_depth(depth, rect).valid.size <= 4500 for rect in rects)
+    assert sample_depth(flat(1000), (-2 ** 31, -2 ** 31, 2 ** 31 - 1, 2 ** 31 - 1), 20).valid.size <= 12
+    assert sample_depth(depth, (300, 200, 310, 220)).valid.size == 200
 
 
-@pytest.mark.parametrize('depth,scale_m,dtype', [(0, 0.001, np.uint16), (np.nan, 1.0, np.float32)])
-def test_foreground_finds_nothing_without_depth(depth, scale_m, dtype):
-    assert foreground(flat(depth, scale_m, dtype), (0, 0, 64, 48)) is None
-    assert foreground(flat(2000), (70, 10, 90, 20)) is None
-
-
-def test_foreground_says_nothing_of_a_few_pixels():
-    """A twentieth of the box is not enough for a person; the wall behind fills none of it."""
+def test_foreground_needs_a_minimum_support():
+    """A twentieth of the box is not enough for a person."""
     depth = flat(0)
     depth.values[20:24, 30:33] = 2000
     assert foreground(depth, (20, 10, 42, 40)) is None
 
 
 @pytest.mark.parametrize('pixels', [1, 2, 3, 11])
-def test_few_pixels_have_a_position_too(pixels):
+def test_a_box_of_few_pixels_has_a_position(pixels):
     depth = flat(0)
     depth.values[10, 10:10 + pixels] = 3000 + 10 * np.arange(pixels)
     box = foreground(depth, (10, 10, 10 + pixels, 11))
@@ -154,7 +142,7 @@ def test_few_pixels_have_a_position_too(pixels):
     assert np.isfinite(box.center_m).all() and (box.size_m > 0).all()
 
 
-def test_one_absurd_depth_neither_stalls_nor_counts():
+def test_depths_beyond_any_camera_are_ignored():
     depth = flat(2.0, 1.0, np.float32)
     depth.values[10, 10], depth.values[20, 20] = 1e30, 1e7
     box = foreground(depth, (5, 5, 60, 45))
@@ -162,23 +150,19 @@ def test_one_absurd_depth_neither_stalls_nor_counts():
 
 
 @pytest.mark.parametrize('name', ['foreground', 'median'])
-def test_boxes_come_in_the_order_of_their_rectangles(name):
+def test_boxes_are_in_the_order_of_their_rectangles(name):
     depth = flat(5000)
     depth.values[10:40, 30:50] = 3000
     depth.values[5:45, 10:34] = 2000
     depth.values[:, 60:] = 0
     rects = [(28, 10, 50, 40), (60, 0, 64, 40), (10, 5, 34, 45)]
-    far, nobody, near = estimate_boxes(depth, rects, CAMERA, estimator_named(name))
-    assert nobody is None and near.rect_px == rects[2] and far.rect_px == rects[0]
+    far, none, near = estimate_boxes(depth, rects, CAMERA, estimator_named(name))
+    assert none is None and near.rect_px == rects[2] and far.rect_px == rects[0]
     assert near.center_m[2] < 2.2 and far.center_m[2] > near.center_m[2] + 0.4
 
 
-def test_those_who_stand_lower_in_the_image_come_first():
-    assert front_to_back([(0, 10, 5, 30), (0, 5, 5, 45), (0, 2, 5, 45)]) == [2, 1, 0]
-
-
 @pytest.mark.parametrize('name,stride,complaint', [('mean', 20, "estimator is 'mean'"), ('median', 0, 'stride is 0')])
-def test_unknown_estimators_and_strides_are_refused(name, stride, complaint):
+def test_unknown_estimators_and_strides_are_rejected(name, stride, complaint):
     with pytest.raises(ValueError, match=complaint):
         estimator_named(name, stride)
 
@@ -193,34 +177,26 @@ WIDE = Camera(640, 480, 420, 420, 319.5, 239.5, 'plumb_bob', (-0.25, 0.06, 0.000
 FISHEYE = Camera(640, 480, 306, 306, 319.5, 239.5, 'equidistant', (-0.0022, 0.0376, -0.0364, 0.0059))
 
 
-def plate_seen_by(camera, center_m, size_m):
-    """Depth image of an upright plate before a wall at 6 m, and the rectangle around the plate, by OpenCV."""
-    matrix, lens = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]]), camera.distortion
+def plate_in(camera, center_m, size_m):
+    """Depth image of an upright plate in front of a wall at 6 m, and the rectangle around the plate."""
     v, u = np.mgrid[:camera.height, :camera.width]
-    pixels = np.stack((u, v), axis=-1).reshape(-1, 1, 2).astype(float)
+    across, down = camera.rays(u, v)
+    on_plate = ((np.abs(across * center_m[2] - center_m[0]) <= size_m[0] / 2)
+                & (np.abs(down * center_m[2] - center_m[1]) <= size_m[1] / 2))
     sides = np.linspace(-0.5, 0.5, 200)
     outline = np.array([edge for side in sides for edge in ((side, -0.5), (side, 0.5), (-0.5, side), (0.5, side))])
-    outline = np.append(outline * size_m + center_m[:2], np.full((len(outline), 1), center_m[2]), axis=1)[:, None]
-    if camera.distortion_model == 'equidistant':
-        rays = cv2.fisheye.undistortPoints(pixels, matrix, np.array(lens))
-        seen = cv2.fisheye.projectPoints(outline, np.zeros(3), np.zeros(3), matrix, np.array(lens))[0]
-    else:
-        until = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-12)
-        rays = cv2.undistortPointsIter(pixels, matrix, np.array(lens), None, None, until)
-        seen = cv2.projectPoints(outline, np.zeros(3), np.zeros(3), matrix, np.array(lens))[0]
-    on_plate = (np.abs(rays[:, 0] * center_m[2] - center_m[:2]) <= np.array(size_m) / 2).all(axis=1)
-    depth_m = np.where(on_plate, center_m[2], 6.0).reshape(v.shape)
-    low, high = np.floor(seen.min(axis=(0, 1))).astype(int), np.ceil(seen.max(axis=(0, 1))).astype(int)
-    return DepthImage(depth_m, 1.0), tuple(low.tolist() + high.tolist())
+    outline_px = camera.project(np.insert(outline * size_m + center_m[:2], 2, center_m[2], axis=1))
+    rect_px = np.floor(outline_px.min(axis=0)).tolist() + np.ceil(outline_px.max(axis=0)).tolist()
+    return DepthImage(np.where(on_plate, center_m[2], 6.0), 1.0), tuple(map(int, rect_px))
 
 
 @pytest.mark.parametrize('camera', [WIDE, FISHEYE], ids=['plumb_bob', 'equidistant'])
 @pytest.mark.parametrize('x_m', [-1.6, 0.0, 1.5])
-def test_lens_distortion_is_taken_out(camera, x_m):
-    """Within 3 cm in position and 6 cm in height; what the same camera without it would say is off at the sides."""
+def test_lens_distortion_is_corrected(camera, x_m):
+    """Within 3 cm in position and 6 cm in height; without the correction, positions at the sides are wrong."""
     center_m = np.array([x_m, 0.3, 3.0])
-    depth, rect = plate_seen_by(camera, center_m, (0.5, 1.7))
-    samples, axis_m = sample_foreground(depth, rect), center_m * (1 + AXIS_BEHIND_SURFACE_M / 3)
+    depth, rect = plate_in(camera, center_m, (0.5, 1.7))
+    samples, axis_m = sample_depth(depth, rect), center_m * (1 + AXIS_BEHIND_SURFACE_M / 3)
     box = estimate_foreground(samples, rect, camera)
     np.testing.assert_allclose(box.center_m, axis_m, atol=0.03)
     assert box.size_m[1] == pytest.approx(1.7, abs=0.06) and box.size_m[0] == pytest.approx(0.5, abs=0.05)
@@ -229,25 +205,66 @@ def test_lens_distortion_is_taken_out(camera, x_m):
 
 
 @pytest.mark.parametrize('camera', [WIDE, FISHEYE], ids=['plumb_bob', 'equidistant'])
-def test_the_median_is_that_of_points_without_distortion(camera):
+def test_the_median_is_that_of_undistorted_points(camera):
     """The rectangle of a small plate, and depth that fills it, so that the median is in its middle."""
     center_m = np.array([1.5, 0.3, 3.0])
-    _depth, rect = plate_seen_by(camera, center_m, (0.1, 0.1))
-    depth, _rect = plate_seen_by(camera, center_m, (1, 1))
-    box = estimate_median(sample_median(depth, rect, 1), rect, camera)
+    _depth, rect = plate_in(camera, center_m, (0.1, 0.1))
+    box = estimate_median(sample_depth(DepthImage(np.full((480, 640), 3.0), 1.0), rect, 1), rect, camera)
     np.testing.assert_allclose(box.center_m, center_m, atol=0.01)  # a pixel
     np.testing.assert_allclose(box.size_m, 0.1, atol=0.03)
 
 
 @pytest.mark.parametrize('name', ['foreground', 'median'])
-def test_what_a_fisheye_sees_at_right_angles_is_no_box(name):
+def test_no_estimate_at_right_angles_to_the_axis_of_a_fisheye(name):
     camera = Camera(640, 480, 150, 150, 319.5, 239.5, 'equidistant', (0, 0, 0, 0))
     estimator, rect = estimator_named(name), (10, 200, 60, 280)
     samples = estimator.sample(DepthImage(np.full((480, 640), 2.0), 1.0), rect)
     assert estimator.estimate(samples, rect, camera, ()) is None
 
 
-def test_a_rectangle_that_leaves_the_image_is_lifted_by_a_camera_with_distortion():
+def test_a_rectangle_beyond_the_image_of_a_distorting_lens_has_an_estimate():
     rect = (-2 ** 31, 100, 300, 2 ** 31 - 1)
     estimator, depth = estimator_named('foreground'), DepthImage(np.full((480, 640), 2.0), 1.0)
     assert np.isfinite(estimator.estimate(estimator.sample(depth, rect), rect, WIDE, ()).center_m).all()
+
+
+@given(hnp.arrays(float, st.integers(1, 50), elements=st.floats(-5, 5)))
+def test_edges_are_extrapolated_percentiles(x_m):
+    low_m, high_m = np.percentile(x_m, [EDGE_PERCENT, 100 - EDGE_PERCENT])
+    beyond_m = (high_m - low_m) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
+    np.testing.assert_allclose(edges(x_m), (low_m - beyond_m, high_m + beyond_m), atol=1e-9)
+
+
+def test_edges_of_a_uniform_body():
+    x_m = np.random.RandomState(0).permutation(np.linspace(-0.3, 0.2, 1001))
+    np.testing.assert_allclose(edges(x_m), (-0.3, 0.2), atol=1e-9)
+
+
+@given(MILLIMETRES, st.integers(0, 9000), st.integers(0, 500))
+def test_within_includes_its_bounds_as_the_rounded_difference_does(depths_mm, middle_mm, half_mm):
+    depths_m, middle_m, half_m = np.sort(depths_mm) * 0.001, middle_mm * 0.001, half_mm * 0.001
+    expected_m = depths_m[np.abs(depths_m - middle_m) <= half_m]
+    np.testing.assert_array_equal(within(depths_m, middle_m, half_m), expected_m)
+
+
+@given(MILLIMETRES, st.integers(0, 100))
+def test_the_layer_is_in_the_range_of_the_depths_in_any_order(depths_mm, seed):
+    depths_m = depths_mm * 0.001
+    sorted_depths_m, even = np.sort(depths_m), np.ones(len(depths_m))
+    layer_m = nearest_dominant_layer(depths_m, even, sorted_depths_m)
+    assert sorted_depths_m[0] <= layer_m <= sorted_depths_m[-1]
+    assert layer_m == nearest_dominant_layer(np.random.RandomState(seed).permutation(depths_m), even, sorted_depths_m)
+
+
+def test_the_nearest_dominant_layer_is_the_person():
+    depths_m = np.array([0.9] * 5 + [2.0] * 30 + [4.0] * 50)  # a few flying pixels, a person, a wall
+    assert nearest_dominant_layer(depths_m, np.ones(85), depths_m) == 2.0
+    assert nearest_dominant_layer(depths_m, np.where(depths_m == 2.0, 0.1, 1.0), depths_m) == 4.0
+
+
+def test_a_truncated_body_is_completed_at_the_truncated_end():
+    np.testing.assert_allclose(complete_truncated_extent(-0.1, 0.2, True, False, 0.5), (-0.3, 0.2))
+    np.testing.assert_allclose(complete_truncated_extent(-0.1, 0.2, False, True, 0.5), (-0.1, 0.4))
+    for cut in (False, True):
+        assert complete_truncated_extent(-0.1, 0.2, cut, cut, 0.5) == (-0.1, 0.2)
+    assert complete_truncated_extent(-0.5, 0.5, True, False, 0.5) == (-0.5, 0.5)

@@ -1,4 +1,4 @@
-"""Cameras and transforms: inverses undo each other, and bad values are named."""
+"""Cameras and transforms: inverses and rejected values."""
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -11,7 +11,7 @@ COORDINATE = st.floats(-100, 100)
 
 
 @given(hnp.arrays(float, (5, 2), elements=st.floats(-2000, 3000)), st.floats(0.1, 20))
-def test_project_undoes_deproject(pixels, depth_m):
+def test_project_is_the_inverse_of_deproject(pixels, depth_m):
     points = D435I.deproject(pixels, np.full(5, depth_m))
     np.testing.assert_allclose(points[:, 2], depth_m)
     np.testing.assert_allclose(D435I.project(points), pixels, atol=1e-6)
@@ -19,13 +19,13 @@ def test_project_undoes_deproject(pixels, depth_m):
 
 def test_deprojection_of_known_pixels():
     """Thesis 3.4.1: x = (X - cx) / fx * z."""
-    points = D435I.deproject([(319.199, 242.08), (319.199 + 614.686, 242.08), (319.199, 242.08 - 614.842)], [2, 2, 3])
-    np.testing.assert_allclose(points, [(0, 0, 2), (2, 0, 2), (0, -3, 3)], atol=1e-12)
+    points = D435I.deproject([(319.199, 242.08), (319.199 + 614.686, 242.08 - 614.842)], [2, 3])
+    np.testing.assert_allclose(points, [(0, 0, 2), (3, -3, 3)], atol=1e-12)
 
 
 @pytest.mark.parametrize('field,value', [('width', 0), ('height', -1), ('fx', 0), ('fy', float('nan')),
                                          ('fx', float('inf')), ('cx', float('nan'))])
-def test_unusable_intrinsics_are_refused(field, value):
+def test_unusable_intrinsics_are_rejected(field, value):
     with pytest.raises(ValueError, match='camera'):
         Camera(**dict(D435I._asdict(), **{field: value}))
 
@@ -33,7 +33,7 @@ def test_unusable_intrinsics_are_refused(field, value):
 @given(st.tuples(COORDINATE, COORDINATE, COORDINATE),
        st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1),
        hnp.arrays(float, (4, 3), elements=COORDINATE))
-def test_transforms_are_rigid_and_can_be_undone(translation, quaternion, points):
+def test_transforms_are_rigid_and_invertible(translation, quaternion, points):
     b_from_a = transform_from(translation, quaternion)
     moved = transform_points(b_from_a, points)
     np.testing.assert_allclose(transform_points(np.linalg.inv(b_from_a), moved), points, atol=1e-9)
@@ -42,25 +42,20 @@ def test_transforms_are_rigid_and_can_be_undone(translation, quaternion, points)
 
 
 @given(st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1))
-def test_the_quaternion_of_a_transform_is_the_one_it_was_made_from(quaternion):
+def test_quaternion_from_is_the_inverse_of_transform_from(quaternion):
     found = quaternion_from(transform_from((1, 2, 3), quaternion))
     expected = np.array(quaternion) / np.linalg.norm(quaternion)
     assert found[3] >= 0
     np.testing.assert_allclose(found * np.sign(found.dot(expected)), expected, atol=1e-9)
 
 
-def test_optical_frame_of_a_camera_that_looks_ahead():
+def test_optical_frame_of_a_camera_that_points_ahead():
     """REP 103: in the body frame x is forward, y left, z up; the optical z is forward, x right, y down."""
     body_from_optical = transform_from((0.17, 0, 0.2), OPTICAL_ROTATION)
     np.testing.assert_allclose(transform_points(body_from_optical, [(1, 2, 3)]), [(3.17, -1, -1.8)], atol=1e-12)
 
 
 @pytest.mark.parametrize('quaternion', [(0, 0, 0, 0), (float('nan'), 0, 0, 1), (float('inf'), 0, 0, 0)])
-def test_quaternions_without_direction_are_refused(quaternion):
+def test_quaternions_without_direction_are_rejected(quaternion):
     with pytest.raises(ValueError, match='quaternion'):
         transform_from((0, 0, 0), quaternion)
-
-
-def test_quaternions_are_normalised():
-    np.testing.assert_allclose(transform_from((0, 0, 0), (0, 0, 3, 3)), transform_from((0, 0, 0), (0, 0, 1, 1)),
-                               atol=1e-15)

@@ -1,4 +1,6 @@
-"""Lens distortion over the whole image: against OpenCV and librealsense, there and back, and what cannot be used."""
+"""Lens distortion over the whole image: compared with OpenCV and librealsense, inverses, and invalid coefficients."""
+import operator
+
 import cv2
 import numpy as np
 import pyrealsense2
@@ -38,14 +40,14 @@ def named(camera):
 
 
 def every_pixel(camera, step=1):
-    """(n, 2), with the corners whatever the step."""
+    """(n, 2), including the corners."""
     u, v = np.meshgrid(*(np.unique(np.append(np.arange(0, size, step), size - 1)) for size in camera[:2]))
     return np.stack((u, v), axis=-1).reshape(-1, 2).astype(float)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize('camera', CAMERAS, ids=named)
-def test_project_undoes_deproject_at_every_pixel(camera):
+def test_project_is_the_inverse_of_deproject_at_every_pixel(camera):
     pixels = every_pixel(camera, camera.width // 640)
     points = camera.deproject(pixels, 2.5)
     assert (points[:, 2] == 2.5).all()
@@ -54,8 +56,8 @@ def test_project_undoes_deproject_at_every_pixel(camera):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('camera', FOR_OPENCV, ids=named)
-def test_is_what_opencv_computes(camera):
-    """Rays to 1e-6 pixels where OpenCV iterates until it is there, and back again by its own projection."""
+def test_equals_opencv(camera):
+    """Rays to 1e-6 pixels where OpenCV iterates until convergence, and pixels by its own projection."""
     pixels = every_pixel(camera, 3)
     matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])
     points, lens = camera.deproject(pixels, 1.0), np.array(camera.distortion)
@@ -71,8 +73,8 @@ def test_is_what_opencv_computes(camera):
 
 
 @pytest.mark.parametrize('camera', FOR_REALSENSE, ids=named)
-def test_is_what_librealsense_computes(camera):
-    """To the rounding of its single precision: 0.002 pixels, for the fisheye at most 70 degrees off its axis."""
+def test_equals_librealsense(camera):
+    """To the rounding of its single precision: 0.002 pixels."""
     intrinsics = pyrealsense2.intrinsics()
     intrinsics.width, intrinsics.height, intrinsics.fx, intrinsics.fy, intrinsics.ppx, intrinsics.ppy = camera[:6]
     intrinsics.model = REALSENSE[camera.distortion_model]
@@ -86,17 +88,8 @@ def test_is_what_librealsense_computes(camera):
     np.testing.assert_allclose((points - expected)[:, :2] * camera[2:4], 0, atol=0.002)
 
 
-@pytest.mark.parametrize('size', SIZES)
-def test_a_realsense_that_is_called_plumb_bob_is_off_by_a_few_hundredths_of_a_pixel(size):
-    """realsense2_camera does not tell the two apart, so this is what believing it costs."""
-    inverse = camera_of(LENSES[4], size)
-    believed = inverse._replace(distortion_model=PLUMB_BOB)
-    pixels = every_pixel(inverse, 5)
-    assert np.abs(inverse.undistort(pixels) - believed.undistort(pixels)).max() < 0.03
-
-
 @pytest.mark.parametrize('camera', CAMERAS, ids=named)
-def test_an_opencv_without_termination_criteria_gives_the_same_rays(camera, monkeypatch):
+def test_opencv_before_3_3_1_gives_the_same_rays(camera, monkeypatch):
     """Ubuntu 18.04 has OpenCV 3.2; undistortPointsIter came with 3.3.1."""
     pixels = every_pixel(camera, 29)
     expected = camera.undistort(pixels)
@@ -105,28 +98,28 @@ def test_an_opencv_without_termination_criteria_gives_the_same_rays(camera, monk
 
 
 @pytest.mark.parametrize('camera', CAMERAS[:len(LENSES)], ids=named)
-def test_no_pixels_have_no_rays(camera):
-    assert camera.deproject(np.zeros((0, 2)), np.zeros(0)).shape == camera.project(np.zeros((0, 3))).shape[:1] + (3,)
-
-
-@pytest.mark.parametrize('camera', CAMERAS[:len(LENSES)], ids=named)
 @pytest.mark.parametrize('offset_px', [0, 1e-9, 1e-6, 3e-6, 1e-5, 1e-4])
 def test_pixels_next_to_the_axis_have_a_ray(camera, offset_px):
     pixel = np.array((camera.cx + offset_px, camera.cy - offset_px))
     np.testing.assert_allclose(camera.project(camera.deproject(pixel, 1.0)), pixel, rtol=0, atol=1e-9)
+    assert camera.deproject(np.zeros((0, 2)), np.zeros(0)).shape == camera.project(np.zeros((0, 3))).shape[:1] + (3,)
 
 
-BENT = st.floats(-0.5, 0.5)
-SKEWED = st.floats(-0.001, 0.001)
-WAVY = st.one_of(st.tuples(st.just(PLUMB_BOB), st.tuples(BENT, BENT, SKEWED, SKEWED, BENT)),
-                 st.tuples(st.just(INVERSE_BROWN_CONRADY), st.tuples(BENT, BENT, SKEWED, SKEWED, BENT)),
-                 st.tuples(st.just(RATIONAL_POLYNOMIAL),
-                           st.tuples(BENT, BENT, SKEWED, SKEWED, BENT, *[st.floats(0, 0.5)] * 3)),
-                 st.tuples(st.just(EQUIDISTANT), st.tuples(*[st.floats(-0.1, 0.1)] * 4)))
+RADIAL = st.floats(-0.5, 0.5)
+TANGENTIAL = st.floats(-0.001, 0.001)
+BROWN = st.tuples(RADIAL, RADIAL, TANGENTIAL, TANGENTIAL, RADIAL)
+MODERATE = st.one_of(st.tuples(st.sampled_from([PLUMB_BOB, INVERSE_BROWN_CONRADY]), BROWN),
+                     st.tuples(st.just(RATIONAL_POLYNOMIAL), st.builds(
+                         operator.add, BROWN, st.tuples(*[st.floats(0, 0.5)] * 3))),
+                     st.tuples(st.just(EQUIDISTANT), st.tuples(*[st.floats(-0.1, 0.1)] * 4)))
+ANY_NUMBER = st.sampled_from([-1e5, -1, -1e-9, 0, 1e-30, 1, 1e5])
+EXTREME = st.one_of(*[st.tuples(st.just(model), st.tuples(*[ANY_NUMBER] * count)) for model, count in (
+    (PLUMB_BOB, 5), (INVERSE_BROWN_CONRADY, 5), (RATIONAL_POLYNOMIAL, 8), (EQUIDISTANT, 4))])
 
 
-@given(WAVY, st.sampled_from(SIZES))
-def test_a_pixel_comes_back_or_has_no_ray(lens, size):
+@pytest.mark.slow
+@given(st.one_of(MODERATE, EXTREME), st.sampled_from(SIZES))
+def test_a_pixel_is_restored_or_has_no_ray(lens, size):
     camera = camera_of((70,) + lens, size)
     pixels = every_pixel(camera, 40)
     points = camera.deproject(pixels, 1.0)
@@ -134,13 +127,13 @@ def test_a_pixel_comes_back_or_has_no_ray(lens, size):
     np.testing.assert_allclose(camera.project(points)[~lost], pixels[~lost], rtol=0, atol=1e-6)
 
 
-@given(WAVY, st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4)))
-def test_rays_before_any_fold_come_back(lens, ray):
+@given(MODERATE, st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4)))
+def test_rays_before_any_fold_are_restored(lens, ray):
     camera = camera_of((70,) + lens, SIZES[0])
     np.testing.assert_allclose(camera.deproject(camera.project(ray + (1,)), 3.0), np.array(ray + (1,)) * 3, atol=1e-8)
 
 
-def test_a_polynomial_that_folds_gives_no_ray_beyond_the_fold_and_no_image_from_there():
+def test_there_are_no_rays_and_images_beyond_a_fold_of_the_polynomial():
     """r - 0.4 r^3 grows up to r = 0.913, where it is 0.609."""
     camera = Camera(640, 480, 500, 500, 320, 240, PLUMB_BOB, (-0.4, 0, 0, 0, 0))
     pixels = np.array([(320 + 500 * 0.6, 240), (320 + 500 * 0.62, 240)])
@@ -149,23 +142,20 @@ def test_a_polynomial_that_folds_gives_no_ray_beyond_the_fold_and_no_image_from_
     assert np.isfinite(camera.project((0.9, 0, 1))).all() and np.isnan(camera.project((0.93, 0, 1))).all()
 
 
-def test_a_fisheye_shows_nothing_flat_at_right_angles():
+def test_a_fisheye_has_no_rays_at_right_angles_to_its_axis():
     camera = Camera(640, 640, 200, 200, 320, 320, EQUIDISTANT, (0, 0, 0, 0))
     assert np.isfinite(camera.deproject((320 + 200 * np.pi / 2 * 0.98, 320), 1.0)).all()
     assert np.isnan(camera.deproject((320 + 200 * np.pi / 2 * 1.01, 320), 1.0)[:2]).all()
 
 
-@pytest.mark.parametrize('model', ['', PLUMB_BOB, RATIONAL_POLYNOMIAL, INVERSE_BROWN_CONRADY, 'none'])
-@pytest.mark.parametrize('coefficients', [(), (0, 0, 0, 0, 0)])
-def test_coefficients_of_zero_are_no_distortion(model, coefficients):
-    assert Camera(640, 480, 600, 600, 320, 240, model, coefficients) == Camera(640, 480, 600, 600, 320, 240)
-
-
 @pytest.mark.parametrize('model,given,kept', [
-    (PLUMB_BOB, (0.1, 0, 0, 0), (0.1, 0, 0, 0, 0)), (PLUMB_BOB, (0.1, 0, 0, 0, 0.2, 0, 0, 0), (0.1, 0, 0, 0, 0.2)),
-    (EQUIDISTANT, (0, 0, 0, 0, 0), (0, 0, 0, 0)), (EQUIDISTANT, (), ())])
-def test_lists_that_drivers_cut_or_fill_up_are_those_of_the_model(model, given, kept):
-    assert Camera(640, 480, 600, 600, 320, 240, model, given).distortion == kept
+    ('', (), ()), ('none', (0,) * 5, ()), (PLUMB_BOB, (), ()), (PLUMB_BOB, (0,) * 5, ()),
+    (RATIONAL_POLYNOMIAL, (0,) * 5, ()), (INVERSE_BROWN_CONRADY, (0,) * 5, ()), (EQUIDISTANT, (), ()),
+    (EQUIDISTANT, (0,) * 5, (0,) * 4), (PLUMB_BOB, (0.1, 0, 0, 0), (0.1, 0, 0, 0, 0)),
+    (PLUMB_BOB, (0.1, 0, 0, 0, 0.2, 0, 0, 0), (0.1, 0, 0, 0, 0.2))])
+def test_missing_and_appended_zeros_are_normalised(model, given, kept):
+    camera = Camera(640, 480, 600, 600, 320, 240, model, given)
+    assert camera.distortion == kept and camera.distortion_model == (model if kept else '')
 
 
 @pytest.mark.parametrize('model,coefficients,reason', [
@@ -175,21 +165,6 @@ def test_lists_that_drivers_cut_or_fill_up_are_those_of_the_model(model, given, 
     (EQUIDISTANT, (0.1,) * 5, '4 expected'), (INVERSE_BROWN_CONRADY, (0.1,) * 4, '5 expected'),
     (PLUMB_BOB, (float('nan'), 0, 0, 0, 0), 'finite'), (EQUIDISTANT, (0, 0, 0, float('inf')), 'finite'),
     (PLUMB_BOB, (1e9, 0, 0, 0, 0), 'below 1e')])
-def test_unusable_distortion_is_refused(model, coefficients, reason):
+def test_unusable_distortion_is_rejected(model, coefficients, reason):
     with pytest.raises(ValueError, match=reason):
         Camera(640, 480, 600, 600, 320, 240, model, coefficients)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('model', [PLUMB_BOB, RATIONAL_POLYNOMIAL, INVERSE_BROWN_CONRADY, EQUIDISTANT])
-def test_any_coefficients_give_numbers_or_nothing(model):
-    """No exception, no endless search: only nan where there is no ray."""
-    random = np.random.RandomState(4)
-    for _ in range(50):
-        coefficients = random.choice([-1e5, -1, -1e-9, 0, 1e-30, 1, 1e5], 8)
-        coefficients = coefficients[:{RATIONAL_POLYNOMIAL: 8, EQUIDISTANT: 4}.get(model, 5)]
-        camera = Camera(64, 48, 60, 60, 31.5, 23.5, model, coefficients)
-        pixels = every_pixel(camera, 5)
-        back = camera.project(camera.deproject(pixels, 1.0))
-        seen = ~np.isnan(back[:, 0])
-        np.testing.assert_allclose(back[seen], pixels[seen], rtol=0, atol=1e-6)

@@ -1,19 +1,25 @@
 """Image messages of every layout, and messages whose data do not match their fields."""
-import types
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.conversions.image_msgs import array_from, fill_image, imgmsg_to_depth, imgmsg_to_rgb
+from ros_3d_bb.conversions.image_msgs import LAYOUTS, array_from, fill_image, imgmsg_to_depth, imgmsg_to_rgb
+
+IMAGES = st.builds(SimpleNamespace, width=st.integers(0, 2 ** 32 - 1) | st.integers(0, 9),
+                   height=st.integers(0, 2 ** 32 - 1) | st.integers(0, 9),
+                   step=st.integers(0, 2 ** 32 - 1) | st.integers(0, 40),
+                   encoding=st.sampled_from(sorted(LAYOUTS)) | st.text(),
+                   is_bigendian=st.integers(0, 255), data=st.integers(0, 400).map(bytes))
 
 
 def message_of(pixels, encoding, padding=0, big_endian=False):
     """Duck-typed image message with padding bytes after each row."""
     pixels = pixels.astype(pixels.dtype.newbyteorder('>' if big_endian else '<'))
     rows = [row.tobytes() + b'\xee' * padding for row in pixels]
-    return types.SimpleNamespace(height=pixels.shape[0], width=pixels.shape[1], encoding=encoding,
-                                 is_bigendian=int(big_endian), step=len(rows[0]), data=b''.join(rows))
+    return SimpleNamespace(height=pixels.shape[0], width=pixels.shape[1], encoding=encoding,
+                           is_bigendian=int(big_endian), step=len(rows[0]), data=b''.join(rows))
 
 
 @given(st.integers(1, 9), st.integers(1, 9), st.integers(0, 5), st.booleans(),
@@ -24,10 +30,7 @@ def test_any_row_step_and_byte_order(height, width, padding, big_endian, layout)
     depth = imgmsg_to_depth(message_of(pixels, encoding, padding, big_endian))
     np.testing.assert_array_equal(depth.values, pixels)
     assert depth.scale_m == (1.0 if encoding == '32FC1' else 0.001)
-
-
-def test_depth_scale_can_be_given():
-    assert imgmsg_to_depth(message_of(np.ones((2, 2), np.uint16), '16UC1'), 0.00025).scale_m == 0.00025
+    assert imgmsg_to_depth(message_of(pixels, encoding), 0.00025).scale_m == 0.00025
 
 
 @pytest.mark.parametrize('encoding,channels', [('rgb8', [0, 1, 2]), ('bgr8', [2, 1, 0]), ('rgba8', [0, 1, 2]),
@@ -58,22 +61,34 @@ def test_invalid_images_are_rejected(change, named):
         array_from(message)
 
 
-def test_colour_is_rejected_as_depth_and_depth_as_colour():
-    with pytest.raises(ValueError, match="'rgb8'"):
-        imgmsg_to_depth(message_of(np.zeros((2, 2, 3), np.uint8), 'rgb8'))
-    with pytest.raises(ValueError, match="'16UC1'"):
-        imgmsg_to_rgb(message_of(np.zeros((2, 2), np.uint16), '16UC1'))
-
-
-@pytest.mark.parametrize('encoding,pixels', [('rgb8', np.arange(24, dtype=np.uint8).reshape(2, 4, 3)),
-                                             ('16UC1', np.arange(8, dtype=np.uint16).reshape(2, 4)),
-                                             ('mono8', np.arange(8, dtype=np.uint8).reshape(2, 4)),
-                                             ('rgb8', np.arange(24, dtype=np.uint8).reshape(2, 4, 3)[..., ::-1])])
-def test_fill_image_inverts_array_from(encoding, pixels):
-    message = fill_image(types.SimpleNamespace(), pixels, encoding)
-    np.testing.assert_array_equal(array_from(message), pixels)
+@pytest.mark.parametrize('read,encoding', [(imgmsg_to_depth, 'rgb8'), (imgmsg_to_rgb, '16UC1')])
+def test_colour_is_rejected_as_depth_and_depth_as_colour(read, encoding):
+    with pytest.raises(ValueError, match=repr(encoding)):
+        read(SimpleNamespace(encoding=encoding))
 
 
 def test_fill_image_rejects_pixels_of_the_wrong_type():
     with pytest.raises(ValueError, match='mono8'):
-        fill_image(types.SimpleNamespace(), np.zeros((2, 2), float), 'mono8')
+        fill_image(SimpleNamespace(), np.zeros((2, 2), float), 'mono8')
+
+
+@given(IMAGES)
+def test_an_image_is_readable_or_rejected(message):
+    for read in (array_from, imgmsg_to_rgb, lambda image: imgmsg_to_depth(image).values):
+        try:
+            pixels = read(message)
+        except ValueError:
+            continue
+        assert pixels.shape[:2] == (message.height, message.width)
+        pixels.sum()  # each of them can be read
+
+
+@given(st.sampled_from(sorted(LAYOUTS)), st.integers(1, 9), st.integers(1, 9), st.integers(0, 255))
+def test_pixels_survive_an_image_message_and_missing_bytes_are_rejected(encoding, height, width, value):
+    kind, channels = LAYOUTS[encoding]
+    pixels = np.full((width, height) + ((channels,) if channels > 1 else ()), value, kind).swapaxes(0, 1)
+    message = fill_image(SimpleNamespace(), pixels, encoding)
+    np.testing.assert_array_equal(array_from(message), pixels)
+    message.data = message.data[:-1]
+    with pytest.raises(ValueError, match='too short'):
+        array_from(message)

@@ -14,7 +14,7 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.nodes.common.alignment_check import DepthCameraCheck
+from ros_3d_bb.nodes.bbox3d_node import DepthCameraCheck
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver
 from ros_3d_bb.nodes.doctor import bag_findings, machine_findings, tracked_cameras
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images

@@ -13,8 +13,8 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.nodes.bbox3d_node import SampleImages
 from ros_3d_bb.nodes.common import master, subscribers
-from ros_3d_bb.nodes.common.debug_images import SampleImages
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
 from support.ros import wait_until
 
@@ -48,7 +48,7 @@ def test_a_master_that_hangs_is_queried_once_for_all_silent_inputs():
 def test_3d_boxes_do_not_wait_for_a_master_to_subscribe_colour():
     """rospy.Subscriber would wait for one, under the node's lock."""
     with mock.patch('rospy.Publisher') as publisher, mock.patch('rospy.Subscriber') as subscriber, \
-            mock.patch('ros_3d_bb.nodes.common.debug_images.patient_master', side_effect=OSError('no route')) as query:
+            mock.patch('ros_3d_bb.nodes.bbox3d_node.patient_master', side_effect=OSError('no route')) as query:
         publisher.return_value.get_num_connections.return_value = 1
         diagnostics, depth = mock.MagicMock(), DepthImage(np.zeros((4, 4), np.uint16), 0.001)
         images = SampleImages(10 ** 9, None, 6.0, diagnostics)

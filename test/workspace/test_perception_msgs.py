@@ -1,25 +1,24 @@
-"""Between messages and our types: nothing is lost, and what cannot be meant is refused."""
-import io
-
+"""Conversions between messages and types of this package: round trips, and rejected messages."""
 import numpy as np
 import pytest
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Point, Vector3
 from hypothesis import given, strategies as st
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
-from ros_3d_bb.camera.camera_model import Camera, transform_from
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, boxes3d_from_msg,
                                                    boxes3d_to_msg, camera_from_msg, detections_from_msg,
                                                    stamp_of, time_from, tracks_from_msg, tracks_to_msg,
-                                                   transform_from_msg, usable_boxes3d, with_stamp)
+                                                   usable_boxes3d, with_stamp)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject as Track
+from support.masterless import on_the_wire
 
 INT32 = st.integers(-2 ** 31, 2 ** 31 - 1)
 STAMP = st.integers(1, 2 ** 32 * NS - 1)
@@ -28,13 +27,6 @@ UNCUT = (False,) * 4
 
 def header(stamp_ns, frame_id='camera'):
     return Header(stamp=time_from(stamp_ns), frame_id=frame_id)
-
-
-def on_the_wire(message):
-    """The message as a subscriber gets it: what does not fit its fields fails here."""
-    buffer = io.BytesIO()
-    message.serialize(buffer)
-    return type(message)().deserialize(buffer.getvalue())
 
 
 @given(st.lists(st.tuples(INT32, INT32, INT32, INT32), max_size=20), STAMP, st.sampled_from(['camera', 'a/b_c', '']))
@@ -46,83 +38,49 @@ def test_2d_boxes_and_their_stamp_survive_to_the_nanosecond(boxes, stamp_ns, fra
     assert message.layout.dim[0].size == len(boxes) and message.layout.data_offset == 0
 
 
-@pytest.mark.parametrize('covariance_m2', [None, np.diag([0.01, 0.04, 0.09])])
-def test_the_covariance_of_a_3d_box_is_sent_and_zero_where_unknown(covariance_m2):
-    box = Box3D(np.array([1.0, 0, 3]), np.array([0.5, 1.7, 0.5]), (10, 10, 40, 40), 0.8, UNCUT,
-                covariance_m2)
-    sent, = on_the_wire(boxes3d_to_msg([box], header(1), Camera(64, 48, 60.0, 60.0, 31.5, 23.5))).boxes
-    expected = np.zeros(9) if covariance_m2 is None else np.ravel(covariance_m2)
-    assert list(sent.position_covariance) == expected.tolist()
+def test_labels_and_rounding_of_2d_boxes():
+    message = boxes2d_to_msg(np.array([[0.4, 1.6, 2.5, -0.6]]), header(12 * NS + 34, 'camera'))
+    assert message.layout.dim[0].label == 'boxes;stamp=12.000000034;frame=camera' and message.data == [0, 2, 2, -1]
 
 
-def test_the_label_is_as_documented():
-    label = boxes2d_to_msg(np.zeros((1, 4)), header(12 * NS + 34, 'camera')).layout.dim[0].label
-    assert label == 'boxes;stamp=12.000000034;frame=camera'
-
-
-def test_boxes_are_rounded_to_whole_pixels():
-    assert boxes2d_to_msg(np.array([[0.4, 1.6, 2.5, -0.6]]), header(1)).data == [0, 2, 2, -1]
-
-
-def test_plain_arrays_have_no_stamp():
-    plain = boxes2d_from_msg(Int32MultiArray(data=[1, 2, 3, 4]))
-    assert plain.stamp_ns is None and plain.boxes.tolist() == [[1, 2, 3, 4]]
-    labelled = Int32MultiArray(data=[1, 2, 3, 4])
-    labelled.layout.dim = [MultiArrayDimension(label='boxes')]
-    assert boxes2d_from_msg(labelled).stamp_ns is None
-
-
-@pytest.mark.parametrize('label', ['boxes;stamp=1.5', 'boxes;stamp=;frame=a', 'boxes;stamp=-1.000000000',
-                                   'boxes;stamp=x.000000000', 'boxes;stamp=1e3.000000000'])
-def test_damaged_stamps_are_refused(label):
+def labelled(label):
     message = Int32MultiArray(data=[1, 2, 3, 4])
     message.layout.dim = [MultiArrayDimension(label=label)]
-    with pytest.raises(ValueError, match='expected'):
-        boxes2d_from_msg(message)
+    return message
 
 
-@pytest.mark.parametrize('count,reason', [(3, 'multiple of 4'), (4004, '1001 2D boxes')])
-def test_arrays_of_the_wrong_length_are_refused(count, reason):
+@pytest.mark.parametrize('message', [Int32MultiArray(data=[1, 2, 3, 4]), labelled('boxes')])
+def test_2d_boxes_without_a_stamp(message):
+    boxes = boxes2d_from_msg(message)
+    assert boxes.stamp_ns is None and boxes.boxes.tolist() == [[1, 2, 3, 4]]
+
+
+@pytest.mark.parametrize('convert,message,reason', [
+    (boxes2d_from_msg, labelled('boxes;stamp=1.5'), 'expected'),
+    (boxes2d_from_msg, labelled('boxes;stamp=;frame=a'), 'expected'),
+    (boxes2d_from_msg, labelled('boxes;stamp=-1.000000000'), 'expected'),
+    (boxes2d_from_msg, labelled('boxes;stamp=1e3.000000000'), 'expected'),
+    (boxes2d_from_msg, Int32MultiArray(data=[1] * 3), 'multiple of 4'),
+    (boxes2d_from_msg, Int32MultiArray(data=[1] * 4004), '1001 2D boxes'),
+    (camera_from_msg, CameraInfo(width=640, height=480), 'it is empty'),
+    (camera_from_msg, CameraInfo(width=640, height=480, K=[0, 0, 320, 0, 610, 240, 0, 0, 1]), 'fx=0'),
+    (stamp_of, BoundingBox3DArray(header=Header(frame_id='a')), "BoundingBox3DArray of frame 'a' has no stamp"),
+    (stamp_of, BoundingBox3DArray(header=header(2 ** 31 * NS)), 'year 2038')])
+def test_messages_are_rejected(convert, message, reason):
     with pytest.raises(ValueError, match=reason):
-        boxes2d_from_msg(Int32MultiArray(data=[1] * count))
-
-
-def test_a_stamp_of_zero_is_refused():
-    with pytest.raises(ValueError, match="BoundingBox3DArray of frame 'camera' carries no stamp"):
-        stamp_of(BoundingBox3DArray(header=Header(frame_id='camera')))
-
-
-def test_camera_info():
-    info = CameraInfo(width=640, height=480, K=[600, 0, 320, 0, 610, 240, 0, 0, 1])
-    assert camera_from_msg(info) == Camera(640, 480, 600, 610, 320, 240)
-    with pytest.raises(ValueError, match='it is empty'):
-        camera_from_msg(CameraInfo(width=640, height=480))
-    with pytest.raises(ValueError, match='fx=0'):
-        camera_from_msg(CameraInfo(width=640, height=480, K=[0, 0, 320, 0, 610, 240, 0, 0, 1]))
+        convert(message)
 
 
 @pytest.mark.parametrize('lens', [('', ()), ('plumb_bob', (0.1, -0.2, 0.001, 0.002, 0.3)),
                                   ('rational_polynomial', (8.5, 5.2, 1e-4, -5e-5, 0.21, 8.9, 8.0, 1.35)),
                                   ('equidistant', (0.0, 0.0, 0.0, 0.0))])
-def test_camera_info_carries_the_lens_distortion_there_and_back(lens):
+def test_camera_info_has_the_lens_distortion(lens):
     camera = Camera(640, 480, 600, 610, 320, 240, *lens)
     frame = CameraFrame(header(5), camera, np.zeros((480, 640, 3), np.uint8),
                         DepthImage(np.zeros((480, 640), np.uint16), 0.001), [])
     infos = [on_the_wire(message) for _topic, message in messages_of(frame) if isinstance(message, CameraInfo)]
     assert [camera_from_msg(info) for info in infos] == [camera, camera]
     assert infos[0].distortion_model == (lens[0] or 'plumb_bob') and len(infos[0].D) == (len(lens[1]) or 5)
-
-
-def test_camera_info_of_an_unknown_lens_is_refused():
-    info = CameraInfo(width=640, height=480, K=[600, 0, 320, 0, 610, 240, 0, 0, 1], distortion_model='ftheta', D=[0.9])
-    with pytest.raises(ValueError, match="distortion model is 'ftheta'; one of equidistant"):
-        camera_from_msg(info)
-
-
-def test_tf_lookup():
-    message = TransformStamped()
-    message.transform.translation.x, message.transform.rotation.w = 3.0, 1.0
-    np.testing.assert_allclose(transform_from_msg(message), transform_from((3, 0, 0), (0, 0, 0, 1)))
 
 
 def test_3d_boxes_fill_every_field():
@@ -137,6 +95,26 @@ def test_3d_boxes_fill_every_field():
     roi = box.roi
     assert (roi.x_offset, roi.y_offset, roi.width, roi.height, roi.do_rectify) == (0, 20, 640, 280, False)
     assert box.support == 0.75 and box.truncated and box.truncated_edges == box.LEFT + box.RIGHT
+    assert box.position_covariance == (0.0,) * 9  # unknown
+
+
+def box_of(width_m=0.5, height_m=1.7, x_m=0.0, y_m=0.0, edge='', covariance_m2=np.zeros((3, 3))):
+    box = BoundingBox3D(position_covariance=np.ravel(covariance_m2).tolist(), truncated=bool(edge),
+                        truncated_edges=getattr(BoundingBox3D, edge) if edge else 0)
+    box.center.position = Point(x_m, y_m, 3.0)
+    box.size = Vector3(width_m, height_m, width_m)
+    return box
+
+
+def detection_of(box, roll_deg=0, pitch_deg=0, yaw_deg=0):
+    """The detection of a camera 1 m above the map that points along x, rolled clockwise as seen by the camera."""
+    map_from_camera = transform_from((0, 0, 1), (0, 0, 0, 1))
+    for axis, angle in ((2, np.radians(yaw_deg)), (1, np.radians(pitch_deg)), (0, np.radians(roll_deg))):
+        quaternion = np.eye(4)[axis] * np.sin(angle / 2) + np.eye(4)[3] * np.cos(angle / 2)
+        map_from_camera = map_from_camera.dot(transform_from((0, 0, 0), quaternion))
+    map_from_camera = map_from_camera.dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
+    detection, = detections_from_msg(BoundingBox3DArray(boxes=[box]), map_from_camera)
+    return detection
 
 
 @pytest.mark.parametrize('covariance_m2', [None, np.diag([0.01, 0.04, 0.09])])
@@ -150,44 +128,12 @@ def test_3d_boxes_survive(covariance_m2):
     assert back.rect_px == other.rect_px == sent.rect_px
 
 
-def test_detections_are_upright_in_the_fixed_frame():
-    """Camera 1 m above the map, looking along x: width and depth of the cylinder are level, its height is z."""
-    map_from_camera = transform_from((0, 0, 1), (-0.5, 0.5, -0.5, 0.5))
-    box = BoundingBox3D()
-    box.center.position.x, box.center.position.y, box.center.position.z = 0.5, 0.1, 3.0
-    box.size.x, box.size.y, box.size.z = 0.6, 1.8, 0.6
-    detection, = detections_from_msg(BoundingBox3DArray(boxes=[box]), map_from_camera)
-    np.testing.assert_allclose(detection.position_m, (3, -0.5, 0.9))
-    np.testing.assert_allclose(detection.size_m, (0.6, 0.6, 1.8))
-
-
-@pytest.mark.parametrize('roll,size,edges', [
-    (0, (0.5, 1.75), 'top'), (90, (1.75, 0.5), 'left'), (180, (0.5, 1.75), 'bottom'), (-90, (1.75, 0.5), 'right'),
-    (20, (0.5, 1.75), 'top'), (70, (1.75, 0.5), 'left'), (-160, (0.5, 1.75), 'bottom')])
-def test_people_stand_upright_however_the_camera_is_mounted(roll, size, edges):
-    """The optical axis is x of the map; roll is about it, clockwise as seen by the camera. The head is cut off."""
-    turn = transform_from((0, 0, 0), (np.sin(np.radians(roll) / 2), 0, 0, np.cos(np.radians(roll) / 2)))
-    box = BoundingBox3D(truncated=True, truncated_edges=getattr(BoundingBox3D, edges.upper()))
-    box.center.position.z, box.size.x, box.size.y, box.size.z = (3.0,) + size + (size[0],)
-    detection, = detections_from_msg(BoundingBox3DArray(boxes=[box]),
-                                     turn.dot(transform_from((0, 0, 0), (-0.5, 0.5, -0.5, 0.5))))
-    np.testing.assert_allclose(detection.size_m, (0.5, 0.5, 1.75))
-    assert detection.truncated_edges == (False, True, False, False)
-
-
-def box_of(width_m=0.5, height_m=1.7, x_m=0.0, covariance_m2=np.zeros((3, 3))):
-    box = BoundingBox3D(position_covariance=np.ravel(covariance_m2).tolist())
-    box.center.position.x, box.center.position.z = x_m, 3.0
-    box.size.x, box.size.y, box.size.z = width_m, height_m, width_m
-    return box
-
-
 @pytest.mark.parametrize('wrong', [
     {'x_m': float('nan')}, {'x_m': float('inf')}, {'x_m': 1e300}, {'width_m': 0.0}, {'width_m': -1.0},
     {'width_m': float('nan')}, {'width_m': 10.0}, {'width_m': 1e6}, {'height_m': 10.93},
     {'covariance_m2': -np.eye(3)}, {'covariance_m2': np.full((3, 3), np.nan)},
     {'covariance_m2': 1e308 * np.eye(3)}, {'covariance_m2': [[1, 5, 0], [5, 1, 0], [0, 0, 1]]}])
-def test_a_3d_box_that_cannot_be_used_takes_no_other_with_it(wrong):
+def test_an_unusable_3d_box_does_not_affect_the_others(wrong):
     good, other = box_of(x_m=-1.0), box_of(x_m=2.0, width_m=9.99, covariance_m2=np.eye(3))
     message = BoundingBox3DArray(header=header(7), boxes=[good, box_of(**wrong), other])
     usable, faults = usable_boxes3d(message)
@@ -199,7 +145,7 @@ def test_a_3d_box_that_cannot_be_used_takes_no_other_with_it(wrong):
 
 
 @given(st.integers(0, 2 ** 32 - 1), st.floats(-6, 7.9), st.integers(1, 3))
-def test_a_covariance_of_any_size_and_rank_is_usable_and_one_with_a_negative_variance_is_not(seed, power, rank):
+def test_covariances_are_usable_unless_a_variance_is_negative(seed, power, rank):
     factor = np.random.RandomState(seed).normal(size=(3, rank))
     covariance_m2 = factor.dot(factor.T) * 10 ** power / np.abs(factor.dot(factor.T)).max()
     boxes = [box_of(covariance_m2=covariance_m2), box_of(covariance_m2=covariance_m2 - 3.1 * 10 ** power * np.eye(3))]
@@ -208,13 +154,39 @@ def test_a_covariance_of_any_size_and_rank_is_usable_and_one_with_a_negative_var
     assert len(faults) == 1
 
 
-def test_the_covariance_of_a_detection_is_turned_into_the_fixed_frame():
-    """Camera looking along x of the map: its z, the range, is the map's x."""
-    box = BoundingBox3D(position_covariance=np.diag([0.01, 0.04, 0.09]).ravel(), truncated=True)
-    box.size.x = box.size.y = 1.0
-    detection, = detections_from_msg(BoundingBox3DArray(boxes=[box]), transform_from((0, 0, 1), (-.5, .5, -.5, .5)))
+def test_detections_are_upright_in_the_fixed_frame():
+    """Width and depth of the cylinder are horizontal, its height is z; covariances are rotated."""
+    detection = detection_of(box_of(0.6, 1.8, 0.5, 0.1, covariance_m2=np.diag([0.01, 0.04, 0.09])))
+    np.testing.assert_allclose(detection.position_m, (3, -0.5, 0.9))
+    np.testing.assert_allclose(detection.size_m, (0.6, 0.6, 1.8))
     np.testing.assert_allclose(detection.covariance_m2, np.diag([0.09, 0.01, 0.04]), atol=1e-12)
-    assert detection.truncated_edges == (True,) * 4  # the message does not say which
+    unknown = BoundingBox3D(truncated=True)  # no edge is trusted if the truncated edges are unknown
+    assert detection_of(unknown).truncated_edges == (True,) * 4
+
+
+@pytest.mark.parametrize('roll_deg,size_m,edge', [
+    (0, (0.5, 1.75), 'TOP'), (90, (1.75, 0.5), 'LEFT'), (180, (0.5, 1.75), 'BOTTOM'), (-90, (1.75, 0.5), 'RIGHT'),
+    (20, (0.5, 1.75), 'TOP'), (70, (1.75, 0.5), 'LEFT'), (-160, (0.5, 1.75), 'BOTTOM')])
+def test_people_are_upright_for_any_mount_of_the_camera(roll_deg, size_m, edge):
+    """The head is truncated."""
+    detection = detection_of(box_of(*size_m, edge=edge), roll_deg)
+    np.testing.assert_allclose(detection.size_m, (0.5, 0.5, 1.75))
+    assert detection.truncated_edges == (False, True, False, False)
+
+
+@pytest.mark.parametrize('edge,y_m', [('BOTTOM', 0.35), ('TOP', -0.35)])
+def test_a_truncated_person_in_portrait_has_the_usual_width(edge, y_m):
+    """The estimator has extended the box beyond the border to 1.7 m, from y = -+0.5 m on."""
+    detection = detection_of(box_of(1.7, 1.7, y_m=y_m, edge=edge), 90)  # the left edge of the image is up
+    np.testing.assert_allclose(detection.size_m, (0.46, 0.46, 1.7))
+    np.testing.assert_allclose(abs(detection.position_m[1]), 0.27)
+
+
+def test_a_camera_that_points_straight_down_keeps_one_orientation_in_spite_of_noise():
+    random = np.random.RandomState(0)
+    for _ in range(100):
+        roll_deg, pitch_deg, yaw_deg = (0, 90, 0) + random.normal(0, 0.5, 3)
+        np.testing.assert_allclose(detection_of(box_of(), roll_deg, pitch_deg, yaw_deg).size_m, (0.5, 0.5, 1.7))
 
 
 def test_the_covariance_of_tracks_and_predictions_survives():
@@ -231,11 +203,8 @@ def test_the_covariance_of_tracks_and_predictions_survives():
 
 def test_tracks_fill_every_field():
     tracker = ThesisTracker()
-    box = BoundingBox3D()
-    box.size.x, box.size.y = 0.5, 1.7
     for frame in range(5):
-        box.center.position.x = 0.1 * frame
-        detections = detections_from_msg(BoundingBox3DArray(boxes=[box]), np.eye(4))
+        detections = detections_from_msg(BoundingBox3DArray(boxes=[box_of(x_m=0.1 * frame)]), np.eye(4))
         tracks = tracker.update(NS + frame * NS // 10, detections)
     message = on_the_wire(tracks_to_msg(tracks, header(NS, 'map')))
     assert isinstance(message, TrackedObjectArray) and message.header.frame_id == 'map'
@@ -254,7 +223,7 @@ def test_states_have_the_numbers_of_the_message():
     assert numbers == (VISIBLE, OCCLUDED, OUT_OF_VIEW)
 
 
-def test_another_stamp_leaves_the_rest_of_a_message():
+def test_with_stamp_changes_only_the_stamp():
     stamp = time_from(7 * NS + 5)
     boxes = boxes2d_from_msg(with_stamp(boxes2d_to_msg(np.array([[1, 2, 3, 4]]), header(1, 'camera')), stamp))
     assert (boxes.boxes.tolist(), boxes.stamp_ns, boxes.frame_id) == ([[1, 2, 3, 4]], 7 * NS + 5, 'camera')
@@ -266,28 +235,3 @@ def test_another_stamp_leaves_the_rest_of_a_message():
         parts = with_stamp(message, stamp).transforms if topic == 'tf' else [with_stamp(message, stamp)]
         assert [part.header.stamp for part in parts] == [stamp] * len(parts)
         assert parts[-1].header.frame_id == ('odom' if topic == 'tf' else 'camera')
-
-
-@pytest.mark.parametrize('edge,center_y', [('BOTTOM', 0.35), ('TOP', -0.35)])
-def test_a_person_whom_the_border_cuts_in_portrait_is_as_wide_as_a_person(edge, center_y):
-    """The estimator has extended the box beyond the border to 1.7 m, from y = -+0.5 m on."""
-    box = BoundingBox3D(truncated=True, truncated_edges=getattr(BoundingBox3D, edge))
-    box.center.position.y, box.center.position.z, box.size.x, box.size.y = center_y, 3.0, 1.7, 1.7
-    turn = transform_from((0, 0, 0), (np.sqrt(0.5), 0, 0, np.sqrt(0.5)))  # the left edge of the image is up
-    detection, = detections_from_msg(BoundingBox3DArray(boxes=[box]),
-                                     turn.dot(transform_from((0, 0, 0), (-0.5, 0.5, -0.5, 0.5))))
-    np.testing.assert_allclose(detection.size_m, (0.46, 0.46, 1.7))
-    np.testing.assert_allclose(abs(detection.position_m[1]), 0.27)
-
-
-def test_a_camera_that_looks_straight_down_keeps_one_orientation_in_spite_of_noise():
-    random, box = np.random.RandomState(0), box_of()
-    for _ in range(100):
-        roll, pitch, yaw = np.radians((0, 90, 0) + random.normal(0, 0.5, 3))
-        down = np.eye(4)
-        for axis, angle in ((2, yaw), (1, pitch), (0, roll)):
-            quaternion = np.eye(4)[axis] * np.sin(angle / 2) + np.eye(4)[3] * np.cos(angle / 2)
-            down = down.dot(transform_from((0, 0, 0), quaternion))
-        detection, = detections_from_msg(BoundingBox3DArray(boxes=[box]),
-                                         down.dot(transform_from((0, 0, 0), (-0.5, 0.5, -0.5, 0.5))))
-        np.testing.assert_allclose(detection.size_m, (0.5, 0.5, 1.7))

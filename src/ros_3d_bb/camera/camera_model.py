@@ -41,36 +41,18 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
         return camera
 
     def deproject(self, pixels, depth_m):
-        """Deproject pixels to points in the optical frame (thesis 3.4.1). Inverse of `project`.
+        """Deproject pixels (..., 2) with depths (...), metres, to points (..., 3) in the optical frame (thesis 3.4.1).
 
-        Parameters
-        ----------
-        pixels : array_like, (..., 2)
-            (u, v); need not be integers.
-        depth_m : array_like, (...)
-            Distance along z, metres.
-
-        Returns
-        -------
-        numpy.ndarray, (..., 3)
-            Metres; x and y are nan for pixels without a ray under the distortion model.
+        x and y are nan for pixels without a ray under the distortion model. Inverse of `project`.
         """
         pixels, depth_m = np.asarray(pixels, float), np.asarray(depth_m, float)
         x, y = (along * depth_m for along in self.rays(pixels[..., 0], pixels[..., 1]))
         return np.stack((x, y, np.broadcast_to(depth_m, x.shape)), axis=-1)
 
     def rays(self, u, v):
-        """Viewing rays x / z and y / z of the pixels in columns u and rows v.
+        """Viewing rays x / z and y / z of the pixels in columns u and rows v; nan for pixels without a ray.
 
-        Parameters
-        ----------
-        u, v : numpy.ndarray
-            Arrays that broadcast to one shape: (1, w) and (h, 1), for example, give a grid.
-
-        Returns
-        -------
-        x, y : numpy.ndarray
-            Arrays that broadcast to the same shape; nan for pixels without a ray under the distortion model.
+        u and v are arrays that broadcast to one shape: (1, w) and (h, 1), for example, give a grid. So are x and y.
         """
         x, y = (u - self.cx) / self.fx, (v - self.cy) / self.fy
         if not self.distortion_model:
@@ -79,17 +61,9 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
         return tuple(np.moveaxis(undistort(self.distortion_model, self.distortion, pixels), -1, 0))
 
     def project(self, points):
-        """Project points in the optical frame to pixels. Inverse of `deproject`.
+        """Project points (..., 3) in the optical frame, z > 0, to pixels (..., 2). Inverse of `deproject`.
 
-        Parameters
-        ----------
-        points : array_like, (..., 3)
-            Metres, z > 0.
-
-        Returns
-        -------
-        numpy.ndarray, (..., 2)
-            (u, v), may be outside the image; nan for rays without a pixel under the distortion model.
+        Pixels may be outside the image; they are nan for rays without a pixel under the distortion model.
         """
         points = np.asarray(points, float)
         x, y = points[..., 0] / points[..., 2], points[..., 1] / points[..., 2]
@@ -98,24 +72,16 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
         return np.stack((x * self.fx + self.cx, y * self.fy + self.cy), axis=-1)
 
     def undistort(self, pixels):
-        """Undistort pixels (..., 2): their positions in a camera without distortion and the same fx, fy, cx and cy.
-
-        nan for pixels without a ray under the distortion model.
-        """
+        """Positions of pixels (..., 2) without distortion, with the same fx, fy, cx and cy; nan without a ray."""
         if not self.distortion_model:
             return pixels
         return self.deproject(pixels, 1.0)[..., :2] * (self.fx, self.fy) + (self.cx, self.cy)
 
 
 def transform_from(translation, quaternion):
-    """Create a 4x4 matrix from a translation (x, y, z) in metres and a quaternion (x, y, z, w).
+    """Create a 4x4 matrix from a translation (x, y, z) in metres and a quaternion (x, y, z, w), which is normalised.
 
-    The quaternion is normalised.
-
-    Raises
-    ------
-    ValueError
-        If the quaternion cannot be normalised (zero, nan or inf).
+    Raises ValueError if the quaternion cannot be normalised (zero, nan or inf).
     """
     quaternion = np.asarray(quaternion, float)
     norm = np.linalg.norm(quaternion)
@@ -146,19 +112,11 @@ def quaternion_from(matrix):
 
 
 def upright_turns(fixed_from_camera):
-    """Number of clockwise quarter turns after which the image is upright, to the nearest quarter turn.
+    """Number of clockwise quarter turns after which the image is upright; `fixed_from_camera` (4, 4): fixed has z up.
 
-    Parameters
-    ----------
-    fixed_from_camera : numpy.ndarray, (4, 4)
-        From an optical frame to a frame with z up.
-
-    Returns
-    -------
-    int
-        0 for an upright camera, 1 if the left edge of the image is up, 2 if the camera is upside down, 3 if the right
-        edge is up. Also 0 for a camera that points up or down within `STEEP`, where people have no upright direction
-        in the image.
+    0 for an upright camera, 1 if the left edge of the image is up, 2 if the camera is upside down, 3 if the right edge
+    is up. Also 0 for a camera that points up or down within `STEEP`, where people have no upright direction in the
+    image.
     """
     x_up, y_up = fixed_from_camera[2, :2]
     if np.hypot(x_up, y_up) < STEEP:

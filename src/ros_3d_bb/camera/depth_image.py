@@ -16,19 +16,6 @@ class DepthImage(NamedTuple):
     scale_m: float
 
     def at(self, u, v):
-        """Depth at pixels.
-
-        Parameters
-        ----------
-        u, v : numpy.ndarray of int or slice
-            Columns and rows; slices select a grid.
-
-        Returns
-        -------
-        depth_m : numpy.ndarray
-            Metres.
-        valid : numpy.ndarray of bool
-            Whether depth was measured, with the shape of depth_m.
-        """
+        """Return the depth, metres, at the pixels in columns u and rows v (arrays of int), and whether it is valid."""
         depth_m = self.values[v, u].astype(float) * self.scale_m
         return depth_m, (depth_m > 0) & (depth_m <= FARTHEST_M)

@@ -1,17 +1,16 @@
 """Lens distortion and its inverse, for the models of sensor_msgs/CameraInfo.
 
 Convention: rays and their images are (..., 2) and dimensionless. A ray is (x/z, y/z) of a point in the optical frame;
-its image is ((u - cx)/fx, (v - cy)/fy) of the pixel onto which it is projected. `distort_*` functions map rays to
-images, `undistort_*` functions map images to rays.
+its image is ((u - cx)/fx, (v - cy)/fy) of the pixel onto which it is projected.
 
 A distortion polynomial increases up to some distance from the axis and then folds back. Real lenses do not, so the
 model is not calibrated beyond that distance: rays there have no image, and images that only such rays would have, have
 no ray. Both are nan. OpenCV inverts the models. Its fixed-point iteration diverges for images whose distance from the
 axis grows more than twice as fast as in proportion to that of their rays; they have no ray either. Inside the image,
-no real lens stretches that much.
+no real lens stretches that much. OpenCV is imported only where it is used: it takes 100 MB, which nodes save whose
+camera has no distortion.
 """
 import functools
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -27,31 +26,24 @@ FOUND = 1e-9  # largest error of a solution: 1e-6 pixels
 ON_AXIS = 1e-8  # `cv2.fisheye` treats smaller values as 0
 UNIT = np.eye(3)  # camera matrix of dimensionless images
 
+# Model: minimum and maximum number of coefficients, and their order.
+MODELS = {PLUMB_BOB: (4, 5, 'k1, k2, p1, p2, k3'), RATIONAL_POLYNOMIAL: (8, 8, 'k1, k2, p1, p2, k3, k4, k5, k6'),
+          INVERSE_BROWN_CONRADY: (5, 5, 'k1, k2, p1, p2, k3'), EQUIDISTANT: (4, 4, 'k1, k2, k3, k4')}
+
 
 def checked_distortion(model, coefficients):
-    """Validate and normalise a distortion for `camera_model.Camera`.
+    """Validate a distortion for `camera_model.Camera`. Returns the model and all of its coefficients.
 
-    Coefficients that are all zero mean no distortion, except for the equidistant model, which is a fisheye even then.
-    Zeros beyond the coefficients of the model, which some drivers append, are removed.
-
-    Returns
-    -------
-    model : str
-        Empty if there is no distortion.
-    coefficients : tuple of float
-        All coefficients of the model; empty if there is no distortion.
-
-    Raises
-    ------
-    ValueError
-        If the model is not one of `MODELS`, or its coefficients are too few, too many, or not below `LARGEST`.
+    Coefficients that are all zero mean no distortion, '' and (), except for the equidistant model, which is a fisheye
+    even then. Zeros beyond the coefficients of the model, which some drivers append, are removed. Raises ValueError if
+    the model is not one of `MODELS`, or its coefficients are too few, too many, or not below `LARGEST`.
     """
     coefficients = tuple(float(coefficient) for coefficient in coefficients)
     if not any(coefficients) and not (model == EQUIDISTANT and coefficients):
         return '', ()
     if model not in MODELS:
         raise ValueError('distortion model is %r; one of %s expected' % (model, ', '.join(sorted(MODELS))))
-    fewest, most, order, _distort, _undistort = MODELS[model]
+    fewest, most, order = MODELS[model]
     if len(coefficients) < fewest or any(coefficients[most:]):
         raise ValueError('distortion %s has %d coefficients %s; %d expected (%s)'
                          % (model, len(coefficients), coefficients, most, order))
@@ -62,13 +54,24 @@ def checked_distortion(model, coefficients):
 
 
 def distort(model, coefficients, rays):
-    """Distort rays (..., 2) to images (..., 2), nan for rays without an image. Inverse of `undistort`."""
+    """Distort rays (..., 2) to images (..., 2), nan for rays without an image. Inverse of `undistort`.
+
+    The equidistant model is the fisheye of Kannala-Brandt, a polynomial in the angle to the axis. The others are
+    computed in closed form, because `cv2.projectPoints` also computes 24 derivatives of each point.
+    Sources: OpenCV, calib3d, "Camera Calibration and 3D Reconstruction" and "Fisheye camera model"; REP 104;
+    sensor_msgs/distortion_models.h.
+    """
     rays = np.asarray(rays, float)
     if not rays.size:
         return rays  # OpenCV rejects empty arrays
     radius = np.hypot(rays[..., 0], rays[..., 1])
     with np.errstate(all='ignore'):  # rays without an image may overflow
-        images = MODELS[model].distort(rays, coefficients)
+        if model == EQUIDISTANT:
+            import cv2
+            images = cv2.fisheye.distortPoints(rays.reshape(-1, 1, 2), UNIT, np.array(coefficients))
+            images = images.reshape(rays.shape)
+        else:
+            images = _distort_brown(rays, coefficients, model == INVERSE_BROWN_CONRADY)
     return np.where((radius <= _widest(model, coefficients))[..., np.newaxis], images, np.nan)
 
 
@@ -78,12 +81,12 @@ def undistort(model, coefficients, images):
     OpenCV's solution is corrected until `distort` maps it to the images. One step suffices if OpenCV is exact; more are
     needed if its lens model differs slightly, and before OpenCV 3.3.1, which stops after five iterations.
     """
-    steps = STEPS if hasattr(_opencv(), 'undistortPointsIter') else STEPS_BEFORE_3_3_1
     targets = images = np.asarray(images, float)
     if not images.size:
         return images  # OpenCV rejects empty arrays
-    for _step in range(steps):
-        rays = MODELS[model].undistort(targets.reshape(-1, 1, 2), coefficients).reshape(images.shape)
+    import cv2
+    for _step in range(STEPS if hasattr(cv2, 'undistortPointsIter') else STEPS_BEFORE_3_3_1):
+        rays = _solved_by_opencv(model, np.array(coefficients), targets.reshape(-1, 1, 2)).reshape(images.shape)
         errors = images - distort(model, coefficients, rays)
         if not np.any(np.abs(errors) > EXACT):
             break
@@ -91,84 +94,34 @@ def undistort(model, coefficients, images):
     return np.where(np.abs(errors).max(axis=-1, keepdims=True) <= FOUND, rays, np.nan)
 
 
-def distort_brown(rays, coefficients):
-    """Distort rays with plumb_bob (k1, k2, p1, p2, k3) or rational_polynomial (k1, k2, p1, p2, k3, k4, k5, k6).
+def _distort_brown(rays, coefficients, is_inverse):
+    """Distort rays by the radial and tangential polynomials of plumb_bob or rational_polynomial.
 
-    Computed in closed form, because `cv2.projectPoints` also computes 24 derivatives of each point.
-    Source: OpenCV, calib3d, "Camera Calibration and 3D Reconstruction"; REP 104.
-    """
-    r2, bent = _bent(rays, coefficients)
-    return bent + _tangential(rays, r2, coefficients)
-
-
-def undistort_brown(images, coefficients):
-    """Undistort images (n, 1, 2) to rays (n, 1, 2). Inverse of `distort_brown`."""
-    cv2 = _opencv()
-    if not hasattr(cv2, 'undistortPointsIter'):  # OpenCV before 3.3.1, as in Ubuntu 18.04
-        return cv2.undistortPoints(images, UNIT, np.array(coefficients))
-    until = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-11)
-    return cv2.undistortPointsIter(images, UNIT, np.array(coefficients), None, None, until)
-
-
-def distort_inverse_brown_conrady(rays, coefficients):
-    """Distort rays with the inverse Brown-Conrady model of librealsense, (k1, k2, p1, p2, k3).
-
-    The model equals plumb_bob, except that the tangential part is computed from the radially distorted ray. In spite of
-    its name it maps rays to images: librealsense uses it to align depth to colour, and its inverse therefore returns
-    the measured points.
+    The inverse Brown-Conrady model of librealsense equals plumb_bob, except that the tangential part is computed from
+    the radially distorted ray. In spite of its name it maps rays to images: librealsense uses it to align depth to
+    colour, and its inverse therefore returns the measured points.
     Source: librealsense, include/librealsense2/rsutil.h (2.43 and later), rs2_project_point_to_pixel.
     """
-    r2, bent = _bent(rays, coefficients)
-    return bent + _tangential(bent, r2, coefficients)
-
-
-def distort_equidistant(rays, coefficients):
-    """Distort rays with the fisheye model of Kannala-Brandt, (k1, k2, k3, k4): a polynomial in the angle to the axis.
-
-    Source: OpenCV, calib3d, "Fisheye camera model"; sensor_msgs/distortion_models.h.
-    """
-    return _opencv().fisheye.distortPoints(rays.reshape(-1, 1, 2), UNIT, np.array(coefficients)).reshape(rays.shape)
-
-
-def undistort_equidistant(images, coefficients):
-    """Undistort images (n, 1, 2) to rays (n, 1, 2). Inverse of `distort_equidistant`.
-
-    OpenCV returns 0 near the axis, which is corrected here, and wrong rays for images farther than pi/2 from the axis,
-    which `undistort` rejects.
-    """
-    next_to_axis = np.abs(images).max(axis=-1, keepdims=True) <= ON_AXIS
-    return np.where(next_to_axis, images, _opencv().fisheye.undistortPoints(images, UNIT, np.array(coefficients)))
-
-
-class Model(NamedTuple):
-    """A distortion model: minimum and maximum number of coefficients, their order, and its pair of functions."""
-
-    fewest: int
-    most: int
-    order: str
-    distort: Any
-    undistort: Any
-
-
-MODELS = {
-    PLUMB_BOB: Model(4, 5, 'k1, k2, p1, p2, k3', distort_brown, undistort_brown),
-    RATIONAL_POLYNOMIAL: Model(8, 8, 'k1, k2, p1, p2, k3, k4, k5, k6', distort_brown, undistort_brown),
-    INVERSE_BROWN_CONRADY: Model(5, 5, 'k1, k2, p1, p2, k3', distort_inverse_brown_conrady, undistort_brown),
-    EQUIDISTANT: Model(4, 4, 'k1, k2, k3, k4', distort_equidistant, undistort_equidistant)}
-
-
-def _bent(rays, coefficients):
-    """Squared distance of rays from the axis, and the rays with radial distortion only."""
     (n1, n2, n3), (d1, d2, d3) = _radial(coefficients)
+    p1, p2 = coefficients[2:4]
     r2 = rays[..., 0] ** 2 + rays[..., 1] ** 2
     factor = (1 + r2 * (n1 + r2 * (n2 + r2 * n3))) / (1 + r2 * (d1 + r2 * (d2 + r2 * d3)))
-    return r2, rays * factor[..., np.newaxis]
+    bent = rays * factor[..., np.newaxis]
+    x, y = np.moveaxis(bent if is_inverse else rays, -1, 0)
+    return bent + np.stack((2 * p1 * x * y + p2 * (r2 + 2 * x * x), 2 * p2 * x * y + p1 * (r2 + 2 * y * y)), axis=-1)
 
 
-def _tangential(rays, r2, coefficients):
-    p1, p2 = coefficients[2:4]
-    x, y = rays[..., 0], rays[..., 1]
-    return np.stack((2 * p1 * x * y + p2 * (r2 + 2 * x * x), 2 * p2 * x * y + p1 * (r2 + 2 * y * y)), axis=-1)
+def _solved_by_opencv(model, coefficients, images):
+    """Undistort images (n, 1, 2) to rays (n, 1, 2)."""
+    import cv2
+    if model == EQUIDISTANT:
+        # OpenCV returns 0 next to the axis, and wrong rays for images farther than pi/2, which `undistort` rejects.
+        next_to_axis = np.abs(images).max(axis=-1, keepdims=True) <= ON_AXIS
+        return np.where(next_to_axis, images, cv2.fisheye.undistortPoints(images, UNIT, coefficients))
+    if not hasattr(cv2, 'undistortPointsIter'):  # OpenCV before 3.3.1, as in Ubuntu 18.04
+        return cv2.undistortPoints(images, UNIT, coefficients)
+    until = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-11)
+    return cv2.undistortPointsIter(images, UNIT, coefficients, None, None, until)
 
 
 def _radial(coefficients):
@@ -192,9 +145,3 @@ def _turning_point(numerator, denominator, limit):
     roots = np.concatenate([polynomial.trim(1e-12).roots() for polynomial in (slope, d)])
     real = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0)]
     return min([limit] + (np.sqrt(real) * (1 - 1e-6)).tolist())  # short of the pole
-
-
-def _opencv():
-    """The module cv2. It takes 100 MB, which nodes save whose camera has no distortion."""
-    import cv2
-    return cv2

@@ -2,7 +2,7 @@
 from typing import Any, NamedTuple, Sequence
 
 import numpy as np
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
@@ -39,7 +39,7 @@ class CameraFrame(NamedTuple):
 def topic_of(camera, topic):
     """Return the name of a topic for a camera, given by its namespace; '' for a single camera.
 
-    Images are on the topics of a driver with that camera name (front/color/image_raw). Results are in the same
+    Images are on the topics of a driver with that camera name (front/color/image_raw), results are in the same
     namespace (front/ros_3d_bb/bb_3d).
     """
     if not camera:
@@ -56,22 +56,25 @@ def messages_of(frame):
 
 def image_messages_of(frame):
     """Yield (topic, message) of one CameraFrame without its transforms."""
+    header, depth = frame.header, frame.depth
     for topic in INFO_TOPICS:
-        yield topic, _camera_info(frame.camera, frame.header)
-    yield DEPTH_TOPIC, _depth_image(frame.depth, frame.header)
-    yield COLOR_TOPIC, fill_image(Image(header=frame.header), frame.color, 'rgb8')
+        yield topic, _camera_info(frame.camera, header)
+    if depth.scale_m == 0.001:  # REP 118: 16UC1 is in millimetres, 32FC1 in metres
+        yield DEPTH_TOPIC, fill_image(Image(header=header), depth.values, '16UC1')
+    else:
+        yield DEPTH_TOPIC, fill_image(Image(header=header), (depth.values * depth.scale_m).astype(np.float32), '32FC1')
+    yield COLOR_TOPIC, fill_image(Image(header=header), frame.color, 'rgb8')
 
 
 def transform_messages(stamp, links):
     """Convert (parent, child, parent_from_child (4, 4)) links to a list of TransformStamped."""
-    return [_transform(stamp, *link) for link in links]
-
-
-def _depth_image(depth, header):
-    """Convert a DepthImage to 16UC1 if its unit is millimetres, otherwise to metres in 32FC1 (REP 118)."""
-    if depth.scale_m == 0.001:
-        return fill_image(Image(header=header), depth.values, '16UC1')
-    return fill_image(Image(header=header), (depth.values * depth.scale_m).astype(np.float32), '32FC1')
+    messages = []
+    for parent, child, parent_from_child in links:
+        message = TransformStamped(header=Header(stamp=stamp, frame_id=parent), child_frame_id=child)
+        message.transform.translation = Vector3(*parent_from_child[:3, 3].tolist())
+        message.transform.rotation = Quaternion(*quaternion_from(parent_from_child).tolist())
+        messages.append(message)
+    return messages
 
 
 def _camera_info(camera, header):
@@ -81,14 +84,6 @@ def _camera_info(camera, header):
     info.R = [1, 0, 0, 0, 1, 0, 0, 0, 1]
     info.P = [camera.fx, 0, camera.cx, 0, 0, camera.fy, camera.cy, 0, 0, 0, 1, 0]
     return info
-
-
-def _transform(stamp, parent, child, parent_from_child):
-    message = TransformStamped(header=Header(stamp=stamp, frame_id=parent), child_frame_id=child)
-    place, turn = message.transform.translation, message.transform.rotation
-    place.x, place.y, place.z = parent_from_child[:3, 3].tolist()
-    turn.x, turn.y, turn.z, turn.w = quaternion_from(parent_from_child).tolist()
-    return message
 
 
 def frame_id_of(camera):

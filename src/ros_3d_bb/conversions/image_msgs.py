@@ -13,23 +13,15 @@ LAYOUTS = {'rgb8': ('u1', 3), 'bgr8': ('u1', 3), 'rgba8': ('u1', 4), 'bgra8': ('
 COLOR_ENCODINGS = ('rgb8', 'bgr8', 'rgba8', 'bgra8', 'mono8', '8UC1', '8UC3')
 # REP 118: depth is in millimetres in 16UC1 (mono16 in Gazebo and some drivers) and in metres in 32FC1.
 DEPTH_SCALES = {'16UC1': 0.001, 'mono16': 0.001, '32FC1': 1.0}
-# The unit of depth is checked by the median of a grid of pixels.
-GRID = 16  # rows and columns of the grid
+GRID = 16  # rows and columns of the grid of pixels whose median shows the unit of depth
 LEAST_SAMPLES = 8  # with fewer valid pixels the unit is not checked
 NEAREST_M, FARTHEST_M = 0.1, 100.0  # plausible range of the median
 
 
 def array_from(message):
-    """Return the pixels of an image message as a read-only view of its data, with its row step and byte order.
+    """Return the pixels, (height, width[, channels]), of an image message as a read-only view of its data.
 
-    Returns
-    -------
-    numpy.ndarray, (height, width) or (height, width, channels)
-
-    Raises
-    ------
-    ValueError
-        If the encoding is unknown, the size is zero, or the data are shorter than the size requires.
+    Raises ValueError if the encoding is unknown, the size is zero, or the data are shorter than the size requires.
     """
     if message.encoding not in LAYOUTS:
         raise ValueError('image encoding %r is unknown; expected one of %s' % (message.encoding, ', '.join(LAYOUTS)))
@@ -50,10 +42,7 @@ def array_from(message):
 def imgmsg_to_rgb(message):
     """Return the pixels of a colour image message as RGB, (height, width, 3), uint8; a view if the encoding allows it.
 
-    Raises
-    ------
-    ValueError
-        See `array_from`; also if the encoding is not colour or grey.
+    Raises ValueError as `array_from`, and if the encoding is not colour or grey.
     """
     if message.encoding not in COLOR_ENCODINGS:
         raise ValueError('colour image has encoding %r; expected one of %s'
@@ -64,51 +53,24 @@ def imgmsg_to_rgb(message):
     return pixels[..., 2::-1] if message.encoding in ('bgr8', 'bgra8', '8UC3') else pixels[..., :3]
 
 
-def imgmsg_to_depth(message, scale_m=None):
-    """Convert an image message to a depth image.
+def imgmsg_to_depth(message, scale_m=None, check_unit=False):
+    """Convert an image message to a DepthImage.
 
-    Parameters
-    ----------
-    message : sensor_msgs.msg.Image
-    scale_m : float, optional
-        Metres per unit of a camera that does not follow REP 118 (16UC1: millimetres, 32FC1: metres).
-
-    Returns
-    -------
-    DepthImage
-
-    Raises
-    ------
-    ValueError
-        See `array_from`; also if the encoding is not a depth encoding.
+    Raises ValueError as `array_from`, if the encoding is not a depth encoding, and with `check_unit` as `units_fault`.
+    `scale_m` is given in metres per unit, for a camera that does not follow REP 118.
     """
     if message.encoding not in DEPTH_SCALES:
         raise ValueError('depth image has encoding %r; expected one of %s'
                          % (message.encoding, ', '.join(DEPTH_SCALES)))
-    return DepthImage(array_from(message), scale_m or DEPTH_SCALES[message.encoding])
-
-
-def checked_depth_from(message, scale_m=None):
-    """Convert as `imgmsg_to_depth`, and also raise ValueError if the values seem to have another unit."""
-    depth = imgmsg_to_depth(message, scale_m)
-    fault = units_fault(depth)
+    depth = DepthImage(array_from(message), scale_m or DEPTH_SCALES[message.encoding])
+    fault = units_fault(depth) if check_unit else ''
     if fault:
         raise ValueError(fault)
     return depth
 
 
 def units_fault(depth):
-    """Check the unit of a depth image by the median of a few hundred pixels.
-
-    Parameters
-    ----------
-    depth : depth_image.DepthImage
-
-    Returns
-    -------
-    str
-        A sentence about the fault; empty if the unit is plausible.
-    """
+    """Return a sentence if the median of a few hundred pixels of a DepthImage indicates a wrong unit, '' otherwise."""
     values = depth.values[::max(1, depth.values.shape[0] // GRID), ::max(1, depth.values.shape[1] // GRID)]
     valid = values[np.isfinite(values) & (values > 0)]
     if valid.size < LEAST_SAMPLES:
@@ -118,18 +80,15 @@ def units_fault(depth):
         return ''
     integers = depth.values.dtype.kind == 'u'
     unit = 'metres' if median_m < NEAREST_M else 'millimetres'
-    return ('the depth image has the wrong unit: half of its pixels are nearer than %.3g m; it seems to hold %s in a '
-            '%s, which has to hold %s (REP 118), or set depth_scale'
+    return ('the depth image has the wrong unit: half of its pixels are nearer than %.3g m; its values seem to be %s '
+            'in a %s image, whose unit is %s (REP 118): fix the driver, or set depth_scale'
             % (median_m, unit, '16UC1' if integers else '32FC1', 'millimetres' if integers else 'metres'))
 
 
 def fill_image(message, pixels, encoding):
     """Write pixels (height, width[, channels]) to an image message, except for its header. Returns the message.
 
-    Raises
-    ------
-    ValueError
-        If the pixels do not have the type and channels of the encoding.
+    Raises ValueError if the pixels do not have the type and channels of the encoding.
     """
     kind, channels = LAYOUTS[encoding]
     if pixels.dtype.newbyteorder('=') != np.dtype(kind) or pixels.shape[2:] != ((channels,) if channels > 1 else ()):

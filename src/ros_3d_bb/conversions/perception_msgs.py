@@ -40,18 +40,14 @@ def time_from(stamp_ns):
 def stamp_of(message):
     """Return the stamp of a message in integer nanoseconds.
 
-    Raises
-    ------
-    ValueError
-        If the stamp is zero, because the message cannot be paired or transformed, or if it exceeds the range of tf2,
-        which would terminate the process.
+    Raises ValueError if the stamp is zero, because the message cannot be paired or transformed, or if it exceeds the
+    range of tf2, which would terminate the process.
     """
     stamp_ns = message.header.stamp.to_nsec()
     if stamp_ns == 0:
-        raise ValueError('the %s of frame %r carries no stamp (zero)' % (type(message).__name__,
-                                                                         message.header.frame_id))
+        raise ValueError('the %s of frame %r has no stamp (zero)' % (type(message).__name__, message.header.frame_id))
     if stamp_ns >= LATEST_NS:
-        raise ValueError('the %s of frame %r carries the stamp %d s, of the year 2038 or later'
+        raise ValueError('the %s of frame %r has the stamp %d s, of the year 2038 or later'
                          % (type(message).__name__, message.header.frame_id, stamp_ns // NS))
     return stamp_ns
 
@@ -62,23 +58,17 @@ def stamp_if_any(message):
 
 
 def check_transforms(message):
-    """Raise ValueError if a stamp in a tf2_msgs/TFMessage exceeds the range of tf2, which would terminate the process.
-    """
+    """Raise ValueError if a stamp in a tf2_msgs/TFMessage exceeds the range of tf2, see `stamp_of`."""
     for transform in message.transforms:
         if transform.header.stamp.to_nsec() >= LATEST_NS:
-            raise ValueError('the transform of %s carries the stamp %d s, of the year 2038 or later'
+            raise ValueError('the transform of %s has the stamp %d s, of the year 2038 or later'
                              % (transform.child_frame_id, transform.header.stamp.secs))
 
 
 def boxes2d_to_msg(boxes, header):
     """Convert 2D boxes to std_msgs/Int32MultiArray, with the stamp and frame of their image in the layout.
 
-    Parameters
-    ----------
-    boxes : numpy.ndarray, (n, 4)
-        x1, y1, x2, y2 in pixels; rounded to integers.
-    header : std_msgs.msg.Header
-        Header of the image.
+    `boxes` (n, 4) are x1, y1, x2, y2 in pixels, which are rounded to integers; `header` is that of the image.
     """
     message = Int32MultiArray(data=np.rint(boxes).astype(int).ravel().tolist())
     label = 'boxes;stamp=%d.%09d;frame=%s' % (header.stamp.secs, header.stamp.nsecs, header.frame_id)
@@ -90,10 +80,7 @@ def boxes2d_to_msg(boxes, header):
 def boxes2d_from_msg(message):
     """Convert an Int32MultiArray, with or without a stamp in its layout, to Boxes2D.
 
-    Raises
-    ------
-    ValueError
-        If the length is not a multiple of 4, there are too many boxes, or the stamp in the label is malformed.
+    Raises ValueError if the length is not a multiple of 4, there are too many boxes, or the label is malformed.
     """
     if len(message.data) % 4:
         raise ValueError('2D boxes have %d numbers; a multiple of 4 expected (x1 y1 x2 y2 each)' % len(message.data))
@@ -109,7 +96,7 @@ def boxes2d_from_msg(message):
         return Boxes2D(boxes, None, '')
     secs, _dot, nsecs = fields['stamp'].partition('.')
     if not (secs.isdigit() and nsecs.isdigit() and len(nsecs) == 9):
-        raise ValueError('2D boxes carry the label %r; boxes;stamp=<secs>.<nsecs, 9 digits>;frame=<frame_id> expected'
+        raise ValueError('2D boxes have the label %r; boxes;stamp=<secs>.<nsecs, 9 digits>;frame=<frame_id> expected'
                          % label)
     return Boxes2D(boxes, int(secs) * NS + int(nsecs), fields.get('frame', ''))
 
@@ -131,12 +118,7 @@ def camera_from_msg(message):
     """Convert a sensor_msgs/CameraInfo to a camera model with intrinsics and lens distortion.
 
     realsense2_camera labels the inverse Brown-Conrady model of librealsense as plumb_bob; the two differ by a few
-    hundredths of a pixel.
-
-    Raises
-    ------
-    ValueError
-        If K is zero, as for an uncalibrated camera, or the distortion model is unknown.
+    hundredths of a pixel. Raises ValueError if K is zero, as for an uncalibrated camera, or as `Camera`.
     """
     if not any(message.K):
         raise ValueError('it is empty (all of K is zero): the driver does not know the calibration of the camera')
@@ -153,24 +135,23 @@ def transform_from_msg(message):
 
 def boxes3d_to_msg(boxes, header, camera):
     """Convert 3D boxes (`box3d_estimator.Box3D`) to BoundingBox3DArray. Inverse of `boxes3d_from_msg`."""
-    return BoundingBox3DArray(header=header, boxes=[_box3d_to_msg(box, camera) for box in boxes])
-
-
-def _box3d_to_msg(box, camera):
-    message = BoundingBox3D(support=box.support, truncated=any(box.truncated_edges))
-    for flag, is_cut in zip(EDGE_FLAGS, box.truncated_edges):
-        message.truncated_edges |= flag if is_cut else 0
-    message.center.position = Point(*map(float, box.center_m))
-    message.center.orientation.w = 1.0
-    message.size = Vector3(*map(float, box.size_m))
-    if box.covariance_m2 is not None:
-        message.position_covariance = np.ravel(box.covariance_m2).tolist()
-    x1, y1, x2, y2 = box.rect_px
-    x1, x2 = min(max(x1, 0), camera.width), min(max(x2, 0), camera.width)
-    y1, y2 = min(max(y1, 0), camera.height), min(max(y2, 0), camera.height)
-    message.roi.x_offset, message.roi.width = x1, x2 - x1
-    message.roi.y_offset, message.roi.height = y1, y2 - y1
-    return message
+    array = BoundingBox3DArray(header=header)
+    for box in boxes:
+        message = BoundingBox3D(support=box.support, truncated=any(box.truncated_edges))
+        for flag, is_cut in zip(EDGE_FLAGS, box.truncated_edges):
+            message.truncated_edges |= flag if is_cut else 0
+        message.center.position = Point(*map(float, box.center_m))
+        message.center.orientation.w = 1.0
+        message.size = Vector3(*map(float, box.size_m))
+        if box.covariance_m2 is not None:
+            message.position_covariance = np.ravel(box.covariance_m2).tolist()
+        x1, y1, x2, y2 = box.rect_px
+        x1, x2 = min(max(x1, 0), camera.width), min(max(x2, 0), camera.width)
+        y1, y2 = min(max(y1, 0), camera.height), min(max(y2, 0), camera.height)
+        message.roi.x_offset, message.roi.width = x1, x2 - x1
+        message.roi.y_offset, message.roi.height = y1, y2 - y1
+        array.boxes.append(message)
+    return array
 
 
 def boxes3d_from_msg(message):
@@ -191,59 +172,38 @@ def _box3d_from_msg(box):
 def usable_boxes3d(message):
     """Select the 3D boxes of a BoundingBox3DArray that can be tracked.
 
-    Returns
-    -------
-    BoundingBox3DArray
-        The message with the usable boxes only.
-    list of str
-        A sentence about the fault of each other box.
-
-    Raises
-    ------
-    ValueError
-        If there are too many boxes.
+    Returns the message with the usable boxes only, and a sentence about the fault of each other box. Raises ValueError
+    if there are too many boxes.
     """
     if len(message.boxes) > MAX_BOXES:
         raise ValueError('%d 3D boxes in one image; at most %d expected' % (len(message.boxes), MAX_BOXES))
-    usable, faults = [], []
+    usable, faults = BoundingBox3DArray(header=message.header), []
     for number, box in enumerate(message.boxes):
-        try:
-            _check_box3d(box)
-            usable.append(box)
-        except ValueError as error:
-            faults.append('3D box %d has %s' % (number, error))
-    return BoundingBox3DArray(header=message.header, boxes=usable), faults
+        fault = _box3d_fault(box)
+        if fault:
+            faults.append('3D box %d has %s' % (number, fault))
+        else:
+            usable.boxes.append(box)
+    return usable, faults
 
 
-def _check_box3d(box):
-    """Raise ValueError if the centre is not finite, the size is not positive, one of them is implausibly large, or the
-    covariance is not positive semi-definite.
-    """
-    center = box.center.position
-    values = np.array([center.x, center.y, center.z, box.size.x, box.size.y])
-    if not ((np.abs(values) < FARTHEST_M).all() and (0 < values[3:]).all() and (values[3:] < LARGEST_M).all()):
-        raise ValueError('centre (%g, %g, %g) and size (%g, %g); finite numbers and sizes of more than 0 and less than '
-                         '%g m expected' % (tuple(values) + (LARGEST_M,)))
-    covariance_m2 = np.array(box.position_covariance).reshape(3, 3)
+def _box3d_fault(message):
+    box = _box3d_from_msg(message)
+    if not box.is_plausible:
+        return ('centre (%g, %g, %g) and size (%g, %g); finite numbers and sizes of more than 0 and less than %g m '
+                'expected' % (tuple(box.center_m) + tuple(box.size_m[:2]) + (LARGEST_M,)))
+    covariance_m2 = np.reshape(message.position_covariance, (3, 3))
     if not ((np.abs(covariance_m2) < FARTHEST_M).all()
             and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T).min() > -ROUNDING * max(1, covariance_m2.max())):
-        raise ValueError('the position_covariance %s; a finite, positive semi-definite matrix, or zeros where it is '
-                         'not known, expected' % list(box.position_covariance))
+        return ('the position_covariance %s; a finite, positive semi-definite matrix, or zeros where it is not known, '
+                'expected' % list(message.position_covariance))
+    return ''
 
 
 def detections_from_msg(message, fixed_from_camera):
-    """Convert the 3D boxes of a BoundingBox3DArray to detections in the fixed frame.
+    """Convert the usable boxes (see `usable_boxes3d`) of a BoundingBox3DArray to Detections in the fixed frame.
 
-    Parameters
-    ----------
-    message : BoundingBox3DArray
-        Usable boxes only, see `usable_boxes3d`.
-    fixed_from_camera : numpy.ndarray, (4, 4)
-        Pose of the camera's optical frame in the fixed frame.
-
-    Returns
-    -------
-    list of Detection
+    `fixed_from_camera` (4, 4) is the pose of the camera's optical frame in the fixed frame.
     """
     return [detection_from_box(box, fixed_from_camera) for box in boxes3d_from_msg(message)]
 

@@ -23,15 +23,10 @@ class Stamped(NamedTuple):
 
 
 class MessageCache(object):
-    """Cache of the latest values of one topic, up to `length_ns` before the newest stamp.
+    """Cache of the latest values of one topic, up to `length_ns` before the newest stamp, `newest_ns`, if any.
 
     The number of values is bounded for any stamps, so that a driver whose clock hangs or a frozen /clock does not
     exhaust the memory. The bound is a count, because arrival times are not meaningful when a bag is played slowly.
-
-    Attributes
-    ----------
-    newest_ns : int
-        The newest stamp, None if the cache is empty.
     """
 
     def __init__(self, length_ns):
@@ -47,15 +42,10 @@ class MessageCache(object):
         return reversed(self._entries)
 
     def add(self, stamp_ns, arrival_ns, value):
-        """Add a value.
+        """Add a value, or replace that of the same stamp. Returns whether time jumped back.
 
         The stamps of a topic are in order. A stamp that goes back means that time jumped back (a bag was looped or
-        rewound); the previous values are then deleted. Of values with equal stamps, the latest is kept.
-
-        Returns
-        -------
-        bool
-            Whether time jumped back.
+        rewound); the previous values are then deleted.
         """
         went_back = self.newest_ns is not None and stamp_ns < self.newest_ns
         if went_back:
@@ -69,7 +59,7 @@ class MessageCache(object):
         return went_back
 
     def nearest(self, stamp_ns, tolerance_ns=0):
-        """The entry with the nearest stamp within the tolerance, None if no entry matches."""
+        """The entry with the nearest stamp within the tolerance, or None."""
         nearest, nearest_ns = None, tolerance_ns
         for entry in list(self._entries):  # a copy, as another thread may add entries
             distance_ns = abs(entry.stamp_ns - stamp_ns)
@@ -78,7 +68,7 @@ class MessageCache(object):
         return nearest
 
     def arrived_at(self, arrival_ns, tolerance_ns):
-        """The entry with the nearest arrival time within the tolerance, None if no entry matches."""
+        """The entry with the nearest arrival time within the tolerance, or None."""
         in_time = [entry for entry in list(self._entries) if abs(entry.arrival_ns - arrival_ns) <= tolerance_ns]
         return min(in_time, key=lambda entry: abs(entry.arrival_ns - arrival_ns), default=None)
 
@@ -97,8 +87,7 @@ class StampSynchronizer(object):
     to `assumed_delay_ns` before them. A camera_info without a stamp is used for all images, because intrinsics do not
     change with time.
 
-    All boxes are passed to exactly one of the two callbacks, in the order of arrival. The callbacks are called by
-    `add_depth`, `add_camera`, `add_boxes` and `end`.
+    All boxes are passed to exactly one of the two callbacks, in the order of arrival, by the methods `add_` and `end`.
 
     Parameters
     ----------
@@ -139,9 +128,7 @@ class StampSynchronizer(object):
             if (self._cameras.newest_ns or 0) > stamp_ns + self._length_ns:  # no camera_info of the new time yet
                 self._cameras.clear()
             self._end_before_ns = newest_ns
-            forgotten, self._waiting = self._waiting, []
-            for entry in forgotten:
-                self._on_lost(entry.value, True)
+            self._lose_waiting(True)
         self._settle(now_ns)
 
     def add_camera(self, stamp_ns, now_ns, camera):
@@ -172,43 +159,39 @@ class StampSynchronizer(object):
 
     def end(self):
         """Signal the end of the input: all waiting boxes are lost."""
-        waiting, self._waiting = self._waiting, []
-        for entry in waiting:
-            self._on_lost(entry.value, False)
+        self._lose_waiting(False)
+
+    def _lose_waiting(self, before_jump):
+        lost, self._waiting = self._waiting, []
+        for entry in lost:
+            self._on_lost(entry.value, before_jump)
 
     def _settle(self, now_ns):
-        """Call the callbacks for boxes whose frame is complete or lost."""
-        complete_or_lost, waiting = [], []
+        """Call the callbacks for boxes whose frame is complete, is lost, or did not arrive in time."""
+        settled, waiting = [], []
+        newest_ns = self._depths.newest_ns
         for number, entry in enumerate(self._waiting):
-            frame = self._frame(entry.stamp_ns)
-            crowded = len(self._waiting) - number > MAX_WAITING
-            if frame is not None or crowded or self._is_hopeless(entry, now_ns):
-                complete_or_lost.append((entry.value, frame))
+            depth = self._depths.nearest(entry.stamp_ns, self._tolerance_ns)
+            camera = None if depth is None else self._camera_at(depth.stamp_ns)
+            is_lost = depth is None and newest_ns is not None and entry.stamp_ns < newest_ns
+            is_late = now_ns - entry.arrival_ns > self._length_ns
+            is_crowded = len(self._waiting) - number > MAX_WAITING
+            if camera is not None or is_lost or is_late or is_crowded:
+                settled.append((entry.value, depth, camera))
             else:
                 waiting.append(entry)
         self._waiting = waiting
-        for boxes, frame in complete_or_lost:
-            if frame is None:
+        for boxes, depth, camera in settled:
+            if camera is None:
                 self._on_lost(boxes, False)
             else:
-                depth, camera = frame
-                self._on_frame(boxes, depth, camera)
+                self._on_frame(boxes, depth.value, camera)
 
-    def _frame(self, stamp_ns):
-        """Depth and camera of a stamp, None if one of them is missing."""
-        depth = self._depths.nearest(stamp_ns, self._tolerance_ns)
-        if depth is None:
-            return None
+    def _camera_at(self, stamp_ns):
+        """The camera of a depth image, or the nearest one as soon as a newer message shows that its own is lost."""
         if self._plain_camera is not None:
-            return depth.value, self._plain_camera
-        camera = self._cameras.nearest(depth.stamp_ns, self._tolerance_ns)
-        if camera is None and max(self._depths.newest_ns, self._cameras.newest_ns or 0) > depth.stamp_ns:
-            camera = self._cameras.nearest(depth.stamp_ns, float('inf'))
-        return None if camera is None else (depth.value, camera.value)
-
-    def _is_hopeless(self, entry, now_ns):
-        """Whether boxes have waited too long, or their depth image was lost or is no longer cached."""
-        newest_ns = self._depths.newest_ns
-        is_past = newest_ns is not None and entry.stamp_ns < newest_ns
-        is_lost = is_past and self._depths.nearest(entry.stamp_ns, self._tolerance_ns) is None
-        return is_lost or now_ns - entry.arrival_ns > self._length_ns
+            return self._plain_camera
+        camera = self._cameras.nearest(stamp_ns, self._tolerance_ns)
+        if camera is None and max(self._depths.newest_ns, self._cameras.newest_ns or 0) > stamp_ns:
+            camera = self._cameras.nearest(stamp_ns, float('inf'))
+        return None if camera is None else camera.value

@@ -1,15 +1,15 @@
 """3D box estimators: from a rectangle in the depth image to a 3D box.
 
 Convention: a rectangle (x1, y1, x2, y2) contains the pixels x1 <= u < x2, y1 <= v < y2. Positions are in the camera
-optical frame, metres.
+optical frame, metres. In `sorted_depths_m` (nearest first), a layer of depth is a slice and its median an element.
 """
+import functools
 from typing import Any, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from ros_3d_bb.core.limits import LARGEST_M, USUAL_HEIGHT_M, USUAL_WIDTH_M
-from ros_3d_bb.estimation.depth_layers import (BODY_HALF_DEPTH_M, complete_truncated_extent, edges,
-                                               nearest_dominant_layer, trimmed_mean, within)
+from ros_3d_bb.camera.depth_image import FARTHEST_M as FARTHEST_DEPTH_M
+from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M, USUAL_HEIGHT_M, USUAL_WIDTH_M
 
 # A box whose edge is this close to the image border counts as truncated: detectors round to whole pixels and regress
 # the edge of a truncated person a pixel or two inside the image.
@@ -18,6 +18,14 @@ SAMPLES_WANTED = 2000  # approximate number of pixels that the foreground estima
 AXIS_BEHIND_SURFACE_M = 0.09  # mean over standing and walking bodies of the simulation, seen from all sides
 LEAST_SUPPORT = 0.1  # minimum share of the samples in the person's layer for an estimate
 LEAST_WIDTH_M = 0.05
+
+# Half the depth extent of a person with stretched arms; points farther from the median are not part of the person.
+BODY_HALF_DEPTH_M = 0.35
+TRUNK_HALF_DEPTH_M = 0.25  # without arms and legs: a wall close behind must not shift the median
+BIN_M, LAYER_BINS = 0.05, 5  # bin width of the depth histogram, and thickness of a layer in bins
+MEDIANS = 3  # maximum number of iterations of the median of the trunk
+FIRST_LAYER_SHARE = 0.5  # the nearest layer with at least this share of the largest layer weight is the person
+EDGE_PERCENT = 5  # percentage of the layer's pixels ignored at the left and at the right: arms, flying pixels
 
 
 class Samples(NamedTuple):
@@ -31,13 +39,6 @@ class Samples(NamedTuple):
     scale_m: float
     depth_m: np.ndarray
     valid: np.ndarray
-
-    def sorted_depths(self, chosen):
-        """Depths of the samples chosen by a mask (h, w), nearest first, metres.
-
-        The raw values are sorted, because numpy sorts 16-bit integers in linear time.
-        """
-        return np.sort(self.values[chosen], kind='mergesort').astype(float) * self.scale_m
 
     @property
     def pixels(self):
@@ -66,47 +67,49 @@ class Box3D(NamedTuple):
         """Whether the image border truncates the object."""
         return any(self.truncated_edges)
 
+    @property
+    def is_plausible(self):
+        """Whether the centre is nearer than `FARTHEST_M`, and width and height are between 0 and `LARGEST_M`."""
+        x_m, y_m, z_m = np.abs(self.center_m).tolist()
+        width_m, height_m, _width_m = self.size_m.tolist()
+        return (x_m < FARTHEST_M and y_m < FARTHEST_M and z_m < FARTHEST_M
+                and 0 < width_m < LARGEST_M and 0 < height_m < LARGEST_M)
 
-def sample_median(depth, rect_px, stride_px=20):
-    """Sample a rectangle on the thesis' centred grid of every `stride_px` pixels, clipped to the image (3.4.2).
+
+def sample_depth(depth, rect_px, stride_px=None):
+    """Sample a rectangle on a centred grid of every `stride_px` pixels, clipped to the image (thesis 3.4.2).
 
     Parameters
     ----------
     depth : depth_image.DepthImage
     rect_px : (x1, y1, x2, y2)
-    stride_px : int
+        There are no samples in an empty or reversed rectangle.
+    stride_px : int, optional
+        Default: a stride that gives about `SAMPLES_WANTED` samples in rectangles of any size.
 
     Returns
     -------
     Samples
-
-    Raises
-    ------
-    ValueError
-        If the rectangle is empty or reversed.
     """
-    x1, y1, x2, y2 = map(int, rect_px)
-    check_rect((x1, y1, x2, y2))
     height, width = depth.values.shape
+    x1, y1, x2, y2 = map(int, rect_px)
+    if stride_px is None:
+        visible_columns = min(max(x2, 0), width) - min(max(x1, 0), width)
+        visible_rows = min(max(y2, 0), height) - min(max(y1, 0), height)
+        visible_px = max(0, visible_columns) * max(0, visible_rows)
+        stride_px = max(1, int(np.sqrt(visible_px / SAMPLES_WANTED)))
     columns, rows = _ticks(x1, x2, width, stride_px), _ticks(y1, y2, height, stride_px)
-    depth_m, valid = depth.at(columns, rows)
-    return Samples(np.arange(width)[columns], np.arange(height)[rows], depth.values[rows, columns], depth.scale_m,
-                   depth_m, valid)
+    values = depth.values[rows, columns]
+    depth_m = values.astype(float) * depth.scale_m
+    valid = (depth_m > 0) & (depth_m <= FARTHEST_DEPTH_M)
+    return Samples(np.arange(width)[columns], np.arange(height)[rows], values, depth.scale_m, depth_m, valid)
 
 
 def estimate_median(samples, rect_px, camera, _nearer=()):
     """Estimate a box as in the thesis (3.4.2): per-axis median of the sampled points, size from the box at that depth.
 
-    Parameters
-    ----------
-    samples : Samples
-    rect_px : (x1, y1, x2, y2)
-    camera : camera_model.Camera
-
-    Returns
-    -------
-    Box3D or None
-        None if no sample has a valid depth and a viewing ray, or the rectangle cannot be undistorted.
+    Parameters and return value are those of `estimate_foreground`; nearer boxes are ignored, and there is no minimum
+    support.
     """
     across, down = camera.rays(samples.columns, samples.rows[:, np.newaxis])
     seen = samples.valid & ~np.isnan(across)  # the distortion model does not define a ray for every pixel
@@ -120,31 +123,6 @@ def estimate_median(samples, rect_px, camera, _nearer=()):
     on_body = np.abs(samples.depth_m[samples.valid] - center_m[2]) <= BODY_HALF_DEPTH_M
     return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px),
                  np.count_nonzero(on_body) / float(samples.valid.size), truncated_edges(rect_px, camera))
-
-
-def sample_foreground(depth, rect_px):
-    """Sample a rectangle on a grid of about `SAMPLES_WANTED` pixels, independent of its size, clipped to the image.
-
-    Parameters
-    ----------
-    depth : depth_image.DepthImage
-    rect_px : (x1, y1, x2, y2)
-
-    Returns
-    -------
-    Samples
-
-    Raises
-    ------
-    ValueError
-        If the rectangle is empty or reversed.
-    """
-    height, width = depth.values.shape
-    x1, y1, x2, y2 = rect_px
-    visible_columns = min(max(x2, 0), width) - min(max(x1, 0), width)
-    visible_rows = min(max(y2, 0), height) - min(max(y1, 0), height)
-    visible_px = max(0, visible_columns) * max(0, visible_rows)
-    return sample_median(depth, rect_px, max(1, int(np.sqrt(visible_px / SAMPLES_WANTED))))
 
 
 def estimate_foreground(samples, rect_px, camera, nearer=()):
@@ -178,18 +156,23 @@ def estimate_foreground(samples, rect_px, camera, nearer=()):
         own = _mask_occluders(own, samples, rect_px, nearer)
     if flat_px is None or not own.any():
         return None
+
     x1, y1, x2, y2 = rect_px
     in_middle = np.exp(-0.5 * ((samples.columns - (x1 + x2) / 2.0) / ((x2 - x1) / 4.0)) ** 2)
-    depths_m = samples.sorted_depths(own)
+    # The raw values are sorted, because numpy sorts 16-bit integers in linear time.
+    depths_m = np.sort(samples.values[own], kind='mergesort').astype(float) * samples.scale_m
     layer_m = nearest_dominant_layer(samples.depth_m[own], np.broadcast_to(in_middle, own.shape)[own], depths_m)
     body_m = within(depths_m, layer_m, BODY_HALF_DEPTH_M)
     support = len(body_m) / float(own.size)
     if support < LEAST_SUPPORT:
         return None
+
     on_body = own & (np.abs(samples.depth_m - layer_m) <= BODY_HALF_DEPTH_M)
     across_m = (columns_px - camera.cx) / camera.fx * samples.depth_m
     left_m, right_m = edges(across_m[on_body])
-    layer_m = trimmed_mean(body_m)
+    # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
+    tenth = len(body_m) // 10
+    layer_m = body_m[tenth:len(body_m) - tenth].mean()
     _left_px, top_px, _right_px, bottom_px = flat_px
     top_m, bottom_m = (top_px - camera.cy) / camera.fy * layer_m, (bottom_px - camera.cy) / camera.fy * layer_m
     cut_left, cut_top, cut_right, cut_bottom = cut = truncated_edges(rect_px, camera)
@@ -228,6 +211,56 @@ def _mask_occluders(own, samples, rect_px, boxes):
     return own
 
 
+def nearest_dominant_layer(depths_m, weights, sorted_depths_m):
+    """Depth of the trunk of the person: the median of the nearest dominant layer of the weighted depth histogram.
+
+    `depths_m` and `weights` have shape (n,); `sorted_depths_m` holds the same depths, nearest first.
+    """
+    bins = ((depths_m - sorted_depths_m[0]) / BIN_M).astype(int)
+    histogram = np.convolve(np.bincount(bins, weights), np.ones(LAYER_BINS), 'same')
+    first = np.argmax(histogram >= FIRST_LAYER_SHARE * histogram.max())
+    best = first + np.argmax(histogram[first:first + LAYER_BINS])
+    nearest, farthest = ((sorted_depths_m - sorted_depths_m[0]) / BIN_M).searchsorted(
+        (best - LAYER_BINS // 2, best + LAYER_BINS // 2 + 1))
+    median_m = _median(sorted_depths_m[nearest:farthest])
+    for _ in range(MEDIANS):
+        before_m, median_m = median_m, _median(within(sorted_depths_m, median_m, TRUNK_HALF_DEPTH_M))
+        if median_m == before_m:
+            break
+    return median_m
+
+
+def within(sorted_depths_m, middle_m, half_m):
+    """The slice of the sorted depths within `half_m` of `middle_m`."""
+    offsets_m = sorted_depths_m - middle_m
+    return sorted_depths_m[offsets_m.searchsorted(-half_m):offsets_m.searchsorted(half_m, 'right')]
+
+
+def edges(x_m):
+    """Left and right edge of a body with points at x (n,), metres, under the assumption of a uniform width."""
+    last = len(x_m) - 1
+    rank, part = divmod(last * EDGE_PERCENT, 100)
+    after = min(rank + 1, last)
+    in_place_m = np.partition(x_m, (rank, after, last - after, last - rank))
+    low_m = in_place_m[rank] + (in_place_m[after] - in_place_m[rank]) * part / 100.0
+    high_m = in_place_m[last - rank] - (in_place_m[last - rank] - in_place_m[last - after]) * part / 100.0
+    beyond_m = (high_m - low_m) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
+    return low_m - beyond_m, high_m + beyond_m
+
+
+def complete_truncated_extent(low, high, cut_low, cut_high, usual):
+    """Extend low..high of a body that the image border truncates at one end to at least the usual extent."""
+    missing = max(0.0, usual - (high - low))
+    if cut_low and not cut_high:
+        return low - missing, high
+    return low, high + (missing if cut_high and not cut_low else 0.0)
+
+
+def _median(sorted_depths_m):
+    last = len(sorted_depths_m) - 1
+    return (sorted_depths_m[last // 2] + sorted_depths_m[last - last // 2]) / 2
+
+
 class Estimator(NamedTuple):
     """Pair of functions: `sample(depth, rect_px)` returns Samples; `estimate(samples, rect_px, camera, nearer)` returns
     a Box3D or None, given the boxes of possible occluders.
@@ -238,70 +271,49 @@ class Estimator(NamedTuple):
 
 
 def estimator_named(name, stride_px=20):
-    """Create an estimator by name.
+    """Create the estimator foreground or median; `stride_px` is the grid spacing of the estimator median.
 
-    Parameters
-    ----------
-    name : str
-        foreground or median.
-    stride_px : int
-        Grid spacing of the median estimator.
-
-    Returns
-    -------
-    Estimator
-
-    Raises
-    ------
-    ValueError
-        If the name is unknown or the stride is not positive.
+    Raises ValueError if the name is unknown or the stride is not positive.
     """
     if stride_px < 1:
         raise ValueError('stride is %d; at least 1 expected' % stride_px)
     if name == 'foreground':
-        return Estimator(sample_foreground, estimate_foreground)
+        return Estimator(sample_depth, estimate_foreground)
     if name == 'median':
-        return Estimator(lambda depth, rect_px: sample_median(depth, rect_px, stride_px), estimate_median)
+        return Estimator(functools.partial(sample_depth, stride_px=stride_px), estimate_median)
     raise ValueError('estimator is %r; foreground or median expected' % name)
 
 
-def estimate_boxes(depth, rects_px, camera, estimator):
+def estimate_boxes(depth, rects_px, camera, estimator, implausible=None):
     """Estimate the 3D boxes of all rectangles of one image, front to back, so that nearer boxes mask their pixels.
-
-    A box that is not plausible (see `is_plausible`) is returned as well, but it does not mask pixels.
 
     Parameters
     ----------
     depth : depth_image.DepthImage
     rects_px : list of (x1, y1, x2, y2)
-        Valid rectangles, see `check_rect`.
     camera : camera_model.Camera
     estimator : Estimator
+    implausible : list, optional
+        Estimates that are not plausible (see `Box3D.is_plausible`) are appended. They do not mask pixels.
 
     Returns
     -------
     list of Box3D or None
-        In the order of the rectangles.
+        In the order of the rectangles; None without a plausible estimate.
     """
     boxes, nearer = [None] * len(rects_px), []
-    for number in front_to_back(rects_px):
+    _left, top, _right, bottom = np.reshape(rects_px, (-1, 4)).T
+    for number in np.lexsort((top, -bottom)).tolist():  # nearer people stand lower in the image and are larger
         rect_px = rects_px[number]
-        samples = estimator.sample(depth, rect_px)
-        box = estimator.estimate(samples, rect_px, camera, nearer)
-        boxes[number] = box
-        if box is not None and is_plausible(box):
+        box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, camera, nearer)
+        if box is None:
+            continue
+        if box.is_plausible:
+            boxes[number] = box
             nearer.append(box)
+        elif implausible is not None:
+            implausible.append(box)
     return boxes
-
-
-def is_plausible(box):
-    """Whether a Box3D has a finite position and a size between 0 and `LARGEST_M`."""
-    return bool(np.isfinite(box.center_m.sum()) and 0 < min(box.size_m) and max(box.size_m) < LARGEST_M)
-
-
-def front_to_back(rects_px):
-    """Indices of rectangles, nearest person first: nearer people stand lower in the image and are larger."""
-    return sorted(range(len(rects_px)), key=lambda number: (-rects_px[number][3], rects_px[number][1], number))
 
 
 def check_rect(rect_px):

@@ -96,30 +96,25 @@ class ErrorModel(NamedTuple):
     cross_validated: Optional[Scores]
 
     def corrected(self, position_m):
-        """Remove the bias from measured positions. Inverse of `biased`.
+        """Remove the bias from measured positions (..., 3). Inverse of `biased`.
 
         Outside the measured range, the bias is that at the limit of the range. y is scaled with z, along the ray.
-
-        Parameters
-        ----------
-        position_m : array_like, (..., 3)
-            Measured positions, z > 0.
-
-        Returns
-        -------
-        numpy.ndarray, (..., 3)
-
-        Raises
-        ------
-        ValueError
-            If a position is not in front of the camera.
+        Raises ValueError if a position is not in front of the camera.
         """
         position_m = np.asarray(position_m, float)
         if not (position_m[..., 2] > 0).all():
             raise ValueError('z is %g m; a position in front of the camera expected' % np.min(position_m[..., 2]))
-        x_m, y_m, measured_z_m = np.moveaxis(position_m, -1, 0)
-        z_m = self._true_z(measured_z_m)
-        return np.stack((self._true_x(x_m, z_m), y_m * z_m / measured_z_m, z_m), axis=-1)
+        measured_x_m, y_m, measured_z_m = np.moveaxis(position_m, -1, 0)
+
+        z_m = measured_z_m
+        for _ in range(SOLVER_STEPS):
+            z_m = measured_z_m - self._z_bias_at(z_m)
+        z_m = np.maximum(z_m, NEAREST_SHARE * measured_z_m)
+
+        x_m, slope, limit_m = measured_x_m - self.x_bias.offset_m, self._x_slope_at(z_m), self.measured_range.x_max_m
+        inside_m = x_m / (1 + slope)
+        x_m = np.where(np.abs(inside_m) <= limit_m, inside_m, x_m - slope * limit_m * np.sign(x_m))
+        return np.stack((x_m, y_m * z_m / measured_z_m, z_m), axis=-1)
 
     def biased(self, position_m):
         """Noise-free measurements of true positions, (..., 3). Inverse of `corrected`."""
@@ -135,18 +130,9 @@ class ErrorModel(NamedTuple):
             raise ValueError('the error model is for the estimator %s, not %s' % (self.provenance.estimator, name))
 
     def covariance(self, position_m):
-        """Covariance of corrected positions in the camera optical frame, square metres.
+        """Covariance (..., 3, 3) of corrected positions (..., 3) in the camera optical frame, square metres.
 
         The covariance is diagonal: the measurements show no correlation of x and z errors along the ray.
-
-        Parameters
-        ----------
-        position_m : array_like, (..., 3)
-            Corrected positions, see `corrected`.
-
-        Returns
-        -------
-        numpy.ndarray, (..., 3, 3)
         """
         z_m = np.asarray(position_m, float)[..., 2]
         sigmas_m = np.stack((self.x_sigma.at(z_m), np.full(z_m.shape, self.y_sigma_m), self.z_sigma.at(z_m)), axis=-1)
@@ -172,18 +158,6 @@ class ErrorModel(NamedTuple):
         nearest_m, farthest_m = self.measured_range.x_z_min_m, self.measured_range.z_max_m
         return self.x_bias.slope + self.x_bias.per_angle_m / np.clip(z_m, nearest_m, farthest_m)
 
-    def _true_z(self, measured_z_m):
-        z_m = measured_z_m
-        for _ in range(SOLVER_STEPS):
-            z_m = measured_z_m - self._z_bias_at(z_m)
-        return np.maximum(z_m, NEAREST_SHARE * measured_z_m)
-
-    def _true_x(self, measured_x_m, z_m):
-        x_m, slope = measured_x_m - self.x_bias.offset_m, self._x_slope_at(z_m)
-        inside_m = x_m / (1 + slope)
-        limit_m = self.measured_range.x_max_m
-        return np.where(np.abs(inside_m) <= limit_m, inside_m, x_m - slope * limit_m * np.sign(x_m))
-
 
 def corrected_boxes(boxes, model):
     """Correct the bias of 3D boxes (`box3d_estimator.Box3D`) and set their covariance."""
@@ -203,39 +177,29 @@ def checked(model):
                          % (tuple(limits),))
     z_m = np.linspace(limits.z_min_m, limits.z_max_m, 101)
     for name, slopes in (('z_bias', np.polyval(np.polyder(model.z_bias), z_m)), ('x_bias', model._x_slope_at(z_m))):
-        if np.abs(slopes).max() > STEEPEST_BIAS:
-            raise ValueError('%s changes by %.2g m a metre; at most %g expected, for it has to be undone'
-                             % (name, np.abs(slopes).max(), STEEPEST_BIAS))
-    if not abs(model._z_bias_at(limits.z_min_m)) < limits.z_min_m:
-        raise ValueError('z_bias is %g m at %g m; less than the range expected'
-                         % (model._z_bias_at(limits.z_min_m), limits.z_min_m))
+        steepest = np.abs(slopes).max()
+        if steepest > STEEPEST_BIAS:
+            raise ValueError('%s changes by %.2g m a metre; at most %g expected, because the bias must be invertible'
+                             % (name, steepest, STEEPEST_BIAS))
+    nearest_bias_m = model._z_bias_at(limits.z_min_m)
+    if not abs(nearest_bias_m) < limits.z_min_m:
+        raise ValueError('z_bias is %g m at %g m; less than the range expected' % (nearest_bias_m, limits.z_min_m))
     for name, spread in (('z_sigma', model.z_sigma), ('x_sigma', model.x_sigma)):
-        if min(spread) < 0:
-            raise ValueError('%s is %s; constant_m, growth and near_m2 of 0 or more expected' % (name, tuple(spread)))
-    sigmas_m = {'z_sigma': model.z_sigma.at(limits.z_min_m), 'x_sigma': model.x_sigma.at(limits.z_min_m),
-                'y_sigma_m': model.y_sigma_m}
-    for name, sigma_m in sorted(sigmas_m.items()):
-        if not sigma_m > 0:
-            raise ValueError('%s is %g m at %g m; more than 0 expected' % (name, sigma_m, limits.z_min_m))
+        if min(spread) < 0 or not spread.at(limits.z_min_m) > 0:
+            raise ValueError('%s is %s; constant_m, growth and near_m2 of 0 or more, and not all 0, expected'
+                             % (name, tuple(spread)))
+    if not model.y_sigma_m > 0:
+        raise ValueError('y_sigma_m is %g; more than 0 expected' % model.y_sigma_m)
     if model.growth_outside < 0:
         raise ValueError('growth_outside is %g; 0 or more expected' % model.growth_outside)
     return model
 
 
 def read_error_model(path):
-    """Read an error model from a YAML file; no code in the file is executed.
+    """Read an ErrorModel from a YAML file; no code in the file is executed.
 
-    Returns
-    -------
-    ErrorModel
-
-    Raises
-    ------
-    ValueError
-        If the file is not YAML, or a key is unknown (the message names the nearest one), missing, or has an invalid
-        value.
-    OSError
-        If the file cannot be read.
+    Raises OSError if the file cannot be read, and ValueError if it is not YAML, or a key is unknown (the message names
+    the nearest one), missing, or has an invalid value.
     """
     with open(str(path), encoding='utf-8') as stream:
         try:
@@ -256,7 +220,6 @@ def write_error_model(path, model):
 
 
 def _line(name, value):
-    """Format one line of YAML."""
     if isinstance(value, tuple):
         return '%s: [%s]\n' % (name, ', '.join(yaml.safe_dump(number).split()[0] for number in value))
     return yaml.safe_dump({name: value}, default_flow_style=False, width=1000, allow_unicode=True)
@@ -274,7 +237,7 @@ def _filled(kind, content, where):
         content = float(content)
     if not isinstance(content, kind) or isinstance(content, bool) or (kind is float and not np.isfinite(content)):
         raise ValueError('%s is %r; %s expected' % (where, content, {
-            tuple: 'a list of numbers', float: 'a number', int: 'a whole number', str: 'text'}[kind]))
+            tuple: 'a list of numbers', float: 'a number', int: 'an integer', str: 'text'}[kind]))
     return content
 
 

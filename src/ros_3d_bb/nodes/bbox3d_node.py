@@ -5,17 +5,21 @@ import rospy
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg
-from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
+from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg, camera_from_msg,
+                                                   stamp_of)
+from ros_3d_bb.core.latest_worker import NewestWorker
+from ros_3d_bb.core.time_sync import NS, MessageCache, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
-from ros_3d_bb.nodes.common.alignment_check import DepthCameraCheck
-from ros_3d_bb.nodes.common.debug_images import SampleImages
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.master import patient_master
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
+from ros_3d_bb.visualization.image_overlay import depth_to_grey, draw_boxes, draw_samples
 
 
 class Bbox3dNode(object):
@@ -42,13 +46,11 @@ class Bbox3dNode(object):
     def __init__(self):
         params, = read_params(Bbox3dParams)
         self._diagnostics = Diagnostics()
-        self._estimation_stage = EstimationStage(params, self._diagnostics, self._on_frame,
-                                                 rospy.resolve_name(DEPTH_TOPIC),
-                                                 rospy.resolve_name(INFO_TOPICS[0]))
+        self._stage = EstimationStage(params, self._diagnostics, self._on_frame, rospy.resolve_name(DEPTH_TOPIC),
+                                      rospy.resolve_name(INFO_TOPICS[0]))
         self._lock = threading.Lock()
         self._boxes_pub = rospy.Publisher(BOXES3D_TOPIC, BoundingBox3DArray, queue_size=10)
-        self._images = SampleImages(int(params.cache_length * NS), self._estimation_stage.sample,
-                                    params.depth_image_range,
+        self._images = SampleImages(int(params.cache_length * NS), self._stage.sample, params.depth_image_range,
                                     self._diagnostics)
         self._alignment = DepthCameraCheck(with_frames=not params.frame_id)
         self._diagnostics.check(self._alignment.faults)
@@ -56,34 +58,142 @@ class Bbox3dNode(object):
         subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
         subscribe(BOXES_TOPIC, Int32MultiArray, self._on_boxes)
-        self._tuning = ReconfigureServer([params], self._tune)
+        self._reconfigure_server = ReconfigureServer([params], self._reconfigure)
 
-    def _tune(self, params):
+    def _reconfigure(self, params):
         with self._lock:
-            self._estimation_stage.reconfigure(params)
-            self._images.reconfigure(self._estimation_stage.sample, params.depth_image_range)
+            self._stage.reconfigure(params)
+            self._images.reconfigure(self._stage.sample, params.depth_image_range)
 
     def _on_camera_info(self, message):
         self._alignment.color = message
         with self._diagnostics.receiving('camera_info'), self._lock:
-            self._estimation_stage.add_camera_info(message, arrival_clock_ns())
+            self._stage.add_camera_info(message, arrival_clock_ns())
 
     def _on_depth(self, message):
         self._alignment.depth_frame = message.header.frame_id
         with self._diagnostics.receiving('depth images'), self._lock:
-            self._estimation_stage.add_depth(message, arrival_clock_ns())
+            self._stage.add_depth(message, arrival_clock_ns())
 
     def _on_boxes(self, message):
         with self._diagnostics.receiving('2D boxes'), self._lock:
-            self._estimation_stage.add_boxes(message, arrival_clock_ns())
+            self._stage.add_boxes(message, arrival_clock_ns())
 
     def _on_frame(self, boxes2d, depth_msg, camera):
         """Publish the 3D boxes of one image, once its 2D boxes, depth image and camera model have arrived."""
         with self._diagnostics.rejecting('2D boxes'):
-            header, depth, boxes3d = self._estimation_stage.estimate(boxes2d, depth_msg, camera)
+            header, depth, boxes3d = self._stage.estimate(boxes2d, depth_msg, camera)
             self._boxes_pub.publish(boxes3d_to_msg(boxes3d, header, camera))
             self._diagnostics.record_latency(header.stamp)
             self._images.publish(header, depth, boxes3d)
+
+
+class DepthCameraCheck(object):
+    """Check that the depth images are aligned to the colour images.
+
+    The node sets the attributes `color` (the latest CameraInfo) and `depth_frame`. `with_frames` states whether the
+    frame names are reliable. The topic stays subscribed: on a new subscription, rospy would wait for an unreachable
+    master and block all other requests to it.
+
+    Subscribes
+    ----------
+    camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
+        Calibration of the depth image, in the namespace of its topic (remapped or not). It is compared with that of
+        the colour camera.
+    """
+
+    def __init__(self, with_frames):
+        self._with_frames = with_frames
+        self.color, self.depth_frame, self._depth = None, '', None
+        topic = rospy.resolve_name(DEPTH_TOPIC).rpartition('/')[0] + '/camera_info'
+        rospy.Subscriber(topic, CameraInfo, self._on_depth_camera, queue_size=1)
+
+    def faults(self):
+        """Yield (event, sentence) for each current fault. Called once per second."""
+        color, depth, fault = self.color, self._depth, ''
+        if color is not None and self._with_frames:
+            fault = frames_fault(color.header.frame_id, self.depth_frame)
+        if color is not None and depth is not None and not fault:
+            try:
+                fault = intrinsics_fault(camera_from_msg(color), camera_from_msg(depth))
+            except ValueError:  # the node reports colour; many drivers leave depth's K empty
+                pass
+        if fault:
+            yield 'alignment', 'depth is not aligned to colour: %s; positions are wrong; %s' % (fault, ALIGN)
+
+    def _on_depth_camera(self, message):
+        self._depth = message
+
+
+class SampleImages(object):
+    """Publish the images and depth samples from which 3D boxes were estimated.
+
+    Subscribes
+    ----------
+    camera/color/image_raw : sensor_msgs/Image
+        Colour image; subscribed only while ros_3d_bb/raw or ros_3d_bb/color has subscribers.
+
+    Publishes
+    ---------
+    ros_3d_bb/raw : sensor_msgs/Image
+        Colour image of the boxes; published only if there are subscribers.
+    ros_3d_bb/color : sensor_msgs/Image
+        Colour image with boxes and depth samples (thesis Fig. 3.5); published only if there are subscribers.
+    ros_3d_bb/depth : sensor_msgs/Image
+        Depth image in grey; published only if there are subscribers.
+    """
+
+    def __init__(self, cache_ns, sample, depth_range_m, diagnostics):
+        self._diagnostics = diagnostics
+        self.reconfigure(sample, depth_range_m)
+        self._raw_pub, self._color_pub, self._depth_pub = (
+            rospy.Publisher('ros_3d_bb/' + name, Image, queue_size=1) for name in ('raw', 'color', 'depth'))
+        self._cache_ns, self._colors, self._subscriber = cache_ns, MessageCache(cache_ns), None
+        # In a separate thread, because an unresponsive master must not block the 3D boxes.
+        self._subscription = NewestWorker(self._subscribe, self._on_error)
+
+    def reconfigure(self, sample, depth_range_m):
+        """Set the sampling function and the depth (metres) drawn as black for the next images."""
+        self._sample, self._depth_range_m = sample, depth_range_m
+
+    def publish(self, header, depth, boxes):
+        """Publish the debug images of one set of 3D boxes on the topics that have subscribers."""
+        needs_raw, needs_color = self._raw_pub.get_num_connections() > 0, self._color_pub.get_num_connections() > 0
+        if (needs_raw or needs_color) != (self._subscriber is not None):
+            self._subscription.offer(needs_raw or needs_color)
+        if self._depth_pub.get_num_connections():
+            grey = depth_to_grey(depth, self._depth_range_m)
+            self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))
+        color = self._colors.nearest(header.stamp.to_nsec())
+        if color is None:
+            return
+        if needs_raw:
+            self._raw_pub.publish(color.value)
+        if needs_color:
+            with self._diagnostics.rejecting('colour images'):  # an unusable one does not affect the 3D boxes
+                image = imgmsg_to_rgb(color.value).copy()
+                for box in boxes:
+                    draw_boxes(image, [box.rect_px], ['%.2f m' % box.center_m[2]])
+                for box in boxes:
+                    draw_samples(image, box.rect_px, self._sample(depth, box.rect_px))
+                self._color_pub.publish(fill_image(Image(header=header), image, 'rgb8'))
+
+    def _subscribe(self, wanted):
+        """Subscribe to colour images or unsubscribe from them."""
+        patient_master().getPid()  # raises if there is no master, for which rospy would hold a lock, even at Ctrl-C
+        if wanted and self._subscriber is None:
+            self._subscriber = subscribe(COLOR_TOPIC, Image, self._on_color, KEPT_AT_ONCE)
+        elif not wanted and self._subscriber is not None:
+            self._subscriber.unregister()
+            self._subscriber, self._colors = None, MessageCache(self._cache_ns)
+
+    def _on_error(self, error):
+        self._diagnostics.warn('colour images not subscribed', 'the ROS master does not respond (%s): the subscription '
+                               'of colour images for ros_3d_bb/color and raw is unchanged; trying again' % error)
+
+    def _on_color(self, message):
+        with self._diagnostics.rejecting('colour images'):
+            self._colors.add(stamp_of(message), 0, message)
 
 
 def main():

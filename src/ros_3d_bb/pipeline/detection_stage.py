@@ -6,7 +6,7 @@ import genpy
 import tf2_ros
 
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.conversions.image_msgs import checked_depth_from, imgmsg_to_rgb
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_if_any, stamp_of
 from ros_3d_bb.core.params import ENABLED, PUBLISH_EMPTY, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
@@ -171,7 +171,7 @@ class RgbdDetectionStage(object):
         """
         image = imgmsg_to_rgb(color_msg)
         camera_frame = self._params.frame_id or color_msg.header.frame_id
-        depth = checked_depth_from(depth_msg)
+        depth = imgmsg_to_depth(depth_msg, check_unit=True)
         found = self._detector.detect(image, depth, camera, self._floor(camera_frame))
         if found is None:
             self._events.warn('images without floor', 'no floor is known from tf nor seen in the depth image: no '

@@ -8,7 +8,7 @@ from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, is_plausible
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import corrected_boxes
 from ros_3d_bb.tracking.association import match_greedily
 from ros_3d_bb.tracking.occlusion import depths_towards
@@ -107,7 +107,7 @@ def _detections(frame, boxes, camera, estimator, error_model):
     """Convert 2D boxes to detections in the map, as bbox3d_node and tracker_node do."""
     rects_px = [tuple(rect) for rect in np.rint(boxes).astype(int).tolist() if rect[0] < rect[2] and rect[1] < rect[3]]
     estimated = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, camera, estimator)
-    found = [box for box in estimated if box is not None and is_plausible(box)]
+    found = [box for box in estimated if box is not None]
     if error_model is not None:
         found = corrected_boxes(found, error_model)
     return [detection_from_box(box, frame.poses.map_from_camera) for box in found]

@@ -18,7 +18,7 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_median, estimator_named, sample_median
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_median, estimator_named, sample_depth
 from ros_3d_bb.sessions.session_reader import read_color, read_session
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
@@ -71,7 +71,7 @@ class Theirs(object):
 
     def estimate(self, depth, rects_px):
         """Estimate 3D boxes in the frame of the camera."""
-        boxes = [estimate_median(sample_median(depth, rect_px), rect_px, self._camera) for rect_px in rects_px]
+        boxes = [estimate_median(sample_depth(depth, rect_px, 20), rect_px, self._camera) for rect_px in rects_px]
         return [box for box in boxes if box is not None]
 
     def track(self, stamp_ns, boxes):

@@ -1,0 +1,96 @@
+"""Estimation stage: effect of one invalid 2D box on the others of its image, and the parameter ~error_model."""
+import os
+
+import numpy as np
+import pytest
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
+
+from ros_3d_bb.conversions.image_msgs import fill_image
+from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg, boxes3d_to_msg, time_from, usable_boxes3d
+from ros_3d_bb.core.event_counter import EventCounter
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
+
+HEADER = Header(stamp=time_from(1000 * NS), frame_id='camera')
+INTRINSICS = [614.7, 0, 319.2, 0, 614.8, 242.1, 0, 0, 1]
+PERSON_PX, PERSON_M = (60, 150, 160, 460), 3.0
+NEAR_PX = (230, 0, 640, 480)  # directly in front of the camera, too near for depth: the wall behind is measured
+MODELS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'error_models')
+
+
+@pytest.fixture
+def events():
+    return EventCounter()
+
+
+def scene(wall_m, person_m=PERSON_M):
+    """Depth (480, 640), metres: a person in front of a wall."""
+    depth_m = np.full((480, 640), wall_m, np.float32)
+    x1, y1, x2, y2 = PERSON_PX
+    depth_m[y1:y2, x1:x2] = person_m
+    return depth_m
+
+
+def estimate(depth_m, rects_px, events, estimator='foreground'):
+    """The 3D boxes of an image. All of them can be tracked, and their regions are inside the image."""
+    results = []
+
+    def on_frame(boxes2d, depth_msg, camera):
+        header, _depth, boxes3d = stage.estimate(boxes2d, depth_msg, camera)
+        message = boxes3d_to_msg(boxes3d, header, camera)
+        assert not usable_boxes3d(message)[1]
+        assert all(box.roi.x_offset + box.roi.width <= 640 for box in message.boxes)
+        results.extend(boxes3d)
+    stage = EstimationStage(Bbox3dParams(estimator=estimator), events, on_frame)
+    stage.add_camera_info(CameraInfo(header=HEADER, width=640, height=480, K=INTRINSICS), 0)
+    stage.add_depth(fill_image(Image(header=HEADER), depth_m, '32FC1'), 0)
+    stage.add_boxes(boxes2d_to_msg(np.array(rects_px), HEADER), 0)
+    return results
+
+
+@pytest.mark.parametrize('estimator', ['foreground', 'median'])
+def test_an_implausibly_large_box_is_dropped_and_the_other_is_kept(estimator, events):
+    depth_m = scene(wall_m=14.0)
+    depth_m[:, 230:][np.random.RandomState(0).rand(480, 410) > 0.2] = 0  # too near to be measured
+    box, = estimate(depth_m, [PERSON_PX, NEAR_PX], events, estimator)
+    assert box.rect_px == PERSON_PX and box.center_m[2] == pytest.approx(PERSON_M, abs=0.1)
+    assert events.counts['boxes of impossible size'] == 1
+    assert events.counts['boxes estimated'] == 1 and events.counts['boxes without depth'] == 0
+
+
+def test_an_implausible_box_does_not_mask_the_pixels_of_others(events):
+    """The person stands 0.2 m in front of the wall that fills the large box: in its layer of depth."""
+    box, = estimate(scene(wall_m=14.0, person_m=13.8), [(0, 0, 640, 480), PERSON_PX], events)
+    assert box.rect_px == PERSON_PX and events.counts['boxes of impossible size'] == 1
+
+
+def test_rectangles_with_extreme_or_reversed_edges(events):
+    rects_px = [(-2 ** 31, -2 ** 31, 2 ** 31 - 1, 2 ** 31 - 1), (5, 5, 5, 9), (9, 5, 5, 9), (1000, 900, 1100, 990),
+                (-9, 100, 650, 480), PERSON_PX]
+    wide, person = estimate(scene(wall_m=5.0), rects_px, events, 'median')
+    assert person.rect_px == PERSON_PX and wide.truncated_edges == (True, False, True, True)
+    assert events.counts['boxes of impossible size'] == 1 and events.counts['boxes rejected'] == 2
+    assert events.counts['boxes without depth'] == 1
+
+
+def params(model, estimator):
+    return Bbox3dParams(estimator=estimator, error_model=os.path.join(MODELS, model + '.yaml'))
+
+
+@pytest.mark.parametrize('model,estimator,other', [('d435i_thesis', 'foreground', 'median'),
+                                                   ('simulated_d435i', 'foreground', 'median'),
+                                                   ('thesis', 'median', 'foreground')])
+def test_an_error_model_is_rejected_for_another_estimator(model, estimator, other):
+    stage = EstimationStage(params(model, estimator), EventCounter(), None)
+    sample = stage.sample
+    with pytest.raises(ValueError, match='is for the estimator %s, not %s' % (estimator, other)):
+        stage.reconfigure(params(model, other))
+    assert stage.sample is sample
+    with pytest.raises(ValueError, match='is for the estimator %s, not %s' % (estimator, other)):
+        EstimationStage(params(model, other), EventCounter(), None)
+
+
+def test_a_missing_error_model_is_named():
+    with pytest.raises(ValueError, match='nowhere.yaml.*absolute path expected'):
+        EstimationStage(params('nowhere', 'median'), EventCounter(), None)
