@@ -15,7 +15,7 @@ from ros_3d_bb.sessions.session_reader import read_color, read_session
 class FixedRuntime(object):
     """Returns the same predictions for every image."""
 
-    names, stride, input_hw = ['person', 'cat'], 32, None
+    names, stride, input_hw, description = ['person', 'cat'], 32, None, 'fixed'
 
     def __init__(self, rows=()):
         self.rows = np.array(rows, np.float32).reshape(-1, 7)

@@ -41,17 +41,14 @@ class Checkpoint(NamedTuple):
 def read_checkpoint(path):
     """Read a checkpoint without executing code from it or instantiating classes that it names.
 
-    Raises
-    ------
-    WeightsError
-        If the file is missing, damaged, not a YOLOv5 detection model, or names anything outside the allow-list.
+    Raises WeightsError if the file is missing, damaged, not a YOLOv5 detection model, or names anything outside the
+    allow-list.
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            root = _Unpickler(archive).load()
-        return _checkpoint_from(root)
-    except FileNotFoundError:
-        raise _missing(path)
+            return _checkpoint_from(_Unpickler(archive).load())
+    except OSError as error:
+        raise _unreadable(path, error)
     except zipfile.BadZipFile as error:
         raise WeightsError('weights %s: truncated, not a checkpoint, or written by torch before 1.6 (%s); %s'
                            % (path, cause(error), EXPECTED))
@@ -64,14 +61,12 @@ def checkpoint_digest(path):
     try:
         with open(path, 'rb') as stream:
             return hashlib.sha256(stream.read()).hexdigest()
-    except FileNotFoundError:
-        raise _missing(path)
     except OSError as error:
-        raise WeightsError('weights %s: %s; %s' % (path, cause(error), EXPECTED))
+        raise _unreadable(path, error)
 
 
-def _missing(path):
-    return WeightsError('weights %s: no such file; %s' % (path, EXPECTED))
+def _unreadable(path, error):
+    return WeightsError('weights %s: cannot be read (%s); %s' % (path, error.strerror, EXPECTED))
 
 
 class Inert(object):
@@ -179,14 +174,7 @@ def class_names(names, count):
 
 
 def _walk(model):
-    """Collect the parameters and buffers below an inert module, and the class names of its activations.
-
-    Returns
-    -------
-    tensors : dict
-        {name: array}, with the names of torch's state_dict.
-    activations : set of str
-    """
+    """Return {name in torch's state_dict: array} of all modules below an inert one, and the classes of activations."""
     tensors, activations, visited, to_visit = {}, set(), set(), [('', model)]
     while to_visit:
         prefix, module = to_visit.pop()

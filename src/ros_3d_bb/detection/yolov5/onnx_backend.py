@@ -49,18 +49,9 @@ class OnnxRuntime(object):
 
 
 class ExportedRuntime(object):
-    """Checkpoint that was exported to ONNX by `ros_3d_bb.detection.yolov5.onnx_cache`.
+    """Checkpoint that was exported to ONNX by `onnx_export`; `model` is the content of the ONNX file.
 
-    Parameters
-    ----------
-    model : bytes
-        Content of the ONNX file.
-    threads : int
-
-    Raises
-    ------
-    OnnxUnusable
-        If the file has another origin, or if the output for the reference image differs from torch's.
+    Raises OnnxUnusable if the file has another origin, or if the output for the reference image differs from torch's.
     """
 
     input_hw = None
@@ -76,7 +67,7 @@ class ExportedRuntime(object):
             rows = self(reference_image(self.stride), -1)
         except Exception as error:  # a foreign file can raise any exception
             raise OnnxUnusable('ONNX Runtime cannot run the exported network (%s)' % cause(error))
-        if rows.size != expected.size or not are_close(rows, expected.reshape(rows.shape)):
+        if not (rows.size == expected.size and _are_close(rows, expected.reshape(rows.shape))):
             raise OnnxUnusable('the output of ONNX Runtime differs from that of torch')
 
     def __call__(self, image, min_objectness):
@@ -89,10 +80,10 @@ def reference_image(stride):
     return np.random.RandomState(0).randint(0, 256, (2 * stride, 3 * stride, 3)).astype(np.uint8)
 
 
-def are_close(rows, expected):
+def _are_close(rows, expected):
     """Whether two arrays of predictions are equal within rounding errors; False if a number is not finite."""
     difference = np.abs(rows - expected).max(axis=0)
-    return bool((difference[:4] <= MAX_DIFFERENCE_PX).all() and (difference[4:] <= MAX_DIFFERENCE).all())
+    return (difference[:4] <= MAX_DIFFERENCE_PX).all() and (difference[4:] <= MAX_DIFFERENCE).all()
 
 
 def session_of(model, threads):
@@ -111,5 +102,4 @@ def session_of(model, threads):
 
 
 def description_of(threads):
-    """Description of the backend for logs."""
     return 'ONNX Runtime, %d thread%s' % (threads, '' if threads == 1 else 's')

@@ -4,38 +4,23 @@ A cached file is named by the SHA-256 of its checkpoint and by `VERSION`, and ac
 its own SHA-256, and contains the output of torch for a reference image, which ONNX Runtime must reproduce each time the
 file is loaded. Loading a cached file executes no code from it; torch is needed only to create it.
 """
-import base64
 import hashlib
-import json
 import os
-
-import numpy as np
 
 from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.yolov5.checkpoint import checkpoint_digest
-from ros_3d_bb.detection.yolov5.onnx_backend import INSTALL, ExportedRuntime, OnnxUnusable, reference_image
+from ros_3d_bb.detection.yolov5.onnx_backend import INSTALL, ExportedRuntime, OnnxUnusable
 from ros_3d_bb.detection.yolov5.onnx_writer import metadata_entry
 
 VERSION = 1  # of the cached files; increase it when network.py or onnx_export.py change their content
 
 
 def open_exported(path, folder, threads, warn):
-    """Open a checkpoint in ONNX Runtime, by its cached export if there is one.
+    """Open a checkpoint as an `onnx_backend.ExportedRuntime`, from the cache in `folder` if it is there.
 
-    Parameters
-    ----------
-    path : str
-        An official checkpoint (.pt).
-    folder : str
-        The cache. It is created if missing. If it cannot be written, the export is used from memory.
-    threads : int
-    warn : callable
-        Called with one line of text for problems that are worked around.
-
-    Returns
-    -------
-    ros_3d_bb.detection.yolov5.onnx_backend.ExportedRuntime
+    The folder is created if missing. If it cannot be written, the export is used from memory. `warn` is called with one
+    line of text for problems that are worked around.
 
     Raises
     ------
@@ -56,7 +41,8 @@ def open_exported(path, folder, threads, warn):
         pass
     except (OSError, ValueError) as error:
         warn('%s cannot be used (%s); exporting the checkpoint again' % (file_path, cause(error)))
-    model = export(path, digest)
+    from ros_3d_bb.detection.yolov5 import onnx_export  # imports torch, which takes a second and 200 MB
+    model = onnx_export.export(path, digest)
     runtime = ExportedRuntime(model, threads)
     try:
         os.makedirs(folder, mode=0o700, exist_ok=True)
@@ -72,24 +58,6 @@ def export_folder(folder=''):
     cache = os.environ.get('ROS_3D_BB_CACHE') or os.path.join(
         os.environ.get('XDG_CACHE_HOME') or os.path.join('~', '.cache'), 'ros_3d_bb')
     return os.path.abspath(os.path.expanduser(folder or os.path.join(cache, 'onnx')))
-
-
-def export(path, digest):
-    """Export a checkpoint to ONNX, with class names, anchors, and the output of torch for the reference image.
-
-    Returns
-    -------
-    bytes
-    """
-    from ros_3d_bb.detection.yolov5.onnx_export import onnx_model_of  # importing torch takes a second and 200 MB
-    from ros_3d_bb.detection.yolov5.torch_backend import network_of, run
-    network, names = network_of(path)
-    detect, stride = network.model[-1], int(network.stride)
-    reference = run(network, reference_image(stride)).numpy()
-    anchors_px = detect.anchors.numpy() * np.reshape(detect.strides, (-1, 1, 1))
-    return onnx_model_of(network, {'about': json.dumps({
-        'checkpoint': digest, 'names': names, 'stride': stride, 'strides': detect.strides,
-        'anchors_px': anchors_px.tolist(), 'reference': base64.b64encode(reference.astype('<f4').tobytes()).decode()})})
 
 
 def with_checksum(model):

@@ -10,6 +10,7 @@ import numpy as np
 IR_VERSION, OPSET = 7, 13  # of ONNX 1.8; supported by ONNX Runtime since 1.6
 FLOAT, UINT8 = 1, 2
 ELEMENTS = {'float32': FLOAT, 'uint8': UINT8, 'int64': 7}
+ATTRIBUTE_FIELDS = {float: (2, 1), int: (3, 2), str: (4, 3), list: (8, 7)}  # field and AttributeType of a value
 
 
 class Graph(object):
@@ -19,8 +20,7 @@ class Graph(object):
         self._nodes, self._constants, self._count = [], [], 0
 
     def node(self, kind, inputs, **attributes):
-        """Add an operator with one output. Attributes are int, float, str or lists of int. Returns the output's name.
-        """
+        """Add an operator with one output. Attributes: int, float, str or list of int. Returns the output's name."""
         self._count += 1
         name = 'v%d' % self._count
         self._nodes.append(_fields((1, list(inputs)), (2, name), (4, kind),
@@ -36,18 +36,9 @@ class Graph(object):
         return name
 
     def model(self, inputs, outputs, metadata):
-        """Serialize the graph.
+        """Serialize the graph to the bytes of an ONNX file.
 
-        Parameters
-        ----------
-        inputs, outputs : list of (name, element, shape)
-            Element: FLOAT or UINT8. Shape: numbers, or names for dynamic dimensions.
-        metadata : dict of str to str
-
-        Returns
-        -------
-        bytes
-            Content of an ONNX file.
+        Inputs and outputs are (name, element, shape): FLOAT or UINT8, and numbers or, for dynamic dimensions, names.
         """
         graph = _fields((1, self._nodes), (2, 'network'), (5, self._constants),
                         (11, [_value(*entry) for entry in inputs]), (12, [_value(*entry) for entry in outputs]))
@@ -61,14 +52,8 @@ def metadata_entry(key, value):
 
 
 def _attribute(name, value):
-    """AttributeProto; field 20 is the type of the value."""
-    if isinstance(value, float):
-        return _fields((1, name), (2, value), (20, 1))
-    if isinstance(value, int):
-        return _fields((1, name), (3, value), (20, 2))
-    if isinstance(value, str):
-        return _fields((1, name), (4, value), (20, 3))
-    return _fields((1, name), (8, list(value)), (20, 7))
+    field, kind = ATTRIBUTE_FIELDS[type(value)]
+    return _fields((1, name), (field, value), (20, kind))
 
 
 def _value(name, element, shape):

@@ -21,13 +21,7 @@ def check_stride(stride):
 
 
 def predictions(output):
-    """Predictions (rows, 5 + classes) of the only image in an output (1, rows, 5 + classes).
-
-    Raises
-    ------
-    ValueError
-        If the output has another shape, because the model is not a YOLOv5 detector.
-    """
+    """Predictions (rows, 5 + classes) of the only image in an output (1, rows, 5 + classes), else ValueError."""
     if len(output.shape) != 3 or output.shape[0] != 1 or output.shape[2] < 6:
         raise ValueError('its output has shape %s; (1, rows, 5 + classes) expected' % (tuple(output.shape),))
     return output[0]
@@ -44,8 +38,6 @@ def decode_heads(heads, anchors_px, strides, min_objectness):
         Width and height in pixels.
     strides : list of int
         Pixels per cell of each scale.
-    min_objectness : float
-        Objectness, 0..1.
 
     Returns
     -------

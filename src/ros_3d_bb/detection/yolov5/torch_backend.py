@@ -24,19 +24,9 @@ def torch_device(name):
 
 
 def network_of(path):
-    """Build the network of a checkpoint.
+    """Return the `network.Network` of a checkpoint, fused, float32, on the CPU, and its class names.
 
-    Returns
-    -------
-    network : ros_3d_bb.detection.yolov5.network.Network
-        Fused, float32, on the CPU.
-    names : list of str
-        Class names.
-
-    Raises
-    ------
-    WeightsError
-        If the checkpoint cannot be read, or its weights do not match its layout.
+    Raises WeightsError if the checkpoint cannot be read, or its weights do not match its layout.
     """
     checkpoint = read_checkpoint(path)
     try:
@@ -60,14 +50,15 @@ def run(network, image):
 
 
 class TorchRuntime(object):
-    """Official checkpoint in the network of this package, in half precision on a GPU."""
+    """Official checkpoint in the network of this package."""
 
     input_hw = None
 
     def __init__(self, path, device, threads):
         network, self.names = network_of(path)
         self.stride = int(network.stride)
-        self._network = on_device(network, device)
+        # In half precision on a GPU; predictions are decoded in single precision.
+        self._network = network.to(device).half() if device.type == 'cuda' else network
         self.description = description_of(device, threads)
 
     def __call__(self, image, min_objectness):
@@ -98,11 +89,6 @@ class TorchScriptRuntime(object):
             output = self._module(torch.from_numpy(batch_of(image)).to(self._device))
         rows = predictions(output[0] if isinstance(output, (tuple, list)) else output)
         return rows[rows[:, 4] > min_objectness].cpu().numpy()
-
-
-def on_device(network, device):
-    """Move a network to a device, in half precision on a GPU. Predictions are decoded in single precision."""
-    return network.to(device).half() if device.type == 'cuda' else network
 
 
 def description_of(device, threads):
