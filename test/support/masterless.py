@@ -126,8 +126,7 @@ def masterless(params=()):
         'rospy.logwarn_throttle': lambda _period_s, text, *arguments: text % arguments,
         'tf2_ros.Buffer': connections._buffer,
         'diagnostic_updater.Updater': mock.Mock(),
-        'ros_3d_bb.nodes.yolov5_node.NewestWorker': Immediately,
-        'ros_3d_bb.nodes.depth_detector_node.NewestWorker': Immediately,
+        'ros_3d_bb.nodes.common.detector_output.NewestWorker': Immediately,
         'ros_3d_bb.nodes.common.persistent_track_ids.NewestWorker': Immediately,
         'ros_3d_bb.nodes.common.debug_images.NewestWorker': Immediately,
         'ros_3d_bb.nodes.common.debug_images.patient_master': mock.Mock()}

@@ -34,7 +34,7 @@ def test_a_detector_whose_search_does_not_end_is_silent_unless_it_is_paused(swit
     assert list(diagnostics.faults()) == [] and diagnostics.text() == 'working'
     now_s[0] += 2
     (event, sentence), = diagnostics.faults()
-    assert event == 'no answers' and 'images come, and none has been answered for 6 s' in sentence
+    assert event == 'detector hangs' and 'for 6 s' in sentence
     enable(SetBoolRequest(False))
     now_s[0] += 60
     assert list(diagnostics.faults()) == [] and diagnostics.text() == 'paused'
@@ -48,7 +48,7 @@ def test_a_detector_is_not_silent_where_it_had_nothing_to_search(switch):
     now_s[0] += 60
     switch.offered()
     assert list(diagnostics.faults()) == []
-    with switch.searching():
+    with switch.detecting():
         now_s[0] += 1
     now_s[0] += 60
     switch.offered()
@@ -60,7 +60,7 @@ def test_a_refused_image_is_an_answer(switch):
     switch, diagnostics, now_s, _enable = switch
     for _image in range(10):
         switch.offered()
-        with pytest.raises(ValueError), switch.searching():
+        with pytest.raises(ValueError), switch.detecting():
             raise ValueError('an image that cannot be used')
         now_s[0] += 1
         assert list(diagnostics.faults()) == []

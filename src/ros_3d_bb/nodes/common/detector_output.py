@@ -1,4 +1,4 @@
-"""Common interface of the 2D detector nodes: published boxes and image, and the service that pauses them."""
+"""What the 2D detector nodes share: the worker that detects and publishes, and the service that pauses it."""
 import contextlib
 import time
 
@@ -9,13 +9,17 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg
+from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.visualization.image_overlay import draw_boxes
 
 SILENT_S = 5.0  # time without a completed detection after which a fault is reported
 
 
-class BoxesOutput(object):
-    """Publish detections for bbox3d_node and as an annotated image.
+class DetectorWorker(object):
+    """Detect objects in the newest images, and publish them for bbox3d_node and as an annotated image.
+
+    `params` has `enabled` and `publish_empty`. `detect(*images)` is called in a thread of its own. It returns the RGB
+    image and its Detections, or None if there is no result; `names` are the names of the classes.
 
     Publishes
     ---------
@@ -23,32 +27,58 @@ class BoxesOutput(object):
         x1, y1, x2, y2 of each person, in pixels; stamp and frame of the image are in `layout.dim[0].label`.
     yolo_result_out : sensor_msgs/Image
         Colour image with the 2D boxes; published only if there are subscribers.
-    """
-
-    def __init__(self, publish_empty):
-        self._publish_empty = publish_empty
-        self._boxes_pub = rospy.Publisher('yolo_bounding_box', Int32MultiArray, queue_size=10)
-        self._image_pub = rospy.Publisher('yolo_result_out', Image, queue_size=1)
-
-    def publish(self, header, image, found, names):
-        """Publish the detections in an RGB image with a header; `names` maps class indices to names."""
-        if len(found.boxes) or self._publish_empty:
-            self._boxes_pub.publish(boxes2d_to_msg(found.boxes, header))
-        if self._image_pub.get_num_connections():
-            labels = ['%s %.2f' % (names[number], score) for number, score in zip(found.classes, found.scores)]
-            drawn = draw_boxes(image.copy(), found.boxes, labels)
-            self._image_pub.publish(fill_image(Image(header=header), drawn, 'rgb8'))
-
-
-class Switch(object):
-    """State of the detector: enabled or paused.
-
-    The state is shown in the diagnostics, with a warning if an image was accepted and no detection completes.
 
     Services
     --------
     ~enable : std_srvs/SetBool
         Enables (true) or pauses (false) the detector.
+    """
+
+    def __init__(self, params, diagnostics, detect, names):
+        self._publish_empty, self._diagnostics, self._detect, self._names = (
+            params.publish_empty, diagnostics, detect, names)
+        self._boxes_pub = rospy.Publisher('yolo_bounding_box', Int32MultiArray, queue_size=10)
+        self._image_pub = rospy.Publisher('yolo_result_out', Image, queue_size=1)
+        self._worker = NewestWorker(self._work, self._on_error)
+        rospy.on_shutdown(self._worker.stop)
+        self._switch = Switch(params.enabled, diagnostics)
+
+    def offer(self, *images):
+        """Detect objects in these images, of which the first is the colour image, unless newer ones arrive first."""
+        if not self._switch.on:
+            self._diagnostics.count('images while paused')
+            return
+        self._switch.offered()
+        if self._worker.offer(images):
+            self._diagnostics.count('images skipped for a newer one')
+
+    def _work(self, images):
+        with self._diagnostics.rejecting('images'), self._switch.detecting():
+            if not self._switch.on:  # the detector was paused after the images arrived
+                self._diagnostics.count('images while paused')
+                return
+            result = self._detect(*images)
+            if result is not None:
+                self._publish(images[0].header, *result)
+                self._diagnostics.record_latency(images[0].header.stamp)
+
+    def _publish(self, header, image, detections):
+        if len(detections.boxes) or self._publish_empty:
+            self._boxes_pub.publish(boxes2d_to_msg(detections.boxes, header))
+        if self._image_pub.get_num_connections():
+            labels = ['%s %.2f' % (self._names[number], score)
+                      for number, score in zip(detections.classes, detections.scores)]
+            drawn = draw_boxes(image.copy(), detections.boxes, labels)
+            self._image_pub.publish(fill_image(Image(header=header), drawn, 'rgb8'))
+
+    def _on_error(self, error):
+        self._diagnostics.warn('detections failed', 'the detector failed: %s; waiting for the next image' % error)
+
+
+class Switch(object):
+    """State of the detector: enabled or paused; its service is documented in DetectorWorker.
+
+    The state is shown in the diagnostics, with a warning if an image was accepted and no detection completes.
     """
 
     def __init__(self, on, diagnostics):
@@ -64,10 +94,8 @@ class Switch(object):
             self._waits_since_s = time.monotonic()
 
     @contextlib.contextmanager
-    def searching(self):
-        """Context manager for one detection. Any outcome (boxes, no floor, rejected image) shows that the detector
-        is working.
-        """
+    def detecting(self):
+        """Context manager for one detection. Any outcome, also a rejected image, shows that the detector works."""
         try:
             yield
         finally:
@@ -76,8 +104,8 @@ class Switch(object):
     def _faults(self):
         since_s, now_s = self._waits_since_s, time.monotonic()
         if self.on and since_s is not None and now_s - since_s > SILENT_S:
-            yield 'no answers', ('the detector is silent: images come, and none has been answered for %.0f s; it '
-                                 'hangs or is starved of CPU' % (now_s - since_s))
+            yield 'detector hangs', ('images arrive, but no detection has completed for %.0f s; the detector hangs or '
+                                     'lacks CPU time' % (now_s - since_s))
 
     def _on_request(self, request):
         self.on = request.data
