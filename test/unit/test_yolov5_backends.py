@@ -241,12 +241,12 @@ def test_parameters_that_contradict_each_other_the_file_or_the_machine_are_rejec
 
 @needs_onnx
 def test_the_number_of_threads_is_the_requested_one_and_limited_by_default(monkeypatch, checkpoint):
-    assert open_runtime(checkpoint, RuntimeParams(threads=3)).description == 'ONNX Runtime, 3 threads'
-    assert open_runtime(checkpoint, ON_TORCH).description == 'torch on the CPU, 1 thread'
+    assert open_runtime(checkpoint, RuntimeParams(threads=3)).description == 'ONNX Runtime on the CPU, threads: 3'
+    assert open_runtime(checkpoint, ON_TORCH).description == 'torch on the CPU, threads: 1'
     assert torch.get_num_threads() == 1
     assert physical_cores() >= 1
     monkeypatch.setattr(backends, 'physical_cores', lambda: 64)
-    assert open_runtime(checkpoint, RuntimeParams(device='cpu')).description == 'ONNX Runtime, 4 threads'
+    assert open_runtime(checkpoint, RuntimeParams(device='cpu')).description == 'ONNX Runtime on the CPU, threads: 4'
 
 
 @needs_onnx

@@ -1,4 +1,4 @@
-"""When a detector is said to be silent, without a master."""
+"""When the switch of a detector reports it as silent, without a master."""
 from unittest import mock
 
 import pytest
@@ -7,60 +7,58 @@ from std_srvs.srv import SetBoolRequest
 from ros_3d_bb.nodes.common.detector_output import Switch
 
 
-class Noting(object):
-    """In place of Diagnostics: keeps what it is to show and to check."""
-
-    def show(self, _name, text):
-        self.text = text
-
-    def check(self, faults):
-        self.faults = faults
+@pytest.fixture
+def now_s():
+    """The clock of the machine, as [seconds]."""
+    seconds = [1000.0]
+    with mock.patch('time.monotonic', lambda: seconds[0]):
+        yield seconds
 
 
 @pytest.fixture
-def switch():
-    """A detector's switch, what it shows and checks, the clock of the machine as [seconds], and its service."""
-    diagnostics, now_s = Noting(), [1000.0]
-    with mock.patch('time.monotonic', lambda: now_s[0]), mock.patch('rospy.Service') as service:
+def rig(now_s):
+    """A switch, its service, and the state and faults that it reports."""
+    with mock.patch('rospy.Service') as service:
+        diagnostics = mock.Mock()
         switch = Switch(True, diagnostics)
-        yield switch, diagnostics, now_s, service.call_args[0][2]
+    return switch, service.call_args[0][2], diagnostics.show.call_args[0][1], diagnostics.check.call_args[0][0]
 
 
-def test_a_detector_whose_search_does_not_end_is_silent_unless_it_is_paused(switch):
-    switch, diagnostics, now_s, enable = switch
+def test_a_detector_that_hangs_is_silent_unless_it_is_paused(rig, now_s):
+    switch, enable, state, faults = rig
     switch.offered()
     now_s[0] += 4
-    switch.offered()  # images go on
-    assert list(diagnostics.faults()) == [] and diagnostics.text() == 'working'
+    switch.offered()  # images continue
+    assert list(faults()) == [] and state() == 'working'
     now_s[0] += 2
-    (event, sentence), = diagnostics.faults()
-    assert event == 'detector hangs' and 'for 6 s' in sentence
+    (event, sentence), = faults()
+    assert event == 'detector hangs' and '6 s' in sentence
     enable(SetBoolRequest(False))
     now_s[0] += 60
-    assert list(diagnostics.faults()) == [] and diagnostics.text() == 'paused'
+    assert list(faults()) == [] and state() == 'paused'
     enable(SetBoolRequest(True))
-    assert list(diagnostics.faults()) == []
+    assert list(faults()) == []
 
 
-def test_a_detector_is_not_silent_where_it_had_nothing_to_search(switch):
-    """After a pause of the camera the first image is on its way through the detector."""
-    switch, diagnostics, now_s, _enable = switch
+def test_a_detector_without_images_is_not_silent(rig, now_s):
+    """After a pause of the camera, the first image is still being processed."""
+    switch, _enable, _state, faults = rig
     now_s[0] += 60
     switch.offered()
-    assert list(diagnostics.faults()) == []
+    assert list(faults()) == []
     with switch.detecting():
         now_s[0] += 1
     now_s[0] += 60
     switch.offered()
     now_s[0] += 1
-    assert list(diagnostics.faults()) == []
+    assert list(faults()) == []
 
 
-def test_a_refused_image_is_an_answer(switch):
-    switch, diagnostics, now_s, _enable = switch
+def test_a_rejected_image_is_an_answer(rig, now_s):
+    switch, _enable, _state, faults = rig
     for _image in range(10):
         switch.offered()
         with pytest.raises(ValueError), switch.detecting():
-            raise ValueError('an image that cannot be used')
+            raise ValueError('an unusable image')
         now_s[0] += 1
-        assert list(diagnostics.faults()) == []
+        assert list(faults()) == []

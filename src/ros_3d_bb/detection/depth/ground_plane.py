@@ -96,8 +96,8 @@ def _hypotheses(points, random):
 
 
 def _is_upright(normals, offsets):
-    low, high = CAMERA_HEIGHT_M
-    return (-normals[..., 1] > np.cos(MAX_FITTED_TILT_RAD)) & (offsets > low) & (offsets < high)
+    return ((-normals[..., 1] > np.cos(MAX_FITTED_TILT_RAD))
+            & (offsets > CAMERA_HEIGHT_M[0]) & (offsets < CAMERA_HEIGHT_M[1]))
 
 
 def _tolerance_m(points):

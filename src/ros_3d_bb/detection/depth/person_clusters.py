@@ -76,7 +76,7 @@ class Blob(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """Size of a blob, heights above the floor, and which image borders cut it."""
+    """Size of a blob, heights above the floor, and the image borders that cut it."""
 
     depth_m: float
     width_m: float
@@ -104,13 +104,11 @@ def grid_of(depth, camera, floor, params):
 
 
 def find_person_clusters(grid, camera, params):
-    """Find blobs of human size. Returns a list of (Blob, Shape)."""
-    clusters = []
+    """Yield (Blob, Shape) of the blobs of human size."""
     for blob in _merge_stacked(_split_blobs(grid, camera, params), grid, camera, params):
         shape = shape_of(blob, grid, camera)
         if _is_human(shape, params):
-            clusters.append((blob, shape))
-    return clusters
+            yield blob, shape
 
 
 def _foreground_cells(grid, params):
@@ -161,7 +159,7 @@ def _connected(cells, row=0, column=0):
 
 
 def _split_blobs(grid, camera, params):
-    """Foreground blobs. Blobs that have two heads or are too large for one person are split."""
+    """Foreground blobs; those that have two heads or are too large for one person are split."""
     to_split = [(blob, 0) for blob in _connected(_foreground_cells(grid, params))]
     parts = []
     while to_split:

@@ -26,7 +26,7 @@ class OnnxRuntime(object):
             import onnxruntime  # noqa: F401
         except ImportError:
             raise WeightsError('weights %s: %s, or use the .pt checkpoint' % (path, INSTALL))
-        self.description = description_of(threads)
+        self.description = 'ONNX Runtime on the CPU, threads: %d' % threads
         try:
             self._session = session_of(path, threads)
             entry = self._session.get_inputs()[0]
@@ -57,7 +57,7 @@ class ExportedRuntime(object):
     input_hw = None
 
     def __init__(self, model, threads):
-        self.description = description_of(threads)
+        self.description = 'ONNX Runtime on the CPU, threads: %d' % threads
         try:
             self._session = session_of(model, threads)
             about = json.loads(self._session.get_modelmeta().custom_metadata_map['about'])
@@ -87,10 +87,9 @@ def _are_close(rows, expected):
 
 
 def session_of(model, threads):
-    """Create an onnxruntime.InferenceSession from a path or from bytes.
+    """Create an onnxruntime.InferenceSession, from a path or from bytes, whose waiting threads sleep.
 
-    Waiting threads sleep. Spinning, which is the default, takes a core from other nodes, and doubles the inference time
-    if two threads share one free core.
+    By default they spin, which takes a core from other nodes, and doubles the inference time if two share a free core.
     """
     import onnxruntime
     options = onnxruntime.SessionOptions()
@@ -99,7 +98,3 @@ def session_of(model, threads):
     if hasattr(options, 'add_session_config_entry'):  # since 1.5
         options.add_session_config_entry('session.intra_op.allow_spinning', '0')
     return onnxruntime.InferenceSession(model, options, providers=['CPUExecutionProvider'])
-
-
-def description_of(threads):
-    return 'ONNX Runtime, %d thread%s' % (threads, '' if threads == 1 else 's')

@@ -28,18 +28,17 @@ def network_of(path):
 
     Raises WeightsError if the checkpoint cannot be read, or its weights do not match its layout.
     """
-    checkpoint = read_checkpoint(path)
+    layout, names, weights = read_checkpoint(path)
     try:
-        network = Network(checkpoint.layout)
-        network.load_state_dict({name: torch.from_numpy(array.astype(np.float32))
-                                 for name, array in checkpoint.weights.items()
+        network = Network(layout)
+        network.load_state_dict({name: torch.from_numpy(array.astype(np.float32)) for name, array in weights.items()
                                  if not name.endswith('.anchor_grid')})  # a second copy of the anchors in release 5.0
         stride = check_stride(network.stride)
         run(network.fuse(), np.zeros((stride, stride, 3), np.uint8))
     except Exception as error:  # an invalid layout can raise any exception
         raise WeightsError('weights %s: the network cannot be built from its yaml (%s); %s'
                            % (path, cause(error), EXPECTED))
-    return network, checkpoint.names
+    return network, names
 
 
 def run(network, image):
@@ -96,4 +95,4 @@ def description_of(device, threads):
     if device.type != 'cpu':
         return 'torch on %s' % device
     torch.set_num_threads(threads)
-    return 'torch on the CPU, %d thread%s' % (threads, '' if threads == 1 else 's')
+    return 'torch on the CPU, threads: %d' % threads

@@ -6,18 +6,12 @@ LARGEST_BYTES = 32 * 2 ** 20  # limit of glibc
 
 
 def reuse_freed_memory():
-    """Let the C library reuse the memory of freed images.
+    """Let glibc reuse the memory of freed images. Returns whether the settings were applied; not by other C libraries.
 
     By default, glibc returns large blocks to the system and requests them again, and the kernel clears them page by
     page. For a rospy node this is two thirds of the cost of receiving an image. All threads share one heap, so the
     retained memory does not exceed the peak use: rospy starts one thread per connection, and with one heap per thread
-    (glibc's default) the memory of a node would grow with each subscriber that connects and disconnects. The function
-    has no effect with other C libraries.
-
-    Returns
-    -------
-    bool
-        Whether the settings were applied.
+    (glibc's default) the memory of a node would grow with each subscriber that connects and disconnects.
     """
     try:
         mallopt = ctypes.CDLL(None).mallopt
