@@ -10,16 +10,16 @@ import onnx
 import pytest
 import torch
 
-from ros_3d_bb.detection.yolov5 import onnx_cache, onnx_export
+from ros_3d_bb.detection.yolov5 import onnx_backend, onnx_export
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
 from ros_3d_bb.detection.yolov5.checkpoint import WeightsError, checkpoint_digest
-from ros_3d_bb.detection.yolov5.onnx_backend import ExportedRuntime, OnnxUnusable
-from ros_3d_bb.detection.yolov5.onnx_cache import export_folder, open_exported, with_checksum
+from ros_3d_bb.detection.yolov5.onnx_backend import (ExportedRuntime, OnnxUnusable, export_folder, open_exported,
+                                                     with_checksum)
 from ros_3d_bb.detection.yolov5.onnx_export import Exporter, export
 from support.checkpoints import random_network, write_checkpoint
 from support.layouts import layout
 
-SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(onnx_cache.__file__))))
+SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(onnx_backend.__file__))))
 
 
 class Cache(object):
@@ -30,7 +30,7 @@ class Cache(object):
         self.warnings = []
         self.checkpoint.write_bytes(content)
         digest = checkpoint_digest(str(self.checkpoint))
-        self.exported = self.folder / ('%s-%d.onnx' % (digest, onnx_cache.VERSION))
+        self.exported = self.folder / ('%s-%d.onnx' % (digest, onnx_backend.VERSION))
 
     def open(self):
         return open_exported(str(self.checkpoint), str(self.folder), 1, self.warnings.append)
@@ -109,7 +109,7 @@ def test_a_folder_that_cannot_be_written_causes_a_warning_only(cache, monkeypatc
     if reason == 'a full disk':
         def full(*_unused):
             raise OSError('no space left')
-        monkeypatch.setattr(onnx_cache.os, 'replace', full)
+        monkeypatch.setattr(onnx_backend.os, 'replace', full)
     else:
         cache.folder.parent.write_bytes(b'')
     assert rows_of(cache.open()).shape[1] == 8
@@ -156,12 +156,12 @@ def test_files_of_other_origin_are_rejected():
 
 @pytest.mark.parametrize('release,digest', [('6.0', 'f57881000fd9a334'), ('5.0', 'e2f0edfc821a2f67')])
 def test_the_exported_model_changes_only_with_the_version(release, digest):
-    """Files cached by earlier releases must not be used as current ones. If this fails, increase onnx_cache.VERSION."""
+    """Files cached by earlier releases must not be used as current ones. If this fails, increase onnx_backend.VERSION."""
     network = random_network(layout(release, 'n', 3)).fuse()
     with torch.no_grad():
         for parameter in network.parameters():
             parameter.zero_()
-    assert (onnx_cache.VERSION, hashlib.sha256(Exporter().model(network, {})).hexdigest()[:16]) == (1, digest)
+    assert (onnx_backend.VERSION, hashlib.sha256(Exporter().model(network, {})).hexdigest()[:16]) == (1, digest)
 
 
 @pytest.mark.parametrize('variables,expected', [

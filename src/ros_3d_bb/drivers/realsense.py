@@ -78,22 +78,16 @@ class Stamps(object):
 class RealSense(object):
     """Open camera, or recording (`file`) of a camera, with depth aligned to colour. Call `close` after use.
 
+    Raises CameraLost if no such camera is connected, and ValueError if the recording cannot be played.
+
     Attributes
     ----------
     camera : Camera
         Intrinsics of the colour stream and of the aligned depth.
     link_from_color : numpy.ndarray, (4, 4)
-        Transform from the body frame of the colour camera to that of the depth camera, which is the camera's `_link`; x
-        points forward, z up.
+        Transform between the body frames, x forward and z up, of the colour and the depth camera (the `_link`).
     is_over : bool
         Whether a recording that is not repeated has ended.
-
-    Raises
-    ------
-    CameraLost
-        If no such camera is connected.
-    ValueError
-        As `librealsense`, or if the recording cannot be played.
     """
 
     def __init__(self, params):

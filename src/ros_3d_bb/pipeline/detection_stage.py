@@ -3,6 +3,7 @@ import os
 from typing import NamedTuple
 
 import genpy
+import numpy as np
 import tf2_ros
 
 from ros_3d_bb.camera.camera_model import transform_from
@@ -43,27 +44,16 @@ class DepthDetectorParams(NamedTuple):
 
 
 def opened_yolov5(weights, detection, running, warn):
-    """Load and warm up a YOLOv5 detector.
+    """Return a `Yolov5` detector, whose `weights` are the path of a checkpoint or exported network.
 
-    Parameters
-    ----------
-    weights : str
-        Path of the checkpoint or exported network.
-    detection : detector.DetectionParams
-    running : backends.RuntimeParams
-    warn : callable
-        Called with the text of each warning.
-
-    Raises
-    ------
-    ValueError
-        If no weights are given or the network cannot be used.
+    `detection` are `detector.DetectionParams`, `running` `backends.RuntimeParams`; `warn` is called with the text of each
+    warning. Raises ValueError if no weights are given or the network cannot be used.
     """
     if not weights:
         raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
                          'checkpoint such as yolov5n.pt')
     detector = Yolov5(open_runtime(os.path.abspath(os.path.expanduser(weights)), running, warn), detection)
-    detector.warm_up()
+    detector.detect(np.zeros((480, 640, 3), np.uint8))  # the first detection takes several times as long as later ones
     return detector
 
 

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 from ros_3d_bb.core.params import Param, check, parameters
 from ros_3d_bb.detection.yolov5.checkpoint import WeightsError
-from ros_3d_bb.detection.yolov5.onnx_backend import OnnxRuntime, OnnxUnusable
-from ros_3d_bb.detection.yolov5.onnx_cache import export_folder, open_exported
+from ros_3d_bb.detection.yolov5.onnx_backend import OnnxRuntime, OnnxUnusable, export_folder, open_exported
 
 MAX_THREADS = 4  # default maximum; small networks gain little from more threads
 
@@ -60,13 +59,8 @@ def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
     if params.runtime == 'onnxruntime' and params.device not in ('auto', 'cpu'):
         raise ValueError('runtime onnxruntime works on the CPU, and device is %r; use runtime torch' % params.device)
     threads = params.threads or min(physical_cores(), MAX_THREADS)
-    path = str(path)
     try:
-        if path.endswith('.onnx'):
-            return _open_onnx(path, params, threads)
-        if path.endswith(('.torchscript', '.torchscript.pt')):
-            return _open_torchscript(path, params, threads)
-        return _open_checkpoint(path, params, threads, warn)
+        return _open_file(str(path), params, threads, warn)
     except ImportError as error:
         if error.name != 'torch':
             raise
@@ -74,23 +68,24 @@ def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
                            'detector without weights (detector:=depth)' % path)
 
 
-def _open_onnx(path, params, threads):
-    if params.runtime == 'torch':
-        raise ValueError('runtime torch cannot run %s; use auto or onnxruntime, or the .pt checkpoint' % path)
-    if params.device not in ('auto', 'cpu'):
-        raise ValueError('device is %r, but %s runs on the CPU; use the .pt checkpoint' % (params.device, path))
-    return OnnxRuntime(path, threads)
+def _open_file(path, params, threads, warn):
+    """Choose the backend. A checkpoint runs in torch on a GPU, and on a CPU in ONNX Runtime, which is twice as fast.
 
+    Torch is large and optional, so it is imported only if it is needed.
+    """
+    if path.endswith('.onnx'):
+        if params.runtime == 'torch':
+            raise ValueError('runtime torch cannot run %s; use auto or onnxruntime, or the .pt checkpoint' % path)
+        if params.device not in ('auto', 'cpu'):
+            raise ValueError('device is %r, but %s runs on the CPU; use the .pt checkpoint' % (params.device, path))
+        return OnnxRuntime(path, threads)
 
-def _open_torchscript(path, params, threads):
-    if params.runtime == 'onnxruntime':
-        raise ValueError('runtime onnxruntime cannot run %s; use auto or torch, or the .pt checkpoint' % path)
-    from ros_3d_bb.detection.yolov5.torch_backend import TorchScriptRuntime, torch_device
-    return TorchScriptRuntime(path, torch_device(params.device), threads)
+    if path.endswith(('.torchscript', '.torchscript.pt')):
+        if params.runtime == 'onnxruntime':
+            raise ValueError('runtime onnxruntime cannot run %s; use auto or torch, or the .pt checkpoint' % path)
+        from ros_3d_bb.detection.yolov5.torch_backend import TorchScriptRuntime, torch_device
+        return TorchScriptRuntime(path, torch_device(params.device), threads)
 
-
-def _open_checkpoint(path, params, threads, warn):
-    """Open a checkpoint: in torch on a GPU; on a CPU in ONNX Runtime, which is twice as fast, and else in torch."""
     if params.runtime == 'onnxruntime' or params.runtime == 'auto' and not on_gpu(params.device):
         try:
             return open_exported(path, export_folder(params.export_folder), threads, warn)

@@ -67,10 +67,6 @@ class Yolov5(object):
         """Return a detector with the same network and other parameters. Raises ValueError like the constructor."""
         return Yolov5(self._runtime, params)
 
-    def warm_up(self):
-        """Run the network on a black image, because the first run takes several times as long as later ones."""
-        self.detect(np.zeros((480, 640, 3), np.uint8))
-
     def detect(self, image):
         """Return the Detections in an RGB image (height, width, 3), uint8."""
         scaled, letterbox = apply_letterbox(image, self._input_hw, self._stride)
