@@ -44,7 +44,7 @@ def _forward(network, x):
         elif kind == 'Upsample':
             given = given.repeat_interleave(2, dim=2).repeat_interleave(2, dim=3)
         elif kind == 'Detect':
-            return torch.cat([_decoded(layer, scale, y[0]) for scale, y in enumerate(given)])
+            return torch.cat([_decoded(layer, scale, y) for scale, y in enumerate(given)])
         else:
             given = {'Conv': _conv, 'C3': _c3, 'SPPF': _spp, 'Focus': _focus, 'SPP': _spp}[kind](layer, given)
         outputs.append(given)
@@ -80,13 +80,9 @@ def _spp(layer, x):
 def _decoded(detect, scale, x):
     """Rows by anchor, line, column, as the official code orders them."""
     stride, layer = detect.strides[scale], detect.m[scale]
-    y = torch.sigmoid(functional.conv2d(x[None], layer.weight, layer.bias)[0])
-    y = y.reshape(3, -1, *y.shape[1:])
-    rows = []
-    for anchor, size in zip(y, detect.anchors[scale] * stride):
-        for line in range(y.shape[2]):
-            for column in range(y.shape[3]):
-                cell = anchor[:, line, column]
-                x_y = (2 * cell[:2] - 0.5 + torch.tensor([column, line])) * stride
-                rows.append(torch.cat((x_y, (2 * cell[2:4]) ** 2 * size, cell[4:])))
-    return torch.stack(rows)
+    y = torch.sigmoid(functional.conv2d(x, layer.weight, layer.bias))
+    y = y.reshape(3, -1, *x.shape[2:]).permute(0, 2, 3, 1)
+    columns, lines = np.meshgrid(np.arange(y.shape[2]), np.arange(y.shape[1]))
+    x_y = (2 * y[..., :2] - 0.5 + torch.from_numpy(np.stack((columns, lines), -1))) * stride
+    sizes = (2 * y[..., 2:4]) ** 2 * (detect.anchors[scale] * stride)[:, None, None]
+    return torch.cat((x_y, sizes, y[..., 4:]), -1).reshape(-1, y.shape[-1])

@@ -7,7 +7,7 @@ import pytest
 
 PROGRAM = """
 import resource, sys, threading
-from ros_3d_bb.nodes.common.allocator import reuse_freed_memory
+from ros_3d_bb.nodes.common.startup import reuse_freed_memory
 how, threads = sys.argv[1], int(sys.argv[2])
 if how == 'reuse':
     assert reuse_freed_memory()

@@ -72,8 +72,10 @@ class Room(object):
         return sorted(depth_people.box_of(blob, shape, grid, self.camera, self.floor)
                       for blob, shape in find_person_clusters(grid, self.camera, params))
 
-    def detections(self, floor='given', **params):
+    def detections(self, floor='given', in_metres=False, **params):
         color, depth = self.images()
+        if in_metres:
+            depth = DepthImage(np.where(self.depth_m < 8, depth.values / np.float32(1000), np.nan), 1.0)
         return DepthPeople(DepthPeopleParams(**params)).detect(color, depth, self.camera,
                                                                self.floor if floor == 'given' else None)
 
@@ -92,13 +94,13 @@ SIZES = [Camera(320, 240, 300, 300, 159.5, 119.5), Camera(848, 480, 420, 425, 43
 @pytest.mark.parametrize('height_m, x, z, camera', [
     (1.0, 0.3, 2.5, CAMERA), (1.0, 0.3, 4.0, CAMERA), (0.6, 0.3, 3.5, CAMERA), (0.26, 0.3, 5.0, CAMERA),
     (1.4, 0.3, 5.5, CAMERA), (0.26, 0.1, 2.0, CAMERA)] + [(1.0, -0.4, 3.0, camera) for camera in SIZES])
-@pytest.mark.parametrize('floor', ['given', 'fitted'])
-def test_the_box_of_a_person_extends_from_head_to_feet(height_m, x, z, camera, floor):
+@pytest.mark.parametrize('floor, in_metres', [('given', False), ('fitted', False), ('given', True)])
+def test_the_box_of_a_person_extends_from_head_to_feet(height_m, x, z, camera, floor, in_metres):
     """Or to the border of the image: in the sixth case the head is above it."""
     room = Room(height_m, camera)
     expected = room.visible(room.person(x, z))
     assert (expected[1] == 0) == (z == 2.0)
-    detections = room.detections(floor)
+    detections = room.detections(floor, in_metres)
     assert_boxes(detections.boxes, expected, 0.8 if z != 2.0 else 0.7)
     assert 0.7 <= detections.scores[0] <= 1 and detections.classes.tolist() == [0]
 
@@ -108,16 +110,6 @@ def test_finds_a_cluster_cut_by_the_side_of_the_image():
     expected = room.visible(room.person(-1.55, 3.0))
     assert expected[0] == 0
     assert_boxes(room.cluster_boxes(), expected)
-
-
-def test_depth_may_be_in_metres_with_nan():
-    room = Room()
-    expected = room.visible(room.person(0, 3))
-    color, depth = room.images()
-    metres = depth.values.astype(np.float32) / 1000
-    metres[metres > 8] = np.nan
-    detections = DepthPeople().detect(color, DepthImage(metres, 1.0), CAMERA, room.floor)
-    assert_boxes(detections.boxes, expected)
 
 
 @pytest.mark.parametrize('one, other', [((0.0, 3.0), (0.4, 3.5)), ((0.0, 3.0), (0.4, 3.7)), ((0.0, 3.0), (0.4, 4.0)),
@@ -158,19 +150,13 @@ def test_furniture_is_not_detected(x, z, low, high, half_width, height_m):
     assert len(DepthPeople().detect(color, depth, CAMERA, room.floor).boxes) == 0
 
 
-def test_a_person_beside_a_cabinet_is_detected_without_the_cabinet():
+def test_people_beside_a_cabinet_are_detected_in_order_of_score_without_the_cabinet():
     room = Room()
     room.block(0.9, 4.0, 0.0, 1.9, 0.4)
-    expected = room.visible(room.person(0, 3))
-    assert_boxes(room.detections().boxes, expected)
-
-
-def test_detections_are_sorted_by_score():
-    room = Room()
-    room.person(-0.8, 3)
-    room.person(0.7, 4.5)
-    scores = room.detections(min_score=0.1).scores
-    assert len(scores) == 2 and scores[0] >= scores[1]
+    expected = [room.visible(room.person(*position)) for position in ((0, 3), (-1.0, 3.5))]
+    detections = room.detections()
+    assert_boxes(detections.boxes, expected)
+    assert detections.scores[0] >= detections.scores[1]
 
 
 @pytest.mark.parametrize('depth', [Room().images()[1], DepthImage(np.zeros((480, 640), np.uint16), 0.001),

@@ -12,7 +12,7 @@ import torch
 
 from ros_3d_bb.detection.yolov5 import onnx_backend, onnx_export
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
-from ros_3d_bb.detection.yolov5.checkpoint import WeightsError, checkpoint_digest
+from ros_3d_bb.detection.yolov5.checkpoint import WeightsError
 from ros_3d_bb.detection.yolov5.onnx_backend import (ExportedRuntime, OnnxUnusable, export_folder, open_exported,
                                                      with_checksum)
 from ros_3d_bb.detection.yolov5.onnx_export import Exporter, export
@@ -29,7 +29,7 @@ class Cache(object):
         self.checkpoint, self.folder = tmp_path / 'random.pt', tmp_path / 'made' / 'when missing'
         self.warnings = []
         self.checkpoint.write_bytes(content)
-        digest = checkpoint_digest(str(self.checkpoint))
+        digest = hashlib.sha256(content).hexdigest()
         self.exported = self.folder / ('%s-%d.onnx' % (digest, onnx_backend.VERSION))
 
     def open(self):

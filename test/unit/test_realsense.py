@@ -47,13 +47,6 @@ def test_all_images_of_a_recording_are_read_with_their_stamps(played):
     assert frames[0].depth.scale_m == 0.001 and frames[0].depth.values.dtype == np.uint16
 
 
-def test_the_camera_is_that_of_the_colour_stream(played):
-    camera, _frames = played
-    assert camera.camera[:2] == COLOR_CAMERA[:2] and camera.camera.distortion_model == COLOR_CAMERA.distortion_model
-    np.testing.assert_allclose(camera.camera[2:6] + camera.camera.distortion,
-                               COLOR_CAMERA[2:6] + COLOR_CAMERA.distortion, rtol=1e-6)
-
-
 def test_aligned_depth_agrees_with_our_projection(played):
     """All points of the depth image are projected to the colour camera. In each pixel the nearest point is expected."""
     _camera, frames = played
@@ -75,16 +68,10 @@ def test_points_of_colour_and_depth_agree_in_the_published_frames(played):
     links = {child: (parent, matrix) for parent, child, matrix in frame_links('front', camera.link_from_color)}
     assert set(links) == {'front_color_frame', 'front_color_optical_frame', 'front_depth_frame',
                           'front_depth_optical_frame'}
-
-    def to_link(frame, point):
-        while frame != 'front_link':
-            parent, matrix = links[frame]
-            point, frame = transform_points(matrix, point), parent
-        return point
-    seen = np.array((0.3, -0.2, 2.0))
-    np.testing.assert_allclose(
-        to_link('front_color_optical_frame', seen),
-        to_link('front_depth_optical_frame', transform_points(DEPTH_FROM_COLOR, seen)), atol=1e-6)
+    link_from_color, link_from_depth = (
+        links['front_%s_frame' % stream][1].dot(links['front_%s_optical_frame' % stream][1])
+        for stream in ('color', 'depth'))
+    np.testing.assert_allclose(link_from_color, link_from_depth.dot(DEPTH_FROM_COLOR), atol=1e-6)
     np.testing.assert_allclose(links['front_depth_optical_frame'][1], transform_from((0, 0, 0), OPTICAL_ROTATION))
     # realsense2_camera's publish_static_tf: x, y, z of the body are z, -x, -y of the optical frame
     x, y, z = DEPTH_FROM_COLOR[:3, 3]

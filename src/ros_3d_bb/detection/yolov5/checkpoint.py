@@ -6,7 +6,6 @@ inert stand-ins. No class is imported and torch is not used, so a file controls 
 the network. Known limitation: a malicious file can keep Python's unpickler busy for very long by hashing nested tuples.
 """
 import collections
-import hashlib
 import pickle
 import zipfile
 
@@ -39,7 +38,7 @@ def read_checkpoint(path):
         with zipfile.ZipFile(path) as archive:
             return _content_of(_Unpickler(archive).load())
     except OSError as error:
-        raise _unreadable(path, error)
+        raise unreadable(path, error)
     except zipfile.BadZipFile as error:
         raise WeightsError('weights %s: truncated, not a checkpoint, or written by torch before 1.6 (%s); %s'
                            % (path, cause(error), EXPECTED))
@@ -47,16 +46,8 @@ def read_checkpoint(path):
         raise WeightsError('weights %s: rejected (%s); %s' % (path, cause(error), EXPECTED))
 
 
-def checkpoint_digest(path):
-    """SHA-256 of a file, in hexadecimal. Raises WeightsError if the file cannot be read."""
-    try:
-        with open(path, 'rb') as stream:
-            return hashlib.sha256(stream.read()).hexdigest()
-    except OSError as error:
-        raise _unreadable(path, error)
-
-
-def _unreadable(path, error):
+def unreadable(path, error):
+    """WeightsError for an OSError."""
     return WeightsError('weights %s: cannot be read (%s); %s' % (path, error.strerror, EXPECTED))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.error_text import cause
-from ros_3d_bb.detection.yolov5.checkpoint import WeightsError, checkpoint_digest, class_names
+from ros_3d_bb.detection.yolov5.checkpoint import WeightsError, class_names, unreadable
 from ros_3d_bb.detection.yolov5.onnx_writer import metadata_entry
 from ros_3d_bb.detection.yolov5.predictions import batch_of, check_stride, decode_heads, predictions
 
@@ -32,10 +32,6 @@ class OnnxRuntime(object):
     """Model that was exported to ONNX by YOLOv5's export.py."""
 
     def __init__(self, path, threads):
-        try:
-            import onnxruntime  # noqa: F401
-        except ImportError:
-            raise WeightsError('weights %s: %s, or use the .pt checkpoint' % (path, INSTALL))
         self.description = 'ONNX Runtime on the CPU, threads: %d' % threads
         try:
             self._session = session_of(path, threads)
@@ -47,6 +43,8 @@ class OnnxRuntime(object):
             self.stride = check_stride(metadata.get('stride', 32))
             columns = self(np.zeros((self.input_hw or (self.stride,) * 2) + (3,), np.uint8), 0).shape[1]
             names = ast.literal_eval(metadata.get('names', 'None'))  # executes no code
+        except ImportError:
+            raise WeightsError('weights %s: %s, or use the .pt checkpoint' % (path, INSTALL))
         except Exception as error:  # a damaged file can raise any exception
             raise WeightsError('weights %s: not a YOLOv5 ONNX export (%s); expected the file that its export.py writes'
                                % (path, cause(error)))
@@ -105,8 +103,7 @@ def session_of(model, threads):
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
     options.log_severity_level = 3
-    if hasattr(options, 'add_session_config_entry'):  # since 1.5
-        options.add_session_config_entry('session.intra_op.allow_spinning', '0')
+    options.add_session_config_entry('session.intra_op.allow_spinning', '0')
     return onnxruntime.InferenceSession(model, options, providers=['CPUExecutionProvider'])
 
 
@@ -127,7 +124,12 @@ def open_exported(path, folder, threads, warn):
         import onnxruntime  # noqa: F401
     except ImportError:
         raise OnnxUnusable(INSTALL)
-    digest = checkpoint_digest(path)
+    try:
+        with open(path, 'rb') as stream:
+            digest = hashlib.sha256(stream.read()).hexdigest()
+    except OSError as error:
+        raise unreadable(path, error)
+
     file_path = os.path.join(folder, '%s-%d.onnx' % (digest, VERSION))
     try:
         return _open_cached(file_path, digest, threads)

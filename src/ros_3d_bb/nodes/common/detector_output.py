@@ -1,5 +1,4 @@
-"""What the 2D detector nodes share: the worker that detects and publishes, and the service that pauses it."""
-import contextlib
+"""Worker of the 2D detector nodes: it detects, publishes, and can be paused."""
 import time
 
 import rospy
@@ -37,30 +36,38 @@ class DetectorWorker(object):
     def __init__(self, params, diagnostics, detect, names):
         self._publish_empty, self._diagnostics, self._detect, self._names = (
             params.publish_empty, diagnostics, detect, names)
+        self._enabled = params.enabled
+        self._waits_since_s = None  # arrival of the oldest image since the last completed detection
         self._boxes_pub = rospy.Publisher('yolo_bounding_box', Int32MultiArray, queue_size=10)
         self._image_pub = rospy.Publisher('yolo_result_out', Image, queue_size=1)
         self._worker = NewestWorker(self._work, self._on_error)
         rospy.on_shutdown(self._worker.stop)
-        self._switch = Switch(params.enabled, diagnostics)
+        diagnostics.show('detector', lambda: 'working' if self._enabled else 'paused')
+        diagnostics.check(self._faults)
+        rospy.Service('~enable', SetBool, self._on_request)
 
     def offer(self, *images):
         """Detect objects in these images, of which the first is the colour image, unless newer ones arrive first."""
-        if not self._switch.on:
+        if not self._enabled:
             self._diagnostics.count('images while paused')
             return
-        self._switch.offered()
+        if self._waits_since_s is None:
+            self._waits_since_s = time.monotonic()
         if self._worker.offer(images):
             self._diagnostics.count('images skipped for a newer one')
 
     def _work(self, images):
-        with self._diagnostics.rejecting('images'), self._switch.detecting():
-            if not self._switch.on:  # the detector was paused after the images arrived
-                self._diagnostics.count('images while paused')
-                return
-            result = self._detect(*images)
-            if result is not None:
-                self._publish(images[0].header, *result)
-                self._diagnostics.record_latency(images[0].header.stamp)
+        if not self._enabled:  # the detector was paused after the images arrived
+            self._diagnostics.count('images while paused')
+            return
+        try:
+            with self._diagnostics.rejecting('images'):
+                result = self._detect(*images)
+                if result is not None:
+                    self._publish(images[0].header, *result)
+                    self._diagnostics.record_latency(images[0].header.stamp)
+        finally:  # any outcome, such as a rejected image, shows that the detector works
+            self._waits_since_s = None
 
     def _publish(self, header, image, detections):
         if len(detections.boxes) or self._publish_empty:
@@ -74,40 +81,12 @@ class DetectorWorker(object):
     def _on_error(self, error):
         self._diagnostics.warn('detections failed', 'the detector failed: %s; waiting for the next image' % error)
 
-
-class Switch(object):
-    """State of the detector: enabled or paused; its service is documented in DetectorWorker.
-
-    The state is shown in the diagnostics, with a warning if an image was accepted and no detection completes.
-    """
-
-    def __init__(self, on, diagnostics):
-        self.on = on
-        self._waits_since_s = None  # arrival of the oldest image since the last completed detection
-        diagnostics.show('detector', lambda: 'working' if self.on else 'paused')
-        diagnostics.check(self._faults)
-        rospy.Service('~enable', SetBool, self._on_request)
-
-    def offered(self):
-        """Record that an image was passed to the detector."""
-        if self._waits_since_s is None:
-            self._waits_since_s = time.monotonic()
-
-    @contextlib.contextmanager
-    def detecting(self):
-        """Context manager for one detection. Any outcome, also a rejected image, shows that the detector works."""
-        try:
-            yield
-        finally:
-            self._waits_since_s = None
-
     def _faults(self):
         since_s, now_s = self._waits_since_s, time.monotonic()
-        if self.on and since_s is not None and now_s - since_s > SILENT_S:
+        if self._enabled and since_s is not None and now_s - since_s > SILENT_S:
             yield 'detector hangs', ('images arrive, but no detection has completed for %.0f s; the detector hangs or '
                                      'lacks CPU time' % (now_s - since_s))
 
     def _on_request(self, request):
-        self.on = request.data
-        self._waits_since_s = None
+        self._enabled, self._waits_since_s = request.data, None
         return SetBoolResponse(True, 'detector %s' % ('enabled' if request.data else 'paused'))
