@@ -31,14 +31,9 @@ def recording(tmp_path_factory):
     return write_recording(path, [colored(number) for number in range(FRAMES)], [sloping_depth()] * FRAMES)
 
 
-def delete_params(name):
-    """Delete the parameters of a previous run."""
-    if rospy.has_param(name):
-        rospy.delete_param(name)
-
-
 def node(*params):
-    delete_params('/realsense_node')
+    if rospy.has_param('/realsense_node'):  # of the previous run
+        rospy.delete_param('/realsense_node')
     return subprocess.Popen(['rosrun', 'ros_3d_bb', 'realsense_node'] + ['_' + param for param in params],
                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
 
@@ -124,7 +119,6 @@ class UnreliableCamera(object):
 
 
 def test_the_node_waits_for_an_unplugged_camera_and_drops_incomplete_images(recording, monkeypatch):
-    delete_params('/test_realsense_node')
     monkeypatch.setattr(realsense_node, 'RealSense', UnreliableCamera)
     monkeypatch.setattr(realsense_node, 'RETRY_S', 0.1)
     with Recorder(DEPTH, Image, publisher_expected=False) as depth, Recorder(COLOR, Image, False) as color:

@@ -14,10 +14,10 @@ DEPTH_FROM_COLOR = transform_from((0.0148, 0.0002, 0.0004), (0.002, -0.001, 0.00
 START_MS, STEP_MS = 1700000000000.25, 33.5
 # pyrealsense2 2.58 and later write .db3 and read both; old releases have no version attribute.
 SUFFIX = '.db3' if tuple(int(part) for part in getattr(rs, '__version__', '2.0').split('.')[:2]) >= (2, 58) else '.bag'
-CLOCKS = {'global': rs.timestamp_domain.global_time, 'camera': rs.timestamp_domain.hardware_clock}
 
 
-def write_recording(path, colors, depths, depth_scale_m=0.001, clock='global', start_ms=START_MS):
+def write_recording(path, colors, depths, depth_scale_m=0.001, clock=rs.timestamp_domain.global_time,
+                    start_ms=START_MS):
     """Record colour (h, w, 3) uint8 and depth (h, w) uint16 images, `STEP_MS` apart. Returns `path`."""
     device = rs.software_device()
     for info, text in ((rs.camera_info.name, 'D435I'), (rs.camera_info.serial_number, '42')):
@@ -38,7 +38,7 @@ def write_recording(path, colors, depths, depth_scale_m=0.001, clock='global', s
             frame = rs.software_video_frame()
             frame.pixels, frame.bpp = np.ascontiguousarray(pixels), pixels[0, 0].nbytes
             frame.stride, frame.profile = pixels.shape[1] * frame.bpp, profile.as_video_stream_profile()
-            frame.timestamp, frame.domain = start_ms + number * STEP_MS, CLOCKS[clock]
+            frame.timestamp, frame.domain = start_ms + number * STEP_MS, clock
             frame.frame_number, frame.depth_units = number, depth_scale_m
             sensor.on_video_frame(frame)
         time.sleep(STEP_MS / 1000)  # the recording also contains arrival times

@@ -4,13 +4,11 @@ import glob
 import json
 import os
 import resource
-import stat
 import zipfile
 
 import pytest
 import yaml
 
-from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.detection.yolov5.backends import open_runtime
 from ros_3d_bb.detection.yolov5.checkpoint import WeightsError, read_checkpoint
@@ -128,13 +126,3 @@ def test_malicious_onnx_files_are_rejected(tmp_path, content):
     path.write_bytes(content)
     with pytest.raises(WeightsError, match='not a YOLOv5 ONNX export'):
         open_runtime(str(path))
-
-
-@pytest.mark.parametrize('mask', [0o077, 0o022, 0o002])
-def test_files_are_written_with_the_permissions_of_the_user(tmp_path, mask):
-    before = os.umask(mask)
-    try:
-        atomic_write(str(tmp_path / 'file'), b'x')
-    finally:
-        os.umask(before)
-    assert stat.S_IMODE(os.stat(str(tmp_path / 'file')).st_mode) == 0o666 & ~mask

@@ -108,7 +108,7 @@ def person_window_of(blob, shape, grid, camera, floor):
 def box_of(blob, shape, grid, camera, floor):
     """Box (x1, y1, x2, y2) of the visible part of a person.
 
-    Visible feet lie within the floor margin, outside the blob. The box of a person seen nearly to the ground is
+    Visible feet lie within the floor margin, outside the blob. The box of a person visible nearly to the ground is
     therefore extended to the floor.
     """
     rows, columns = blob.mask.shape

@@ -222,7 +222,11 @@ class _Builder(object):
 
     def _block(self, kind, in_channels, repeats, arguments):
         """Build a layer with weights. Returns the layer, its output channels, and its stride."""
-        out_channels, rest = self._scaled(arguments[0]), arguments[1:]
+        out_channels, rest = arguments[0], arguments[1:]
+        if out_channels != self._anchor_count * (self._class_count + 5):  # rounded up to a multiple of 8 as in YOLOv5
+            out_channels = int(math.ceil(out_channels * self._width / 8) * 8)
+        if out_channels <= 0:
+            raise ValueError('a layer has %d channels; at least 1 expected' % out_channels)
         sizes = rest[0] if kind == 'SPP' and rest else rest
         if len(sizes) > 4 or not all(isinstance(n, int) and 0 <= n <= MAX_KERNEL for n in sizes):
             raise ValueError('kernel, stride and padding of %s are not integers from 0 to %d' % (kind, MAX_KERNEL))
@@ -250,12 +254,3 @@ class _Builder(object):
             'SPPF': repeats * (in_channels ** 2 / 2.0 + 2 * in_channels * out_channels)}[kind]
         if self._parameters > MAX_PARAMETERS:
             raise ValueError('the layout has more than %d million parameters' % (MAX_PARAMETERS / 1e6))
-
-    def _scaled(self, channels):
-        """Channels times the width multiple, rounded up to a multiple of 8 as in YOLOv5."""
-        if channels == self._anchor_count * (self._class_count + 5):
-            return channels
-        scaled = int(math.ceil(channels * self._width / 8) * 8)
-        if scaled <= 0:
-            raise ValueError('a layer has %d channels; at least 1 expected' % scaled)
-        return scaled

@@ -23,8 +23,11 @@ class Graph(object):
         """Add an operator with one output. Attributes: int, float, str or list of int. Returns the output's name."""
         self._count += 1
         name = 'v%d' % self._count
-        self._nodes.append(_fields((1, list(inputs)), (2, name), (4, kind),
-                                   (5, [_attribute(key, attributes[key]) for key in sorted(attributes)])))
+        encoded = []
+        for key in sorted(attributes):
+            field, attribute_type = ATTRIBUTE_FIELDS[type(attributes[key])]
+            encoded.append(_fields((1, key), (field, attributes[key]), (20, attribute_type)))
+        self._nodes.append(_fields((1, list(inputs)), (2, name), (4, kind), (5, encoded)))
         return name
 
     def constant(self, values):
@@ -49,11 +52,6 @@ class Graph(object):
 def metadata_entry(key, value):
     """One entry of the metadata of a model, as bytes. It may be appended to a serialized model."""
     return _fields((14, _fields((1, key), (2, value))))
-
-
-def _attribute(name, value):
-    field, kind = ATTRIBUTE_FIELDS[type(value)]
-    return _fields((1, name), (field, value), (20, kind))
 
 
 def _value(name, element, shape):
