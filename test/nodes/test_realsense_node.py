@@ -123,7 +123,7 @@ def test_the_node_waits_for_an_unplugged_camera_and_drops_incomplete_images(reco
     monkeypatch.setattr(realsense_node, 'RETRY_S', 0.1)
     with Recorder(DEPTH, Image, publisher_expected=False) as depth, Recorder(COLOR, Image, False) as color:
         realsense_node.RealSenseNode()
-        wait_until(lambda: any(message.data[0] == 4 for message in color.messages), 'images after the second connection')
+        wait_until(lambda: any(message.data[0] == 4 for message in color.messages), 'images of the second connection')
         depth.wait_for(3)
     assert UnreliableCamera.opened == 4 and UnreliableCamera.closed == 1
     assert depth.messages[0].encoding == '32FC1'

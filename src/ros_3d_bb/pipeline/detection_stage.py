@@ -44,16 +44,27 @@ class DepthDetectorParams(NamedTuple):
 
 
 def opened_yolov5(weights, detection, running, warn):
-    """Return a `Yolov5` detector, whose `weights` are the path of a checkpoint or exported network.
+    """Return a `Yolov5` detector.
 
-    `detection` are `detector.DetectionParams`, `running` `backends.RuntimeParams`; `warn` is called with the text of each
-    warning. Raises ValueError if no weights are given or the network cannot be used.
+    Parameters
+    ----------
+    weights : str
+        Path of the checkpoint or exported network.
+    detection : detector.DetectionParams
+    running : backends.RuntimeParams
+    warn : callable
+        Called with the text of each warning.
+
+    Raises
+    ------
+    ValueError
+        If no weights are given or the network cannot be used.
     """
     if not weights:
         raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
                          'checkpoint such as yolov5n.pt')
     detector = Yolov5(open_runtime(os.path.abspath(os.path.expanduser(weights)), running, warn), detection)
-    detector.detect(np.zeros((480, 640, 3), np.uint8))  # the first detection takes several times as long as later ones
+    detector.detect(np.zeros((480, 640, 3), np.uint8))  # the first detection takes several times as long as others
     return detector
 
 
@@ -121,7 +132,7 @@ class RgbdDetectionStage(object):
                          'colour image arrived; waiting for the next' % (stamp_of(color_msg) / NS))
 
     def detect(self, color_msg, depth_msg, camera):
-        """Return the colour image as RGB, (height, width, 3), and the Detections in it; None while the floor is unknown.
+        """Return the RGB image, (height, width, 3), and the Detections in it; None while the floor is unknown.
 
         Raises ValueError if the images cannot be used.
         """
@@ -130,8 +141,8 @@ class RgbdDetectionStage(object):
         depth = checked_depth_from(depth_msg)
         detections = self._detector.detect(image, depth, camera, self._floor(camera_frame))
         if detections is None:
-            self._tally.warn('images without floor', 'tf gives no floor, and none is visible in the depth image; people '
-                             'cannot be detected; waiting for the next image')
+            self._tally.warn('images without floor', 'tf gives no floor, and none is visible in the depth image; no '
+                             'detection; waiting for the next image')
             return None
         self._tally.count('images processed')
         return image, detections

@@ -120,8 +120,9 @@ def box_of(blob, shape, grid, camera, floor):
 
 
 def _merged_detections(people):
-    """Convert a list of DepthDetection to Detections. Parts of one person, closer together than MIN_DISTANCE_M, are merged;
-    the position of the largest part is kept, as it is more accurate.
+    """Merge parts of one person, closer together than MIN_DISTANCE_M, and convert DepthDetections to Detections.
+
+    The position of the largest part is kept, as it is more accurate.
     """
     merged = []
     for part in sorted(people, key=lambda person: -np.subtract(person.box[2:], person.box[:2]).prod()):

@@ -73,8 +73,9 @@ def shape_features_of(mask, ahead_m, thickness_m):
 
 
 def person_score(features, hog, headless):
-    """Probability that a cluster is a person, from `shape_features_of`, `PersonHog.score`, and whether its top is cut by
-    the image border.
+    """Probability that a cluster is a person, from `shape_features_of` and `PersonHog.score`.
+
+    `headless`: the top of the cluster is cut by the image border.
     """
     weights = WEIGHTS_HEADLESS if headless else WEIGHTS
     return float(1 / (1 + np.exp(-weights.dot(np.hstack((1, hog, features))))))
