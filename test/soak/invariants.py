@@ -37,11 +37,11 @@ class Balance(NamedTuple):
 
 
 BALANCES = {
-    'yolov5_node': Balance('colour images', 'images searched', (
-        'images rejected', 'images skipped for a newer one', 'images while paused', 'searches failed')),
-    'depth_detector_node': Balance('colour images', 'images searched', (
+    'yolov5_node': Balance('colour images', 'images processed', (
+        'images rejected', 'images skipped for a newer one', 'images while paused', 'detections failed')),
+    'depth_detector_node': Balance('colour images', 'images processed', (
         'colour images rejected', 'colour images without depth', 'colour images of a time before', 'images rejected',
-        'images skipped for a newer one', 'images without floor', 'images while paused', 'searches failed')),
+        'images skipped for a newer one', 'images without floor', 'images while paused', 'detections failed')),
     'bbox3d_node': Balance('2D boxes', 'images estimated', ('2D boxes rejected', '2D boxes from before a time jump')),
     'tracker_node': Balance('3D boxes', 'images tracked', (
         '3D boxes rejected', 'no transform', 'images behind other cameras', 'images ahead of other cameras')),
@@ -145,8 +145,8 @@ def nobody_dies_of_a_message(record):
     broken = [(death.at_s, '%s (process %d) %s' % (death.node, death.pid, death.how))
               for death in record.deaths if death.pid not in record.killed]
     broken += [(at_s, text) for at_s, text in record.errors]
-    broken += [(status.at_s, '%s: %d searches failed' % (status.node, status.counts['searches failed']))
-               for status in last_of_each(record) if status.counts.get('searches failed')]
+    broken += [(status.at_s, '%s: %d detections failed' % (status.node, status.counts['detections failed']))
+               for status in last_of_each(record) if status.counts.get('detections failed')]
     return Finding('nobody dies of a message', '%d killed, %d died, %d exceptions'
                    % (len(record.killed), len([1 for death in record.deaths if death.pid not in record.killed]),
                       len(record.errors)), 'only who is killed', broken)

@@ -88,8 +88,7 @@ def masterless(params=()):
         'rospy.logwarn_throttle': lambda _period_s, text, *arguments: text % arguments,
         'tf2_ros.Buffer': connections._buffer,
         'diagnostic_updater.Updater': mock.Mock(),
-        'ros_3d_bb.nodes.yolov5_node.NewestWorker': immediate_worker,
-        'ros_3d_bb.nodes.depth_detector_node.NewestWorker': immediate_worker,
+        'ros_3d_bb.nodes.common.detector_output.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.tracker_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.bbox3d_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.bbox3d_node.patient_master': mock.Mock()}

@@ -151,7 +151,7 @@ def test_somebody_who_is_hidden_is_remembered():
 
 @pytest.mark.parametrize('changed, at_s', [
     ({'killed': set()}, 50), ({'errors': [(BEGAN_S + 9, 'bad callback: ...')]}, 9),
-    ({'statuses': [status(20, **{'searches failed': 1})]}, 20)])
+    ({'statuses': [status(20, **{'detections failed': 1})]}, 20)])
 def test_deaths_and_exceptions_are_found(changed, at_s):
     (found_s, _text), = broken_of(nobody_dies_of_a_message, **changed)
     assert found_s == at_s

@@ -76,7 +76,7 @@ def test_people_are_tracked_and_the_input_is_kept(scene, tmp_path):
     assert {topic: after[topic] for topic in before} == before
     assert set(after) - set(before) == {'/yolo_bounding_box', '/ros_3d_bb/bb_3d', '/ros_3d_bb/tracks',
                                         '/visualization_marker_array'}
-    assert events.counts['images searched'] == events.counts['images tracked'] == len(after['/ros_3d_bb/tracks']) == 15
+    assert events.counts['images processed'] == events.counts['images tracked'] == len(after['/ros_3d_bb/tracks']) == 15
     assert not events.sentences
     truth = {message.header.stamp: tracks_from_msg(message) for message in before['/ground_truth']}
     last = after['/ros_3d_bb/tracks'][-1]

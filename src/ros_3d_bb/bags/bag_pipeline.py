@@ -13,7 +13,7 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, STATIC_TOPIC, TF_TOPI
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.pipeline.detection_stage import opened_yolov5, search_color
+from ros_3d_bb.pipeline.detection_stage import detect_in_color, opened_yolov5
 from ros_3d_bb.pipeline.offline_pipeline import INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, Pipeline, Settings
 
 MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
@@ -48,7 +48,7 @@ class BagRun(object):
             params, detection, running = settings.yolov5
             self._detector = opened_yolov5(params.weights, detection, running,
                                            lambda line: events.note('remarks of the detector', line))
-            self._detect = lambda message: search_color(self._detector, message)[1]
+            self._detect = lambda message: detect_in_color(self._detector, message)[1]
         needed = BOXES_TOPIC if settings.detector == 'none' else COLOR_TOPIC
         for camera in settings.cameras:
             reader.check_topic(settings.name(needed, camera), INPUTS[needed])
@@ -116,7 +116,7 @@ class BagRun(object):
             return []
         with self._pipeline.searching():
             found = search.result()
-            self._events.count('images searched')
+            self._events.count('images processed')
             return self._pipeline.found(message.header, found, now_ns, camera)
         return []
 

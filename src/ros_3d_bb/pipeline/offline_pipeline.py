@@ -120,7 +120,7 @@ class Pipeline(object):
             with self._events.rejecting('images'):
                 yield
         except Exception as error:  # as in the worker threads of the nodes
-            self._events.warn('searches failed', 'the detector failed: %s; waiting for the next image' % cause(error))
+            self._events.warn('detections failed', 'the detector failed: %s; waiting for the next image' % cause(error))
 
     def end(self):
         """Report inputs that are still waiting for others. Call at the end of the input."""
@@ -130,7 +130,7 @@ class Pipeline(object):
     def _on_images(self, camera, color_msg, depth_msg, camera_model):
         """Detect people in the images of one stamp, as depth_detector_node does."""
         with self.searching():
-            found = self._searches[camera].search(color_msg, depth_msg, camera_model)
+            found = self._searches[camera].detect(color_msg, depth_msg, camera_model)
             if found is not None:
                 _image, detections = found
                 self._on_detections(camera, color_msg.header, detections)
