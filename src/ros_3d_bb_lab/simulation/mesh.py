@@ -22,28 +22,26 @@ class Mesh(NamedTuple):
 
     def moved(self, position_m, heading_rad):
         """Return the mesh rotated about z (counter-clockwise seen from above), then translated by (x, y, z)."""
-        c, s = np.cos(heading_rad), np.sin(heading_rad)
-        turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]], np.float32)
+        turn = rotation(2, -heading_rad).astype(np.float32)  # applied to row vectors
         return self._replace(vertices=self.vertices.dot(turn) + np.asarray(position_m, np.float32),
                              normals=self.normals.dot(turn))
 
 
+def rotation(axis, angle):
+    """Rotation matrix (3, 3) about x (0), y (1) or z (2)."""
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    c, s = np.cos(angle), np.sin(angle)
+    matrix = np.eye(3)
+    matrix[first, first] = matrix[second, second] = c
+    matrix[first, second], matrix[second, first] = -s, s
+    return matrix
+
+
 def loft(centers, forward, sideways, exponent, sides):
-    """Closed tube through rings.
+    """Vertices and faces of a closed tube through superelliptic rings.
 
-    Parameters
-    ----------
-    centers, forward, sideways : array_like, (rings, 3)
-        Centre and the two half axes of each ring.
-    exponent : float
-        Exponent of the superellipse: 2 is an ellipse, larger values approach a rectangle.
-    sides : int
-        Even number of vertices in a ring.
-
-    Returns
-    -------
-    vertices : numpy.ndarray, (rings * sides, 3)
-    faces : numpy.ndarray, (m, 4)
+    `centers`, `forward` and `sideways` (rings, 3) are the centre and the half axes of each ring; an `exponent` of 2 is
+    an ellipse, larger values approach a rectangle; `sides` is the even number of vertices in a ring.
     """
     centers, forward, sideways = (np.asarray(axis, float)[:, None] for axis in (centers, forward, sideways))
     angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
