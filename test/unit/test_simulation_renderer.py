@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb_lab.simulation import textures
 from ros_3d_bb_lab.simulation.body import Body, Build
-from ros_3d_bb_lab.simulation.color_sensor import ColorSensor
+from ros_3d_bb_lab.simulation.sensors import ColorSensor
 from ros_3d_bb_lab.simulation.mesh import Mesh, box
 from ros_3d_bb_lab.simulation.renderer import render
 from ros_3d_bb_lab.simulation.room import FLOOR, RenderedRoom

@@ -6,9 +6,8 @@ from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
-from ros_3d_bb_lab.simulation.ground_truth import PREDICTION_STEP_S, truth_at
 from ros_3d_bb_lab.simulation.scenario import Follow, Furniture, Mount, Move, Person, Robot, Room, Scenario
-from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
+from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, PREDICTION_STEP_S, Simulator
 
 CAMERA = Camera(160, 120, 153.7, 153.7, 79.8, 60.5)
 HALL = Room(furniture=(Furniture((3.0, 0.0), (.4, .8, 2.8)),))
@@ -199,7 +198,7 @@ def test_the_appearance_is_random_by_the_seed_unless_specified():
 
 def test_a_person_behind_a_pillar_is_occluded(pillar):
     simulator, frames = pillar
-    status = [truth_at(simulator, frame, START_NS)[0].status for frame in frames]
+    status = [simulator.true_tracks(frame, START_NS)[0].status for frame in frames]
     hidden = [frame.people[0].hidden for frame in frames]
     assert status[0] == status[-1] == VISIBLE and max(hidden) == 1
     occluded = [number for number, value in enumerate(status) if value == OCCLUDED]
@@ -214,7 +213,7 @@ def test_a_person_behind_a_pillar_is_occluded(pillar):
 @pytest.mark.parametrize('start,status', [((4.0, 0.0), VISIBLE), ((4.0, 2.6), OUT_OF_VIEW), ((-2.0, 0.0), OUT_OF_VIEW)])
 def test_the_status_of_people_outside_the_image_is_out_of_view(start, status):
     simulator = Simulator(scene(Person(start)), CAMERA)
-    assert truth_at(simulator, simulator.frame(0), START_NS)[0].status == status
+    assert simulator.true_tracks(simulator.frame(0), START_NS)[0].status == status
 
 
 def test_a_near_person_hides_a_far_person():
@@ -224,7 +223,7 @@ def test_a_near_person_hides_a_far_person():
 
 def test_predictions_of_the_truth_are_the_future_positions(pillar):
     simulator, frames = pillar
-    track, = truth_at(simulator, frames[3], START_NS)
+    track, = simulator.true_tracks(frames[3], START_NS)
     assert track.prediction_step_s == PREDICTION_STEP_S and len(track.prediction_m) * PREDICTION_STEP_S == 2.0
     for step, place in enumerate(track.prediction_m, 1):
         time_s = frames[3].time_s + step * PREDICTION_STEP_S
@@ -235,7 +234,7 @@ def test_predictions_of_the_truth_are_the_future_positions(pillar):
 def test_true_tracks_agree_with_the_frame(pillar):
     simulator, frames = pillar
     frame = frames[6]
-    track, = truth_at(simulator, frame, START_NS)
+    track, = simulator.true_tracks(frame, START_NS)
     person = frame.people[0]
     assert track.id == person.id == 1 and track.moving
     np.testing.assert_array_equal(track.position_m, person.position_m)
@@ -247,12 +246,12 @@ def test_true_tracks_agree_with_the_frame(pillar):
 
 def test_a_standing_person_is_not_moving():
     simulator = Simulator(scene(Person((4.0, 0.0))), CAMERA)
-    track, = truth_at(simulator, simulator.frame(5), START_NS)
+    track, = simulator.true_tracks(simulator.frame(5), START_NS)
     assert not track.moving and not track.velocity_mps.any()
     np.testing.assert_allclose(track.prediction_m, [track.position_m] * 8)
 
 
 def test_an_empty_room_has_no_truth(empty_simulator):
     frame = empty_simulator.frame(0)
-    assert frame.people == [] and truth_at(empty_simulator, frame, START_NS) == []
+    assert frame.people == [] and empty_simulator.true_tracks(frame, START_NS) == []
     assert empty_simulator.positions_at(1.0).shape == (0, 2)

@@ -44,13 +44,11 @@ SHOE = ((-.09, .043, .024, .025), (-.065, .05, .046, .036), (-.015, .055, .052, 
 
 
 class Build(NamedTuple):
-    """Appearance of a person. `girth` scales the body horizontally, 1 is slim; `hips` ranges from 0 (wide shoulders) to
-    1 (wide hips); colours are RGB.
-    """
+    """Appearance of a person. Colours are RGB."""
 
     height_m: float = TABLE_HEIGHT_M
-    girth: float = 1.0
-    hips: float = 0.0
+    girth: float = 1.0  # scales the body horizontally, 1 is slim
+    hips: float = 0.0   # 0 (wide shoulders) to 1 (wide hips)
     long_hair: bool = False
     short_sleeves: bool = False
     skin: Color = (225, 180, 150)
@@ -61,14 +59,7 @@ class Build(NamedTuple):
 
 
 class Body(object):
-    """Body of one person.
-
-    Parameters
-    ----------
-    build : Build
-    random : numpy.random.RandomState
-        Source of the creases in the clothes.
-    """
+    """Body of one person. `random` determines the creases in the clothes."""
 
     def __init__(self, build, random):
         self.build = build
@@ -92,12 +83,7 @@ class Body(object):
         return 2 * (JOINTS_M['arm_l'][1] + SHOULDER_M * self.build.girth) * self._scale
 
     def posed(self, posture=Posture()):
-        """Return the body in a posture, with its lowest point on the floor.
-
-        Returns
-        -------
-        Mesh
-        """
+        """Return the body in a posture as a Mesh, with its lowest point on the floor."""
         bones = bone_transforms(posture).astype(np.float32)
         bones[:, :, 3] *= self._scale
         skin = self._weights.dot(bones.reshape(len(BONES), 12)).reshape(-1, 3, 4)
@@ -109,9 +95,8 @@ class Body(object):
 def _parts(build):
     """Yield (vertices, faces, colour, bones) of each part. Bones: [(bone, z above which only this bone moves it)]."""
     def trunk(rings):
-        table = np.array(rings)
-        return np.c_[table[:, :3], table[:, 3] + build.hips * (table[:, 4] - table[:, 3])] * [1, 1, build.girth,
-                                                                                              build.girth]
+        z, x, depth, slim, wide = np.array(rings).T
+        return np.c_[z, x, depth * build.girth, (slim + build.hips * (wide - slim)) * build.girth]
 
     yield _upright(trunk(TORSO), 16, 2.4) + (build.shirt, (('pelvis', 1.0), ('chest', 1.2)))
     yield _upright(trunk(SEAT), 14, 2.3) + (build.trousers, (('pelvis', 0),))

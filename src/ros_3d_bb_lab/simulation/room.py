@@ -25,14 +25,7 @@ class Surface(NamedTuple):
 
 
 class RenderedRoom(object):
-    """Room x0..x1, y0..y1, 0..height, seen from inside.
-
-    Parameters
-    ----------
-    bounds_m : (x0, x1, y0, y1)
-    height_m : float
-    random : numpy.random.RandomState
-    """
+    """Room with the bounds (x0, x1, y0, y1), seen from inside."""
 
     def __init__(self, bounds_m, height_m, random):
         x0, x1, y0, y1 = bounds_m
@@ -51,14 +44,7 @@ class RenderedRoom(object):
     def draw(self, camera, world_from_camera):
         """Draw the image of a camera inside the room.
 
-        Returns
-        -------
-        color : numpy.ndarray, (height, width, 3), uint8
-            RGB.
-        inverse_depth : numpy.ndarray, (height, width), float32
-            1/m along the optical axis.
-        surfaces : numpy.ndarray, (height, width), uint8
-            Number of the surface; `FLOOR` is the floor.
+        Returns colour (h, w, 3), uint8 RGB, inverse depth (h, w), float32, and the number of the surface (h, w), uint8.
         """
         shape = (camera.height, camera.width)
         inverse_depth, surfaces = np.full(shape, 1e-3, np.float32), np.full(shape, 255, np.uint8)
