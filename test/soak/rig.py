@@ -9,7 +9,7 @@ import rospy
 
 from fuzz import hostile
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
-from ros_3d_bb_lab.simulation.scenario import ScenarioError, read_scenario
+from ros_3d_bb_lab.simulation.scenario import read_scenario
 from soak.camera import Camera, rendered
 from soak.faults import FAULTS
 from soak.graph import Graph, GraphEnded
@@ -166,7 +166,7 @@ def soak(arguments, port, folder):
             rig = Rig(graph, scenes, arguments)
             interrupted = _played(rig)
             return rig.record(), dict(rig.witness.empty), interrupted
-    except (GraphEnded, ScenarioError, OSError) as error:
+    except (GraphEnded, ValueError, OSError) as error:
         return None, '%s%s' % (error, _tail(folder)), False
     except KeyboardInterrupt:
         return None, 'ended before it began', False

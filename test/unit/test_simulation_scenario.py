@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from ros_3d_bb_lab.simulation.motion import person_motion, robot_motion
 from ros_3d_bb_lab.simulation.scenario import (Follow, Furniture, Mount, Move, Person, Robot, Room, Scenario,
-                                               ScenarioError, read_scenario, scenario_from)
+                                               read_scenario, scenario_from)
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'config', 'scenarios')
 SHIPPED = sorted(os.path.basename(path) for path in glob.glob(os.path.join(FOLDER, '*.yaml')))
@@ -32,7 +32,7 @@ KEYS = [(where, name) for where, (kind, _wrap) in PLACES.items() for name in kin
 
 
 def error_of(content):
-    with pytest.raises(ScenarioError) as caught:
+    with pytest.raises(ValueError) as caught:
         scenario_from(content)
     return str(caught.value)
 
@@ -119,7 +119,7 @@ def test_the_error_of_an_impossible_scenario_names_keys_and_values(content, name
 def test_any_content_gives_a_scenario_or_a_scenario_error(content):
     try:
         assert isinstance(scenario_from(content), Scenario)
-    except ScenarioError as error:
+    except ValueError as error:
         assert str(error)
 
 
@@ -160,7 +160,7 @@ def test_the_room_may_be_another_file(tmp_path):
 def test_errors_name_the_file(tmp_path, content, named):
     path = tmp_path / 'scene.yaml'
     path.write_bytes(content)
-    with pytest.raises(ScenarioError, match=r'scene\.yaml.*' + named):
+    with pytest.raises(ValueError, match=r'scene\.yaml.*' + named):
         read_scenario(str(path))
 
 
