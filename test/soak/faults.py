@@ -15,7 +15,7 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOP
 from ros_3d_bb.conversions.image_msgs import array_from, fill_image
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb_lab.evaluation.latency.benchmark import eating_a_core
+from ros_3d_bb_lab.evaluation.latency.benchmark import cpu_load
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import stamp_in
 
 DETECTORS = ('depth_detector_node', 'yolov5_node')
@@ -208,7 +208,7 @@ def _is_stopped(pid):
 @contextlib.contextmanager
 def cpu_is_taken(_rig):
     """Two processes that compute."""
-    with eating_a_core(True), eating_a_core(True):
+    with cpu_load(2):
         yield 'CPU taken'
 
 

@@ -10,8 +10,7 @@ from visualization_msgs.msg import MarkerArray
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.visualization.markers import MARKERS_TOPIC
-from ros_3d_bb_lab.evaluation.latency.latency_probe_node import stamp_in
-from ros_3d_bb_lab.evaluation.latency.process_usage import usage_of
+from ros_3d_bb_lab.evaluation.latency.latency_probe_node import stamp_in, usage_of
 from soak.invariants import BALANCES
 from soak.records import Status, Track
 

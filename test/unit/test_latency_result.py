@@ -1,14 +1,10 @@
 """The figures of the latency benchmark, on records of which the answer is known."""
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
 from ros_3d_bb_lab.evaluation.latency.benchmark import CASES, row
 from ros_3d_bb_lab.evaluation.latency.latency_result import STAGES, latencies, percentiles, result_of
-from ros_3d_bb_lab.evaluation.latency.process_usage import usage_of
 
 NS = 10 ** 9
 BEGAN_S = 1000.0
@@ -77,36 +73,6 @@ def test_without_any_answer_there_are_no_latencies():
 def test_percentiles_are_in_order_and_within_the_values(values_ms):
     found = percentiles(np.array(values_ms))
     assert min(values_ms) - 1e-6 <= found['p50_ms'] <= found['p95_ms'] <= found['p99_ms'] <= max(values_ms) + 1e-6
-
-
-HOLDS_AND_COMPUTES = """
-input()
-held = b'1' * (32 * 2 ** 20)
-begin_s = time.process_time()
-while time.process_time() < begin_s + 0.1:
-    pass
-print('done', flush=True)
-input()
-"""
-
-
-def test_a_process_uses_what_it_computes_and_holds():
-    """One of its own: memory that this one has freed would be taken again."""
-    process = subprocess.Popen([sys.executable, '-c', 'import time; print("ready", flush=True)' + HOLDS_AND_COMPUTES],
-                               stdin=subprocess.PIPE, stdout=subprocess.PIPE, universal_newlines=True)
-    process.stdout.readline()
-    before = usage_of(process.pid)
-    process.stdin.write('\n')
-    process.stdin.flush()
-    process.stdout.readline()
-    after = usage_of(process.pid)
-    process.communicate('\n')
-    assert after.rss_mb - before.rss_mb == pytest.approx(33.5, abs=3)
-    assert after.cpu_s - before.cpu_s >= 0.08
-
-
-def test_a_process_that_is_gone_uses_nothing():
-    assert usage_of(2 ** 22 + 1) is None  # no process has such a number
 
 
 def test_cases_have_names_of_their_own():

@@ -1,28 +1,30 @@
 """Content of the image of a report."""
+import cv2
 import numpy as np
+from matplotlib.colors import to_rgb
 
-from ros_3d_bb_lab.evaluation.demo.scene_plot import TRACK_COLORS, TRUTH_COLOR, Paths, scene_picture, top_view
-
-
-def has(image, color):
-    return bool((image == color).all(axis=-1).any())
+from ros_3d_bb_lab.evaluation.demo.scene_plot import ROBOT_COLOR, SIZE_IN, TRUTH_COLOR, draw_scene
 
 
-def test_the_top_view_shows_truth_tracks_and_robot():
-    paths = Paths({1: [(2, 1), (4, 1)]}, {3: [(2, -1), (4, -1)]}, np.array([(0, 0), (1, 0)]))
-    image = top_view(paths)
-    truth, track = ((image == color).all(axis=-1) for color in (TRUTH_COLOR, TRACK_COLORS[3]))
-    assert truth.any() and track.any() and has(image, (20, 20, 20))
-    assert np.nonzero(truth)[0].mean() < np.nonzero(track)[0].mean()  # y points up
+def drawn(tmp_path, *content):
+    path = str(tmp_path / 'scene.png')
+    draw_scene(path, *content)
+    return cv2.imread(path)[..., ::-1]
 
 
-def test_an_empty_scene_can_be_drawn():
-    image = scene_picture([], Paths({}, {}, np.zeros((0, 2))), ['nothing'])
-    assert image.dtype == np.uint8 and image.ndim == 3
+def rows_of(image, color):
+    return np.nonzero((image == np.rint(255 * np.array(to_rgb(color)))).all(axis=-1))[0]
 
 
-def test_images_are_arranged_in_rows_of_three():
+def test_the_top_view_shows_truth_tracks_and_robot(tmp_path):
+    image = drawn(tmp_path, [], {1: [(2, 1), (4, 1)]}, {3: [(2, -1), (4, -1)]}, np.array([(0, 0), (1, 0)]), [])
+    truth, robot, track = (rows_of(image, color) for color in (TRUTH_COLOR, ROBOT_COLOR, 'C0'))
+    assert 0 < truth.mean() < robot.mean() < track.mean()  # y points up
+
+
+def test_images_are_arranged_in_rows_of_three(tmp_path):
     panels = [np.full((480, 640, 3), 10 * number, np.uint8) for number in range(1, 5)]
-    image = scene_picture(panels, Paths({}, {}, np.zeros((0, 2))), [])
-    assert [int(image[50, 100 + 488 * column, 0]) for column in range(3)] == [10, 20, 30]
-    assert int(image[420, 100, 0]) == 40 and int(image[420, 600, 0]) == 255
+    image = drawn(tmp_path, panels, {}, {}, np.zeros((0, 2)), ['a scene without people'])
+    assert image.shape[1] == 100 * SIZE_IN[0]
+    assert [int(image[100, 250 + 470 * column, 0]) for column in range(3)] == [10, 20, 30]
+    assert 40 in image[:, 250, 0] and 40 not in image[:, 700, 0]

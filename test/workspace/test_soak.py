@@ -175,7 +175,7 @@ def named_faults(seed, images):
     rig.graph.pids = {'depth_detector_node': 1, 'bbox3d_node': 2, 'tracker_node': 3}
     names = []
     with mock.patch('soak.faults.os.kill'), mock.patch('soak.faults.subprocess.Popen'), \
-            mock.patch('soak.faults.eating_a_core'):
+            mock.patch('soak.faults.cpu_load'):
         for fault in 2 * rig.source.sample([fault for fault, _lasts, _disturbs in FAULTS], len(FAULTS)):
             rig.camera.throw_in = None
             with fault(rig) as name:
