@@ -15,7 +15,7 @@ angles = st.floats(-7, 7)
 def tube(length, depth, width, exponent=2.0, sides=64, rings=3):
     """Straight tube along z with half axes `depth` (x) and `width` (y)."""
     z, zero = np.linspace(0, length, rings), np.zeros(rings)
-    return loft(np.c_[zero, zero, z], np.c_[zero + depth, zero, zero], np.c_[zero, zero + width, zero], exponent, sides)
+    return loft(np.c_[zero, zero, z], [(depth, width)] * rings, exponent, sides)
 
 
 def crate(size=(1, 2, 3)):
@@ -41,8 +41,7 @@ def test_a_tube_is_closed_and_wound_outwards(sides, rings, exponent):
 
 
 def test_a_tube_with_descending_rings_is_wound_outwards():
-    axes = np.c_[[1, 1], [0, 0], [0, 0]], np.c_[[0, 0], [1, 1], [0, 0]]
-    up, down = loft([(0, 0, 0), (0, 0, 2)], *axes, 2, 32), loft([(0, 0, 2), (0, 0, 0)], *axes, 2, 32)
+    up, down = (loft(centers, [(1, 1)] * 2, 2, 32) for centers in ([(0, 0, 0), (0, 0, 2)], [(0, 0, 2), (0, 0, 0)]))
     assert volume(*up) == pytest.approx(volume(*down)) and volume(*up) > 0
     assert volume(up[0], up[1][:, ::-1]) == pytest.approx(-volume(*up))
 

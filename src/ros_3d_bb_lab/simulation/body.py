@@ -118,8 +118,7 @@ def _parts(build):
 
 def _upright(rings, sides, exponent=2.1):
     z, x, depth, width = np.array(rings).T
-    zero = np.zeros_like(z)
-    return loft(np.c_[x, zero, z], np.c_[depth, zero, zero], np.c_[zero, width, zero], exponent, sides)
+    return loft(np.c_[x, np.zeros_like(z), z], np.c_[depth, width], exponent, sides)
 
 
 def _limb(rings, joints, sign, sides, girth):
@@ -127,16 +126,13 @@ def _limb(rings, joints, sign, sides, girth):
     z, shift, depth, width = np.array(rings)[::-1].T
     line = np.array([JOINTS_M[name + '_l'] for name in joints])[::-1]
     x, y = (np.interp(z, line[:, 2], line[:, axis]) for axis in range(2))
-    zero = np.zeros_like(z)
-    return loft(np.c_[x + shift, sign * y, z], np.c_[depth * girth, zero, zero], np.c_[zero, width * girth, zero], 2.1,
-                sides)
+    return loft(np.c_[x + shift, sign * y, z], np.c_[depth, width] * girth, 2.1, sides)
 
 
 def _shoe(sign):
     x, z, height, width = np.array(SHOE).T
     y = np.full_like(x, sign * (JOINTS_M['foot_l'][1] + .005))
-    zero = np.zeros_like(x)
-    return loft(np.c_[x, y, z], np.c_[zero, width, zero], np.c_[zero, zero, height], 2.4, 10)
+    return loft(np.c_[x, y, z], np.c_[width, height], 2.4, 10, axes=(1, 2))
 
 
 def _weights(vertices, bones):

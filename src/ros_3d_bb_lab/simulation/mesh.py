@@ -37,16 +37,16 @@ def rotation(axis, angle):
     return matrix
 
 
-def loft(centers, forward, sideways, exponent, sides):
+def loft(centers, half_axes, exponent, sides, axes=(0, 1)):
     """Vertices and faces of a closed tube through superelliptic rings.
 
-    `centers`, `forward` and `sideways` (rings, 3) are the centre and the half axes of each ring; an `exponent` of 2 is
-    an ellipse, larger values approach a rectangle; `sides` is the even number of vertices in a ring.
+    `centers` (rings, 3) and `half_axes` (rings, 2), whose directions are the coordinate axes `axes`; an `exponent` of 2
+    is an ellipse, larger values approach a rectangle; `sides` is the even number of vertices in a ring.
     """
-    centers, forward, sideways = (np.asarray(axis, float)[:, None] for axis in (centers, forward, sideways))
     angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
-    ring = [np.sign(f) * np.abs(f) ** (2.0 / exponent) for f in (np.cos(angles), np.sin(angles))]
-    vertices = centers + ring[0][:, None] * forward + ring[1][:, None] * sideways
+    vertices = np.repeat(np.asarray(centers, float)[:, None], sides, axis=1)
+    for axis, lengths, f in zip(axes, np.transpose(half_axes), (np.cos(angles), np.sin(angles))):
+        vertices[..., axis] += lengths[:, None] * np.sign(f) * np.abs(f) ** (2.0 / exponent)
     low = np.arange((len(centers) - 1) * sides).reshape(-1, sides)
     walls = np.stack([low, np.roll(low, -1, 1), np.roll(low, -1, 1) + sides, low + sides], axis=-1).reshape(-1, 4)
     strip = np.arange(sides // 2 - 1)

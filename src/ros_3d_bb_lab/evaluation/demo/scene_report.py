@@ -4,6 +4,7 @@ import os
 import sys
 from typing import NamedTuple
 
+import matplotlib
 import numpy as np
 import rosbag
 
@@ -15,10 +16,14 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_caption
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score, table
-from ros_3d_bb_lab.evaluation.demo.scene_plot import draw_scene
 from ros_3d_bb_lab.simulation.ros.simulator_msgs import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
 
-PANELS = 6
+matplotlib.use('Agg')
+from matplotlib import gridspec, pyplot  # noqa: E402 (the backend must be selected first)
+
+PANELS, COLUMNS = 6, 3
+SIZE_IN, LINE_IN, DPI = (14.56, 14.5), 0.17, 100
+TRUTH_COLOR, ROBOT_COLOR = '#aaaaaa', '#141414'
 
 
 class Recording(NamedTuple):
@@ -89,6 +94,40 @@ def panels_of(bag, recording, count=PANELS):
             panel = draw_boxes(imgmsg_to_rgb(message).copy(), boxes, [''] * len(boxes))
             panels.append(draw_caption(panel, '%.1f s' % ((stamp_ns - recording.moments[0].stamp_ns) / NS)))
     return panels
+
+
+def draw_scene(path, panels, people, tracks, robot, lines):
+    """Write the image of a scene: panels (h, w, 3), uint8 RGB, a top view of the paths in the map, and lines of text.
+
+    `people` and `tracks` are paths {ID: (n, 2)} and `robot` is a path (n, 2) in metres. The suffix of the file selects
+    its format.
+    """
+    rows = (len(panels) + COLUMNS - 1) // COLUMNS
+    text_share = LINE_IN * (len(lines) + 3) / SIZE_IN[1]  # with the labels of the axis
+    grid = gridspec.GridSpec(rows + 1, COLUMNS, height_ratios=[1] * rows + [1.8], left=0.03, right=0.99, top=0.99,
+                             bottom=text_share, wspace=0.02, hspace=0.08)
+    figure = pyplot.figure(figsize=SIZE_IN, dpi=DPI)
+    for number, panel in enumerate(panels):
+        axes = figure.add_subplot(grid[divmod(number, COLUMNS)])
+        axes.imshow(panel)
+        axes.set_axis_off()
+    _draw_paths(figure.add_subplot(grid[rows, :]), people, tracks, robot)
+    figure.text(0.03, 0.01, '\n'.join(lines), family='monospace')
+    figure.savefig(path, dpi=DPI)
+    pyplot.close(figure)
+
+
+def _draw_paths(axes, people, tracks, robot):
+    for number, path in sorted(people.items()):
+        axes.plot(*zip(*path), color=TRUTH_COLOR, linewidth=6)
+        axes.annotate('person %d' % number, path[-1])
+    for number, path in sorted(tracks.items()):
+        line, = axes.plot(*zip(*path))
+        axes.annotate(str(number), path[0], color=line.get_color(), weight='bold')
+    axes.plot(robot[:, 0], robot[:, 1], color=ROBOT_COLOR, marker='o', markevery=[-1] if len(robot) else [])
+    axes.set_aspect('equal', 'datalim')
+    axes.grid(True)
+    axes.set(title='map in metres: true paths (grey), tracks with their IDs (colour), robot (black)')
 
 
 def write_report(bag_path, picture_path):

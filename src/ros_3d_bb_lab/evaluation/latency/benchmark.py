@@ -41,9 +41,7 @@ def measured(case, arguments, bag, folder):
 
     Raises RuntimeError if nothing was measured.
     """
-    record, log = os.path.join(folder, 'record.json'), os.path.join(folder, 'launch.log')
-    if os.path.exists(record):
-        os.remove(record)
+    record, log = (os.path.join(folder, case.name + suffix) for suffix in ('.json', '.log'))
     options = {'bag': bag, 'record': record, 'detector': case.detector, 'weights': arguments.weights or '',
                'image_size': case.image_size, 'seconds': arguments.seconds, 'rate': arguments.rate}
     with cpu_load(int(case.loaded)), open(log, 'w') as stream:
