@@ -35,14 +35,6 @@ def shoe(body, side):
 
 @given(postures)
 @settings(max_examples=50)
-def test_bones_move_rigidly(posture):
-    for transform in bone_transforms(posture):
-        np.testing.assert_allclose(transform[:, :3].dot(transform[:, :3].T), np.eye(3), atol=1e-12)
-        assert np.linalg.det(transform[:, :3]) == pytest.approx(1)
-
-
-@given(postures)
-@settings(max_examples=50)
 def test_bones_are_connected_at_their_joints(posture):
     for bone, parent in PARENTS[1:]:
         np.testing.assert_allclose(joint(posture, bone, bone), joint(posture, parent, bone), atol=1e-12)
@@ -111,12 +103,6 @@ def test_the_stance_foot_is_on_the_floor_and_does_not_slide(body, swing):
     assert np.abs(slips).max() < .3 and abs(slips.mean()) < .15
 
 
-def test_the_swinging_foot_is_above_the_floor(body):
-    """At full swing; slow people nearly drag their feet."""
-    heights_m, _slips = sole_heights_and_slips(body, 1, np.arange(.6, .92, .02))
-    assert heights_m.min() > .02
-
-
 def test_stride_grows_with_height_and_swing_and_is_realistic():
     assert stride_m(1.75) == pytest.approx(1.2, abs=.1)
     assert stride_m(2 * 1.75) == pytest.approx(2 * stride_m(1.75))
@@ -145,19 +131,6 @@ def test_the_head_is_lowered_by_crouching(body):
     tops = [body.posed(Posture(crouch=crouch)).vertices[:, 2].max() for crouch in np.linspace(0, 1, 11)]
     assert (np.diff(tops) < 0).all()
     assert 1.0 < tops[-1] < 1.3
-
-
-def test_a_walking_body_bobs_by_centimetres(body):
-    tops = [body.posed(Posture(phase, 1)).vertices[:, 2].max() for phase in np.linspace(0, 1, 20)]
-    assert .01 < np.ptp(tops) < .06
-
-
-@given(builds)
-@settings(max_examples=10)
-def test_skinning_weights_sum_to_one(build):
-    body = Body(build, np.random.RandomState(0))
-    np.testing.assert_allclose(body._weights.sum(axis=1), 1, atol=1e-6)
-    assert body._weights.min() >= 0
 
 
 @given(builds)
@@ -208,9 +181,3 @@ def test_clothes_and_hair_are_those_of_the_build():
     assert lowest_hair[1] < lowest_hair[0] - .1
     skin = [(mesh.colors == build.skin).all(axis=1).sum() for mesh in bodies]
     assert skin[2] > skin[0]
-
-
-def test_posed_does_not_change_the_body(body):
-    before = body.posed().vertices.copy()
-    body.posed(Posture(.3, 1, .5)).moved((1, 2, 0), 1)
-    np.testing.assert_array_equal(body.posed().vertices, before)

@@ -174,14 +174,6 @@ def test_objects_identify_the_object_of_each_pixel(room, person):
         assert rendering.areas[number - 1] == single.areas[0] >= mask.sum() > 0
 
 
-def test_the_area_is_that_of_the_object_alone(room, person):
-    rendering = draw(room, [person.moved((4, 0, 0), 3.0)])
-    assert rendering.areas[0] == pytest.approx((rendering.objects == 1).sum(), rel=.01)  # except for soles in the floor
-    width_px, height_px = .5 * CAMERA.fx / 4, 1.75 * CAMERA.fy / 4
-    assert .4 < rendering.areas[0] / (width_px * height_px) < 1
-    assert rendering.inside == [1]
-
-
 @given(st.sampled_from(['left', 'right', 'top', 'bottom']), st.floats(.15, .85))
 @settings(max_examples=20)
 def test_inside_is_the_share_in_the_image(room, side, share):
@@ -220,16 +212,11 @@ def test_the_visible_part_ends_at_the_edge_of_a_pillar(room, person, edge_m):
     assert both.areas[0] == alone.areas[0] and both.inside[0] == 1
 
 
-def test_objects_behind_the_camera_are_not_drawn(room, person):
-    behind = [person.moved((-1.5, y, 0), 0) for y in (-.5, 0, .5)] + [crate((1, 1, 2), (-2, 0, 0))]
-    rendering, empty = draw(room, behind), draw(room, [])
+def test_objects_behind_the_camera_or_outside_the_image_are_not_drawn(room, person):
+    hidden = [person.moved((-1.5, 0, 0), 0), crate((1, 1, 2), (-2, 0, 0)), person.moved((2, 3.5, 0), 0)]
+    rendering, empty = draw(room, hidden), draw(room, [])
     np.testing.assert_array_equal(rendering.color, empty.color)
-    assert not rendering.objects.any() and rendering.areas == [0] * 4 and rendering.inside == [0] * 4
-
-
-def test_objects_outside_the_image_are_not_drawn(room, person):
-    rendering = draw(room, [person.moved((2, 3.5, 0), 0)])
-    assert not rendering.objects.any() and rendering.areas == [0] and rendering.inside == [0]
+    assert not rendering.objects.any() and rendering.areas == rendering.inside == [0] * 3
 
 
 @given(st.floats(-.3, .4))
@@ -258,28 +245,15 @@ def test_images_of_any_size_can_be_rendered(room, person, camera):
     assert rendering.color.shape == (camera.height, camera.width, 3) and rendering.objects[camera.height // 2].any()
 
 
-def test_the_scene_does_not_depend_on_the_resolution(room, person):
-    body = person.moved((3, .2, 0), 1)
-    small, large = (draw(room, [body], camera).objects for camera in (
-        CAMERA, Camera(480, 360, 3 * 153.7, 3 * 153.7, 3 * 79.8 + 1, 3 * 60.5 + 1)))
-    assert np.mean(small != large[1::3, 1::3]) < .01
-
-
 def test_shadows_darken_the_floor_around_the_feet_only(room):
-    lit, shaded = draw(room, []), draw(room, [], shadows=[(4, 0, .3), (-2, 0, .3)])
+    lit, shaded = draw(room, []), draw(room, [], shadows=[(4, 0, .3), (-2, 0, .3), (8.9, 0, .5)])
     share = shaded.color.sum(axis=2) / lit.color.sum(axis=2, dtype=float)
     u, v = CAMERA.project((0, 1.2, 4)).round().astype(int)
     assert .55 < share[v, u] < .9
     rows, columns = np.nonzero(share < .97)
     assert np.abs(columns - u).max() < 35 and np.abs(rows - v).max() < 25
-    np.testing.assert_array_equal(lit.inverse_depth, shaded.inverse_depth)
-
-
-def test_shadows_do_not_fall_on_walls(room):
-    lit, shaded = draw(room, []), draw(room, [], shadows=[(8.9, 0, .5)])
     _color, _inverse_depth, surfaces = room.draw(CAMERA, pose((0, 0, 1.2)))
-    np.testing.assert_array_equal(shaded.color[surfaces != FLOOR], lit.color[surfaces != FLOOR])
-    assert (shaded.color != lit.color).any()
+    assert (share[surfaces != FLOOR] == 1).all()
 
 
 def test_objects_are_lit_from_above(room):
@@ -290,23 +264,9 @@ def test_objects_are_lit_from_above(room):
 
 @pytest.mark.parametrize('height', [1.0, 1.4, 2.4])
 def test_rooms_may_be_low_and_small(height):
-    for seed in range(5):
-        color, inverse_depth, _surfaces = RenderedRoom((-1.5, 3.0, -1.0, 6.0), height,
-                                                       np.random.RandomState(seed)).draw(
-            CAMERA, pose((0, 0, .5)))
-        assert color.mean() > 50 and inverse_depth.min() >= 1 / 7.
-
-
-def test_rooms_depend_on_the_seed(room):
-    images = [RenderedRoom(BOUNDS, HEIGHT, np.random.RandomState(seed)).draw(CAMERA, pose((0, 0, 1.2)))[0]
-              for seed in (3, 3, 4)]
-    np.testing.assert_array_equal(images[0], images[1])
-    assert np.mean(images[0] != images[2]) > .3
-
-
-def test_mottle_has_mean_0_and_standard_deviation_1():
-    shade = textures.mottle(128, np.random.RandomState(0))
-    assert shade.shape == (128, 128) and abs(shade.mean()) < 1e-5 and shade.std() == pytest.approx(1, abs=1e-5)
+    small_room = RenderedRoom((-1.5, 3.0, -1.0, 6.0), height, np.random.RandomState(0))
+    color, inverse_depth, _surfaces = small_room.draw(CAMERA, pose((0, 0, .5)))
+    assert color.mean() > 50 and inverse_depth.min() >= 1 / 7.
 
 
 GREY = np.full((120, 160, 3), 120, np.uint8)
@@ -318,22 +278,8 @@ def test_colour_noise_has_the_given_sigma_and_no_bias(sigma):
     noise = np.stack([sensor.capture(GREY, number) for number in range(10)]) - 120.
     assert noise.std() == pytest.approx(np.hypot(sigma, 12 ** -.5) if sigma else 0, rel=.03)
     assert abs(noise.mean()) < .1
-
-
-def test_colour_noise_depends_on_seed_and_number_only():
-    one, other = ColorSensor(CAMERA, 5, 2.0), ColorSensor(CAMERA, 5, 2.0)
-    forward = [one.capture(GREY, number) for number in range(6)]
-    backward = [other.capture(GREY, number) for number in reversed(range(6))][::-1]
-    np.testing.assert_array_equal(forward, backward)
-    assert len({image.tobytes() for image in forward}) == 6
-    assert ColorSensor(CAMERA, 6, 2.0).capture(GREY, 0).tobytes() != forward[0].tobytes()
-    assert (GREY == 120).all()
-
-
-def test_colour_noise_of_frames_is_independent():
-    sensor = ColorSensor(CAMERA, 2, 3.0)
-    correlation = np.corrcoef([sensor.capture(GREY, number).ravel() for number in range(8)]) - np.eye(8)
-    assert np.abs(correlation).max() < .05
+    if sigma:  # images are independent
+        assert np.abs(np.corrcoef(noise.reshape(10, -1)) - np.eye(10)).max() < .05
 
 
 def test_the_colour_sensor_blurs_slightly_and_saturates():
