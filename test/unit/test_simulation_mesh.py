@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb_lab.simulation.mesh import CELL_M, Mesh, box, loft, vertex_normals, volume
+from ros_3d_bb_lab.simulation.mesh import CELL_M, box, loft, vertex_normals, volume
 from support.meshes import assert_closed
 
 metres = st.floats(.05, 3)

@@ -148,7 +148,8 @@ def test_the_robot_turns_before_it_drives():
 
 def test_a_following_robot_faces_the_person_and_keeps_its_distance_and_limits():
     person = walker(Move(to=(8.0, 0.0), speed=.8), Move(to=(8.0, 6.0), speed=.8), start=(2.0, 0.0))
-    motion = robot_motion(Robot((-1.0, -1.0, 3.0), follow=Follow(1, distance=2.0, speed=1.2, rate=1.0)), [person], LONG_S)
+    robot = Robot((-1.0, -1.0, 3.0), follow=Follow(1, distance=2.0, speed=1.2, rate=1.0))
+    motion = robot_motion(robot, [person], LONG_S)
     times_s = np.arange(0, 25, .1)
     robots = [motion.at(time_s) for time_s in times_s]
     offsets_m = np.array([person.at(time_s).position_m for time_s in times_s]) - [robot.position_m for robot in robots]

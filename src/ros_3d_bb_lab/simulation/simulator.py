@@ -137,9 +137,9 @@ class Simulator(object):
         return np.array([motion.at(time_s).position_m for motion in self._motions]).reshape(-1, 2)
 
     def true_tracks(self, frame, stamp_ns):
-        """Convert the people of a frame with this stamp to tracks in the map frame, first seen at the start of the scene.
+        """Convert the people of a frame to tracks (TrackedObject) in the map, first seen at the start of the scene.
 
-        Their predictions are their actual future positions. Returns a list of TrackedObject.
+        Their predictions are their actual future positions.
         """
         times_s = prediction_times_s(PREDICTION_S, PREDICTION_STEP_S)
         paths = np.stack([self.positions_at(frame.time_s + time_s) for time_s in times_s], axis=1)
