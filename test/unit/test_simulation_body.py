@@ -34,7 +34,7 @@ def shoe(body, side):
 
 
 @given(postures)
-@settings(max_examples=50)
+@settings(max_examples=30)
 def test_bones_are_connected_at_their_joints(posture):
     for bone, parent in PARENTS[1:]:
         np.testing.assert_allclose(joint(posture, bone, bone), joint(posture, parent, bone), atol=1e-12)

@@ -86,7 +86,7 @@ def test_each_gait_cycle_covers_one_stride(speed):
 
 
 @given(st.floats(-7, 7), st.floats(-3, 3), st.floats(-3, 3), st.floats(0, 1))
-@settings(max_examples=50)
+@settings(max_examples=20)
 def test_people_face_the_direction_of_walking(facing, first, second, share):
     """On two sections of 3 m, except near the corner."""
     corner = 3 * np.array([np.cos(first), np.sin(first)])

@@ -71,7 +71,7 @@ def everywhere(mask):
 
 
 @given(poses, cameras)
-@settings(max_examples=40)
+@settings(max_examples=25)
 def test_depth_of_floor_ceiling_and_walls_agrees_with_ray_casting(room, world_from_camera, camera):
     _color, inverse_depth, surfaces = room.draw(camera, world_from_camera)
     low, high = np.array(BOUNDS[::2] + (0.0,)), np.array(BOUNDS[1::2] + (HEIGHT,))
@@ -84,7 +84,7 @@ def test_depth_of_floor_ceiling_and_walls_agrees_with_ray_casting(room, world_fr
 
 
 @given(cameras, st.floats(2, 6), st.floats(-1, 1), st.floats(-3, 3), st.tuples(*[st.floats(.2, 1.5)] * 3))
-@settings(max_examples=40)
+@settings(max_examples=25)
 def test_depth_of_a_box_is_that_of_rays(room, camera, x, y, yaw, size):
     """Two pixels away from its outline and edges; nearer, it need not be."""
     world_from_camera = pose((0, 0, 1.2), .05, -.1, .03)
@@ -198,7 +198,7 @@ def test_half_a_person_at_the_border_is_half_inside(room, person, cx):
 
 
 @given(st.floats(0, .25))
-@settings(max_examples=20)
+@settings(max_examples=12)
 def test_the_visible_part_ends_at_the_edge_of_a_pillar(room, person, edge_m):
     """The left edge of the pillar projects to a known column; the person is visible to the left of it."""
     camera = Camera(320, 240, 307.4, 307.4, 159.6, 121)
