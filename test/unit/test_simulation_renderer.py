@@ -83,6 +83,34 @@ def test_depth_of_floor_ceiling_and_walls_agrees_with_ray_casting(room, world_fr
     assert surfaces.max() <= 5
 
 
+@pytest.fixture(scope='module')
+def gradient_room():
+    """Room with a floor and walls whose red and green values grow along the columns and rows of their textures."""
+    def gradient_of(original):
+        def gradient(*arguments):
+            height, width = original(*arguments).shape[:2]
+            u, v = np.meshgrid(np.linspace(0, 255, width), np.linspace(0, 255, height))
+            return np.dstack([u, v, 0 * u]).astype(np.uint8)
+        return gradient
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ('floor', 'wall'):
+            patch.setattr(textures, name, gradient_of(getattr(textures, name)))
+        return RenderedRoom(BOUNDS, HEIGHT, np.random.RandomState(0))
+
+
+@given(poses, cameras)
+@settings(max_examples=25)
+def test_textures_of_floor_and_wall_agree_with_ray_casting(gradient_room, world_from_camera, camera):
+    color, inverse_depth, surfaces = gradient_room.draw(camera, world_from_camera)
+    points = world_from_camera[:3, 3] + rays(camera, world_from_camera) / inverse_depth[..., None]
+    x, y, z = (np.interp(points[..., axis], ends, (0, 255))
+               for axis, ends in enumerate((BOUNDS[:2], BOUNDS[2:], (0, HEIGHT))))
+    for surface, right_and_down in ((FLOOR, (x, y)), (2, (255 - y, 255 - z))):
+        pixels = everywhere(surfaces == surface)
+        np.testing.assert_allclose(color[pixels][:, :2], np.dstack(right_and_down)[pixels], atol=4)
+
+
 @given(cameras, st.floats(2, 6), st.floats(-1, 1), st.floats(-3, 3), st.tuples(*[st.floats(.2, 1.5)] * 3))
 @settings(max_examples=25)
 def test_depth_of_a_box_is_that_of_rays(room, camera, x, y, yaw, size):
@@ -99,43 +127,6 @@ def test_depth_of_a_box_is_that_of_rays(room, camera, x, y, yaw, size):
     for number in range(3):
         on_side = everywhere(hit & (axis == number))
         np.testing.assert_allclose(drawn.inverse_depth[on_side], 1 / near[on_side], rtol=1e-4)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('surface,spot', [('floor', (5.0, 1.0, 0.0)), ('wall', (9.0, .5, 1.5))])
-@given(st.floats(-.1, .1), st.floats(-.15, .05), st.floats(-.1, .1), st.floats(-.5, 1))
-@settings(max_examples=15)
-def test_a_mark_on_a_surface_is_seen_where_it_projects_to(surface, spot, yaw, pitch, roll, y):
-    """Within a pixel: the mark on the floor covers some ten."""
-    original = getattr(textures, surface)
-
-    def marked(*arguments):
-        texture = np.zeros_like(original(*arguments))
-        place = ((spot[0] - BOUNDS[0], spot[1] - BOUNDS[2]), textures.FLOOR_PPM) if surface == 'floor' else (
-            (BOUNDS[3] - spot[1], HEIGHT - spot[2]), textures.WALL_PPM)
-        u, v = (int(round(part * place[1])) for part in place[0])
-        texture[v - 5:v + 6, u - 5:u + 6] = 255
-        return texture
-
-    world_from_camera = pose((0, y, 1.2), yaw, pitch, roll)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(textures, surface, marked)
-        color, _inverse, surfaces = RenderedRoom(BOUNDS, HEIGHT, np.random.RandomState(0)).draw(CAMERA,
-                                                                                                world_from_camera)
-    marks = (color[..., 0] > 128) & (surfaces == (FLOOR if surface == 'floor' else 2))
-    found = np.argwhere(marks).mean(axis=0)[::-1]
-    np.testing.assert_allclose(found, middle_of_mark(surface, spot, np.linalg.inv(world_from_camera)), atol=1)
-
-
-def middle_of_mark(surface, spot, camera_from_world):
-    """Centroid in the image of a mark of 11 x 11 texels; with perspective, the middle of the mark is not there."""
-    half_m = 5.5 / (textures.FLOOR_PPM if surface == 'floor' else textures.WALL_PPM)
-    along = ((1, 0, 0), (0, 1, 0)) if surface == 'floor' else ((0, 1, 0), (0, 0, 1))
-    corners = [np.array(spot) + half_m * (a * np.array(along[0]) + b * np.array(along[1]))
-               for a, b in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
-    outline = CAMERA.project([camera_from_world.dot(tuple(corner) + (1,))[:3] for corner in corners])
-    moments = cv2.moments(outline.astype(np.float32))
-    return moments['m10'] / moments['m00'], moments['m01'] / moments['m00']
 
 
 def test_the_nearest_object_is_visible_in_any_order(room):

@@ -230,16 +230,11 @@ def test_shadow_follows_the_formula(params):
         assert np.mean(depth_mm[:, 300:] == 0) < 0.01
 
 
-def test_shadow_ends_at_the_left_border():
-    depth_mm = StereoCamera(SMALL, params=NO_NOISE).measure(plate(0.5, 5, SMALL, slice(8, 40)), 0)
-    assert not depth_mm[:, :8].any() and depth_mm[:, 8:].all()
-
-
-def test_near_objects_at_the_border_cause_no_shadow():
-    """As in the real frames, because the imagers have a wider field of view than the colour camera."""
-    camera = StereoCamera(SMALL, params=NO_NOISE)
-    for columns in (slice(0, 30), slice(0, 160)):
-        assert camera.measure(plate(0.5, 5, SMALL, columns), 0).all()
+@pytest.mark.parametrize('columns, shadow_px', [(slice(8, 40), 8), (slice(0, 30), 0), (slice(0, 160), 0)])
+def test_shadow_ends_at_the_left_border(columns, shadow_px):
+    """Objects at the border cause no shadow, because the imagers have a wider field of view than the colour camera."""
+    depth_mm = StereoCamera(SMALL, params=NO_NOISE).measure(plate(0.5, 5, SMALL, columns), 0)
+    assert not depth_mm[:, :shadow_px].any() and depth_mm[:, shadow_px:].all()
 
 
 def test_without_noise_the_only_error_is_quantisation():
