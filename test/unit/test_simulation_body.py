@@ -13,7 +13,6 @@ from support.meshes import assert_closed
 postures = st.builds(Posture, st.floats(-3, 3), st.floats(0, 1), st.floats(0, 1))
 builds = st.tuples(st.floats(1.4, 2.1), st.floats(.9, 1.4), st.floats(0, 1), st.booleans(), st.booleans()).map(
     lambda values: Build(*values))
-TOUCHING_M = .015  # a sole at less height touches the floor
 
 
 @pytest.fixture(scope='module')
@@ -38,14 +37,6 @@ def shoe(body, side):
 def test_bones_are_connected_at_their_joints(posture):
     for bone, parent in PARENTS[1:]:
         np.testing.assert_allclose(joint(posture, bone, bone), joint(posture, parent, bone), atol=1e-12)
-
-
-def test_joints_of_a_standing_body_are_nearly_straight():
-    """Only the elbows are slightly bent."""
-    turned = {bone: np.arccos((np.trace(transform[:, :3]) - 1) / 2)
-              for bone, transform in zip(BONES, bone_transforms(Posture(phase=.3)))}
-    assert {bone for bone, angle in turned.items() if angle > .05} == {'forearm_l', 'forearm_r'}
-    assert max(turned.values()) < .25
 
 
 @given(st.floats(-2, 2), st.floats(0, 1), st.floats(0, 1))

@@ -40,12 +40,6 @@ def test_a_tube_is_closed_and_wound_outwards(sides, rings, exponent):
     assert volume(vertices, faces) > 0
 
 
-def test_a_tube_with_descending_rings_is_wound_outwards():
-    up, down = (loft(centers, [(1, 1)] * 2, 2, 32) for centers in ([(0, 0, 0), (0, 0, 2)], [(0, 0, 2), (0, 0, 0)]))
-    assert volume(*up) == pytest.approx(volume(*down)) and volume(*up) > 0
-    assert volume(up[0], up[1][:, ::-1]) == pytest.approx(-volume(*up))
-
-
 def test_the_cross_section_approaches_a_rectangle_with_growing_exponent():
     volumes = [volume(*tube(1.0, .5, .5, exponent, 64)) for exponent in (2, 3, 6, 50)]
     assert (np.diff(volumes) > 0).all() and volumes[0] < np.pi / 4 and .9 < volumes[-1] <= 1

@@ -218,17 +218,6 @@ def test_objects_around_the_camera_give_finite_depth(room, person, x):
     assert all(0 <= inside <= 1 for inside in rendering.inside)
 
 
-def test_rendering_does_not_change_meshes_and_rooms(room, person):
-    meshes = [person.moved((3, 0, 0), 1), crate((1, 1, 1), (4, 1, 0))]
-    before = [[part.copy() for part in mesh] for mesh in meshes]
-    first, second = draw(room, meshes), draw(room, meshes)
-    for mesh, parts in zip(meshes, before):
-        for part, old in zip(mesh, parts):
-            np.testing.assert_array_equal(part, old)
-    np.testing.assert_array_equal(first.color, second.color)
-    assert first.color.dtype == first.objects.dtype == np.uint8 and first.inverse_depth.dtype == np.float32
-
-
 @pytest.mark.parametrize('camera', [Camera(1, 1, 30, 30, 0, 0), Camera(3, 50, 40, 40, 1, 25),
                                     Camera(333, 7, 300, 300, 166, 3)])
 def test_images_of_any_size_can_be_rendered(room, person, camera):

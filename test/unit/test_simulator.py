@@ -195,17 +195,7 @@ def test_the_status_of_people_outside_the_image_is_out_of_view(start, is_in_view
     np.testing.assert_allclose(track.prediction_m, [track.position_m] * 8)
 
 
-def test_predictions_of_the_truth_are_the_future_positions(pillar):
-    simulator, frames = pillar
-    track, = simulator.true_tracks(frames[3], START_NS)
-    assert track.prediction_step_s == PREDICTION_STEP_S and len(track.prediction_m) * PREDICTION_STEP_S == 2.0
-    for step, place in enumerate(track.prediction_m, 1):
-        time_s = frames[3].time_s + step * PREDICTION_STEP_S
-        np.testing.assert_allclose(place[:2], simulator.positions_at(time_s)[0])
-    np.testing.assert_allclose(track.prediction_m[3, :2], frames[8].people[0].position_m[:2])  # one second later
-
-
-def test_true_tracks_agree_with_the_frame(pillar):
+def test_true_tracks_agree_with_the_frame_and_the_future_positions(pillar):
     simulator, frames = pillar
     frame = frames[6]
     track, = simulator.true_tracks(frame, START_NS)
@@ -216,3 +206,7 @@ def test_true_tracks_agree_with_the_frame(pillar):
     np.testing.assert_allclose(track.velocity_mps, (0, -1, 0), atol=1e-9)
     np.testing.assert_array_equal(track.velocity_mps, track.instant_velocity_mps)
     assert (track.first_seen_ns, track.last_seen_ns) == (START_NS - 1200000000, START_NS)
+    assert track.prediction_step_s == PREDICTION_STEP_S and len(track.prediction_m) * PREDICTION_STEP_S == 2.0
+    for step, predicted_m in enumerate(track.prediction_m, 1):
+        positions_m = simulator.positions_at(frame.time_s + step * PREDICTION_STEP_S)
+        np.testing.assert_allclose(predicted_m[:2], positions_m[0])

@@ -12,8 +12,7 @@ import sys
 import pytest
 
 from soak.faults import FAULTS
-from soak.graph import LAUNCH, Graph
-from support.launching import loaded
+from soak.graph import Graph
 from support.running import processes_naming
 
 TEST = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -106,9 +105,3 @@ def test_the_log_of_roslaunch_is_parsed():
                             (1.0, 13, 'tracker_node (process 13) ended with a clean exit')]
     (_at_s, text), = graph.errors
     assert text.startswith('[ERROR] [160.1]: bad callback') and text.endswith('KeyError: 3')
-
-
-def test_nodes_are_respawned():
-    parameters, nodes = loaded(LAUNCH, 'detector:=depth')
-    assert parameters['/use_sim_time'] is True and len(nodes) == 4
-    assert all(node.respawn for node in nodes.values())
