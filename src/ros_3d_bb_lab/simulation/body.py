@@ -9,7 +9,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 
 from ros_3d_bb_lab.simulation.gait import BONES, JOINTS_M, TABLE_HEIGHT_M, Posture, bone_transforms
-from ros_3d_bb_lab.simulation.mesh import Mesh, loft, vertex_normals
+from ros_3d_bb_lab.simulation.mesh import Mesh, loft, merged, vertex_normals
 
 Color = Tuple[int, int, int]
 
@@ -64,16 +64,14 @@ class Body(object):
     def __init__(self, build, random):
         self.build = build
         parts = list(_parts(build))
-        counts = [len(vertices) for vertices, _faces, _color, _bones in parts]
-        offsets = np.cumsum([0] + counts[:-1])
-        scale = build.height_m / TABLE_HEIGHT_M
-        vertices = np.concatenate([part[0] for part in parts]) * scale
-        faces = np.concatenate([part[1] + offset for part, offset in zip(parts, offsets)])
-        self._rest = Mesh(vertices, vertex_normals(vertices, faces), faces,
-                          np.concatenate([np.tile(part[2], (len(part[1]), 1)) for part in parts]).astype(np.uint8),
+        self._scale = build.height_m / TABLE_HEIGHT_M
+        vertices, faces = merged([part[:2] for part in parts])
+        vertices *= self._scale
+        colors = np.concatenate([np.tile(color, (len(faces), 1)) for _vertices, faces, color, _bones in parts])
+        self._rest = Mesh(vertices, vertex_normals(vertices, faces), faces, colors.astype(np.uint8),
                           _tone(parts, random))
-        weights = np.concatenate([_weights(part[0], part[3]) for part in parts])
-        self._weights, self._scale = weights.astype(np.float32), scale
+        weights = np.concatenate([_weights(vertices, bones) for vertices, _faces, _color, bones in parts])
+        self._weights = weights.astype(np.float32)
         self._points = np.c_[vertices, np.ones(len(vertices))].astype(np.float32)
         self._normals = self._rest.normals.astype(np.float32)
 

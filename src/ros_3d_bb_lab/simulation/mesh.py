@@ -57,6 +57,13 @@ def loft(centers, half_axes, exponent, sides, axes=(0, 1)):
     return vertices, faces if volume(vertices, faces) > 0 else faces[:, ::-1]
 
 
+def merged(parts):
+    """Vertices and faces of several surfaces [(vertices, faces), ...] as one."""
+    offsets = np.cumsum([0] + [len(vertices) for vertices, _faces in parts[:-1]])
+    return (np.concatenate([vertices for vertices, _faces in parts]),
+            np.concatenate([faces + offset for (_vertices, faces), offset in zip(parts, offsets)]))
+
+
 def volume(vertices, faces):
     """Volume inside a closed surface; negative if its faces are wound clockwise."""
     a, b, c, d = (vertices[faces[:, corner]] for corner in range(4))
@@ -75,15 +82,11 @@ def vertex_normals(vertices, faces):
 
 def box(size_m, color, random):
     """Box of size (x, y, z) that stands on z = 0 at the origin, with slightly mottled sides that share no vertices."""
-    parts, offset = [], 0
-    for axis in range(3):
-        for side in (-1, 1):
-            corners, faces = _side(np.asarray(size_m, float), axis, side)
-            normal = np.zeros(3)
-            normal[axis] = side
-            parts.append((corners, np.tile(normal, (len(corners), 1)), faces + offset))
-            offset += len(corners)
-    vertices, normals, faces = (np.concatenate(column) for column in zip(*parts))
+    sides = [(axis, side) for axis in range(3) for side in (-1, 1)]
+    parts = [_side(np.asarray(size_m, float), axis, side) for axis, side in sides]
+    normals = np.concatenate([np.tile(side * np.eye(3)[axis], (len(corners), 1))
+                              for (axis, side), (corners, _faces) in zip(sides, parts)])
+    vertices, faces = merged(parts)
     return Mesh(vertices.astype(np.float32), normals.astype(np.float32), faces,
                 np.tile(np.asarray(color, np.uint8), (len(faces), 1)),
                 (1 + 0.05 * random.standard_normal(len(vertices)).clip(-2, 2)).astype(np.float32))

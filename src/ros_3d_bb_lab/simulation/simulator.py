@@ -186,7 +186,5 @@ def _build(person, seed, number):
     build = Build(random.uniform(1.58, 1.92), random.uniform(.95, 1.25), float(random.randint(2)),
                   bool(random.randint(2)), bool(random.randint(2)), choice(SKINS), choice(HAIRS),
                   SHIRTS[shirts[number % len(SHIRTS)]], choice(TROUSERS), choice(SHOES))
-    specified = {name: getattr(person, name) for name in (
-        'girth', 'hips', 'long_hair', 'short_sleeves', 'skin', 'hair', 'shirt', 'trousers')}
-    specified['height_m'] = person.height
-    return build._replace(**{name: value for name, value in specified.items() if value is not None})
+    specified = dict(person._asdict(), height_m=person.height)
+    return build._replace(**{name: specified[name] for name in Build._fields if specified.get(name) is not None})

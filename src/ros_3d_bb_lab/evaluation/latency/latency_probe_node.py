@@ -77,7 +77,11 @@ class LatencyProbeNode(object):
 
     def measure(self):
         """Wait for markers, measure, and write the record."""
-        self._wait_for_markers()
+        deadline_s = time.monotonic() + START_TIMEOUT_S
+        while not self._arrivals['markers'] and not rospy.is_shutdown():
+            if time.monotonic() > deadline_s:
+                raise ValueError('no markers within %.0f s' % START_TIMEOUT_S)
+            time.sleep(0.1)
         time.sleep(self._params.warm_up)
         pids, began_s = pids_of_nodes(), time.time()
         usage = {node: [] for node in pids}
@@ -96,13 +100,6 @@ class LatencyProbeNode(object):
                   'usage': usage, 'load_average': load}
         with open(self._params.record, 'w') as stream:
             json.dump(record, stream)
-
-    def _wait_for_markers(self):
-        deadline_s = time.monotonic() + START_TIMEOUT_S
-        while not self._arrivals['markers'] and not rospy.is_shutdown():
-            if time.monotonic() > deadline_s:
-                raise ValueError('no markers within %.0f s' % START_TIMEOUT_S)
-            time.sleep(0.1)
 
 
 def stamp_in(message):
