@@ -109,6 +109,6 @@ def test_a_number_is_remembered_over_images_without_tracks():
 
 def test_the_table_has_a_line_for_each_person():
     lines = table(score(moments(([at(1, 0, 0), at(2, 3, 0)], [at(5, 0.25, 0)]))))
-    assert lines[0].split() == ['person', 'visible', 'followed', 'switches', 'numbers', 'RMSE', 'worst']
+    assert lines[0].split() == ['person', 'visible', 'tracked', 'ID', 'switches', 'track', 'IDs', 'RMSE', 'worst']
     assert len(lines) == 4
     assert '5' in lines[1].split() and '0.250' in lines[1] and 'nan' in lines[2]

@@ -59,7 +59,7 @@ ALLOWED = {
         'scipy trackeval'),
     'ros_3d_bb_lab.evaluation.demo': (
         'conversions core tracking visualization lab.evaluation lab.simulation.ros',
-        'cv2 rosbag'),
+        'matplotlib rosbag'),
     'ros_3d_bb_lab.evaluation.latency': (
         'bags conversions core msg nodes.common lab.evaluation',
         'rospy sensor_msgs std_msgs visualization_msgs'),

@@ -14,7 +14,6 @@ from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from
                                                    tracks_from_msg, transform_from_msg)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb_lab.simulation.ground_truth import truth_at
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
@@ -143,7 +142,7 @@ def test_a_scene_contains_the_images_of_the_simulator(scene):
         np.testing.assert_array_equal(depth.values, frame.depth_mm)
         assert camera_from_msg(messages['/camera/color/camera_info'][number]) == simulator.camera
         written, = tracks_from_msg(messages['/ground_truth'][number])
-        person, = truth_at(simulator, frame, START_NS + number * NS // 10)
+        person, = simulator.true_tracks(frame, START_NS + number * NS // 10)
         assert (written.id, written.status, written.moving) == (person.id, person.status, person.moving)
         for field in ('position_m', 'velocity_mps', 'size_m', 'prediction_m'):
             np.testing.assert_allclose(getattr(written, field), getattr(person, field), atol=1e-12)

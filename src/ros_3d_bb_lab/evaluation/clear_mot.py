@@ -136,10 +136,10 @@ def _stretches_s(shown_ns, all_ns):
 
 def table(scene_score):
     """Format the scores as lines of text."""
-    lines = ['person  visible  followed  switches  numbers     RMSE     worst']
+    lines = ['person  visible   tracked  ID switches  track IDs     RMSE     worst']
     for person in scene_score.people:
-        lines.append('%6d  %5.1f s  %6.0f %%  %8d  %-9s  %6.3f m  %6.3f m'
+        lines.append('%6d  %5.1f s  %6.0f %%  %11d  %-9s  %6.3f m  %6.3f m'
                      % (person.person, person.visible_s, 100 * person.followed, person.switches,
                         ' '.join(map(str, person.ids)) or '-', person.rmse_m, person.worst_m))
-    lines.append('%d images, %.3f tracks of nobody for each' % (scene_score.images, scene_score.false_share))
+    lines.append('%d images, %.3f false tracks per image' % (scene_score.images, scene_score.false_share))
     return lines

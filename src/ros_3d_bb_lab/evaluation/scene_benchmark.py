@@ -14,7 +14,7 @@ from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path, scenario_paths
 from ros_3d_bb_lab.evaluation.scene_tracks import is_in_image, score_tracks
 from ros_3d_bb_lab.evaluation.scenes import LEAST_SHOWN, run_scene, score_detections
-from ros_3d_bb_lab.simulation.scenario import ScenarioError, read_scenario
+from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
 
 RANGE_M = {'yolov5': (2.0, 8.0), 'depth': (2.0, 6.0), 'exact': (0.5, 8.0)}  # evaluated range of each detector
@@ -87,7 +87,7 @@ def main():
         if arguments.json:
             with open(arguments.json, 'w') as stream:
                 json.dump({'scenes': results}, stream, indent=1)
-    except (ScenarioError, ValueError, OSError) as error:
+    except (ValueError, OSError) as error:
         sys.exit('./run bench scenes: %s' % error)
 
 

@@ -15,7 +15,6 @@ from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, Detection, TrackedObject, detection_from_box
 from ros_3d_bb_lab.evaluation.clear_mot import Moment
-from ros_3d_bb_lab.simulation.ground_truth import truth_at
 from ros_3d_bb_lab.simulation.simulator import SimulatedFrame
 
 LEAST_SHOWN = 0.3  # visible share of the body below which its position cannot be estimated
@@ -84,7 +83,7 @@ def look_at_scene(simulator, detect, every=1, estimator=estimator_named('foregro
         stamp_ns = int(round(frame.time_s * NS))
         yield SceneImage(stamp_ns, frame._replace(color=None, depth_mm=None), boxes,
                          _detections(frame, boxes, simulator.camera, estimator, error_model),
-                         _view(frame, simulator.camera), truth_at(simulator, frame, stamp_ns))
+                         _view(frame, simulator.camera), simulator.true_tracks(frame, stamp_ns))
 
 
 def track_scene(images, trackers):

@@ -12,7 +12,6 @@ from ros_3d_bb_lab.evaluation.tracking.benchmark import BOUND, CONTESTANTS, comp
 from ros_3d_bb_lab.evaluation.tracking.rendered_scenes import compare_scenes
 from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS
 from ros_3d_bb_lab.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
-from ros_3d_bb_lab.simulation.scenario import ScenarioError
 
 
 def main():
@@ -26,7 +25,7 @@ def main():
         if arguments.json:
             with open(arguments.json, 'w') as stream:
                 json.dump(result, stream, indent=1)
-    except (ScenarioError, ValueError, OSError) as error:
+    except (ValueError, OSError) as error:
         sys.exit('./run bench tracking: %s' % error)
 
 

@@ -30,7 +30,7 @@ def compare_scenes(paths, weights=None, every=2):
 
     Raises
     ------
-    ScenarioError, ValueError, OSError
+    ValueError, OSError
         If a scenario or the weights cannot be used.
     """
     yolov5 = yolov5_detector(weights) if weights else None
