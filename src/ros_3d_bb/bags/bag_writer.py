@@ -33,19 +33,9 @@ class SessionBagOptions(NamedTuple):
 
 
 def write_bag(images, path, compression='lz4'):
-    """Write the messages of images to a bag. The bag has a temporary name until it is complete.
+    """Write `images`, an iterable of (stamp_ns, iterable of (topic, message)), to a bag, and return their number.
 
-    Parameters
-    ----------
-    images : iterable of (stamp_ns, iterable of (topic, message))
-    path : str
-    compression : str
-        none, bz2 or lz4.
-
-    Returns
-    -------
-    int
-        Number of images. If `images` raises an exception, no bag remains.
+    If `images` raises an exception, no bag remains. `compression` is none, bz2 or lz4.
     """
     count = 0
     with new_bag(path, compression) as bag:
@@ -75,17 +65,9 @@ def remove_partial(path):
 
 
 def images_in(path, topics):
-    """Read the messages of a bag on some topics, grouped by image.
+    """Read the messages of a bag on some topics, grouped by image: a list of lists of (topic, message).
 
-    Returns
-    -------
-    list of list of (topic, message)
-        Topics have no leading slash.
-
-    Raises
-    ------
-    ValueError
-        If the bag cannot be read, or an image lacks one of the topics.
+    Topics have no leading slash. Raises ValueError if the bag cannot be read, or an image lacks one of the topics.
     """
     images = collections.OrderedDict()
     try:
@@ -97,8 +79,8 @@ def images_in(path, topics):
     for stamp_ns, messages in images.items():
         missing = set(topics) - set(topic for topic, _message in messages)
         if missing:
-            raise ValueError('the image at %.3f in the bag %s has no %s; a bag written by scenario_to_bag or '
-                             'session_to_bag expected' % (stamp_ns / NS, path, ', '.join(sorted(missing))))
+            raise ValueError('the image at %.3f in the bag %s has no %s; expected a bag written by scenario_to_bag or '
+                             'session_to_bag' % (stamp_ns / NS, path, ', '.join(sorted(missing))))
     if not images:
         raise ValueError('the bag %s has no messages on %s' % (path, ', '.join(sorted(topics))))
     return list(images.values())

@@ -57,55 +57,49 @@ class Settings(NamedTuple):
 class Pipeline(object):
     """Detection and estimation stages of each camera and one tracking stage.
 
-    `take` accepts a message and returns the messages that the nodes would publish.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is invalid.
+    `take` accepts a message and returns the messages that the nodes would publish. Raises ValueError if a parameter is
+    invalid.
     """
 
     def __init__(self, settings, tally, transforms):
         self._tally = tally
-        follower, marker_params, *tracking = settings.tracker
-        self._tracking_stage, self._markers = TrackingStage(follower, tracking, tally,
-                                                            transforms), MarkerWriter(marker_params)
-        self._estimation_stages = {camera: EstimationStage(settings.bbox3d[0], tally,
-                                                           functools.partial(self._on_frame, camera),
-                                                           settings.name(DEPTH_TOPIC, camera),
-                                                           settings.name(INFO_TOPIC, camera))
-                                   for camera in settings.cameras}
-        self._searches, self._publish_empty = {}, settings.yolov5[0].publish_empty
+        tracker_params, marker_params, *tracking = settings.tracker
+        self._tracking_stage = TrackingStage(tracker_params, tracking, tally, transforms)
+        self._markers = MarkerWriter(marker_params)
+        self._estimation_stages, self._detection_stages = {}, {}
+        for camera in settings.cameras:
+            self._estimation_stages[camera] = EstimationStage(
+                settings.bbox3d[0], tally, functools.partial(self._on_frame, camera),
+                settings.name(DEPTH_TOPIC, camera), settings.name(INFO_TOPIC, camera))
+        self._publish_empty = settings.yolov5[0].publish_empty
         if settings.detector == 'depth':
             params, people = settings.depth
-            transforms = transforms if params.floor_frame else None
-            self._searches = {camera: RgbdDetectionStage(params, people, tally,
-                                                         functools.partial(self._on_images, camera),
-                                                         transforms) for camera in settings.cameras}
             self._publish_empty = params.publish_empty
+            for camera in settings.cameras:
+                self._detection_stages[camera] = RgbdDetectionStage(
+                    params, people, tally, functools.partial(self._on_images, camera),
+                    transforms if params.floor_frame else None)
         self._now_ns, self._outputs = 0, []  # time and outputs of the message that is being processed
 
     def take(self, topic, message, now_ns, camera=''):
         """Process a message recorded at `now_ns` on an input topic of the nodes. Returns [(topic, message), ...]."""
         self._now_ns, self._outputs = now_ns, []
-        search, lifter = self._searches.get(camera), self._estimation_stages[camera]
+        stages = [stages[camera] for stages in (self._detection_stages, self._estimation_stages) if camera in stages]
         with_camera, with_depth = self._tracking_stage.looks
         if topic == INFO_TOPIC:
             if with_camera:
                 self._tracking_stage.add_camera_info(message, camera)
-            if search is not None:
-                search.add_camera_info(message, now_ns)
-            lifter.add_camera_info(message, now_ns)
+            for stage in stages:
+                stage.add_camera_info(message, now_ns)
         elif topic == DEPTH_TOPIC:
             if with_depth:
                 self._tracking_stage.add_depth(message, now_ns, camera)
-            if search is not None:
-                search.add_depth(message, now_ns)
-            lifter.add_depth(message, now_ns)
+            for stage in stages:
+                stage.add_depth(message, now_ns)
         elif topic == COLOR_TOPIC:
-            search.add_color(message, now_ns)
+            self._detection_stages[camera].add_color(message, now_ns)
         else:
-            lifter.add_boxes(message, now_ns)
+            self._estimation_stages[camera].add_boxes(message, now_ns)
         return self._outputs
 
     def found(self, header, found, now_ns, camera=''):
@@ -125,13 +119,13 @@ class Pipeline(object):
 
     def end(self):
         """Report inputs that are still waiting for others. Call at the end of the input."""
-        for part in list(self._searches.values()) + list(self._estimation_stages.values()):
-            part.end()
+        for stage in [*self._detection_stages.values(), *self._estimation_stages.values()]:
+            stage.end()
 
     def _on_images(self, camera, color_msg, depth_msg, camera_model):
         """Detect people in the images of one stamp, as depth_detector_node does."""
         with self.searching():
-            found = self._searches[camera].search(color_msg, depth_msg, camera_model)
+            found = self._detection_stages[camera].search(color_msg, depth_msg, camera_model)
             if found is not None:
                 _image, detections = found
                 self._on_detections(camera, color_msg.header, detections)
@@ -145,17 +139,13 @@ class Pipeline(object):
         self._estimation_stages[camera].add_boxes(message, self._now_ns)
 
     def _on_frame(self, camera, boxes2d, depth_msg, camera_model):
-        """Output the 3D boxes of one image, as bbox3d_node does."""
+        """Output the 3D boxes, tracks and markers of one image, as bbox3d_node and tracker_node do."""
         with self._tally.rejecting('2D boxes'):
             header, _depth, boxes3d = self._estimation_stages[camera].estimate(boxes2d, depth_msg, camera_model)
             message = boxes3d_to_msg(boxes3d, header, camera_model)
             self._outputs.append((topic_of(camera, BOXES3D_TOPIC), message))
-            self._on_boxes3d(camera, message)
-
-    def _on_boxes3d(self, camera, message):
-        """Output tracks and markers, as tracker_node does."""
-        with self._tally.rejecting('3D boxes'):
-            followed = self._tracking_stage.add_boxes(message, self._now_ns, camera)
-            if followed is not None:
-                self._outputs.append((TRACKS_TOPIC, tracks_to_msg(followed.tracks, followed.header)))
-                self._outputs.append((MARKERS_TOPIC, self._markers.write(followed.tracks, followed.header)))
+            with self._tally.rejecting('3D boxes'):
+                result = self._tracking_stage.add_boxes(message, self._now_ns, camera)
+                if result is not None:
+                    self._outputs += [(TRACKS_TOPIC, tracks_to_msg(result.tracks, result.header)),
+                                      (MARKERS_TOPIC, self._markers.write(result.tracks, result.header))]
