@@ -25,22 +25,9 @@ ID_FORMAT = re.compile(r'(\d+)_\d+_\d{9}$')
 class MeasurementRecord(NamedTuple):
     """One measurement to be stored.
 
-    Attributes
-    ----------
-    color : numpy.ndarray, (height, width, 3), uint8
-        RGB.
-    depth : DepthImage
-        Aligned to colour.
-    camera : Camera
-    frame_id : str
-        Frame of the camera.
-    stamp_ns : int
-    rects_px : tuple of (x1, y1, x2, y2)
-        2D boxes.
-    boxes : tuple of Box3D
-        3D boxes that were estimated from the 2D boxes; some may be missing.
-    label : str
-        Name given by the user; may be empty.
+    `color` is (height, width, 3), uint8, RGB; `depth` is aligned to it. `frame_id` is the frame of the camera.
+    `rects_px` are the 2D boxes (x1, y1, x2, y2), and `boxes` the 3D boxes that were estimated from them; some may be
+    missing. `label` is given by the user.
     """
 
     color: np.ndarray
@@ -53,21 +40,13 @@ class MeasurementRecord(NamedTuple):
     label: str = ''
 
 
-class Appended(NamedTuple):
-    """ID of a new measurement, and the number of measurements in its session."""
-
-    id: str
-    count: int
-
-
 def append(folder, measurement):
-    """Append a measurement to the session in a folder. The folder is created if it does not exist.
-
-    The ID consists of the next free number and the stamp. Nothing is overwritten.
+    """Append a MeasurementRecord to the session in a folder, which is created if it does not exist.
 
     Returns
     -------
-    Appended
+    str, int
+        ID of the measurement (the next free number and the stamp), and number of measurements in the session.
 
     Raises
     ------
@@ -78,7 +57,10 @@ def append(folder, measurement):
         If the session cannot be written. It is unchanged.
     """
     depth = stored_depth(measurement.depth)
-    _check_sizes(measurement)
+    for name, pixels in (('colour', measurement.color), ('depth', measurement.depth.values)):
+        if pixels.shape[:2] != (measurement.camera.height, measurement.camera.width):
+            raise ValueError('the %s image has %d x %d pixels and the camera has %d x %d; depth aligned to colour '
+                             'expected' % ((name,) + pixels.shape[1::-1] + measurement.camera[:2]))
     for name in ('color', 'depth'):
         os.makedirs(os.path.join(folder, name), exist_ok=True)
     written = []
@@ -96,7 +78,7 @@ def append(folder, measurement):
         for path in written:
             os.unlink(path)
         raise
-    return Appended(entry['id'], len(content['frames']))
+    return entry['id'], len(content['frames'])
 
 
 def stored_depth(depth):
@@ -111,14 +93,6 @@ def stored_depth(depth):
         depth_mm = np.rint(depth.values.astype(float) * (depth.scale_m / MILLIMETRE))
         valid = (depth_mm > 0) & (depth_mm <= MAX_DEPTH_MM)
     return DepthImage(np.where(valid, depth_mm, 0).astype(np.uint16), MILLIMETRE)
-
-
-def _check_sizes(measurement):
-    expected = (measurement.camera.height, measurement.camera.width)
-    for name, pixels in (('colour', measurement.color), ('depth', measurement.depth.values)):
-        if pixels.shape[:2] != expected:
-            raise ValueError('the %s image has %d x %d pixels and the camera has %d x %d; depth aligned to colour '
-                             'expected' % ((name,) + pixels.shape[1::-1] + measurement.camera[:2]))
 
 
 def _check_camera(folder, measurement, scale_m):
@@ -140,12 +114,12 @@ def _next_id(entries, stamp_ns):
 
 
 def _camera_entry(measurement, scale_m):
-    camera = measurement.camera._asdict()
+    camera = dict(measurement.camera._asdict())
     model, distortion = camera.pop('distortion_model'), list(camera.pop('distortion'))
     camera.update(distortion=distortion or [0.0] * 5, depth_scale=scale_m, frame=measurement.frame_id)
     if model:
         camera['distortion_model'] = model
-    return dict(camera)
+    return camera
 
 
 def _frame_entry(measurement, name):
