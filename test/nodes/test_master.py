@@ -96,7 +96,7 @@ def test_the_master_is_killed_and_started_again(port, tmp_path):
             label, failing = Label(''), Failing()
             on_new_master(failing)
             rospy.set_param('~label', 'A1')
-            assert label.heard() == 'A1'
+            assert label.from_cache() == 'A1'
             stage = Stage()
             depth_camera_pub = rospy.Publisher(INFO_TOPICS[1], CameraInfo, queue_size=10)
             rospy.Subscriber(INFO_TOPICS[0], CameraInfo, depth_camera_pub.publish)  # depth is that of colour
@@ -107,7 +107,7 @@ def test_the_master_is_killed_and_started_again(port, tmp_path):
             wait_until(lambda: stage.tries(TIMEOUT_S) and capture().success, 'a measurement')
             Client('tracker_node', timeout=20).update_configuration({'marker_history': 3.0})
             set_label('A2')
-            wait_until(lambda: label.heard() == 'A2', 'the label that was set')
+            wait_until(lambda: label.from_cache() == 'A2', 'the label that was set')
             wait_for_reports = running.enter_context(reports_of('bbox3d_node'))
             first.send_signal(signal.SIGSTOP)
             wait_for_reports(10)  # after 5 s without images it asks the master why
@@ -130,7 +130,7 @@ def test_the_master_is_killed_and_started_again(port, tmp_path):
             wait_until(lambda: failing.calls == 2, 'another registration after one that ended half-way')
             assert rospy.get_param('~label') == 'A2'
             set_label('B1')
-            wait_until(lambda: label.heard() == 'B1', 'the label that was set in the new master')
+            wait_until(lambda: label.from_cache() == 'B1', 'the label that was set in the new master')
             wait_until(lambda: rospy.has_param('/tracker_node_numbers'), 'the numbers in the new master')
             killed_and_back('/tracker_node', lambda: time.sleep(0.1))
             after = stage.recovered('tracker killed after that')

@@ -70,7 +70,7 @@ def test_boxes_may_be_missing(changes):
 
 def test_positions_are_shown_as_text():
     line, = box_lines((BOX,))
-    assert line == '1: x +0.50  y -0.25  z 2.00 m,  0.50 m wide, 1.75 m high, cut'
+    assert line == '1: x +0.50  y -0.25  z 2.00 m,  0.50 m wide, 1.75 m high, truncated'
 
 
 def test_warnings_are_in_another_colour():
