@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb_lab.evaluation.noise.tables import (MeasurementTable, TableError, clusters_of,
+from ros_3d_bb_lab.evaluation.noise.tables import (MeasurementTable, clusters_of,
                                                    read_session_measurements, read_table)
 from support.noise_tables import COLUMNS, RANGES_M, SIDES_M, rows_of, write_table
 
@@ -33,14 +33,14 @@ def test_clusters_are_by_true_value(tmp_path):
     ([0, 0, '', 300], 'line 3: "Z measured" is nan and "Z true" is 300; both or none expected'),
     ([0, 0, 288, 300, 0, 0, 12], 'line 3: "Z error" is 12, but measured minus true is -12')])
 def test_rows_with_faults_are_named(tmp_path, row, reason):
-    with pytest.raises(TableError) as error:
+    with pytest.raises(ValueError) as error:
         read_table(write_table(tmp_path / 'table.csv', [[0, 0, 288, 300], row]), 'Z')
     assert 'table.csv' in str(error.value) and reason in str(error.value)
 
 
 @pytest.mark.parametrize('columns', [['X measured', 'X true', 'Z measured'], []])
 def test_missing_columns_are_named(tmp_path, columns):
-    with pytest.raises(TableError, match='no column "Z true"; there are: X measured' if columns else 'there are: none'):
+    with pytest.raises(ValueError, match='no column "Z true"; there are: X measured' if columns else 'there are: none'):
         read_table(write_table(tmp_path / 'table.csv', [], columns), 'Z')
 
 
@@ -48,7 +48,7 @@ def test_files_that_are_no_tables_are_named(tmp_path):
     (tmp_path / 'image.csv').write_bytes(b'\x89PNG\xff\xfe')
     write_table(tmp_path / 'empty.csv', [])
     for name, reason in (('image.csv', 'cannot be read'), ('no.csv', 'No such file'), ('empty.csv', 'without rows')):
-        with pytest.raises(TableError, match=reason):
+        with pytest.raises(ValueError, match=reason):
             read_table(str(tmp_path / name), 'Z')
 
 
@@ -58,7 +58,7 @@ def test_files_that_are_no_tables_are_named(tmp_path):
     ([[0, 0, 288, 300]] * 5 + [[0, 0, 588, 600]] * 2, 'only 2 measurements with Z true = 0.6 m; at least 3')])
 def test_too_little_to_analyse_is_refused(tmp_path, rows, reason):
     table = read_table(write_table(tmp_path / 'table.csv', rows, COLUMNS[:4]), 'Z')
-    with pytest.raises(TableError, match=reason):
+    with pytest.raises(ValueError, match=reason):
         clusters_of(table, 'Z')
 
 
