@@ -9,23 +9,15 @@ WAKE_MS = 250
 
 
 def make_application():
-    """Return the QApplication of this process. It is created if there is none."""
-    application = QtWidgets.QApplication.instance()
-    if application is None:
-        application = QtWidgets.QApplication(sys.argv[:1])
-        application.setApplicationName('ros_3d_bb annotator')
-        application.setStyle('Fusion')  # same appearance on all platforms
+    """Create the QApplication of this process."""
+    application = QtWidgets.QApplication(sys.argv[:1])
+    application.setApplicationName('ros_3d_bb annotator')
+    application.setStyle('Fusion')  # same appearance on all platforms
     return application
 
 
 def run_window(folder=None):
-    """Show the window, optionally with the session in `folder`, until it is closed.
-
-    Returns
-    -------
-    int
-        Exit status.
-    """
+    """Show the window, optionally with the session in `folder`, until it is closed. Returns the exit status."""
     application = make_application()
     signal.signal(signal.SIGINT, lambda _number, _frame: application.closeAllWindows())
     wake = QtCore.QTimer(interval=WAKE_MS)  # Python handles signals only while it executes bytecode

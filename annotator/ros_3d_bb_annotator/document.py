@@ -16,7 +16,7 @@ from ros_3d_bb.sessions.session_reader import (Session, SessionError, camera_of,
 from ros_3d_bb_annotator import legacy
 from ros_3d_bb_annotator.drafts import Drafts
 from ros_3d_bb_annotator.entries import (Edit, changed, changes_with_estimate, detections_with, entry_at, grid_of,
-                                         grid_entry, millimetres)
+                                         millimetres)
 from ros_3d_bb_annotator.measurement import ANNOTATED, NEW, FileNames, measurement_of
 
 ESTIMATOR = 'foreground'  # the default of bbox3d_node
@@ -25,28 +25,18 @@ ESTIMATOR = 'foreground'  # the default of bbox3d_node
 class Document(object):
     """Session that is being annotated. Use `Document.open` to create one.
 
-    Attributes
-    ----------
-    folder : str
-    measurements : tuple of Measurement
-        In the order of the file. An index remains valid while the document is open.
-    camera : camera_model.Camera or None
-        None in the old format, which does not contain it.
-    depth_scale_m : float or None
-        Metres per unit of depth.
-    grid : tuple of Mark
-    is_old_form : bool
-        Whether the session has the old format of the thesis, whose stretched depth does not permit new estimates.
-    notes : tuple of str
-        Messages to the user on data that cannot be recovered.
+    `measurements` are EditedMeasurements in the order of the file; an index remains valid while the document is open.
+    `grid` are the Marks on the floor. `is_old_form` is whether the session has the old format of the thesis, which has
+    no `camera` (None), and whose stretched depth does not permit new estimates. `notes` tell the user which data cannot
+    be recovered.
     """
 
     def __init__(self, folder, content):
         self.folder, self.measurements = folder, ()
         self.is_old_form = content.get('form') == legacy.FORM
         self.notes = legacy.NOTES if self.is_old_form else ()
-        camera, self.depth_scale_m, frame_id = (None, None, '') if self.is_old_form else camera_of(content)
-        self.camera, self._session = camera, Session(camera, self.depth_scale_m, frame_id, ())
+        self._session = Session(*(None, None, '') if self.is_old_form else camera_of(content), frames=())
+        self.camera = self._session.camera
         self._content, self._signature = {'frames': []}, None
         self._undo, self._redo, self._annotated = [], [], []
         self._drafts = Drafts(folder)
@@ -70,42 +60,31 @@ class Document(object):
         signature = _signature(self.folder)  # before reading, so that concurrent changes are detected next time
         if self._signature == signature:
             return False
-        before, grid = self.measurements, self.grid
+        before = self._content
         content = read_description(self.folder)
         with session_errors(os.path.join(self.folder, FILE_NAME)):
             self._update(content)
         self._signature = signature
-        return (len(before) != len(self.measurements) or grid != self.grid
-                or any(old is not new for old, new in zip(before, self.measurements)))
+        return content != before
 
     def color(self, index):
-        """Read the colour image of a measurement, (height, width, 3), uint8, RGB. Raises SessionError."""
+        """Read the colour image of a measurement, see `read_color`."""
         return read_color(self._usable(index), self.camera)
 
     def depth(self, index):
-        """Read the depth of a measurement, an box3d_estimator.DepthImage. Raises SessionError."""
+        """Read the depth image of a measurement, see `read_depth`."""
         if self.is_old_form:
             raise SessionError(legacy.NOTES[0])
         return read_depth(self._usable(index), self._session)
 
     def stretched_depth(self, index):
-        """Read the unitless depth image (height, width) of a measurement in the old format. Raises SessionError."""
+        """Read the unitless depth image of a measurement in the old format, see `legacy.read_stretched`."""
         return legacy.read_stretched(self._usable(index).depth_path)
 
     def estimated(self, index, box_px):
-        """Estimate the 3D box of a 2D box (x1, y1, x2, y2) in a measurement, considering the boxes of other people.
+        """Estimate the Box3D of a 2D box (x1, y1, x2, y2) in a measurement, considering the boxes of other people.
 
-        Returns
-        -------
-        box3d_estimator.Box3D or None
-            None if there is not enough depth.
-
-        Raises
-        ------
-        SessionError
-            If the depth cannot be read.
-        ValueError
-            If the box is empty or reversed.
+        Returns None if there is not enough depth. Raises ValueError if the depth cannot be read, or the box is empty.
         """
         box_px = tuple(int(edge) for edge in box_px)
         check_rect(box_px)
@@ -125,15 +104,9 @@ class Document(object):
         return dx_m, dz_m, float(np.hypot(dx_m, dz_m))
 
     def set_truth(self, index, x_m, z_m, y_m=None):
-        """Set the true position of the person, and restore a rejected measurement. The person's box is estimated if no
-        estimate is stored.
+        """Set the true position of the person, which must be in front of the camera, and restore a rejected measurement.
 
-        Raises
-        ------
-        ValueError
-            If the position is not in front of the camera.
-        SessionError
-            If the measurement is invalid, or the truth cannot be saved.
+        The person's box is estimated if no estimate is stored.
         """
         values_m = [value for value in (x_m, y_m, z_m) if value is not None]
         if not np.isfinite(values_m).all() or max(np.abs(values_m)) > FARTHEST_M:
@@ -149,7 +122,7 @@ class Document(object):
         self.set_draft(index, {})
 
     def set_same_as_last(self, index):
-        """Set the truth of the last annotated measurement, or else of the nearest one before. Raises as `set_truth`."""
+        """Set the truth of the last annotated measurement, or else of the nearest one before."""
         candidates = self._annotated[::-1] + list(range(index - 1, -1, -1))
         for last in candidates:
             if last != index and self.measurements[last].state == ANNOTATED:
@@ -159,30 +132,14 @@ class Document(object):
                          % self.measurements[index].id)
 
     def choose_person(self, index, detection):
-        """Select the detection that the truth belongs to, by its index. It is estimated if no estimate is stored.
-
-        Raises ValueError, SessionError.
-        """
+        """Select the detection that the truth belongs to, by its index. It is estimated if no estimate is stored."""
         count = len(self.measurements[index].detections)
         if not 0 <= detection < count:
             raise ValueError('detection %d does not exist; there are %d detections' % (detection, count))
         self._edit(index, dict(self._missing_estimate(index, detection), person=int(detection)))
 
     def add_box(self, index, box_px):
-        """Add a box (x1, y1, x2, y2) that was drawn by hand, estimate it, and select it as the person.
-
-        Returns
-        -------
-        box3d_estimator.Box3D or None
-            None if there is not enough depth. The box is added nevertheless.
-
-        Raises
-        ------
-        ValueError
-            If the part of the box inside the image is empty.
-        SessionError
-            If the depth cannot be read, or the edit cannot be saved.
-        """
+        """Add a box (x1, y1, x2, y2) drawn by hand, select it as the person, and return its estimate as `estimated`."""
         if self.camera is None:
             raise SessionError(legacy.NOTES[0])
         x1, y1, x2, y2 = (int(round(edge)) for edge in box_px)
@@ -194,36 +151,35 @@ class Document(object):
         return box
 
     def reject(self, index, reason):
-        """Exclude a measurement, with a reason. Raises ValueError if the reason is empty, SessionError."""
+        """Exclude a measurement, with a reason."""
         if not reason.strip():
             raise ValueError('a reason is needed to reject a measurement')
         self._edit(index, {'rejected': reason.strip()})
         self.set_draft(index, {})
 
     def restore(self, index):
-        """Restore a rejected measurement with its previous truth. Raises SessionError."""
+        """Restore a rejected measurement with its previous truth."""
         self._edit(index, {'rejected': None})
 
     def set_grid(self, marks):
-        """Replace the marks (Mark) of the session. Raises SessionError."""
-        self._edit(None, {'grid': [grid_entry(mark) for mark in marks]})
+        """Replace the Marks of the session."""
+        self._edit(None, {'grid': [
+            {'name': mark.name, 'x': millimetres(mark.x_m), 'z': millimetres(mark.z_m)} for mark in marks]})
 
     @property
     def can_undo(self):
-        """Whether there is an edit to undo."""
         return bool(self._undo)
 
     @property
     def can_redo(self):
-        """Whether there is an edit to redo."""
         return bool(self._redo)
 
     def undo(self):
-        """Undo the last edit. Returns the changed index, or None for the grid or no edit. Raises SessionError."""
+        """Undo the last edit. Returns the changed index, or None for the grid or no edit."""
         return self._step(self._undo, self._redo)
 
     def redo(self):
-        """Redo the last undone edit. Returns the same as `undo`. Raises SessionError."""
+        """Redo the last undone edit. Returns the same as `undo`."""
         return self._step(self._redo, self._undo)
 
     def draft(self, index):
@@ -231,11 +187,8 @@ class Document(object):
         return self._drafts.of(self.measurements[index].id)
 
     def set_draft(self, index, fields):
-        """Save the draft of a measurement, {name of a field: text}; {} removes it. Raises SessionError."""
-        try:
-            self._drafts.set(self.measurements[index].id, fields)
-        except OSError as error:
-            raise SessionError('%s: the typed text cannot be saved (%s)' % (self.folder, error.strerror))
+        """Save the draft of a measurement, {name of a field: text}; {} removes it."""
+        self._drafts.set(self.measurements[index].id, fields)
 
     def _missing_estimate(self, index, person):
         """Changes that add the estimate of a detection; {} if it has one, or it cannot be estimated."""
@@ -274,18 +227,15 @@ class Document(object):
                 if self.is_old_form and 'form' not in content:
                     content.update(copy.deepcopy(self._content))
                 inverse = changed(content if edit.index is None else entry_at(content['frames'], edit), edit)
-        except OSError as error:
-            raise SessionError('%s: cannot be saved (%s)' % (self.folder, error.strerror))
-        except ValueError as error:
-            raise SessionError('%s: cannot be saved (%s)' % (self.folder, error))
+        except (OSError, ValueError) as error:
+            raise SessionError('%s: cannot be saved (%s)' % (self.folder, getattr(error, 'strerror', error)))
         self._update(content)
         self._signature = None  # another program may write before the next refresh
         return inverse
 
     def _update(self, content):
         """Update from the content of frames.json. Unchanged measurements are not parsed again."""
-        frames, old = content['frames'], self._content['frames']
-        files = FileNames()
+        frames, old, files = content['frames'], self._content['frames'], FileNames()
         self.measurements = tuple(
             self.measurements[index] if index < len(old) and old[index] == entry
             else measurement_of(self.folder, entry, files) for index, entry in enumerate(frames))

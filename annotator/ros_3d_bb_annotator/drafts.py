@@ -1,9 +1,9 @@
 """Text that was typed but not entered. It is saved in a file in the session's folder, so that it survives a crash."""
-import contextlib
 import json
 import os
 
 from ros_3d_bb.core.atomic_file import atomic_write
+from ros_3d_bb.sessions.session_reader import SessionError
 
 FILE_NAME = '.annotator_draft.json'
 
@@ -20,18 +20,20 @@ class Drafts(object):
         return dict(self._fields.get(name, {}))
 
     def set(self, name, fields):
-        """Save the draft of a measurement. If all fields are empty, the draft is removed. Raises OSError."""
+        """Save the draft of a measurement. If all fields are empty, the draft is removed. Raises SessionError."""
         fields = {key: text for key, text in fields.items() if text}
         if fields == self._fields.get(name, {}):
             return
         self._fields[name] = fields
         if not fields:
             del self._fields[name]
-        if self._fields:
-            atomic_write(self._path, json.dumps(self._fields).encode())
-        else:
-            with contextlib.suppress(FileNotFoundError):
+        try:
+            if self._fields:
+                atomic_write(self._path, json.dumps(self._fields).encode())
+            elif os.path.exists(self._path):
                 os.remove(self._path)
+        except OSError as error:
+            raise SessionError('%s: the typed text cannot be saved (%s)' % (self._path, error.strerror))
 
 
 def _read(path):

@@ -21,17 +21,9 @@ def rows_of(document):
 
 
 def export(document, path):
-    """Write the table to a CSV file atomically.
+    """Write the table to a CSV file atomically, and return the number of rows.
 
-    Returns
-    -------
-    int
-        Number of rows.
-
-    Raises
-    ------
-    SessionError
-        If no measurement is annotated, or the file cannot be written.
+    Raises SessionError if no measurement is annotated, or the file cannot be written.
     """
     rows = rows_of(document)
     if not rows:

@@ -33,10 +33,7 @@ def is_old_form(folder):
 def read(folder):
     """Convert a session in the old format to the content of a frames.json. Its field "form" marks the missing camera.
 
-    Raises
-    ------
-    SessionError
-        If the text cannot be read, or no line has the format.
+    Raises SessionError if the text cannot be read, or no line has the format.
     """
     path = os.path.join(folder, TEXT_NAME)
     try:

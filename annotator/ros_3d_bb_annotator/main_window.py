@@ -13,7 +13,6 @@ from ros_3d_bb_annotator.results import Results
 
 TITLE = 'ros_3d_bb annotator'
 REFRESH_MS = 2000
-NEIGHBOURS = (1, -1)
 
 
 class AnnotatorWindow(QtWidgets.QMainWindow):
@@ -34,11 +33,17 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self._refresh.timeout.connect(self._refresh_document)
         self._show_state()
 
+    @property
+    def measurement(self):
+        """Current measurement, or None."""
+        return None if self.current is None else self.document.measurements[self.current]
+
     def handler(self, name):
-        """Method that an action calls: a method of the window, of its edits or of its view."""
+        """Method that an action calls: a method of the window or of one of its parts."""
         if name.startswith('choose_'):
             return functools.partial(self.edits.choose_person, int(name.split('_')[1]) - 1)
-        return next(getattr(owner, name) for owner in (self, self.edits, self.pane.shared) if hasattr(owner, name))
+        owners = self, self.edits, self.results, self.pane.shared, self.pane.truth
+        return next(getattr(owner, name) for owner in owners if hasattr(owner, name))
 
     # --- sessions
 
@@ -70,17 +75,16 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     def reload(self):
         """Read changes of the session by other programs, and reload the images."""
-        if self.document is not None:
-            self.pane.read_again()
-            self._refresh.start()
-            self._refresh_document()
-            if self.current is not None:
-                self.keep_typed()
-                self.show_measurement(self.current)
+        self.pane.read_again()
+        self._refresh.start()
+        self._refresh_document()
+        if self.current is not None:
+            self.keep_typed()
+            self.show_measurement(self.current)
 
     def _refresh_document(self):
         """Show changes of the session by other programs."""
-        before = self.document.measurements
+        before = self.measurement
         try:
             if not self.document.refresh():
                 return
@@ -89,24 +93,11 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
             dialogs.show_error(self, 'The session has changed and cannot be read', error)
             return
         count = len(self.document.measurements)
-        changed = self.current is None or self.current >= count or (
-            self.document.measurements[self.current] is not before[self.current])
         if self.current is not None and self.current >= count:
             self.current = None  # another program removed the measurement
         self.after_edit()
-        if changed and count:
+        if count and (self.current is None or self.measurement is not before):
             self.show_measurement(self._next_new(-1) or 0 if self.current is None else self.current)
-
-    def ask_export(self):
-        """Ask for a file and write the table of errors to it."""
-        if self.document is not None:
-            self.results.ask_export(self.document)
-
-    def analyse(self):
-        """Analyse the noise and show the figures."""
-        if self.document is not None:
-            self.keep_typed()
-            self.results.analyse(self.document)
 
     # --- navigation
 
@@ -124,61 +115,43 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self._ahead.start()
 
     def next(self):
-        """Show the next measurement."""
-        if self.current is not None:
-            self._go_to(self.current + 1)
+        self._go_to(self.current + 1)
 
     def previous(self):
-        """Show the previous measurement."""
-        if self.current is not None:
-            self._go_to(self.current - 1)
+        self._go_to(self.current - 1)
 
     def first(self):
-        """Show the first measurement."""
         self._go_to(0)
 
     def last(self):
-        """Show the last measurement."""
-        self._go_to(len(self.document.measurements) - 1 if self.document else 0)
+        self._go_to(len(self.document.measurements) - 1)
 
     def next_new(self):
         """Show the next measurement that is neither annotated nor rejected."""
-        if self.document is None:
-            return
-        number = self._next_new(-1 if self.current is None else self.current)
+        number = self._next_new(self.current)
         if number is None:
             self.statusBar().showMessage('No new measurements: %d of %d are done' % self.document.progress)
         else:
             self._go_to(number)
 
     def go_to_list(self):
-        """Set the keyboard focus to the list."""
         self.list.table.setFocus()
 
     def go_to_image(self):
-        """Set the keyboard focus to the colour image."""
         self.pane.color_view.setFocus()
 
     def go_to_truth(self):
-        """Set the keyboard focus to the fields of the truth."""
         self.pane.truth.begin()
 
     def go_to_floor(self):
-        """Set the keyboard focus to the floor."""
         self.pane.floor.setFocus()
 
     def start_drawing(self):
         """Start to draw a box by dragging or by cursor and Space, or stop it."""
-        if self.current is not None:
-            self.pane.shared.start_drawing(not self.pane.shared.drawing)
-            self.pane.color_view.setFocus()
-
-    def switch_unit(self):
-        """Switch between millimetres and metres."""
-        self.pane.truth.switch_unit()
+        self.pane.shared.start_drawing(not self.pane.shared.drawing)
+        self.pane.color_view.setFocus()
 
     def show_keys(self):
-        """Show the overview of all keys."""
         keys_dialog(self).exec_()
 
     # --- calls by the parts of the window
@@ -200,7 +173,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         super(AnnotatorWindow, self).closeEvent(event)
 
     def _go_to(self, number):
-        if self.document is not None and 0 <= number < len(self.document.measurements):
+        if 0 <= number < len(self.document.measurements):
             self.show_measurement(number)
 
     def _next_new(self, number):
@@ -211,7 +184,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     def _read_ahead(self):
         """Read the images of neighbouring measurements, one measurement per idle event."""
-        for step in NEIGHBOURS:
+        for step in (1, -1):
             number = self.current + step
             if 0 <= number < len(self.document.measurements) and self.pane.read_ahead(number):
                 self._ahead.start()
@@ -219,7 +192,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     def _on_drawing(self, drawing):
         self.statusBar().showMessage('Drag a box around the person, or move the cursor with the arrows and set two '
-                                     'corners with Space; Esc drops it' if drawing else '')
+                                     'corners with Space; Esc cancels it' if drawing else '')
 
     def _keep_draft(self, texts):
         try:
@@ -232,11 +205,11 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.progress.setRange(0, max(count, 1))
         self.progress.setValue(done)
         self.progress.setFormat('%d of %d done' % (done, count))
-        measurement = None if self.current is None else self.document.measurements[self.current]
+        measurement = self.measurement
         self.actions['undo'].setEnabled(bool(self.document and self.document.can_undo))
         self.actions['redo'].setEnabled(bool(self.document and self.document.can_redo))
         self.actions['restore'].setEnabled(measurement is not None and measurement.rejected is not None)
-        for name in ('same_as_last', 'ask_reject', 'start_drawing'):
+        for name in ('same_as_last', 'ask_reject', 'start_drawing', 'next', 'previous', 'next_new', 'first', 'last'):
             self.actions[name].setEnabled(measurement is not None)
         for name in ('ask_export', 'analyse', 'edit_marks', 'reload'):
             self.actions[name].setEnabled(self.document is not None)

@@ -22,9 +22,7 @@ class MarkedBox(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """Overlay of an image: boxes, the index of the person's box or None, and the visible samples
-    (box3d_estimator.Samples).
-    """
+    """Overlay of an image: boxes, index of the person's box or None, and visible box3d_estimator.Samples."""
 
     boxes: Tuple[MarkedBox, ...]
     person: Optional[int]
@@ -122,7 +120,7 @@ def _paint_box(painter, transform, box_px, color, stroke):
 
 
 def _paint_label(painter, corner, text, color, inside=False, ends=False):
-    """Paint text on a filled background above the lower left corner, or with `inside` below the upper left corner.
+    """Paint text above the lower left corner of its background, or with `inside` below the upper left corner.
 
     With `ends` the corner is the right one.
     """

@@ -5,7 +5,6 @@ COLUMNS = ('measurement', 'state', 'error')
 COLORS = {'new': QtGui.QColor(60, 120, 200), 'annotated': QtGui.QColor(30, 140, 60),
           'rejected': QtGui.QColor(150, 150, 150)}
 PROBLEM = QtGui.QColor(190, 0, 40)
-STATES = ('new', 'annotated', 'rejected')
 
 
 class MeasurementModel(QtCore.QAbstractTableModel):
@@ -42,7 +41,9 @@ class MeasurementModel(QtCore.QAbstractTableModel):
     def data(self, index, role=Qt.DisplayRole):
         measurement = self._document.measurements[index.row()]
         if role == Qt.DisplayRole:
-            return self._text(index.row(), measurement, COLUMNS[index.column()])
+            errors = self._document.errors(index.row())
+            error = '' if errors is None else '%.0f mm' % (1000 * errors[2])
+            return (measurement.id, measurement.state, error)[index.column()]
         if role == Qt.ForegroundRole:
             return QtGui.QBrush(PROBLEM if measurement.problem else COLORS[measurement.state])
         if role == Qt.ToolTipRole:
@@ -51,33 +52,18 @@ class MeasurementModel(QtCore.QAbstractTableModel):
             return int(Qt.AlignRight | Qt.AlignVCenter)
         return None
 
-    def _text(self, row, measurement, column):
-        if column == 'measurement':
-            return measurement.id
-        if column == 'state':
-            return measurement.state
-        errors = self._document.errors(row)
-        return '' if errors is None else '%.0f mm' % (1000 * errors[2])
-
 
 class StateFilter(QtCore.QSortFilterProxyModel):
-    """Filter of measurements by state."""
+    """Filter of measurements by state.
 
-    def __init__(self, parent=None):
-        super(StateFilter, self).__init__(parent)
-        self._state, self._states = None, ()
+    `state` is the visible one, or None for all; `states` are those of all measurements, which must be set before the
+    model emits a change.
+    """
 
-    def show_states(self, states):
-        """Set the states of all measurements. Call it before the model emits a change."""
-        self._states = states
-
-    def show_only(self, state):
-        """Show measurements in one state, or all for None."""
-        self._state = state
-        self.invalidateFilter()
+    state, states = None, ()
 
     def filterAcceptsRow(self, row, _parent):  # noqa: N802
-        return self._state is None or self._states[row] == self._state
+        return self.state is None or self.states[row] == self.state
 
 
 class MeasurementList(QtWidgets.QWidget):
@@ -92,7 +78,7 @@ class MeasurementList(QtWidgets.QWidget):
         self._filter.setSourceModel(self._model)
         self.filter_box = QtWidgets.QComboBox()
         self.filter_box.addItem('all measurements', None)
-        for state in STATES:
+        for state in COLORS:
             self.filter_box.addItem('%s only' % state, state)
         self.filter_box.currentIndexChanged.connect(self._change_filter)
         self.table = self._make_table()
@@ -104,15 +90,13 @@ class MeasurementList(QtWidgets.QWidget):
     def show_document(self, document):
         """Show the measurements of a document."""
         self._document = document
-        self._filter.show_states([measurement.state for measurement in document.measurements])
+        self._update_states()
         self._model.show_document(document)
-        self._name_counts()
 
     def update_rows(self):
         """Update the list from the document."""
-        self._filter.show_states([measurement.state for measurement in self._document.measurements])
+        self._update_states()
         self._model.update_rows()
-        self._name_counts()
 
     def mark_current(self, number):
         """Select the current measurement without emitting `chosen`."""
@@ -148,10 +132,11 @@ class MeasurementList(QtWidgets.QWidget):
             self.chosen.emit(self._filter.mapToSource(index).row())
 
     def _change_filter(self):
-        self._filter.show_only(self.filter_box.currentData())
+        self._filter.state = self.filter_box.currentData()
+        self._filter.invalidateFilter()
 
-    def _name_counts(self):
-        states = [measurement.state for measurement in self._document.measurements]
+    def _update_states(self):
+        states = self._filter.states = [measurement.state for measurement in self._document.measurements]
         self.filter_box.setItemText(0, 'all measurements (%d)' % len(states))
-        for row, state in enumerate(STATES, 1):
+        for row, state in enumerate(COLORS, 1):
             self.filter_box.setItemText(row, '%s only (%d)' % (state, states.count(state)))

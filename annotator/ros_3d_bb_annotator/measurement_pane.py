@@ -1,9 +1,11 @@
 """View of one measurement: images, people, truth, and position on the floor."""
+import html
+
 from ros_3d_bb_annotator.grid_view import FloorScene, GridView
 from ros_3d_bb_annotator.image_view import ImageView
 from ros_3d_bb_annotator.pictures import PictureCache, depth_scale
 from ros_3d_bb_annotator.qt import Qt, QtWidgets, Signal
-from ros_3d_bb_annotator.scenes import detection_text, floor_of, readout_text, scene_of
+from ros_3d_bb_annotator.scenes import detection_text, readout_text, scene_of
 from ros_3d_bb_annotator.shared_view import SharedView
 from ros_3d_bb_annotator.truth_panel import TruthPanel
 
@@ -12,8 +14,9 @@ HEADER = '<span style="font-size: large"><b>%s</b></span> &nbsp; <b style="color
 
 
 class MeasurementPane(QtWidgets.QWidget):
-    """View of one measurement of a document. `person_chosen` is emitted with the index of a detection. `truth` (a
-    TruthPanel), `floor` (a GridView) and `shared` (a SharedView) have the signals for other user actions.
+    """View of one measurement of a document. `person_chosen` is emitted with the index of a detection.
+
+    `truth`, `floor` and `shared` have the signals for other user actions.
     """
 
     person_chosen = Signal(int)
@@ -32,8 +35,8 @@ class MeasurementPane(QtWidgets.QWidget):
         for view in (self.color_view, self.depth_view):
             view.box_chosen.connect(self.person_chosen)
         self.people.setAlternatingRowColors(True)
-        self.people.itemActivated.connect(lambda item: self.person_chosen.emit(self.people.row(item)))
-        self.people.itemClicked.connect(lambda item: self.person_chosen.emit(self.people.row(item)))
+        for signal in (self.people.itemActivated, self.people.itemClicked):
+            signal.connect(lambda item: self.person_chosen.emit(self.people.row(item)))
         self.shared.pointed.connect(self._show_readout)
         self.truth.previewed.connect(self._show_floor)
 
@@ -45,8 +48,9 @@ class MeasurementPane(QtWidgets.QWidget):
     def show_document(self, document):
         """Set the document. No measurement is shown yet."""
         self._document, self._pictures, self._shown = document, PictureCache(document), None
+        self.read_ahead, self.read_again = self._pictures.read_ahead, self._pictures.clear
         self.header.setText('This session contains no measurements yet.')
-        self.banner.setText('<br>'.join(_escaped(note) for note in document.notes))
+        self.banner.setText('<br>'.join(html.escape(note) for note in document.notes))
         self.banner.setVisible(bool(document.notes))
 
     def show_measurement(self, number):
@@ -66,14 +70,6 @@ class MeasurementPane(QtWidgets.QWidget):
         self.truth.show_truth(measurement.truth_m, measurement.estimate_m, self._document.draft(number))
         self._show_readout()
 
-    def read_ahead(self, number):
-        """Read the images of a measurement in advance. Returns whether they were not in the cache."""
-        return self._pictures.read_ahead(number)
-
-    def read_again(self):
-        """Clear the cache of images, because files may have changed."""
-        self._pictures.forget()
-
     def show_samples(self, shown):
         """Show or hide the samples."""
         self._samples_shown = shown
@@ -89,8 +85,8 @@ class MeasurementPane(QtWidgets.QWidget):
         details = [text for text in (measurement.label, measurement.stamp_text and 'at %s s' % measurement.stamp_text,
                                      measurement.rejected and 'because: %s' % measurement.rejected,
                                      measurement.problem) if text]
-        self.header.setText(HEADER % (_escaped(measurement.id), STATE_COLORS[measurement.state], measurement.state,
-                                      _escaped(' · '.join(details))))
+        self.header.setText(HEADER % (html.escape(measurement.id), STATE_COLORS[measurement.state], measurement.state,
+                                      html.escape(' · '.join(details))))
 
     def _show_people(self, measurement):
         self.people.clear()
@@ -109,8 +105,10 @@ class MeasurementPane(QtWidgets.QWidget):
 
     def _show_floor(self, truth_m):
         """Show the floor with the typed truth (x, z), or without truth for None."""
-        self.floor.show_scene(FloorScene(self._document.grid, truth_m, floor_of(self._measurement.estimate_m),
-                                         sight_of(self._document.camera)))
+        estimate_m, camera = self._measurement.estimate_m, self._document.camera
+        sight = (0.0, 0.0) if camera is None else (-camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx)
+        self.floor.show_scene(FloorScene(self._document.grid, truth_m,
+                                         None if estimate_m is None else tuple(estimate_m[[0, 2]].tolist()), sight))
 
     def _lay_out(self):
         views = QtWidgets.QSplitter(Qt.Horizontal)
@@ -141,19 +139,9 @@ class MeasurementPane(QtWidgets.QWidget):
         return layout
 
 
-def sight_of(camera):
-    """Tangents of the left and right limits of a camera's field of view; (0, 0) for an unknown camera."""
-    if camera is None:
-        return 0.0, 0.0
-    return -camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx
-
-
 def _label():
     label = QtWidgets.QLabel()
     label.setTextFormat(Qt.RichText)
     label.setWordWrap(True)
     return label
 
-
-def _escaped(text):
-    return text.replace('&', '&amp;').replace('<', '&lt;')

@@ -25,15 +25,11 @@ def detection_text(number, detection):
 
 
 def readout_text(cursor, depth, camera):
-    """Text with pixel, depth and position at the cursor (u, v). `depth` is a DepthImage or None, `camera` may be None.
-    """
+    """Text with pixel, depth and position at the cursor (u, v) or None. `depth` is a DepthImage or None."""
     if cursor is None:
         return 'Point at the image: pixel, depth, X Y Z'
     text = 'pixel (%d, %d)' % cursor
     if depth is None:
-        return text
-    height, width = depth.values.shape
-    if not (0 <= cursor[0] < width and 0 <= cursor[1] < height):
         return text
     depth_m, valid = depth.at(*cursor)
     if not valid:
@@ -42,17 +38,10 @@ def readout_text(cursor, depth, camera):
     return text + '    depth %.3f m    X %s  Y %s  Z %.3f m' % (depth_m, signed(x_m), signed(y_m), z_m)
 
 
-def floor_of(position_m):
-    """(x, z) of a position (3,), or None."""
-    return None if position_m is None else (float(position_m[0]), float(position_m[2]))
-
-
 def signed(value_m):
     """Format metres with a sign, with a minus sign as wide as the plus sign."""
     return ('%+.3f' % value_m).replace('-', '−')
 
 
 def _label_of(number, detection):
-    if detection.estimate_m is None:
-        return '%d' % (number + 1)
-    return '%d: %.2f m' % (number + 1, detection.estimate_m[2])
+    return '%d' % (number + 1) + ('' if detection.estimate_m is None else ': %.2f m' % detection.estimate_m[2])

@@ -28,7 +28,7 @@ def test_a_new_session_is_read(document):
     assert first.detections[0].truncated is False and first.detections[1].truncated is None
     assert document.grid == (Mark('A1', -0.5, 2.0),) and document.camera.width == 64
     assert document.color(0)[20, 20].tolist() == [200, 30, 30]
-    assert document.depth(0).values[20, 20] == NEAR_MM and document.depth_scale_m == 0.001
+    assert document.depth(0).values[20, 20] == NEAR_MM and document.depth(0).scale_m == 0.001
 
 
 def test_errors_are_estimate_minus_truth(document):

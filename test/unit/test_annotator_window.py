@@ -179,7 +179,7 @@ def test_invalid_marks_are_rejected(drive, folder):
         for column, text in enumerate(('B1', '__import__("os")', '2000')):
             dialog.table.item(1, column).setText(text)
         dialog.accept()
-        return dialog._problem.text(), dialog.isVisible()
+        return dialog.problem.text(), dialog.isVisible()
     problem, still_there = drive.answer(enter_nonsense, lambda: drive.press((Qt.Key_G, CONTROL)))
     assert 'Row 2' in problem and still_there and len(Document.open(folder).grid) == 1
 

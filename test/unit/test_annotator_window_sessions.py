@@ -188,21 +188,21 @@ def test_export_and_analysis(window_on, tmp_path):
     change_json(folder, lambda content: [entry.update(truth_mm=dict(zip('xz', truth[number % 9])))
                                          for number, entry in enumerate(content['frames'][:23])])
     driver = window_on(folder)
-    driver.window.results.export(driver.document, str(tmp_path / 'table.csv'))
+    driver.window.results.export(str(tmp_path / 'table.csv'))
     assert len((tmp_path / 'table.csv').read_text().splitlines()) == 24
     driver.press((Qt.Key_A, CONTROL | SHIFT))
     driver.wait_for(lambda: driver.window.results.figures is not None)
     figures = driver.window.results.figures
-    assert figures.names.count() == 7 and figures.figure.picture.pixmap().width() > 500
-    first = figures.figure.picture.pixmap().cacheKey()
+    assert figures.names.count() == 7 and figures.picture.pixmap().width() > 500
+    first = figures.picture.pixmap().cacheKey()
     figures.names.setCurrentRow(1)
-    assert figures.figure.picture.pixmap().cacheKey() != first
+    assert figures.picture.pixmap().cacheKey() != first
     figures.close()
 
 
 def test_an_analysis_without_annotations_is_reported(drive):
     message = drive.answer(message_of, lambda: (drive.press((Qt.Key_A, CONTROL | SHIFT)), drive.window.results.wait()))
-    assert 'cannot be analysed' in message
+    assert 'no frame with ground truth' in message
 
 
 def test_nothing_typed_is_written(drive, folder):

@@ -53,7 +53,7 @@ def test_the_annotator_opens_the_campaign(reader, campaign):
 
 def test_scripts_export_analyse_and_validate_it(reader, campaign):
     os.symlink(str(campaign), str(reader.clone / 'SESSION'))
-    assert 'nothing wrong' in reader.types(SCRIPTS, reader.clone)
+    assert ', 0 problems' in reader.types(SCRIPTS, reader.clone)
     assert (reader.clone / 'table.csv').exists() and (campaign / 'analysis' / 'report.html').exists()
 
 
