@@ -96,7 +96,7 @@ class Document(object):
         return estimate_boxes(self.depth(index), boxes_px, self.camera, estimator_named(ESTIMATOR))[0]
 
     def errors(self, index):
-        """Estimate minus truth (x, z, distance on the floor) in metres; None if one of both is missing."""
+        """Estimate minus truth (x, z, distance on the floor) in metres; None if either is missing."""
         measurement = self.measurements[index]
         if measurement.truth_m is None or measurement.estimate_m is None:
             return None
@@ -123,8 +123,7 @@ class Document(object):
 
     def set_same_as_last(self, index):
         """Set the truth of the last annotated measurement, or else of the nearest one before."""
-        candidates = self._annotated[::-1] + list(range(index - 1, -1, -1))
-        for last in candidates:
+        for last in self._annotated[::-1] + list(range(index - 1, -1, -1)):
             if last != index and self.measurements[last].state == ANNOTATED:
                 x_m, y_m, z_m = self.measurements[last].truth_m
                 return self.set_truth(index, x_m, z_m, y_m)

@@ -45,8 +45,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         owners = self, self.edits, self.results, self.pane.shared, self.pane.truth
         return next(getattr(owner, name) for owner in owners if hasattr(owner, name))
 
-    # --- sessions
-
     def ask_session(self):
         """Ask for a folder and open it."""
         folder = QtWidgets.QFileDialog.getExistingDirectory(self, 'Open a measurement session')
@@ -98,8 +96,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.after_edit()
         if count and (self.current is None or self.measurement is not before):
             self.show_measurement(self._next_new(-1) or 0 if self.current is None else self.current)
-
-    # --- navigation
 
     def show_measurement(self, number):
         """Show a measurement. The text typed for the previous one is saved."""
@@ -153,8 +149,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     def show_keys(self):
         keys_dialog(self).exec_()
-
-    # --- calls by the parts of the window
 
     def keep_typed(self):
         """Save the text that was typed for the current measurement."""

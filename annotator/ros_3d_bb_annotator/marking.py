@@ -111,19 +111,15 @@ def _thinned(ticks, scale):
 
 def _paint_box(painter, transform, box_px, color, stroke):
     x1, y1, x2, y2 = box_px
-    rect = transform.mapRect(QtCore.QRectF(x1, y1, x2 - x1, y2 - y1))
     painter.setBrush(Qt.NoBrush)
-    painter.setPen(QtGui.QPen(QtGui.QColor(0, 0, 0, 130), stroke[0] + 2))  # so that it shows on any ground
-    painter.drawRect(rect)
-    painter.setPen(QtGui.QPen(color, *stroke))
-    painter.drawRect(rect)
+    outline = QtGui.QPen(QtGui.QColor(0, 0, 0, 130), stroke[0] + 2)  # visible on any background
+    for pen in (outline, QtGui.QPen(color, *stroke)):
+        painter.setPen(pen)
+        painter.drawRect(transform.mapRect(QtCore.QRectF(x1, y1, x2 - x1, y2 - y1)))
 
 
 def _paint_label(painter, corner, text, color, inside=False, ends=False):
-    """Paint text above the lower left corner of its background, or with `inside` below the upper left corner.
-
-    With `ends` the corner is the right one.
-    """
+    """Paint text on a background above its left corner. `inside`: below the corner, `ends`: to the left of it."""
     if not text:
         return
     metrics = painter.fontMetrics()

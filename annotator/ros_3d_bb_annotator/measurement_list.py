@@ -15,9 +15,9 @@ class MeasurementModel(QtCore.QAbstractTableModel):
         self._document, self._count = None, 0
 
     def show_document(self, document):
-        """Show another document, or None."""
+        """Show another document."""
         self.beginResetModel()
-        self._document, self._count = document, len(document.measurements) if document else 0
+        self._document, self._count = document, len(document.measurements)
         self.endResetModel()
 
     def update_rows(self):
@@ -53,19 +53,6 @@ class MeasurementModel(QtCore.QAbstractTableModel):
         return None
 
 
-class StateFilter(QtCore.QSortFilterProxyModel):
-    """Filter of measurements by state.
-
-    `state` is the visible one, or None for all; `states` are those of all measurements, which must be set before the
-    model emits a change.
-    """
-
-    state, states = None, ()
-
-    def filterAcceptsRow(self, row, _parent):  # noqa: N802
-        return self.state is None or self.states[row] == self.state
-
-
 class MeasurementList(QtWidgets.QWidget):
     """List with a filter. `chosen` is emitted with the index of the measurement that the user selects."""
 
@@ -73,14 +60,14 @@ class MeasurementList(QtWidgets.QWidget):
 
     def __init__(self, parent=None):
         super(MeasurementList, self).__init__(parent)
-        self._model, self._filter = MeasurementModel(self), StateFilter(self)
-        self._document, self._marking = None, False
+        self._model, self._filter = MeasurementModel(self), QtCore.QSortFilterProxyModel(self)
         self._filter.setSourceModel(self._model)
+        self._filter.setFilterKeyColumn(COLUMNS.index('state'))
         self.filter_box = QtWidgets.QComboBox()
-        self.filter_box.addItem('all measurements', None)
-        for state in COLORS:
+        for state in ('',) + tuple(COLORS):
             self.filter_box.addItem('%s only' % state, state)
-        self.filter_box.currentIndexChanged.connect(self._change_filter)
+        self.filter_box.currentIndexChanged.connect(
+            lambda _row: self._filter.setFilterFixedString(self.filter_box.currentData()))
         self.table = self._make_table()
         layout = QtWidgets.QVBoxLayout(self)
         layout.setContentsMargins(6, 6, 0, 6)
@@ -90,23 +77,23 @@ class MeasurementList(QtWidgets.QWidget):
     def show_document(self, document):
         """Show the measurements of a document."""
         self._document = document
-        self._update_states()
         self._model.show_document(document)
+        self._show_counts()
 
     def update_rows(self):
         """Update the list from the document."""
-        self._update_states()
         self._model.update_rows()
+        self._show_counts()
 
     def mark_current(self, number):
         """Select the current measurement without emitting `chosen`."""
         index = self._filter.mapFromSource(self._model.index(number, 0))
-        self._marking = True
+        self.blockSignals(True)
         if index.isValid():
             self.table.setCurrentIndex(index)
         else:
             self.table.clearSelection()
-        self._marking = False
+        self.blockSignals(False)
 
     def _make_table(self):
         table = QtWidgets.QTableView()
@@ -128,15 +115,11 @@ class MeasurementList(QtWidgets.QWidget):
         return table
 
     def _on_current(self, index, _previous):
-        if index.isValid() and not self._marking:
+        if index.isValid():
             self.chosen.emit(self._filter.mapToSource(index).row())
 
-    def _change_filter(self):
-        self._filter.state = self.filter_box.currentData()
-        self._filter.invalidateFilter()
-
-    def _update_states(self):
-        states = self._filter.states = [measurement.state for measurement in self._document.measurements]
+    def _show_counts(self):
+        states = [measurement.state for measurement in self._document.measurements]
         self.filter_box.setItemText(0, 'all measurements (%d)' % len(states))
         for row, state in enumerate(COLORS, 1):
             self.filter_box.setItemText(row, '%s only (%d)' % (state, states.count(state)))

@@ -60,7 +60,7 @@ class SharedView(QtCore.QObject):
         self.changed.emit()
 
     def step(self, columns, rows):
-        """Move the cursor, which starts in the centre of the visible part. The visible part follows the cursor."""
+        """Move the cursor, which starts in the centre of the visible part, and the visible part with it."""
         start = self.cursor or tuple(int(share * size) for share, size in zip(self.center, self.size))
         self.point_at(*(min(max(value + move, 0), size - 1)
                         for value, move, size in zip(start, (columns, rows), self.size)))
@@ -91,7 +91,6 @@ class SharedView(QtCore.QObject):
             self.box_drawn.emit(box_px)
 
     def cancel(self):
-        """Cancel the box that is being drawn."""
         self.start_drawing(False)
 
     def rubber_band(self):

@@ -1,6 +1,7 @@
 """Validation of sessions: readable images, boxes inside the image, plausible estimates and truth."""
 import collections
 import os
+import pathlib
 
 from ros_3d_bb.sessions.session_reader import SessionError, read_description
 from ros_3d_bb_annotator.measurement import ANNOTATED, REJECTED
@@ -24,15 +25,12 @@ def leftovers_of(document):
     """Sorted relative paths of files that no measurement refers to, such as those left by a killed program."""
     if document.is_old_form:
         return []
-    folder = document.folder
-    files = [name for name in os.listdir(folder) if name.startswith('.') and name.endswith('.tmp')]
-    for kind in ('color', 'depth'):
-        if os.path.isdir(os.path.join(folder, kind)):
-            files += [os.path.join(kind, name) for name in os.listdir(os.path.join(folder, kind))]
+    folder = pathlib.Path(document.folder)
+    paths = [*folder.glob('.*.tmp'), *folder.glob('color/*'), *folder.glob('depth/*')]
     # read after the files are listed, because a viewer may add measurements concurrently
     entries = [entry for entry in read_description(folder)['frames'] if isinstance(entry, dict)]
-    return sorted(set(files) - set(os.path.normpath(str(entry.get(kind, ''))) for entry in entries
-                                   for kind in ('color', 'depth')))
+    used = set(os.path.normpath(str(entry.get(kind, ''))) for entry in entries for kind in ('color', 'depth'))
+    return sorted(set(str(path.relative_to(folder)) for path in paths) - used)
 
 
 def _problems_at(document, index):
