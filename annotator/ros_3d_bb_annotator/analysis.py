@@ -29,8 +29,8 @@ class Analysed(NamedTuple):
 def analyse(document, folder=None, estimator=None):
     """Analyse the errors of the annotated measurements of a document. Writes report, figures and error model.
 
-    The results are written to `folder`, by default `analysis` in the folder of the session. `estimator` is 'foreground',
-    'median', or 'recorded' for the stored estimates. The default is that of bbox3d_node, or 'recorded' for the old
+    The results are written to `folder`, by default `analysis` in the session. `estimator` is 'foreground', 'median', or
+    'recorded' for the stored estimates. The default is that of bbox3d_node, or 'recorded' for the old
     format, which has no depth. Raises ValueError if there are too few measurements, or an image cannot be read.
     """
     folder = pathlib.Path(folder or os.path.join(document.folder, 'analysis'))

@@ -104,7 +104,7 @@ class Document(object):
         return dx_m, dz_m, float(np.hypot(dx_m, dz_m))
 
     def set_truth(self, index, x_m, z_m, y_m=None):
-        """Set the true position of the person, which must be in front of the camera, and restore a rejected measurement.
+        """Set the true position of the person, in front of the camera, and restore a rejected measurement.
 
         The person's box is estimated if no estimate is stored.
         """

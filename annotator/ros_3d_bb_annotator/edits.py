@@ -75,7 +75,7 @@ class Edits(object):
                 window.next_new()
 
     def _edit(self, edit, *values):
-        """Apply an edit, a method of Document, to the current measurement, and show it. Returns whether it succeeded."""
+        """Apply a method of Document to the current measurement, and show it. Returns whether it succeeded."""
         window = self._window
         done = window.current is not None and self._succeeds(lambda: edit(window.document, window.current, *values))
         if done:

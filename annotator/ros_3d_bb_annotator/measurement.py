@@ -20,8 +20,8 @@ class Mark(NamedTuple):
 class EditedMeasurement(NamedTuple):
     """One measurement, with the fields of `session_reader.Measurement`.
 
-    `person` is None without detections; `truth_m` is (x, y, z), where y may be None; `stamp_text` is '<secs>.<nsecs>' or
-    empty; `problem` is the fault of an invalid measurement or None.
+    `person` is None without detections; `truth_m` is (x, y, z), where y may be None; `stamp_text` is
+    '<secs>.<nsecs>' or empty; `problem` is the fault of an invalid measurement or None.
     """
 
     id: str
@@ -83,4 +83,3 @@ def measurement_of(folder, entry, files):
     return EditedMeasurement(frame.id, frame.color_path, frame.depth_path, str(entry.get('stamp') or ''), frame.label,
                              frame.detections, frame.person if frame.detections else None, truth_m, frame.rejected,
                              'there is no file %s' % ' and no file '.join(missing) if missing else None)
-

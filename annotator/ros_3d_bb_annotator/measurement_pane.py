@@ -144,4 +144,3 @@ def _label():
     label.setTextFormat(Qt.RichText)
     label.setWordWrap(True)
     return label
-

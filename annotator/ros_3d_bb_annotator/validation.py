@@ -51,7 +51,8 @@ def _problems_at(document, index):
 
 def _box_problems(document, index):
     width, height = document.camera.width, document.camera.height
-    boxes_px = [detection.box_px for detection in document.measurements[index].detections if detection.box_px is not None]
+    detections = document.measurements[index].detections
+    boxes_px = [detection.box_px for detection in detections if detection.box_px is not None]
     return ['box (%d, %d, %d, %d) is not inside the image of %d x %d pixels' % (x1, y1, x2, y2, width, height)
             for x1, y1, x2, y2 in boxes_px if not (0 <= x1 < x2 <= width and 0 <= y1 < y2 <= height)]
 

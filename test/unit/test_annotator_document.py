@@ -126,8 +126,8 @@ def test_after_any_edits_the_file_is_what_is_shown_and_undo_leads_back(tmp_path_
             {'truth': lambda: document.set_truth(index, number, 1 + number), 'reject': lambda: document.reject(
                 index, 'no'), 'restore': lambda: document.restore(index),
              'person': lambda: document.choose_person(index, number)}[kind]()
-    shown, saved = ([(measurement.truth_m, measurement.person, measurement.rejected) for measurement in one.measurements]
-                    for one in (document, Document.open(folder)))
+    shown, saved = ([(one.truth_m, one.person, one.rejected) for one in source.measurements]
+                    for source in (document, Document.open(folder)))
     assert shown == saved
     while document.can_undo:
         document.undo()

@@ -1,4 +1,4 @@
-"""process_bag: the messages that the nodes would publish, identical bytes for equal input, and errors that name bags."""
+"""process_bag: the messages that the nodes would publish, identical bytes for equal input, and broken bags."""
 import bz2
 import filecmp
 import os

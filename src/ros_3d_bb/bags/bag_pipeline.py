@@ -20,10 +20,9 @@ MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
 
 
 class Waiting(NamedTuple):
-    """A message that was read ahead of its processing.
+    """A message that was read ahead of its processing, and what was begun: deserialization, and a detection in it.
 
-    `topic` is the topic of the nodes (None: not used by them), `camera` the namespace, `message` the deserialized
-    message if it was needed ahead, and `search` the detection that was started in it.
+    `topic` is the topic of the nodes (None: not used by them), and `camera` the namespace.
     """
 
     raw: Raw
@@ -115,28 +114,10 @@ class BagRun(object):
 
 
 def process_bag(source, target, settings=Settings(), progress=lambda share: None):
-    """Write a bag with the messages of another bag and those that the nodes would publish.
+    """Write a bag with the messages of another bag and those that the nodes would publish. Returns an EventCounter.
 
-    Parameters
-    ----------
-    source, target : str
-        Paths of the input and output bags.
-    settings : Settings
-    progress : callable
-        Called after each message with the processed fraction, 0..1.
-
-    Returns
-    -------
-    event_counter.EventCounter
-
-    Raises
-    ------
-    BagError
-        If the source cannot be read; the target is then removed.
-    ValueError
-        If a parameter is invalid.
-    OSError
-        If the target cannot be written.
+    `progress` is called after each message with the processed fraction, 0..1. Raises BagError if the source cannot be
+    read, ValueError if a parameter is invalid, and OSError if the target cannot be written; no target remains then.
     """
     tally = EventCounter()
     with BagReader(source) as reader, new_bag(target, settings.compression) as bag:

@@ -21,11 +21,8 @@ MOUNT_M = (0.17, 0.0, 0.20)  # position of the camera of a Jackal in base_link: 
 
 
 class SessionBagOptions(NamedTuple):
-    """Options for bags of sessions.
-
-    `rate_hz`: frames per second; `mount_m`: position of the forward-facing camera in base_link (x forward, y left,
-    z up), metres; `with_boxes`: whether the 2D boxes of the session are written to yolo_bounding_box.
-    """
+    """Options for bags of sessions: frames per second, position of the forward-facing camera in base_link (x forward,
+    y left, z up) in metres, and whether the 2D boxes of the session are written to yolo_bounding_box."""
 
     rate_hz: float = 30.0
     mount_m: Tuple[float, float, float] = MOUNT_M
@@ -59,8 +56,8 @@ def new_bag(path, compression):
 
 
 def remove_partial(path):
-    """Remove the temporary file of an incomplete bag, if there is one."""
-    if os.path.exists(path + PARTIAL):
+    """Remove the temporary file of an incomplete bag."""
+    with contextlib.suppress(FileNotFoundError):
         os.remove(path + PARTIAL)
 
 

@@ -228,7 +228,7 @@ def _parser():
     parser = argparse.ArgumentParser(prog='process_bag', description='Copy bags and add 2D boxes, 3D boxes, tracks and '
                                      'markers. Equal inputs give identical bytes.')
     parser.add_argument('bags', nargs='+', metavar='BAG', help='IN OUT; or, with --out-dir, the input bags')
-    parser.add_argument('--out-dir', metavar='DIR', help='folder of the output bags, which have the names of the inputs')
+    parser.add_argument('--out-dir', metavar='DIR', help='folder of the outputs, which have the names of the inputs')
     parser.add_argument('--jobs', type=int, default=1, metavar='N', help='number of parallel bags (default: 1)')
     parser.add_argument('--detector', choices=DETECTORS, default='yolov5',
                         help='none: use the 2D boxes in the bag (default: yolov5)')
@@ -243,8 +243,8 @@ def _parser():
     parser.add_argument('--remap', action='append', default=[], metavar='TOPIC:=TOPIC',
                         help="a topic of the nodes and its name in the bag")
     parser.add_argument('--keep', nargs='*', metavar='TOPIC', help='topics of the input to copy (default: all)')
-    parser.add_argument('--searches', type=int, default=0, metavar='N', help='number of images that yolov5 processes in '
-                        'parallel (default: cores / jobs); does not affect the result')
+    parser.add_argument('--searches', type=int, default=0, metavar='N', help='number of images that yolov5 processes '
+                        'in parallel (default: cores / jobs); does not affect the result')
     parser.add_argument('--memory', type=float, default=8.0, metavar='GIB', help='limit for each bag (default: 8)')
     parser.add_argument('--compression', choices=('none', 'bz2', 'lz4'), default='lz4', help='default: lz4')
     return parser

@@ -22,14 +22,8 @@ class Snapshots(object):
     `add_color`. The stamps of boxes must be equal to that of the colour image. Depth and camera are matched as in
     `StampSynchronizer`. If time jumps back, older messages are dropped.
 
-    Parameters
-    ----------
-    length_ns : int
-        How long images are kept while their boxes have not arrived.
-    tolerance_ns : int
-        Maximum difference of the stamps of the colour and the depth image.
-    on_lost : callable
-        Called with the stamp of a colour image whose depth image or camera did not arrive.
+    Images are kept for `length_ns` until their boxes arrive. The stamps of colour and depth image differ by at most
+    `tolerance_ns`. `on_lost` is called with the stamp of a colour image whose depth image or camera did not arrive.
     """
 
     def __init__(self, length_ns, tolerance_ns, on_lost):

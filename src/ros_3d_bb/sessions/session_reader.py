@@ -29,8 +29,8 @@ class SessionError(ValueError):
 class RecordedDetection(NamedTuple):
     """Detected person in an image. Values that are not stored are None.
 
-    `box_px` is (x1, y1, x2, y2), `estimate_m` (x, y, z) is in the optical frame, `size_m` is (width, height), `support`
-    and `truncated` are as in box3d_estimator.Box3D. `by_hand`: a user drew the box.
+    `box_px` is (x1, y1, x2, y2), `estimate_m` (x, y, z) in the optical frame, `size_m` (width, height). `support` and
+    `truncated` are those of box3d_estimator.Box3D. `by_hand`: a user drew the box.
     """
 
     box_px: Optional[Tuple[int, int, int, int]]
@@ -173,7 +173,7 @@ def read_color(frame, camera):
 
 
 def read_depth(frame, session):
-    """Read the depth image of a frame. Raises SessionError."""
+    """Read the DepthImage of a frame. Raises SessionError."""
     image = read_image(frame.depth_path, session.camera)
     if image.dtype != np.uint16 or image.ndim != 2:
         raise SessionError('%s: 16-bit depth image with one channel expected; 8-bit images have no depth scale'

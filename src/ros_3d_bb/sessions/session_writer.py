@@ -68,9 +68,13 @@ def append(folder, measurement):
         with locked_update(folder) as content:
             _check_camera(folder, measurement, depth.scale_m)
             content.setdefault('camera', _camera_entry(measurement, depth.scale_m))
-            entry = _frame_entry(measurement, _next_id(content['frames'], measurement.stamp_ns))
-            for name, pixels in (('color', measurement.color[..., ::-1]), ('depth', depth.values)):
-                path = os.path.join(folder, entry[name])
+            name = _next_id(content['frames'], measurement.stamp_ns)
+            entry = {'id': name, 'color': 'color/%s.png' % name, 'depth': 'depth/%s.png' % name,
+                     'stamp': '%d.%09d' % divmod(measurement.stamp_ns, NS), 'detections': _detections(measurement)}
+            if measurement.label:
+                entry['label'] = measurement.label
+            for kind, pixels in (('color', measurement.color[..., ::-1]), ('depth', depth.values)):
+                path = os.path.join(folder, entry[kind])
                 atomic_write(path, _png(pixels))
                 written.append(path)
             content['frames'].append(entry)
@@ -109,7 +113,8 @@ def _check_camera(folder, measurement, scale_m):
 
 
 def _next_id(entries, stamp_ns):
-    numbers = [int(match.group(1)) for match in (ID_FORMAT.match(str(entry['id'])) for entry in entries) if match]
+    matches = [ID_FORMAT.match(str(entry['id'])) for entry in entries]
+    numbers = [int(match.group(1)) for match in matches if match]
     return '%05d_%d_%09d' % ((max([len(entries)] + numbers) + 1,) + divmod(stamp_ns, NS))
 
 
@@ -120,14 +125,6 @@ def _camera_entry(measurement, scale_m):
     if model:
         camera['distortion_model'] = model
     return camera
-
-
-def _frame_entry(measurement, name):
-    entry = {'id': name, 'color': 'color/%s.png' % name, 'depth': 'depth/%s.png' % name,
-             'stamp': '%d.%09d' % divmod(measurement.stamp_ns, NS), 'detections': _detections(measurement)}
-    if measurement.label:
-        entry['label'] = measurement.label
-    return entry
 
 
 def _detections(measurement):

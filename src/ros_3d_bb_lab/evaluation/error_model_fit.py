@@ -41,28 +41,11 @@ class Data(NamedTuple):
 
 
 def fit_error_model(measured_m, truth_m, source='', estimator='', camera='', date=''):
-    """Fit an error model, selecting the number of coefficients by cross-validation.
+    """Fit an ErrorModel. More coefficients are selected only if they predict held-out positions clearly better.
 
-    A model with more coefficients is selected only if it predicts held-out positions clearly better.
-
-    Parameters
-    ----------
-    measured_m : array_like, (n, 3)
-        Estimated x, y, z in metres.
-    truth_m : array_like, (n, 2)
-        True x, z in metres. Measurements with equal truth are repetitions at one position.
-    source, estimator, camera, date : str
-        Provenance, stored in the model.
-
-    Returns
-    -------
-    ErrorModel
-
-    Raises
-    ------
-    ValueError
-        If there are too few positions, if all have the same range or the same x, or if the bias is too steep to be
-        inverted.
+    `measured_m` (n, 3) are the estimated x, y, z and `truth_m` (n, 2) the true x, z in metres. Measurements with equal
+    truth are repetitions at one position. Raises ValueError if there are too few positions, if all have the same range
+    or the same x, or if the bias is too steep to be inverted.
     """
     data = data_of(measured_m, truth_m)
     model = _fit(data)
@@ -126,7 +109,6 @@ def _folds(data):
 
 
 def _fit(data):
-    """Fit a model without provenance and scores."""
     degrees = [degree for degree in DEGREES if degree + 2 <= len(np.unique(data.truth_m[:, 1]))]
     degree = _simplest([(degree, _residuals(data, degree, X_TERMS[0])[:, 1]) for degree in degrees], data)
     terms = _simplest([(terms, _residuals(data, degree, terms)[:, 0]) for terms in X_TERMS], data)
@@ -139,7 +121,7 @@ def _fit(data):
 
 
 def _simplest(candidates, data):
-    """Select the first of the candidates (value, residuals (n,)), ordered by complexity, whose cost is near the best."""
+    """Select the simplest of the candidates (value, residuals), ordered by complexity, with nearly the best cost."""
     costs = [np.sqrt(np.average(residuals_m ** 2, weights=data.weights())) for _what, residuals_m in candidates]
     best = 0
     for number, cost in enumerate(costs):
@@ -158,7 +140,6 @@ def _residuals(data, degree, terms):
 
 
 def _fit_bias(data, degree, terms):
-    """Fit the bias by weighted least squares."""
     x_m, z_m = data.truth_m.T
     roots = np.sqrt(data.weights())
     z_bias = np.polyfit(z_m, data.measured_m[:, 2] - z_m, degree, w=roots)
@@ -188,8 +169,7 @@ def _fit_spread(residuals_m, data):
     z_m, weights = data.truth_m[:, 1], data.weights()
     likelihoods = [0.0, 0.0]
     for with_near in (False, True):
-        for number in range(data.position.max() + 1):
-            held = data.position == number
+        for held, _others in _folds(data):
             sigma_m = _spread_of(residuals_m[~held], z_m[~held], weights[~held], with_near).at(z_m[held])
             likelihoods[with_near] -= np.mean(np.log(sigma_m) + (residuals_m[held] / sigma_m) ** 2 / 2)
     return _spread_of(residuals_m, z_m, weights, likelihoods[True] > likelihoods[False] + LIKELIER)

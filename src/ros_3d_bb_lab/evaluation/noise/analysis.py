@@ -16,10 +16,7 @@ RMS_FIT_FROM_M = 1.5  # below, the error is not quadratic in the distance (thesi
 
 
 class Inputs(NamedTuple):
-    """Measurements for z, for x, and for the variance of x, with the estimator and the camera that produced them.
-
-    The measurements for the variance of x exclude people truncated by the image border, as in the thesis.
-    """
+    """Measurements for z, for x, and for its variance (no truncated people, as in the thesis), and their origin."""
 
     z: MeasurementTable
     x: MeasurementTable
@@ -53,7 +50,7 @@ class Analysis(NamedTuple):
     @property
     def variance_clusters(self):
         """Pairs (axis, ClusterStatistics) of the clusters that the variances are computed from."""
-        return [('Z', cluster) for cluster in self.z.clusters] + [('X', cluster) for cluster in self.x_variance.clusters]
+        return [(name, cluster) for name, axis in (('Z', self.z), ('X', self.x_variance)) for cluster in axis.clusters]
 
 
 def analyse(inputs):

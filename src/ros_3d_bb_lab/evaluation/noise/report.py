@@ -77,9 +77,9 @@ def _theory(analysis):
     far = analysis.z.clusters[-1]
     return [
         _heading('Depth error and the theory of stereo cameras'),
-        _paragraph('A stereo camera with a matching error of s pixels has a depth error of d² · s / (f · b) at distance '
-                   'd, for one pixel on a plane. The curved surface of a person and the detector increase the error; '
-                   'averaging over many pixels decreases it.',
+        _paragraph('A stereo camera with a matching error of s pixels has a depth error of d² · s / (f · b) at '
+                   'distance d, for one pixel on a plane. The curved surface of a person and the detector increase '
+                   'the error; averaging over many pixels decreases it.',
                    'The measured RMS includes the mean error; the standard deviation does not.',
                    'If the RMS is much larger than the standard deviation, most of the error is bias.',
                    'At %.2f m: RMS %.4f m, standard deviation %.4f m, theory %.4f m.' % (

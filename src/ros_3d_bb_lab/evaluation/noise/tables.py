@@ -18,10 +18,9 @@ ROUNDING_MM = 1.01  # errors may have been computed before the values were round
 
 
 class MeasurementTable(NamedTuple):
-    """Measured positions with ground truth.
+    """Positions x, y, z (n, 3) and ground truth x, z (n, 2) in metres, NaN if not measured, and name of the source.
 
-    `measured_m` (n, 3) as x, y, z and `truth_m` (n, 2) as x, z are in metres, NaN if not measured. `name` is the source
-    of the measurements. `cut` (n,) is whether the left or right image border truncates the person, if known.
+    `cut` (n,) is whether the left or right image border truncates the person, if known.
     """
 
     name: str
@@ -96,23 +95,10 @@ def read_table(path, axis):
 
 
 def read_session_measurements(folder, estimator):
-    """Apply an estimator to a measurement session.
+    """Apply an estimator to the frames with ground truth of a measurement session, and return a MeasurementTable.
 
-    Parameters
-    ----------
-    folder : str
-    estimator : str
-        Name for `estimator_named`, or 'recorded' for the estimates stored in the session.
-
-    Returns
-    -------
-    MeasurementTable
-        Measurements of the frames with ground truth and an estimate.
-
-    Raises
-    ------
-    ValueError
-        If the session cannot be read, or none of its frames can be used.
+    `estimator` is a name for `estimator_named`, or 'recorded' for the estimates stored in the session. Raises
+    ValueError if the session cannot be read, or none of its frames has ground truth and an estimate.
     """
     session, measured_m, truth_m, cut = read_session(folder), [], [], []
     for frame in session.frames:
