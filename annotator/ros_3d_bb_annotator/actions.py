@@ -94,7 +94,6 @@ def build_menus(window):
 
 
 def keys_dialog(parent):
-    """Create a dialog with the overview of keys."""
     dialog = QtWidgets.QDialog(parent)
     dialog.setWindowTitle('Keys')
     dialog.resize(620, 640)

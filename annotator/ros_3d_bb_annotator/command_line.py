@@ -30,7 +30,7 @@ def main(arguments=None):
 
 def _show(folder):
     try:
-        from ros_3d_bb_annotator.application import run_window  # scripts need no Qt
+        from ros_3d_bb_annotator.main_window import run_window  # scripts need no Qt
     except ImportError as error:
         print('annotator: the window cannot be opened (%s); install PyQt5, or see annotator --help for commands that '
               'work without it' % error, file=sys.stderr)

@@ -7,7 +7,6 @@ HEADER = ('name', 'X [mm]', 'Z [mm]')
 
 
 def show_error(parent, what, error):
-    """Show an error message: what failed, and why."""
     box = QtWidgets.QMessageBox(QtWidgets.QMessageBox.Critical, what, '<b>%s</b>' % what,
                                 QtWidgets.QMessageBox.Ok, parent)
     box.setInformativeText(str(error))
@@ -57,13 +56,11 @@ class MarksDialog(QtWidgets.QDialog):
             layout.addWidget(widget)
 
     def add_empty(self):
-        """Add a row and select it."""
         self._add(('', '', ''))
         self.table.setCurrentCell(self.table.rowCount() - 1, 0)
         self.table.setFocus()
 
     def remove_current(self):
-        """Remove the selected row."""
         self.table.removeRow(self.table.currentRow())
 
     def accept(self):

@@ -150,18 +150,15 @@ class Document(object):
         return box
 
     def reject(self, index, reason):
-        """Exclude a measurement, with a reason."""
         if not reason.strip():
             raise ValueError('a reason is needed to reject a measurement')
         self._edit(index, {'rejected': reason.strip()})
         self.set_draft(index, {})
 
     def restore(self, index):
-        """Restore a rejected measurement with its previous truth."""
         self._edit(index, {'rejected': None})
 
     def set_grid(self, marks):
-        """Replace the Marks of the session."""
         self._edit(None, {'grid': [
             {'name': mark.name, 'x': millimetres(mark.x_m), 'z': millimetres(mark.z_m)} for mark in marks]})
 

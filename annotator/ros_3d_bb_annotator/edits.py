@@ -29,7 +29,6 @@ class Edits(object):
             self._enter(Document.reject, reason)
 
     def restore(self):
-        """Restore the rejected measurement."""
         self._edit(Document.restore)
 
     def choose_person(self, person):
@@ -50,15 +49,12 @@ class Edits(object):
                                                  'The box has not enough depth for an estimate')
 
     def undo(self):
-        """Undo the last edit, and show its measurement."""
         self._step(Document.undo)
 
     def redo(self):
-        """Redo the last undone edit, and show its measurement."""
         self._step(Document.redo)
 
     def edit_marks(self):
-        """Edit the marks on the floor."""
         document = self._window.document
         marks = dialogs.ask_marks(self._window, document.grid)
         if marks != document.grid and self._succeeds(lambda: document.set_grid(marks)):

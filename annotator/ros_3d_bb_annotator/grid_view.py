@@ -47,7 +47,6 @@ class GridView(QtWidgets.QWidget):
         return QtCore.QSize(340, 340)
 
     def show_scene(self, scene):
-        """Show a FloorScene."""
         if scene.marks != self._scene.marks:
             self._pointed = None
         self._scene = scene

@@ -38,7 +38,6 @@ class ImageView(QtWidgets.QWidget):
         self.update()
 
     def show_scene(self, scene):
-        """Change the overlay."""
         self._scene = scene
         self.update()
 

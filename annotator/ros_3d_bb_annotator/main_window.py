@@ -1,5 +1,7 @@
 """Main window: list of measurements, view of the current measurement, and actions."""
 import functools
+import signal
+import sys
 
 from ros_3d_bb_annotator import dialogs
 from ros_3d_bb_annotator.actions import build_menus, keys_dialog
@@ -12,7 +14,7 @@ from ros_3d_bb_annotator.qt import Qt, QtCore, QtWidgets
 from ros_3d_bb_annotator.results import Results
 
 TITLE = 'ros_3d_bb annotator'
-REFRESH_MS = 2000
+REFRESH_MS, WAKE_MS = 2000, 250
 
 
 class AnnotatorWindow(QtWidgets.QMainWindow):
@@ -35,7 +37,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     @property
     def measurement(self):
-        """Current measurement, or None."""
         return None if self.current is None else self.document.measurements[self.current]
 
     def handler(self, name):
@@ -46,7 +47,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         return next(getattr(owner, name) for owner in owners if hasattr(owner, name))
 
     def ask_session(self):
-        """Ask for a folder and open it."""
         folder = QtWidgets.QFileDialog.getExistingDirectory(self, 'Open a measurement session')
         if folder:
             self.open_session(folder)
@@ -236,3 +236,24 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.pane.truth.typed.connect(self._keep_draft)
         self.pane.floor.mark_chosen.connect(lambda mark: self.edits.enter_truth(mark.x_m, mark.z_m))
         self.actions['show_samples'].toggled.connect(self.pane.show_samples)
+
+
+def make_application():
+    application = QtWidgets.QApplication(sys.argv[:1])
+    application.setApplicationName('ros_3d_bb annotator')
+    application.setStyle('Fusion')  # same appearance on all platforms
+    return application
+
+
+def run_window(folder=None):
+    """Show the window, optionally with the session in `folder`, until it is closed. Returns the exit status."""
+    application = make_application()
+    signal.signal(signal.SIGINT, lambda _number, _frame: application.closeAllWindows())
+    wake = QtCore.QTimer(interval=WAKE_MS)  # Python handles signals only while it executes bytecode
+    wake.timeout.connect(lambda: None)
+    wake.start()
+    window = AnnotatorWindow()
+    window.show()
+    if folder is not None:
+        QtCore.QTimer.singleShot(0, lambda: window.open_session(folder))
+    return application.exec_()

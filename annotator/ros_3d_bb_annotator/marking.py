@@ -39,7 +39,6 @@ NOTHING = Scene((), None, ())
 
 
 def paint_scene(painter, transform, scene):
-    """Paint samples and boxes."""
     for samples in scene.samples:
         _paint_samples(painter, transform, samples)
     boxes = sorted(scene.boxes, key=lambda box: box.number == scene.person)  # the person's on top
@@ -84,7 +83,6 @@ def paint_frame(painter, rect, name, legend, focused):
 
 
 def paint_message(painter, rect, message):
-    """Paint a message instead of an image."""
     painter.setPen(Qt.white)
     option = QtGui.QTextOption(Qt.AlignCenter)
     option.setWrapMode(QtGui.QTextOption.WrapAtWordBoundaryOrAnywhere)  # paths have no spaces

@@ -44,7 +44,6 @@ class EditedMeasurement(NamedTuple):
 
     @property
     def estimate_m(self):
-        """Stored position (3,) of the person, or None."""
         return None if self.person is None else self.detections[self.person].estimate_m
 
 

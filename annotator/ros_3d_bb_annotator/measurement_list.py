@@ -15,13 +15,11 @@ class MeasurementModel(QtCore.QAbstractTableModel):
         self._document, self._count = None, 0
 
     def show_document(self, document):
-        """Show another document."""
         self.beginResetModel()
         self._document, self._count = document, len(document.measurements)
         self.endResetModel()
 
     def update_rows(self):
-        """Update the rows from the document."""
         if len(self._document.measurements) != self._count:
             self.show_document(self._document)
         elif self._count:
@@ -75,13 +73,11 @@ class MeasurementList(QtWidgets.QWidget):
         layout.addWidget(self.table)
 
     def show_document(self, document):
-        """Show the measurements of a document."""
         self._document = document
         self._model.show_document(document)
         self._show_counts()
 
     def update_rows(self):
-        """Update the list from the document."""
         self._model.update_rows()
         self._show_counts()
 

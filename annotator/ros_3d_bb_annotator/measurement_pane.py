@@ -1,11 +1,13 @@
 """View of one measurement: images, people, truth, and position on the floor."""
 import html
 
+from ros_3d_bb.estimation.box3d_estimator import estimator_named
+from ros_3d_bb_annotator.document import ESTIMATOR
 from ros_3d_bb_annotator.grid_view import FloorScene, GridView
 from ros_3d_bb_annotator.image_view import ImageView
+from ros_3d_bb_annotator.marking import MarkedBox, Scene
 from ros_3d_bb_annotator.pictures import PictureCache, depth_scale
 from ros_3d_bb_annotator.qt import Qt, QtWidgets, Signal
-from ros_3d_bb_annotator.scenes import detection_text, readout_text, scene_of
 from ros_3d_bb_annotator.shared_view import SharedView
 from ros_3d_bb_annotator.truth_panel import TruthPanel
 
@@ -71,7 +73,6 @@ class MeasurementPane(QtWidgets.QWidget):
         self._show_readout()
 
     def show_samples(self, shown):
-        """Show or hide the samples."""
         self._samples_shown = shown
         if self._measurement is not None:
             scene = self._scene()
@@ -79,7 +80,7 @@ class MeasurementPane(QtWidgets.QWidget):
             self.depth_view.show_scene(scene)
 
     def _scene(self):
-        return scene_of(self._measurement, self._shown.depth if self._samples_shown else None)
+        return _scene_of(self._measurement, self._shown.depth if self._samples_shown else None)
 
     def _show_header(self, measurement):
         details = [text for text in (measurement.label, measurement.stamp_text and 'at %s s' % measurement.stamp_text,
@@ -91,7 +92,7 @@ class MeasurementPane(QtWidgets.QWidget):
     def _show_people(self, measurement):
         self.people.clear()
         for number, detection in enumerate(measurement.detections):
-            item = QtWidgets.QListWidgetItem(detection_text(number, detection))
+            item = QtWidgets.QListWidgetItem(_detection_text(number, detection))
             font = item.font()
             font.setBold(number == measurement.person)
             item.setFont(font)
@@ -101,7 +102,7 @@ class MeasurementPane(QtWidgets.QWidget):
 
     def _show_readout(self):
         depth, camera = (self._shown.depth, self._document.camera) if self._shown is not None else (None, None)
-        self.readout.setText(readout_text(self.shared.cursor, depth, camera))
+        self.readout.setText(_readout_text(self.shared.cursor, depth, camera))
 
     def _show_floor(self, truth_m):
         """Show the floor with the typed truth (x, z), or without truth for None."""
@@ -144,3 +145,45 @@ def _label():
     label.setTextFormat(Qt.RichText)
     label.setWordWrap(True)
     return label
+
+
+def _scene_of(measurement, depth):
+    """Overlay of a measurement. With a DepthImage it contains the samples of the estimator in each box."""
+    boxes = []
+    for number, detection in enumerate(measurement.detections):
+        if detection.box_px is not None:
+            distance = '' if detection.estimate_m is None else ': %.2f m' % detection.estimate_m[2]
+            boxes.append(MarkedBox(number, detection.box_px, '%d%s' % (number + 1, distance), detection.by_hand))
+    sample = estimator_named(ESTIMATOR).sample
+    samples = () if depth is None else tuple(
+        sample(depth, box.rect_px) for box in boxes
+        if box.rect_px[0] < box.rect_px[2] and box.rect_px[1] < box.rect_px[3])
+    return Scene(tuple(boxes), measurement.person, samples)
+
+
+def _detection_text(number, detection):
+    """Description of a detection in two lines."""
+    position = 'no estimate' if detection.estimate_m is None else (
+        'X %s  Z %.3f m' % (_signed(detection.estimate_m[0]), detection.estimate_m[2]))
+    details = (detection.support is not None and 'support %.0f %%' % (100 * detection.support),
+               detection.truncated and 'truncated', detection.by_hand and 'drawn by hand')
+    return '%d: %s\n     %s' % (number + 1, position, ', '.join(filter(None, details)))
+
+
+def _readout_text(cursor, depth, camera):
+    """Text with pixel, depth and position at the cursor (u, v) or None. `depth` is a DepthImage or None."""
+    if cursor is None:
+        return 'Point at the image: pixel, depth, X Y Z'
+    text = 'pixel (%d, %d)' % cursor
+    if depth is None:
+        return text
+    depth_m, valid = depth.at(*cursor)
+    if not valid:
+        return text + '    no depth there'
+    x_m, y_m, z_m = camera.deproject(cursor, depth_m).tolist()
+    return text + '    depth %.3f m    X %s  Y %s  Z %.3f m' % (depth_m, _signed(x_m), _signed(y_m), z_m)
+
+
+def _signed(value_m):
+    """Format metres with a sign, with a minus sign as wide as the plus sign."""
+    return ('%+.3f' % value_m).replace('-', '−')

@@ -31,7 +31,6 @@ class PictureCache(object):
         self.clear = self._cache.clear
 
     def of(self, number):
-        """Pictures of a measurement."""
         if number in self._cache:
             self._cache.move_to_end(number)
         else:

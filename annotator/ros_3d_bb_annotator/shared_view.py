@@ -49,7 +49,6 @@ class SharedView(QtCore.QObject):
         self._move_center((self.center[0] + x_px / self.size[0], self.center[1] + y_px / self.size[1]))
 
     def fit(self):
-        """Show the whole image."""
         self.zoom, self.center = MIN_ZOOM, (0.5, 0.5)
         self.changed.emit()
 

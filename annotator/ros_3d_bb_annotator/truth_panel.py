@@ -68,12 +68,10 @@ class TruthPanel(QtWidgets.QGroupBox):
         return dict({name: field.text() for name, field in self.fields.items()}, unit=self.unit_box.currentText())
 
     def begin(self):
-        """Set the keyboard focus to the first field."""
         self.fields['x'].setFocus()
         self.fields['x'].selectAll()
 
     def has_keyboard(self):
-        """Whether a field has the keyboard focus."""
         return any(field.hasFocus() for field in self.fields.values())
 
     def flush(self):
@@ -89,7 +87,6 @@ class TruthPanel(QtWidgets.QGroupBox):
         self._on_unit()
 
     def show_problem(self, text):
-        """Show what is wrong with the input."""
         self._show_hint(text, 'color: #b00020')
 
     def read(self):

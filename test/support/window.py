@@ -4,9 +4,8 @@ import os
 
 os.environ.setdefault('QT_QPA_PLATFORM', 'offscreen')  # before Qt is imported; a virtual display does as well
 
-from ros_3d_bb_annotator.application import make_application  # noqa: E402
 from ros_3d_bb_annotator.document import Document  # noqa: E402
-from ros_3d_bb_annotator.main_window import AnnotatorWindow  # noqa: E402
+from ros_3d_bb_annotator.main_window import AnnotatorWindow, make_application  # noqa: E402
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets  # noqa: E402
 
 QtTest = importlib.import_module(QtCore.__name__.replace('QtCore', 'QtTest'))  # of the binding that is in use

@@ -56,7 +56,6 @@ def new_bag(path, compression):
 
 
 def remove_partial(path):
-    """Remove the temporary file of an incomplete bag."""
     with contextlib.suppress(FileNotFoundError):
         os.remove(path + PARTIAL)
 
@@ -115,7 +114,6 @@ def session_to_bag():
 
 
 def bag_command_parser(name, doc):
-    """Create the argument parser of a command that writes a bag."""
     parser = argparse.ArgumentParser(prog=name, description=doc.split(': ', 1)[1])
     parser.add_argument('--compression', choices=('none', 'bz2', 'lz4'), default='lz4', help='default: lz4')
     return parser

@@ -180,7 +180,6 @@ def _news_of(one, shares):
 
 
 def _work(job, sender):
-    """Main function of the process of a job."""
     resource.setrlimit(resource.RLIMIT_DATA, (job.memory, resource.getrlimit(resource.RLIMIT_DATA)[1]))
     reported_s = 0.0
 

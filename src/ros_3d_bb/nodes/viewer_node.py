@@ -266,7 +266,6 @@ class ViewerNode(object):
 
 
 def _complain(future):
-    """Log an unexpected exception of a key's action."""
     if future.exception() is not None:
         rospy.logerr('the action of the key failed: %r', future.exception())
 

@@ -36,7 +36,6 @@ class Snapshots(object):
         self._first_ns = None
 
     def add_color(self, stamp_ns, now_ns, color):
-        """Add a colour image."""
         self._sync.add_boxes(stamp_ns, now_ns, (stamp_ns, color))
 
     @property

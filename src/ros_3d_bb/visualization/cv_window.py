@@ -25,7 +25,6 @@ class Window(object):
 
     @property
     def is_closed(self):
-        """Whether the user has closed the window."""
         return self._size_px is not None and cv2.getWindowProperty(self._title, cv2.WND_PROP_VISIBLE) < 1
 
     def show(self, picture):
@@ -44,7 +43,6 @@ class Window(object):
         return '' if code == NO_KEY else chr(code)
 
     def close(self):
-        """Close the window."""
         cv2.destroyAllWindows()
         cv2.waitKey(1)  # the toolkit closes the window in its event loop
 

@@ -43,7 +43,6 @@ class FrameRate(object):
         self._arrivals_ns = collections.deque()
 
     def add(self, arrival_ns):
-        """Register the arrival of an image."""
         self._arrivals_ns.append(arrival_ns)
         self.at(arrival_ns)  # limits the memory if the rate is never read
 

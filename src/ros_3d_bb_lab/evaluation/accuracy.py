@@ -85,7 +85,6 @@ def _raw_positions(session, boxes, estimator):
 
 
 def truth_of(session):
-    """Ground truth (x, z) of the frames, (n, 2), metres."""
     return np.array([frame.truth_m for frame in session.frames])
 
 
@@ -149,7 +148,6 @@ def _numbers(values):
 
 
 def table(result):
-    """Format the scores as lines of text."""
     names = [name for name in ('ours', 'thesis', 'recorded') if result[name] is not None]
     lines = ['%-20s' % '' + ''.join('%12s' % name for name in names)]
     for key in LENGTHS + SHARES + ('missed',):

@@ -32,7 +32,6 @@ class Data(NamedTuple):
     position: np.ndarray
 
     def part(self, mask):
-        """Select the measurements of a mask (n,)."""
         return Data(*(values[mask] for values in self))
 
     def weights(self):

@@ -65,7 +65,6 @@ def _scenario(position_m, number):
 
 
 def main():
-    """Write the session of the whole grid."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('folder', help='output folder')
     print(write_simulated_session(parser.parse_args().folder))

@@ -17,7 +17,6 @@ MEASURED, FITTED, THEORY, OTHER = 'tab:blue', 'tab:orange', 'tab:green', '0.55'
 
 
 def write_figures(folder, analysis):
-    """Write all figures into a folder (pathlib.Path)."""
     _rms(folder / 'figure_5_2.png', analysis)
     _error_by_truth(folder / 'figure_5_3.png', analysis.z, 'Z')
     _variances(folder / 'figure_5_4.png', analysis.z, 'Z')

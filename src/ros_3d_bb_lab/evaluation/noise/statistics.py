@@ -36,7 +36,6 @@ class ClusterStatistics(NamedTuple):
 
     @property
     def sigma_m(self):
-        """Standard deviation."""
         return float(np.sqrt(self.variance_m2))
 
     @property
@@ -58,12 +57,10 @@ class AxisStatistics(NamedTuple):
 
     @property
     def max_variance_m2(self):
-        """Largest variance of the clusters."""
         return max(cluster.variance_m2 for cluster in self.clusters)
 
     @property
     def max_sigma_m(self):
-        """Largest standard deviation of the clusters."""
         return float(np.sqrt(self.max_variance_m2))
 
 
@@ -100,7 +97,6 @@ def _variance_within(values, group):
 
 
 def cluster_statistics(cluster):
-    """Compute the ClusterStatistics of a Cluster."""
     error_m = cluster.error_m
     found = ClusterStatistics(cluster.truth_m, len(error_m), float(error_m.mean()), float(error_m.var()),
                               float(np.sqrt((error_m ** 2).mean())))
