@@ -4,22 +4,23 @@ Positions are in the camera's optical frame, in metres. Only the edited fields o
 can add measurements to the same session concurrently.
 """
 import copy
+import json
 import os
 
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import FARTHEST_M
-from ros_3d_bb.core.atomic_file import FILE_NAME, locked_update
+from ros_3d_bb.core.atomic_file import FILE_NAME, atomic_write, locked_update
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.sessions.session_reader import (Session, SessionError, camera_of, boxes_of_others, read_color,
                                                read_depth, read_description, session_errors)
 from ros_3d_bb_annotator import legacy
-from ros_3d_bb_annotator.drafts import Drafts
 from ros_3d_bb_annotator.entries import (Edit, changed, changes_with_estimate, detections_with, entry_at, grid_of,
                                          millimetres)
 from ros_3d_bb_annotator.measurement import ANNOTATED, NEW, FileNames, measurement_of
 
 ESTIMATOR = 'foreground'  # the default of bbox3d_node
+DRAFTS_NAME = '.annotator_draft.json'  # exists while there are drafts
 
 
 class Document(object):
@@ -39,7 +40,8 @@ class Document(object):
         self.camera = self._session.camera
         self._content, self._signature = {'frames': []}, None
         self._undo, self._redo, self._annotated = [], [], []
-        self._drafts = Drafts(folder)
+        self._drafts_path = os.path.join(folder, DRAFTS_NAME)
+        self._drafts = _read_drafts(self._drafts_path)
         self._update(content)
 
     @classmethod
@@ -180,11 +182,22 @@ class Document(object):
 
     def draft(self, index):
         """Draft of a measurement, the text that was typed but not entered: {name of a field: text}."""
-        return self._drafts.of(self.measurements[index].id)
+        return dict(self._drafts.get(self.measurements[index].id, {}))
 
     def set_draft(self, index, fields):
-        """Save the draft of a measurement, {name of a field: text}; {} removes it."""
-        self._drafts.set(self.measurements[index].id, fields)
+        """Save the draft of a measurement in a file, so that it survives a crash. Empty fields are removed."""
+        fields = {key: text for key, text in fields.items() if text}
+        if fields == self.draft(index):
+            return
+        self._drafts[self.measurements[index].id] = fields
+        used = {name: texts for name, texts in self._drafts.items() if texts}
+        try:
+            if used:
+                atomic_write(self._drafts_path, json.dumps(used).encode())
+            elif os.path.exists(self._drafts_path):
+                os.remove(self._drafts_path)
+        except OSError as error:
+            raise SessionError('%s: the typed text cannot be saved (%s)' % (self._drafts_path, error.strerror))
 
     def _missing_estimate(self, index, person):
         """Changes that add the estimate of a detection; {} if it has one, or it cannot be estimated."""
@@ -236,6 +249,16 @@ class Document(object):
             self.measurements[index] if index < len(old) and old[index] == entry
             else measurement_of(self.folder, entry, files) for index, entry in enumerate(frames))
         self.grid, self._content = grid_of(content), content
+
+
+def _read_drafts(path):
+    """Read the drafts in a file, {ID of a measurement: {name of a field: text}}; {} if it cannot be read."""
+    try:
+        with open(path, encoding='utf-8') as stream:
+            content = json.load(stream)
+        return {str(name): {str(key): str(text) for key, text in fields.items()} for name, fields in content.items()}
+    except (OSError, ValueError, AttributeError, RecursionError):
+        return {}
 
 
 def _signature(folder):
