@@ -48,7 +48,7 @@ def test_invalid_truth_is_reported_next_to_the_fields(drive, x, z, problem, fiel
     assert field is None or truth.fields[field].hasFocus()
 
 
-def test_metres_and_millimetres(drive, folder):
+def test_the_unit_can_be_switched(drive, folder):
     drive.press('1500', (Qt.Key_U, CONTROL))
     assert drive.window.pane.truth.fields['x'].text() == '1.5'
     drive.press(Qt.Key_Tab, '2', Qt.Key_Return)
@@ -83,8 +83,11 @@ def test_a_click_on_a_box_or_its_list_entry_selects_it(drive, folder, name):
     assert opened(folder)[0].person == 1
 
 
-def test_a_box_is_drawn_with_shift_and_drag(drive, folder):
+def test_a_box_is_drawn_with_shift_and_drag_unless_it_is_tiny_or_cancelled(drive, folder):
     view = drive.window.pane.color_view
+    drive.press(Qt.Key_F3, Qt.Key_Space, Qt.Key_Right, Qt.Key_Escape, Qt.Key_Down)
+    drive.drag(view, place_in(view, 20.5, 20.5), place_in(view, 22.5, 22.5), SHIFT)
+    assert len(drive.measurement(0).detections) == 2 and not drive.document.can_undo
     drive.drag(view, place_in(view, 11.5, 5.5), place_in(view, 25.5, 43.5), SHIFT)
     drawn = opened(folder)[0].detections[2]
     assert drawn.box_px == (11, 5, 26, 44) and drawn.by_hand and opened(folder)[0].person == 2
@@ -97,13 +100,6 @@ def test_a_box_is_drawn_by_the_keyboard(drive, folder):
     drive.press(Qt.Key_Right, Qt.Key_Down, Qt.Key_Down, Qt.Key_Down, Qt.Key_Down, (Qt.Key_Down, CONTROL), Qt.Key_Return)
     assert opened(folder)[0].detections[2].box_px == (11, 4, 22, 46)
     assert not drive.window.pane.shared.drawing
-
-
-def test_escape_cancels_a_box_and_tiny_boxes_are_ignored(drive):
-    view = drive.window.pane.color_view
-    drive.press(Qt.Key_F3, Qt.Key_Space, Qt.Key_Right, Qt.Key_Escape, Qt.Key_Down)
-    drive.drag(view, place_in(view, 20.5, 20.5), place_in(view, 22.5, 22.5), SHIFT)
-    assert len(drive.measurement(0).detections) == 2 and not drive.document.can_undo
 
 
 def test_a_drag_moves_what_both_views_show(drive):
@@ -185,8 +181,10 @@ def test_reject_asks_for_a_reason_and_restore_undoes_it(drive, folder):
     assert opened(folder)[0].state == 'new' and drive.window.last_entry.text() == ''
 
 
-def test_undo_and_redo_show_where_they_were(drive, folder):
+def test_undo_starts_with_typed_text_and_undo_and_redo_show_their_measurement(drive, folder):
     drive.press('100', Qt.Key_Tab, '2000', Qt.Key_Return, '200', Qt.Key_Tab, '2000', Qt.Key_Return)
+    drive.press('7', (Qt.Key_Z, CONTROL))
+    assert drive.window.pane.truth.fields['x'].text() == '' and opened(folder)[1].state == 'annotated'
     drive.press((Qt.Key_Z, CONTROL), (Qt.Key_Z, CONTROL))
     assert drive.window.current == 0 and [measurement.state for measurement in opened(folder)] == ['new'] * 4
     drive.press((Qt.Key_Y, CONTROL))
@@ -196,24 +194,14 @@ def test_undo_and_redo_show_where_they_were(drive, folder):
     assert not drive.window.actions['redo'].isEnabled()
 
 
-def test_undo_in_a_field_undoes_the_typed_text_first(drive, folder):
-    drive.press('100', Qt.Key_Tab, '2000', Qt.Key_Return, '7', (Qt.Key_Z, CONTROL))
-    assert drive.window.pane.truth.fields['x'].text() == '' and opened(folder)[0].state == 'annotated'
-    drive.press((Qt.Key_Z, CONTROL))
-    assert opened(folder)[0].state == 'new'
-
-
-def test_the_list_goes_to_a_measurement_and_filters_by_state(drive):
-    drive.press('1', Qt.Key_Tab, '2000', Qt.Key_Return, Qt.Key_F2, Qt.Key_Down)
-    assert drive.window.current == 2
+def test_the_list_selects_and_filters_and_going_on_can_be_switched_off(drive):
+    drive.press((Qt.Key_T, CONTROL), '1', Qt.Key_Tab, '2000', Qt.Key_Return)
+    assert drive.window.current == 0 and drive.measurement(0).state == 'annotated'
+    drive.press(Qt.Key_F2, Qt.Key_Down)
+    assert drive.window.current == 1
     drive.window.list.filter_box.setCurrentIndex(2)
     shown = drive.window.list.table.model()
     assert shown.rowCount() == 1 and shown.index(0, 0).data() == 'm0'
     assert shown.index(0, 2).data() == '468 mm'
     drive.window.list.filter_box.setCurrentIndex(1)
     assert shown.rowCount() == 3 and drive.window.list.filter_box.itemText(1) == 'new only (3)'
-
-
-def test_going_on_can_be_switched_off(drive):
-    drive.press((Qt.Key_T, CONTROL), '1', Qt.Key_Tab, '2000', Qt.Key_Return)
-    assert drive.window.current == 0 and drive.measurement(0).state == 'annotated'

@@ -183,13 +183,10 @@ def test_export_and_analysis(window_on, tmp_path):
     figures.close()
 
 
-def test_an_analysis_without_annotations_is_reported(drive):
-    message = drive.answer(message_of, lambda: (drive.press((Qt.Key_A, CONTROL | SHIFT)), drive.window.results.wait()))
-    assert 'no frame with ground truth' in message
-
-
-def test_nothing_typed_is_written(drive, folder):
+def test_navigation_and_a_failed_analysis_do_not_change_the_session(drive, folder):
     before = read_json(folder)
     drive.press(Qt.Key_PageDown, Qt.Key_PageUp, Qt.Key_F3, '+', '-', '0', Qt.Key_P)
+    message = drive.answer(message_of, lambda: (drive.press((Qt.Key_A, CONTROL | SHIFT)), drive.window.results.wait()))
+    assert 'no frame with ground truth' in message
     drive.close()
     assert read_json(folder) == before
