@@ -34,8 +34,8 @@ def analyse(document, folder=None, estimator=None):
     format, which has no depth. Raises ValueError if there are too few measurements, or an image cannot be read.
     """
     folder = pathlib.Path(folder or os.path.join(document.folder, 'analysis'))
-    estimator = estimator or (RECORDED if document.is_old_form else ESTIMATOR)
-    measurements = (_recorded(document, estimator) if document.is_old_form
+    estimator = estimator or (RECORDED if document.is_old_format else ESTIMATOR)
+    measurements = (_recorded(document, estimator) if document.is_old_format
                     else read_session_measurements(document.folder, estimator))
     analysis = analyse_noise(Inputs(measurements, measurements, measurements.whole(), estimator, 'unknown'))
     write_results(folder, analysis)

@@ -27,16 +27,15 @@ class Document(object):
     """Session that is being annotated. Use `Document.open` to create one.
 
     `measurements` are EditedMeasurements in the order of the file; an index remains valid while the document is open.
-    `grid` are the Marks on the floor. `is_old_form` is whether the session has the old format of the thesis, which has
-    no `camera` (None), and whose stretched depth does not permit new estimates. `notes` tell the user which data cannot
-    be recovered.
+    `grid` are the Marks on the floor. `is_old_format` is whether the session has the format of the thesis, without
+    `camera` (None) and usable depth. `notes` are messages to the user on data that cannot be recovered.
     """
 
     def __init__(self, folder, content):
         self.folder, self.measurements = folder, ()
-        self.is_old_form = content.get('form') == legacy.FORM
-        self.notes = legacy.NOTES if self.is_old_form else ()
-        self._session = Session(*(None, None, '') if self.is_old_form else camera_of(content), frames=())
+        self.is_old_format = content.get('form') == legacy.FORM
+        self.notes = legacy.NOTES if self.is_old_format else ()
+        self._session = Session(*(None, None, '') if self.is_old_format else camera_of(content), frames=())
         self.camera = self._session.camera
         self._content, self._signature = {'frames': []}, None
         self._undo, self._redo, self._annotated = [], [], []
@@ -48,7 +47,7 @@ class Document(object):
     def open(cls, folder):
         """Open the session in a folder, without reading images. Raises SessionError if it cannot be opened."""
         folder = os.path.abspath(str(folder))
-        content = legacy.read(folder) if legacy.is_old_form(folder) else read_description(folder)
+        content = legacy.read(folder) if legacy.is_old_format(folder) else read_description(folder)
         with session_errors(os.path.join(folder, FILE_NAME)):
             return cls(folder, content)
 
@@ -75,7 +74,7 @@ class Document(object):
 
     def depth(self, index):
         """Read the depth image of a measurement, see `read_depth`."""
-        if self.is_old_form:
+        if self.is_old_format:
             raise SessionError(legacy.NOTES[0])
         return read_depth(self._usable(index), self._session)
 
@@ -233,7 +232,7 @@ class Document(object):
         """Write an edit. Returns its inverse."""
         try:
             with locked_update(self.folder) as content:
-                if self.is_old_form and 'form' not in content:
+                if self.is_old_format and 'form' not in content:
                     content.update(copy.deepcopy(self._content))
                 inverse = changed(content if edit.index is None else entry_at(content['frames'], edit), edit)
         except (OSError, ValueError) as error:

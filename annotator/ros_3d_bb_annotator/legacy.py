@@ -25,7 +25,7 @@ POSITION = r'\({0}, ?{0}, ?{0}\)'.format(NUMBER)
 LINE = re.compile(r'\[((?:{0}(?:, ?{0})*)?)\][ ;] ?([\w-]{{1,60}})$'.format(POSITION))
 
 
-def is_old_form(folder):
+def is_old_format(folder):
     """Whether a folder contains a session in the old format without a frames.json."""
     return os.path.isfile(os.path.join(folder, TEXT_NAME)) and not os.path.exists(os.path.join(folder, FILE_NAME))
 

@@ -174,7 +174,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         """Index of the next new measurement, continuing at the start after the last one; None if there is none."""
         measurements = self.document.measurements
         order = list(range(number + 1, len(measurements))) + list(range(number + 1))
-        return next((place for place in order if measurements[place].state == NEW), None)
+        return next((index for index in order if measurements[index].state == NEW), None)
 
     def _read_ahead(self):
         """Read the images of neighbouring measurements, one measurement per idle event."""

@@ -48,7 +48,7 @@ class PictureCache(object):
 
     def _read(self, number):
         color, color_problem = _read_or_error(self._document.color, number)
-        if self._document.is_old_form:
+        if self._document.is_old_format:
             depth, (stretched, depth_problem) = None, _read_or_error(self._document.stretched_depth, number)
             shown, farthest_m = None if stretched is None else _grey_image(stretched), 0.0
         else:

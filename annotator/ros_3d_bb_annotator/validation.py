@@ -23,7 +23,7 @@ def problems_of(document):
 
 def leftovers_of(document):
     """Sorted relative paths of files that no measurement refers to, such as those left by a killed program."""
-    if document.is_old_form:
+    if document.is_old_format:
         return []
     folder = pathlib.Path(document.folder)
     paths = [*folder.glob('.*.tmp'), *folder.glob('color/*'), *folder.glob('depth/*')]
@@ -39,7 +39,7 @@ def _problems_at(document, index):
         return [measurement.problem]
     try:
         document.color(index)
-        if document.is_old_form:
+        if document.is_old_format:
             document.stretched_depth(index)
             return _truth_problems(document, index)
         document.depth(index)

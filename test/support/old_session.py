@@ -9,7 +9,7 @@ LINES = ('[(-7, 3, 300)];30-03-2021-11-49-54', '[(2971, 535, 6102), (-7, 2, 300)
 
 
 def write_old_session(folder, lines=LINES, kinds=('raw', 'color', 'depth'), bits=16):
-    """Write the lines and, of each time in them, the images; returns the folder."""
+    """Write the lines and the images of each time in them; returns the folder."""
     os.makedirs(folder, exist_ok=True)
     with open(os.path.join(folder, 'measurements.txt'), 'w') as stream:
         stream.write('\n'.join(lines) + '\n')

@@ -11,7 +11,7 @@ from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets  # noqa: E402
 QtTest = importlib.import_module(QtCore.__name__.replace('QtCore', 'QtTest'))  # of the binding that is in use
 CONTROL, SHIFT, ALT = Qt.ControlModifier, Qt.ShiftModifier, Qt.AltModifier
 TRIES, WAIT_MS = 1000, 20
-APPLICATION = make_application()  # Qt goes with the last reference to it
+APPLICATION = make_application()  # Qt ends with the last reference to it
 
 
 class Driver(object):
@@ -43,14 +43,14 @@ class Driver(object):
         self.settle()
 
     def click(self, widget, place, modifiers=Qt.NoModifier):
-        """Click at a place (QPointF) in a widget."""
+        """Click at a position (QPointF) in a widget."""
         QtTest.QTest.mouseClick(widget, Qt.LeftButton, modifiers, place.toPoint())
         self.settle()
 
     def drag(self, widget, start, end, modifiers=Qt.NoModifier):
-        """Press at a place in a widget, move, release at another one."""
+        """Press at a position in a widget, move, and release at another one."""
         QtTest.QTest.mousePress(widget, Qt.LeftButton, modifiers, start.toPoint())
-        for place in ((start + end) / 2, end):  # QTest.mouseMove holds no button
+        for place in ((start + end) / 2, end):  # QTest.mouseMove presses no button
             QtWidgets.QApplication.sendEvent(widget, QtGui.QMouseEvent(
                 QtCore.QEvent.MouseMove, place, Qt.NoButton, Qt.LeftButton, modifiers))
         QtTest.QTest.mouseRelease(widget, Qt.LeftButton, modifiers, end.toPoint())

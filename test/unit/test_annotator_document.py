@@ -70,7 +70,7 @@ def test_the_truth_of_the_last_annotation_is_copied(document):
     document.set_truth(1, 0.2, 2.5)
     document.set_same_as_last(3)
     assert document.measurements[3].truth_m == (0.2, None, 2.5)
-    reopened = Document.open(document.folder)  # knows no order: the nearest one before
+    reopened = Document.open(document.folder)  # the order of annotation is unknown: the nearest one before
     reopened.reject(3, 'blurred')
     reopened.set_same_as_last(3)
     assert reopened.measurements[3].truth_m == (0.1, 0.4, 2.3) and reopened.measurements[3].state == 'annotated'

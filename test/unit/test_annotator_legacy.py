@@ -15,7 +15,7 @@ from support.small_session import read_json
 
 def test_positions_times_and_images_are_read(tmp_path):
     document = Document.open(write_old_session(str(tmp_path)))
-    assert document.is_old_form and document.progress == (0, 5) and document.camera is None
+    assert document.is_old_format and document.progress == (0, 5) and document.camera is None
     assert [measurement.id for measurement in document.measurements] == [
         '30-03-2021-11-49-54', '30-03-2021-11-49-56', '30-03-2021-11-53-28', '30-03-2021-11-53-28-2',
         '30-03-2021-11-53-29']
@@ -57,7 +57,7 @@ def test_truth_is_saved_in_another_file_and_the_text_is_unchanged(tmp_path):
     document.reject(0, 'blurred')
     assert (tmp_path / 'measurements.txt').read_text() == '\n'.join(LINES) + '\n'
     reopened = Document.open(str(tmp_path))
-    assert reopened.is_old_form and reopened.notes and len(reopened.measurements) == 5
+    assert reopened.is_old_format and reopened.notes and len(reopened.measurements) == 5
     assert reopened.errors(1)[:2] == pytest.approx((-0.007, 0.0)) and reopened.progress == (2, 5)
     assert rows_of(reopened) == [(-7, 0, 300, 300, -7, 7, 0, 0)]
     assert document.undo() == 0 and Document.open(str(tmp_path)).measurements[0].rejected is None

@@ -65,7 +65,7 @@ def test_positions_are_shown_as_text():
 
 
 def test_warnings_are_in_another_colour():
-    plain, warned = (text_image(('line',), warnings, 400).astype(int) for warnings in ((), ('nothing comes',)))
+    plain, warned = (text_image(('line',), warnings, 400).astype(int) for warnings in ((), ('no images',)))
     has_ink = [(np.abs(picture - WARNING_INK).max(axis=2) < 60).any() for picture in (plain, warned)]
     assert has_ink == [False, True]
 

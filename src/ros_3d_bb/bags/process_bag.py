@@ -6,7 +6,7 @@ import resource
 import sys
 import time
 from multiprocessing.connection import wait
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import yaml
 
@@ -32,14 +32,6 @@ class Job(NamedTuple):
     target: str
     settings: Settings
     memory: int
-
-
-class Running(NamedTuple):
-    """A running job: its process and the connection on which it reports its progress."""
-
-    job: Job
-    process: Any
-    news: Any
 
 
 def main(arguments=None):
@@ -127,19 +119,21 @@ def _run_jobs(jobs, at_once, with_bar):
     # In a catkin workspace, the source folder, which lacks the generated messages, precedes the imported package in the
     # search path.
     sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(ros_3d_bb.__file__))))
-    todo, running, shares, failed = list(jobs), [], {}, 0
+    todo, running, shares, failed = list(jobs), {}, {}, 0  # running: {connection: (job, process)}
     try:
         while todo or running:
             while todo and len(running) < at_once:
-                running.append(_started(context, todo.pop(0)))
-            wait([one.news for one in running], POLL_S)
-            for one in list(running):
-                done, text = _news_of(one, shares)
+                job = todo.pop(0)
+                news, process = _started(context, job)
+                running[news] = job, process
+            wait(list(running), POLL_S)
+            for news, (job, process) in list(running.items()):
+                done, text = _news_of(news, job, process, shares)
                 if done is None:
                     continue
-                running.remove(one)
-                one.process.join()
-                shares[one.job.target] = 1.0
+                del running[news]
+                process.join()
+                shares[job.target] = 1.0
                 failed += not done
                 print(('\r' + 79 * ' ' + '\r' if with_bar else '') + text, file=sys.stdout if done else sys.stderr)
             if with_bar:
@@ -148,8 +142,8 @@ def _run_jobs(jobs, at_once, with_bar):
                                                           len(jobs) - len(todo) - len(running), len(jobs)),
                       end='', file=sys.stderr, flush=True)
     finally:
-        for one in running:
-            one.process.join()  # the process was interrupted, too, and removes its incomplete bag
+        for _job, process in running.values():
+            process.join()  # the process was interrupted, too, and removes its incomplete bag
         if with_bar:
             print(file=sys.stderr)
     return failed
@@ -160,22 +154,21 @@ def _started(context, job):
     process = context.Process(target=_work, args=(job, sender))
     process.start()
     sender.close()
-    return Running(job, process, news)
+    return news, process
 
 
-def _news_of(one, shares):
+def _news_of(news, job, process, shares):
     """Return whether a job has succeeded (None while it runs) and the text to print."""
     try:
-        while one.news.poll():
-            kind, content = one.news.recv()
+        while news.poll():
+            kind, content = news.recv()
             if kind != 'share':
                 return kind == 'done', content
-            shares[one.job.target] = content
+            shares[job.target] = content
     except EOFError:  # killed, for example by the kernel when out of memory
-        one.process.join()
-        remove_partial(one.job.target)
-        return False, '%s: its process ended with status %s; no bag was written' % (one.job.source,
-                                                                                    one.process.exitcode)
+        process.join()
+        remove_partial(job.target)
+        return False, '%s: its process ended with status %s; no bag was written' % (job.source, process.exitcode)
     return None, ''
 
 

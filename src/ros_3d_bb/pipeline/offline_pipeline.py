@@ -27,10 +27,9 @@ DETECTORS = 'yolov5', 'depth', 'none'
 
 
 class Settings(NamedTuple):
-    """Settings for processing bags: the detector and the parameters of each node.
+    """Settings for processing bags: detector, parameters of each node, topics, concurrent searches, and compression.
 
-    `names` maps topics of the nodes to topics of the bag; `keep` lists the topics to copy (None: all); `searches` is
-    the number of images that are searched concurrently.
+    `names` maps topics of the nodes to topics of the bag; `keep` lists the topics to copy (None: all).
     """
 
     detector: str = 'yolov5'

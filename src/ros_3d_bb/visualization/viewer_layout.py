@@ -22,11 +22,7 @@ TITLES = ('colour', 'depth', 'boxes')
 
 
 class ViewerContent(NamedTuple):
-    """Content of the window: an image, its boxes, and text.
-
-    `rects_px` are the 2D boxes, `boxes` the 3D boxes; None if they have not been received. `lines` are shown as plain
-    text, `warnings` are highlighted.
-    """
+    """Content of the window: an image, its 2D and 3D boxes or None, lines of text, and highlighted warnings."""
 
     color: np.ndarray
     depth: DepthImage

@@ -29,11 +29,7 @@ CALIBRATIONS = ('leave-one-position-out', 'error model')
 
 
 class Estimates(NamedTuple):
-    """Positions from one estimator.
-
-    `raw_m` and `position_m` (corrected) are (n, 3), NaN for frames without an estimate; `covariances` is (n, 3, 3), or
-    None if unknown.
-    """
+    """Raw and corrected positions (n, 3) from one estimator, NaN if missing, and covariances (n, 3, 3) or None."""
 
     raw_m: np.ndarray
     position_m: np.ndarray

@@ -18,10 +18,8 @@ LEAST_TO_TEST = 8  # measurements; the critical values of Anderson-Darling are u
 class ClusterStatistics(NamedTuple):
     """Statistics of one cluster, in metres.
 
-    `variance_m2` is divided by n, as in the thesis; `shapiro_p` is the p-value of the Shapiro-Wilk test; `anderson` is
-    the Anderson-Darling statistic, with its critical value at 5 %; `log_likelihoods` are the held-out log-likelihoods
-    per measurement of the distributions in DISTRIBUTIONS. The last four fields are None if all errors are equal, or if
-    there are fewer than 8.
+    `variance_m2` is divided by n, as in the thesis. The other fields are results of the Shapiro-Wilk and
+    Anderson-Darling tests, and held-out log-likelihoods per measurement; None if all errors are equal, or if there are fewer than 8.
     """
 
     truth_m: float

@@ -34,10 +34,7 @@ class MeasurementTable(NamedTuple):
         return self._part(np.isfinite(values_m).all(axis=1))
 
     def whole(self):
-        """Select the measurements of people that the left and right image borders do not truncate.
-
-        Clusters of true x with fewer than 3 such measurements are left out.
-        """
+        """Select the measurements of people that are not truncated, in clusters of true x with at least 3 of them."""
         whole = self._part(~self.cut)
         values_m, counts = np.unique(whole.truth_m[:, 0], return_counts=True)
         return whole._part(np.isin(whole.truth_m[:, 0], values_m[counts >= LEAST_IN_CLUSTER]))
