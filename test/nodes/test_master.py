@@ -69,7 +69,7 @@ def test_the_master_is_killed_and_restarted(tmp_path, monkeypatch):
             label, failing_once = Label(''), mock.Mock(side_effect=[OSError('the network is gone again'), None])
             on_new_master(failing_once)
             rospy.set_param('~label', 'A1')
-            assert label.heard() == 'A1'
+            assert label.from_cache() == 'A1'
             stage = Stage()
             depth_camera_pub = rospy.Publisher(INFO_TOPICS[1], CameraInfo, queue_size=10)
             rospy.Subscriber(INFO_TOPICS[0], CameraInfo, depth_camera_pub.publish)  # depth is that of colour
@@ -80,7 +80,7 @@ def test_the_master_is_killed_and_restarted(tmp_path, monkeypatch):
             wait_until(lambda: stage.tries(TIMEOUT_S) and capture().success, 'a measurement')
             Client('tracker_node', timeout=20).update_configuration({'marker_history': 3.0})
             set_label('A2')
-            wait_until(lambda: label.heard() == 'A2', 'the label that was set')
+            wait_until(lambda: label.from_cache() == 'A2', 'the label that was set')
             diagnostics = running.enter_context(Recorder('/diagnostics', DiagnosticArray))
             wait_for_reports(diagnostics, 'bbox3d_node', 1)
             first.send_signal(signal.SIGSTOP)
@@ -104,7 +104,7 @@ def test_the_master_is_killed_and_restarted(tmp_path, monkeypatch):
             wait_until(lambda: failing_once.call_count == 2, 'another registration after an incomplete one')
             assert rospy.get_param('~label') == 'A2'
             set_label('B1')
-            wait_until(lambda: label.heard() == 'B1', 'the label that was set in the new master')
+            wait_until(lambda: label.from_cache() == 'B1', 'the label that was set in the new master')
             wait_until(lambda: rospy.has_param('/tracker_node_numbers'), 'the reserved IDs in the new master')
             killed_and_back('/tracker_node', lambda: time.sleep(0.1))
             after = stage.recovered('tracker killed after that')

@@ -10,7 +10,7 @@ import rospy
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.bags.bag_writer import write_bag
-from ros_3d_bb.bags.process_bag import with_tracker
+from ros_3d_bb.bags.process_bag import with_params
 from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.offline_pipeline import Settings
@@ -25,7 +25,7 @@ from support.two_cameras import PERIOD_NS, START_NS, Rig
 # A person walks from the view of the front camera into that of the left one; another one stands in both views.
 SCENE = {'duration': 3.2, 'rate': 6.0, 'robot': {'cameras': [{'name': 'front'}, {'name': 'left', 'yaw': 0.6}]},
          'people': [{'start': [3.0, -0.2], 'moves': [{'to': [2.4, 2.2], 'speed': 0.9}]}, {'start': [4.6, 1.4]}]}
-BOTH = with_tracker(Settings(detector='none'), cameras=['front', 'left'])
+BOTH = with_params(Settings(detector='none'), 'tracker', cameras=['front', 'left'])
 
 
 @pytest.fixture(scope='module')
@@ -81,7 +81,7 @@ def test_the_same_bag_gives_the_same_bytes(bags, tmp_path):
 
 def test_a_camera_missing_in_a_bag_is_named(bags, tmp_path):
     with pytest.raises(BagError, match='no std_msgs/Int32MultiArray on /rear/yolo_bounding_box; did you mean'):
-        process_bag(bags[0], str(tmp_path / 'out.bag'), with_tracker(BOTH, cameras=['front', 'rear']))
+        process_bag(bags[0], str(tmp_path / 'out.bag'), with_params(BOTH, 'tracker', cameras=['front', 'rear']))
 
 
 @pytest.mark.parametrize('shift_s', [-10, 3600])

@@ -178,7 +178,7 @@ def test_a_scene_becomes_a_bag_boxes_tracks_and_a_report(installed, tmp_path):
 
 def test_the_annotator_and_the_tool_for_sessions_work_there(installed, tmp_path):
     session, bag = write_small_session(str(tmp_path / 'session')), tmp_path / 'session.bag'
-    assert 'nothing wrong' in run_in(installed, 'rosrun ros_3d_bb', 'annotator', '--validate', session)
+    assert ', 0 problems' in run_in(installed, 'rosrun ros_3d_bb', 'annotator', '--validate', session)
     run_in(installed, 'rosrun ros_3d_bb', 'session_to_bag', session, bag)
     assert bag.exists()
 
