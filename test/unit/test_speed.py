@@ -13,9 +13,8 @@ from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.types import Detection
 from ros_3d_bb_lab.evaluation import speed as benchmark
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
-from ros_3d_bb_lab.evaluation.crowd import JITTER_PX, crowd_of, people_of
 from ros_3d_bb_lab.evaluation.machine import describe_machine
-from ros_3d_bb_lab.evaluation.speed_plot import draw_speed
+from ros_3d_bb_lab.evaluation.speed import JITTER_PX, crowd_of, people_of
 
 SIZE = np.array([0.5, 0.5, 1.7])
 
@@ -76,7 +75,7 @@ def test_every_number_of_people_is_timed_and_said(session, tmp_path):
     assert len(result['ratio']) == 2 and result['growth'][1] == 1
     text = '\n'.join(benchmark.table(result))
     assert '%.2f' % result['thesis']['both_ms'][1] in text and '%.2f' % result['ratio'][0] in text
-    draw_speed(result, str(tmp_path / 'speed.png'))
+    benchmark.draw(result, str(tmp_path / 'speed.png'))
     assert (tmp_path / 'speed.png').stat().st_size > 5000
 
 
