@@ -10,7 +10,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 from ros_3d_bb_lab.evaluation.clear_mot import GATE_M, Moment, score, table
-from ros_3d_bb_lab.evaluation.tracking.metrics import Scored, _data_of, _metrics
+from ros_3d_bb_lab.evaluation.tracking.metrics import trackeval_data, trackeval_metrics
 
 
 def at(number, x, y, status=VISIBLE):
@@ -62,12 +62,11 @@ def test_id_switches_are_those_of_trackeval(seed):
 
 def clear_of(images):
     """TrackEval's CLEAR metric of images (people, tracks)."""
-    _hota, clear, _identity = _metrics()
-    data = _data_of([Scored(*(np.array([thing.id for thing in objects], int) for objects in (people, tracks)),
-                            1 - plane_distances(places(people), places(tracks)) / (2 * GATE_M))
-                     for people, tracks in images])
+    _hota, clear, _identity = trackeval_metrics()
+    people, tracks = ([np.array([thing.id for thing in objects], int) for objects in column] for column in zip(*images))
+    similarities = [1 - plane_distances(places(seen), places(tracked)) / (2 * GATE_M) for seen, tracked in images]
     with contextlib.redirect_stdout(io.StringIO()):
-        return clear.eval_sequence(data)
+        return clear.eval_sequence(trackeval_data(people, tracks, similarities))
 
 
 def places(objects):
@@ -109,6 +108,6 @@ def test_a_number_is_remembered_over_images_without_tracks():
 
 def test_the_table_has_a_line_for_each_person():
     lines = table(score(moments(([at(1, 0, 0), at(2, 3, 0)], [at(5, 0.25, 0)]))))
-    assert lines[0].split() == ['person', 'visible', 'followed', 'switches', 'numbers', 'RMSE', 'worst']
+    assert lines[0].split() == ['person', 'visible', 'followed', 'switches', 'IDs', 'RMSE', 'worst']
     assert len(lines) == 4
     assert '5' in lines[1].split() and '0.250' in lines[1] and 'nan' in lines[2]

@@ -15,7 +15,7 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, exact_detector, main, result_of,
                                                       yolov5_detector)
-from ros_3d_bb_lab.evaluation.scenes import look_at_scene, run_scene, score_detections
+from ros_3d_bb_lab.evaluation.scenes import detect_in_scene, run_scene, score_detections
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
@@ -129,11 +129,11 @@ def test_exact_boxes_are_the_true_ones_with_a_jitter_that_is_the_same_each_time(
 def test_exact_boxes_have_the_covariance_of_the_error_model(approach):
     """In the map, whose x is the range of a camera that looks along it: as the model says at 3.7 m."""
     model = read_error_model(ERROR_MODEL)
-    plain = next(look_at_scene(approach, exact_detector(approach)))
-    image = next(look_at_scene(approach, exact_detector(approach), error_model=model))
+    plain = next(detect_in_scene(approach, exact_detector(approach)))
+    image = next(detect_in_scene(approach, exact_detector(approach), error_model=model))
     (before,), (detection,) = plain.detections, image.detections
     assert before.covariance_m2 is None
-    camera_m = image.frame.poses.map_from_camera[:3, 3]
+    camera_m = image.step.frame.poses.map_from_camera[:3, 3]
     x_m, y_m, z_m = detection.position_m - camera_m
     expected, = model.covariance(np.array([(-y_m, -z_m, x_m)]))
     assert detection.covariance_m2[0, 0] == pytest.approx(expected[2, 2])

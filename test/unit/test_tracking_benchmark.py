@@ -146,7 +146,7 @@ def test_the_command_writes_all_keys_of_the_design(monkeypatch, tmp_path, capsys
     for key in ('coverage_95_position', 'coverage_95_velocity', 'coverage_95_1s', 'coverage_95_2s'):
         assert result['trackers']['thesis'][key] is None and result['trackers']['library'][key] is None
         assert 0 <= result['trackers']['ours'][key] <= 1
-    assert 'made; no recordings are at hand' in capsys.readouterr().out
+    assert 'generated; no recordings found' in capsys.readouterr().out
 
 
 @pytest.mark.slow

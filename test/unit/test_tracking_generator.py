@@ -11,7 +11,7 @@ from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel, half_width
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import DOUBLE, FALSE, DetectablePerson, Detector
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING, OdometryModel
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, Models, Timing, simulate, view_of
-from ros_3d_bb_lab.evaluation.tracking.timing import crowd
+from ros_3d_bb_lab.evaluation.tracking.benchmark import crowd
 from ros_3d_bb_lab.evaluation.tracking.trajectories import made_sequences
 
 SECONDS = 4
@@ -179,13 +179,13 @@ def test_to_frame_undoes_from_frame(heading, x_m, y_m, forward_m, left_m):
 
 def test_odometry_drifts_from_the_truth_only_while_the_robot_drives():
     random = np.random.RandomState(0)
-    still = robot_motion.with_odometry(robot_motion.standing((1, 2), 0.5, 10), OdometryModel(), random)
-    assert np.allclose(still.odometry, still.true)
+    standing = robot_motion.standing((1, 2), 0.5, 10)
+    assert np.allclose(robot_motion.odometry_of(standing, OdometryModel(), random), standing)
     true = robot_motion.driving((1, 2), 0.5, 0.3, 30)
-    moving = robot_motion.with_odometry(true, OdometryModel(), random)
-    exact_path = robot_motion.with_odometry(true, OdometryModel(*[0.0] * 6), random)
-    assert np.allclose(exact_path.odometry, true, atol=1e-6)
-    off_m = np.linalg.norm(moving.odometry[:, :2] - true[:, :2], axis=1)
+    moving = robot_motion.odometry_of(true, OdometryModel(), random)
+    exact_path = robot_motion.odometry_of(true, OdometryModel(*[0.0] * 6), random)
+    assert np.allclose(exact_path, true, atol=1e-6)
+    off_m = np.linalg.norm(moving[:, :2] - true[:, :2], axis=1)
     assert off_m[0] == 0 and 0.02 < off_m.max() < 3
     assert np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1).mean() == pytest.approx(0.007, rel=0.05)
 

@@ -148,7 +148,7 @@ def test_runs_together_are_weighed_by_their_images():
     nothing = outputs_of(one, lambda _number, _truth: [])
     result = scores_of([score_run(one, nothing), score_run(three, outputs_of(three, right))])
     assert result['recall'] == pytest.approx(75) == result['mota']
-    assert score_run(one, nothing).errors.position_m.shape == (0, 2)
+    assert score_run(one, nothing).errors.shape == (0, 6, 3)
 
 
 def test_where_nobody_is_visible_and_nothing_is_tracked_there_is_no_score_but_no_failure_either():
@@ -160,7 +160,7 @@ def test_where_nobody_is_visible_and_nothing_is_tracked_there_is_no_score_but_no
 def test_predictions_that_do_not_reach_two_seconds_are_refused():
     run = run_of()
     for steps, step_s in ((4, 0.25), (8, 0.3)):
-        with pytest.raises(ValueError, match='%d predictions %g s apart do not hold' % (steps, step_s)):
+        with pytest.raises(ValueError, match='%d predictions at intervals of %g s' % (steps, step_s)):
             score_run(run, outputs_of(run, lambda _number, truth: [
                 track(1, truth.position_m[0], steps=steps, step_s=step_s)]))
 
