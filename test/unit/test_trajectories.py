@@ -72,12 +72,12 @@ def test_people_of_few_points_are_left_out(tmp_path):
 
 
 @pytest.mark.parametrize('rows,header,message', [
-    ([(0, 1, 2, 3)], 't_s,id,x_m,y_m', 'nobody has 6 points'),
-    ([], 't_s,id,x_m,y_m', 'nobody has 6 points'),
+    ([(0, 1, 2, 3)], 't_s,id,x_m,y_m', 'no person has 6 points'),
+    ([], 't_s,id,x_m,y_m', 'no person has 6 points'),
     ([(0, 1, 2, 3)], 'frame,id,x,y', 'has the columns frame,id,x,y'),
-    ([(0, 1, 2, 3), (0.4, 1, 'left', 3)], 't_s,id,x_m,y_m', 'line 3: 0.4,1,left,3 is no point'),
-    ([('nan', 1, 2, 3)], 't_s,id,x_m,y_m', 'line 2: nan,1,2,3 is no point'),
-    ([(0, 1, 2)], 't_s,id,x_m,y_m', 'line 2: 0,1,2,None is no point')])
+    ([(0, 1, 2, 3), (0.4, 1, 'left', 3)], 't_s,id,x_m,y_m', 'line 3: 0.4,1,left,3 is not a point'),
+    ([('nan', 1, 2, 3)], 't_s,id,x_m,y_m', 'line 2: nan,1,2,3 is not a point'),
+    ([(0, 1, 2)], 't_s,id,x_m,y_m', 'line 2: 0,1,2,None is not a point')])
 def test_a_file_that_cannot_be_used_is_named(tmp_path, rows, header, message):
     with pytest.raises(ValueError, match='plaza.csv.*' + message):
         read_sequence(csv_file(tmp_path, rows, header))

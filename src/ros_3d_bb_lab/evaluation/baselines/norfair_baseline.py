@@ -10,10 +10,9 @@ from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject, predictio
 class NorfairParams(NamedTuple):
     """Parameters of Norfair, in images (`rate_hz` per second) and metres.
 
-    They were tuned for HOTA and IDF1 on the recordings eth, hotel, students001 and zara03: `distance_threshold` from
-    0.4 to 0.8, `hit_counter_max` (how many images a track survives without detections) from 12 to 90,
-    `initialization_delay` from 2 to 8, and `process_noise` (Q) from 0.0002 to 0.002. The other parameters are Norfair's
-    defaults.
+    Tuned for HOTA and IDF1 on the recordings eth, hotel, students001 and zara03: `distance_threshold` from 0.4 to 0.8,
+    `hit_counter_max` (images that a track survives without detections) from 12 to 90, `initialization_delay` from 2 to
+    8, and `process_noise` (Q) from 0.0002 to 0.002. The other parameters are Norfair's defaults.
     """
 
     distance_threshold: float = 0.5
@@ -32,10 +31,7 @@ class NorfairParams(NamedTuple):
 class Norfair(object):
     """Tracks objects in the plane with Norfair's tracker and its constant-velocity Kalman filter.
 
-    Raises
-    ------
-    ValueError
-        If Norfair is not installed.
+    Raises ValueError if Norfair is not installed.
     """
 
     def __init__(self, params=NorfairParams()):
@@ -54,12 +50,7 @@ class Norfair(object):
         self._now_ns, self._first_seen_ns = None, {}
 
     def update(self, stamp_ns, detections, view=None):
-        """Update the tracks with the detections of one image, as `ThesisTracker.update`.
-
-        Returns
-        -------
-        list of TrackedObject
-        """
+        """Update the tracks with the detections of one image, as `ThesisTracker.update`."""
         period = 1
         if self._now_ns is not None:
             period = max(1, int(round((stamp_ns - self._now_ns) / NS * self._params.rate_hz)))

@@ -60,8 +60,8 @@ def read_sequences(folder):
 def read_sequence(path):
     """Read a recording: CSV with the columns t_s, id, x_m, y_m.
 
-    Points with a NaN or infinite position are treated as missing. If a person has several points at the same time, the
-    first one is used. Segments with fewer than `FEWEST_POINTS` points are left out; gaps separate segments.
+    Points with a NaN or infinite position are treated as missing. Of several points of a person at the same time, the
+    first one is used. Segments between gaps with fewer than `FEWEST_POINTS` points are left out.
 
     Raises
     ------
@@ -88,12 +88,13 @@ def _row(path, number, line):
         if not np.isfinite(time_s):
             raise ValueError
     except (TypeError, ValueError):
-        raise ValueError('%s, line %d: %s is no point' % (path, number, ','.join(str(line[name]) for name in COLUMNS)))
+        values = ','.join(str(line[name]) for name in COLUMNS)
+        raise ValueError('%s, line %d: %s is not a point' % (path, number, values))
     return line['id'], time_s, x_m, y_m
 
 
 def _sequence(source, name, rows):
-    """Sequence of rows (id, time_s, x_m, y_m). Raises ValueError if no person has enough points."""
+    """Sequence of rows (id, time_s, x_m, y_m)."""
     points = {}
     for identity, time_s, x_m, y_m in rows:
         if np.isfinite(x_m) and np.isfinite(y_m):
@@ -108,7 +109,7 @@ def _sequence(source, name, rows):
                 people.append(pedestrian_of(part_s, part_m))
                 all_points.append(part_m)
     if not people:
-        raise ValueError('%s: nobody has %d points without a gap of more than %g s'
+        raise ValueError('%s: no person has %d points without a gap of more than %g s'
                          % (source, FEWEST_POINTS, LONGEST_GAP_S))
     return Sequence(name, tuple(people), np.concatenate(all_points))
 
