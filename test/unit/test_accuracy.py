@@ -95,6 +95,7 @@ def test_scenes_have_their_scores_too():
     assert empty['ours'] == {'boxes': 0, 'missed': 0}
 
 
+@pytest.mark.slow
 def test_the_result_has_the_promised_keys_and_a_table(result):
     assert {'frames', 'positions', 'calibration', 'thesis_calibration', 'ours', 'thesis', 'recorded',
             'per_frame'} == set(result)

@@ -66,6 +66,7 @@ def test_the_digits_that_the_thesis_prints(out):
     assert '%.5f %.3f' % (summary['x']['max_variance_m2'], summary['x']['max_sigma_m']) == '0.00032 0.018'
 
 
+@pytest.mark.slow
 def test_the_summary_has_a_table_of_each_cluster(out):
     summary = json.loads((out / 'summary.json').read_text())
     assert len(summary['z']['clusters']) in (7, 10) and len(summary['x']['variance_clusters']) == 5
@@ -74,6 +75,7 @@ def test_the_summary_has_a_table_of_each_cluster(out):
                                                 'log_likelihoods'}
 
 
+@pytest.mark.slow
 def test_the_report_shows_every_figure_and_every_figure_shows_something(out):
     page = (out / 'report.html').read_text(encoding='utf-8')
     assert Images(page).names == FIGURES
@@ -84,6 +86,7 @@ def test_the_report_shows_every_figure_and_every_figure_shows_something(out):
     assert '>None' not in page and 'nan' not in page
 
 
+@pytest.mark.slow
 def test_the_error_models_can_be_read_and_correct_the_bias(out):
     for name in ('error_model.yaml', 'error_model_thesis_form.yaml'):
         model = read_error_model(out / name)

@@ -138,6 +138,7 @@ def test_another_checkpoint_of_the_same_name_is_exported(opened, checkpoint, fol
     assert len(opened().names) == 5 and len(os.listdir(folder)) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('fault', ['not installed', 'wrong'])
 def test_torch_replaces_an_onnx_runtime_that_does_not_work(checkpoint, folder, warnings, monkeypatch, fault):
     if fault == 'not installed':

@@ -302,6 +302,7 @@ def test_onnx_runtime_is_used_if_torch_cannot_use_the_gpu(monkeypatch, official_
     assert open_runtime(official_output[0]).description.startswith('ONNX Runtime')
 
 
+@pytest.mark.slow
 @pytest.mark.needs('torch.export')  # torch 2 supports convolutions in half precision on a CPU
 def test_half_precision_gives_the_same_boxes(official_output):
     """Within 1 px and 0.01 of the recorded predictions. Runs on the CPU."""
