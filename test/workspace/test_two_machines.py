@@ -24,7 +24,7 @@ people:
 
 
 class Host(NamedTuple):
-    """A computer: its address, and what to put before a command to run it there."""
+    """A computer: its address, and the prefix of commands that run on it."""
 
     address: str
     enter: tuple
@@ -32,7 +32,7 @@ class Host(NamedTuple):
 
 @contextlib.contextmanager
 def processes():
-    """Start processes; all that still run at the end are ended, the last first."""
+    """Start processes; at the end, those still running are ended, the last first."""
     started = []
 
     def start(command, **options):
@@ -51,10 +51,9 @@ def processes():
 
 
 def network(start):
-    """Two hosts, (robot, other), in network namespaces of their own with a cable between them.
+    """Two hosts, (robot, other), in network namespaces with a cable between them.
 
-    Where namespaces may not be made (in some containers), two addresses of this machine: all is the same then but that
-    the kernel does not keep them apart.
+    If namespaces are not permitted (in some containers), two addresses of this machine, which are not isolated.
     """
     own = [] if os.geteuid() == 0 else ['--user', '--map-root-user']
     holders, enters = [], [()]
@@ -81,7 +80,7 @@ def network(start):
 
 
 def environment_script(folder, host):
-    """What README has the user write: it sets up the other computer and runs its arguments."""
+    """The environment script of the README for the other computer."""
     path = folder / 'env.sh'
     path.write_text('#!/bin/sh\nexport ROS_IP=%s PYTHONPATH=%s:$PYTHONPATH CLOCK_AHEAD_S=%s\nunset ROS_HOSTNAME\n'
                     'exec "$@"\n' % (host.address, os.path.join(SUPPORT, 'other_clock'), AHEAD_S))
@@ -91,7 +90,7 @@ def environment_script(folder, host):
 
 @pytest.fixture(scope='module')
 def heard(tmp_path_factory):
-    """What a listener on the robot has heard, and the two hosts."""
+    """Messages received by a listener on the robot, and the two hosts."""
     folder = tmp_path_factory.mktemp('two_machines')
     (folder / 'scene.yaml').write_text(SCENE)
     with processes() as start:
