@@ -57,17 +57,7 @@ class SceneScore(NamedTuple):
 
 
 def score(moments):
-    """Compare tracks with ground truth.
-
-    Parameters
-    ----------
-    moments : list of Moment
-        Ordered by stamp.
-
-    Returns
-    -------
-    SceneScore
-    """
+    """Compare tracks with ground truth. Takes a list of Moment ordered by stamp, returns a SceneScore."""
     matches, false, matcher = [], 0, ClearMatcher()
     for moment in moments:
         visible = [track for track in moment.tracks if track.status == VISIBLE]

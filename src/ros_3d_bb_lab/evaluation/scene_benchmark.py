@@ -135,7 +135,7 @@ def result_of(steps, detector, camera=D435I_COLOR):
     followed = [person for person in tracked.people if person.ids]
     result = {'detector': detector, 'images': found.images, 'people': len(tracked.people), 'recall': found.recall,
               'false_boxes': found.false_rate, 'id_switches': sum(person.switches for person in tracked.people),
-              'rmse_m': float(np.sqrt(np.mean([person.rmse_m ** 2 for person in followed]))) if followed else None,
+              'rmse_m': _rms([person.rmse_m for person in followed]),
               'worst_m': max([person.worst_m for person in followed], default=None)}
     result.update(score_tracks(steps, camera))
     return result

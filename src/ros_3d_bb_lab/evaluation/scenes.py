@@ -61,19 +61,8 @@ class DetectionScore(NamedTuple):
 def detect_in_scene(simulator, detect, every=1, error_model=None):
     """Render a scene and detect the people in it, image by image.
 
-    Parameters
-    ----------
-    simulator : Simulator
-    detect : callable
-        Called with a SimulatedFrame; returns 2D boxes (n, 4).
-    every : int
-        Use every n-th image.
-    error_model : ErrorModel, optional
-        Corrects the 3D boxes and provides their covariance, as in bbox3d_node.
-
-    Yields
-    ------
-    SceneImage
+    `detect` is called with a SimulatedFrame and returns 2D boxes (n, 4). Every `every`-th image is used. An error model
+    corrects the 3D boxes and provides their covariance, as in bbox3d_node. Yields SceneImage.
     """
     for number in range(0, simulator.frame_count, every):
         frame = simulator.frame(number)

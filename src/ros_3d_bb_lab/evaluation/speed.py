@@ -139,20 +139,11 @@ class Theirs(object):
 def speed(session, counts=OBJECTS, images=60, seed=0):
     """Measure the CPU time of both algorithms in `images` images for each number of people in `counts`.
 
-    `seed` is that of the order of the people and of the jitter.
-
-    Returns
-    -------
-    dict
-        `machine`, `people`, `images`, `objects` (= `counts`), and for `ours` and `thesis` the median, mean and standard
-        deviation of the times in ms by stage. By number of people, medians: `ratio` of our time to that of the thesis
-        over both stages, and `growth` of our time relative to that for 5 people, or for the fewest without 5 in
-        `counts`.
-
-    Raises
-    ------
-    ValueError
-        If no frame of the session has a box.
+    `seed` is that of the order of the people and of the jitter. Returns a dictionary: `machine`, `people`, `images`,
+    `objects` (= `counts`); for `ours` and `thesis` the median, mean and standard deviation of the times in ms by stage;
+    and medians by number of people: `ratio` of our time to that of the thesis over both stages, and `growth` of our
+    time relative to that for 5 people, or for the fewest without 5 in `counts`. Raises ValueError if no frame of the
+    session has a box.
     """
     people, random = people_of(session), np.random.RandomState(seed)
     if not people:
@@ -210,9 +201,8 @@ def table(result):
                 '%22s' % ('%.2f (%.2f ± %.2f)' % column) for column in columns))
     for key, title in (('ratio', 'ours / thesis'), ('growth', 'ours / ours for few')):
         lines.append('%-20s' % title + ''.join('%22.2f' % value for value in result[key]))
-    lines += ['detector, %s at %d, %d thread%s: %.1f ms CPU time, %.1f ms wall time'
-              % (row['runtime'], row['size'], row['threads'], 's' * (row['threads'] > 1), row['cpu_ms'],
-                 row['wall_ms']) for row in result['detector']]
+    lines += ['detector, %s at %d: %.1f ms CPU time, %.1f ms wall time'
+              % (row['runtime'], row['size'], row['cpu_ms'], row['wall_ms']) for row in result['detector']]
     return lines
 
 

@@ -7,13 +7,7 @@ COASTS_S = 1.0
 
 
 def outputs_with_perfect_association(make_tracker, run):
-    """Run a separate tracker for each person, without false detections.
-
-    Returns
-    -------
-    list of list of TrackedObject
-        Published tracks after each image.
-    """
+    """Run a separate tracker for each person, without false detections. Returns the published tracks of each image."""
     trackers, track_ids, seen_ns, last_id, outputs = {}, {}, {}, 0, []
     for image in run.images:
         found = {source: detection for source, detection in zip(image.sources, image.detections) if source >= 0}

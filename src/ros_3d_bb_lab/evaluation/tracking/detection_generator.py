@@ -17,11 +17,7 @@ FALSE_SIDE_M, FALSE_DEPTH_M = 0.02, 0.04
 
 
 class SimulatedDetection(NamedTuple):
-    """3D box of a simulated detector.
-
-    `depth_m` is along the optical axis, width and height are in metres, `cut` is whether the image border truncates the
-    box, and `source` is the ID of the person, or FALSE or DOUBLE.
-    """
+    """3D box; `cut` is whether the image border truncates it, `source` the ID of the person, or FALSE or DOUBLE."""
 
     bearing: float
     depth_m: float
@@ -32,10 +28,8 @@ class SimulatedDetection(NamedTuple):
 
 
 class DetectablePerson(NamedTuple):
-    """Person that is visible in an image.
-
-    `person` is the ID, `depth_m` is the depth of the centre, `middle`, `share` and `cut` are as in `d435_model.Shown`,
-    and `heading` is relative to the camera.
+    """Person that is visible in an image, by ID, with the fields of `d435_model.Shown`; `heading` is relative to the
+    camera.
     """
 
     person: int

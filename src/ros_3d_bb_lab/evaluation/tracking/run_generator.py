@@ -104,21 +104,9 @@ class _Walks(NamedTuple):
 
 
 def simulate(sequence, motion, seed, models=Models(), seconds=SECONDS):
-    """Simulate a run of a robot among the people of a sequence.
+    """Simulate a run of a robot among the people of a sequence. Returns a Run.
 
-    Parameters
-    ----------
-    sequence : trajectories.Sequence
-    motion : str
-        robot_motion.STANDING or robot_motion.DRIVING.
-    seed : int or sequence of int
-    models : Models
-    seconds : float
-        Maximum duration.
-
-    Returns
-    -------
-    Run
+    `motion` is STANDING or DRIVING, `seed` an int or a sequence of int, and `seconds` the maximum duration.
     """
     names = [zlib.crc32(name.encode('utf-8')) & 0xffffffff for name in (sequence.name, motion)]
     random = np.random.RandomState(np.append(np.atleast_1d(seed), names).astype(np.uint32))

@@ -42,15 +42,7 @@ class Sequence(NamedTuple):
 
 
 def read_sequences(folder):
-    """Read the recordings in a folder: all `.csv` files, sorted by name.
-
-    Raises
-    ------
-    ValueError
-        If there are no files, or one of them is invalid. The message names the file.
-    OSError
-        If the folder does not exist.
-    """
+    """Read the recordings in a folder: all `.csv` files, sorted by name. Raises ValueError if there are none."""
     names = sorted(name for name in os.listdir(folder) if name.endswith('.csv'))
     if not names:
         raise ValueError('%s has no .csv file; files with the columns %s expected' % (folder, ','.join(COLUMNS)))
@@ -61,14 +53,8 @@ def read_sequence(path):
     """Read a recording: CSV with the columns t_s, id, x_m, y_m.
 
     Points with a NaN or infinite position are treated as missing. Of several points of a person at the same time, the
-    first one is used. Segments between gaps with fewer than `FEWEST_POINTS` points are left out.
-
-    Raises
-    ------
-    ValueError
-        If a column is missing, a line cannot be parsed, or no person has enough points.
-    OSError
-        If the file does not exist.
+    first one is used. Segments between gaps with fewer than `FEWEST_POINTS` points are left out. Raises ValueError if a
+    column is missing, a line cannot be parsed, or no person has enough points; the message names the file.
     """
     with open(path, newline='', encoding='utf-8-sig') as stream:
         reader = csv.DictReader(stream)
