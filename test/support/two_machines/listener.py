@@ -1,4 +1,4 @@
-"""On the robot: what the two computers send, as JSON on the standard output once there are enough tracks."""
+"""On the robot: print what the two computers send as JSON once there are enough tracks."""
 import json
 import sys
 import time

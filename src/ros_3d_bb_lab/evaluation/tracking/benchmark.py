@@ -16,11 +16,6 @@ from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
 from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, detection_of, simulate, view_of
 
-ROWS = (('hota', '%.1f'), ('assa', '%.1f'), ('deta', '%.1f'), ('mota', '%.1f'), ('idf1', '%.1f'),
-        ('id_switches', '%d'), ('fragmentations', '%d'), ('recall', '%.1f'), ('precision', '%.1f'),
-        ('position_rmse_m', '%.3f'), ('velocity_rmse_mps', '%.3f'), ('ade_1s_m', '%.3f'), ('fde_1s_m', '%.3f'),
-        ('ade_2s_m', '%.3f'), ('fde_2s_m', '%.3f'), ('coverage_95_position', '%.3f'),
-        ('coverage_95_velocity', '%.3f'), ('coverage_95_1s', '%.3f'), ('coverage_95_2s', '%.3f'))
 # CPU time: people walk in circles around fixed places, on an area that grows with their number
 PEOPLE = (5, 20, 100)
 AREA_M2 = 1.0  # per person
@@ -106,8 +101,17 @@ def crowd(people, images):
 def table(trackers):
     """Format {name: scores} as lines of text."""
     lines = ['%-22s' % '' + ''.join('%20s' % name for name in trackers)]
-    rows = [(key, [form % scores[key] if scores[key] is not None else '-' for scores in trackers.values()])
-            for key, form in ROWS]
-    rows += [('cpu_ms, %s people' % people, ['%.2f' % scores['cpu_ms'][people] for scores in trackers.values()])
-             for people in list(trackers.values())[0]['cpu_ms']]
-    return lines + ['%-22s' % key + ''.join('%20s' % value for value in values) for key, values in rows]
+    for key in list(trackers.values())[0]:
+        if key != 'cpu_ms':
+            lines.append('%-22s' % key + ''.join('%20s' % _text(key, scores[key]) for scores in trackers.values()))
+    for people in list(trackers.values())[0]['cpu_ms']:
+        times = ''.join('%20.2f' % scores['cpu_ms'][people] for scores in trackers.values())
+        lines.append('%-22s' % ('cpu_ms, %s people' % people) + times)
+    return lines
+
+
+def _text(key, value):
+    """Percentages have one digit, lengths and shares three."""
+    if value is None or isinstance(value, int):
+        return '-' if value is None else str(value)
+    return '%.3f' % value if '_' in key else '%.1f' % value
