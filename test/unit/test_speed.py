@@ -58,9 +58,9 @@ def test_people_of_a_crowd_have_the_depth_they_had(session):
     people = people_of(session)
     crowd = crowd_of(people, len(people) + 2, session)
     assert len(crowd.rects_px) == len(people) + 2
-    for (x1, y1, x2, y2), after, person in zip(crowd.rects_px, crowd.rects_px[1:], people):
-        assert (x2 - x1, y2 - y1) == person.values.shape[::-1] and x1 < after[0] < x2
-        np.testing.assert_array_equal(crowd.depth.values[y1:y2, x1:after[0]], person.values[:, :after[0] - x1])
+    for (x1, y1, x2, y2), after, (depth, top) in zip(crowd.rects_px, crowd.rects_px[1:], people):
+        assert (x2 - x1, y2 - y1) == depth.shape[::-1] and x1 < after[0] < x2 and y1 == top
+        np.testing.assert_array_equal(crowd.depth.values[y1:y2, x1:after[0]], depth[:, :after[0] - x1])
     for rect, jittered in zip(crowd.rects_px, crowd.jittered(np.random.RandomState(0))):
         assert np.abs(np.subtract(rect, jittered)).max() <= JITTER_PX
         assert jittered[0] >= 0 and jittered[3] <= crowd.camera.height

@@ -180,7 +180,7 @@ def test_to_frame_undoes_from_frame(heading, x_m, y_m, forward_m, left_m):
 
 def test_odometry_drifts_from_the_truth_only_while_the_robot_drives():
     random = np.random.RandomState(0)
-    standing = robot_motion.standing((1, 2), 0.5, 10)
+    standing = np.tile((1, 2, 0.5), (1001, 1))
     assert np.allclose(robot_motion.odometry_of(standing, OdometryModel(), random), standing)
     true = robot_motion.driving((1, 2), 0.5, 0.3, 30)
     moving = robot_motion.odometry_of(true, OdometryModel(), random)

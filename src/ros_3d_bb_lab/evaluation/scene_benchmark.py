@@ -65,9 +65,7 @@ def exact_detector(simulator):
 
 
 def is_in_image(person, map_from_camera, camera):
-    """Whether the body axis of a PersonTruth is between the left and right image borders, and most of the body is not
-    occluded.
-    """
+    """Whether the body axis of a PersonTruth is between the left and right image borders, and not mostly occluded."""
     x_m, _y, z_m = transform_points(np.linalg.inv(map_from_camera), person.position_m)
     if person.box_px is None or person.hidden > 1 - LEAST_SHOWN or z_m <= 0:
         return False
@@ -97,7 +95,7 @@ def score_tracks(steps, camera):
         for person, track in matcher.match(people, tracks):
             followed.add(person.id)
             velocity_errors.append(_distance(track.velocity_mps, person.velocity_mps))
-            predicted_m, true_m = (_position_after(item, HORIZON_S) for item in (track, person))
+            predicted_m, true_m = _predicted_m(track), _predicted_m(person)
             if predicted_m is not None and true_m is not None:
                 prediction_errors.append(_distance(predicted_m, true_m))
     return {'track_ids': len(track_ids), 'not_visible': not_visible, 'velocity_rmse_mps': _rms(velocity_errors),
@@ -111,9 +109,9 @@ def _scored_people(step, camera):
     return [person for person in step.moment.truth if person.id in shown]
 
 
-def _position_after(track, time_s):
-    """Predicted position (3,) of a track after `time_s`; None if the prediction is shorter."""
-    number = int(round(time_s / track.prediction_step_s)) - 1 if len(track.prediction_m) else 0
+def _predicted_m(track):
+    """Predicted position (3,) of a track after `HORIZON_S`; None if the prediction is shorter."""
+    number = int(round(HORIZON_S / track.prediction_step_s)) - 1 if len(track.prediction_m) else 0
     return track.prediction_m[number] if number < len(track.prediction_m) else None
 
 

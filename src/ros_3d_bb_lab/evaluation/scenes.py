@@ -39,10 +39,7 @@ class SceneImage(NamedTuple):
 
 
 class DetectionScore(NamedTuple):
-    """Number of `people` to be detected, of those `found`, of `false` boxes, and of `images`.
-
-    `recall` is 0..1, and 1 if there were no people to be detected; `false_rate` is the number of false boxes per image.
-    """
+    """Number of `people` to be detected, of those `found`, of `false` boxes, and of `images`."""
 
     people: int
     found: int
@@ -51,10 +48,12 @@ class DetectionScore(NamedTuple):
 
     @property
     def recall(self):
+        """0..1; 1 if there were no people to be detected."""
         return self.found / float(self.people) if self.people else 1.0
 
     @property
     def false_rate(self):
+        """Number of false boxes per image."""
         return self.false / float(max(1, self.images))
 
 

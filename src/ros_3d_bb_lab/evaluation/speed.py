@@ -45,13 +45,6 @@ JITTER_PX = 2  # maximum change of the edges of a box between images
 SIMULATED = (2.0, 4.0), (-0.2, 0.2), 2  # simulated session, used if no session is given
 
 
-class PersonCutout(NamedTuple):
-    """Depth values in the box of a person, (height, width), in the camera's units, and the top row of the box."""
-
-    values: np.ndarray
-    top: int
-
-
 class Crowd(NamedTuple):
     """Wide depth image, its camera, and the 2D boxes of the people in it."""
 
@@ -67,32 +60,35 @@ class Crowd(NamedTuple):
 
 
 def people_of(session):
-    """Cut out the annotated person of each frame that has a box. Raises SessionError."""
+    """Cut out the annotated person of each frame that has a box.
+
+    Returns (depth values in the camera's units (height, width), top row) of each person. Raises SessionError.
+    """
     people = []
     for frame in session.frames:
         if frame.boxes_px:
             x1, y1, x2, y2 = np.clip(frame.boxes_px[0], 0, (session.camera.width, session.camera.height) * 2)
-            people.append(PersonCutout(read_depth(frame, session).values[y1:y2, x1:x2], int(y1)))
+            people.append((read_depth(frame, session).values[y1:y2, x1:x2], int(y1)))
     return people
 
 
 def crowd_of(people, count, session):
-    """Place `count` people side by side in one depth image. Each person covers a part of the person to the left.
+    """Place `count` people of `people_of`, repeated cyclically, side by side in one depth image. Returns a Crowd.
 
-    `people`, a list of PersonCutout of the session, is repeated cyclically. Returns a Crowd.
+    Each person covers a part of the person to the left.
     """
+    rects_px, left = [], 0
     chosen = list(itertools.islice(itertools.cycle(people), count))
-    steps = [int(person.values.shape[1] * (1 - COVERED)) for person in chosen]
-    lefts = np.cumsum([0] + steps[:-1])
-    rects_px = tuple((int(left), person.top, int(left) + person.values.shape[1], person.top + person.values.shape[0])
-                     for left, person in zip(lefts, chosen))
-    width = max(rect_px[2] for rect_px in rects_px)
-    values = np.zeros((session.camera.height, width), chosen[0].values.dtype)
-    for (x1, y1, x2, y2), person in zip(rects_px, chosen):
-        values[y1:y2, x1:x2] = person.values
-    camera = session.camera
+    for depth, top in chosen:
+        height, width = depth.shape
+        rects_px.append((left, top, left + width, top + height))
+        left += int(width * (1 - COVERED))
+    width, camera = max(rect_px[2] for rect_px in rects_px), session.camera
+    values = np.zeros((camera.height, width), chosen[0][0].dtype)
+    for (x1, y1, x2, y2), (depth, _top) in zip(rects_px, chosen):
+        values[y1:y2, x1:x2] = depth
     return Crowd(DepthImage(values, session.depth_scale_m),
-                 Camera(width, camera.height, camera.fx, camera.fy, width / 2.0, camera.cy), rects_px)
+                 Camera(width, camera.height, camera.fx, camera.fy, width / 2.0, camera.cy), tuple(rects_px))
 
 
 class Ours(object):

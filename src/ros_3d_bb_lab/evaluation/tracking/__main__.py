@@ -43,17 +43,12 @@ def bench(arguments):
                                            arguments.seed), flush=True)
     contestants = CONTESTANTS + ((BOUND,) if arguments.bound else ())
     runs = runs_of(sequences, arguments.seed, arguments.repetitions, arguments.seconds)
-    trackers = compare(runs, contestants, on_run=_print_run)
+    trackers = compare(runs, contestants)
     for contestant in contestants:
         trackers[contestant.name]['cpu_ms'] = {str(people): cpu_ms(contestant.make, people) for people in PEOPLE}
     print('\n'.join(table(trackers)))
     return {'sequences': names, 'recorded': bool(arguments.data), 'seed': arguments.seed,
             'repetitions': arguments.repetitions, 'seconds': arguments.seconds, 'trackers': trackers}
-
-
-def _print_run(run, scores):
-    print('  %-24s %4d images, HOTA %s' % (run.name, len(run.images), ', '.join(
-        '%s %.1f' % (name, tracker['hota']) for name, tracker in scores.items())), flush=True)
 
 
 def bench_scenes(paths, weights):

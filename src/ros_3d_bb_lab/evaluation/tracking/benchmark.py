@@ -53,18 +53,17 @@ def runs_of(sequences, seed, repetitions, seconds=SECONDS):
                 yield simulate(sequence, motion, (seed, repetition), seconds=seconds)
 
 
-def compare(runs, contestants, on_run=None):
-    """Score each tracker on all runs. Returns {name: scores}, without `cpu_ms`.
+def compare(runs, contestants):
+    """Score each tracker on all runs, and print its HOTA on each. Returns {name: scores}, without `cpu_ms`.
 
-    `on_run` is called after each run with the run and its {name: scores}. Raises ValueError if an optional library is
-    not installed.
+    Raises ValueError if an optional library is not installed.
     """
     scores = {contestant.name: [] for contestant in contestants}
     for run in runs:
         for contestant in contestants:
             scores[contestant.name].append(score_run(run, contestant.outputs(contestant.make, run)))
-        if on_run is not None:
-            on_run(run, {name: scores_of(run_scores[-1:]) for name, run_scores in scores.items()})
+        print('  %-24s %4d images, HOTA %s' % (run.name, len(run.images), ', '.join(
+            '%s %.1f' % (name, scores_of(run_scores[-1:])['hota']) for name, run_scores in scores.items())), flush=True)
     return {name: scores_of(run_scores) for name, run_scores in scores.items()}
 
 

@@ -59,8 +59,7 @@ class CameraModel(NamedTuple):
         return np.hypot(self.depth_floor_m, np.square(depth_m) * self.matching_px / (self.focal_px * self.baseline_m))
 
     def covariance_m2(self, bearing, depth_m):
-        """Covariance of a position, (3, 3) in the optical frame, with the slow part, as in a fit to many measurements.
-        """
+        """Covariance of a position, (3, 3) in the optical frame, of the independent and the slow errors."""
         along_m2 = self.depth_sigma_m(depth_m) ** 2 + self.slow_depth_m ** 2
         across_m2 = self.side_floor_m ** 2 + self.slow_side_m ** 2
         right, forward = -np.sin(bearing), np.cos(bearing)
@@ -71,10 +70,9 @@ class CameraModel(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """Visibility of people (n,) in an image.
+    """Visibility of people (n,) in an image: the largest visible part of each.
 
-    `share` is the width of the largest visible part relative to the width of the person, 0..1, `middle` is its bearing,
-    and `cut` is whether the image border truncates it.
+    `share` is its share of the width of the person, `middle` its bearing, `cut` whether the image border truncates it.
     """
 
     share: np.ndarray

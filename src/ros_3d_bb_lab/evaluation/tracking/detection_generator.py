@@ -28,9 +28,7 @@ class SimulatedDetection(NamedTuple):
 
 
 class DetectablePerson(NamedTuple):
-    """Person that is visible in an image, by ID, with the fields of `d435_model.Shown`; `heading` is relative to the
-    camera.
-    """
+    """Person visible in an image, with the fields of `d435_model.Shown`; `heading` is relative to the camera."""
 
     person: int
     depth_m: float
@@ -43,8 +41,7 @@ class DetectablePerson(NamedTuple):
 
 
 class Detector(object):
-    """Detector of people (0 .. people - 1) in images at intervals of `period_s`, with errors correlated between images.
-    """
+    """Detector of people (0 .. people - 1) in images every `period_s`, with errors correlated between images."""
 
     def __init__(self, camera, people, period_s, random):
         self._camera, self._period_s, self._random = camera, period_s, random

@@ -15,9 +15,8 @@ STANDING, DRIVING = 'standing', 'driving'
 class OdometryModel(NamedTuple):
     """Errors of the odometry.
 
-    `distance_scale` and `turn_scale` are standard deviations of constant scale errors. `step_m` (metres) and `turn`
-    (radians) are those of the random walk over one metre; they grow with the square root of the distance. `position_m`
-    and `heading` (radians) are those of the noise of a single pose.
+    Standard deviations of the constant scale errors, of the random walk over one metre (`step_m`, `turn`), which grows
+    with the square root of the distance, and of the noise of a single pose (`position_m`, `heading`).
     """
 
     distance_scale: float = 0.02
@@ -33,11 +32,6 @@ def pose_at(poses, time_s):
     row = time_s / PERIOD_S
     before = int(np.clip(np.floor(row), 0, len(poses) - 2))
     return poses[before] + (row - before) * (poses[before + 1] - poses[before])
-
-
-def standing(place_m, heading, seconds):
-    """Poses (n, 3) of a standing robot."""
-    return np.tile(np.append(place_m, heading), (int(round(seconds / PERIOD_S)) + 1, 1))
 
 
 def driving(place_m, heading, phase, seconds):

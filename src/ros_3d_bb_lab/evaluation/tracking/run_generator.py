@@ -13,8 +13,7 @@ from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView,
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel, half_width, shown
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import HARD_TO_SEE, DetectablePerson, Detector
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import (PERIOD_S, STANDING, OdometryModel, bearing_of, driving,
-                                                            from_frame, odometry_of, pose_at, standing, to_frame,
-                                                            turned)
+                                                            from_frame, odometry_of, pose_at, to_frame, turned)
 
 HORIZONS_S = np.array([0.5, 1.0, 1.5, 2.0])  # prediction horizons that are evaluated
 CAMERA_HEIGHT_M = 0.5
@@ -27,10 +26,7 @@ OPTICAL_FROM_BODY = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], float)
 
 
 class Timing(NamedTuple):
-    """Timing of images and detections, in seconds and shares of the images.
-
-    Stalls occur at the rate `stalls_hz`; a stall loses all images for `stall_s`.
-    """
+    """Timing of images and detections, in seconds and shares of the images. A stall loses all images for `stall_s`."""
 
     rate_hz: float = 30.0
     stamp_sigma_s: float = 0.0007
@@ -70,8 +66,7 @@ class RunTruth(NamedTuple):
 class Image(NamedTuple):
     """Received image: inputs of a tracker, and ground truth.
 
-    `sources` are the person IDs of the `detections`, or FALSE or DOUBLE. `arrival_ns` is the time at which the
-    detections arrive, and `arrival_view` is the camera pose from tf at that time.
+    `sources` are the person IDs of the `detections`, or FALSE or DOUBLE. `arrival_view` is from tf at `arrival_ns`.
     """
 
     stamp_ns: int
@@ -92,10 +87,7 @@ class Run(NamedTuple):
 
 
 class _Walks(NamedTuple):
-    """People of a run at the time of each image: (images, people, 2), NaN if not present.
-
-    `ended` (images, people) is whether the recording has ended; `future_m` is (images, people, horizons, 2).
-    """
+    """People of a run (images, people, ...), NaN if not present; `ended` is whether the recording has ended."""
 
     position_m: np.ndarray
     velocity_mps: np.ndarray
@@ -130,7 +122,8 @@ def _busiest(sequence, motion, seconds, camera, random):
         if motion == STANDING:
             place_m = random.uniform(low_m, high_m)
             towards_m = sequence.points_m[random.randint(len(sequence.points_m))]
-            poses = standing(place_m, bearing_of(towards_m - place_m), seconds + 1)
+            pose = np.append(place_m, bearing_of(towards_m - place_m))
+            poses = np.tile(pose, (int(round((seconds + 1) / PERIOD_S)) + 1, 1))
         else:
             place_m = (low_m + high_m) / 2 + random.normal(0, 0.8, 2)
             poses = driving(place_m, random.uniform(0, 2 * np.pi), random.uniform(), seconds + 1)

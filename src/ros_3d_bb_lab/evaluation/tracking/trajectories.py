@@ -17,10 +17,7 @@ PERIOD_S = 0.4  # of generated trajectories, as in common recordings
 
 
 class Pedestrian(NamedTuple):
-    """Person that is present from `start_s` to `end_s`.
-
-    `position_m` and `velocity_mps` are functions of times (n,) in seconds that return (n, 2).
-    """
+    """Person with a position and a velocity (n, 2) as functions of times (n,) from `start_s` to `end_s`."""
 
     start_s: float
     end_s: float
@@ -125,10 +122,7 @@ def _smoothed(times_s, points_m):
 
 
 def made_sequences(seed, seconds=90):
-    """Generate sequences: one with few and one with many people, some of them in pairs, some standing.
-
-    People do not avoid each other.
-    """
+    """Generate sequences with few and many people, some in pairs, some standing. They do not avoid each other."""
     return [_made('made_%s' % name, np.random.RandomState([seed, people]), people, seconds)
             for name, people in (('sparse', 30), ('dense', 90))]
 
