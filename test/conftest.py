@@ -92,9 +92,7 @@ def official_output(tmp_path_factory):
 def reader(tmp_path_factory, weights):
     """Runs the commands of the README."""
     from support.reader import Reader
-    reader = Reader(tmp_path_factory.mktemp('reader'), weights)
-    yield reader
-    reader.end()
+    return Reader(tmp_path_factory.mktemp('reader'), weights)
 
 
 @pytest.fixture(scope='session')

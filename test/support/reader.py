@@ -9,10 +9,12 @@ import sys
 import tempfile
 import time
 from hashlib import sha1
+from unittest import mock
 
 from ros_3d_bb_lab.evaluation.latency.benchmark import free_port
 from support.code_blocks import ROOT
 from support.launching import RS_CAMERA_ARGUMENTS, stand_in_gazebo, stand_in_launch_file, write
+from support.screen import start_screen
 
 SUPPORT = os.path.join(ROOT, 'test', 'support')
 PATIENCE_S = 120  # on a busy machine
@@ -42,7 +44,7 @@ class Reader(object):
 
     def __init__(self, folder, weights):
         self.home, self.clone, self.etc = folder / 'home', folder / 'home' / 'ros_3d_bb', folder / 'etc'
-        self.log, self.cache, self._screen = folder / 'log.txt', folder / 'cache', None
+        self.log, self.cache, self._display = folder / 'log.txt', folder / 'cache', None
         for path in (self.home / 'catkin_ws' / 'src', self.etc, folder / 'path' / 'to', self.clone):
             path.mkdir(parents=True)
         self.log.write_text('')
@@ -110,18 +112,12 @@ class Reader(object):
             graph.end()
 
     def screen(self):
-        """DISPLAY of a virtual screen."""
-        if self._screen is None:
-            self._screen = subprocess.Popen(['Xvfb', '-displayfd', '1', '-screen', '0', '1600x900x24'],
-                                            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-            self._display = ':' + self._screen.stdout.readline().decode().strip()
+        """DISPLAY of a virtual screen, which ends with the tests."""
+        if self._display is None:
+            with mock.patch.dict(os.environ):
+                start_screen()
+                self._display = os.environ['DISPLAY']
         return self._display
-
-    def end(self):
-        """End the virtual screen."""
-        if self._screen is not None:
-            self._screen.terminate()
-            self._screen.wait()
 
 
 class Graph(object):

@@ -23,7 +23,7 @@ def moments(*images):
     return [Moment(number * NS // 2, truth, tracks) for number, (truth, tracks) in enumerate(images)]
 
 
-def test_a_person_followed_well():
+def test_a_person_with_one_track():
     result = score(moments(*[([at(1, 3 + 0.1 * n, 0)], [at(7, 3 + 0.1 * n, 0.3)]) for n in range(5)]))
     person, = result.people
     assert (person.person, person.ids, person.switches, person.followed) == (1, [7], 0, 1.0)
@@ -32,7 +32,7 @@ def test_a_person_followed_well():
     assert result.false_share == 0
 
 
-def test_a_pair_is_kept_while_it_is_within_the_gate_though_another_is_nearer():
+def test_a_match_within_the_gate_is_kept_although_another_track_is_nearer():
     near = moments(([at(1, 0, 0)], [at(5, 0.1, 0)]), ([at(1, 0, 0)], [at(5, GATE_M - 0.1, 0), at(6, 0.1, 0)]))
     person, = score(near).people
     assert person.ids == [5]
@@ -65,7 +65,7 @@ def places(objects):
     return np.array([thing.position_m for thing in objects]).reshape(-1, 3)
 
 
-def test_nobody_there_and_nobody_tracked():
+def test_people_without_tracks_and_tracks_without_people():
     result = score(moments(([], [at(1, 0, 0), at(2, 5, 5, OCCLUDED)]), ([at(3, 0, 0)], [])))
     assert result.false_share == 0.5
     person, = result.people
@@ -85,7 +85,7 @@ def test_only_visible_people_and_tracks_count(images, followed):
     assert person.ids == [5] and person.followed == pytest.approx(followed)
 
 
-def test_time_without_images_is_no_time_in_view():
+def test_time_without_images_is_not_visible_time():
     images = [Moment(int(time_s * NS), [at(1, 0, 0)], [at(5, 0, 0)]) for time_s in (0, 1, 2, 100, 101)]
     person, = score(images).people
     assert (person.longest_s, person.visible_s) == (2.0, 3.0)

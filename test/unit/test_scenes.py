@@ -68,7 +68,7 @@ def test_everybody_in_the_thesis_scenes_keeps_one_id(runs, name, detector):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('detector,recall,false_rate', [('yolov5', 0.95, 0.05), ('depth', 0.90, 0.05)])
-def test_detectors_find_people_and_nothing_else(runs, detector, recall, false_rate):
+def test_recall_and_false_positives_of_detectors(runs, detector, recall, false_rate):
     """People of whom 80 % are visible, in all scenes, at 2 to 8 m (YOLOv5) or 2 to 6 m (weight-free)."""
     scores = [score_detections(runs[detector, name], *RANGE_M[detector]) for name in SCENES]
     people, found, false, images = (sum(column) for column in zip(*scores))
@@ -91,7 +91,7 @@ def approach():
 
 @pytest.mark.slow
 @pytest.mark.parametrize('name', sorted(APPROACHES))
-def test_somebody_comes_within_half_a_metre_stays_for_two_seconds_and_goes(name):
+def test_approach_scenes_come_within_half_a_metre_for_two_seconds(name):
     camera_m, person_m = APPROACHES[name]
     simulator = Simulator(read_scenario(os.path.join(FOLDER, name)))
     times_s = [simulator.time_s(number) for number in range(simulator.frame_count)]
@@ -104,7 +104,7 @@ def test_somebody_comes_within_half_a_metre_stays_for_two_seconds_and_goes(name)
     assert 1.5 <= np.count_nonzero(distances_m < 0.51) / simulator.rate <= 2.5
 
 
-def test_exact_boxes_are_the_true_ones_with_a_jitter_that_is_the_same_each_time(approach):
+def test_exact_boxes_have_a_reproducible_jitter(approach):
     jitters_px = []
     for number in range(0, 285, 19):
         frame = approach.frame(number)
@@ -191,7 +191,7 @@ def test_errors_of_velocity_and_prediction_are_those_in_the_plane():
     assert result['prediction_1s_m'] == pytest.approx(np.hypot(0.3, 0.1))
 
 
-def test_images_without_a_visible_track_count_from_the_first_with_one_on():
+def test_images_without_a_visible_track_count_after_the_first_match():
     someone = person(1, 2.0)
     held, occluded = track_of(someone), track_of(someone, status=OCCLUDED)
     away = track_of(someone, number=2, off_m=(0.0, 0.51, 0.0))
@@ -216,7 +216,7 @@ def test_each_id_counts_once():
     assert result['track_ids'] == 3 and result['not_visible'] == 1
 
 
-def test_what_is_not_known_is_none():
+def test_errors_without_matches_or_predictions_are_none():
     someone = person(1, 2.0)
     assert scored([([someone], [])]) == {
         'track_ids': 0, 'not_visible': 0, 'velocity_rmse_mps': None, 'prediction_1s_m': None}

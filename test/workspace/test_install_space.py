@@ -81,14 +81,8 @@ def test_launch_config_rviz_and_scripts_are_installed(installed):
     assert os.path.exists(os.path.join(share, 'LICENSE'))
 
 
-def test_the_package_is_found_and_imported_from_there(installed):
-    assert run_in(installed, 'rospack find ros_3d_bb').strip() == os.path.join(installed, 'share', 'ros_3d_bb')
-    where = run_in(installed, 'python3 -c "import ros_3d_bb.nodes.tracker_node as node; print(node.__file__)"')
-    assert where.startswith(installed)
-
-
 @pytest.mark.parametrize('name', [name for name in PROGRAMS if name not in NODES])
-def test_each_tool_says_how_it_is_used(installed, name):
+def test_each_tool_prints_its_usage(installed, name):
     assert 'usage: ' + name in run_in(installed, 'rosrun ros_3d_bb', name, '--help')
 
 
@@ -104,7 +98,7 @@ def master():
 
 
 @pytest.mark.parametrize('name', NODES)
-def test_each_node_starts_and_reads_its_parameters(installed, master, name):
+def test_each_node_starts_and_rejects_an_unknown_parameter(installed, master, name):
     """The parameter is rejected after all imports."""
     output = run_in(installed, 'rosrun ros_3d_bb', name, '_frobnicate:=1', status=1,
                     environment={'ROS_MASTER_URI': master})
@@ -128,13 +122,13 @@ def loaded(installed, tmp_path_factory):
                                  os.path.join(installed, 'share', 'ros_3d_bb', 'launch'), *ARGUMENTS))
 
 
-def test_all_launch_files_load_and_start_what_is_installed(installed, loaded):
+def test_launch_files_load_and_start_installed_nodes(installed, loaded):
     assert sorted(loaded) == sorted(os.listdir(os.path.join(ROOT, 'launch')))
     started = set(node for nodes, _parameters in loaded.values() for node in nodes if node.startswith('ros_3d_bb/'))
     assert started == set('ros_3d_bb/' + name for name in NODES)
 
 
-def test_files_that_launch_files_name_are_installed(installed, loaded):
+def test_files_named_in_launch_files_are_installed(installed, loaded):
     named = [value for _nodes, parameters in loaded.values() for value in parameters.values() if installed in value]
     share = os.path.join(installed, 'share', 'ros_3d_bb')
     for path in ('config/scenarios/demo.yaml', 'urdf/d435i.urdf.xacro'):
@@ -152,7 +146,7 @@ def test_a_scene_becomes_a_bag_boxes_tracks_and_a_report(installed, tmp_path):
     assert picture.exists()
 
 
-def test_the_annotator_and_the_tool_for_sessions_work_there(installed, tmp_path):
+def test_annotator_and_session_to_bag(installed, tmp_path):
     session, bag = write_small_session(str(tmp_path / 'session')), tmp_path / 'session.bag'
     assert 'nothing wrong' in run_in(installed, 'rosrun ros_3d_bb', 'annotator', '--validate', session)
     run_in(installed, 'rosrun ros_3d_bb', 'session_to_bag', session, bag)

@@ -67,7 +67,7 @@ def test_every_import_is_declared_and_every_dependency_is_used():
     assert declared('depend', 'exec_depend') == needed
 
 
-def test_what_the_tests_import_is_declared_or_in_their_requirements():
+def test_imports_of_the_tests_are_declared_or_in_their_requirements():
     names = imported(glob.glob(inside('test', '**', '*.py'), recursive=True))
     names -= {'support', 'fuzz', 'soak', 'conftest'} | TEST_STANDARD_LIBRARY
     with open(inside('test', 'requirements.txt')) as stream:
@@ -79,7 +79,7 @@ def test_what_the_tests_import_is_declared_or_in_their_requirements():
     assert programs == {'rosbash', 'rosservice', 'rostest', 'xdotool', 'xvfb'}
 
 
-def test_nothing_names_a_machine_or_stamps_with_now():
+def test_no_paths_of_this_machine_and_no_stamps_of_the_current_time():
     for path in python_files() + glob.glob(inside('launch', '*')) + (
             glob.glob(inside('config', '**', '*.yaml'), recursive=True) + glob.glob(inside('urdf', '*'))
             + glob.glob(inside('worlds', '*')) + [inside('run')]):
@@ -112,7 +112,7 @@ def test_values_outside_of_the_table_are_rejected(name):
 
 
 @pytest.mark.parametrize('name', sorted(NODES))
-def test_parameters_are_live_only_where_a_node_takes_changes(name):
+def test_parameters_are_live_only_in_nodes_with_a_reconfigure_server(name):
     module = sys.modules[NODES[name].node_class.__module__]
     is_live = any(param.live for param in table_of(node_pages.parameter_types(NODES[name].node_class)).values())
     assert is_live == hasattr(module, 'ReconfigureServer')

@@ -108,7 +108,7 @@ def test_a_robot_is_set_up(reader):
     assert os.path.exists(description) and '/catkin_ws/devel/setup.bash' in setup
 
 
-def test_a_workspace_of_ones_own_installs_builds_and_tests(reader):
+def test_own_workspace_installs_builds_and_tests(reader):
     for block in (INSTALL_ON_DEBIAN, OWN_TESTS):
         reader.types(block, reader.home / 'catkin_ws')
     said = reader.log.read_text()
@@ -132,7 +132,7 @@ def test_the_arguments_are_listed(reader):
     assert {'detector', 'weights', 'error_model', 'frame_world', 'planner'} <= listed
 
 
-def test_bags_are_processed_one_or_many(reader, camera_bag):
+def test_one_or_many_bags_are_processed(reader, camera_bag):
     (reader.home / 'day1').mkdir()
     for path in ('some.bag', 'day1/one.bag', 'day1/two.bag'):
         with rosbag.Bag(camera_bag) as whole, rosbag.Bag(str(reader.home / path), 'w') as part:
@@ -162,14 +162,14 @@ def test_benchmarks_print_a_table(reader, clone, data, block, shortened):
     assert len(re.findall(r'\d+\.\d+', printed)) > 5, printed
 
 
-def test_the_detector_is_timed_by_runtime(reader, clone, data, official_output):
+def test_detector_speed_by_runtime(reader, clone, data, official_output):
     """A checkpoint, because the stand-in export has one runtime only."""
     printed = reader.types(DETECTOR_SPEED, clone, appended=' --images 1', ROS_3D_BB_DATA=data,
                            replaced=[('$HOME/yolov5n.pt', official_output[0])])
     assert 'torch' in printed and 'onnxruntime' in printed
 
 
-def test_a_label_written_by_hand_is_read_as_stamp_and_frame():
+def test_stamp_and_frame_in_the_layout_of_2d_boxes():
     image = Image()
     image.header.stamp, image.header.frame_id = time_from(1600000000000000005), 'some_camera'
     names = {'image': image, 'Int32MultiArray': Int32MultiArray, 'MultiArrayDimension': MultiArrayDimension,
@@ -181,7 +181,7 @@ def test_a_label_written_by_hand_is_read_as_stamp_and_frame():
 
 
 @pytest.mark.parametrize('block', YAML, ids=lambda block: block.text.split(':')[0])
-def test_parameters_of_planners_load_as_a_node_would(reader, tmp_path, block):
+def test_parameters_of_planners_can_be_loaded(reader, tmp_path, block):
     """roslaunch sets the parameters of the block: it has no duplicate keys or tabs."""
     (tmp_path / 'planner.yaml').write_text(block.text)
     (tmp_path / 'planner.launch').write_text(

@@ -89,7 +89,7 @@ def environment_script(folder, host):
 
 
 @pytest.fixture(scope='module')
-def heard(tmp_path_factory):
+def received(tmp_path_factory):
     """Messages received by a listener on the robot, and the two hosts."""
     folder = tmp_path_factory.mktemp('two_machines')
     (folder / 'scene.yaml').write_text(SCENE)
@@ -111,19 +111,19 @@ def heard(tmp_path_factory):
         listener = os.path.join(SUPPORT, 'two_machines', 'listener.py')
         output = subprocess.check_output(run + [listener, str(WANTED), '90'], env=environment,
                                          universal_newlines=True)
-    line, = [line for line in output.splitlines() if line.startswith('HEARD ')]
-    return json.loads(line[len('HEARD '):]), robot, other
+    line, = [line for line in output.splitlines() if line.startswith('RECEIVED ')]
+    return json.loads(line[len('RECEIVED '):]), robot, other
 
 
-def test_the_pipeline_runs_on_the_other_computer_and_the_rest_on_the_robot(heard):
-    message, robot, other = heard
+def test_the_pipeline_runs_on_the_other_computer(received):
+    message, robot, other = received
     assert message['nodes']['/tracker_node'].startswith('http://%s:' % other.address)
     for name in ('/simulator_node', '/camera_mount'):
         assert message['nodes'][name].startswith('http://%s:' % robot.address)
 
 
-def test_tracks_carry_the_stamps_of_the_images_whatever_the_clock_of_the_other_computer(heard):
-    message, _robot, _other = heard
+def test_tracks_have_the_stamps_of_the_images_with_another_clock(received):
+    message, _robot, _other = received
     assert message['clocks']['tracker_node'] == pytest.approx(AHEAD_S, abs=20)
     assert message['clocks']['simulator_node'] == pytest.approx(0, abs=20)
     found = [stamp for stamp, frame, people in message['tracks'] if people == 1 and frame == 'odom']

@@ -28,7 +28,7 @@ def main():
         time.sleep(0.1)
     nodes = {name: rospy.get_master().lookupNode(name)[2]
              for name in ('/tracker_node', '/simulator_node', '/camera_mount')}
-    print('HEARD ' + json.dumps({'images': images, 'tracks': tracks, 'clocks': clocks, 'nodes': nodes}))
+    print('RECEIVED ' + json.dumps({'images': images, 'tracks': tracks, 'clocks': clocks, 'nodes': nodes}))
 
 
 if __name__ == '__main__':
