@@ -57,7 +57,7 @@ def runs(yolov5):
 @pytest.mark.parametrize('detector', ['yolov5', 'depth'])
 @pytest.mark.parametrize('name', THESIS_SCENES)
 def test_everybody_in_the_thesis_scenes_keeps_one_id(runs, name, detector):
-    """Everybody who is visible for a second; tracks are published from the fourth detection on."""
+    """Each person is visible for a second; tracks are published from the fourth detection on."""
     result = score([step.moment for step in runs[detector, name]])
     assert len(result.people) == 4
     for person in result.people:
@@ -69,7 +69,7 @@ def test_everybody_in_the_thesis_scenes_keeps_one_id(runs, name, detector):
 @pytest.mark.slow
 @pytest.mark.parametrize('detector,recall,false_rate', [('yolov5', 0.95, 0.05), ('depth', 0.90, 0.05)])
 def test_recall_and_false_positives_of_detectors(runs, detector, recall, false_rate):
-    """People of whom 80 % are visible, in all scenes, at 2 to 8 m (YOLOv5) or 2 to 6 m (weight-free)."""
+    """At least 80 % of each person is visible, at 2 to 8 m (YOLOv5) or 2 to 6 m (weight-free)."""
     scores = [score_detections(runs[detector, name], *RANGE_M[detector]) for name in SCENES]
     people, found, false, images = (sum(column) for column in zip(*scores))
     assert people > 500
@@ -117,7 +117,7 @@ def test_exact_boxes_have_a_reproducible_jitter(approach):
 
 
 def test_exact_boxes_have_the_covariance_of_the_error_model(approach):
-    """In the map, whose x is the range of a camera that looks along it: as the model says at 3.7 m."""
+    """In the map, whose x axis is the optical axis of the camera; the person is at 3.7 m."""
     model = read_error_model(ERROR_MODEL)
     plain = next(detect_in_scene(approach, exact_detector(approach)))
     image = next(detect_in_scene(approach, exact_detector(approach), error_model=model))
@@ -211,8 +211,8 @@ def test_people_too_near_outside_of_the_image_or_hidden_are_not_scored(then, not
 def test_each_id_counts_once():
     someone, other = person(1, 2.0), person(2, 4.0)
     first, second = track_of(someone, 5), track_of(someone, 6, off_m=(0.2, 0.0, 0.0))
-    nobody = track_of(person(3, 7.0), 7)
-    result = scored([([someone, other], [first, track_of(other, 8), nobody]), ([someone, other], [first, second])])
+    unmatched = track_of(person(3, 7.0), 7)
+    result = scored([([someone, other], [first, track_of(other, 8), unmatched]), ([someone, other], [first, second])])
     assert result['track_ids'] == 3 and result['not_visible'] == 1
 
 

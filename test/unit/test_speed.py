@@ -28,7 +28,7 @@ def session(session_folder):
 
 
 def walks(steps, random):
-    """Three people who keep apart, image by image: positions (3, 3)."""
+    """Positions (3, 3) of three people in each image, with large distances."""
     places_m = np.array([[2.0, -2, 1], [4, 0, 1], [3, 3, 1]])
     for _image in range(steps):
         places_m = places_m + random.uniform(-0.05, 0.05, (3, 3)) * (1, 1, 0)
@@ -49,7 +49,7 @@ def test_the_thesis_tracks_are_those_of_its_mended_tracker_while_everybody_is_se
 
 def test_the_thesis_predicts_two_seconds_along_the_velocity(session):
     algorithm = benchmark.Theirs(crowd_of(people_of(session), 1, session))
-    for image, x_m in enumerate((0.0, 0.1, 0.2)):  # of a camera that looks along x: to its right
+    for image, x_m in enumerate((0.0, 0.1, 0.2)):  # to the right of a camera that faces along x
         ahead_m = algorithm.track(image * NS // 10, [Box3D(np.array([x_m, 0, 3.0]), SIZE, (0, 0, 9, 9), 1.0, ())])
     np.testing.assert_allclose(ahead_m[1], (3, -0.2 - 2 * (0.2 + 0.8 * 0.2), 1), atol=1e-6)
 

@@ -95,14 +95,14 @@ def test_a_robot_is_set_up(reader):
     """All commands in order; the stand-ins log what they are asked for."""
     for block in (INSTALL, WEIGHTS, RUNTIMES, DESCRIPTION, UPSTART):
         reader.types(block)
-    said = reader.log.read_text().splitlines()
+    logged = reader.log.read_text().splitlines()
     assert os.path.exists(str(reader.home / 'catkin_ws' / 'src' / 'ros_3d_bb' / 'package.xml'))
     for command in ('git clone URL ros_3d_bb', 'rosdep install --from-paths src --ignore-src', 'catkin_make',
                     'pip3 install torch onnxruntime', 'systemctl restart ros', 'systemctl daemon-reload',
                     'systemctl start people'):
-        assert command in said
-    assert [line for line in said if line.startswith('wget https://github.com/ultralytics/yolov5/releases')]
-    assert '/yolov5_node' in said and '/camera_mount' in said  # robot_upstart could load the launch file
+        assert command in logged
+    assert [line for line in logged if line.startswith('wget https://github.com/ultralytics/yolov5/releases')]
+    assert '/yolov5_node' in logged and '/camera_mount' in logged  # robot_upstart could load the launch file
     setup = (reader.etc / 'setup.bash').read_text()
     description = re.search('JACKAL_URDF_EXTRAS=(.*)', setup).group(1)
     assert os.path.exists(description) and '/catkin_ws/devel/setup.bash' in setup
@@ -111,8 +111,8 @@ def test_a_robot_is_set_up(reader):
 def test_own_workspace_installs_builds_and_tests(reader):
     for block in (INSTALL_ON_DEBIAN, OWN_TESTS):
         reader.types(block, reader.home / 'catkin_ws')
-    said = reader.log.read_text()
-    assert 'rosdep update' in said and 'catkin_make run_tests -j1' in said
+    logged = reader.log.read_text()
+    assert 'rosdep update' in logged and 'catkin_make run_tests -j1' in logged
 
 
 def test_the_other_computers_script_runs_its_arguments(reader, tmp_path):
