@@ -96,6 +96,7 @@ def test_incompatible_arguments_are_rejected(arguments, capsys):
     assert error.value.code == 2 and 'usage: annotator' in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_clone_works_without_ros_and_qt(folder, tmp_path):
     # modules that cannot be imported stand for those that are not installed
     (tmp_path / 'sitecustomize.py').write_text(

@@ -27,6 +27,7 @@ def test_recovers_a_bias_that_goes_with_the_angle():
     assert model.x_bias.slope == 0 and model.x_bias.per_angle_m == pytest.approx(-0.25, abs=0.02)
 
 
+@pytest.mark.slow
 def test_recovers_the_spread(fitted):
     ranges_m = np.array([1.0, 2.5, 4.0])
     assert fitted.z_sigma.at(ranges_m) == pytest.approx(MODEL.z_sigma.at(ranges_m), rel=0.4)

@@ -63,6 +63,7 @@ def test_the_report_contains_all_figures(out):
     assert '>None' not in page and 'nan' not in page
 
 
+@pytest.mark.slow
 def test_the_error_models_can_be_read_and_correct_the_bias(out):
     for name in ('error_model.yaml', 'error_model_thesis_form.yaml'):
         model = read_error_model(out / name)

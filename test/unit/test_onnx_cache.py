@@ -115,6 +115,7 @@ def test_a_file_in_place_of_the_folder_causes_warnings_only(cache):
     assert rows_of(cache.open()).shape[1] == 8 and len(cache.warnings) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('fault', ['not installed', 'wrong'])
 def test_torch_replaces_an_onnx_runtime_that_does_not_work(cache, monkeypatch, fault):
     if fault == 'not installed':
