@@ -53,6 +53,7 @@ def test_the_numbers_are_those_of_the_thesis(out):
                                                 'log_likelihoods'}
 
 
+@pytest.mark.slow
 def test_the_report_contains_all_figures(out):
     page = (out / 'report.html').read_text(encoding='utf-8')
     assert re.findall('<img src="([^"]*)"', page) == FIGURES

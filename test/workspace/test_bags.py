@@ -15,7 +15,6 @@ from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from
                                                    tracks_from_msg, transform_from_msg)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb_lab.simulation.ground_truth import truth_at
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images, scenario_to_bag
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator

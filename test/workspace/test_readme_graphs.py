@@ -110,7 +110,7 @@ def test_simulation_and_doctor(reader):
         graph.shows('RViz')
         graph.hears(TRACKS, 'ground_truth:objects')
         printed = reader.types(DOCTOR, appended=' --patience 60', ROS_MASTER_URI=graph.environment['ROS_MASTER_URI'])
-    assert 'doctor: all is well' in printed
+    assert 'doctor: no faults found' in printed
 
 
 def test_gazebo(reader, camera_bag):

@@ -129,7 +129,7 @@ class RgbdDetectionStage(object):
             self._events.count('colour images of a time before')
             return
         self._events.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f of the '
-                         'colour image arrived; waiting for the next' % (stamp_of(color_msg) / NS))
+                          'colour image arrived; waiting for the next' % (stamp_of(color_msg) / NS))
 
     def detect(self, color_msg, depth_msg, camera):
         """Return the RGB image, (height, width, 3), and the Detections in it; None while the floor is unknown.
@@ -142,7 +142,7 @@ class RgbdDetectionStage(object):
         detections = self._detector.detect(image, depth, camera, self._floor(camera_frame))
         if detections is None:
             self._events.warn('images without floor', 'tf gives no floor, and none is visible in the depth image; no '
-                             'detection; waiting for the next image')
+                              'detection; waiting for the next image')
             return None
         self._events.count('images processed')
         return image, detections
@@ -158,7 +158,7 @@ class RgbdDetectionStage(object):
             camera_from_base = self._transforms.lookup(camera_frame, self._params.floor_frame, NEWEST)
         except tf2_ros.TransformException as error:
             self._events.warn('images without transform', 'no transform from %s to %s: %s; fitting the floor to the '
-                             'depth image' % (self._params.floor_frame, camera_frame, error))
+                              'depth image' % (self._params.floor_frame, camera_frame, error))
             return None
         base_from_floor = transform_from((0, 0, self._params.floor_height), (0, 0, 0, 1))
         return floor_from_transform(camera_from_base.dot(base_from_floor))

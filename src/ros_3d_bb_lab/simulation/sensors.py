@@ -1,8 +1,9 @@
 """Model of a RealSense D435i: depth images with the errors of active stereo, and colour images with blur and noise.
 
 The depth camera matches the images of two imagers. It measures the disparity d = f B / z in steps of 1/32 px, so that
-depth has levels C / n with integer n. The noise of disparity is constant, so the noise of depth grows with the square of the
-distance. Surfaces that the second imager does not see have no depth; they form a shadow to the left of near objects.
+depth has levels C / n with integer n. The noise of disparity is constant, so the noise of depth grows with the square
+of the distance. Surfaces that the second imager does not see have no depth; they form a shadow to the left of near
+objects.
 All parameters were fitted to the images of the thesis (compared in `test/unit/test_stereo.py`). Their depth is aligned
 to the colour camera, and so is the output of this model.
 

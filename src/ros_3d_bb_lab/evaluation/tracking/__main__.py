@@ -13,7 +13,7 @@ from ros_3d_bb_lab.evaluation.scenes import detect_in_scene, track_scene
 from ros_3d_bb_lab.evaluation.tracking.benchmark import BOUND, CONTESTANTS, PEOPLE, compare, cpu_ms, runs_of, table
 from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS
 from ros_3d_bb_lab.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
-from ros_3d_bb_lab.simulation.scenario import ScenarioError, read_scenario
+from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
 SCENE_COLUMNS = '%-22s %-13s %7s %9s %9s %9s'

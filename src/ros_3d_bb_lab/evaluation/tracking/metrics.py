@@ -82,7 +82,7 @@ def _score_image(truth, objects, camera):
     places_m = np.array([thing.position_m[:2] for thing in objects]).reshape(-1, 2)
     distances_m = plane_distances(truth.position_m[counts].reshape(-1, 2), places_m)
     near = distances_m <= PAIRED_M
-    pairs = assign(np.where(near, distances_m, np.inf))
+    pairs = list(zip(*assign(np.where(near, distances_m, np.inf))))
     counted = _in_scored_area(places_m, truth, camera)
     for row, column in pairs:
         counted[column] |= distances_m[row, column] <= MATCHED_M
