@@ -76,7 +76,7 @@ def graph_findings(arguments):
         found = findings(observer.observations())
         observer.close()
         if len(cameras) > 1:
-            found.insert(0, Finding('cameras', '%s of %s; check another one with doctor --camera NAME'
+            found.insert(0, Finding('cameras', '%s; of %s, checked one at a time: doctor --camera NAME'
                                     % (camera, ', '.join(cameras))))
         if not any(finding.fault for finding in found) or time.monotonic() >= deadline_s:
             return found
