@@ -22,7 +22,7 @@ def play():
 def test_one_stamp_of_the_future_costs_the_other_camera_no_image(play, ahead_ns, goes_on):
     play.run(2)
     assert play.send('rear', ahead_ns) is None
-    play.run(10, {'front', 'rear'} if goes_on else {'front'})
+    play.run(3, {'front', 'rear'} if goes_on else {'front'})
     assert play.lost('front') == 0 and play.lost('rear') == 1 and play.ids == [1]
     assert dict(play.counts, **{'images tracked': 0}) == {'images tracked': 0, AHEAD: 1}
     assert play.transforms.jumps == 0
@@ -76,7 +76,7 @@ GLITCHES = st.tuples(st.floats(0.5, 8.0), st.sampled_from(sorted(PERIODS_NS)),
                      st.sampled_from([HOUR_NS, 100 * NS, 2 * NS, 1200 * MS, 900 * MS, 400 * MS]), st.booleans())
 
 
-@settings(max_examples=15)
+@settings(max_examples=6)
 @given(st.integers(1, 3), st.lists(GLITCHES, max_size=6), st.lists(st.integers(0, 300), min_size=3, max_size=3))
 def test_after_a_glitch_each_camera_is_answered_within_a_second(number, glitches, lags_ms):
     """At random times random cameras send a stamp of the future, after which some of them end."""
@@ -104,7 +104,7 @@ def test_after_a_glitch_each_camera_is_answered_within_a_second(number, glitches
 STEPS_NS = [0, 1, MS, NS // 30, NS // 30, 400 * MS, -NS // 30, -400 * MS, 2 * NS, -2 * NS, HOUR_NS, -HOUR_NS]
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(st.integers(1, 3), st.lists(st.tuples(st.sampled_from(sorted(PERIODS_NS)), st.sampled_from(STEPS_NS),
                                              st.sampled_from([0, MS, NS // 30, 2 * NS])), min_size=50, max_size=400))
 def test_a_good_second_follows_whatever_the_stamps_were(number, images):

@@ -2,7 +2,6 @@
 import threading
 from typing import NamedTuple
 
-import numpy as np
 import rospy
 import tf2_ros
 from std_msgs.msg import Header
@@ -16,7 +15,7 @@ from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.planning.planner_outputs import outputs_from
-from ros_3d_bb.planning.planner_view import predicted_to, rounding_m, usable_tracks
+from ros_3d_bb.planning.planner_view import SAME_FRAME, predicted_to, rounding_m, usable_tracks
 
 MAX_ROUNDING_M = 0.005  # largest rounding error of a coordinate: a tenth of a typical costmap cell
 
@@ -153,7 +152,7 @@ class PlannerBridgeNode(object):
 
     def _transforms_at(self, header):
         """Return {frame: 4x4 matrix} from the tracks' frame to the output frames known to tf at the tracks' stamp."""
-        transforms = {header.frame_id: np.eye(4)}
+        transforms = {header.frame_id: SAME_FRAME}
         for frame in sorted(set(topic.output.frame for topic in self._topics) - {'', header.frame_id}):
             try:
                 transforms[frame] = self._transforms.lookup(frame, header.frame_id, header.stamp)

@@ -8,6 +8,7 @@ from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
 
 SWATH_STEP_S = 0.1  # a person at 3 m/s moves 0.3 m, less than a body's width, so that the footprints overlap
+SAME_FRAME = np.eye(4)
 LOWEST, HIGHEST = 0.25, 0.75  # fractions of a cylinder's height: off the floor and below 2 m, the limit of costmaps
 
 
