@@ -54,17 +54,15 @@ class Poses(NamedTuple):
 
 
 class SimulatedFrame(NamedTuple):
-    """`time_s` since the start; `color` (h, w, 3), uint8 RGB; `depth_mm` (h, w), uint16, aligned to colour, 0 means no
-    depth; `camera`, the name of the camera, or '' if there is only one.
-    """
+    """One image of one camera."""
 
     number: int
-    time_s: float
-    color: np.ndarray
-    depth_mm: np.ndarray
+    time_s: float         # since the start
+    color: np.ndarray     # (h, w, 3), uint8 RGB
+    depth_mm: np.ndarray  # (h, w), uint16, aligned to colour; 0 means no depth
     poses: Poses
     people: List[PersonTruth]
-    camera: str = ''
+    camera: str = ''      # its name, '' if there is only one
 
 
 class Simulator(object):
