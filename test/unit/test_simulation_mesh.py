@@ -8,7 +8,7 @@ from ros_3d_bb_lab.simulation.mesh import CELL_M, box, loft, vertex_normals, vol
 from support.meshes import assert_closed
 
 metres = st.floats(.05, 3)
-places = st.tuples(*[st.floats(-5, 5)] * 3)
+positions = st.tuples(*[st.floats(-5, 5)] * 3)
 angles = st.floats(-7, 7)
 
 
@@ -74,7 +74,7 @@ def test_faces_of_a_box_are_small_and_agree_with_their_normals(size):
     assert (((corners.mean(axis=1) - (0, 0, size[2] / 2)) * normals).sum(axis=1) > 0).all()
 
 
-@given(places, angles)
+@given(positions, angles)
 @settings(max_examples=30)
 def test_moved_rotates_counter_clockwise_and_translates(position, heading):
     mesh = crate()

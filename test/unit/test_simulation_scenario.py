@@ -168,9 +168,9 @@ def distance_to(furniture, points):
 
 def assert_apart(distances_m, min_m, times_s, objects):
     """Assert that distances, whose first axis is time, exceed a minimum."""
-    place = np.unravel_index(np.argmin(distances_m), distances_m.shape) if distances_m.size else None
-    assert place is None or distances_m[place] > min_m, '%s: %.2f m at %.1f s, numbers %s from 1' % (
-        objects, distances_m[place], times_s[place[0]], [number + 1 for number in place[1:]])
+    worst = np.unravel_index(np.argmin(distances_m), distances_m.shape) if distances_m.size else None
+    assert worst is None or distances_m[worst] > min_m, '%s: %.2f m at %.1f s, numbers %s from 1' % (
+        objects, distances_m[worst], times_s[worst[0]], [number + 1 for number in worst[1:]])
 
 
 @pytest.mark.slow

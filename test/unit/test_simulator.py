@@ -159,9 +159,9 @@ def test_drift_changes_the_pose_in_odom_and_not_in_the_map():
 
 
 def test_the_appearance_is_random_by_the_seed_unless_specified():
-    looks = {seed: [body.build for body in Simulator(scene(*[Person((5, y)) for y in (-1, 0, 1)], seed=seed),
-                                                     CAMERA)._bodies] for seed in (1, 2)}
-    assert looks[1] != looks[2] and len({build.shirt for build in looks[1]}) == 3
+    people = [Person((5, y)) for y in (-1, 0, 1)]
+    builds = {seed: [body.build for body in Simulator(scene(*people, seed=seed), CAMERA)._bodies] for seed in (1, 2)}
+    assert builds[1] != builds[2] and len({build.shirt for build in builds[1]}) == 3
     specified = Person((5, 0), height=1.6, girth=1.2, hips=.5, long_hair=True, short_sleeves=False, skin=(1, 2, 3),
                        hair=(4, 5, 6), shirt=(7, 8, 9), trousers=(10, 11, 12))
     build = Simulator(scene(specified), CAMERA)._bodies[0].build

@@ -37,12 +37,11 @@ CROUCH = np.radians([105, 130, 25, 20])
 
 
 class Posture(NamedTuple):
-    """`phase` of the gait in cycles since left heel strike; `swing` from 0 (standing) to 1 (walking); `crouch` 0 to 1.
-    """
+    """Posture while walking, standing or crouching."""
 
-    phase: float = 0.0
-    swing: float = 0.0
-    crouch: float = 0.0
+    phase: float = 0.0   # of the gait, in cycles since left heel strike
+    swing: float = 0.0   # 0 (standing) to 1 (walking)
+    crouch: float = 0.0  # 0 to 1
 
 
 def bone_transforms(posture):

@@ -10,15 +10,13 @@ CELL_M = 0.5  # maximum edge of a face of a box; faces that are partly behind th
 
 
 class Mesh(NamedTuple):
-    """`vertices` and unit `normals` (n, 3); `faces` (m, 4), indices of vertices; `colors` (m, 3) of the faces, uint8
-    RGB; `tone` (n,), factor of brightness of the vertices.
-    """
+    """Surface of quadrilaterals."""
 
-    vertices: np.ndarray
-    normals: np.ndarray
-    faces: np.ndarray
-    colors: np.ndarray
-    tone: np.ndarray
+    vertices: np.ndarray  # (n, 3)
+    normals: np.ndarray   # (n, 3), unit vectors
+    faces: np.ndarray     # (m, 4), indices of vertices
+    colors: np.ndarray    # (m, 3) of the faces, uint8 RGB
+    tone: np.ndarray      # (n,), factor of brightness of the vertices
 
     def moved(self, position_m, heading_rad):
         """Return the mesh rotated about z (counter-clockwise seen from above), then translated by (x, y, z)."""

@@ -1,8 +1,7 @@
 """Renderer of a room with meshes: colour, inverse depth, and the object in each pixel.
 
 The faces of each object are painted from back to front into an image of face numbers. The planes of the faces give the
-inverse depth and the brightness of each pixel, and the nearest object wins. Convention: as in `geometry`; inverse depth
-is 1/m along the optical axis.
+inverse depth (1/m along the optical axis) and the brightness of each pixel, and the nearest object wins.
 """
 from typing import NamedTuple
 

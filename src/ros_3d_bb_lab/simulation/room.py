@@ -47,18 +47,16 @@ class RenderedRoom(object):
         shape = (camera.height, camera.width)
         inverse_depth, surfaces = np.full(shape, 1e-3, np.float32), np.full(shape, 255, np.uint8)
         color = np.zeros(shape + (3,), np.uint8)
-        plane, lines = np.empty(shape, np.float32), []
-        for number, surface in enumerate(self._surfaces):
-            a, b, c = line = _inverse_depth_of(surface, camera, world_from_camera)
-            lines.append(line)
+        plane = np.empty(shape, np.float32)
+        lines = [_inverse_depth_of(surface, camera, world_from_camera) for surface in self._surfaces]
+        for number, (a, b, c) in enumerate(lines):
             if c + max(0, a * camera.width) + max(0, b * camera.height) > 0:  # otherwise it is behind the camera
                 np.add((b * np.arange(camera.height) + c).astype(np.float32)[:, None],
                        (a * np.arange(camera.width)).astype(np.float32), out=plane)
                 surfaces[cv2.compare(plane, inverse_depth, cv2.CMP_GT) > 0] = number
                 cv2.max(plane, inverse_depth, inverse_depth)
-        for number, line in enumerate(lines):
-            _paint(color, cv2.inRange(surfaces, number, number), self._surfaces[number], line, camera,
-                   world_from_camera)
+        for number, (surface, line) in enumerate(zip(self._surfaces, lines)):
+            _paint(color, cv2.inRange(surfaces, number, number), surface, line, camera, world_from_camera)
         return color, inverse_depth, surfaces
 
 

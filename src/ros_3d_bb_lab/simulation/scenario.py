@@ -116,14 +116,18 @@ LISTS = {'furniture': Furniture, 'people': Person, 'moves': Move, 'cameras': Mou
 VECTORS = {'bounds': 4, 'at': 2, 'size': 3, 'to': 2, 'start': 2, 'pose': 3, 'mount': 3, 'odometry_drift': 3, 'color': 3,
            'skin': 3, 'hair': 3, 'shirt': 3, 'trousers': 3}
 FLAGS, WHOLE = {'repeat', 'long_hair', 'short_sleeves', 'depth_noise'}, {'seed', 'person'}
-RANGES = (  # keys, check of a number, and its description
+NAME = re.compile(r'[A-Za-z]\w*$')  # a topic namespace
+TYPES = (  # keys, check of a value, and its description
+    (LISTS, lambda value: isinstance(value, list), 'a list'),
+    (FLAGS, lambda value: isinstance(value, bool), 'true or false'),
+    ({'name'}, lambda value: isinstance(value, str) and NAME.match(value), 'a name such as front'))
+RANGES = (  # the same for numbers
     (WHOLE, lambda number: number == int(number) and 0 <= number < 2 ** 32, 'an integer from 0 to 4294967295'),
     ({'duration', 'rate', 'height', 'speed', 'girth', 'distance', 'size'}, lambda number: number > 0, 'more than 0'),
     ({'rate'}, lambda number: number <= 1000, 'at most 1000'),
     ({'wait', 'color_noise'}, lambda number: number >= 0, 'at least 0'),
     ({'crouch', 'hips'}, lambda number: 0 <= number <= 1, '0 to 1'),
     ({'color', 'skin', 'hair', 'shirt', 'trousers'}, lambda number: 0 <= number <= 255, '0 to 255'))
-NAME = re.compile(r'[A-Za-z]\w*$')  # a topic namespace
 
 
 def read_scenario(path):
@@ -225,31 +229,28 @@ def _check_move(given, where):
 
 
 def _value(name, value, where):
+    _check(TYPES, name, value, where)
     if name in RECORDS:
         return _record(RECORDS[name], value, where)
     if name in LISTS:
-        if not isinstance(value, list):
-            raise ValueError('%s is %r; a list expected' % (where, value))
         return tuple(_record(LISTS[name], entry, '%s[%d]' % (where, number)) for number, entry in enumerate(value, 1))
     if name in VECTORS:
         if not (isinstance(value, list) and len(value) == VECTORS[name]):
             raise ValueError('%s is %r; %d numbers expected' % (where, value, VECTORS[name]))
         return tuple(_checked(name, _number(entry, where), where) for entry in value)
-    if name == 'name':
-        if not (isinstance(value, str) and NAME.match(value)):
-            raise ValueError('%s is %r; a name such as front expected' % (where, value))
-        return value
-    if name in FLAGS:
-        if not isinstance(value, bool):
-            raise ValueError('%s is %r; true or false expected' % (where, value))
+    if name in FLAGS or name == 'name':
         return value
     return _checked(name, _number(value, where), where)
 
 
+def _check(checks, name, value, where):
+    for names, is_valid, expected in checks:
+        if name in names and not is_valid(value):
+            raise ValueError('%s is %r; %s expected' % (where, value, expected))
+
+
 def _checked(name, number, where):
-    for names, is_valid, expected in RANGES:
-        if name in names and not is_valid(number):
-            raise ValueError('%s is %r; %s expected' % (where, number, expected))
+    _check(RANGES, name, number, where)
     return int(number) if name in WHOLE else float(number)
 
 

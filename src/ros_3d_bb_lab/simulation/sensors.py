@@ -1,9 +1,8 @@
 """Model of a RealSense D435i: depth images with the errors of active stereo, and colour images with blur and noise.
 
-The depth camera matches the images of two imagers. It measures the disparity d = f B / z in steps of 1/32 px, so that
-depth has levels C / n with integer n. The noise of disparity is constant, so the noise of depth grows with the square
-of the distance. Surfaces that the second imager does not see have no depth; they form a shadow to the left of near
-objects.
+The depth camera matches the images of two imagers. It measures the disparity d = f B / z in steps of 1/32 px, so depth
+has levels C / n with integer n. The noise of disparity is constant, so that of depth grows with the square of the
+distance. Surfaces that the second imager does not see have no depth; they form a shadow to the left of near objects.
 All parameters were fitted to the images of the thesis (compared in `test/unit/test_stereo.py`). Their depth is aligned
 to the colour camera, and so is the output of this model.
 
@@ -14,8 +13,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-# The random fields are this much larger than the image; each frame uses a part at a random place. For two frames in a
-# thousand the places are so close to each other that the noise is correlated.
+# The random fields are this much larger than the image; each frame uses a random part. For two frames in a thousand
+# the parts overlap so much that the noise is correlated.
 SPARE_PX = 512
 COLOR_FIELDS, COLOR_SPARE_PX = 4, 64  # each image has one of these fields of colour noise
 BLUR_PX, GRAIN_PX = .65, .6  # sigma of the blur of colour images and of the correlation of their noise
@@ -24,11 +23,7 @@ HIDDEN_BY_PX = 0.3
 
 
 class StereoParams(NamedTuple):
-    """Parameters of the camera. Disparities are in pixels of the imagers, other lengths in pixels of the colour image.
-
-    The minimum disparity is that of 20.3 m, the largest depth in 110 real frames. The maximum, that of 0.15 m, is the
-    search range of the camera.
-    """
+    """Parameters of the depth camera. Disparities are in pixels of the imagers, lengths in those of colour images."""
 
     focal_baseline_px_m: float = 19.066875  # f B of the imagers (381 px, 50 mm): levels of 610140 / n mm
     steps_per_px: int = 32                  # disparity steps per pixel
@@ -41,8 +36,8 @@ class StereoParams(NamedTuple):
     shadow_extra_px: int = 4                # extra width of shadows, because the imagers match patches
     hole_share: float = 5e-4                # share of the pixels in small holes, away from silhouettes
     hole_kernel_px: float = 1.0             # sigma of the Gaussian kernel that sets the size of holes
-    min_disparity_px: float = 30 / 32.      # range of disparity
-    max_disparity_px: float = 126.
+    min_disparity_px: float = 30 / 32.      # that of 20.3 m, the largest depth in 110 real frames
+    max_disparity_px: float = 126.          # that of 0.15 m, the search range of the camera
 
 
 class StereoCamera(object):

@@ -54,17 +54,15 @@ class Poses(NamedTuple):
 
 
 class SimulatedFrame(NamedTuple):
-    """`time_s` since the start; `color` (h, w, 3), uint8 RGB; `depth_mm` (h, w), uint16, aligned to colour, 0 means no
-    depth; `camera`, the name of the camera, or '' if there is only one.
-    """
+    """One image of one camera."""
 
     number: int
-    time_s: float
-    color: np.ndarray
-    depth_mm: np.ndarray
+    time_s: float         # since the start
+    color: np.ndarray     # (h, w, 3), uint8 RGB
+    depth_mm: np.ndarray  # (h, w), uint16, aligned to colour; 0 means no depth
     poses: Poses
     people: List[PersonTruth]
-    camera: str = ''
+    camera: str = ''      # its name, '' if there is only one
 
 
 class Simulator(object):
@@ -76,6 +74,9 @@ class Simulator(object):
 
     def __init__(self, scenario, camera=D435I_COLOR):
         self.scenario, self.camera = scenario, camera
+        self.cameras = [mount.name for mount in scenario.robot.mounts]  # [''] if there is only one
+        self.rate = scenario.rate * len(self.cameras)  # frames per second of all cameras together
+        self.frame_count = int(np.ceil(scenario.duration * self.rate))
         self._room = RenderedRoom(scenario.room.bounds, scenario.room.height, np.random.RandomState(scenario.seed))
         self._furniture = [box(item.size, item.color, np.random.RandomState(number)).moved(item.at + (0,), item.yaw)
                            for number, item in enumerate(scenario.room.furniture)]
@@ -86,21 +87,6 @@ class Simulator(object):
         self._robot = robot_motion(scenario.robot, self._motions, scenario.duration)
         self._color_sensor = ColorSensor(camera, scenario.seed, scenario.color_noise)
         self._stereo = StereoCamera(camera, scenario.seed) if scenario.depth_noise else None
-
-    @property
-    def cameras(self):
-        """Names of the cameras; [''] if there is only one."""
-        return [mount.name for mount in self.scenario.robot.mounts]
-
-    @property
-    def rate(self):
-        """Frames per second of all cameras together."""
-        return self.scenario.rate * len(self.cameras)
-
-    @property
-    def frame_count(self):
-        """Number of frames in the scene."""
-        return int(np.ceil(self.scenario.duration * self.rate))
 
     def time_s(self, number):
         """Time of a frame since the start."""

@@ -78,9 +78,8 @@ def launch(arguments, timeout_s, log):
                                stderr=subprocess.STDOUT, start_new_session=True,
                                env=dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % port))
     try:
-        process.wait(timeout_s)
-    except subprocess.TimeoutExpired:
-        pass  # the missing record is reported
+        with contextlib.suppress(subprocess.TimeoutExpired):  # the missing record is reported
+            process.wait(timeout_s)
     finally:
         end(process)
 

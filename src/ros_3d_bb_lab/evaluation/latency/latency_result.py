@@ -6,21 +6,16 @@ EDGE_S = 60.0  # intervals at the start and at the end that are compared in `tre
 
 
 def result_of(record):
-    """Compute the results of a case (dict).
+    """Compute the results of a case.
 
-    Parameters
-    ----------
-    record : dict
-        `began_s`, `ended_s`: start and end of the measurement; `sent_ns`: stamps of the images; `arrivals`: by stage,
-        [stamp in ns, arrival in seconds]; `usage`: by node, [time in s, CPU time in s, memory in MB]. All times are
-        from the same clock. Only images with a stamp during the measurement are evaluated.
+    A record has the start and the end of the measurement, the stamps of the images, `arrivals` by stage [stamp in ns,
+    arrival in seconds], and `usage` by node [time in s, CPU time in s, memory in MB]. All times are from the same
+    clock. Only images with a stamp during the measurement are evaluated.
 
-    Returns
-    -------
-    dict
-        Latencies are from the stamp to the arrival of the markers, CPU usage is in percent of a core, memory is that at
-        the end. `stages_ms`: median latency by stage. `trend`: `first` and `last` minute (or half of the measurement,
-        if that is shorter), and the memory growth of the second half, because caches are filled in the first minute.
+    Latencies of the result are from the stamp to the arrival of the markers, CPU usage is in percent of a core, memory
+    is that at the end. `stages_ms`: median latency by stage. `trend`: `first` and `last` minute (or half of the
+    measurement, if that is shorter), and the memory growth of the second half, because caches are filled in the first
+    minute.
     """
     began_s, ended_s = record['began_s'], record['ended_s']
     window_s = ended_s - began_s

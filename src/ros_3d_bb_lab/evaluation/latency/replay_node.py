@@ -64,15 +64,12 @@ class ReplayNode(object):
             time.sleep(max(0.0, -late_s))
             if rospy.is_shutdown():
                 return
-            self._publish(messages)
-
-    def _publish(self, messages):
-        stamp = rospy.get_rostime()
-        with self._diagnostics.rejecting('images'):
-            for topic, message in messages:
-                self._pubs[topic].publish(with_stamp(message, stamp))
-            self._diagnostics.count('images')
-            self._diagnostics.record_latency(stamp)
+            stamp = rospy.get_rostime()
+            with self._diagnostics.rejecting('images'):
+                for topic, message in messages:
+                    self._pubs[topic].publish(with_stamp(message, stamp))
+                self._diagnostics.count('images')
+                self._diagnostics.record_latency(stamp)
 
 
 def main():
