@@ -19,7 +19,7 @@ class ClusterStatistics(NamedTuple):
     """Statistics of one cluster, in metres.
 
     `variance_m2` is divided by n, as in the thesis. The other fields are results of the Shapiro-Wilk and
-    Anderson-Darling tests, and held-out log-likelihoods per measurement; None if all errors are equal, or if there are
+    Anderson-Darling tests and held-out log-likelihoods per measurement; None if all errors are equal, or if there are
     fewer than 8.
     """
 
