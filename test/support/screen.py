@@ -6,7 +6,8 @@ import subprocess
 
 def start_screen(width=1600, height=900):
     """Start a virtual display with nobody else on it, named by DISPLAY; it ends with this process. Returns it."""
-    process = subprocess.Popen(['Xvfb', '-displayfd', '1', '-screen', '0', '%dx%dx24' % (width, height)],
+    # without -noreset, a program that connects while the last client disconnects is turned away
+    process = subprocess.Popen(['Xvfb', '-noreset', '-displayfd', '1', '-screen', '0', '%dx%dx24' % (width, height)],
                                stdout=subprocess.PIPE)
     atexit.register(process.kill)  # not before: Qt does not live longer than its display
     os.environ['DISPLAY'] = ':' + process.stdout.readline().decode().strip()
