@@ -6,7 +6,8 @@ import subprocess
 
 def start_screen(width=1600, height=900):
     """Start a virtual display, set DISPLAY, and return its process, which ends with this one."""
-    process = subprocess.Popen(['Xvfb', '-displayfd', '1', '-screen', '0', '%dx%dx24' % (width, height)],
+    # Without -noreset, a program that connects while the last client disconnects is rejected.
+    process = subprocess.Popen(['Xvfb', '-noreset', '-displayfd', '1', '-screen', '0', '%dx%dx24' % (width, height)],
                                stdout=subprocess.PIPE)
     atexit.register(process.kill)  # Qt needs its display until the end
     os.environ['DISPLAY'] = ':' + process.stdout.readline().decode().strip()
