@@ -13,8 +13,7 @@ import numpy as np
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.sessions.session_writer import box_entry
-from ros_3d_bb_annotator.application import make_application
-from ros_3d_bb_annotator.main_window import AnnotatorWindow
+from ros_3d_bb_annotator.main_window import AnnotatorWindow, make_application
 from ros_3d_bb_annotator.qt import QtGui
 from ros_3d_bb_lab.simulation.scenario import Person, Robot, Room, Scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator

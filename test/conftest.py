@@ -1,7 +1,7 @@
-"""Where the tests find real data, and what they make themselves where there is none.
+"""Shared fixtures, and options for machines without all test dependencies.
 
 ROS_3D_BB_DATA names a folder with data/thesis (a measurement session), weights/yolov5n.pt and
-weights/yolov5n_reference.npz. Without it each test runs on a session and a detector that the package makes.
+weights/yolov5n_reference.npz. Without it, the tests generate a session and a detector.
 """
 import importlib.util
 import os
@@ -14,8 +14,8 @@ settings.register_profile('repeatable', derandomize=True, database=None, deadlin
 settings.load_profile('repeatable')
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)
-from support.missing import imports_when_loaded, misses_something, missing_requirements  # noqa: E402 (found there)
-if importlib.util.find_spec('ros_3d_bb') is None:  # no workspace is sourced: the pure modules need none
+from support.missing import imports_when_loaded, misses_something, missing_requirements  # noqa: E402 (needs the path)
+if importlib.util.find_spec('ros_3d_bb') is None:  # no workspace is sourced; unit tests need none
     sys.path.insert(0, os.path.join(os.path.dirname(HERE), 'src'))
 if importlib.util.find_spec('ros_3d_bb_annotator') is None:
     sys.path.insert(0, os.path.join(os.path.dirname(HERE), 'annotator'))
@@ -23,31 +23,30 @@ DATA = os.environ.get('ROS_3D_BB_DATA', '')
 
 
 def pytest_addoption(parser):
-    parser.addoption('--leave-out', action='store_true', help='leave out the tests that need packages of '
-                     'requirements.txt that are not installed, instead of failing there')
+    parser.addoption('--leave-out', action='store_true',
+                     help='deselect tests that need packages of requirements.txt that are not installed')
 
 
 def left_out(config):
-    """Modules whose tests are left out: none, unless that was asked for."""
+    """Missing modules whose tests are deselected."""
     return missing_requirements() if config.getoption('--leave-out') else set()
 
 
 def pytest_configure(config):
-    config.addinivalue_line('markers', 'needs(*modules): modules that a test needs later than its file is imported')
+    config.addinivalue_line('markers', 'needs(*modules): modules that a test imports when it runs')
 
 
 def pytest_report_header(config):
-    data = 'ROS_3D_BB_DATA: %s' % (DATA or 'not set; the tests use data that they make themselves')
-    return [data] + ['left out: what needs ' + ', '.join(sorted(left_out(config)))] * bool(left_out(config))
+    data = 'ROS_3D_BB_DATA: %s' % (DATA or 'not set; the tests use generated data')
+    return [data] + ['deselected: tests of ' + ', '.join(sorted(left_out(config)))] * bool(left_out(config))
 
 
 def pytest_ignore_collect(path, config):
-    """Whether a file cannot even be imported."""
+    """Ignore files that cannot be imported."""
     return bool(path.basename.startswith('test_') and imports_when_loaded(str(path)) & left_out(config)) or None
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leave out single tests."""
     gone = [item for item in items if config.getoption('--leave-out') and misses_something(item)]
     config.hook.pytest_deselected(items=gone)
     items[:] = [item for item in items if item not in gone]
@@ -55,13 +54,13 @@ def pytest_collection_modifyitems(config, items):
 
 @pytest.fixture(scope='session', autouse=True)
 def own_cache(tmp_path_factory):
-    """Exported networks of the tests, and of the nodes that they start, do not go into the user's cache."""
+    """Keep networks exported by tests, and by nodes that they start, out of the user's cache."""
     os.environ['ROS_3D_BB_CACHE'] = str(tmp_path_factory.mktemp('cache'))
 
 
 @pytest.fixture(scope='session')
 def session_folder(tmp_path_factory):
-    """A measurement session: the real one, or a synthetic one."""
+    """A measurement session, real or synthetic."""
     if DATA:
         return os.path.join(DATA, 'data', 'thesis')
     from support.synthetic_session import write_synthetic_session
@@ -70,7 +69,7 @@ def session_folder(tmp_path_factory):
 
 @pytest.fixture(scope='session')
 def weights(tmp_path_factory):
-    """Weights that find the person in `session_folder`: YOLOv5n, or a stand-in that looks for red."""
+    """Weights that detect the person in `session_folder`: YOLOv5n, or a stand-in that detects red."""
     if DATA:
         return os.path.join(DATA, 'weights', 'yolov5n.pt')
     from support.red_detector import write_red_detector
@@ -79,9 +78,9 @@ def weights(tmp_path_factory):
 
 @pytest.fixture(scope='session')
 def official_output(tmp_path_factory):
-    """A checkpoint, and what YOLOv5's own code says to given images: (path, [(image, rows, values)]).
+    """A checkpoint, and the output of YOLOv5's own code for given images: (path, [(image, rows, values)]).
 
-    Without the real one: a checkpoint of random weights in the official form, and a plain numpy forward pass.
+    Without data: random weights in the official format, and a plain numpy forward pass.
     """
     from support import official_reference
     if DATA:
@@ -91,16 +90,14 @@ def official_output(tmp_path_factory):
 
 @pytest.fixture(scope='session')
 def reader(tmp_path_factory, weights):
-    """Somebody who types what the README tells."""
+    """Runs the commands of the README."""
     from support.reader import Reader
-    reader = Reader(tmp_path_factory.mktemp('reader'), weights)
-    yield reader
-    reader.leave()
+    return Reader(tmp_path_factory.mktemp('reader'), weights)
 
 
 @pytest.fixture(scope='session')
 def camera_bag(session_folder, tmp_path_factory):
-    """A bag at 2 Hz of a camera before which somebody stands, with 2D boxes; it lasts while a detector starts."""
+    """A bag at 2 Hz of a camera with a person in front of it, with 2D boxes; longer than a detector takes to start."""
     from ros_3d_bb.bags.bag_writer import SessionBagOptions, session_images, write_bag
     from ros_3d_bb.sessions.session_reader import read_session
     session = read_session(session_folder)
@@ -112,8 +109,8 @@ def camera_bag(session_folder, tmp_path_factory):
 
 @pytest.fixture
 def window_on():
-    """Opens the annotator's window on the session in a folder; the windows are closed at the end."""
-    from support.window import Driver  # Qt, which few tests need
+    """Opens the annotator's window on the session in a folder."""
+    from support.window import Driver  # imports Qt
     drivers = []
 
     def window_on_session(folder):
@@ -126,19 +123,19 @@ def window_on():
 
 @pytest.fixture
 def folder(tmp_path):
-    """A small measurement session, to be annotated."""
+    """A small measurement session."""
     from support.small_session import write_small_session
     return write_small_session(str(tmp_path))
 
 
 @pytest.fixture
 def document(folder):
-    """It, opened."""
+    """The document of `folder`."""
     from ros_3d_bb_annotator.document import Document
     return Document.open(folder)
 
 
 @pytest.fixture
 def drive(window_on, folder):
-    """The annotator's window on it."""
+    """The annotator's window on `folder`."""
     return window_on(folder)

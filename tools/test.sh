@@ -9,7 +9,7 @@ run_tests() {
       set_up_system
       set_up_python
       cd "$here"
-      "$venv/bin/python3" -m pytest -q -n 2 -m 'not slow' test/unit ;;
+      "$venv/bin/python3" -m pytest -q -n 2 --dist loadfile -m 'not slow' test/unit ;;
     *) run_some_tests "$@" ;;
   esac
 }

@@ -5,9 +5,7 @@ from ros_3d_bb_annotator.qt import QtGui, QtWidgets
 
 
 class Action(NamedTuple):
-    """Menu entry: `name` of the method that it calls, `text`, and shortcuts `keys`. `checked` is the initial state of a
-    checkable action, and None otherwise.
-    """
+    """Menu entry: method that it calls, text, shortcuts, and the initial state of a checkable action or None."""
 
     name: str
     text: str
@@ -19,7 +17,7 @@ LINE = Action('', '')
 MENUS = (
     ('&File', (
         Action('ask_session', '&Open a session…', ('Ctrl+O',)),
-        Action('reload', 'Look for &new measurements', ('F5',)),
+        Action('reload', 'Load &new measurements', ('F5',)),
         LINE,
         Action('ask_export', '&Export CSV…', ('Ctrl+E',)),
         Action('analyse', '&Analyse the noise…', ('Ctrl+Shift+A',)),
@@ -60,17 +58,17 @@ MENUS = (
     ('&Help', (
         Action('show_keys', '&Keys', ('F1',)),)))
 OTHER_KEYS = (
-    ('The image has the keyboard (F3, or a click)', (
+    ('The image has the keyboard focus (F3, or a click)', (
         ('arrows', 'move the cursor by 10 pixels; with Ctrl by one'),
         ('Shift + arrows', 'move the part of the image that is shown'),
         ('Space', 'the first corner of a box at the cursor, then the second one'),
-        ('Esc', 'drop the box that is being drawn'),
-        ('wheel, drag', 'zoom, move; a click chooses a box'),
+        ('Esc', 'cancel the box that is being drawn'),
+        ('wheel, drag', 'zoom, move; a click selects a box'),
         ('Shift + drag', 'draw a box'))),
-    ('The floor has the keyboard (F6)', (
+    ('The floor has the keyboard focus (F6)', (
         ('arrows', 'go from mark to mark'),
         ('Enter, Space', 'the person stood on this mark'))),
-    ('A field of the truth has the keyboard (F4)', (
+    ('A field of the truth has the keyboard focus (F4)', (
         ('Enter', 'enter the truth and go on to the next new measurement'),
         ('Tab', 'next field'))))
 
@@ -90,18 +88,17 @@ def build_menus(window):
                 action.setCheckable(True)
                 action.setChecked(entry.checked)
             else:
-                action.triggered.connect(_without_argument(window.handler(entry.name)))
+                action.triggered.connect(lambda _checked, call=window.handler(entry.name): call())
             actions[entry.name] = action
     return actions
 
 
 def keys_dialog(parent):
-    """Create a dialog with the overview of keys."""
     dialog = QtWidgets.QDialog(parent)
     dialog.setWindowTitle('Keys')
     dialog.resize(620, 640)
     text = QtWidgets.QTextBrowser()
-    text.setHtml(overview())
+    text.setHtml(_overview())
     buttons = QtWidgets.QDialogButtonBox(QtWidgets.QDialogButtonBox.Close)
     buttons.rejected.connect(dialog.reject)
     layout = QtWidgets.QVBoxLayout(dialog)
@@ -110,7 +107,7 @@ def keys_dialog(parent):
     return dialog
 
 
-def overview():
+def _overview():
     """Overview of keys as HTML, generated from the menus."""
     sections = [(title.replace('&', ''), [(', '.join(entry.keys), entry.text.replace('&', '').rstrip('…'))
                                           for entry in entries if entry != LINE])
@@ -118,8 +115,4 @@ def overview():
     rows = ''.join('<tr><td colspan="2"><br><b>%s</b></td></tr>' % title
                    + ''.join('<tr><td>%s&nbsp;&nbsp;&nbsp;</td><td>%s</td></tr>' % row for row in lines)
                    for title, lines in sections)
-    return '<p>In a field, digits are text: there, Alt and a digit chooses a box.</p><table>%s</table>' % rows
-
-
-def _without_argument(call):
-    return lambda _checked=False: call()
+    return '<p>In a field, digits are text; Alt and a digit selects a box there.</p><table>%s</table>' % rows

@@ -8,10 +8,9 @@ import numpy as np
 from ros_3d_bb_annotator.document import ESTIMATOR
 from ros_3d_bb_annotator.measurement import ANNOTATED
 from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse as analyse_noise
-from ros_3d_bb_lab.evaluation.noise.results import text_of, write_results
-from ros_3d_bb_lab.evaluation.noise.tables import MeasurementTable, TableError, read_session_measurements
+from ros_3d_bb_lab.evaluation.noise.report import text_of, write_results
+from ros_3d_bb_lab.evaluation.noise.tables import MeasurementTable, read_session_measurements
 
-FOLDER_NAME = 'analysis'
 RECORDED = 'recorded'
 
 
@@ -30,32 +29,14 @@ class Analysed(NamedTuple):
 def analyse(document, folder=None, estimator=None):
     """Analyse the errors of the annotated measurements of a document. Writes report, figures and error model.
 
-    Parameters
-    ----------
-    document : Document
-    folder : str, optional
-        Folder for the results; by default `analysis` in the folder of the session.
-    estimator : str, optional
-        'foreground', 'median', or 'recorded' for the stored estimates. The default is that of bbox3d_node, or
-        'recorded' for the old format, which has no depth.
-
-    Returns
-    -------
-    Analysed
-
-    Raises
-    ------
-    ValueError
-        If there are too few measurements, or an image cannot be read.
-    OSError
-        If the results cannot be written.
+    The results are written to `folder`, by default `analysis` in the session. `estimator` is 'foreground', 'median', or
+    'recorded' for the stored estimates. The default is that of bbox3d_node, or 'recorded' for the old
+    format, which has no depth. Raises ValueError if there are too few measurements, or an image cannot be read.
     """
-    folder = pathlib.Path(folder or os.path.join(document.folder, FOLDER_NAME))
-    estimator = estimator or (RECORDED if document.is_old_form else ESTIMATOR)
-    if document.is_old_form:
-        measurements = _recorded(document, estimator)
-    else:
-        measurements = read_session_measurements(document.folder, estimator)
+    folder = pathlib.Path(folder or os.path.join(document.folder, 'analysis'))
+    estimator = estimator or (RECORDED if document.is_old_format else ESTIMATOR)
+    measurements = (_recorded(document, estimator) if document.is_old_format
+                    else read_session_measurements(document.folder, estimator))
     analysis = analyse_noise(Inputs(measurements, measurements, measurements.whole(), estimator, 'unknown'))
     write_results(folder, analysis)
     return Analysed(str(folder), str(folder / 'report.html'), tuple(sorted(map(str, folder.glob('figure_*.png')))),
@@ -63,14 +44,14 @@ def analyse(document, folder=None, estimator=None):
 
 
 def _recorded(document, estimator):
-    """Stored estimates of a document of the old format, which does not tell which people are truncated."""
+    """Stored estimates of a document of the old format, which does not store which people are truncated."""
     if estimator != RECORDED:
-        raise TableError('%s: its depth is lost, so only the recorded estimates can be analysed, not those of %r'
+        raise ValueError('%s: only the recorded estimates can be analysed, not those of %r, because depth is not stored'
                          % (document.folder, estimator))
     used = [measurement for measurement in document.measurements
             if measurement.state == ANNOTATED and measurement.estimate_m is not None]
     if not used:
-        raise TableError('%s: no annotated measurement with an estimate' % document.folder)
+        raise ValueError('%s: no annotated measurement with an estimate' % document.folder)
     return MeasurementTable(document.folder, np.array([measurement.estimate_m for measurement in used]),
                             np.array([(measurement.truth_m[0], measurement.truth_m[2]) for measurement in used]),
                             np.zeros(len(used), bool))

@@ -1,4 +1,4 @@
-"""Show the snapshots of a measurement session, take the ground truth, compute the errors; or do that in a script."""
+"""Annotate the measurements of a session with ground truth in a window; or export, analyse or validate the session."""
 import argparse
 import sys
 
@@ -30,7 +30,7 @@ def main(arguments=None):
 
 def _show(folder):
     try:
-        from ros_3d_bb_annotator.application import run_window  # scripts need no Qt
+        from ros_3d_bb_annotator.main_window import run_window  # scripts need no Qt
     except ImportError as error:
         print('annotator: the window cannot be opened (%s); install PyQt5, or see annotator --help for commands that '
               'work without it' % error, file=sys.stderr)
@@ -48,18 +48,17 @@ def _analyse(document, arguments):
 
 
 def _validate(document):
-    count = 0
-    for problem in problems_of(document):
+    problems = list(problems_of(document))
+    for problem in problems:
         print(problem)
-        count += 1
     leftovers = leftovers_of(document)
     if leftovers:
         print('annotator: note: no measurement refers to %s; these files may be left from a killed program, and can be '
               'deleted if no program uses the session' % ', '.join(leftovers), file=sys.stderr)
     done, total = document.progress
-    found = '%d problem%s' % (count, '' if count == 1 else 's') if count else 'nothing wrong'
-    print('%s: %d measurements, %d annotated or rejected, %s' % (document.folder, total, done, found))
-    return 1 if count else 0
+    print('%s: %d measurements, %d annotated or rejected, %d problem%s'
+          % (document.folder, total, done, len(problems), '' if len(problems) == 1 else 's'))
+    return 1 if problems else 0
 
 
 def _arguments(arguments):

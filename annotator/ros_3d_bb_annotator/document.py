@@ -4,59 +4,50 @@ Positions are in the camera's optical frame, in metres. Only the edited fields o
 can add measurements to the same session concurrently.
 """
 import copy
+import json
 import os
 
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import FARTHEST_M
-from ros_3d_bb.core.atomic_file import FILE_NAME, locked_update
+from ros_3d_bb.core.atomic_file import FILE_NAME, atomic_write, locked_update
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.sessions.session_reader import (Session, SessionError, camera_of, boxes_of_others, read_color,
                                                read_depth, read_description, session_errors)
 from ros_3d_bb_annotator import legacy
-from ros_3d_bb_annotator.drafts import Drafts
 from ros_3d_bb_annotator.entries import (Edit, changed, changes_with_estimate, detections_with, entry_at, grid_of,
-                                         grid_entry, millimetres)
+                                         millimetres)
 from ros_3d_bb_annotator.measurement import ANNOTATED, NEW, FileNames, measurement_of
 
 ESTIMATOR = 'foreground'  # the default of bbox3d_node
+DRAFTS_NAME = '.annotator_draft.json'  # exists while there are drafts
 
 
 class Document(object):
     """Session that is being annotated. Use `Document.open` to create one.
 
-    Attributes
-    ----------
-    folder : str
-    measurements : tuple of Measurement
-        In the order of the file. An index remains valid while the document is open.
-    camera : camera_model.Camera or None
-        None in the old format, which does not contain it.
-    depth_scale_m : float or None
-        Metres per unit of depth.
-    grid : tuple of Mark
-    is_old_form : bool
-        Whether the session has the old format of the thesis, whose stretched depth does not permit new estimates.
-    notes : tuple of str
-        Messages to the user on data that cannot be recovered.
+    `measurements` are EditedMeasurements in the order of the file; an index remains valid while the document is open.
+    `grid` are the Marks on the floor. `is_old_format` is whether the session has the format of the thesis, without
+    `camera` (None) and usable depth. `notes` are messages to the user on data that cannot be recovered.
     """
 
     def __init__(self, folder, content):
         self.folder, self.measurements = folder, ()
-        self.is_old_form = content.get('form') == legacy.FORM
-        self.notes = legacy.NOTES if self.is_old_form else ()
-        camera, self.depth_scale_m, frame_id = (None, None, '') if self.is_old_form else camera_of(content)
-        self.camera, self._session = camera, Session(camera, self.depth_scale_m, frame_id, ())
+        self.is_old_format = content.get('form') == legacy.FORM
+        self.notes = legacy.NOTES if self.is_old_format else ()
+        self._session = Session(*(None, None, '') if self.is_old_format else camera_of(content), frames=())
+        self.camera = self._session.camera
         self._content, self._signature = {'frames': []}, None
         self._undo, self._redo, self._annotated = [], [], []
-        self._drafts = Drafts(folder)
+        self._drafts_path = os.path.join(folder, DRAFTS_NAME)
+        self._drafts = _read_drafts(self._drafts_path)
         self._update(content)
 
     @classmethod
     def open(cls, folder):
         """Open the session in a folder, without reading images. Raises SessionError if it cannot be opened."""
         folder = os.path.abspath(str(folder))
-        content = legacy.read(folder) if legacy.is_old_form(folder) else read_description(folder)
+        content = legacy.read(folder) if legacy.is_old_format(folder) else read_description(folder)
         with session_errors(os.path.join(folder, FILE_NAME)):
             return cls(folder, content)
 
@@ -70,42 +61,31 @@ class Document(object):
         signature = _signature(self.folder)  # before reading, so that concurrent changes are detected next time
         if self._signature == signature:
             return False
-        before, grid = self.measurements, self.grid
+        before = self._content
         content = read_description(self.folder)
         with session_errors(os.path.join(self.folder, FILE_NAME)):
             self._update(content)
         self._signature = signature
-        return (len(before) != len(self.measurements) or grid != self.grid
-                or any(old is not new for old, new in zip(before, self.measurements)))
+        return content != before
 
     def color(self, index):
-        """Read the colour image of a measurement, (height, width, 3), uint8, RGB. Raises SessionError."""
+        """Read the colour image of a measurement, see `read_color`."""
         return read_color(self._usable(index), self.camera)
 
     def depth(self, index):
-        """Read the depth of a measurement, an box3d_estimator.DepthImage. Raises SessionError."""
-        if self.is_old_form:
+        """Read the depth image of a measurement, see `read_depth`."""
+        if self.is_old_format:
             raise SessionError(legacy.NOTES[0])
         return read_depth(self._usable(index), self._session)
 
     def stretched_depth(self, index):
-        """Read the unitless depth image (height, width) of a measurement in the old format. Raises SessionError."""
+        """Read the unitless depth image of a measurement in the old format, see `legacy.read_stretched`."""
         return legacy.read_stretched(self._usable(index).depth_path)
 
     def estimated(self, index, box_px):
-        """Estimate the 3D box of a 2D box (x1, y1, x2, y2) in a measurement, considering the boxes of other people.
+        """Estimate the Box3D of a 2D box (x1, y1, x2, y2) in a measurement, considering the boxes of other people.
 
-        Returns
-        -------
-        box3d_estimator.Box3D or None
-            None if there is not enough depth.
-
-        Raises
-        ------
-        SessionError
-            If the depth cannot be read.
-        ValueError
-            If the box is empty or reversed.
+        Returns None if there is not enough depth. Raises ValueError if the depth cannot be read, or the box is empty.
         """
         box_px = tuple(int(edge) for edge in box_px)
         check_rect(box_px)
@@ -117,7 +97,7 @@ class Document(object):
         return estimate_boxes(self.depth(index), boxes_px, self.camera, estimator_named(ESTIMATOR))[0]
 
     def errors(self, index):
-        """Estimate minus truth (x, z, distance on the floor) in metres; None if one of both is missing."""
+        """Estimate minus truth (x, z, distance on the floor) in metres; None if either is missing."""
         measurement = self.measurements[index]
         if measurement.truth_m is None or measurement.estimate_m is None:
             return None
@@ -125,15 +105,9 @@ class Document(object):
         return dx_m, dz_m, float(np.hypot(dx_m, dz_m))
 
     def set_truth(self, index, x_m, z_m, y_m=None):
-        """Set the true position of the person, and restore a rejected measurement. The person's box is estimated if no
-        estimate is stored.
+        """Set the true position of the person, in front of the camera, and restore a rejected measurement.
 
-        Raises
-        ------
-        ValueError
-            If the position is not in front of the camera.
-        SessionError
-            If the measurement is invalid, or the truth cannot be saved.
+        The person's box is estimated if no estimate is stored.
         """
         values_m = [value for value in (x_m, y_m, z_m) if value is not None]
         if not np.isfinite(values_m).all() or max(np.abs(values_m)) > FARTHEST_M:
@@ -149,9 +123,8 @@ class Document(object):
         self.set_draft(index, {})
 
     def set_same_as_last(self, index):
-        """Set the truth of the last annotated measurement, or else of the nearest one before. Raises as `set_truth`."""
-        candidates = self._annotated[::-1] + list(range(index - 1, -1, -1))
-        for last in candidates:
+        """Set the truth of the last annotated measurement, or else of the nearest one before."""
+        for last in self._annotated[::-1] + list(range(index - 1, -1, -1)):
             if last != index and self.measurements[last].state == ANNOTATED:
                 x_m, y_m, z_m = self.measurements[last].truth_m
                 return self.set_truth(index, x_m, z_m, y_m)
@@ -159,30 +132,14 @@ class Document(object):
                          % self.measurements[index].id)
 
     def choose_person(self, index, detection):
-        """Select the detection that the truth belongs to, by its index. It is estimated if no estimate is stored.
-
-        Raises ValueError, SessionError.
-        """
+        """Select the detection that the truth belongs to, by its index. It is estimated if no estimate is stored."""
         count = len(self.measurements[index].detections)
         if not 0 <= detection < count:
             raise ValueError('detection %d does not exist; there are %d detections' % (detection, count))
         self._edit(index, dict(self._missing_estimate(index, detection), person=int(detection)))
 
     def add_box(self, index, box_px):
-        """Add a box (x1, y1, x2, y2) that was drawn by hand, estimate it, and select it as the person.
-
-        Returns
-        -------
-        box3d_estimator.Box3D or None
-            None if there is not enough depth. The box is added nevertheless.
-
-        Raises
-        ------
-        ValueError
-            If the part of the box inside the image is empty.
-        SessionError
-            If the depth cannot be read, or the edit cannot be saved.
-        """
+        """Add a box (x1, y1, x2, y2) drawn by hand, select it as the person, and return its estimate as `estimated`."""
         if self.camera is None:
             raise SessionError(legacy.NOTES[0])
         x1, y1, x2, y2 = (int(round(edge)) for edge in box_px)
@@ -194,48 +151,52 @@ class Document(object):
         return box
 
     def reject(self, index, reason):
-        """Exclude a measurement, with a reason. Raises ValueError if the reason is empty, SessionError."""
         if not reason.strip():
             raise ValueError('a reason is needed to reject a measurement')
         self._edit(index, {'rejected': reason.strip()})
         self.set_draft(index, {})
 
     def restore(self, index):
-        """Restore a rejected measurement with its previous truth. Raises SessionError."""
         self._edit(index, {'rejected': None})
 
     def set_grid(self, marks):
-        """Replace the marks (Mark) of the session. Raises SessionError."""
-        self._edit(None, {'grid': [grid_entry(mark) for mark in marks]})
+        self._edit(None, {'grid': [
+            {'name': mark.name, 'x': millimetres(mark.x_m), 'z': millimetres(mark.z_m)} for mark in marks]})
 
     @property
     def can_undo(self):
-        """Whether there is an edit to undo."""
         return bool(self._undo)
 
     @property
     def can_redo(self):
-        """Whether there is an edit to redo."""
         return bool(self._redo)
 
     def undo(self):
-        """Undo the last edit. Returns the changed index, or None for the grid or no edit. Raises SessionError."""
+        """Undo the last edit. Returns the changed index, or None for the grid or no edit."""
         return self._step(self._undo, self._redo)
 
     def redo(self):
-        """Redo the last undone edit. Returns the same as `undo`. Raises SessionError."""
+        """Redo the last undone edit. Returns the same as `undo`."""
         return self._step(self._redo, self._undo)
 
     def draft(self, index):
         """Draft of a measurement, the text that was typed but not entered: {name of a field: text}."""
-        return self._drafts.of(self.measurements[index].id)
+        return dict(self._drafts.get(self.measurements[index].id, {}))
 
     def set_draft(self, index, fields):
-        """Save the draft of a measurement, {name of a field: text}; {} removes it. Raises SessionError."""
+        """Save the draft of a measurement in a file, so that it survives a crash. Empty fields are removed."""
+        fields = {key: text for key, text in fields.items() if text}
+        if fields == self.draft(index):
+            return
+        self._drafts[self.measurements[index].id] = fields
+        used = {name: texts for name, texts in self._drafts.items() if texts}
         try:
-            self._drafts.set(self.measurements[index].id, fields)
+            if used:
+                atomic_write(self._drafts_path, json.dumps(used).encode())
+            elif os.path.exists(self._drafts_path):
+                os.remove(self._drafts_path)
         except OSError as error:
-            raise SessionError('%s: the typed text cannot be saved (%s)' % (self.folder, error.strerror))
+            raise SessionError('%s: the typed text cannot be saved (%s)' % (self._drafts_path, error.strerror))
 
     def _missing_estimate(self, index, person):
         """Changes that add the estimate of a detection; {} if it has one, or it cannot be estimated."""
@@ -271,25 +232,32 @@ class Document(object):
         """Write an edit. Returns its inverse."""
         try:
             with locked_update(self.folder) as content:
-                if self.is_old_form and 'form' not in content:
+                if self.is_old_format and 'form' not in content:
                     content.update(copy.deepcopy(self._content))
                 inverse = changed(content if edit.index is None else entry_at(content['frames'], edit), edit)
-        except OSError as error:
-            raise SessionError('%s: cannot be saved (%s)' % (self.folder, error.strerror))
-        except ValueError as error:
-            raise SessionError('%s: cannot be saved (%s)' % (self.folder, error))
+        except (OSError, ValueError) as error:
+            raise SessionError('%s: cannot be saved (%s)' % (self.folder, getattr(error, 'strerror', error)))
         self._update(content)
         self._signature = None  # another program may write before the next refresh
         return inverse
 
     def _update(self, content):
         """Update from the content of frames.json. Unchanged measurements are not parsed again."""
-        frames, old = content['frames'], self._content['frames']
-        files = FileNames()
+        frames, old, files = content['frames'], self._content['frames'], FileNames()
         self.measurements = tuple(
             self.measurements[index] if index < len(old) and old[index] == entry
             else measurement_of(self.folder, entry, files) for index, entry in enumerate(frames))
         self.grid, self._content = grid_of(content), content
+
+
+def _read_drafts(path):
+    """Read the drafts in a file, {ID of a measurement: {name of a field: text}}; {} if it cannot be read."""
+    try:
+        with open(path, encoding='utf-8') as stream:
+            content = json.load(stream)
+        return {str(name): {str(key): str(text) for key, text in fields.items()} for name, fields in content.items()}
+    except (OSError, ValueError, AttributeError, RecursionError):
+        return {}
 
 
 def _signature(folder):

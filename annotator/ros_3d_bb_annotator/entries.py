@@ -12,9 +12,7 @@ DIGITS = 3  # micrometres: negligible rounding that avoids values such as 1229.9
 
 
 class Edit(NamedTuple):
-    """New values of fields, None to remove a field. The edit applies to the entry `index` with the ID `id`, or to the
-    description itself if `index` is None.
-    """
+    """New values of fields (None: remove) of the entry `index` with an ID, or of the description if `index` is None."""
 
     index: Optional[int]
     id: Optional[str]
@@ -45,7 +43,8 @@ def detections_with(entry, box_px, box):
     detections = [dict(detection) for detection in entry.get('detections') or ()]
     if not detections:
         recorded = {'box': entry.get('box'), 'estimate_mm': entry.get('estimate_mm', entry.get('original_mm'))}
-        detections = [{key: value for key, value in recorded.items() if value}] if any(recorded.values()) else []
+        recorded = {key: value for key, value in recorded.items() if value}
+        detections = [recorded] if recorded else []
     drawn = {'box': [int(edge) for edge in box_px], 'by': 'hand'}
     return detections + [dict(drawn, **({} if box is None else box_entry(box)))]
 
@@ -61,17 +60,12 @@ def changes_with_estimate(entry, number, box):
 
 def grid_of(content):
     """Marks of a description. Raises KeyError, TypeError or ValueError."""
-    marks = [Mark(str(entry['name']), float(entry['x']) / 1000, float(entry['z']) / 1000)
-             for entry in content.get('grid', ())]
+    marks = tuple(Mark(str(entry['name']), float(entry['x']) / 1000, float(entry['z']) / 1000)
+                  for entry in content.get('grid', ()))
     for mark in marks:
         if not np.isfinite(mark[1:]).all():
             raise ValueError('mark %s of the grid is at (%g, %g) m; finite numbers expected' % mark)
-    return tuple(marks)
-
-
-def grid_entry(mark):
-    """Mark in the format of the file."""
-    return {'name': mark.name, 'x': millimetres(mark.x_m), 'z': millimetres(mark.z_m)}
+    return marks
 
 
 def millimetres(value_m):

@@ -11,27 +11,15 @@ COLUMNS = ('X measured', 'X true', 'Z measured', 'Z true', 'X error', 'X absolut
 
 
 def rows_of(document):
-    """Rows of the annotated measurements with an estimate, ints in millimetres, sorted by the measured values.
-
-    Rejected measurements are excluded. Equal measurements give equal rows, which the table of the thesis contains only
-    once.
-    """
+    """Rows of the annotated measurements with an estimate, ints in millimetres, sorted by the measured values."""
     return sorted(_row(measurement) for measurement in document.measurements
                   if measurement.state == ANNOTATED and measurement.estimate_m is not None)
 
 
 def export(document, path):
-    """Write the table to a CSV file atomically.
+    """Write the table to a CSV file atomically, and return the number of rows.
 
-    Returns
-    -------
-    int
-        Number of rows.
-
-    Raises
-    ------
-    SessionError
-        If no measurement is annotated, or the file cannot be written.
+    Raises SessionError if no measurement is annotated, or the file cannot be written.
     """
     rows = rows_of(document)
     if not rows:

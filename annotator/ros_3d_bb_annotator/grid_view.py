@@ -1,8 +1,7 @@
 """Top view of the floor in front of the camera with its marks (thesis Fig. 5.1). A click on a mark sets the truth."""
+import itertools
 import math
 from typing import Any, NamedTuple, Optional, Tuple
-
-import numpy as np
 
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
@@ -17,9 +16,7 @@ ARROWS = {Qt.Key_Left: (-1, 0), Qt.Key_Right: (1, 0), Qt.Key_Up: (0, 1), Qt.Key_
 
 
 class FloorScene(NamedTuple):
-    """Content of the floor: `marks` (see `measurement.Mark`), the positions (x, z) of truth and estimate in metres or
-    None, and the tangents of the left and right limits of the camera's field of view.
-    """
+    """Marks on the floor, positions (x, z) in metres or None, and tangents of the limits of the field of view."""
 
     marks: Tuple[Any, ...]
     truth_m: Optional[Tuple[float, float]]
@@ -50,7 +47,6 @@ class GridView(QtWidgets.QWidget):
         return QtCore.QSize(340, 340)
 
     def show_scene(self, scene):
-        """Show a FloorScene."""
         if scene.marks != self._scene.marks:
             self._pointed = None
         self._scene = scene
@@ -65,10 +61,10 @@ class GridView(QtWidgets.QWidget):
 
     def _apart_px(self):
         """Minimum distance between marks on the screen; 1000 if there are fewer than two marks."""
-        places = np.array([(place.x(), place.y()) for place in (
-            self.place_of(mark.x_m, mark.z_m) for mark in self._scene.marks)]).reshape(-1, 2)
-        apart = np.hypot(*np.moveaxis(places[:, None] - places[None], -1, 0))
-        return float(apart[apart > 0].min()) if (apart > 0).any() else 1000.0
+        places = [self.place_of(mark.x_m, mark.z_m) for mark in self._scene.marks]
+        apart_px = [math.hypot(one.x() - other.x(), one.y() - other.y())
+                    for one, other in itertools.combinations(places, 2) if one != other]
+        return min(apart_px, default=1000.0)
 
     def _extent(self):
         """Left, right and far limit of the visible floor in metres, with a margin around its content."""
@@ -101,14 +97,15 @@ class GridView(QtWidgets.QWidget):
         _set_height(painter, NAME_PX[1])
         far_m *= 1.5  # lines extend beyond the farthest mark
         step_m = next((step for step in STEPS_M if max(right_m - left_m, far_m) / step <= 9), STEPS_M[-1])
+        painter.setPen(LINES)
         for number in range(math.ceil(4 * left_m / step_m), math.floor(4 * right_m / step_m) + 1):
-            self._paint_line(painter, (number * step_m, 0), (number * step_m, far_m))
-        for number in range(int(far_m / step_m) + 1):
-            z_m = number * step_m
-            self._paint_line(painter, (4 * left_m, z_m), (4 * right_m, z_m))
-            if number:
-                painter.setPen(TEXT)
-                painter.drawText(QtCore.QPointF(4, self.place_of(0, z_m).y() - 2), '%g m' % z_m)
+            painter.drawLine(self.place_of(number * step_m, 0), self.place_of(number * step_m, far_m))
+        depths_m = [number * step_m for number in range(int(far_m / step_m) + 1)]
+        for z_m in depths_m:
+            painter.drawLine(self.place_of(4 * left_m, z_m), self.place_of(4 * right_m, z_m))
+        painter.setPen(TEXT)
+        for z_m in depths_m[1:]:
+            painter.drawText(QtCore.QPointF(4, self.place_of(0, z_m).y() - 2), '%g m' % z_m)
         camera = self.place_of(0, 0)
         sides = [self.place_of(tangent * 10 * far_m, 10 * far_m) for tangent in self._scene.sight]
         painter.setPen(Qt.NoPen)
@@ -116,10 +113,6 @@ class GridView(QtWidgets.QWidget):
         painter.drawPolygon(QtGui.QPolygonF([camera] + sides))
         painter.setBrush(CAMERA)
         painter.drawRoundedRect(QtCore.QRectF(camera.x() - 20, camera.y() - 4, 40, 11), 5, 5)
-
-    def _paint_line(self, painter, start, end):
-        painter.setPen(QtGui.QPen(LINES, 1))
-        painter.drawLine(self.place_of(*start), self.place_of(*end))
 
     def _paint_mark(self, painter, mark, apart_px):
         place, pointed = self.place_of(mark.x_m, mark.z_m), mark == self._pointed
@@ -181,22 +174,21 @@ class GridView(QtWidgets.QWidget):
 
     def _mark_at(self, position):
         """Mark nearest to a position in this widget, or None if there is none within REACH_PX."""
-        ways = [((self.place_of(mark.x_m, mark.z_m) - position).manhattanLength(), number)
-                for number, mark in enumerate(self._scene.marks)]
-        distance, number = min(ways) if ways else (REACH_PX + 1, 0)
-        return self._scene.marks[number] if distance <= REACH_PX else None
+        def distance_px(mark):
+            return (self.place_of(mark.x_m, mark.z_m) - position).manhattanLength()
+        return min((mark for mark in self._scene.marks if distance_px(mark) <= REACH_PX), key=distance_px, default=None)
 
     def _next_mark(self, way):
         """Next mark in the direction of an arrow key (right, ahead). Lateral distance counts three times."""
         if self._pointed is None:
             return min(self._scene.marks, key=lambda mark: (mark.z_m, abs(mark.x_m)))
-        best, here = (float('inf'), self._pointed), self._pointed
+        least_m, best = float('inf'), self._pointed
         for mark in self._scene.marks:
-            x_m, z_m = mark.x_m - here.x_m, mark.z_m - here.z_m
+            x_m, z_m = mark.x_m - self._pointed.x_m, mark.z_m - self._pointed.z_m
             ahead_m, aside_m = x_m * way[0] + z_m * way[1], abs(x_m * way[1]) + abs(z_m * way[0])
-            if ahead_m > 1e-6 and ahead_m + 3 * aside_m < best[0]:
-                best = (ahead_m + 3 * aside_m, mark)
-        return best[1]
+            if ahead_m > 1e-6 and ahead_m + 3 * aside_m < least_m:
+                least_m, best = ahead_m + 3 * aside_m, mark
+        return best
 
 
 def _set_height(painter, height_px):

@@ -33,15 +33,11 @@ class ImageView(QtWidgets.QWidget):
         return QtCore.QSize(640, 480)
 
     def show_image(self, image, scene, message='', legend=None):
-        """Show a QImage and its overlay (`marking.Scene`), or a message if the image is None.
-
-        `legend` is the colour scale (QImage, text at the top, text at the bottom), or None.
-        """
+        """Show a QImage with overlay (`marking.Scene`) and colour scale (QImage, top, bottom text), or a message."""
         self.image, self.message, self._scene, self._legend = image, message, scene, legend
         self.update()
 
     def show_scene(self, scene):
-        """Change the overlay."""
         self._scene = scene
         self.update()
 

@@ -25,7 +25,7 @@ POSITION = r'\({0}, ?{0}, ?{0}\)'.format(NUMBER)
 LINE = re.compile(r'\[((?:{0}(?:, ?{0})*)?)\][ ;] ?([\w-]{{1,60}})$'.format(POSITION))
 
 
-def is_old_form(folder):
+def is_old_format(folder):
     """Whether a folder contains a session in the old format without a frames.json."""
     return os.path.isfile(os.path.join(folder, TEXT_NAME)) and not os.path.exists(os.path.join(folder, FILE_NAME))
 
@@ -33,10 +33,7 @@ def is_old_form(folder):
 def read(folder):
     """Convert a session in the old format to the content of a frames.json. Its field "form" marks the missing camera.
 
-    Raises
-    ------
-    SessionError
-        If the text cannot be read, or no line has the format.
+    Raises SessionError if the text cannot be read, or no line has the format.
     """
     path = os.path.join(folder, TEXT_NAME)
     try:

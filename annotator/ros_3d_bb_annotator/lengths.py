@@ -7,19 +7,9 @@ METRES = {'m': 1.0, 'cm': 0.01, 'mm': 0.001}
 
 
 def parse_length(text, unit):
-    """Parse a length such as '1230', '1230 mm', '1.23 m' or '1,23'. Returns metres.
+    """Parse a length such as '1230', '1230 mm', '1.23 m' or '1,23' with the default unit 'mm', 'cm' or 'm' to metres.
 
-    Parameters
-    ----------
-    text : str
-        With a decimal point or comma.
-    unit : str
-        Default unit: 'mm', 'cm' or 'm'.
-
-    Raises
-    ------
-    ValueError
-        If the text is not a length, is ambiguous, or exceeds the range of depth cameras.
+    Raises ValueError if the text is not a length, is ambiguous, or exceeds the range of depth cameras.
     """
     match = re.match(r'\s*([+\-\u2212]?)(\d+(?:[.,]\d*)?|[.,]\d+)\s*(mm|cm|m)?\s*$', text, re.ASCII)
     if match is None:
@@ -30,6 +20,5 @@ def parse_length(text, unit):
                          % (text, number.replace(',', ''), number.replace(',', '.')))
     metres = float(number.replace(',', '.')) * METRES[unit]
     if metres > FARTHEST_M:
-        raise ValueError('%.40r is %g m; at most %g m expected. Check the unit'
-                         % (text, metres, FARTHEST_M))
+        raise ValueError('%.40r is %g m; at most %g m expected. Check the unit' % (text, metres, FARTHEST_M))
     return round(-metres if sign in ('-', '\u2212') else metres, 6) + 0.0  # no -0.0

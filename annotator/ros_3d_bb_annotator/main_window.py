@@ -1,5 +1,7 @@
 """Main window: list of measurements, view of the current measurement, and actions."""
 import functools
+import signal
+import sys
 
 from ros_3d_bb_annotator import dialogs
 from ros_3d_bb_annotator.actions import build_menus, keys_dialog
@@ -12,8 +14,7 @@ from ros_3d_bb_annotator.qt import Qt, QtCore, QtWidgets
 from ros_3d_bb_annotator.results import Results
 
 TITLE = 'ros_3d_bb annotator'
-REFRESH_MS = 2000
-NEIGHBOURS = (1, -1)
+REFRESH_MS, WAKE_MS = 2000, 250
 
 
 class AnnotatorWindow(QtWidgets.QMainWindow):
@@ -34,16 +35,18 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self._refresh.timeout.connect(self._refresh_document)
         self._show_state()
 
+    @property
+    def measurement(self):
+        return None if self.current is None else self.document.measurements[self.current]
+
     def handler(self, name):
-        """Method that an action calls: a method of the window, of its edits or of its view."""
+        """Method that an action calls: a method of the window or of one of its parts."""
         if name.startswith('choose_'):
             return functools.partial(self.edits.choose_person, int(name.split('_')[1]) - 1)
-        return next(getattr(owner, name) for owner in (self, self.edits, self.pane.shared) if hasattr(owner, name))
-
-    # --- sessions
+        owners = self, self.edits, self.results, self.pane.shared, self.pane.truth
+        return next(getattr(owner, name) for owner in owners if hasattr(owner, name))
 
     def ask_session(self):
-        """Ask for a folder and open it."""
         folder = QtWidgets.QFileDialog.getExistingDirectory(self, 'Open a measurement session')
         if folder:
             self.open_session(folder)
@@ -70,17 +73,16 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     def reload(self):
         """Read changes of the session by other programs, and reload the images."""
-        if self.document is not None:
-            self.pane.read_again()
-            self._refresh.start()
-            self._refresh_document()
-            if self.current is not None:
-                self.keep_typed()
-                self.show_measurement(self.current)
+        self.pane.read_again()
+        self._refresh.start()
+        self._refresh_document()
+        if self.current is not None:
+            self.keep_typed()
+            self.show_measurement(self.current)
 
     def _refresh_document(self):
         """Show changes of the session by other programs."""
-        before = self.document.measurements
+        before = self.measurement
         try:
             if not self.document.refresh():
                 return
@@ -89,26 +91,11 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
             dialogs.show_error(self, 'The session has changed and cannot be read', error)
             return
         count = len(self.document.measurements)
-        changed = self.current is None or self.current >= count or (
-            self.document.measurements[self.current] is not before[self.current])
         if self.current is not None and self.current >= count:
             self.current = None  # another program removed the measurement
         self.after_edit()
-        if changed and count:
+        if count and (self.current is None or self.measurement is not before):
             self.show_measurement(self._next_new(-1) or 0 if self.current is None else self.current)
-
-    def ask_export(self):
-        """Ask for a file and write the table of errors to it."""
-        if self.document is not None:
-            self.results.ask_export(self.document)
-
-    def analyse(self):
-        """Analyse the noise and show the figures."""
-        if self.document is not None:
-            self.keep_typed()
-            self.results.analyse(self.document)
-
-    # --- navigation
 
     def show_measurement(self, number):
         """Show a measurement. The text typed for the previous one is saved."""
@@ -124,64 +111,44 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self._ahead.start()
 
     def next(self):
-        """Show the next measurement."""
-        if self.current is not None:
-            self._go_to(self.current + 1)
+        self._go_to(self.current + 1)
 
     def previous(self):
-        """Show the previous measurement."""
-        if self.current is not None:
-            self._go_to(self.current - 1)
+        self._go_to(self.current - 1)
 
     def first(self):
-        """Show the first measurement."""
         self._go_to(0)
 
     def last(self):
-        """Show the last measurement."""
-        self._go_to(len(self.document.measurements) - 1 if self.document else 0)
+        self._go_to(len(self.document.measurements) - 1)
 
     def next_new(self):
         """Show the next measurement that is neither annotated nor rejected."""
-        if self.document is None:
-            return
-        number = self._next_new(-1 if self.current is None else self.current)
+        number = self._next_new(self.current)
         if number is None:
             self.statusBar().showMessage('No new measurements: %d of %d are done' % self.document.progress)
         else:
             self._go_to(number)
 
     def go_to_list(self):
-        """Set the keyboard focus to the list."""
         self.list.table.setFocus()
 
     def go_to_image(self):
-        """Set the keyboard focus to the colour image."""
         self.pane.color_view.setFocus()
 
     def go_to_truth(self):
-        """Set the keyboard focus to the fields of the truth."""
         self.pane.truth.begin()
 
     def go_to_floor(self):
-        """Set the keyboard focus to the floor."""
         self.pane.floor.setFocus()
 
     def start_drawing(self):
         """Start to draw a box by dragging or by cursor and Space, or stop it."""
-        if self.current is not None:
-            self.pane.shared.start_drawing(not self.pane.shared.drawing)
-            self.pane.color_view.setFocus()
-
-    def switch_unit(self):
-        """Switch between millimetres and metres."""
-        self.pane.truth.switch_unit()
+        self.pane.shared.start_drawing(not self.pane.shared.drawing)
+        self.pane.color_view.setFocus()
 
     def show_keys(self):
-        """Show the overview of all keys."""
         keys_dialog(self).exec_()
-
-    # --- calls by the parts of the window
 
     def keep_typed(self):
         """Save the text that was typed for the current measurement."""
@@ -200,18 +167,18 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         super(AnnotatorWindow, self).closeEvent(event)
 
     def _go_to(self, number):
-        if self.document is not None and 0 <= number < len(self.document.measurements):
+        if 0 <= number < len(self.document.measurements):
             self.show_measurement(number)
 
     def _next_new(self, number):
         """Index of the next new measurement, continuing at the start after the last one; None if there is none."""
         measurements = self.document.measurements
         order = list(range(number + 1, len(measurements))) + list(range(number + 1))
-        return next((place for place in order if measurements[place].state == NEW), None)
+        return next((index for index in order if measurements[index].state == NEW), None)
 
     def _read_ahead(self):
         """Read the images of neighbouring measurements, one measurement per idle event."""
-        for step in NEIGHBOURS:
+        for step in (1, -1):
             number = self.current + step
             if 0 <= number < len(self.document.measurements) and self.pane.read_ahead(number):
                 self._ahead.start()
@@ -219,7 +186,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     def _on_drawing(self, drawing):
         self.statusBar().showMessage('Drag a box around the person, or move the cursor with the arrows and set two '
-                                     'corners with Space; Esc drops it' if drawing else '')
+                                     'corners with Space; Esc cancels it' if drawing else '')
 
     def _keep_draft(self, texts):
         try:
@@ -232,11 +199,11 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.progress.setRange(0, max(count, 1))
         self.progress.setValue(done)
         self.progress.setFormat('%d of %d done' % (done, count))
-        measurement = None if self.current is None else self.document.measurements[self.current]
+        measurement = self.measurement
         self.actions['undo'].setEnabled(bool(self.document and self.document.can_undo))
         self.actions['redo'].setEnabled(bool(self.document and self.document.can_redo))
         self.actions['restore'].setEnabled(measurement is not None and measurement.rejected is not None)
-        for name in ('same_as_last', 'ask_reject', 'start_drawing'):
+        for name in ('same_as_last', 'ask_reject', 'start_drawing', 'next', 'previous', 'next_new', 'first', 'last'):
             self.actions[name].setEnabled(measurement is not None)
         for name in ('ask_export', 'analyse', 'edit_marks', 'reload'):
             self.actions[name].setEnabled(self.document is not None)
@@ -269,3 +236,24 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.pane.truth.typed.connect(self._keep_draft)
         self.pane.floor.mark_chosen.connect(lambda mark: self.edits.enter_truth(mark.x_m, mark.z_m))
         self.actions['show_samples'].toggled.connect(self.pane.show_samples)
+
+
+def make_application():
+    application = QtWidgets.QApplication(sys.argv[:1])
+    application.setApplicationName('ros_3d_bb annotator')
+    application.setStyle('Fusion')  # same appearance on all platforms
+    return application
+
+
+def run_window(folder=None):
+    """Show the window, optionally with the session in `folder`, until it is closed. Returns the exit status."""
+    application = make_application()
+    signal.signal(signal.SIGINT, lambda _number, _frame: application.closeAllWindows())
+    wake = QtCore.QTimer(interval=WAKE_MS)  # Python handles signals only while it executes bytecode
+    wake.timeout.connect(lambda: None)
+    wake.start()
+    window = AnnotatorWindow()
+    window.show()
+    if folder is not None:
+        QtCore.QTimer.singleShot(0, lambda: window.open_session(folder))
+    return application.exec_()

@@ -22,9 +22,7 @@ class MarkedBox(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """Overlay of an image: boxes, the index of the person's box or None, and the visible samples
-    (box3d_estimator.Samples).
-    """
+    """Overlay of an image: boxes, index of the person's box or None, and visible box3d_estimator.Samples."""
 
     boxes: Tuple[MarkedBox, ...]
     person: Optional[int]
@@ -41,7 +39,6 @@ NOTHING = Scene((), None, ())
 
 
 def paint_scene(painter, transform, scene):
-    """Paint samples and boxes."""
     for samples in scene.samples:
         _paint_samples(painter, transform, samples)
     boxes = sorted(scene.boxes, key=lambda box: box.number == scene.person)  # the person's on top
@@ -86,7 +83,6 @@ def paint_frame(painter, rect, name, legend, focused):
 
 
 def paint_message(painter, rect, message):
-    """Paint a message instead of an image."""
     painter.setPen(Qt.white)
     option = QtGui.QTextOption(Qt.AlignCenter)
     option.setWrapMode(QtGui.QTextOption.WrapAtWordBoundaryOrAnywhere)  # paths have no spaces
@@ -113,19 +109,15 @@ def _thinned(ticks, scale):
 
 def _paint_box(painter, transform, box_px, color, stroke):
     x1, y1, x2, y2 = box_px
-    rect = transform.mapRect(QtCore.QRectF(x1, y1, x2 - x1, y2 - y1))
     painter.setBrush(Qt.NoBrush)
-    painter.setPen(QtGui.QPen(QtGui.QColor(0, 0, 0, 130), stroke[0] + 2))  # so that it shows on any ground
-    painter.drawRect(rect)
-    painter.setPen(QtGui.QPen(color, *stroke))
-    painter.drawRect(rect)
+    outline = QtGui.QPen(QtGui.QColor(0, 0, 0, 130), stroke[0] + 2)  # visible on any background
+    for pen in (outline, QtGui.QPen(color, *stroke)):
+        painter.setPen(pen)
+        painter.drawRect(transform.mapRect(QtCore.QRectF(x1, y1, x2 - x1, y2 - y1)))
 
 
 def _paint_label(painter, corner, text, color, inside=False, ends=False):
-    """Paint text on a filled background above the lower left corner, or with `inside` below the upper left corner.
-
-    With `ends` the corner is the right one.
-    """
+    """Paint text on a background above its left corner. `inside`: below the corner, `ends`: to the left of it."""
     if not text:
         return
     metrics = painter.fontMetrics()

@@ -18,9 +18,10 @@ class Mark(NamedTuple):
 
 
 class EditedMeasurement(NamedTuple):
-    """One measurement. `person` is the index of the detection that the truth belongs to, or None without detections;
-    `truth_m` is (x, y, z) in the optical frame, where y may be None; `rejected` is the reason for rejection or None;
-    `problem` is the fault of an invalid measurement or None. `stamp_text` is '<secs>.<nsecs>' or empty.
+    """One measurement, with the fields of `session_reader.Measurement`.
+
+    `person` is None without detections; `truth_m` is (x, y, z), where y may be None; `stamp_text` is
+    '<secs>.<nsecs>' or empty; `problem` is the fault of an invalid measurement or None.
     """
 
     id: str
@@ -43,7 +44,6 @@ class EditedMeasurement(NamedTuple):
 
     @property
     def estimate_m(self):
-        """Stored position (3,) of the person, or None."""
         return None if self.person is None else self.detections[self.person].estimate_m
 
 
@@ -64,37 +64,21 @@ class FileNames(object):
 
 
 def measurement_of(folder, entry, files):
-    """Measurement of an entry of frames.json. An invalid entry gives a measurement with a `problem`.
+    """Measurement of an entry of the session in a folder; `files` are FileNames.
 
-    Parameters
-    ----------
-    folder : str
-        Folder of the session.
-    entry : object
-        Any entry of "frames".
-    files : FileNames
+    An invalid entry gives a measurement with a `problem`.
     """
-    if isinstance(entry, dict) and entry.get('unreadable'):
-        return _broken(entry, str(entry['unreadable']))
+    known = entry if isinstance(entry, dict) else {}
     try:
         with session_errors('frames.json'):
-            frame = frame_of(folder, _with_depth(entry))
+            if known.get('unreadable'):
+                raise SessionError(str(known['unreadable']))
+            frame = frame_of(folder, dict(entry, depth=entry[STRETCHED_DEPTH]) if STRETCHED_DEPTH in known else entry)
     except SessionError as error:
-        return _broken(entry, str(error))
+        return EditedMeasurement(str(known.get('id', '')), '', '', problem=str(error),
+                                 rejected=str(known['rejected']) if known.get('rejected') else None)
     missing = [os.path.relpath(path, folder) for path in (frame.color_path, frame.depth_path) if path not in files]
     truth_m = None if frame.truth_m is None else (float(frame.truth_m[0]), frame.truth_y_m, float(frame.truth_m[1]))
     return EditedMeasurement(frame.id, frame.color_path, frame.depth_path, str(entry.get('stamp') or ''), frame.label,
                              frame.detections, frame.person if frame.detections else None, truth_m, frame.rejected,
                              'there is no file %s' % ' and no file '.join(missing) if missing else None)
-
-
-def _with_depth(entry):
-    if isinstance(entry, dict) and STRETCHED_DEPTH in entry:
-        return dict(entry, depth=entry[STRETCHED_DEPTH])
-    return entry
-
-
-def _broken(entry, problem):
-    known = entry if isinstance(entry, dict) else {}
-    return EditedMeasurement(str(known.get('id', '')), '', '', problem=problem,
-                             rejected=str(known['rejected']) if known.get('rejected') else None)

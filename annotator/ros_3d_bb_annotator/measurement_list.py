@@ -5,7 +5,6 @@ COLUMNS = ('measurement', 'state', 'error')
 COLORS = {'new': QtGui.QColor(60, 120, 200), 'annotated': QtGui.QColor(30, 140, 60),
           'rejected': QtGui.QColor(150, 150, 150)}
 PROBLEM = QtGui.QColor(190, 0, 40)
-STATES = ('new', 'annotated', 'rejected')
 
 
 class MeasurementModel(QtCore.QAbstractTableModel):
@@ -16,13 +15,11 @@ class MeasurementModel(QtCore.QAbstractTableModel):
         self._document, self._count = None, 0
 
     def show_document(self, document):
-        """Show another document, or None."""
         self.beginResetModel()
-        self._document, self._count = document, len(document.measurements) if document else 0
+        self._document, self._count = document, len(document.measurements)
         self.endResetModel()
 
     def update_rows(self):
-        """Update the rows from the document."""
         if len(self._document.measurements) != self._count:
             self.show_document(self._document)
         elif self._count:
@@ -42,7 +39,9 @@ class MeasurementModel(QtCore.QAbstractTableModel):
     def data(self, index, role=Qt.DisplayRole):
         measurement = self._document.measurements[index.row()]
         if role == Qt.DisplayRole:
-            return self._text(index.row(), measurement, COLUMNS[index.column()])
+            errors = self._document.errors(index.row())
+            error = '' if errors is None else '%.0f mm' % (1000 * errors[2])
+            return (measurement.id, measurement.state, error)[index.column()]
         if role == Qt.ForegroundRole:
             return QtGui.QBrush(PROBLEM if measurement.problem else COLORS[measurement.state])
         if role == Qt.ToolTipRole:
@@ -50,34 +49,6 @@ class MeasurementModel(QtCore.QAbstractTableModel):
         if role == Qt.TextAlignmentRole and index.column() == 2:
             return int(Qt.AlignRight | Qt.AlignVCenter)
         return None
-
-    def _text(self, row, measurement, column):
-        if column == 'measurement':
-            return measurement.id
-        if column == 'state':
-            return measurement.state
-        errors = self._document.errors(row)
-        return '' if errors is None else '%.0f mm' % (1000 * errors[2])
-
-
-class StateFilter(QtCore.QSortFilterProxyModel):
-    """Filter of measurements by state."""
-
-    def __init__(self, parent=None):
-        super(StateFilter, self).__init__(parent)
-        self._state, self._states = None, ()
-
-    def show_states(self, states):
-        """Set the states of all measurements. Call it before the model emits a change."""
-        self._states = states
-
-    def show_only(self, state):
-        """Show measurements in one state, or all for None."""
-        self._state = state
-        self.invalidateFilter()
-
-    def filterAcceptsRow(self, row, _parent):  # noqa: N802
-        return self._state is None or self._states[row] == self._state
 
 
 class MeasurementList(QtWidgets.QWidget):
@@ -87,14 +58,14 @@ class MeasurementList(QtWidgets.QWidget):
 
     def __init__(self, parent=None):
         super(MeasurementList, self).__init__(parent)
-        self._model, self._filter = MeasurementModel(self), StateFilter(self)
-        self._document, self._marking = None, False
+        self._model, self._filter = MeasurementModel(self), QtCore.QSortFilterProxyModel(self)
         self._filter.setSourceModel(self._model)
+        self._filter.setFilterKeyColumn(COLUMNS.index('state'))
         self.filter_box = QtWidgets.QComboBox()
-        self.filter_box.addItem('all measurements', None)
-        for state in STATES:
+        for state in ('',) + tuple(COLORS):
             self.filter_box.addItem('%s only' % state, state)
-        self.filter_box.currentIndexChanged.connect(self._change_filter)
+        self.filter_box.currentIndexChanged.connect(
+            lambda _row: self._filter.setFilterFixedString(self.filter_box.currentData()))
         self.table = self._make_table()
         layout = QtWidgets.QVBoxLayout(self)
         layout.setContentsMargins(6, 6, 0, 6)
@@ -102,27 +73,23 @@ class MeasurementList(QtWidgets.QWidget):
         layout.addWidget(self.table)
 
     def show_document(self, document):
-        """Show the measurements of a document."""
         self._document = document
-        self._filter.show_states([measurement.state for measurement in document.measurements])
         self._model.show_document(document)
-        self._name_counts()
+        self._show_counts()
 
     def update_rows(self):
-        """Update the list from the document."""
-        self._filter.show_states([measurement.state for measurement in self._document.measurements])
         self._model.update_rows()
-        self._name_counts()
+        self._show_counts()
 
     def mark_current(self, number):
         """Select the current measurement without emitting `chosen`."""
         index = self._filter.mapFromSource(self._model.index(number, 0))
-        self._marking = True
+        self.blockSignals(True)
         if index.isValid():
             self.table.setCurrentIndex(index)
         else:
             self.table.clearSelection()
-        self._marking = False
+        self.blockSignals(False)
 
     def _make_table(self):
         table = QtWidgets.QTableView()
@@ -144,14 +111,11 @@ class MeasurementList(QtWidgets.QWidget):
         return table
 
     def _on_current(self, index, _previous):
-        if index.isValid() and not self._marking:
+        if index.isValid():
             self.chosen.emit(self._filter.mapToSource(index).row())
 
-    def _change_filter(self):
-        self._filter.show_only(self.filter_box.currentData())
-
-    def _name_counts(self):
+    def _show_counts(self):
         states = [measurement.state for measurement in self._document.measurements]
         self.filter_box.setItemText(0, 'all measurements (%d)' % len(states))
-        for row, state in enumerate(STATES, 1):
+        for row, state in enumerate(COLORS, 1):
             self.filter_box.setItemText(row, '%s only (%d)' % (state, states.count(state)))

@@ -1,9 +1,13 @@
 """View of one measurement: images, people, truth, and position on the floor."""
+import html
+
+from ros_3d_bb.estimation.box3d_estimator import estimator_named
+from ros_3d_bb_annotator.document import ESTIMATOR
 from ros_3d_bb_annotator.grid_view import FloorScene, GridView
 from ros_3d_bb_annotator.image_view import ImageView
+from ros_3d_bb_annotator.marking import MarkedBox, Scene
 from ros_3d_bb_annotator.pictures import PictureCache, depth_scale
 from ros_3d_bb_annotator.qt import Qt, QtWidgets, Signal
-from ros_3d_bb_annotator.scenes import detection_text, floor_of, readout_text, scene_of
 from ros_3d_bb_annotator.shared_view import SharedView
 from ros_3d_bb_annotator.truth_panel import TruthPanel
 
@@ -12,8 +16,9 @@ HEADER = '<span style="font-size: large"><b>%s</b></span> &nbsp; <b style="color
 
 
 class MeasurementPane(QtWidgets.QWidget):
-    """View of one measurement of a document. `person_chosen` is emitted with the index of a detection. `truth` (a
-    TruthPanel), `floor` (a GridView) and `shared` (a SharedView) have the signals for other user actions.
+    """View of one measurement of a document. `person_chosen` is emitted with the index of a detection.
+
+    `truth`, `floor` and `shared` have the signals for other user actions.
     """
 
     person_chosen = Signal(int)
@@ -32,8 +37,8 @@ class MeasurementPane(QtWidgets.QWidget):
         for view in (self.color_view, self.depth_view):
             view.box_chosen.connect(self.person_chosen)
         self.people.setAlternatingRowColors(True)
-        self.people.itemActivated.connect(lambda item: self.person_chosen.emit(self.people.row(item)))
-        self.people.itemClicked.connect(lambda item: self.person_chosen.emit(self.people.row(item)))
+        for signal in (self.people.itemActivated, self.people.itemClicked):
+            signal.connect(lambda item: self.person_chosen.emit(self.people.row(item)))
         self.shared.pointed.connect(self._show_readout)
         self.truth.previewed.connect(self._show_floor)
 
@@ -45,8 +50,9 @@ class MeasurementPane(QtWidgets.QWidget):
     def show_document(self, document):
         """Set the document. No measurement is shown yet."""
         self._document, self._pictures, self._shown = document, PictureCache(document), None
+        self.read_ahead, self.read_again = self._pictures.read_ahead, self._pictures.clear
         self.header.setText('This session contains no measurements yet.')
-        self.banner.setText('<br>'.join(_escaped(note) for note in document.notes))
+        self.banner.setText('<br>'.join(html.escape(note) for note in document.notes))
         self.banner.setVisible(bool(document.notes))
 
     def show_measurement(self, number):
@@ -66,16 +72,7 @@ class MeasurementPane(QtWidgets.QWidget):
         self.truth.show_truth(measurement.truth_m, measurement.estimate_m, self._document.draft(number))
         self._show_readout()
 
-    def read_ahead(self, number):
-        """Read the images of a measurement in advance. Returns whether they were not in the cache."""
-        return self._pictures.read_ahead(number)
-
-    def read_again(self):
-        """Clear the cache of images, because files may have changed."""
-        self._pictures.forget()
-
     def show_samples(self, shown):
-        """Show or hide the samples."""
         self._samples_shown = shown
         if self._measurement is not None:
             scene = self._scene()
@@ -83,19 +80,19 @@ class MeasurementPane(QtWidgets.QWidget):
             self.depth_view.show_scene(scene)
 
     def _scene(self):
-        return scene_of(self._measurement, self._shown.depth if self._samples_shown else None)
+        return _scene_of(self._measurement, self._shown.depth if self._samples_shown else None)
 
     def _show_header(self, measurement):
         details = [text for text in (measurement.label, measurement.stamp_text and 'at %s s' % measurement.stamp_text,
                                      measurement.rejected and 'because: %s' % measurement.rejected,
                                      measurement.problem) if text]
-        self.header.setText(HEADER % (_escaped(measurement.id), STATE_COLORS[measurement.state], measurement.state,
-                                      _escaped(' · '.join(details))))
+        self.header.setText(HEADER % (html.escape(measurement.id), STATE_COLORS[measurement.state], measurement.state,
+                                      html.escape(' · '.join(details))))
 
     def _show_people(self, measurement):
         self.people.clear()
         for number, detection in enumerate(measurement.detections):
-            item = QtWidgets.QListWidgetItem(detection_text(number, detection))
+            item = QtWidgets.QListWidgetItem(_detection_text(number, detection))
             font = item.font()
             font.setBold(number == measurement.person)
             item.setFont(font)
@@ -105,12 +102,14 @@ class MeasurementPane(QtWidgets.QWidget):
 
     def _show_readout(self):
         depth, camera = (self._shown.depth, self._document.camera) if self._shown is not None else (None, None)
-        self.readout.setText(readout_text(self.shared.cursor, depth, camera))
+        self.readout.setText(_readout_text(self.shared.cursor, depth, camera))
 
     def _show_floor(self, truth_m):
         """Show the floor with the typed truth (x, z), or without truth for None."""
-        self.floor.show_scene(FloorScene(self._document.grid, truth_m, floor_of(self._measurement.estimate_m),
-                                         sight_of(self._document.camera)))
+        estimate_m, camera = self._measurement.estimate_m, self._document.camera
+        sight = (0.0, 0.0) if camera is None else (-camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx)
+        self.floor.show_scene(FloorScene(self._document.grid, truth_m,
+                                         None if estimate_m is None else tuple(estimate_m[[0, 2]].tolist()), sight))
 
     def _lay_out(self):
         views = QtWidgets.QSplitter(Qt.Horizontal)
@@ -141,13 +140,6 @@ class MeasurementPane(QtWidgets.QWidget):
         return layout
 
 
-def sight_of(camera):
-    """Tangents of the left and right limits of a camera's field of view; (0, 0) for an unknown camera."""
-    if camera is None:
-        return 0.0, 0.0
-    return -camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx
-
-
 def _label():
     label = QtWidgets.QLabel()
     label.setTextFormat(Qt.RichText)
@@ -155,5 +147,43 @@ def _label():
     return label
 
 
-def _escaped(text):
-    return text.replace('&', '&amp;').replace('<', '&lt;')
+def _scene_of(measurement, depth):
+    """Overlay of a measurement. With a DepthImage it contains the samples of the estimator in each box."""
+    boxes = []
+    for number, detection in enumerate(measurement.detections):
+        if detection.box_px is not None:
+            distance = '' if detection.estimate_m is None else ': %.2f m' % detection.estimate_m[2]
+            boxes.append(MarkedBox(number, detection.box_px, '%d%s' % (number + 1, distance), detection.by_hand))
+    sample = estimator_named(ESTIMATOR).sample
+    samples = () if depth is None else tuple(
+        sample(depth, box.rect_px) for box in boxes
+        if box.rect_px[0] < box.rect_px[2] and box.rect_px[1] < box.rect_px[3])
+    return Scene(tuple(boxes), measurement.person, samples)
+
+
+def _detection_text(number, detection):
+    """Description of a detection in two lines."""
+    position = 'no estimate' if detection.estimate_m is None else (
+        'X %s  Z %.3f m' % (_signed(detection.estimate_m[0]), detection.estimate_m[2]))
+    details = (detection.support is not None and 'support %.0f %%' % (100 * detection.support),
+               detection.truncated and 'truncated', detection.by_hand and 'drawn by hand')
+    return '%d: %s\n     %s' % (number + 1, position, ', '.join(filter(None, details)))
+
+
+def _readout_text(cursor, depth, camera):
+    """Text with pixel, depth and position at the cursor (u, v) or None. `depth` is a DepthImage or None."""
+    if cursor is None:
+        return 'Point at the image: pixel, depth, X Y Z'
+    text = 'pixel (%d, %d)' % cursor
+    if depth is None:
+        return text
+    depth_m, valid = depth.at(*cursor)
+    if not valid:
+        return text + '    no depth there'
+    x_m, y_m, z_m = camera.deproject(cursor, depth_m).tolist()
+    return text + '    depth %.3f m    X %s  Y %s  Z %.3f m' % (depth_m, _signed(x_m), _signed(y_m), z_m)
+
+
+def _signed(value_m):
+    """Format metres with a sign, with a minus sign as wide as the plus sign."""
+    return ('%+.3f' % value_m).replace('-', '−')

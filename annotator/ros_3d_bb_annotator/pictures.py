@@ -13,9 +13,7 @@ RANGES_M = (1, 2, 3, 4, 6, 8, 10, 15, 20, 40)
 
 
 class Pictures(NamedTuple):
-    """QImages of colour and depth of a measurement; None if there is a problem. `depth` is the DepthImage or None,
-    `farthest_m` the end of the colour scale.
-    """
+    """QImages of a measurement or None, with the problems, the DepthImage or None, and the end of its colour scale."""
 
     color_image: Any
     color_problem: str
@@ -30,9 +28,9 @@ class PictureCache(object):
 
     def __init__(self, document):
         self._document, self._cache = document, collections.OrderedDict()
+        self.clear = self._cache.clear
 
     def of(self, number):
-        """Pictures of a measurement."""
         if number in self._cache:
             self._cache.move_to_end(number)
         else:
@@ -48,24 +46,19 @@ class PictureCache(object):
         self.of(number)
         return True
 
-    def forget(self):
-        """Clear the cache, because files may have changed."""
-        self._cache.clear()
-
     def _read(self, number):
         color, color_problem = _read_or_error(self._document.color, number)
-        if self._document.is_old_form:
+        if self._document.is_old_format:
             depth, (stretched, depth_problem) = None, _read_or_error(self._document.stretched_depth, number)
-            shown = None if stretched is None else grey_image(stretched)
+            shown, farthest_m = None if stretched is None else _grey_image(stretched), 0.0
         else:
             depth, depth_problem = _read_or_error(self._document.depth, number)
-            shown = None if depth is None else colorize_depth(depth_to_grey(depth, farthest_of(depth)))
-        return Pictures(None if color is None else image_of(color), color_problem,
-                        None if shown is None else image_of(shown), depth_problem,
-                        depth, 0.0 if depth is None else farthest_of(depth))
+            farthest_m = 0.0 if depth is None else _farthest_of(depth)
+            shown = None if depth is None else colorize_depth(depth_to_grey(depth, farthest_m))
+        return Pictures(_image_of(color), color_problem, _image_of(shown), depth_problem, depth, farthest_m)
 
 
-def farthest_of(depth):
+def _farthest_of(depth):
     """End of the colour scale for a DepthImage, one of RANGES_M."""
     depth_m = depth.values[::4, ::4].astype(float) * depth.scale_m
     depth_m = depth_m[np.isfinite(depth_m) & (depth_m > 0)]
@@ -75,7 +68,7 @@ def farthest_of(depth):
     return next((range_m for range_m in RANGES_M if range_m >= far_m), RANGES_M[-1])
 
 
-def grey_image(values):
+def _grey_image(values):
     """Convert an image (height, width), uint8 or uint16, to RGB, (height, width, 3), uint8."""
     grey = values if values.dtype == np.uint8 else (values // 256).astype(np.uint8)
     return np.repeat(grey[..., None], 3, axis=2)
@@ -84,11 +77,13 @@ def grey_image(values):
 def depth_scale():
     """QImage of the colour scale of depth, from far (top) to near (bottom)."""
     grey = np.linspace(1, 255, 255).astype(np.uint8)[:, None]
-    return image_of(colorize_depth(grey))
+    return _image_of(colorize_depth(grey))
 
 
-def image_of(rgb):
-    """Convert an image (height, width, 3), uint8, RGB, to a QImage."""
+def _image_of(rgb):
+    """Convert an image (height, width, 3), uint8, RGB, or None to a QImage or None."""
+    if rgb is None:
+        return None
     rgb = np.ascontiguousarray(rgb)
     height, width = rgb.shape[:2]
     return QtGui.QImage(rgb.data, width, height, 3 * width, QtGui.QImage.Format_RGB888).copy()

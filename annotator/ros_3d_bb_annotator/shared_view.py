@@ -8,11 +8,9 @@ MIN_BOX_PX = 4  # smaller boxes are ignored
 class SharedView(QtCore.QObject):
     """State of linked views of images of one size.
 
-    Image coordinates are continuous: pixel (u, v) covers u..u+1 and v..v+1. `zoom` is 1 if the whole image fits the
-    view. `center` is the point in the centre of the view as shares 0..1 of width and height. `cursor` is a pixel (u, v)
-    or None, `corner` the first corner of a box that is being drawn, or None. Signals: `changed` if views must be
-    repainted, `pointed` if the cursor moved, `drawing_changed` if drawing starts or stops, `box_drawn` with
-    (x1, y1, x2, y2) in pixels.
+    Image coordinates are continuous: pixel (u, v) covers u..u+1 and v..v+1. `center` is the point in the centre of the
+    view as shares 0..1 of width and height. `cursor` and `corner`, the first corner of a box that is being drawn, are
+    pixels (u, v) or None. `changed`: views must be repainted; `box_drawn`: (x1, y1, x2, y2) in pixels.
     """
 
     changed = Signal()
@@ -36,25 +34,21 @@ class SharedView(QtCore.QObject):
         """Zoom around the point `anchor` (x, y) of the image, by default the centre of the view."""
         shares = self.center if anchor is None else tuple(value / size for value, size in zip(anchor, self.size))
         zoom = min(max(self.zoom * factor, MIN_ZOOM), MAX_ZOOM)
-        self.center = tuple(share + (center - share) * self.zoom / zoom for share, center in zip(shares, self.center))
+        center = tuple(share + (center - share) * self.zoom / zoom for share, center in zip(shares, self.center))
         self.zoom = zoom
-        self._stay_inside()
+        self._move_center(center)
 
     def zoom_in(self):
-        """Zoom in a step, towards the cursor."""
         self.zoom_by(ZOOM_STEP, self.cursor)
 
     def zoom_out(self):
-        """Zoom out a step."""
         self.zoom_by(1 / ZOOM_STEP, self.cursor)
 
     def pan_by(self, x_px, y_px):
         """Move the visible part by pixels of the image."""
-        self.center = (self.center[0] + x_px / self.size[0], self.center[1] + y_px / self.size[1])
-        self._stay_inside()
+        self._move_center((self.center[0] + x_px / self.size[0], self.center[1] + y_px / self.size[1]))
 
     def fit(self):
-        """Show the whole image."""
         self.zoom, self.center = MIN_ZOOM, (0.5, 0.5)
         self.changed.emit()
 
@@ -65,16 +59,15 @@ class SharedView(QtCore.QObject):
         self.changed.emit()
 
     def step(self, columns, rows):
-        """Move the cursor, which starts in the centre of the visible part. The visible part follows the cursor."""
+        """Move the cursor, which starts in the centre of the visible part, and the visible part with it."""
         start = self.cursor or tuple(int(share * size) for share, size in zip(self.center, self.size))
         self.point_at(*(min(max(value + move, 0), size - 1)
                         for value, move, size in zip(start, (columns, rows), self.size)))
         half = 0.45 / self.zoom
-        self.center = tuple(min(max(center, value / size - half), value / size + half)
-                            for center, value, size in zip(self.center, self.cursor, self.size))
-        self._stay_inside()
+        self._move_center(min(max(center, value / size - half), value / size + half)
+                          for center, value, size in zip(self.center, self.cursor, self.size))
 
-    def start_drawing(self, drawing=True):
+    def start_drawing(self, drawing):
         """Set whether dragging draws a box."""
         changed, self.drawing = drawing != self.drawing, drawing
         if not drawing:
@@ -97,7 +90,6 @@ class SharedView(QtCore.QObject):
             self.box_drawn.emit(box_px)
 
     def cancel(self):
-        """Cancel the box that is being drawn."""
         self.start_drawing(False)
 
     def rubber_band(self):
@@ -110,7 +102,8 @@ class SharedView(QtCore.QObject):
     def _is_inside(self, pixel):
         return all(0 <= value < size for value, size in zip(pixel, self.size))
 
-    def _stay_inside(self):
+    def _move_center(self, center):
+        """Move the visible part, which stays inside the image."""
         margin = 0.5 / self.zoom
-        self.center = tuple(min(max(share, margin), 1 - margin) for share in self.center)
+        self.center = tuple(min(max(share, margin), 1 - margin) for share in center)
         self.changed.emit()

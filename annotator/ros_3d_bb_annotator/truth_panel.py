@@ -1,4 +1,5 @@
 """Fields for the truth of a measurement, and the resulting error."""
+import contextlib
 import math
 
 from ros_3d_bb_annotator.lengths import METRES, parse_length
@@ -7,7 +8,6 @@ from ros_3d_bb_annotator.qt import QtCore, QtGui, QtWidgets, Signal
 FIELDS = (('x', '&X, right of the camera'), ('z', '&Z, ahead of it'), ('y', '&Y, below it (optional)'))
 UNITS = ('mm', 'm')
 TYPING_MS = 300  # typed text is saved after a pause of this length
-WRONG, PLAIN = 'color: #b00020', ''
 
 
 class LengthEdit(QtWidgets.QLineEdit):
@@ -23,8 +23,10 @@ class LengthEdit(QtWidgets.QLineEdit):
 
 
 class TruthPanel(QtWidgets.QGroupBox):
-    """Panel of the truth. Signals: `entered` with (x_m, z_m, y_m or None) when Enter is pressed on a complete position;
-    `typed` with the text of the fields to be saved; `previewed` with the current (x_m, z_m), or None if incomplete.
+    """Panel of the truth.
+
+    Signals: `entered` with (x_m, z_m, y_m or None) when Enter is pressed on a complete position; `typed` with the text
+    of the fields to be saved; `previewed` with the current (x_m, z_m), or None if incomplete.
     """
 
     entered = Signal(float, float, object)
@@ -51,12 +53,14 @@ class TruthPanel(QtWidgets.QGroupBox):
         self._timer.stop()
         self._estimate_m = estimate_m
         unit = draft.get('unit', self.unit_box.currentText())
-        self.unit_box.setCurrentText(unit if unit in UNITS else UNITS[0])
-        self._stored = dict(_texts_of(truth_m, self.unit_box.currentText()), unit=self.unit_box.currentText())
+        unit = unit if unit in UNITS else UNITS[0]
+        self.unit_box.setCurrentText(unit)
+        x_m, y_m, z_m = truth_m or (None, None, None)
+        self._stored = {'x': _text_of(x_m, unit), 'z': _text_of(z_m, unit), 'y': _text_of(y_m, unit), 'unit': unit}
         shown = dict(self._stored, **draft)
         for name, field in self.fields.items():
             field.setText(shown[name])
-        self._say('typed, but not saved as truth yet: press Enter' if draft else '')
+        self._show_hint('typed, but not saved as truth yet: press Enter' if draft else '')
         self._show_error()
 
     def texts(self):
@@ -64,18 +68,15 @@ class TruthPanel(QtWidgets.QGroupBox):
         return dict({name: field.text() for name, field in self.fields.items()}, unit=self.unit_box.currentText())
 
     def begin(self):
-        """Set the keyboard focus to the first field."""
         self.fields['x'].setFocus()
         self.fields['x'].selectAll()
 
     def has_keyboard(self):
-        """Whether a field has the keyboard focus."""
         return any(field.hasFocus() for field in self.fields.values())
 
     def flush(self):
         """Emit `typed` immediately instead of after a pause."""
-        if self._timer.isActive():
-            self._timer.stop()
+        self._timer.stop()
         texts = self.texts()
         edited = any(texts[name] != self._stored[name] for name in self.fields)
         self.typed.emit(texts if edited and any(texts[name] for name in self.fields) else {})
@@ -86,8 +87,7 @@ class TruthPanel(QtWidgets.QGroupBox):
         self._on_unit()
 
     def show_problem(self, text):
-        """Show what is wrong with the input."""
-        self._say(text, WRONG)
+        self._show_hint(text, 'color: #b00020')
 
     def read(self):
         """Return (x_m, z_m, y_m or None). Raises ValueError with the name of the invalid field."""
@@ -114,7 +114,7 @@ class TruthPanel(QtWidgets.QGroupBox):
         form.addRow(self.hint_label)
 
     def _on_typed(self):
-        self._say('')
+        self._show_hint('')
         self._show_error()
         self._timer.start()
 
@@ -142,17 +142,16 @@ class TruthPanel(QtWidgets.QGroupBox):
         self.entered.emit(*position)
 
     def _show_error(self):
-        try:
+        error_m = truth_m = None
+        with contextlib.suppress(ValueError):  # no complete position yet
             x_m, z_m, _y_m = self.read()
-        except ValueError:
-            self.error_label.setText(error_text(None))
-            self.previewed.emit(None)
-            return
-        self.error_label.setText(error_text(None if self._estimate_m is None else (
-            float(self._estimate_m[0]) - x_m, float(self._estimate_m[2]) - z_m)))
-        self.previewed.emit((x_m, z_m))
+            truth_m = x_m, z_m
+            if self._estimate_m is not None:
+                error_m = float(self._estimate_m[0]) - x_m, float(self._estimate_m[2]) - z_m
+        self.error_label.setText(error_text(error_m))
+        self.previewed.emit(truth_m)
 
-    def _say(self, text, style=PLAIN):
+    def _show_hint(self, text, style=''):
         self.hint_label.setStyleSheet(style)
         self.hint_label.setText(text)
 
@@ -161,21 +160,9 @@ def error_text(error_m):
     """Text of errors (x, z) in metres, or of None."""
     if error_m is None:
         return 'Error: –'
-    return 'Error: <b>X %s mm, Z %s mm</b>, %.0f mm on the floor' % (
-        signed_mm(error_m[0]), signed_mm(error_m[1]), 1000 * math.hypot(*error_m[:2]))
-
-
-def signed_mm(value_m):
-    """Format metres as signed millimetres: +12, −3."""
-    return ('%+.0f' % (1000 * value_m)).replace('-', '−')
-
-
-def _texts_of(truth_m, unit):
-    if truth_m is None:
-        return {name: '' for name, _label in FIELDS}
-    x_m, y_m, z_m = truth_m
-    return {'x': _text_of(x_m, unit), 'z': _text_of(z_m, unit), 'y': '' if y_m is None else _text_of(y_m, unit)}
+    axes = 'X %+.0f mm, Z %+.0f mm' % (1000 * error_m[0], 1000 * error_m[1])
+    return 'Error: <b>%s</b>, %.0f mm on the floor' % (axes.replace('-', '−'), 1000 * math.hypot(*error_m[:2]))
 
 
 def _text_of(length_m, unit):
-    return '%.10g' % round(length_m / METRES[unit], 6)
+    return '' if length_m is None else '%.10g' % round(length_m / METRES[unit], 6)

@@ -1,6 +1,7 @@
 """Validation of sessions: readable images, boxes inside the image, plausible estimates and truth."""
 import collections
 import os
+import pathlib
 
 from ros_3d_bb.sessions.session_reader import SessionError, read_description
 from ros_3d_bb_annotator.measurement import ANNOTATED, REJECTED
@@ -22,17 +23,14 @@ def problems_of(document):
 
 def leftovers_of(document):
     """Sorted relative paths of files that no measurement refers to, such as those left by a killed program."""
-    if document.is_old_form:
+    if document.is_old_format:
         return []
-    folder = document.folder
-    files = [name for name in os.listdir(folder) if name.startswith('.') and name.endswith('.tmp')]
-    for kind in ('color', 'depth'):
-        if os.path.isdir(os.path.join(folder, kind)):
-            files += [os.path.join(kind, name) for name in os.listdir(os.path.join(folder, kind))]
+    folder = pathlib.Path(document.folder)
+    paths = [*folder.glob('.*.tmp'), *folder.glob('color/*'), *folder.glob('depth/*')]
     # read after the files are listed, because a viewer may add measurements concurrently
     entries = [entry for entry in read_description(folder)['frames'] if isinstance(entry, dict)]
-    return sorted(set(files) - set(os.path.normpath(str(entry.get(kind, ''))) for entry in entries
-                                   for kind in ('color', 'depth')))
+    used = set(os.path.normpath(str(entry.get(kind, ''))) for entry in entries for kind in ('color', 'depth'))
+    return sorted(set(str(path.relative_to(folder)) for path in paths) - used)
 
 
 def _problems_at(document, index):
@@ -41,7 +39,7 @@ def _problems_at(document, index):
         return [measurement.problem]
     try:
         document.color(index)
-        if document.is_old_form:
+        if document.is_old_format:
             document.stretched_depth(index)
             return _truth_problems(document, index)
         document.depth(index)
@@ -52,15 +50,11 @@ def _problems_at(document, index):
 
 
 def _box_problems(document, index):
-    return ['box (%d, %d, %d, %d) is not inside the image of %d x %d pixels'
-            % (detection.box_px + (document.camera.width, document.camera.height))
-            for detection in document.measurements[index].detections if detection.box_px is not None
-            and not _is_inside(detection.box_px, document.camera)]
-
-
-def _is_inside(box_px, camera):
-    x1, y1, x2, y2 = box_px
-    return 0 <= x1 < x2 <= camera.width and 0 <= y1 < y2 <= camera.height
+    width, height = document.camera.width, document.camera.height
+    detections = document.measurements[index].detections
+    boxes_px = [detection.box_px for detection in detections if detection.box_px is not None]
+    return ['box (%d, %d, %d, %d) is not inside the image of %d x %d pixels' % (x1, y1, x2, y2, width, height)
+            for x1, y1, x2, y2 in boxes_px if not (0 <= x1 < x2 <= width and 0 <= y1 < y2 <= height)]
 
 
 def _estimate_problems(document, index):
@@ -76,15 +70,15 @@ def _estimate_problems(document, index):
 
 def _truth_problems(document, index):
     """Problems of the truth: it is outside the field of view, or far from the estimate."""
-    truth_m, errors_m, problems = document.measurements[index].truth_m, document.errors(index), []
+    camera, truth_m, errors_m = document.camera, document.measurements[index].truth_m, document.errors(index)
     if truth_m is None:
-        return problems
+        return []
     x_m, _y_m, z_m = truth_m
     if not z_m > 0:
         return ['truth z is %g m; more than 0 expected' % z_m]
-    if document.camera is not None:
-        left_m, right_m = document.camera.deproject([(0, document.camera.cy), (document.camera.width,
-                                                                               document.camera.cy)], z_m)[:, 0]
+    problems = []
+    if camera is not None:
+        left_m, right_m = camera.deproject([(0, camera.cy), (camera.width, camera.cy)], z_m)[:, 0]
         if not left_m - HALF_PERSON_M <= x_m <= right_m + HALF_PERSON_M:
             problems.append('truth x is %g m, outside the image, which shows %.2f to %.2f m at %g m'
                             % (x_m, left_m, right_m, z_m))

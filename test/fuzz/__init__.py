@@ -1,1 +1,1 @@
-"""Wrong input for parsers, conversions and the callbacks of nodes: `./run fuzz`."""
+"""Invalid input for parsers, conversions and the callbacks of nodes: `./run fuzz`."""

@@ -1,4 +1,4 @@
-"""The command `./run fuzz`: wrong input for everything that takes any; prints counts."""
+"""The command `./run fuzz`: invalid input for all parsers, conversions and nodes; prints counts."""
 import argparse
 import resource
 import sys
@@ -7,17 +7,17 @@ import time
 from fuzz.functions import fuzz_functions
 from fuzz.nodes import TARGETS, fuzz_node
 
-MEMORY = 4 * 2 ** 30  # what asks for more of it than this is a fault
+MEMORY = 4 * 2 ** 30  # limit; requests for more are errors
 
 
 def main():
-    """Call functions and callbacks with wrong input; the first exception that is no refusal ends it."""
-    parser = argparse.ArgumentParser(prog='./run fuzz', description='Wrong input for parsers, conversions and nodes.')
-    parser.add_argument('--seed', type=int, default=1, help='the same seed gives the same input (default: 1)')
-    parser.add_argument('--minutes', type=float, help='stop after so long, in all (default: when all calls are made)')
-    parser.add_argument('--calls', type=int, default=10 ** 6, help='of functions (default: 1000000)')
-    parser.add_argument('--messages', type=int, default=10 ** 5, help='to each node (default: 100000)')
-    parser.add_argument('--only', choices=['functions'] + list(TARGETS), help='one part of it')
+    """Call functions and callbacks until the first exception other than a rejection."""
+    parser = argparse.ArgumentParser(prog='./run fuzz', description=__doc__)
+    parser.add_argument('--seed', type=int, default=1, help='seed of the input (default: 1)')
+    parser.add_argument('--minutes', type=float, help='limit of the duration (default: none)')
+    parser.add_argument('--calls', type=int, default=10 ** 6, help='number for all functions (default: 1000000)')
+    parser.add_argument('--messages', type=int, default=10 ** 5, help='number for each node (default: 100000)')
+    parser.add_argument('--only', choices=['functions'] + list(TARGETS), help='run only this part')
     given = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, resource.getrlimit(resource.RLIMIT_DATA)[1]))
     parts = [given.only] if given.only else ['functions'] + list(TARGETS)
@@ -27,12 +27,12 @@ def main():
         if part == 'functions':
             counts = fuzz_functions(given.seed, given.calls, deadline_s)
             for name in counts:
-                print('%-45s %8d calls, %8d refused' % ((name,) + tuple(counts[name])))
-            print('%-45s %8d calls' % ('functions', sum(calls for calls, _refused in counts.values())), flush=True)
+                print('%-45s %8d calls, %8d rejected' % ((name,) + tuple(counts[name])))
+            print('%-45s %8d calls' % ('functions', sum(calls for calls, _rejected in counts.values())), flush=True)
         else:
             sent, cpu_s = fuzz_node(part, given.seed, given.messages, deadline_s)
             print('%-45s %8d messages, %.1f s of CPU' % (part, sent, cpu_s), flush=True)
-    print('seed %d: nothing but refusals' % given.seed)
+    print('seed %d: no errors' % given.seed)
 
 
 if __name__ == '__main__':

@@ -1,11 +1,11 @@
-"""Wrong values for parsers and conversions. Each may refuse them by a ValueError (or what it documents), no more."""
+"""Invalid values for parsers and conversions, which may only raise ValueError, OSError or yaml.YAMLError."""
 import glob
 import json
 import os
+import pathlib
 import tempfile
 import time
 import zipfile
-from typing import Callable, NamedTuple
 
 import numpy as np
 import yaml
@@ -13,6 +13,7 @@ import yaml
 from fuzz import hostile
 from ros_3d_bb.bags.process_bag import read_params
 from ros_3d_bb.camera.camera_model import transform_from
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import array_from, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, boxes3d_from_msg,
                                                    boxes3d_to_msg, camera_from_msg, detections_from_msg,
@@ -47,20 +48,12 @@ VALUES = (0, 1, -1, 2 ** 70, 0.5, float('nan'), float('inf'), True, None, '', 'm
 FROM_CAMERA = transform_from((1, 2, 0.5), (-0.5, 0.5, -0.5, 0.5))
 
 
-class Function(NamedTuple):
-    """One of what is tried: `call(source, folder)`, and how often beside the others."""
-
-    call: Callable
-    share: float
-
-
 GOOD = hostile.good_frame(NOW_NS)
-INFO, DEPTH, COLOR = (GOOD[topic] for topic in (
-    'camera/color/camera_info', 'camera/aligned_depth_to_color/image_raw', 'camera/color/image_raw'))
 
 
-def _image(read, good):
-    return lambda source, _folder: read(hostile.image(source, NOW_NS, good))
+def _made(read, topic):
+    """Function that reads an invalid message of a topic."""
+    return lambda source, _folder: read(hostile.makers(source, NOW_NS, GOOD)[topic]())
 
 
 def _boxes2d(source, _folder):
@@ -90,20 +83,20 @@ def _tracks(source, _folder):
 
 
 def _estimates(source, _folder):
-    rects_px = [tuple(source.randrange(-5, 70) for _edge in range(4)) for _rect in range(2)]
-    rects_px.append((source.choice((-2 ** 31, 0)),) * 2 + (source.choice((40, 2 ** 31 - 1)),) * 2)
-    rects_px = [(min(rect_px[::2]), min(rect_px[1::2]), max(rect_px[::2]) + 1, max(rect_px[1::2]) + 1)
-                for rect_px in rects_px]
+    corners_px = [np.sort(np.reshape([source.randrange(-5, 70) for _edge in range(4)], (2, 2)), axis=0)
+                  for _rect in range(2)]
+    corners_px.append(np.array([[source.choice((-2 ** 31, 0))] * 2, [source.choice((40, 2 ** 31 - 2))] * 2]))
+    rects_px = [tuple((rect + [[0], [1]]).ravel().tolist()) for rect in corners_px]
     for rect_px in rects_px:
         check_rect(rect_px)
-    depth = imgmsg_to_depth(hostile.image(source, NOW_NS, DEPTH))
+    depth = imgmsg_to_depth(hostile.image(source, NOW_NS, GOOD[DEPTH_TOPIC]))
     camera = hostile.CAMERA._replace(width=depth.values.shape[1], height=depth.values.shape[0])
     estimate_boxes(depth, rects_px, camera, estimator_named(source.choice(('foreground', 'median')), 20))
 
 
 def _predictions(source, _folder):
-    rows = np.array([[source.number() for _column in range(7)] for _row in range(source.choice((0, 1, 5)))])
-    candidates = filter_predictions(rows.reshape(-1, 7).astype(np.float32), 0.25, [0, 1])
+    rows = np.reshape(source.numbers(7 * source.choice((0, 1, 5))), (-1, 7))
+    candidates = filter_predictions(rows.astype(np.float32), 0.25, [0, 1])
     detections = non_maximum_suppression(candidates, 0.45, 100)
     assert np.isfinite(detections.boxes).all()
 
@@ -120,21 +113,14 @@ def _params(source, _folder):
 
 
 def _mutated(source, data):
-    """Bytes with some changed, taken away, doubled, or replaced by what means something to a parser."""
-    data = bytearray(data)
+    """Bytes of which some are changed, removed, doubled, replaced by tokens of a parser, or cut off at the end."""
     for _fault in range(source.choice((1, 1, 2, 5))):
-        where, kind = source.randrange(len(data) + 1), source.randrange(5)
-        if kind == 0 and data:
-            data[where % len(data)] = source.randrange(256)
-        elif kind == 1:
-            del data[where:where + source.choice((1, 10, 1000))]
-        elif kind == 2:
-            data[where:where] = data[where:where + 50]
-        elif kind == 3:
-            data[where:where + source.choice((0, 3))] = source.choice(TOKENS)
-        else:
-            data = data[:where]
-    return bytes(data)
+        where = source.randrange(len(data) + 1)
+        removed, inserted = source.choice((
+            (1, bytes([source.randrange(256)])), (source.choice((1, 10, 1000)), b''), (0, data[where:where + 50]),
+            (source.choice((0, 3)), source.choice(TOKENS)), (len(data), b'')))
+        data = data[:where] + inserted + data[where + removed:]
+    return data
 
 
 TOKENS = (b'[' * 3000, b'{"a":' * 3000, b'-1', b'1e999', b'NaN', b'null', b'true', b'"', b"'", b': ', b'\n- ', b'\n  ',
@@ -142,22 +128,18 @@ TOKENS = (b'[' * 3000, b'{"a":' * 3000, b'-1', b'1e999', b'NaN', b'null', b'true
           b'[]', b'{}', b'? ', b'<<: *b', b'2001-01-01', b'1:2:3', '\u0661'.encode())
 
 
-def _in_file(source, folder, name, text, read):
-    path = os.path.join(folder, name)
-    with open(path, 'wb') as stream:
-        stream.write(_mutated(source, text))
-    return read(path)
+def _file(read, name, *texts):
+    """Function that reads a mutated text from a file."""
+    def read_mutated(source, folder):
+        path = pathlib.Path(folder, name)
+        path.write_bytes(_mutated(source, source.choice(texts)))
+        read(str(path))
+    return read_mutated
 
 
-def _texts(pattern):
-    found = []
-    for path in sorted(glob.glob(os.path.join(CONFIG, pattern))):
-        with open(path, 'rb') as stream:
-            found.append(stream.read())
-    return found
-
-
-MODELS, SCENARIOS, TRACKER = _texts('error_models/*.yaml'), _texts('scenarios/*.yaml'), _texts('tracker.yaml')[0]
+MODELS, SCENARIOS, (TRACKER,) = (
+    [pathlib.Path(path).read_bytes() for path in sorted(glob.glob(os.path.join(CONFIG, pattern)))]
+    for pattern in ('error_models/*.yaml', 'scenarios/*.yaml', 'tracker.yaml'))
 CONTENTS = [yaml.safe_load(text) for text in SCENARIOS]
 SESSION = json.dumps({
     'camera': {'width': 64, 'height': 48, 'fx': 60, 'fy': 60, 'cx': 31, 'cy': 23, 'distortion': [0] * 5,
@@ -172,7 +154,7 @@ def _scenario(source, _folder):
 
 
 def _changed(source, content):
-    """A content of which something, somewhere, is another value."""
+    """The content with another value somewhere."""
     if isinstance(content, dict) and content and source.random() < 0.8:
         key = source.choice(sorted(content, key=str))
         return dict(content, **{key: _changed(source, content[key])})
@@ -182,16 +164,8 @@ def _changed(source, content):
     return source.choice(VALUES)
 
 
-def _session(source, folder):
-    _in_file(source, folder, 'frames.json', SESSION, lambda _path: read_session(folder))
-
-
-def _old_session(source, folder):
-    _in_file(source, folder, legacy.TEXT_NAME, OLD, lambda _path: legacy.read(folder))
-
-
 def _checkpoint(source, folder):
-    """Opcodes of a pickle at random, in the archive of a checkpoint."""
+    """Random opcodes of a pickle, in the archive of a checkpoint."""
     path = os.path.join(folder, 'weights.pt')
     opcodes = (b'.0125FNKJMIUXTC}]()aesbtdlhjgpqrRQc'
                b'\x80\x81\x82\x85\x86\x87\x88\x89\x8a\x8c\x8e\x8f\x90\x92\x93\x94\x95')
@@ -203,56 +177,48 @@ def _checkpoint(source, folder):
     read_checkpoint(path)
 
 
-FUNCTIONS = {
-    'array_from': Function(_image(array_from, COLOR), 10), 'imgmsg_to_rgb': Function(_image(imgmsg_to_rgb, COLOR), 8),
-    'imgmsg_to_depth': Function(_image(imgmsg_to_depth, DEPTH), 8),
-    'camera_from_msg': Function(
-        lambda source, _folder: camera_from_msg(hostile.camera_info(source, NOW_NS, INFO)), 8),
-    'boxes2d_from_msg, boxes2d_to_msg': Function(_boxes2d, 6),
-    'boxes3d_from_msg, boxes3d_to_msg': Function(_boxes3d, 3),
-    'usable_boxes3d, detections_from_msg': Function(_detections, 4), 'tracks, planners': Function(_tracks, 3),
-    'estimate_boxes': Function(_estimates, 2), 'filter_predictions, non_maximum_suppression': Function(_predictions, 3),
-    'decode_heads': Function(_heads, 2), 'params_from': Function(_params, 15),
-    'parse_length': Function(lambda source, _folder: parse_length(
-        _mutated(source, b'1,230.5 mm').decode('utf-8', 'replace'), source.choice(('mm', 'm'))), 10),
-    'scenario_from': Function(_scenario, 2),
-    'read_scenario': Function(lambda source, folder: _in_file(
-        source, folder, 'scenario.yaml', source.choice(SCENARIOS), read_scenario), 0.1),
-    'read_error_model': Function(lambda source, folder: _in_file(
-        source, folder, 'model.yaml', source.choice(MODELS), read_error_model), 0.1),
-    'read_params': Function(lambda source, folder: _in_file(source, folder, 'tracker.yaml', TRACKER, lambda path: (
-        read_params(path, (TrackerNodeParams(), MarkerParams()) + tuple(kind() for kind in TRACKING_PARAMS)))), 0.05),
-    'read_session': Function(_session, 0.5), 'legacy.read': Function(_old_session, 0.5),
-    'read_checkpoint': Function(_checkpoint, 0.3)}
+def _length(source, _folder):
+    parse_length(_mutated(source, b'1,230.5 mm').decode('utf-8', 'replace'), source.choice(('mm', 'm')))
+
+
+def _tracker_params(path):
+    read_params(path, (TrackerNodeParams(), MarkerParams()) + tuple(kind() for kind in TRACKING_PARAMS))
+
+
+FUNCTIONS = {  # name: (function of a Source and a folder, relative frequency)
+    'array_from': (_made(array_from, COLOR_TOPIC), 10), 'imgmsg_to_rgb': (_made(imgmsg_to_rgb, COLOR_TOPIC), 8),
+    'imgmsg_to_depth': (_made(imgmsg_to_depth, DEPTH_TOPIC), 8),
+    'camera_from_msg': (_made(camera_from_msg, INFO_TOPICS[0]), 8),
+    'boxes2d_from_msg, boxes2d_to_msg': (_boxes2d, 6), 'boxes3d_from_msg, boxes3d_to_msg': (_boxes3d, 3),
+    'usable_boxes3d, detections_from_msg': (_detections, 4), 'tracks, planners': (_tracks, 3),
+    'estimate_boxes': (_estimates, 2), 'filter_predictions, non_maximum_suppression': (_predictions, 3),
+    'decode_heads': (_heads, 2), 'params_from': (_params, 15), 'parse_length': (_length, 10),
+    'scenario_from': (_scenario, 2), 'read_scenario': (_file(read_scenario, 'scenario.yaml', *SCENARIOS), 0.1),
+    'read_error_model': (_file(read_error_model, 'model.yaml', *MODELS), 0.1),
+    'read_params': (_file(_tracker_params, 'tracker.yaml', TRACKER), 0.05),
+    'read_session': (_file(lambda path: read_session(os.path.dirname(path)), 'frames.json', SESSION), 0.5),
+    'legacy.read': (_file(lambda path: legacy.read(os.path.dirname(path)), legacy.TEXT_NAME, OLD), 0.5),
+    'read_checkpoint': (_checkpoint, 0.3)}
 
 
 def fuzz_functions(seed, count, deadline_s=float('inf')):
-    """Call the functions so many times, or as many as it takes until a time on time.monotonic().
+    """Call the functions until a number of calls, or a time on time.monotonic().
 
-    Returns
-    -------
-    dict
-        By function, [calls, of which were refused].
-
-    Raises
-    ------
-    Exception
-        What is no refusal.
+    Returns {name: [calls, rejections]}. Raises any other exception of a function.
     """
     source, counts = hostile.Source(seed), {name: [0, 0] for name in FUNCTIONS}
-    names = list(FUNCTIONS)
-    weights = [FUNCTIONS[name].share for name in names]
+    names, shares = list(FUNCTIONS), [share for _call, share in FUNCTIONS.values()]
     with tempfile.TemporaryDirectory() as folder, np.errstate(all='ignore'):
         for number in range(count):
             if number % 100 == 0:
-                batch = source.choices(names, weights, k=100)
+                batch = source.choices(names, shares, k=100)
                 if time.monotonic() >= deadline_s:
                     break
             name = batch[number % 100]
             counts[name][0] += 1
             try:
-                FUNCTIONS[name].call(source, folder)
-            except (ValueError, OSError, yaml.YAMLError):  # OSError: a scenario names a file that is not there
+                FUNCTIONS[name][0](source, folder)
+            except (ValueError, OSError, yaml.YAMLError):  # OSError: a scenario names a missing file
                 counts[name][1] += 1
             except Exception:
                 print('%s, seed %d: at call %d' % (name, seed, number))

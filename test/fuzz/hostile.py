@@ -1,17 +1,20 @@
-"""Messages that a node should not get, made from a seed. Each is one that can be sent."""
+"""Random invalid messages, determined by a seed. All of them can be serialized."""
+import copy
 import random
 
 import genpy
 import numpy as np
-from sensor_msgs.msg import CameraInfo, Image
+from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion, Transform, TransformStamped, Vector3
+from sensor_msgs.msg import RegionOfInterest
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
+from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import MODELS
-from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, CameraFrame, messages_of
 from ros_3d_bb.conversions.image_msgs import LAYOUTS
-from ros_3d_bb.conversions.perception_msgs import time_from
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 
@@ -24,7 +27,7 @@ CAMERA = Camera(WIDTH, HEIGHT, 60.0, 60.0, 31.5, 23.5)
 
 
 class Source(random.Random):
-    """Random values, of which many are extreme. The same seed gives the same ones."""
+    """Random values, many of them extreme. The same seed gives the same values."""
 
     def __init__(self, seed):
         super(Source, self).__init__(seed)
@@ -34,26 +37,29 @@ class Source(random.Random):
         """A float."""
         return self.choice(FLOATS) if self.random() < 0.4 else self.gauss(0, 3)
 
+    def numbers(self, count):
+        """Several floats."""
+        return [self.number() for _number in range(count)]
+
     def bytes_of(self, count):
-        """So many bytes, at most 65536."""
+        """At most 65536 bytes."""
         start = self.randrange(max(1, len(self.noise) - count))
         return self.noise[start:start + count]
 
     def stamp(self, now_ns):
-        """The stamp at hand, or another: zero, of the future, of the past, of the end of time."""
-        kind = self.random()
-        if kind < 0.7:
+        """Mostly the current stamp, or zero, in the future, in the past, or the largest or the smallest one."""
+        if self.random() < 0.7:
             return time_from(now_ns)
         return self.choice((genpy.Time(), time_from(now_ns + 10 * NS), time_from(now_ns - NS // 2),
                             time_from(now_ns - 5 * NS), genpy.Time(2 ** 32 - 1, NS - 1), genpy.Time(0, 1)))
 
     def header(self, now_ns):
-        """A header, mostly with the camera's frame."""
+        """A header, mostly with the frame of the camera."""
         return Header(stamp=self.stamp(now_ns), frame_id='camera' if self.random() < 0.8 else self.choice(TEXTS))
 
 
 def good_frame(stamp_ns, frame_id='camera'):
-    """{topic: message} of an image that shows a person 2 m away, as a robot sends it."""
+    """Messages {topic: message} of a valid image of a person at 2 m."""
     depth_mm = np.full((HEIGHT, WIDTH), 4000, np.uint16)
     depth_mm[8:44, 26:38] = 2000
     header = Header(stamp=time_from(stamp_ns), frame_id=frame_id)
@@ -62,61 +68,82 @@ def good_frame(stamp_ns, frame_id='camera'):
 
 
 def good_boxes(stamp_ns):
-    """The 2D boxes that belong to `good_frame`."""
+    """Valid 2D boxes of `good_frame`."""
     message = Int32MultiArray(data=[26, 8, 38, 44])
     message.layout.dim = [MultiArrayDimension(label='boxes;stamp=%d.%09d;frame=camera' % divmod(stamp_ns, NS), size=1)]
     return message
 
 
-def image(source, now_ns, good):
-    """An image like a good one, mostly damaged."""
-    message = Image(source.header(now_ns), good.height, good.width, good.encoding, 0, good.step, good.data)
-    for _fault in range(source.choice((0, 1, 1, 2))):
-        fault = source.randrange(8)
-        if fault == 0:
-            message.encoding = source.choice(tuple(LAYOUTS) + TEXTS)
-        elif fault == 1:
-            message.step = source.choice(UINT32 + (max(message.step, 1) - 1, min(message.step, 2 ** 31) + 1))
-        elif fault == 2:
-            message.data = message.data[:source.randrange(len(message.data) + 1)]
-        elif fault == 3:
-            message.width = source.choice(UINT32)
-        elif fault == 4:
-            message.height = source.choice(UINT32)
-        elif fault == 5:
-            message.is_bigendian = source.choice((1, 255))
-        elif fault == 6:
-            message.data = source.bytes_of(len(message.data))
-        else:
-            values = np.array([source.choice(FLOATS) for _column in range(16)])
-            with np.errstate(over='ignore'):
-                pixels = np.resize(values.astype(np.float32), (message.height % 64, message.width % 64))
-            message.height, message.width, message.encoding = pixels.shape + ('32FC1',)
-            message.step, message.data = 4 * message.width, pixels.tobytes()
+def transforms(stamp_ns):
+    """Transforms from the map to the camera."""
+    message = TFMessage()
+    for parent, child, quaternion in (('map', 'base_link', (0, 0, 0, 1)),
+                                      ('base_link', 'camera', (-0.5, 0.5, -0.5, 0.5))):
+        message.transforms.append(TransformStamped(Header(stamp=time_from(stamp_ns), frame_id=parent), child,
+                                                   Transform(Vector3(), Quaternion(*quaternion))))
     return message
+
+
+def makers(source, now_ns, good):
+    """{topic: function that makes an invalid message}; `good` are the messages of a valid image."""
+    return {INFO_TOPICS[0]: lambda: camera_info(source, now_ns, good[INFO_TOPICS[0]]),
+            DEPTH_TOPIC: lambda: image(source, now_ns, good[DEPTH_TOPIC]),
+            COLOR_TOPIC: lambda: image(source, now_ns, good[COLOR_TOPIC]),
+            BOXES_TOPIC: lambda: boxes2d(source, now_ns), BOXES3D_TOPIC: lambda: boxes3d(source, now_ns),
+            TRACKS_TOPIC: lambda: tracks(source, now_ns)}
+
+
+def image(source, now_ns, good):
+    """A mostly damaged copy of a valid image."""
+    message = copy.copy(good)
+    message.header = source.header(now_ns)
+    _damage(source, message, (
+        lambda: {'encoding': source.choice(tuple(LAYOUTS) + TEXTS)},
+        lambda: {'step': source.choice(UINT32 + (max(message.step, 1) - 1, min(message.step, 2 ** 31) + 1))},
+        lambda: {'data': message.data[:source.randrange(len(message.data) + 1)]},
+        lambda: {'width': source.choice(UINT32)},
+        lambda: {'height': source.choice(UINT32)},
+        lambda: {'is_bigendian': source.choice((1, 255))},
+        lambda: {'data': source.bytes_of(len(message.data))},
+        lambda: _extreme_pixels(source, message.height % 64, message.width % 64)))
+    return message
+
+
+def _extreme_pixels(source, height, width):
+    values = np.array([source.choice(FLOATS) for _column in range(16)])
+    with np.errstate(over='ignore'):
+        pixels = np.resize(values.astype(np.float32), (height, width))
+    return {'height': height, 'width': width, 'encoding': '32FC1', 'step': 4 * width, 'data': pixels.tobytes()}
 
 
 def camera_info(source, now_ns, good):
-    """A camera_info like a good one, mostly damaged."""
-    message = CameraInfo(header=source.header(now_ns), height=good.height, width=good.width, K=list(good.K),
-                         distortion_model=good.distortion_model, D=good.D, R=good.R, P=good.P)
-    for _fault in range(source.choice((0, 1, 1, 2))):
-        fault = source.randrange(5)
-        if fault == 0:
-            message.K[source.randrange(9)] = source.number()
-        elif fault == 1:
-            message.width = source.choice(UINT32)
-        elif fault == 2:
-            message.height = source.choice(UINT32)
-        elif fault == 3:
-            message.distortion_model = source.choice(tuple(MODELS) + TEXTS)
-        else:
-            message.D = [source.number() for _number in range(source.choice((0, 1, 4, 5, 8, 12, 14, 100)))]
+    """A mostly damaged copy of a valid camera_info."""
+    message = copy.copy(good)
+    message.header = source.header(now_ns)
+
+    def other_matrix():
+        matrix = list(message.K)
+        matrix[source.randrange(9)] = source.number()
+        return {'K': matrix}
+
+    _damage(source, message, (
+        other_matrix,
+        lambda: {'width': source.choice(UINT32)},
+        lambda: {'height': source.choice(UINT32)},
+        lambda: {'distortion_model': source.choice(tuple(MODELS) + TEXTS)},
+        lambda: {'D': source.numbers(source.choice((0, 1, 4, 5, 8, 12, 14, 100)))}))
     return message
 
 
+def _damage(source, message, faults):
+    """Replace fields of a message by those of up to two faults, functions that return {field: value}."""
+    for _fault in range(source.choice((0, 1, 1, 2))):
+        for name, value in source.choice(faults)().items():
+            setattr(message, name, value)
+
+
 def boxes2d(source, now_ns):
-    """An array of 2D boxes."""
+    """2D boxes."""
     count = 10 ** 6 if source.random() < 0.0002 else source.choice((0, 1, 2, 3, 4, 4, 4, 4, 8, 8, 12, 13, 400, 4004))
     if count > 400:
         return Int32MultiArray(data=[source.choice(INT32)] * count)
@@ -133,56 +160,38 @@ def boxes2d(source, now_ns):
     return message
 
 
-def _fill(source, part, names):
-    for name in names:
-        setattr(part, name, source.number())
-
-
 def boxes3d(source, now_ns):
-    """An array of 3D boxes."""
+    """3D boxes."""
     message = BoundingBox3DArray(header=source.header(now_ns))
     for _box in range(source.choice((0, 1, 1, 2, 5))):
-        box = BoundingBox3D(support=float(np.float32(min(source.random(), 1))), truncated=source.random() < 0.3)
-        place, size = box.center.position, box.size
-        place.x, place.y, place.z = source.gauss(0, 1), source.gauss(0, 0.3), abs(source.gauss(3, 1))
-        size.x, size.y, size.z, box.center.orientation.w = 0.5, 1.7, 0.5, 1.0
-        for _fault in range(source.choice((0, 0, 1, 2))):
-            fault = source.randrange(5)
-            if fault == 0:
-                _fill(source, place, 'xyz')
-            elif fault == 1:
-                _fill(source, size, 'xyz')
-            elif fault == 2:
-                _fill(source, box.center.orientation, 'xyzw')
-            elif fault == 3:
-                box.position_covariance = [source.number() for _number in range(9)]
-            else:
-                _fill_roi(source, box.roi)
+        position = Point(source.gauss(0, 1), source.gauss(0, 0.3), abs(source.gauss(3, 1)))
+        box = BoundingBox3D(support=float(np.float32(source.random())), truncated=source.random() < 0.3,
+                            center=Pose(position, Quaternion(w=1)), size=Vector3(0.5, 1.7, 0.5))
+        _damage(source, box, (
+            lambda: {'center': Pose(Point(*source.numbers(3)), Quaternion(w=1))},
+            lambda: {'center': Pose(position, Quaternion(*source.numbers(4)))},
+            lambda: {'size': Vector3(*source.numbers(3))},
+            lambda: {'position_covariance': source.numbers(9)},
+            lambda: {'roi': RegionOfInterest(*[source.choice(UINT32) for _edge in range(4)], False)}))
         message.boxes.append(box)
     return message
 
 
-def _fill_roi(source, roi):
-    roi.x_offset, roi.y_offset, roi.width, roi.height = (source.choice(UINT32) for _edge in range(4))
-
-
 def tracks(source, now_ns):
-    """An array of tracks."""
+    """Tracks."""
     message = TrackedObjectArray(header=source.header(now_ns))
     for _track in range(source.choice((0, 1, 2))):
-        track = TrackedObject(id=source.choice(UINT32), status=source.choice((0, 1, 2, 3, 255)),
-                              moving=source.random() < 0.5)
-        track.size.x = track.size.y = 0.5
-        track.size.z = 1.7
-        track.prediction_step = source.choice((genpy.Duration(0, NS // 4), genpy.Duration(), genpy.Duration(-5),
-                                               genpy.Duration(2 ** 31 - 1)))
-        track.prediction = [type(track.pose)() for _step in range(source.choice((0, 1, 8)))]
+        track = TrackedObject(
+            id=source.choice(UINT32), status=source.choice((0, 1, 2, 3, 255)), moving=source.random() < 0.5,
+            size=Vector3(0.5, 0.5, 1.7),
+            prediction_step=source.choice((genpy.Duration(0, NS // 4), genpy.Duration(), genpy.Duration(-5),
+                                           genpy.Duration(2 ** 31 - 1))),
+            prediction=[PoseWithCovariance() for _step in range(source.choice((0, 1, 8)))])
         if source.random() < 0.5:
             part = source.choice((track.pose.pose.position, track.twist.twist.linear, track.size)
                                  + tuple(pose.pose.position for pose in track.prediction))
-            _fill(source, part, 'xyz')
+            part.x, part.y, part.z = source.numbers(3)
         if source.random() < 0.3:
-            track.pose.covariance = [source.number() for _number in range(36)]
-            track.twist.covariance = [source.number() for _number in range(36)]
+            track.pose.covariance, track.twist.covariance = source.numbers(36), source.numbers(36)
         message.objects.append(track)
     return message

@@ -1,7 +1,7 @@
-"""A whole measurement campaign: simulated people, viewer_node, the annotator's window, its table and its analysis.
+"""A measurement campaign: simulated people, measure.launch, the annotator's window, its table and its analysis.
 
-Needs a master for the pipeline, and a display for both windows. The errors at the end are compared with what
-bbox3d_node and the simulator said on their topics when the measurements were taken.
+Needs a master for the pipeline, and a display for both windows. The errors at the end are compared with the messages of
+bbox3d_node and the simulator at the stamps of the measurements.
 """
 import csv
 import json
@@ -12,46 +12,48 @@ import time
 
 import numpy as np
 import pytest
+import rosbag
 import rospy
 
 from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.atomic_file import locked_update
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
-from ros_3d_bb.sessions.session_reader import read_session
+from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from support.ros import Recorder, launched, wait_until
 from support.screen import press, start_screen
 
-PLACES_M = ((-0.7, 2.4), (0.0, 3.2), (0.9, 4.0))  # of the people: X and Z in the camera's optical frame
+COLOR, DEPTH = '/camera/color/image_raw', '/camera/aligned_depth_to_color/image_raw'
+POSITIONS_M = ((-0.7, 2.4), (0.0, 3.2), (0.9, 4.0))  # of the people: X and Z in the camera's optical frame
 MOUNT_M = 0.17  # of the camera, in front of the map's origin
-REPETITIONS = 3  # the least for a variance
-COUNT = REPETITIONS * len(PLACES_M)
+REPETITIONS = 3  # minimum for a variance
+COUNT = REPETITIONS * len(POSITIONS_M)
 SCENE = {'duration': 100.0, 'rate': 5.0,
-         'people': [{'start': [MOUNT_M + z_m, -x_m], 'facing': 3.1} for x_m, z_m in PLACES_M]}
-CHEST_Y_M = -0.5  # in the optical frame, of anybody who stands
+         'people': [{'start': [MOUNT_M + z_m, -x_m], 'facing': 3.1} for x_m, z_m in POSITIONS_M]}
+CHEST_Y_M = -0.5  # of a standing person in the optical frame
 MILLIMETRE_M = 0.001 + 1e-9
 
 
 @pytest.fixture(scope='module')
-def screen():
-    rospy.init_node('test_campaign')
-    return start_screen()
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp('a campaign')
 
 
 @pytest.fixture(scope='module')
-def campaign(screen, tmp_path_factory):
-    """(folder of a session taken by pressing s in the viewer's window, expected (estimate x, z, truth x, z) of the
-    person whom each measurement is about, (n, 4), metres).
-    """
-    folder = tmp_path_factory.mktemp('campaign')
+def campaign(folder):
+    """(session taken by pressing s in the viewer's window, expected estimate x, z and truth x, z in metres, (n, 4))."""
+    rospy.init_node('test_campaign')
+    start_screen()
     (folder / 'scene.yaml').write_text(json.dumps(SCENE))
     session = str(folder / 'session')
+    # detector, viewer and recorder of the bag: none may miss an image that is measured
     camera = subprocess.Popen(['rosrun', 'ros_3d_bb', 'simulator_node', '_scenario:=%s' % (folder / 'scene.yaml'),
-                               '_wait_for_subscribers:=2'])
+                               '_wait_for_subscribers:=3'])
     try:
         with Recorder('ground_truth', TrackedObjectArray) as truths, \
                 Recorder('ros_3d_bb/bb_3d', BoundingBox3DArray, False) as boxes, \
-                launched('measure.launch', 'session:=' + session, 'detector:=depth') as launch:
-            boxes.wait_for(3, 60)  # from now on none is missed
+                launched('measure.launch', 'session:=' + session, 'detector:=depth', 'label:=A1',
+                         'record:=%s' % (folder / 'run.bag')) as launch:
+            boxes.wait_for(3, 60)  # from now on, all messages are recorded
             take_measurements(session)
             press('ros_3d_bb viewer', 'q')
             launch.wait()
@@ -71,17 +73,17 @@ def take_measurements(session):
 
 
 def person_of(number):
-    """Whom a measurement is about, by number."""
-    return min(number // REPETITIONS, len(PLACES_M) - 1)
+    """The person that a measurement is annotated for, by number."""
+    return min(number // REPETITIONS, len(POSITIONS_M) - 1)
 
 
 def expected_m(frames, truths, boxes):
-    """(n, 4): estimate x, z and truth x, z of whom each frame is about, of the messages with its stamp."""
+    """(n, 4): estimate x, z and truth x, z of the person of each frame, from the messages with its stamp."""
     truths, boxes = ({stamp_of(message): message for message in messages} for messages in (truths, boxes))
     rows = []
     for number, frame in enumerate(frames):
-        place = truths[frame.stamp_ns].objects[person_of(number)].pose.pose.position
-        truth_m = np.array([-place.y, place.x - MOUNT_M])
+        position = truths[frame.stamp_ns].objects[person_of(number)].pose.pose.position
+        truth_m = np.array([-position.y, position.x - MOUNT_M])
         centers_m = np.array([(box.center.position.x, box.center.position.z) for box in boxes[frame.stamp_ns].boxes])
         rows.append(np.append(centers_m[np.argmin(np.hypot(*(centers_m - truth_m).T))], truth_m))
     return np.array(rows)
@@ -89,13 +91,13 @@ def expected_m(frames, truths, boxes):
 
 @pytest.fixture(scope='module')
 def annotated(campaign):
-    """The campaign after somebody has clicked and typed in the annotator's window."""
-    folder, expected = campaign
-    with locked_update(folder) as content:
+    """The campaign after annotation by clicks and keys in the annotator's window."""
+    session, expected = campaign
+    with locked_update(session) as content:
         content['grid'] = [{'name': name, 'x': 1000 * x_m, 'z': 1000 * z_m}
-                           for name, (x_m, z_m) in zip('ABC', PLACES_M)]
-    from support.hands import Hands  # Qt must not come before its display
-    hands = Hands(folder)
+                           for name, (x_m, z_m) in zip('ABC', POSITIONS_M)]
+    from support.hands import Hands  # Qt must be imported after the display was started
+    hands = Hands(session)
     for number in range(len(expected)):
         choose_person(hands, number)
         enter_truth(hands, number)
@@ -106,8 +108,8 @@ def annotated(campaign):
 
 
 def choose_person(hands, number):
-    """Click on the chest of whom the measurement is about."""
-    x_m, z_m = PLACES_M[person_of(number)]
+    """Click on the chest of the person of a measurement."""
+    x_m, z_m = POSITIONS_M[person_of(number)]
     u, v = hands.document.camera.project(np.array([x_m, CHEST_Y_M, z_m]))
     hands.click_in_image((u, v))
 
@@ -119,12 +121,12 @@ def choose_person(hands, number):
 
 
 def enter_truth(hands, number):
-    """Type the first of a person, click the mark on the floor for the second, take the same for the rest."""
-    x_m, z_m = PLACES_M[person_of(number)]
-    way = number - REPETITIONS * person_of(number)
-    if way == 0:
+    """Type the truth of a person's first measurement, click the mark for the second, repeat it for the others."""
+    x_m, z_m = POSITIONS_M[person_of(number)]
+    repetition = number - REPETITIONS * person_of(number)
+    if repetition == 0:
         hands.key('F4', *('%.0f' % (1000 * x_m)), 'Tab', *('%.0f' % (1000 * z_m)), 'Return')
-    elif way == 1:
+    elif repetition == 1:
         hands.point_and_click(hands.window.pane.floor, hands.window.pane.floor.place_of(x_m, z_m))
     else:
         hands.key('ctrl+l')
@@ -134,39 +136,50 @@ def run_annotator(*arguments):
     return subprocess.check_output(('rosrun', 'ros_3d_bb', 'annotator') + arguments).decode()
 
 
-def test_everybody_stands_where_the_simulation_has_them_and_is_found_there(campaign):
-    _folder, expected = campaign
-    places_m = np.array([PLACES_M[person_of(number)] for number in range(len(expected))])
-    assert np.abs(expected[:, 2:] - places_m).max() < MILLIMETRE_M
-    assert np.abs(expected[:, :2] - places_m).max() < 0.2
+def test_people_are_measured_at_their_simulated_positions(campaign):
+    session, expected = campaign
+    assert all(frame.label == 'A1' for frame in read_session(session).frames)
+    positions_m = np.array([POSITIONS_M[person_of(number)] for number in range(len(expected))])
+    assert np.abs(expected[:, 2:] - positions_m).max() < MILLIMETRE_M
+    assert np.abs(expected[:, :2] - positions_m).max() < 0.2
 
 
-def test_the_table_holds_the_errors_of_the_campaign_to_the_millimetre(annotated, tmp_path):
-    folder, expected = annotated
+def test_the_bag_contains_the_measured_images(campaign, folder):
+    session = read_session(campaign[0])
+    with rosbag.Bag(str(folder / 'run.bag')) as bag:
+        images = {(topic, message.header.stamp.to_nsec()): message.data
+                  for topic, message, _time in bag.read_messages([COLOR, DEPTH])}
+        topics = set(bag.get_type_and_topic_info().topics)
+    for frame in session.frames:
+        color, depth = read_color(frame, session.camera), read_depth(frame, session)
+        assert images[COLOR, frame.stamp_ns] == np.ascontiguousarray(color).tobytes()
+        assert images[DEPTH, frame.stamp_ns] == depth.values.tobytes()
+    assert {'/camera/color/camera_info', '/yolo_bounding_box', '/ros_3d_bb/bb_3d', '/ros_3d_bb/tracks', '/tf'} <= topics
+
+
+def test_the_table_contains_the_errors_of_the_campaign_to_the_millimetre(annotated, tmp_path):
+    session, expected = annotated
     table = str(tmp_path / 'table.csv')
-    assert run_annotator('--export', table, folder) == '%s: %d measurements\n' % (table, len(expected))
+    assert run_annotator('--export', table, session) == '%s: %d measurements\n' % (table, len(expected))
     with open(table) as stream:
         rows = [{name: int(text) / 1000.0 for name, text in row.items()} for row in csv.DictReader(stream)]
-    told = np.array([[row[name] for name in ('X measured', 'Z measured', 'X true', 'Z true', 'X error', 'Z error')]
-                     for row in rows])
+    written = np.array([[row[name] for name in ('X measured', 'Z measured', 'X true', 'Z true', 'X error', 'Z error')]
+                        for row in rows])
     errors = np.c_[expected, expected[:, :2] - expected[:, 2:]]
-    off = np.abs(told[:, None] - errors[None]).max(axis=-1)  # the table is sorted, and names no measurement
-    assert len(told) == len(errors) and off.min(axis=0).max() < MILLIMETRE_M and off.min(axis=1).max() < MILLIMETRE_M
+    off = np.abs(written[:, None] - errors[None]).max(axis=-1)  # the table is sorted, without IDs of measurements
+    assert len(written) == len(errors)
+    assert off.min(axis=0).max() < MILLIMETRE_M and off.min(axis=1).max() < MILLIMETRE_M
 
 
-def test_the_analysis_sees_the_same_errors(annotated):
-    folder, expected = annotated
-    run_annotator('--analyse', folder)
-    with open(os.path.join(folder, 'analysis', 'summary.json')) as stream:
+def test_the_analysis_contains_the_same_errors_and_the_session_is_valid(annotated):
+    session, expected = annotated
+    run_annotator('--analyse', session)
+    with open(os.path.join(session, 'analysis', 'summary.json')) as stream:
         summary = json.load(stream)
     for axis, name in enumerate('xz'):
         truth_m, error_m = expected[:, 2 + axis], expected[:, axis] - expected[:, 2 + axis]
-        assert len(summary[name]['clusters']) == len(PLACES_M)
+        assert len(summary[name]['clusters']) == len(POSITIONS_M)
         for cluster in summary[name]['clusters']:
             errors_m = error_m[np.abs(truth_m - cluster['truth_m']) < MILLIMETRE_M]
             assert len(errors_m) == cluster['count'] and abs(errors_m.mean() - cluster['mean_m']) < MILLIMETRE_M
-
-
-def test_the_session_is_sound(annotated):
-    folder, _expected = annotated
-    assert 'nothing wrong' in run_annotator('--validate', folder)
+    assert ', 0 problems' in run_annotator('--validate', session)

@@ -1,12 +1,11 @@
-"""The whole pipeline while the ROS master is killed and started again. Needs a master of its own for that."""
+"""The whole pipeline while the ROS master is killed and restarted. The test starts a master of its own for that."""
 import contextlib
 import os
 import signal
-import socket
 import subprocess
 import time
+from unittest import mock
 
-import pytest
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -16,9 +15,10 @@ from std_srvs.srv import Trigger
 
 from ros_3d_bb.conversions.camera_msgs import INFO_TOPICS
 from ros_3d_bb.msg import TrackedObjectArray
-from ros_3d_bb.nodes.common.master_registration import Registration, on_new_master
+from ros_3d_bb.nodes.common.master import Registration, on_new_master
 from ros_3d_bb.nodes.common.measurement_label import Label
 from ros_3d_bb.sessions.session_reader import read_session
+from ros_3d_bb_lab.evaluation.latency.benchmark import free_port
 from support.processes import killed_and_back, pid_of
 from support.ros import TIMEOUT_S, Recorder, launched, wait_until
 from support.stage import RECOVERY_IMAGES, Stage
@@ -26,13 +26,7 @@ from support.stage import RECOVERY_IMAGES, Stage
 NODES = '/depth_detector_node', '/bbox3d_node', '/tracker_node', '/planner_bridge_node'
 
 
-def free_port():
-    with contextlib.closing(socket.socket()) as listener:
-        listener.bind(('', 0))
-        return listener.getsockname()[1]
-
-
-def answers():
+def has_master():
     try:
         return rospy.get_master().getPid()[0] == 1
     except OSError:
@@ -43,60 +37,39 @@ def answers():
 def master(port):
     process = subprocess.Popen(['rosmaster', '--core', '-p', str(port)])
     try:
-        wait_until(answers, 'a master')
+        wait_until(has_master, 'a master')
         yield process
     finally:
         process.kill()
         process.wait()
 
 
-class Failing(object):
-    """Cannot be called the first time."""
-
-    calls = 0
-
-    def __call__(self):
-        self.calls += 1
-        if self.calls == 1:
-            raise OSError('the network is gone again')
-
-
 def set_label(label):
-    """As somebody else does, with rosparam set."""
+    """As with rosparam set."""
     rosgraph.Master('/somebody').setParam('/test_master/label', label)
 
 
-@contextlib.contextmanager
-def reports_of(node):
-    """A function that waits for so many reports of a node on /diagnostics."""
-    with Recorder('/diagnostics', DiagnosticArray) as recorder:
-        def wait_for_reports(count):
-            begin = len(recorder.messages)
-            wait_until(lambda: count <= sum(status.name.startswith(node) for message in recorder.messages[begin:]
-                                            for status in message.status), '%d reports of %s' % (count, node), 40)
-        wait_for_reports(1)
-        yield wait_for_reports
+def wait_for_reports(recorder, node, count):
+    """Wait for this many further reports of a node on /diagnostics."""
+    begin = len(recorder.messages)
+    wait_until(lambda: count <= sum(status.name.startswith(node) for message in recorder.messages[begin:]
+                                    for status in message.status), '%d reports of %s' % (count, node), 40)
 
 
-@pytest.fixture(scope='module')
-def port():
+def test_the_master_is_killed_and_restarted(tmp_path, monkeypatch):
+    """Connected nodes continue meanwhile; then they register again, so that later nodes find them."""
     port = free_port()
-    os.environ['ROS_MASTER_URI'] = 'http://localhost:%d' % port
-    return port
-
-
-def test_the_master_is_killed_and_started_again(port, tmp_path):
-    """Who is connected goes on meanwhile and afterwards; the nodes register again, and are found by who comes later."""
+    monkeypatch.setenv('ROS_MASTER_URI', 'http://localhost:%d' % port)
     with contextlib.ExitStack() as running:
         with master(port) as first:
             rospy.set_param('/use_sim_time', True)
             rospy.init_node('test_master')
             Registration()  # this process has to be found again, too
             running.enter_context(launched('pipeline.launch', 'detector:=depth', 'planner:=costmap', 'respawn:=true'))
-            label, failing = Label(''), Failing()
-            on_new_master(failing)
+            label, failing_once = Label(''), mock.Mock(side_effect=[OSError('the network is gone again'), None])
+            on_new_master(failing_once)
             rospy.set_param('~label', 'A1')
-            assert label.heard() == 'A1'
+            assert label.from_cache() == 'A1'
             stage = Stage()
             depth_camera_pub = rospy.Publisher(INFO_TOPICS[1], CameraInfo, queue_size=10)
             rospy.Subscriber(INFO_TOPICS[0], CameraInfo, depth_camera_pub.publish)  # depth is that of colour
@@ -107,31 +80,32 @@ def test_the_master_is_killed_and_started_again(port, tmp_path):
             wait_until(lambda: stage.tries(TIMEOUT_S) and capture().success, 'a measurement')
             Client('tracker_node', timeout=20).update_configuration({'marker_history': 3.0})
             set_label('A2')
-            wait_until(lambda: label.heard() == 'A2', 'the label that was set')
-            wait_for_reports = running.enter_context(reports_of('bbox3d_node'))
+            wait_until(lambda: label.from_cache() == 'A2', 'the label that was set')
+            diagnostics = running.enter_context(Recorder('/diagnostics', DiagnosticArray))
+            wait_for_reports(diagnostics, 'bbox3d_node', 1)
             first.send_signal(signal.SIGSTOP)
-            wait_for_reports(10)  # after 5 s without images it asks the master why
+            wait_for_reports(diagnostics, 'bbox3d_node', 10)  # after 5 s without images it queries the master
         for _image in range(RECOVERY_IMAGES):
             stage.step()  # without a master
         wait_until(lambda: capture().success, 'a measurement without a master')
         assert [frame.label for frame in read_session(str(tmp_path)).frames] == ['A1', 'A1']
         with master(port):
             began_s = time.monotonic()
-            assert stage.recovered('master killed and started again') == before
+            assert stage.recovered('master killed and restarted') == before
             wait_until(lambda: [pid_of(node) for node in NODES + ('/test_master',)] == pids + [os.getpid()],
                        'the nodes in the new master')
             stage.rows.append('all nodes are registered again after %.1f s' % (time.monotonic() - began_s))
             assert rospy.get_param('/tracker_node/tracker') == 'kalman' and rospy.get_param('/use_sim_time')
-            with Recorder('/ros_3d_bb/tracks', TrackedObjectArray) as newcomer:
+            with Recorder('/ros_3d_bb/tracks', TrackedObjectArray) as later_subscriber:
                 stage.send()
-                newcomer.wait_for(1)
+                later_subscriber.wait_for(1)
             rospy.wait_for_service('viewer_node/capture', timeout=20)
-            wait_until(lambda: rospy.get_param('/tracker_node/marker_history', 0) == 3, 'what was changed meanwhile')
-            wait_until(lambda: failing.calls == 2, 'another registration after one that ended half-way')
+            wait_until(lambda: rospy.get_param('/tracker_node/marker_history', 0) == 3, 'the live parameter')
+            wait_until(lambda: failing_once.call_count == 2, 'another registration after an incomplete one')
             assert rospy.get_param('~label') == 'A2'
             set_label('B1')
-            wait_until(lambda: label.heard() == 'B1', 'the label that was set in the new master')
-            wait_until(lambda: rospy.has_param('/tracker_node_numbers'), 'the numbers in the new master')
+            wait_until(lambda: label.from_cache() == 'B1', 'the label that was set in the new master')
+            wait_until(lambda: rospy.has_param('/tracker_node_numbers'), 'the reserved IDs in the new master')
             killed_and_back('/tracker_node', lambda: time.sleep(0.1))
             after = stage.recovered('tracker killed after that')
             assert min(after.values()) > max(before.values())

@@ -1,4 +1,4 @@
-"""realsense_node on a recording, and on a camera that comes and goes. Needs a master: it is about what is published."""
+"""What realsense_node publishes of a recording, and of a camera that is disconnected."""
 import subprocess
 
 import numpy as np
@@ -9,6 +9,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC as COLOR, DEPTH_TOPIC as DEPTH, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg, transform_from_msg
 from ros_3d_bb.core.time_sync import NS
@@ -19,9 +20,8 @@ from support.realsense_recordings import (COLOR_CAMERA, START_MS, STEP_MS, SUFFI
 from support.ros import Recorder, diagnostics_of, wait_until
 
 FRAMES = 6
-COLOR, DEPTH = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
-TOPICS = {COLOR: Image, DEPTH: Image, 'camera/color/camera_info': CameraInfo,
-          'camera/aligned_depth_to_color/camera_info': CameraInfo, '/tf_static': TFMessage, '/clock': Clock}
+TOPICS = dict({'/tf_static': TFMessage, '/clock': Clock, COLOR: Image, DEPTH: Image},
+              **{topic: CameraInfo for topic in INFO_TOPICS})
 
 
 @pytest.fixture(scope='module')
@@ -32,7 +32,7 @@ def recording(tmp_path_factory):
 
 
 def node(*params):
-    if rospy.has_param('/realsense_node'):  # of the run before
+    if rospy.has_param('/realsense_node'):  # of the previous run
         rospy.delete_param('/realsense_node')
     return subprocess.Popen(['rosrun', 'ros_3d_bb', 'realsense_node'] + ['_' + param for param in params],
                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
@@ -50,7 +50,7 @@ def played(recording):
     return {topic: recorder.messages for topic, recorder in recorders.items()}
 
 
-def test_all_images_come_with_one_stamp_for_colour_depth_and_camera(played):
+def test_all_messages_of_a_frame_have_one_stamp(played):
     expected = [(START_MS + number * STEP_MS) / 1000 for number in range(FRAMES)]
     for topic in set(TOPICS) - {'/tf_static', '/clock'}:
         headers = [message.header for message in played[topic]]
@@ -60,24 +60,21 @@ def test_all_images_come_with_one_stamp_for_colour_depth_and_camera(played):
     assert [message.clock for message in played['/clock'][-FRAMES:]] == [image.header.stamp for image in played[COLOR]]
 
 
-def test_the_images_are_those_of_the_recording_and_depth_is_in_millimetres(played):
+def test_images_and_calibration_are_those_of_the_recording(played):
     for number, message in enumerate(played[COLOR]):
         assert message.encoding == 'rgb8'
         np.testing.assert_array_equal(imgmsg_to_rgb(message), colored(number))
     assert played[DEPTH][0].encoding == '16UC1'
     depth = imgmsg_to_depth(played[DEPTH][0])
     assert depth.values.shape == (480, 640) and depth.values[244, 320] * depth.scale_m == pytest.approx(0.8)
-
-
-def test_the_intrinsics_have_the_lens_of_the_camera(played):
-    for topic in ('camera/color/camera_info', 'camera/aligned_depth_to_color/camera_info'):
+    for topic in INFO_TOPICS:
         camera = camera_from_msg(played[topic][0])
         assert camera.distortion_model == COLOR_CAMERA.distortion_model == 'inverse_brown_conrady'
         np.testing.assert_allclose(camera[2:6] + camera.distortion, COLOR_CAMERA[2:6] + COLOR_CAMERA.distortion,
                                    rtol=1e-6)
 
 
-def test_the_frames_of_the_camera_are_told_once_and_are_a_tree(played):
+def test_the_frames_of_the_camera_are_published_once_and_form_a_tree(played):
     message, = played['/tf_static']
     links = {link.child_frame_id: link for link in message.transforms}
     assert {child: link.header.frame_id for child, link in links.items()} == {
@@ -87,53 +84,50 @@ def test_the_frames_of_the_camera_are_told_once_and_are_a_tree(played):
     np.testing.assert_allclose(ahead, (1, 0, 0), atol=1e-12)
 
 
-@pytest.mark.parametrize('params, complaint', [
+@pytest.mark.parametrize('params, reason', [
     (('file:=/nowhere.bag',), '/nowhere.bag'), (('filters:=median',), "has 'median'"), (('hight:=3',), '~height')])
-def test_what_is_missing_or_wrong_is_said_at_the_start(recording, params, complaint):
+def test_a_node_that_cannot_start_exits_with_the_reason(recording, params, reason):
     process = node(*params)
     output, _none = process.communicate(timeout=30)
-    assert process.returncode == 1 and complaint in output and 'Traceback' not in output
+    assert process.returncode == 1 and reason in output and 'Traceback' not in output
 
 
-class ComingAndGoing(object):
-    """In place of a camera: not there, then there with a bad image among good ones, unplugged, then there again."""
+class UnreliableCamera(object):
+    """In place of RealSense: missing, then connected with incomplete images, unplugged, and connected again."""
 
     opened, closed = 0, 0
     camera, link_from_color, is_over = COLOR_CAMERA, np.eye(4), False
 
     def __init__(self, _params):
-        ComingAndGoing.opened += 1
-        if ComingAndGoing.opened in (1, 3):
+        UnreliableCamera.opened += 1
+        if UnreliableCamera.opened in (1, 3):
             raise CameraLost('no images of a RealSense')
         unplugged = CameraLost('the RealSense has sent no images for 5 s')
-        self._events = ['pair', ValueError('colour came without depth'), None, 'pair']
-        self._events += [unplugged] if ComingAndGoing.opened == 2 else ['pair'] * 1000
+        self._events = ['frame', ValueError('colour without depth'), None, 'frame']
+        self._events += [unplugged] if UnreliableCamera.opened == 2 else ['frame'] * 1000
 
     def read(self):
         rospy.sleep(0.05)
         event = self._events.pop(0)
         if isinstance(event, Exception):
             raise event
-        return event and RgbdFrame(rospy.get_rostime().to_nsec(), colored(ComingAndGoing.opened),
+        return event and RgbdFrame(rospy.get_rostime().to_nsec(), colored(UnreliableCamera.opened),
                                    DepthImage(np.full((480, 640), 2500, np.uint16), 0.0001))
 
     def close(self):
-        ComingAndGoing.closed += 1
+        UnreliableCamera.closed += 1
 
 
-def test_a_camera_that_is_unplugged_is_waited_for_and_bad_images_are_left_out(recording, monkeypatch):
-    for name in ('/realsense_node', '/test_realsense_node'):
-        if rospy.has_param(name):
-            rospy.delete_param(name)
-    monkeypatch.setattr(realsense_node, 'RealSense', ComingAndGoing)
+def test_the_node_waits_for_an_unplugged_camera_and_drops_incomplete_images(recording, monkeypatch):
+    monkeypatch.setattr(realsense_node, 'RealSense', UnreliableCamera)
     monkeypatch.setattr(realsense_node, 'RETRY_S', 0.1)
     with Recorder(DEPTH, Image, publisher_expected=False) as depth, Recorder(COLOR, Image, False) as color:
         realsense_node.RealSenseNode()
-        wait_until(lambda: any(message.data[0] == 4 for message in color.messages), 'images of the camera that is back')
+        wait_until(lambda: any(message.data[0] == 4 for message in color.messages), 'images of the second connection')
         depth.wait_for(3)
-    assert ComingAndGoing.opened == 4 and ComingAndGoing.closed == 1
-    assert depth.messages[0].encoding == '32FC1' and imgmsg_to_depth(depth.messages[0]).values[0,
-                                                                                               0] == pytest.approx(0.25)
+    assert UnreliableCamera.opened == 4 and UnreliableCamera.closed == 1
+    assert depth.messages[0].encoding == '32FC1'
+    assert imgmsg_to_depth(depth.messages[0]).values[0, 0] == pytest.approx(0.25)
     assert abs(color.messages[-1].header.stamp.to_nsec() - rospy.get_rostime().to_nsec()) < 60 * NS
     _level, _message, counts = diagnostics_of('test_realsense_node')
-    assert counts['camera lost'] >= 3 and counts['images refused'] >= 1
+    assert counts['camera lost'] >= 3 and counts['images rejected'] >= 1

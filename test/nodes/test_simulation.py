@@ -1,7 +1,4 @@
-"""simulation.launch as ./run demo starts it: a scene through the whole pipeline into a bag, and the report of it.
-
-Needs a master, as it is about all nodes together, with the simulator's clock.
-"""
+"""simulation.launch as in `./run demo`: the bag of a scene, and its report. Needs a master and simulated time."""
 import os
 
 import pytest
@@ -24,7 +21,7 @@ robot: {moves: [{to: [0.4, 0.0], speed: 0.2}]}
 
 @pytest.fixture(scope='module')
 def bag(tmp_path_factory):
-    """The bag of a run; the folder has a space in its name, as folders may."""
+    """Bag of a run, in a folder with a space in its name."""
     rospy.init_node('test_simulation')
     folder = tmp_path_factory.mktemp('a scene')
     (folder / 'scene.yaml').write_text(SCENE)
@@ -35,7 +32,7 @@ def bag(tmp_path_factory):
     return path
 
 
-def test_the_scene_ends_by_itself_and_everybody_was_followed(bag):
+def test_all_people_are_tracked_until_the_end_of_the_scene(bag):
     with rosbag.Bag(bag) as opened:
         result = score(read_recording(opened).moments)
     assert result.images > 30
@@ -45,7 +42,7 @@ def test_the_scene_ends_by_itself_and_everybody_was_followed(bag):
     assert result.false_share < 0.1
 
 
-def test_the_bag_holds_what_is_needed_to_play_it_again(bag):
+def test_the_bag_has_the_topics_for_playback(bag):
     with rosbag.Bag(bag) as opened:
         topics = opened.get_type_and_topic_info().topics
     assert {'/camera/color/image_raw', '/camera/aligned_depth_to_color/image_raw', '/camera/color/camera_info', '/tf',
@@ -54,7 +51,7 @@ def test_the_bag_holds_what_is_needed_to_play_it_again(bag):
     assert not {'/ros_3d_bb/color', '/yolo_result_out'} & set(topics)
 
 
-def test_positions_come_with_the_covariance_of_the_simulated_camera(bag):
+def test_boxes_have_the_covariance_of_the_simulated_camera(bag):
     with rosbag.Bag(bag) as opened:
         boxes = [box for _topic, message, _time in opened.read_messages(['/ros_3d_bb/bb_3d']) for box in message.boxes]
     assert len(boxes) > 30
@@ -63,6 +60,6 @@ def test_positions_come_with_the_covariance_of_the_simulated_camera(bag):
         assert 0.01 ** 2 < min(variances) and max(variances) < 0.5 ** 2
 
 
-def test_the_report_is_made_of_it(bag, tmp_path):
+def test_a_report_is_written(bag, tmp_path):
     assert len(write_report(bag, str(tmp_path / 'report.png'))) == 5
     assert os.path.getsize(str(tmp_path / 'report.png')) > 10000

@@ -1,4 +1,4 @@
-"""simulator_node as a user starts it. Needs a master: it is about what is published, when, and with what time."""
+"""Messages, stamps and clock of simulator_node. Needs a master."""
 import os
 import subprocess
 import time
@@ -11,6 +11,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
+from ros_3d_bb.conversions.perception_msgs import tracks_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -37,7 +38,7 @@ def path(tmp_path_factory):
 
 
 def simulator(*params):
-    if rospy.has_param('/simulator_node'):  # of the run before
+    if rospy.has_param('/simulator_node'):  # of the previous test
         rospy.delete_param('/simulator_node')
     return subprocess.Popen(['rosrun', 'ros_3d_bb', 'simulator_node'] + ['_' + param for param in params],
                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
@@ -45,7 +46,7 @@ def simulator(*params):
 
 @pytest.fixture(scope='module')
 def round_of_scene(path):
-    """{topic: messages} of one round, where the node tells the time."""
+    """{topic: messages} of one round with the clock of the node."""
     recorders = {topic: Recorder(topic, kind, publisher_expected=False) for topic, kind in TOPICS.items()}
     recorders['/clock'] = Recorder('/clock', Clock, publisher_expected=False)
     process = simulator('scenario:=' + path, 'publish_clock:=true', 'repeat:=false', 'wait_for_subscribers:=1')
@@ -54,7 +55,7 @@ def round_of_scene(path):
     return {topic: recorder.messages for topic, recorder in recorders.items()}
 
 
-def test_everything_comes_with_the_stamps_of_the_scene(round_of_scene):
+def test_all_messages_have_the_stamps_of_the_scene(round_of_scene):
     stamps = [message.header.stamp for message in round_of_scene['ground_truth']]
     assert [(stamp - stamps[0]).to_nsec() for stamp in stamps] == [number * NS // 10 for number in range(10)]
     for topic in set(TOPICS) - {'/tf'}:
@@ -72,12 +73,11 @@ def test_the_images_are_those_of_the_scenario(round_of_scene, path):
         np.testing.assert_array_equal(imgmsg_to_rgb(round_of_scene['camera/color/image_raw'][number]), frame.color)
         depth = imgmsg_to_depth(round_of_scene['camera/aligned_depth_to_color/image_raw'][number])
         np.testing.assert_array_equal(depth.values, frame.depth_mm)
-        person, = round_of_scene['ground_truth'][number].objects
-        place = person.pose.pose.position
-        np.testing.assert_allclose((place.x, place.y, place.z), frame.people[0].position_m)
+        person, = tracks_from_msg(round_of_scene['ground_truth'][number])
+        np.testing.assert_allclose(person.position_m, frame.people[0].position_m)
 
 
-def test_without_its_own_clock_the_stamps_are_the_time_and_go_on_in_the_next_round(path):
+def test_without_publish_clock_stamps_are_the_time_of_the_machine(path):
     began = time.time()
     with Recorder('ground_truth', TrackedObjectArray, publisher_expected=False) as truth:
         process = simulator('scenario:=' + path)
@@ -92,11 +92,11 @@ def test_without_its_own_clock_the_stamps_are_the_time_and_go_on_in_the_next_rou
     assert stamps[-1] < time.time()
 
 
-@pytest.mark.parametrize('params,complaint', [
+@pytest.mark.parametrize('params,reason', [
     ((), 'no scenario given'), (('scenario:=/nowhere.yaml',), '/nowhere.yaml'),
     (('scenario:=' + os.devnull, 'speed:=0'), '~speed is 0'), (('scenario:=x', 'speed:=2.0'), 'publish_clock'),
     (('scenario:=x', 'sped:=2'), 'did you mean ~speed'), (('scenario:=' + os.devnull, 'rate:=-5.0'), 'rate is -5')])
-def test_what_is_missing_or_wrong_is_said_at_the_start(path, params, complaint):
+def test_invalid_parameters_are_rejected_at_the_start(path, params, reason):
     process = simulator(*params)
     output, _none = process.communicate(timeout=30)
-    assert process.returncode == 1 and complaint in output and 'Traceback' not in output
+    assert process.returncode == 1 and reason in output and 'Traceback' not in output

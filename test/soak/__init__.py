@@ -1,1 +1,1 @@
-"""The whole graph for half an hour, with faults: `./run soak`."""
+"""Soak test of the whole graph with faults: `./run soak`."""

@@ -1,4 +1,4 @@
-"""The camera, the robot's transforms and the clock: good images of scenes, and what faults make of them."""
+"""The camera, the transforms of the robot, and the clock: images of scenes, which faults change."""
 import collections
 import itertools
 import threading
@@ -14,8 +14,8 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 
-ROUNDS = 3  # of one scene, forwards and backwards, before the next
-AFTER_JUMP_NS = 1009  # added at each jump, so that no stamp comes twice
+ROUNDS = 3  # repetitions of a scene, forwards and backwards, before the next one
+AFTER_JUMP_NS = 1009  # added at each jump, so that no stamp is repeated
 OTHERS = {BOXES_TOPIC: Int32MultiArray, BOXES3D_TOPIC: BoundingBox3DArray, TRACKS_TOPIC: TrackedObjectArray}
 
 
@@ -27,41 +27,32 @@ def rendered(scenario, images, with_boxes):
 
 
 class Camera(object):
-    """Sends images at a rate, with a clock of its own, until it is stopped.
+    """Sends images at a rate, and publishes a clock, until it is stopped.
 
-    Attributes, which faults change
-    -------------------------------
-    sends, tells_time : bool
-        Whether there are images, and whether /clock goes on.
-    missing : set of str
-        Topics that are left out.
-    change : callable or None
-        Makes another message of a (topic, message).
-    throw_in : callable or None
-        Returns [(topic, message), ...] that come with an image of a stamp.
-    images, wrong_ns, sent
-        See `records.Record`.
+    `images`, `wrong_ns` and `sent` are those of `records.Record`. Faults change `sends` (images), `publishes_clock`,
+    `missing` (topics that are left out), `change` (a function of topic and message, which returns another message) and
+    `throw_in` (a function of the stamp and the messages of an image, which returns messages to be sent with it).
     """
 
     def __init__(self, scenes, rate_hz):
-        self.sends, self.tells_time, self.missing, self.change, self.throw_in = True, True, set(), None, None
+        self.sends, self.publishes_clock, self.missing = True, True, set()
+        self.change, self.throw_in = lambda _topic, message: message, lambda _stamp_ns, _good: []
         self.images, self.wrong_ns, self.sent = [], set(), collections.Counter()
         self._scenes, self._period_ns = scenes, int(NS / rate_hz)
         self._now_ns, self._jump_ns, self._runs = START_NS + 1000 * NS, 0, True
-        types = dict(TYPES, **OTHERS)
         self._pubs = {topic: rospy.Publisher('/tf' if topic == TF_TOPIC else topic, kind, queue_size=10)
-                      for topic, kind in types.items()}
+                      for topic, kind in dict(TYPES, **OTHERS).items()}
         self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=10)
         self._thread = threading.Thread(target=self._run)
         self._thread.daemon = True
         self._thread.start()
 
     def jump(self, seconds):
-        """Let the stamps of all that follows be later, or earlier."""
+        """Shift all later stamps."""
         self._jump_ns += int(seconds * NS) + AFTER_JUMP_NS
 
     def stop(self):
-        """Send the last image."""
+        """Stop after the current image."""
         self._runs = False
         self._thread.join()
 
@@ -73,20 +64,19 @@ class Camera(object):
             due_s = max(due_s + self._period_ns / NS, time.monotonic() - self._period_ns / NS)
             time.sleep(max(0.0, due_s - time.monotonic()))
             jump_ns, self._jump_ns = self._jump_ns, 0
-            if self.tells_time or jump_ns:
+            if self.publishes_clock or jump_ns:
                 self._now_ns += self._period_ns + jump_ns
                 self._clock_pub.publish(Clock(time_from(self._now_ns)))
-            if self.sends and self.tells_time:
+            if self.sends and self.publishes_clock:
                 self._send(next(played))
 
     def _send(self, messages):
         stamp = time_from(self._now_ns)
-        wrong = self.throw_in(self._now_ns, dict(messages)) if self.throw_in else []
+        wrong = self.throw_in(self._now_ns, dict(messages))
         self.images.append((self._now_ns, time.monotonic()))
         for topic, message in messages:
             if topic not in self.missing:
-                message = with_stamp(message, stamp)
-                self._publish(topic, self.change(topic, message) if self.change else message)
+                self._publish(topic, self.change(topic, with_stamp(message, stamp)))
         for topic, stamp_ns, message in wrong:
             self.wrong_ns.add(stamp_ns)
             self._publish(topic, message)

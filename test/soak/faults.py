@@ -1,21 +1,20 @@
-"""What goes wrong on robots. Each is a context manager: the block is the time of the fault; it yields its name."""
+"""Faults. Each is a context manager, which yields the name of the fault and lasts while its cause exists."""
 import contextlib
 import copy
+import functools
 import os
 import signal
 import subprocess
 import sys
 
 import numpy as np
-from geometry_msgs.msg import TransformStamped
-from tf2_msgs.msg import TFMessage
 
 from fuzz import hostile
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, TF_TOPIC
 from ros_3d_bb.conversions.image_msgs import array_from, fill_image
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, time_from
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb_lab.evaluation.latency.benchmark import eating_a_core
+from ros_3d_bb_lab.evaluation.latency.benchmark import cpu_load
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import stamp_in
 
 DETECTORS = ('depth_detector_node', 'yolov5_node')
@@ -35,23 +34,19 @@ ALL_OUTPUTS = (BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC, 'visualization_marker_a
 
 @contextlib.contextmanager
 def node_killed(rig):
-    """The cause ends when the node that was started in its place speaks."""
+    """The cause ends when the respawned node publishes diagnostics."""
     node = rig.source.choice(sorted(rig.graph.pids))
     pid = rig.graph.pids[node]
     rig.killed.add(pid)
     os.kill(pid, signal.SIGKILL)
     yield '%s killed' % node
-    rig.wait_until(lambda: _speaks(rig, node, pid), '%s to be back' % node)
-
-
-def _speaks(rig, node, pid_before):
-    newest = rig.witness.newest_status(node)
-    return rig.graph.pids[node] != pid_before and newest is not None and newest.pid == rig.graph.pids[node]
+    rig.wait_until(lambda: rig.graph.pids[node] != pid and rig.witness.has_status_of(node, rig.graph.pids[node]),
+                   'respawned %s' % node)
 
 
 @contextlib.contextmanager
 def node_hangs(rig):
-    """Mostly the detector."""
+    """In half of the cases it is the detector."""
     nodes = sorted(rig.graph.pids)
     detectors = [node for node in nodes if node in DETECTORS]
     node = rig.source.choice(detectors if detectors and rig.source.random() < 0.5 else nodes)
@@ -64,136 +59,101 @@ def node_hangs(rig):
 
 
 @contextlib.contextmanager
-def camera_pauses(rig):
-    """While time goes on."""
-    rig.camera.sends = False
+def _camera_with(rig, name, attribute, value):
+    """An attribute of the camera has another value."""
+    before = getattr(rig.camera, attribute)
+    setattr(rig.camera, attribute, value)
     try:
-        yield 'camera pauses'
+        yield name
     finally:
-        rig.camera.sends = True
+        setattr(rig.camera, attribute, before)
 
 
-@contextlib.contextmanager
+def camera_pauses(rig):
+    """Time continues."""
+    return _camera_with(rig, 'camera pauses', 'sends', False)
+
+
 def bag_pauses(rig):
     """Time stands still."""
-    rig.camera.tells_time = False
-    try:
-        yield 'bag pauses'
-    finally:
-        rig.camera.tells_time = True
+    return _camera_with(rig, 'bag pauses', 'publishes_clock', False)
 
 
-@contextlib.contextmanager
 def topic_stops(rig):
-    """tf, or the depth images alone."""
+    """Either tf, or the depth images alone, or camera_info."""
     topic, name = rig.source.choice(((TF_TOPIC, 'tf stops'), (TF_TOPIC, 'tf stops'), (DEPTH_TOPIC, 'no depth images'),
                                      (INFO_TOPICS[0], 'no camera_info')))
-    rig.camera.missing = {topic}
-    try:
-        yield name
-    finally:
-        rig.camera.missing = set()
+    return _camera_with(rig, name, 'missing', {topic})
 
 
-@contextlib.contextmanager
-def bag_loops(rig):
-    """Time goes back, far or little."""
-    rig.camera.jump(-rig.source.choice((2.0, 10.0, 60.0)))
-    yield 'time jumps back'
-
-
-@contextlib.contextmanager
-def bag_seeks(rig):
-    """Time goes on later."""
-    rig.camera.jump(rig.source.choice((2.0, 30.0, 3600.0)))
-    yield 'time jumps ahead'
-
-
-@contextlib.contextmanager
-def wrong_messages(rig):
-    """Beside the good ones, on all topics."""
-    rig.camera.throw_in = lambda stamp_ns, good: _wrong(rig.wrong_source, stamp_ns, good)
-    try:
-        yield 'wrong messages'
-    finally:
-        rig.camera.throw_in = None
-
-
-def _wrong(source, stamp_ns, good):
-    """[(topic, stamp, message), ...] of one image."""
-    make = {INFO_TOPICS[0]: lambda: hostile.camera_info(source, stamp_ns, good[INFO_TOPICS[0]]),
-            DEPTH_TOPIC: lambda: hostile.image(source, stamp_ns, good[DEPTH_TOPIC]),
-            COLOR_TOPIC: lambda: hostile.image(source, stamp_ns, good[COLOR_TOPIC]),
-            BOXES_TOPIC: lambda: hostile.boxes2d(source, stamp_ns),
-            BOXES3D_TOPIC: lambda: hostile.boxes3d(source, stamp_ns),
-            TRACKS_TOPIC: lambda: hostile.tracks(source, stamp_ns),
-            TF_TOPIC: lambda: _late_transform(source)}
-    topics = [source.choice(sorted(make)) for _message in range(source.choice((1, 2, 4)))]
-    return [(topic, _stamp(message), message) for topic, message in ((topic, make[topic]()) for topic in topics)]
-
-
-def _stamp(message):
-    """Its stamp; 0 where it has none that one could read."""
-    if isinstance(message, TFMessage):
-        return 0
-    try:
-        return stamp_in(message) or 0
-    except ValueError:
-        return 0
-
-
-def _late_transform(source):
-    """Of a time that tf2 cannot reckon with."""
-    transform = TransformStamped(child_frame_id='odom')
-    transform.header.frame_id, transform.header.stamp = 'map', time_from(source.choice((2 ** 31, 2 ** 32 - 1)) * NS)
-    transform.transform.rotation.w = 1.0
-    return TFMessage([transform])
-
-
-@contextlib.contextmanager
 def camera_changes(rig):
-    """Its camera_info: uncalibrated, of another size, not a number; or smaller depth images than it says."""
-    name, change = rig.source.choice((('camera_info without focal length', _uncalibrated),
-                                      ('camera_info of another size', _halved), ('camera_info not a number', _nan),
-                                      ('depth not aligned', _smaller_depth)))
-    rig.camera.change = change
-    try:
-        yield name
-    finally:
-        rig.camera.change = None
+    """camera_info without focal length, of another size, or not a number; or depth that does not match it."""
+    name, change = rig.source.choice((
+        ('camera_info without focal length', functools.partial(_change_info, lambda info: {'K': [0.0] * 9})),
+        ('camera_info of another size', functools.partial(
+            _change_info, lambda info: {'width': info.width // 2, 'height': info.height // 2})),
+        ('camera_info not a number', functools.partial(
+            _change_info, lambda info: {'K': [float('nan')] + list(info.K[1:])})),
+        ('depth not aligned', _shrink_depth)))
+    return _camera_with(rig, name, 'change', change)
 
 
-def _uncalibrated(topic, message):
-    return _changed(message, K=[0.0] * 9) if topic in INFO_TOPICS else message
+def _change_info(fields_of, topic, message):
+    if topic not in INFO_TOPICS:
+        return message
+    changed = copy.copy(message)
+    for name, value in fields_of(message).items():
+        setattr(changed, name, value)
+    return changed
 
 
-def _halved(topic, message):
-    return _changed(message, width=message.width // 2, height=message.height // 2) if topic in INFO_TOPICS else message
-
-
-def _nan(topic, message):
-    return _changed(message, K=[float('nan')] + list(message.K[1:])) if topic in INFO_TOPICS else message
-
-
-def _smaller_depth(topic, message):
+def _shrink_depth(topic, message):
     if topic != DEPTH_TOPIC:
         return message
     return fill_image(copy.copy(message), np.ascontiguousarray(array_from(message)[::2, ::2]), message.encoding)
 
 
-def _changed(message, **fields):
-    message = copy.copy(message)
-    for name, value in fields.items():
-        setattr(message, name, value)
-    return message
+@contextlib.contextmanager
+def time_jumps_back(rig):
+    """As in a bag that loops."""
+    rig.camera.jump(-rig.source.choice((2.0, 10.0, 60.0)))
+    yield 'time jumps back'
+
+
+@contextlib.contextmanager
+def time_jumps_ahead(rig):
+    """As in a bag when the user seeks."""
+    rig.camera.jump(rig.source.choice((2.0, 30.0, 3600.0)))
+    yield 'time jumps ahead'
+
+
+def wrong_messages(rig):
+    """Beside the valid ones, on all topics."""
+    return _camera_with(rig, 'wrong messages', 'throw_in', functools.partial(_wrong_messages_of, rig.wrong_source))
+
+
+def _wrong_messages_of(source, stamp_ns, good):
+    """[(topic, stamp, message), ...] that accompany an image."""
+    make = hostile.makers(source, stamp_ns, good)
+    make[TF_TOPIC] = lambda: hostile.transforms(source.choice((2 ** 31, 2 ** 32 - 1)) * NS)  # invalid for tf2
+    topics = [source.choice(sorted(make)) for _message in range(source.choice((1, 2, 4)))]
+    return [(topic, _stamp_of(message), message) for topic, message in ((topic, make[topic]()) for topic in topics)]
+
+
+def _stamp_of(message):
+    """Stamp of a message; 0 if it has none or an unreadable one."""
+    try:
+        return stamp_in(message) or 0
+    except (AttributeError, ValueError):
+        return 0
 
 
 @contextlib.contextmanager
 def subscriber_never_reads(rig):
-    """A process that connects to all outputs, and then stops."""
+    """A process that subscribes to all outputs, and then stops."""
     process = subprocess.Popen([sys.executable, '-c', NEVER_READS] + ['/' + topic for topic in ALL_OUTPUTS])
     try:
-        rig.wait_until(lambda: process.poll() is not None or _is_stopped(process.pid), 'a subscriber to stop')
+        rig.wait_until(lambda: process.poll() is not None or _is_stopped(process.pid), 'stopped subscriber')
         yield 'a subscriber never reads' if process.poll() is None else 'a subscriber did not start'
     finally:
         process.kill()
@@ -206,14 +166,14 @@ def _is_stopped(pid):
 
 
 @contextlib.contextmanager
-def cpu_is_taken(_rig):
-    """Two processes that compute."""
-    with eating_a_core(True), eating_a_core(True):
-        yield 'CPU taken'
+def cpu_is_loaded(_rig):
+    """By two processes."""
+    with cpu_load(2):
+        yield 'CPU loaded'
 
 
-# (fault, whether it lasts, whether stamps may go back)
+# (fault, whether it lasts, whether stamps may decrease)
 FAULTS = ((node_killed, False, True), (node_hangs, True, False), (camera_pauses, True, False),
-          (bag_pauses, True, False), (topic_stops, True, False), (bag_loops, False, True), (bag_seeks, False, False),
-          (wrong_messages, True, True), (camera_changes, True, False), (subscriber_never_reads, True, False),
-          (cpu_is_taken, True, False))
+          (bag_pauses, True, False), (topic_stops, True, False), (time_jumps_back, False, True),
+          (time_jumps_ahead, False, False), (wrong_messages, True, True), (camera_changes, True, False),
+          (subscriber_never_reads, True, False), (cpu_is_loaded, True, False))

@@ -1,4 +1,4 @@
-"""Runs the graph, brings the faults about one after the other, and writes down what comes."""
+"""Runs the graph, injects one fault after the other, and records the outputs."""
 import os
 import signal
 import sys
@@ -9,33 +9,31 @@ import rospy
 
 from fuzz import hostile
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
-from ros_3d_bb_lab.simulation.scenario import ScenarioError, read_scenario
+from ros_3d_bb_lab.simulation.scenario import read_scenario
 from soak.camera import Camera, rendered
 from soak.faults import FAULTS
 from soak.graph import Graph, GraphEnded
 from soak.invariants import outcomes_are_known
-from soak.records import INTERRUPTED, FaultDone, Record
+from soak.records import INTERRUPTED, Fault, Record
 from soak.witness import Witness
 
-START_S = 180.0  # a detector may have to export its network first
-RECOVERY_S = 60.0  # what has not come back by then, or within --recover-within, does not come back
-QUIET_S = 3.0, 8.0  # between two faults, shortest and longest
-QUIET_SHARE = 1 / 60.0  # of a soak that is so short that this is less
-SHORTEST_S, LONGEST_S = 2.0, 10.0  # of a fault; a short soak has shorter ones
-POLL_S = 0.02
-PROGRESS_S = 0.5
-SETTLING_S = 4.0  # the nodes tell their counts every second
+START_S = 180.0  # includes the time for exporting the network of a detector
+RECOVERY_S = 60.0  # time without recovery, or --recover-within, after which a fault counts as permanent
+QUIET_S, QUIET_SHARE = (3.0, 8.0), 1 / 60.0  # shortest and longest time between faults; share of a short soak
+SHORTEST_S, LONGEST_S = 2.0, 10.0  # duration of a fault; at most a 30th of the soak
+POLL_S, PROGRESS_S = 0.02, 0.5
+SETTLING_S = 4.0  # nodes publish their counters every second
 
 
 class Interrupted(Exception):
-    """Somebody pressed Ctrl-C."""
+    """Ctrl-C was pressed."""
 
 
 class Rig(object):
-    """What faults work on: `camera`, `graph`, `witness`, and who was `killed`.
+    """Interface of the faults: `camera`, `graph`, `witness`, and the process IDs that were `killed`.
 
-    Of the seed are `source`, which says what comes when, and `wrong_source` of wrong messages: these depend on how many
-    images the machine sends, and must not change what comes next.
+    `source` determines the sequence of faults. Invalid messages have their own `wrong_source`, because their number
+    depends on how many images the machine sends.
     """
 
     def __init__(self, graph, scenes, arguments):
@@ -44,162 +42,110 @@ class Rig(object):
         self.witness, self.camera = Witness(graph), Camera(scenes, arguments.rate)
         self._stopped = threading.Event()
         self._seconds, self._patience_s = 60 * arguments.minutes, max(RECOVERY_S, arguments.recover_within)
-        self._quiet_s = min(QUIET_S[0], QUIET_SHARE * self._seconds)
-        self._began_s, self._shown_s, self._doing = time.monotonic(), 0.0, 'starting'
+        self._began_s, self._shown_s, self._activity = time.monotonic(), 0.0, 'starting'
         signal.signal(signal.SIGINT, lambda *_: self._stopped.set())
-
-    @property
-    def ends_s(self):
-        """When it is to end."""
-        return self._began_s + self._seconds
 
     def wait(self, seconds):
         """Raises Interrupted, GraphEnded."""
         ends_s = time.monotonic() + seconds
         while time.monotonic() < ends_s:
-            self._look()
+            self._poll()
 
     def wait_until(self, condition, what, longest_s=START_S):
-        """Raises Interrupted, and GraphEnded where it does not come."""
-        gives_up_s = time.monotonic() + longest_s
+        """Raises Interrupted, and GraphEnded if the condition is not met in time."""
+        ends_s = time.monotonic() + longest_s
         while not condition():
-            if time.monotonic() > gives_up_s:
-                raise GraphEnded('%.0f s were not enough for %s' % (longest_s, what))
-            self._look()
+            if time.monotonic() > ends_s:
+                raise self.graph.failure('no %s within %.0f s' % (what, longest_s))
+            self._poll()
 
-    def _look(self):
+    def _poll(self):
         self.graph.check()
         if self._stopped.is_set():
             raise Interrupted()
         now_s = time.monotonic()
         if now_s - self._shown_s > PROGRESS_S:
             self._shown_s = now_s
-            self._show(min(1.0, (now_s - self._began_s) / self._seconds))
+            share = min(1.0, (now_s - self._began_s) / self._seconds)
+            sys.stderr.write('\r[%-30s] %3d %%  %5d images, %5d answered, %3d faults; %-36s' % (
+                '#' * int(30 * share), int(100 * share), len(self.camera.images),
+                len(self.witness.arrivals[TRACKS_TOPIC]), len(self.faults), self._activity))
+            sys.stderr.flush()
         time.sleep(POLL_S)
 
-    def _show(self, share):
-        sys.stderr.write('\r[%-30s] %3d %%  %5d images, %5d answered, %3d faults; %-36s' % (
-            '#' * int(30 * share), int(100 * share), len(self.camera.images),
-            len(self.witness.arrivals[TRACKS_TOPIC]), len(self.faults), self._doing))
-        sys.stderr.flush()
-
-    def begin(self):
-        """Wait for the first tracks; from then on it counts."""
-        self.wait_until(lambda: self.witness.tracks, 'the first tracks')
-        self._began_s = time.monotonic()
-
     def play(self):
-        """Fault after fault, each kind once before any comes again. Raises Interrupted, GraphEnded."""
-        self._doing = 'no fault'
-        self.wait(self._quiet_s)
+        """Inject the faults in random order, each kind once before any is repeated. Raises Interrupted, GraphEnded."""
+        self.wait_until(lambda: self.witness.tracks, 'tracks')
+        self._began_s = time.monotonic()
+        ends_s = self._began_s + self._seconds
+        short_quiet_s = min(QUIET_S[0], QUIET_SHARE * self._seconds)
+        self._activity = 'no fault'
+        self.wait(short_quiet_s)
         while True:
             for kind in self.source.sample(FAULTS, len(FAULTS)):
-                if time.monotonic() >= self.ends_s:
+                if time.monotonic() >= ends_s:
                     return
-                self._fault(*kind)
-                self._doing = 'no fault'
-                quiet_s = self.source.uniform(*QUIET_S) if self._seconds > 300 else self._quiet_s
-                self.wait(max(0.0, min(quiet_s, self.ends_s - time.monotonic())))
+                self._inject(*kind)
+                self._activity = 'no fault'
+                quiet_s = self.source.uniform(*QUIET_S) if self._seconds > 300 else short_quiet_s
+                self.wait(max(0.0, min(quiet_s, ends_s - time.monotonic())))
 
-    def _fault(self, fault, lasts, disturbs):
+    def _inject(self, fault, lasts, disorders):
         longest_s = min(LONGEST_S, max(SHORTEST_S, self._seconds / 30))
-        began_s, number = time.monotonic(), len(self.faults)
-        self.faults.append(FaultDone(INTERRUPTED, began_s, began_s, None, disturbs))
+        began_s = time.monotonic()
+        self.faults.append(Fault(INTERRUPTED, began_s, began_s, None, disorders))
         with fault(self) as name:
-            self._doing = name
+            self._activity = name
             self.wait(self.source.uniform(SHORTEST_S, longest_s) if lasts else 0.0)
         ended_s, sent = time.monotonic(), len(self.camera.images)
-        self._doing = 'after: %s' % name
-        recovered_s = self._recovered_s(sent)
-        self.faults[number] = FaultDone(name, began_s, ended_s, recovered_s, disturbs)
+        self._activity = 'after: %s' % name
+        recovered_s = time.monotonic() if self._is_met(lambda: self._is_answered_since(sent)) else None
+        self.faults[-1] = Fault(name, began_s, ended_s, recovered_s, disorders)
 
-    def _recovered_s(self, sent):
-        """When one of the images after the first `sent` was answered; None: never. Raises Interrupted, GraphEnded."""
+    def _is_met(self, condition):
+        """Wait for a condition. If it is not met, the invariants report it; only the end of the graph is an error."""
         try:
-            self.wait_until(lambda: self._answered_since(sent), 'an answer', self._patience_s)
-            return time.monotonic()
+            self.wait_until(condition, 'answer', self._patience_s)
         except GraphEnded:
-            self.graph.check()  # no recovery is a finding; no graph is the end
-            return None
+            self.graph.check()
+        return condition()
 
-    def _answered_since(self, sent):
-        """Whether one of the images after the first `sent` was answered by tracks."""
+    def _is_answered_since(self, sent):
+        """Whether one of the images after the first `sent` was answered with tracks."""
         new_ns = set(stamp_ns for stamp_ns, _sent_s in self.camera.images[sent:])
         return any(stamp_ns in new_ns for _at_s, stamp_ns in self.witness.arrivals[TRACKS_TOPIC][-20:])
 
     def settle(self):
-        """Let the nodes tell what became of the last inputs. A second Ctrl-C ends that, too."""
+        """Wait for the outcomes of the last inputs. A second Ctrl-C ends this."""
         self._stopped.clear()
-        self._doing = 'waiting for the last counts'
+        self._activity = 'waiting for the last counters'
         self.camera.stop()
         self.wait(SETTLING_S)
-        try:
-            self.wait_until(lambda: outcomes_are_known(self.witness.statuses), 'the last counts', self._patience_s)
-        except GraphEnded:
-            self.graph.check()  # an input without an outcome is a finding
+        self._is_met(lambda: outcomes_are_known(self.witness.statuses))
 
     def record(self):
-        """What was written down."""
+        """Copy of everything that was measured."""
         witness, camera, graph = self.witness, self.camera, self.graph
         return Record(self._began_s, time.monotonic(), list(camera.images), set(camera.wrong_ns), dict(camera.sent),
-                      {topic: list(arrivals) for topic, arrivals in witness.arrivals.items()}, list(witness.tracks),
-                      list(witness.statuses), list(self.faults), list(graph.deaths), set(self.killed),
-                      list(graph.errors))
+                      {topic: list(arrivals) for topic, arrivals in witness.arrivals.items()}, dict(witness.empty),
+                      list(witness.tracks), list(witness.statuses), list(self.faults), list(graph.deaths),
+                      set(self.killed), list(graph.errors))
 
 
 def soak(arguments, port, folder):
-    """Run it.
-
-    Returns
-    -------
-    (Record or None, dict or str, bool)
-        What was written down, with how many arrays were empty by topic; or None and why there is nothing; and whether
-        somebody ended it.
-    """
-    options = {'detector': arguments.detector, 'weights': arguments.weights or ''}
-    try:
-        scenes = [rendered(read_scenario(path), arguments.images, arguments.detector == 'none')
-                  for path in arguments.scenarios]
-        with Graph(folder, port, ['%s:=%s' % option for option in options.items()]) as graph:
-            _wait_for_master(graph)
-            rospy.init_node('soak', disable_signals=True)
-            rig = Rig(graph, scenes, arguments)
-            interrupted = _played(rig)
-            return rig.record(), dict(rig.witness.empty), interrupted
-    except (GraphEnded, ScenarioError, OSError) as error:
-        return None, '%s%s' % (error, _tail(folder)), False
-    except KeyboardInterrupt:
-        return None, 'ended before it began', False
-
-
-def _played(rig):
-    """Play it all; whether somebody ended it."""
+    """Run a soak. Returns its Record, and whether it was interrupted. Raises GraphEnded, ValueError, OSError."""
+    scenes = [rendered(read_scenario(path), arguments.images, arguments.detector == 'none')
+              for path in arguments.scenarios]
+    options = ['detector:=%s' % arguments.detector, 'weights:=%s' % (arguments.weights or '')]
     interrupted = False
-    try:
-        rig.begin()
-        rig.play()
-    except Interrupted:
-        interrupted = True
-    try:
-        rig.settle()
-    except Interrupted:
-        interrupted = True
-    sys.stderr.write('\n')
-    return interrupted
-
-
-def _wait_for_master(graph):
-    gives_up_s = time.monotonic() + START_S
-    while not rospy.core.rosgraph.is_master_online():
-        graph.check()
-        if time.monotonic() > gives_up_s:
-            raise GraphEnded('no ROS master came')
-        time.sleep(0.1)
-
-
-def _tail(folder):
-    path = os.path.join(folder, 'launch.log')
-    if not os.path.exists(path):
-        return ''
-    with open(path) as stream:
-        return '\nThe end of its log:\n%s' % ''.join(stream.readlines()[-30:])
+    with Graph(os.path.join(folder, 'launch.log'), port, options) as graph:
+        graph.wait_for_master(START_S)
+        rospy.init_node('soak', disable_signals=True)
+        rig = Rig(graph, scenes, arguments)
+        for phase in (rig.play, rig.settle):
+            try:
+                phase()
+            except Interrupted:
+                interrupted = True
+        sys.stderr.write('\n')
+        return rig.record(), interrupted

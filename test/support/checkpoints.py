@@ -1,4 +1,4 @@
-"""Checkpoints in the form of the official ones, of random weights: pickled instances of classes of `models`."""
+"""Checkpoints with random weights in the official format: pickled instances of classes of `models`."""
 import contextlib
 import sys
 import types
@@ -10,18 +10,18 @@ from ros_3d_bb.detection.yolov5.network import Bottleneck, C3, Concat, Conv, Det
 
 
 def write_checkpoint(path, layout, yaml=None, root='Model', anchor_grid=False, **extra):
-    """Write a checkpoint of random float16 weights; returns the network it was made of, with the same weights.
+    """Write a checkpoint of random float16 weights and return its network.
 
     Parameters
     ----------
     yaml : dict, optional
-        The layout that the file claims, where it is not that of the weights.
+        The layout in the file, by default that of the weights.
     root : str
         Name of the model's class in `models.yolo`: Model (to release 6.1), DetectionModel (6.2 on), or another.
     anchor_grid : bool
-        Whether the anchors are kept twice, as in release 5.0.
+        Whether the anchors are stored twice, as in release 5.0.
     **extra
-        More entries of the checkpoint, beside `model`.
+        Other entries of the checkpoint, beside `model`.
     """
     network = random_network(layout).half()
     if anchor_grid:
@@ -39,7 +39,7 @@ def write_checkpoint(path, layout, yaml=None, root='Model', anchor_grid=False, *
 
 
 def random_network(layout, seed=0):
-    """A network of ours with random weights, statistics that keep the signal alive, and the layout's anchors."""
+    """A network with random weights, statistics that preserve the signal, and the anchors of the layout."""
     torch.manual_seed(seed)
     network = Network(layout)
     for module in network.modules():
@@ -54,19 +54,14 @@ def random_network(layout, seed=0):
 
 @contextlib.contextmanager
 def official_classes(root='Model'):
-    """Modules `models`, `models.common` and `models.yolo` with empty classes of the official names, while it lasts.
-
-    Yields {our class: the official one}.
-    """
-    places = {Conv: 'models.common', C3: 'models.common', Bottleneck: 'models.common', SPP: 'models.common',
-              SPPF: 'models.common', Focus: 'models.common', Concat: 'models.common', Detect: 'models.yolo',
-              Network: 'models.yolo'}
+    """Context with modules `models.common` and `models.yolo` of empty official classes; yields {our class: theirs}."""
     modules = {name: types.ModuleType(name) for name in ('models', 'models.common', 'models.yolo')}
     classes = {}
-    for own, place in places.items():
+    for own in (Conv, C3, Bottleneck, SPP, SPPF, Focus, Concat, Detect, Network):
+        module = 'models.yolo' if own in (Detect, Network) else 'models.common'
         name = root if own is Network else own.__name__
-        classes[own] = type(name, (torch.nn.Module,), {'__module__': place})
-        setattr(modules[place], name, classes[own])
+        classes[own] = type(name, (torch.nn.Module,), {'__module__': module})
+        setattr(modules[module], name, classes[own])
     sys.modules.update(modules)
     try:
         yield classes

@@ -1,17 +1,17 @@
-"""The fenced blocks of code in Markdown pages."""
+"""Fenced blocks of code in Markdown pages."""
 import os
 import re
 from typing import NamedTuple
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-# Whose blocks are run. Pages of doc/ that are not here have none, or tests of their own.
+# Pages with blocks that are run. Other pages of doc/ have none, or tests of their own.
 PAGES = ('README.md',) + tuple('doc/%s.md' % name for name in (
     'bags', 'benchmarks', 'cameras', 'campaign', 'detectors', 'doctor', 'faults', 'installing', 'jackal', 'planners',
     'realsense', 'rviz', 'security', 'simulation', 'tuning'))
 
 
 class Block(NamedTuple):
-    """What stands between two fences: `language` as the opening fence names it, '' where it names none."""
+    """Text between two fences; `language` is '' if the opening fence names none."""
 
     page: str
     line: int
@@ -20,7 +20,7 @@ class Block(NamedTuple):
 
 
 def blocks_in(page):
-    """The blocks of a page, by its path in the package."""
+    """Blocks of a page, given by its path in the package."""
     with open(os.path.join(ROOT, page), encoding='utf-8') as stream:
         text = stream.read()
     return [Block(page, text.count('\n', 0, match.start()) + 1, match.group(1), match.group(2))
@@ -32,10 +32,7 @@ _claimed = []
 
 
 def claimed(beginning, language='bash'):
-    """The block that begins like this, for the test that runs it. Raises LookupError where none does, or another one.
-
-    A block that stands on several pages is run once.
-    """
+    """The only block that begins like this, for the test that runs it; a block on several pages counts once."""
     found = {block.text: block for block in BLOCKS if block.language == language and block.text.startswith(beginning)}
     if len(found) != 1:
         raise LookupError('%d blocks of %s begin with %r; 1 expected' % (len(found), language, beginning))
@@ -44,5 +41,5 @@ def claimed(beginning, language='bash'):
 
 
 def unclaimed():
-    """The blocks that no test runs."""
+    """Blocks that no test runs."""
     return [block for block in BLOCKS if block.text not in _claimed]

@@ -1,4 +1,4 @@
-"""Drive the annotator's window on a display by real keys and a real mouse. Import it when DISPLAY is set."""
+"""Drive the window of the annotator by keys and the mouse of a display. Import it after DISPLAY is set."""
 import os
 import subprocess
 
@@ -9,16 +9,16 @@ KEYSYMS = {'-': 'minus', '.': 'period'}
 
 
 class Hands(Driver):
-    """A Driver whose keys and clicks come from the display."""
+    """A Driver with key presses and clicks on the display."""
 
     def key(self, *names):
-        """Press keys by X's names for them; a digit, a minus or a point may be named as it is."""
+        """Press keys, given by their names in X, or as a digit, a minus or a point."""
         self._do('key', *[KEYSYMS.get(name, name) for name in names])
 
-    def point_and_click(self, widget, place):
-        """Move the mouse to a place (QPointF) in a widget and click."""
-        there = widget.mapToGlobal(place.toPoint())
-        self._do('mousemove', str(there.x()), str(there.y()), 'click', '1')
+    def point_and_click(self, widget, position):
+        """Click on a position (QPointF) in a widget."""
+        pixel = widget.mapToGlobal(position.toPoint())
+        self._do('mousemove', str(pixel.x()), str(pixel.y()), 'click', '1')
 
     def click_in_image(self, pixel):
         """Click on a pixel (u, v) of the colour image."""

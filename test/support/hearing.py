@@ -1,14 +1,12 @@
-"""As a command: wait until each of some topics has brought something, in a field of its message where one is named.
+"""Command that waits for messages: `hearing.py SECONDS TOPIC[:FIELD] ...`.
 
-`hearing.py SECONDS TOPIC[:FIELD] ...` ends with 0 once something that is not empty came on all of them, else with 1 and
-what is missing.
+The exit status is 0 once a message, with a field that is not empty, has arrived on each topic; otherwise 1.
 """
 import sys
 import time
 
 import rospy
-
-from support.ros_types import message_class
+from genpy.message import get_message_class
 
 
 def wait_for(wanted, seconds):
@@ -20,7 +18,7 @@ def wait_for(wanted, seconds):
         for name in sorted(missing - set(subscribers)):
             topic, _colon, field = name.partition(':')
             if rospy.resolve_name(topic) in kinds:
-                subscribers[name] = rospy.Subscriber(topic, message_class(kinds[rospy.resolve_name(topic)]),
+                subscribers[name] = rospy.Subscriber(topic, get_message_class(kinds[rospy.resolve_name(topic)]),
                                                      _checker(name, field, missing), buff_size=2 ** 24)
         time.sleep(0.1)
     return sorted(missing)

@@ -1,4 +1,4 @@
-"""What launch files would set and start, with stand-ins for packages that are not on every machine."""
+"""The parameters and nodes of launch files, with stand-ins for packages that are not on every machine."""
 import os
 import subprocess
 import sys
@@ -21,7 +21,7 @@ RS_CAMERA_ARGUMENTS = tuple('''
     filters clip_distance linear_accel_cov initial_reset reconnect_timeout wait_for_device_timeout
     unite_imu_method topic_odom_in calib_odom_file publish_odom_tf
     stereo_module/exposure/1 stereo_module/gain/1 stereo_module/exposure/2 stereo_module/gain/2'''.split())
-# A robot that takes in the camera as jackal.urdf.xacro does.
+# A robot that includes the camera as jackal.urdf.xacro does.
 JACKAL_TO_BE_EXTENDED = """<robot name="jackal" xmlns:xacro="http://www.ros.org/wiki/xacro">
   <link name="base_link"/>
   <xacro:include filename="$(optenv JACKAL_URDF_EXTRAS empty.urdf)"/>
@@ -34,36 +34,36 @@ GAZEBO_ARGUMENTS = {
 
 
 def write(path, text):
-    """Write a file and the folders that it is in."""
+    """Write a file and create its folders."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text)
 
 
 def stand_in_launch_file(folder, name, arguments, more=''):
-    """A launch file `package/...` in `folder` that knows these arguments and puts them into parameters /stub/NAME.
-
-    `more` stands below them, and may use them.
-    """
+    """A launch file `package/...` that copies its arguments into parameters /stub/NAME; `more` may use them."""
     lines = ['<arg name="%s" default=""/><param name="/stub/%s" type="str" value="$(arg %s)"/>' % ((arg,) * 3)
              for arg in arguments]
     write(folder / name, '<launch>%s%s</launch>' % (''.join(lines), more))
-    package = name.split('/')[0]
-    write(folder / package / 'package.xml', '<package format="2"><name>%s</name></package>' % package)
+    write_package(folder, name.split('/')[0])
+
+
+def write_package(folder, name):
+    write(folder / name / 'package.xml', '<package format="2"><name>%s</name></package>' % name)
 
 
 def stand_in_gazebo(folder):
-    """Packages in place of Gazebo's and Jackal's, in a folder."""
+    """Stand-ins for the packages of Gazebo and Jackal."""
     for name, arguments in GAZEBO_ARGUMENTS.items():
         stand_in_launch_file(folder, name, arguments, '<param name="robot_description" value="bare"/>')
     write(folder / 'jackal_description' / 'urdf' / 'jackal.urdf.xacro', JACKAL_TO_BE_EXTENDED)
     write(folder / 'xacro' / 'xacro', '#!%s\nimport xacro\nxacro.main()\n' % sys.executable)
     (folder / 'xacro' / 'xacro').chmod(0o755)
-    for name in ('jackal_description', 'xacro'):
-        write(folder / name / 'package.xml', '<package format="2"><name>%s</name></package>' % name)
+    write_package(folder, 'jackal_description')
+    write_package(folder, 'xacro')
 
 
 def dumped(launch_file, packages, *arguments, **environment):
-    """The parameters that roslaunch would set, with the packages in a folder before all others."""
+    """The parameters that roslaunch would set; packages in the folder `packages` precede all others."""
     path = '%s:%s:%s' % (packages, ROOT, os.environ.get('ROS_PACKAGE_PATH', ''))
     command = [sys.executable, '-c', 'import roslaunch; roslaunch.main()', '--dump-params',
                os.path.join(ROOT, 'launch', launch_file)] + list(arguments)
@@ -71,7 +71,7 @@ def dumped(launch_file, packages, *arguments, **environment):
 
 
 def given_to_stand_ins(parameters):
-    """What stand-ins were given, {argument: text}, without what was left empty."""
+    """The arguments of stand-ins, {argument: text}, without empty ones."""
     return {key[len('/stub/'):]: value for key, value in parameters.items() if key.startswith('/stub/') and value}
 
 

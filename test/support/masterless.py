@@ -1,7 +1,7 @@
-"""Nodes in this process without a master: what they subscribe, publish and ask of tf is taken by objects of ours.
+"""Nodes in this process without a master: their subscribers, publishers and tf buffers are replaced by recording ones.
 
-Only rospy's and tf2's connections are replaced; the nodes and their callbacks are the real ones. What a node publishes
-is serialized, as rospy would; what it is sent has been, too (see `on_the_wire`).
+Only the connections of rospy and tf2 are replaced; the nodes and their callbacks are the real ones. Published messages
+are serialized, as by rospy; so are the messages that are sent to them (see `on_the_wire`).
 """
 import contextlib
 import io
@@ -12,124 +12,85 @@ import tf2_ros
 
 
 def on_the_wire(message):
-    """The message as a subscriber gets it. Raises what genpy raises where a field cannot be sent."""
+    """The message as a subscriber receives it. Raises the error of genpy if a field cannot be sent."""
     buffer = io.BytesIO()
     message.serialize(buffer)
     return type(message)().deserialize(buffer.getvalue())
 
 
 class Publisher(object):
-    """Keeps what was published last, and counts."""
+    """Keeps and counts the published messages. It has a subscriber, so that every output is computed."""
 
-    def __init__(self, topic, kind, **_options):
+    def __init__(self, topic, kind):
         self.topic, self.kind, self.count, self.newest = topic, kind, 0, None
 
     def publish(self, message):
-        """Serialize a message, as rospy does where somebody subscribes."""
+        """Serialize a message, as rospy does."""
         self.newest = on_the_wire(message)
         self.count += 1
 
     def get_num_connections(self):
-        """Somebody always looks, so that everything is made."""
         return 1
 
 
-class Subscriber(object):
-    """Keeps a callback."""
-
-    def __init__(self, topic, kind, callback, **_options):
-        self.topic, self.kind, self.callback = topic, kind, callback
-
-    def unregister(self):
-        """Nothing is connected."""
-
-
 class Buffer(tf2_ros.BufferCore):
-    """tf2's buffer with transforms that a test sets."""
+    """tf2's buffer with transforms that a test sets; lookups do not wait, which would need a clock."""
 
-    def __init__(self, **_options):
-        super(Buffer, self).__init__()
-
-    def lookup_transform(self, target_frame, source_frame, stamp):
-        """Without a wait, which needs a clock."""
-        return self.lookup_transform_core(target_frame, source_frame, stamp)
+    lookup_transform = tf2_ros.BufferCore.lookup_transform_core
 
 
-class Immediately(object):
-    """In place of the worker thread: works at once. Errors, which a worker only counts, are kept."""
-
-    def __init__(self, work, _on_error):
-        self._work = work
-
-    def offer(self, item):
-        """Work on an item."""
-        self._work(item)
+def immediate_worker(work, _on_error):
+    """Replaces NewestWorker: works at once, and raises errors, which a worker would only count."""
+    def offer(item):
+        work(item)
         return False
-
-    def stop(self):
-        """There is no thread."""
+    return mock.Mock(offer=offer)
 
 
 class Connections(object):
-    """What the nodes made in `masterless` have connected to.
-
-    Attributes
-    ----------
-    publishers, subscribers : dict
-        By topic.
-    services : dict
-        Types by name.
-    buffers : list
-        tf buffers.
-    now : genpy.Time
-        What rospy takes for the time.
-    """
+    """Connections of the nodes that were created in `masterless`, and ROS time."""
 
     def __init__(self):
-        self.publishers, self.subscribers, self.services, self.buffers, self.timers = {}, {}, {}, [], []
+        self.publishers, self.subscribers = {}, {}  # by topic
+        self.services, self.buffers, self.timers = {}, [], []  # types by name, tf buffers, and callbacks
         self.now = genpy.Time(1)
 
     def send(self, topic, message):
         """Call the callback of a topic."""
-        message._connection_header = {'callerid': 'test'}  # which tf2's listener asks for
+        message._connection_header = {'callerid': 'test'}  # required by tf2's listener
         self.subscribers[topic].callback(message)
 
-    def _keeping(self, kept, kind):
-        def made(topic, *arguments, **options):
-            kept[topic] = kind(topic, *arguments, **options)
-            return kept[topic]
-        return made
+    def _publisher(self, topic, kind, **_options):
+        self.publishers[topic] = Publisher(topic, kind)
+        return self.publishers[topic]
 
-    def _buffer(self, **options):
-        self.buffers.append(Buffer(**options))
+    def _subscriber(self, topic, kind, callback, **_options):
+        self.subscribers[topic] = mock.Mock(topic=topic, kind=kind, callback=callback)
+        return self.subscribers[topic]
+
+    def _buffer(self, **_options):
+        self.buffers.append(Buffer())
         return self.buffers[-1]
-
-    def _service(self, name, kind, _handler):
-        self.services[name] = kind
-
-    def _timer(self, _period, callback, **_options):
-        self.timers.append(callback)
 
 
 @contextlib.contextmanager
 def masterless(params=()):
-    """Within the block nodes can be made, with these private parameters (a dict). Yields Connections."""
+    """Within the block, nodes can be created, with these private parameters (a dict). Yields Connections."""
     connections = Connections()
     replaced = {
-        'rospy.Publisher': connections._keeping(connections.publishers, Publisher),
-        'rospy.Subscriber': connections._keeping(connections.subscribers, Subscriber),
-        'rospy.Service': connections._service, 'rospy.Timer': connections._timer, 'rospy.on_shutdown': mock.Mock(),
-        'rospy.set_param': mock.Mock(),
+        'rospy.Publisher': connections._publisher, 'rospy.Subscriber': connections._subscriber,
+        'rospy.Service': lambda name, kind, _handler: connections.services.update({name: kind}),
+        'rospy.Timer': lambda _period, callback, **_options: connections.timers.append(callback),
+        'rospy.on_shutdown': mock.Mock(), 'rospy.set_param': mock.Mock(),
         'rospy.get_param': lambda name, default=None: dict(params) if name == '~' else default,
         'rospy.resolve_name': lambda name: '/' + name, 'rospy.is_shutdown': lambda: False,
         'rospy.get_rostime': lambda: connections.now, 'rospy.rostime.get_rostime': lambda: connections.now,
         'rospy.logwarn_throttle': lambda _period_s, text, *arguments: text % arguments,
         'tf2_ros.Buffer': connections._buffer,
         'diagnostic_updater.Updater': mock.Mock(),
-        'ros_3d_bb.nodes.yolov5_node.NewestWorker': Immediately,
-        'ros_3d_bb.nodes.depth_detector_node.NewestWorker': Immediately,
-        'ros_3d_bb.nodes.common.persistent_track_ids.NewestWorker': Immediately,
-        'ros_3d_bb.nodes.bbox3d_node.NewestWorker': Immediately,
+        'ros_3d_bb.nodes.common.detector_output.NewestWorker': immediate_worker,
+        'ros_3d_bb.nodes.tracker_node.NewestWorker': immediate_worker,
+        'ros_3d_bb.nodes.bbox3d_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.bbox3d_node.patient_master': mock.Mock()}
     for level in ('loginfo', 'logwarn', 'loginfo_once'):
         replaced['rospy.' + level] = lambda text, *arguments: text % arguments

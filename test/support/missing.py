@@ -1,4 +1,4 @@
-"""Which tests need packages of requirements.txt that a machine with no more than the keys of package.xml lacks."""
+"""Tests that need packages of requirements.txt, which a machine with only the dependencies of package.xml lacks."""
 import ast
 import importlib.util
 import os
@@ -8,15 +8,15 @@ TEST = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
 def is_missing(module):
-    """Whether this Python does not find a module, such as `onnx` or `torch.export`."""
+    """Whether a module such as `onnx` or `torch.export` is not installed."""
     try:
         return importlib.util.find_spec(module) is None
-    except ImportError:  # the package that it is in
+    except ImportError:  # of its package
         return True
 
 
 def missing_requirements():
-    """Names of modules: what requirements*.txt ask for and this Python does not find."""
+    """Names of the modules in requirements*.txt that are not installed."""
     names = set()
     for name in ('requirements.txt', 'requirements_no_deps.txt'):
         with open(os.path.join(TEST, name)) as stream:
@@ -25,7 +25,7 @@ def missing_requirements():
 
 
 def imports_when_loaded(path):
-    """Modules that a file of the tests imports at its top, and what those of test/support import for it."""
+    """Modules that a test file imports, also by modules of test/support."""
     with open(path) as stream:
         body = ast.parse(stream.read()).body
     names = [name.name for node in body if isinstance(node, ast.Import) for name in node.names]
@@ -41,5 +41,5 @@ def imports_when_loaded(path):
 
 
 def misses_something(item):
-    """Whether a module is missing that a test says it needs: `@pytest.mark.needs('module')`."""
+    """Whether a module is missing that a test needs: `@pytest.mark.needs('module')`."""
     return any(is_missing(name) for mark in item.iter_markers('needs') for name in mark.args)

@@ -1,4 +1,4 @@
-"""Tables of the thesis' form with known statistics."""
+"""Tables in the format of the thesis with known statistics."""
 import csv
 
 import numpy as np
@@ -9,14 +9,13 @@ RANGES_M, SIDES_M = (0.6, 0.9, 1.2, 1.5, 2.0, 2.5, 3.0), (-1.23, -0.65, 0.0, 0.6
 Z_SIGMA_M, X_SIGMA_M = 0.0474, 0.018
 
 
-def rows_of(repetitions=6, noise=1.0, seed=1):
-    """Rows in millimetres. The mean error of each cluster is exactly that of the polynomials; so is the standard
-    deviation of the noise, times `noise`."""
-    random, rows = np.random.RandomState(seed), []
+def rows_of(repetitions=6):
+    """Rows in millimetres. The clusters have exactly the mean errors of the polynomials and the standard deviations."""
+    random, rows = np.random.RandomState(1), []
     for z_m in RANGES_M:
         for x_m in SIDES_M:
             z_error_m, x_error_m = (
-                np.polyval(poly, true_m) + noise * sigma_m * _standardised(random.normal(size=repetitions))
+                np.polyval(poly, true_m) + sigma_m * _standardised(random.normal(size=repetitions))
                 for poly, true_m, sigma_m in ((Z_POLY, z_m, Z_SIGMA_M), (X_POLY, x_m, X_SIGMA_M)))
             rows += [[1000 * value for value in (x_m + x, x_m, z_m + z, z_m, x, abs(x), z, abs(z))]
                      for x, z in zip(x_error_m, z_error_m)]

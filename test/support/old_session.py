@@ -1,4 +1,4 @@
-"""Measurements in the thesis' own old form: measurements.txt, and images of which the depth is stretched."""
+"""Measurements in the old format of the thesis: measurements.txt, and images with stretched depth."""
 import os
 
 import cv2
@@ -6,11 +6,10 @@ import numpy as np
 
 LINES = ('[(-7, 3, 300)];30-03-2021-11-49-54', '[(2971, 535, 6102), (-7, 2, 300)];30-03-2021-11-49-56',
          '[(24, 81, 2431)];30-03-2021-11-53-28', '[(24, 81, 2431)];30-03-2021-11-53-28', '[];30-03-2021-11-53-29')
-FIRST_CAMPAIGN_LINES = ('[(-2, 5, 288), (123, 24, 288)] 18-03-2021-12-34-53', '[(12, 5, 295)] 18-03-2021-12-34-55')
 
 
 def write_old_session(folder, lines=LINES, kinds=('raw', 'color', 'depth'), bits=16):
-    """Write the lines and, of each time in them, the images; returns the folder."""
+    """Write the lines and the images of each time in them; returns the folder."""
     os.makedirs(folder, exist_ok=True)
     with open(os.path.join(folder, 'measurements.txt'), 'w') as stream:
         stream.write('\n'.join(lines) + '\n')

@@ -1,10 +1,9 @@
-"""The messages of packages that planners bring along and that are not on every machine, made from their definitions.
+"""Messages of packages of planners, which may not be installed, generated from their definitions.
 
 Types and names of the fields are those of the .msg files in the public repositories wg-perception/people,
 rst-tu-dortmund/costmap_converter, astuff/astuff_sensor_msgs (derived_object_msgs), ros-perception/vision_msgs (0.0.1
-and 0.0.2, the releases for ROS 1) and ros/common_msgs (shape_msgs). `PUBLISHED_MD5` are the checksums in code that
-others generated from those files; a checksum depends on every field, in order, down to the last nested one.
-ras_carla's RasObject is here for its checksum only: it holds a derived_object_msgs/Object.
+and 0.0.2, the releases for ROS 1) and ros/common_msgs (shape_msgs). `PUBLISHED_MD5` are checksums from published code;
+ras_carla's RasObject, which contains a derived_object_msgs/Object, is only used for its checksum.
 """
 import functools
 import importlib

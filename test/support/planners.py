@@ -1,12 +1,23 @@
-"""What planners do with the messages of planner_bridge_node: replicas of what their public sources do, traps included.
-
-They are written from the behaviour of the sources named at each, and take over none of their text.
-"""
+"""What planners do with the messages of planner_bridge_node: replicas of the behaviour of the sources named at each."""
+import genpy
 import numpy as np
+from geometry_msgs.msg import Point, PoseWithCovariance, Vector3
 from sensor_msgs import point_cloud2
+
+from ros_3d_bb.msg import TrackedObject
 
 LETHAL, FREE = 254, 0
 CYLINDER, CYLINDER_RADIUS = 3, 1
+
+
+def person(number, x, y, moving=True, speed=1.0):
+    """A track that walks along x of the map, predicted for 2 s."""
+    track = TrackedObject(id=number, moving=moving, prediction_step=genpy.Duration(2), size=Vector3(0.6, 0.6, 1.7))
+    track.pose.pose.position = Point(x, y, 0.85)
+    track.twist.twist.linear.x = speed
+    track.prediction = [PoseWithCovariance()]
+    track.prediction[0].pose.position = Point(x + 2 * speed, y, 0.85)
+    return track
 
 
 def yaw_of(quaternion):
@@ -29,25 +40,23 @@ def moved_float32(points, transform):
 class TebReplica(object):
     """teb_local_planner (Noetic): teb_local_planner_ros.cpp and obstacles.h.
 
-    It keeps the last array for ever and looks at its stamp never. Positions are transformed by the latest transform
-    from the array's frame (the identity where there is none); velocities are not. An obstacle of less than 1 mm/s is
-    static; another one moves on from where it is at the moment of planning.
+    It keeps the last array and ignores its stamp. Positions are transformed by the latest transform from the array's
+    frame (the identity where there is none); velocities are not. An obstacle of less than 1 mm/s is static; another one
+    moves on from its position at the moment of planning.
     """
 
     def __init__(self, planner_from):
-        self._planner_from, self._array = planner_from, None
+        self._planner_from = planner_from
 
     def receive(self, array):
         self._array = array
 
     def obstacles(self):
         """(centre (2,), radius, velocity (2,) or None) of each circle."""
-        if self._array is None:
-            return []
         transform = self._planner_from.get(self._array.header.frame_id, np.eye(4))
         found = []
         for obstacle in self._array.obstacles:
-            assert len(obstacle.polygon.points) == 1 and obstacle.radius > 0  # else it is no circle to TEB
+            assert len(obstacle.polygon.points) == 1 and obstacle.radius > 0  # otherwise it is not a circle to TEB
             point = obstacle.polygon.points[0]
             velocity = np.array([obstacle.velocities.twist.linear.x, obstacle.velocities.twist.linear.y])
             found.append((moved([point.x, point.y, point.z], transform)[0, :2], obstacle.radius,
@@ -55,7 +64,7 @@ class TebReplica(object):
         return found
 
     def predicted(self, ahead_s):
-        """Where it expects the circles' centres, seconds after it plans, (n, 2)."""
+        """Expected centres of the circles, seconds after planning, (n, 2)."""
         return np.array([centre + ahead_s * (0 if velocity is None else velocity)
                          for centre, _radius, velocity in self.obstacles()]).reshape(-1, 2)
 
@@ -63,7 +72,7 @@ class TebReplica(object):
 class JackalMpcReplica(object):
     """mpc_planner_jackal (tud-amr/mpc_planner): ros1_jackal.cpp, obstacleCallback.
 
-    No frame and no stamp is looked at. Number 0 is left out (by some versions; the public one takes it). A cylinder's
+    Frame and stamp are ignored. ID 0 is skipped (by some versions, not the public one). A cylinder's
     radius is the second dimension. The twist is turned by minus the yaw of the pose, and the prediction is straight on
     from the moment of arrival.
     """
@@ -87,26 +96,23 @@ class JackalMpcReplica(object):
 class SocialLayerReplica(object):
     """social_navigation_layers: social_layer.cpp.
 
-    It keeps the last list and looks at its stamp never. Position, and position plus velocity, are transformed by the
-    latest transform; their difference is the velocity.
+    It keeps the last list and ignores its stamp. Position, and position plus velocity, are transformed by the latest
+    transform; their difference is the velocity.
     """
 
     def __init__(self, costmap_from):
-        self._costmap_from, self._people = costmap_from, None
+        self._costmap_from = costmap_from
 
     def receive(self, people):
         self._people = people
 
     def people(self):
         """(position (3,), velocity (3,)) of each."""
-        if self._people is None:
-            return []
-        transform = self._costmap_from[self._people.header.frame_id]
         found = []
         for person in self._people.people:
             position = np.array([person.position.x, person.position.y, person.position.z])
             end = position + [person.velocity.x, person.velocity.y, person.velocity.z]
-            start, end = moved([position, end], transform)
+            start, end = moved([position, end], self._costmap_from[self._people.header.frame_id])
             found.append((start, end - start))
         return found
 
@@ -114,10 +120,9 @@ class SocialLayerReplica(object):
 class ObstacleLayerReplica(object):
     """costmap_2d's ObstacleLayer and ObservationBuffer with observation_persistence 0.
 
-    Each source keeps its last cloud for ever, less the points outside of the heights, which count in the costmap's
-    frame. Clouds are moved there in float32. At an update the rays from the
-    sensor's origin to all points of the clearing clouds are set free, and then the points of the marking clouds that
-    are in range are set lethal. What no ray meets stays as it was.
+    Each source keeps its last cloud without the points outside of the heights in the costmap's frame. Clouds are moved
+    there in float32. At an update the rays from the sensor's origin to all points of the clearing clouds are set free,
+    and then the points of the marking clouds that are in range are set lethal. Other cells do not change.
 
     Parameters
     ----------

@@ -1,5 +1,6 @@
-"""Nodes as processes, to be killed and stopped; and what else takes their cores or never reads what they send."""
+"""Processes of nodes, to be killed and stopped, and processes that disturb them."""
 import contextlib
+import glob
 import os
 import signal
 import socket
@@ -13,12 +14,19 @@ import rospy
 
 from support.ros import TIMEOUT_S, wait_until
 
-BUSY = 'while True: pass'
+
+def processes_naming(text):
+    """The number of processes with a text in their command line."""
+    found = 0
+    for path in glob.glob('/proc/[0-9]*/cmdline'):
+        with contextlib.suppress(OSError), open(path) as stream:  # a process may have ended
+            found += text in stream.read()
+    return found
 
 
 def pid_of(node):
-    """The process of a node; None where it does not answer."""
-    code, _said, uri = rospy.get_master().lookupNode(node)
+    """The process of a node; None if it does not respond."""
+    code, _status, uri = rospy.get_master().lookupNode(node)
     try:
         return ServerProxy(uri).getPid(rospy.get_name())[2] if code == 1 else None
     except (OSError, Fault):
@@ -26,18 +34,18 @@ def pid_of(node):
 
 
 def killed_and_back(node, meanwhile):
-    """Kill a node and call `meanwhile` until it was started again; returns after how many seconds."""
+    """Kill a node and call `meanwhile` until it is restarted; returns the elapsed seconds."""
     pid, began_s = pid_of(node), time.monotonic()
     os.kill(pid, signal.SIGKILL)
     while pid_of(node) in (None, pid):
-        assert time.monotonic() - began_s < TIMEOUT_S, '%s was not started again' % node
+        assert time.monotonic() - began_s < TIMEOUT_S, '%s was not restarted' % node
         meanwhile()
     return time.monotonic() - began_s
 
 
 @contextlib.contextmanager
 def hanging(node):
-    """A node does nothing within the block."""
+    """A node is stopped within the block."""
     pid = pid_of(node)
     os.kill(pid, signal.SIGSTOP)
     try:
@@ -48,8 +56,8 @@ def hanging(node):
 
 @contextlib.contextmanager
 def starved(at_once):
-    """So many processes for each core want all of it."""
-    busy = [subprocess.Popen([sys.executable, '-c', BUSY]) for _process in range(at_once * os.cpu_count())]
+    """This many processes for each core run endless loops."""
+    busy = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(at_once * os.cpu_count())]
     try:
         yield
     finally:
@@ -61,15 +69,15 @@ def starved(at_once):
 
 @contextlib.contextmanager
 def never_reading(node, topic, kind):
-    """A subscriber of a node that takes nothing of what that sends."""
+    """A node has a subscriber that never reads from its connection."""
     uri = rospy.get_master().lookupNode(node)[2]
-    _code, _said, (_protocol, host, port) = ServerProxy(uri).requestTopic('/deaf', topic, [['TCPROS']])
+    _code, _status, (_protocol, host, port) = ServerProxy(uri).requestTopic('/subscriber', topic, [['TCPROS']])
     with contextlib.closing(socket.socket()) as connection:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         connection.connect((host, port))
-        fields = ['callerid=/deaf', 'topic=' + topic, 'md5sum=' + kind._md5sum, 'type=' + kind._type]
+        fields = ['callerid=/subscriber', 'topic=' + topic, 'md5sum=' + kind._md5sum, 'type=' + kind._type]
         header = b''.join(struct.pack('<I', len(field)) + field.encode() for field in fields)
         connection.sendall(struct.pack('<I', len(header)) + header)
-        wait_until(lambda: any(entry[1] == '/deaf' and entry[4] == topic for entry in ServerProxy(uri).getBusInfo(
-            '/deaf')[2]), 'the connection of a subscriber of ' + topic)
+        wait_until(lambda: any(entry[1] == '/subscriber' and entry[4] == topic for entry in ServerProxy(uri).getBusInfo(
+            '/subscriber')[2]), 'the connection of a subscriber of ' + topic)
         yield

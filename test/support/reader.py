@@ -1,4 +1,4 @@
-"""A reader's machine: what the README tells to type is typed here, with stand-ins for what a test machine has not."""
+"""Runs the commands of the README as a user types them, with stand-ins for what a test machine does not have."""
 import contextlib
 import os
 import shutil
@@ -9,13 +9,16 @@ import sys
 import tempfile
 import time
 from hashlib import sha1
+from unittest import mock
 
+from ros_3d_bb_lab.evaluation.latency.benchmark import free_port
 from support.code_blocks import ROOT
 from support.launching import RS_CAMERA_ARGUMENTS, stand_in_gazebo, stand_in_launch_file, write
+from support.screen import start_screen
 
 SUPPORT = os.path.join(ROOT, 'test', 'support')
-PATIENCE_S = 120  # of a machine that is busy; nothing waits so long where all is well
-# A driver has the camera's frames below camera_link, and knows nothing of the robot.
+PATIENCE_S = 120  # on a busy machine
+# A driver publishes the camera's frames below camera_link, and no frames of the robot.
 CAMERA_DRIVER = """
 <node pkg="ros_3d_bb" type="replay_node" name="$(arg camera)_realsense">
   <param name="bag" value="$(env READER_BAG)"/> <param name="rate" value="5"/> <remap from="/tf" to="not_a_driver"/>
@@ -25,7 +28,7 @@ CAMERA_DRIVER = """
 </node>
 <node pkg="tf2_ros" type="static_transform_publisher" name="$(arg camera)_frames"
       args="0 0 0 -0.5 0.5 -0.5 0.5 $(arg camera)_link $(arg camera)_color_optical_frame"/>"""
-# robot_upstart makes a job of a launch file, so one that can be loaded.
+# robot_upstart makes a job of a launch file; the stand-in checks that the file can be loaded.
 UPSTART = """#!/bin/bash
 echo "robot_upstart install $*" >> "$READER_LOG"
 roslaunch --nodes "${1%%/*}" "$(basename "$1")" >> "$READER_LOG"
@@ -34,19 +37,14 @@ SLIDERS = '#!/bin/bash\necho rqt_reconfigure >> "$READER_LOG"\n'
 
 
 class Reader(object):
-    """Types blocks of code into a shell at home.
+    """Runs blocks of code in a shell in a home folder below `folder`, an empty pathlib.Path.
 
-    Parameters
-    ----------
-    folder : pathlib.Path
-        An empty folder for everything.
-    weights : str
-        Path of weights, which take the place of yolov5n.pt.
+    `weights` is the path of weights used as yolov5n.pt.
     """
 
     def __init__(self, folder, weights):
         self.home, self.clone, self.etc = folder / 'home', folder / 'home' / 'ros_3d_bb', folder / 'etc'
-        self.log, self.cache, self._screen = folder / 'log.txt', folder / 'cache', None
+        self.log, self.cache, self._display = folder / 'log.txt', folder / 'cache', None
         for path in (self.home / 'catkin_ws' / 'src', self.etc, folder / 'path' / 'to', self.clone):
             path.mkdir(parents=True)
         self.log.write_text('')
@@ -55,7 +53,6 @@ class Reader(object):
             os.symlink(os.path.join(ROOT, name), str(self.clone / name))
         shutil.copytree(os.path.join(ROOT, 'config'), str(self.clone / 'config'))
         self._put_stand_ins(folder / 'packages')
-        self._put_environment(self.cache / 'venv')
         self._replacements = [('/path/to/', '%s/path/to/' % folder), ('/etc/ros/', '%s/' % self.etc),
                               ('/opt/ros/noetic/', '%s/' % self.etc), ('/home/administrator/', '%s/' % self.home),
                               ('yolov5n.pt', os.path.basename(weights))]
@@ -68,35 +65,36 @@ class Reader(object):
             self._environment.pop(name, None)
 
     def _put_stand_ins(self, packages):
+        """Packages that a test machine does not have, and the virtual environment that `run` would make."""
         stand_in_gazebo(packages)
         stand_in_launch_file(packages, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS, CAMERA_DRIVER)
         for package, program, text in (('robot_upstart', 'install', UPSTART),
                                        ('rqt_reconfigure', 'rqt_reconfigure', SLIDERS)):
             write(packages / package / 'package.xml', '<package format="2"><name>%s</name></package>' % package)
-            write(packages / package / program, text)
-            (packages / package / program).chmod(0o755)
-
-    def _put_environment(self, venv):
-        """The virtual environment that `run` would make, of the Python that runs the tests."""
-        write(venv / 'bin' / 'python3', '#!/bin/sh\nexec %s "$@"\n' % sys.executable)
-        (venv / 'bin' / 'python3').chmod(0o755)
+            self._write_program(packages / package / program, text)
+        self._write_program(self.cache / 'venv' / 'bin' / 'python3', '#!/bin/sh\nexec %s "$@"\n' % sys.executable)
         wanted = b''.join(open(os.path.join(ROOT, 'test', name), 'rb').read()
                           for name in ('requirements.txt', 'requirements_no_deps.txt'))
-        (venv / 'installed').write_text('%s  -\n' % sha1(wanted).hexdigest())  # as sha1sum says it
+        (self.cache / 'venv' / 'installed').write_text('%s  -\n' % sha1(wanted).hexdigest())  # the format of sha1sum
+
+    @staticmethod
+    def _write_program(path, text):
+        write(path, text)
+        path.chmod(0o755)
 
     def environment(self, **more):
-        """The reader's variables, and more."""
+        """Environment variables of the user, and more."""
         return dict(self._environment, **more)
 
     def typed(self, block, replaced=(), appended=''):
-        """The text of a block, with paths and addresses of this machine."""
+        """Script of a block, with paths and addresses of this machine."""
         text = block.text.rstrip('\n') + appended
         for old, new in tuple(replaced) + tuple(self._replacements):
             text = text.replace(old, new)
         return '. %s/stand_ins/reader.sh\n%s\n' % (SUPPORT, text)
 
     def types(self, block, at=None, replaced=(), appended='', **environment):
-        """Type a block that ends by itself. Returns what is printed; fails where it fails."""
+        """Run a block that ends by itself. Returns its output; fails if a command fails."""
         result = subprocess.run(['bash', '-euo', 'pipefail', '-c', self.typed(block, replaced, appended)],
                                 cwd=str(at or self.home), env=self.environment(**environment), stdin=subprocess.DEVNULL,
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
@@ -105,7 +103,7 @@ class Reader(object):
 
     @contextlib.contextmanager
     def running(self, block, at=None, replaced=(), **environment):
-        """Type a block that runs until Ctrl-C. Yields a Graph, and ends it."""
+        """Run a block until Ctrl-C. Yields a Graph, and ends it."""
         graph = Graph(self.environment(**dict({'ROS_MASTER_URI': 'http://localhost:%d' % free_port()}, **environment)))
         try:
             graph.start(['bash', '-c', self.typed(block, replaced)], cwd=str(at or self.home))
@@ -114,18 +112,12 @@ class Reader(object):
             graph.end()
 
     def screen(self):
-        """DISPLAY of a screen with nobody else on it."""
-        if self._screen is None:
-            self._screen = subprocess.Popen(['Xvfb', '-displayfd', '1', '-screen', '0', '1600x900x24'],
-                                            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-            self._display = ':' + self._screen.stdout.readline().decode().strip()
+        """DISPLAY of a virtual screen, which ends with the tests."""
+        if self._display is None:
+            with mock.patch.dict(os.environ):
+                start_screen()
+                self._display = os.environ['DISPLAY']
         return self._display
-
-    def leave(self):
-        """Switch the screen off."""
-        if self._screen is not None:
-            self._screen.terminate()
-            self._screen.wait()
 
 
 class Graph(object):
@@ -135,7 +127,7 @@ class Graph(object):
         self.environment, self._started = environment, []
 
     def start(self, command, **options):
-        """Start a process; its output goes into a file of its own."""
+        """Start a process with its own output file."""
         descriptor, path = tempfile.mkstemp('.txt', 'output', self.environment['HOME'])
         with os.fdopen(descriptor, 'w') as stream:
             process = subprocess.Popen(command, env=self.environment, stdin=subprocess.DEVNULL, stdout=stream,
@@ -144,7 +136,7 @@ class Graph(object):
         return process
 
     def output(self):
-        """What all processes have printed."""
+        """Output of all processes."""
         texts = []
         for _process, path in self._started:
             with open(path, errors='replace') as stream:
@@ -152,7 +144,7 @@ class Graph(object):
         return '\n'.join(texts)
 
     def starts_camera(self, bag):
-        """A camera on a robot, from a bag, at 5 Hz."""
+        """Play a bag at 5 Hz, as the camera of a robot."""
         self.waits(self._has_master, 'a master')
         self.start([sys.executable, os.path.join(ROOT, 'scripts', 'replay_node'), '_bag:=' + bag, '_rate:=5'])
 
@@ -162,7 +154,7 @@ class Graph(object):
             return connection.connect_ex(('localhost', port)) == 0
 
     def hears(self, *wanted):
-        """Wait until something comes on all of these topics ('topic' or 'topic:field that is not empty')."""
+        """Wait for a message on each of these topics ('topic', or 'topic:field that is not empty')."""
         self.waits(self._has_master, 'a master')
         result = subprocess.run([sys.executable, os.path.join(SUPPORT, 'hearing.py'), str(PATIENCE_S)] + list(wanted),
                                 env=dict(self.environment, PYTHONPATH='%s:%s' % (
@@ -171,36 +163,30 @@ class Graph(object):
         assert result.returncode == 0, result.stdout + self.output()
 
     def shows(self, title):
-        """Wait until there is a window with this title."""
+        """Wait for a window with this title."""
         self.waits(lambda: subprocess.call(['xdotool', 'search', '--onlyvisible', '--name', title],
                                            env=self.environment, stdout=subprocess.DEVNULL) == 0, 'window ' + title)
 
     def says(self, words):
-        """Wait until these words are printed."""
+        """Wait until these words are in the output."""
         self.waits(lambda: words in self.output(), words)
 
     def waits(self, condition, what):
-        """Wait until a condition holds; fail where that is never so, or the process that was typed has ended."""
+        """Wait for a condition; fail after PATIENCE_S, or when the first process ends."""
         deadline_s = time.monotonic() + PATIENCE_S
         while not condition():
             assert time.monotonic() < deadline_s and self._started[0][0].poll() is None, (
-                'never happened: %s\n%s' % (what, self.output()))
+                'timeout: %s\n%s' % (what, self.output()))
             time.sleep(0.1)
 
     def end(self):
-        """Ctrl-C, for all processes, the last first."""
+        """Send Ctrl-C to all processes, the last first, and wait for them."""
         for process, _path in reversed(self._started):
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGINT)
+        for process, _path in self._started:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(40)  # roslaunch itself gives nodes 15 s, and kills them then
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
-
-
-def free_port():
-    """A port that nobody listens on."""
-    with socket.socket() as listener:
-        listener.bind(('', 0))
-        return listener.getsockname()[1]

@@ -6,18 +6,18 @@ import pyrealsense2 as rs
 
 from ros_3d_bb.camera.camera_model import Camera, transform_from
 
-# As a D435i has them: depth sees more, and colour is 15 mm to its right, turned a little.
+# As of a D435i: depth has a wider field of view, and colour is 15 mm to its right, slightly rotated.
 DEPTH_CAMERA = Camera(640, 480, 386.0, 386.0, 320.3, 238.9)
 COLOR_CAMERA = Camera(640, 480, 614.0, 613.0, 322.1, 243.7, 'inverse_brown_conrady',
                       (0.02, -0.05, 0.001, -0.0005, 0.01))
 DEPTH_FROM_COLOR = transform_from((0.0148, 0.0002, 0.0004), (0.002, -0.001, 0.0015, 1.0))
 START_MS, STEP_MS = 1700000000000.25, 33.5
-# pyrealsense2 2.58 and later write the first, and read both; old ones do not tell their version.
+# pyrealsense2 2.58 and later write .db3 and read both; old releases have no version attribute.
 SUFFIX = '.db3' if tuple(int(part) for part in getattr(rs, '__version__', '2.0').split('.')[:2]) >= (2, 58) else '.bag'
-CLOCKS = {'global': rs.timestamp_domain.global_time, 'camera': rs.timestamp_domain.hardware_clock}
 
 
-def write_recording(path, colors, depths, depth_scale_m=0.001, clock='global', start_ms=START_MS):
+def write_recording(path, colors, depths, depth_scale_m=0.001, clock=rs.timestamp_domain.global_time,
+                    start_ms=START_MS):
     """Record colour (h, w, 3) uint8 and depth (h, w) uint16 images, `STEP_MS` apart. Returns `path`."""
     device = rs.software_device()
     for info, text in ((rs.camera_info.name, 'D435I'), (rs.camera_info.serial_number, '42')):
@@ -26,8 +26,8 @@ def write_recording(path, colors, depths, depth_scale_m=0.001, clock='global', s
     sensors[0].add_read_only_option(rs.option.depth_units, depth_scale_m)
     profiles = (sensors[0].add_video_stream(_stream(rs.stream.depth, 1, rs.format.z16, 2, DEPTH_CAMERA)),
                 sensors[1].add_video_stream(_stream(rs.stream.color, 2, rs.format.rgb8, 3, COLOR_CAMERA)))
-    profiles[1].register_extrinsics_to(profiles[0], extrinsics_of(DEPTH_FROM_COLOR))
-    profiles[0].register_extrinsics_to(profiles[1], extrinsics_of(np.linalg.inv(DEPTH_FROM_COLOR)))
+    profiles[1].register_extrinsics_to(profiles[0], _extrinsics_of(DEPTH_FROM_COLOR))
+    profiles[0].register_extrinsics_to(profiles[1], _extrinsics_of(np.linalg.inv(DEPTH_FROM_COLOR)))
     recorder, queue = rs.recorder(path, device), rs.frame_queue(100)
     recorded = recorder.query_sensors()
     for sensor in recorded:
@@ -38,10 +38,10 @@ def write_recording(path, colors, depths, depth_scale_m=0.001, clock='global', s
             frame = rs.software_video_frame()
             frame.pixels, frame.bpp = np.ascontiguousarray(pixels), pixels[0, 0].nbytes
             frame.stride, frame.profile = pixels.shape[1] * frame.bpp, profile.as_video_stream_profile()
-            frame.timestamp, frame.domain = start_ms + number * STEP_MS, CLOCKS[clock]
+            frame.timestamp, frame.domain = start_ms + number * STEP_MS, clock
             frame.frame_number, frame.depth_units = number, depth_scale_m
             sensor.on_video_frame(frame)
-        time.sleep(STEP_MS / 1000)  # the recording has the times at which images came, too
+        time.sleep(STEP_MS / 1000)  # the recording also contains arrival times
     for sensor in recorded:
         sensor.stop()
         sensor.close()
@@ -64,9 +64,8 @@ def intrinsics_of(camera, model=None):
     return intrinsics
 
 
-def extrinsics_of(b_from_a):
-    """librealsense's extrinsics of a transform: the rotation by columns."""
-    extrinsics = rs.extrinsics()
+def _extrinsics_of(b_from_a):
+    extrinsics = rs.extrinsics()  # the rotation by columns
     extrinsics.rotation, extrinsics.translation = b_from_a[:3, :3].T.ravel().tolist(), b_from_a[:3, 3].tolist()
     return extrinsics
 
@@ -81,7 +80,7 @@ def sloping_depth(scale_m=0.001):
 
 
 def colored(number):
-    """A colour image that says its number."""
+    """A colour image whose red is its number."""
     image = np.zeros((COLOR_CAMERA.height, COLOR_CAMERA.width, 3), np.uint8)
     image[..., 0], image[:, :100, 1], image[:50, :, 2] = number, 200, 90
     return image

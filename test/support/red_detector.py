@@ -1,4 +1,4 @@
-"""A TorchScript model with YOLOv5's output that finds what is red: weights that a test can make."""
+"""A TorchScript model with the output of YOLOv5 that detects red objects: weights that a test can write."""
 import json
 
 import torch
@@ -15,9 +15,7 @@ class RedDetector(torch.nn.Module):
         if columns.numel() > 0:
             x1, x2 = columns[0].item(), columns[-1].item() + 1.0
             y1, y2 = lines[0].item(), lines[-1].item() + 1.0
-            row[0, 0, 0], row[0, 0, 1] = (x1 + x2) / 2, (y1 + y2) / 2
-            row[0, 0, 2], row[0, 0, 3] = x2 - x1, y2 - y1
-            row[0, 0, 4], row[0, 0, 5] = 0.95, 0.98
+            row[0, 0, :6] = torch.tensor([(x1 + x2) / 2, (y1 + y2) / 2, x2 - x1, y2 - y1, 0.95, 0.98])
         return (row,)
 
 

@@ -1,4 +1,4 @@
-"""What the tests of nodes share: recording topics, and sending what a camera and a detector send."""
+"""Shared by the tests of nodes: recording topics, and messages of a camera."""
 import contextlib
 import signal
 import subprocess
@@ -17,7 +17,7 @@ TIMEOUT_S = 20.0
 
 
 def wait_until(condition, what, timeout_s=TIMEOUT_S):
-    """Wait by the machine's clock, whatever /clock does; fail saying what never came."""
+    """Wait in wall-clock time, independent of /clock, and fail after the timeout."""
     deadline_s = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < deadline_s and not rospy.is_shutdown(), 'never happened: %s' % what
@@ -26,7 +26,7 @@ def wait_until(condition, what, timeout_s=TIMEOUT_S):
 
 @contextlib.contextmanager
 def launched(*arguments):
-    """A launch file of the package as a process of its own on this test's master, ended afterwards."""
+    """Run a launch file of the package on this test's master, until the end of the block."""
     process = subprocess.Popen(['roslaunch', 'ros_3d_bb'] + list(arguments))
     try:
         yield process
@@ -41,7 +41,8 @@ class Recorder(object):
 
     def __init__(self, topic, kind, publisher_expected=True):
         self.topic, self.messages = topic, []
-        self._subscriber = rospy.Subscriber(topic, kind, self._keep, queue_size=1000, buff_size=2 ** 26)
+        self._subscriber = rospy.Subscriber(topic, kind, lambda message: self.messages.append(message),
+                                            queue_size=1000, buff_size=2 ** 26)
         if publisher_expected:
             wait_until(lambda: self._subscriber.get_num_connections() > 0, 'a publisher on ' + topic)
             time.sleep(0.3)  # the publisher counts a connection a moment later than the subscriber
@@ -53,26 +54,23 @@ class Recorder(object):
         self._subscriber.unregister()
 
     def emptied(self):
-        """Itself, without what came before: a connection that lasts over several tests loses nothing at its start."""
+        """Itself, without the messages so far. A connection that lasts for several tests misses no message."""
         self.messages = []
         return self
 
-    def _keep(self, message):
-        self.messages.append(message)
-
     def wait_for(self, count, timeout_s=TIMEOUT_S):
-        """The first `count` messages, once they are there."""
+        """Wait for the first `count` messages."""
         wait_until(lambda: len(self.messages) >= count, '%d messages on %s' % (count, self.topic), timeout_s)
         return self.messages[:count]
 
     def stays_at(self, count, seconds=0.7):
-        """Whether there are `count` messages and no more come for a while."""
+        """Whether there are `count` messages and no more arrive for a while."""
         time.sleep(seconds)
         return len(self.messages) == count
 
 
 def publisher(topic, kind):
-    """A publisher that somebody listens to already."""
+    """A publisher with a subscriber."""
     result = rospy.Publisher(topic, kind, queue_size=100)
     wait_until(lambda: result.get_num_connections() > 0, 'a subscriber on ' + topic)
     return result
@@ -95,12 +93,12 @@ def camera_info(stamp_ns, width=64, height=48, focal=60.0):
 
 
 def diagnostics_of(node, timeout_s=TIMEOUT_S):
-    """The next diagnostic status of a node: (level, message, {event: count}, and what it shows in words)."""
+    """The next diagnostic status of a node: (level, message, {event: count}, with further values as text)."""
     with Recorder('/diagnostics', DiagnosticArray) as recorder:
-        def mine():
+        def received():
             return [status for message in recorder.messages for status in message.status
                     if status.name.startswith(node)]
-        wait_until(mine, 'diagnostics of ' + node, timeout_s)
-        status = mine()[-1]
-        return status.level, status.message, {
-            entry.key: int(entry.value) if entry.value.isdigit() else entry.value for entry in status.values}
+        wait_until(received, 'diagnostics of ' + node, timeout_s)
+        status = received()[-1]
+    return status.level, status.message, {
+        entry.key: int(entry.value) if entry.value.isdigit() else entry.value for entry in status.values}

@@ -1,24 +1,20 @@
-"""A measurement session of a red cardboard person in front of a wall, with exact ground truth.
-
-As a command: `python3 synthetic_session.py FOLDER` writes one.
-"""
+"""A measurement session of a red cardboard person in front of a wall, with exact ground truth."""
 import json
 import os
-import sys
 
 import cv2
 import numpy as np
 
 WIDTH, HEIGHT, FX, FY, CX, CY = 640, 480, 614.686, 614.842, 319.199, 242.08
 WALL_M, CAMERA_HEIGHT_M = 4.5, 1.0
-# Places of the person, metres right of and in front of the camera; the person walks in front of it and away.
+# X and Z of the person
 PLACES_M = [(x, z) for z in (1.6, 2.0, 2.4, 2.8, 3.2) for x in (-0.4, 0.0, 0.4)] + [(0.9, 3.0), (-0.9, 3.0)]
 FRAMES_PER_PLACE = 5
 
 
-def write_synthetic_session(folder, seed=1):
+def write_synthetic_session(folder):
     """Write the session; returns the folder."""
-    random = np.random.RandomState(seed)
+    random = np.random.RandomState(1)
     for name in ('color', 'depth'):
         os.makedirs(os.path.join(folder, name), exist_ok=True)
     frames = []
@@ -67,7 +63,3 @@ def _median_by_loops(depth_mm, box, stride=20):
             if z > 0:
                 points.append(((u - CX) / FX * z, (v - CY) / FY * z, z))
     return [float(np.median([point[axis] for point in points])) for axis in range(3)]
-
-
-if __name__ == '__main__':
-    print(write_synthetic_session(sys.argv[1]))

@@ -1,5 +1,8 @@
-"""A Follower of some cameras that look at somebody from one place, and boxes for it."""
+"""Tracking stages of cameras that look along x from one place, with boxes of a person 3 m ahead."""
+from typing import NamedTuple
+
 import tf2_ros
+from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
@@ -14,16 +17,14 @@ PERIODS_NS = {'front': NS // 30, 'rear': NS // 25, 'left': NS // 10}  # of Play
 
 
 class Transforms(object):
-    """Cameras that look along x from one place; none for the frames in `missing`. By frame, `while_waiting` is called
-    in the next wait for one.
-    """
+    """Lookup fails for the frames and stamps in `missing`. `while_waiting[frame]` is called in the next lookup."""
 
     def __init__(self):
         self.missing, self.while_waiting, self.jumps = set(), {}, 0
 
-    def lookup(self, _target, source, _stamp):
+    def lookup(self, _target, source, stamp):
         self.while_waiting.pop(source, lambda: None)()
-        if source in self.missing:
+        if {source, stamp.to_nsec()} & self.missing:
             raise tf2_ros.LookupException('no such frame')
         return transform_from((0, 0, 1), OPTICAL_ROTATION)
 
@@ -31,36 +32,44 @@ class Transforms(object):
         self.jumps += 1
 
 
-class Rig(object):
-    """A Follower of two cameras, and boxes for it, which arrive at `now_ns`."""
+class Result(NamedTuple):
+    """Arguments of `on_tracks`."""
 
-    def __init__(self):
-        self.now_ns = 0
-        self.transforms, self.tally = Transforms(), EventCounter()
-        params = TrackerNodeParams(cameras=['front', 'rear'])
-        self.follower = TrackingStage(params, [kind() for kind in TRACKING_PARAMS], self.tally, self.transforms)
+    tracks: list
+    header: Header
 
-    def send(self, stamp_ns, camera, frame_id=None, count=1):
-        return self.follower.add_boxes(boxes(stamp_ns, frame_id or camera, count), self.now_ns, camera)
+
+class Rig(TrackingStage):
+    """A stage of some cameras; of a single one without names. Boxes arrive at `now_ns`."""
+
+    def __init__(self, *cameras, **params):
+        self.now_ns, self.transforms, self.events, self._results = 0, Transforms(), EventCounter(), []
+        super().__init__(TrackerNodeParams(cameras=list(cameras), **params), [kind() for kind in TRACKING_PARAMS],
+                         self.events, self.transforms, lambda *result: self._results.append(Result(*result)))
+
+    def send(self, stamp_ns, camera='', frame_id=None, count=1, z=3.0):
+        """Equal boxes of one image. Returns the Result, or None."""
+        self.add_boxes(boxes(stamp_ns, frame_id or camera or 'camera', [(0.0, 0.0, z)] * count), self.now_ns, camera)
+        return self._results.pop() if self._results else None
 
 
 class Play(object):
-    """Cameras that send boxes of somebody while time passes. `answers` are (now_ns, camera, Followed or None)."""
+    """Cameras that send boxes while time passes. `results` are (now_ns, camera, Result or None)."""
 
     def __init__(self, *cameras, periods_ns=PERIODS_NS):
-        self.tally, self.transforms, self.now_ns, self.answers = EventCounter(), Transforms(), 0, []
+        self.now_ns, self.results = 0, []
         self.cameras, self.ahead_ns, self._due_ns = set(cameras), 0, {camera: 0 for camera in cameras}
         self._periods_ns = periods_ns
-        self.faults = {}  # by camera: returns how far its stamps are ahead of what is right
+        self.faults = {}  # by camera: a function that returns by how much its stamps are ahead
         self.respawn()
 
     def respawn(self):
-        """Go on with another Follower, as where tracker_node ends and is started again."""
-        params = TrackerNodeParams(cameras=sorted(self.cameras) if len(self.cameras) > 1 else [])
-        self.follower = TrackingStage(params, [kind() for kind in TRACKING_PARAMS], self.tally, self.transforms)
+        """Start a new stage, as where tracker_node is restarted."""
+        self.rig = Rig(*sorted(self.cameras) if len(self.cameras) > 1 else [])
+        self.transforms, self.counts = self.rig.transforms, self.rig.events.counts
 
     def run(self, seconds, cameras=None, count=1, lags_ns=None):
-        """Let time pass. `lags_ns`: by camera, how long its boxes take."""
+        """Let time pass. `lags_ns`: latency of the boxes of each camera."""
         end_ns = self.now_ns + int(seconds * NS)
         cameras = self.cameras if cameras is None else cameras
         self._due_ns = {camera: max(due_ns, self.now_ns) for camera, due_ns in self._due_ns.items()}
@@ -75,26 +84,29 @@ class Play(object):
         return self
 
     def send(self, camera, ahead_ns=0, count=1):
-        """One image; how far its stamp is ahead of what is right."""
-        message = boxes(START_NS + self.now_ns + self.ahead_ns + ahead_ns, camera, count)
-        followed = None
-        with self.tally.rejecting('boxes'):
-            followed = self.follower.add_boxes(message, self.now_ns, camera if self.follower.cameras != ('',) else '')
-        self.answers.append((self.now_ns, camera, followed))
-        return followed
+        """One image, whose stamp is ahead by `ahead_ns`."""
+        self.rig.now_ns, result = self.now_ns, None
+        with self.rig.events.rejecting('boxes'):
+            result = self.rig.send(START_NS + self.now_ns + self.ahead_ns + ahead_ns,
+                                   camera if len(self.cameras) > 1 else '', camera, count=count)
+        self.results.append((self.now_ns, camera, result))
+        return result
 
     def lost(self, camera, since_ns=0):
-        """How many images of a camera had no answer."""
-        return sum(followed is None for now_ns, name, followed in self.answers if name == camera and now_ns >= since_ns)
+        """Number of images of a camera without a result."""
+        return sum(result is None for now_ns, name, result in self.results if name == camera and now_ns >= since_ns)
 
     @property
     def ids(self):
-        """Of the tracks in the newest answer."""
-        return [track.id for track in [followed for _now_ns, _camera, followed in self.answers if followed][-1].tracks]
+        """IDs of the tracks in the newest result."""
+        return [track.id for track in [result for _now_ns, _camera, result in self.results if result][-1].tracks]
 
 
-def boxes(stamp_ns, frame_id, count=1):
-    box = BoundingBox3D()
-    box.center.position.z = 3.0
-    box.size.x, box.size.y, box.size.z = 0.5, 1.7, 0.5
-    return BoundingBox3DArray(header=Header(stamp=time_from(stamp_ns), frame_id=frame_id), boxes=[box] * count)
+def boxes(stamp_ns, frame_id='camera', centers_m=((0.0, 0.0, 3.0),)):
+    """A BoundingBox3DArray with boxes of people at positions (right, down, forward) in a camera."""
+    message = BoundingBox3DArray(header=Header(stamp=time_from(stamp_ns), frame_id=frame_id))
+    for center_m in centers_m:
+        box = BoundingBox3D(size=Vector3(0.5, 1.7, 0.5))
+        box.center.position, box.center.orientation.w = Point(*center_m), 1.0
+        message.boxes.append(box)
+    return message

@@ -1,16 +1,17 @@
-"""Drive the annotator's window as a person does: keys go to what has the keyboard, clicks to places in a widget."""
+"""Drive the annotator's window: keys go to the widget with the keyboard focus, clicks to positions in a widget."""
 import importlib
 import os
 
 os.environ.setdefault('QT_QPA_PLATFORM', 'offscreen')  # before Qt is imported; a virtual display does as well
 
-from ros_3d_bb_annotator.application import make_application  # noqa: E402
-from ros_3d_bb_annotator.main_window import AnnotatorWindow  # noqa: E402
+from ros_3d_bb_annotator.document import Document  # noqa: E402
+from ros_3d_bb_annotator.main_window import AnnotatorWindow, make_application  # noqa: E402
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets  # noqa: E402
 
 QtTest = importlib.import_module(QtCore.__name__.replace('QtCore', 'QtTest'))  # of the binding that is in use
+CONTROL, SHIFT, ALT = Qt.ControlModifier, Qt.ShiftModifier, Qt.AltModifier
 TRIES, WAIT_MS = 1000, 20
-APPLICATION = make_application()  # Qt goes with the last reference to it
+APPLICATION = make_application()  # Qt ends with the last reference to it
 
 
 class Driver(object):
@@ -42,21 +43,21 @@ class Driver(object):
         self.settle()
 
     def click(self, widget, place, modifiers=Qt.NoModifier):
-        """Click at a place (QPointF) in a widget."""
+        """Click at a position (QPointF) in a widget."""
         QtTest.QTest.mouseClick(widget, Qt.LeftButton, modifiers, place.toPoint())
         self.settle()
 
     def drag(self, widget, start, end, modifiers=Qt.NoModifier):
-        """Press at a place in a widget, move, release at another one."""
+        """Press at a position in a widget, move, and release at another one."""
         QtTest.QTest.mousePress(widget, Qt.LeftButton, modifiers, start.toPoint())
-        for place in ((start + end) / 2, end):  # QTest.mouseMove holds no button
-            event = _mouse_move(place, modifiers)
-            QtWidgets.QApplication.sendEvent(widget, event)
+        for place in ((start + end) / 2, end):  # QTest.mouseMove presses no button
+            QtWidgets.QApplication.sendEvent(widget, QtGui.QMouseEvent(
+                QtCore.QEvent.MouseMove, place, Qt.NoButton, Qt.LeftButton, modifiers))
         QtTest.QTest.mouseRelease(widget, Qt.LeftButton, modifiers, end.toPoint())
         self.settle()
 
     def answer(self, reply, act):
-        """Do what opens a dialog, `act()`, and let `reply(dialog)` answer it; returns what it returned."""
+        """Open a dialog by `act()`, and return what `reply(dialog)` returns."""
         replies = []
 
         def reply_when_it_is_there():
@@ -83,10 +84,10 @@ class Driver(object):
             if condition():
                 return
             QtTest.QTest.qWait(WAIT_MS)
-        raise AssertionError('waited in vain')
+        raise AssertionError('timeout')
 
     def settle(self):
-        """Let the program do what is due."""
+        """Process pending events."""
         for _ in range(5):
             QtWidgets.QApplication.processEvents()
 
@@ -96,5 +97,6 @@ class Driver(object):
         self.settle()
 
 
-def _mouse_move(place, modifiers):
-    return QtGui.QMouseEvent(QtCore.QEvent.MouseMove, place, Qt.NoButton, Qt.LeftButton, modifiers)
+def opened(folder):
+    """The measurements of a session, as another program reads them."""
+    return Document.open(folder).measurements

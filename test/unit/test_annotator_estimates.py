@@ -8,7 +8,6 @@ import pytest
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_annotator.document import Document
 from support.small_session import FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json
-from support.synthetic_session import write_synthetic_session
 
 
 def test_a_box_drawn_by_hand_is_estimated_and_chosen(document, folder):
@@ -45,17 +44,25 @@ def test_a_box_without_pixels_is_rejected(document, box_px):
     assert not document.can_undo
 
 
-@pytest.mark.slow
-def test_a_box_in_a_session_of_one_box_a_frame(tmp_path):
-    folder = write_synthetic_session(str(tmp_path))
-    before = read_json(folder)
-    document = Document.open(folder)
+@pytest.fixture
+def single(folder):
+    """A session that stores one detection in each frame."""
+    def change(content):
+        for entry in content['frames']:
+            entry.update(entry.pop('detections')[0])
+    change_json(folder, change)
+    return folder
+
+
+def test_a_box_is_added_to_a_session_of_one_box_per_frame(single):
+    before, document = read_json(single), Document.open(single)
     recorded_m = document.measurements[0].estimate_m
-    document.add_box(0, (200, 100, 330, 400))
+    document.add_box(0, FAR_BOX)
     assert len(document.measurements[0].detections) == 2
     assert document.measurements[0].detections[0].estimate_m.tolist() == recorded_m.tolist()
-    assert set(read_json(folder)['frames'][0]) == {'id', 'color', 'depth', 'truth_mm', 'detections', 'person'}
-    assert document.undo() == 0 and read_json(folder) == before
+    entry = read_json(single)['frames'][0]
+    assert len(entry['detections']) == 2 and not {'box', 'estimate_mm'} & set(entry)
+    assert document.undo() == 0 and read_json(single) == before
 
 
 @pytest.mark.parametrize('edit', [lambda document: document.set_truth(0, 0.1, 2.0),
@@ -77,15 +84,12 @@ def test_a_box_without_estimate_is_estimated_when_it_is_needed(document, folder,
     assert read_json(folder) == before
 
 
-@pytest.mark.slow
-def test_the_only_box_of_a_measurement_is_estimated_when_truth_is_entered(tmp_path):
-    folder = write_synthetic_session(str(tmp_path))
-    change_json(folder, lambda content: content['frames'][0].pop('estimate_mm'))
-    document = Document.open(folder)
-    assert document.errors(0) is None
-    document.set_truth(0, *(document.measurements[0].truth_m[axis] for axis in (0, 2)))
-    assert document.errors(0)[2] < 0.1 and len(read_json(folder)['frames'][0]['estimate_mm']) == 3
-    assert 'detections' not in read_json(folder)['frames'][0]
+def test_the_only_box_of_a_measurement_is_estimated_when_truth_is_entered(single):
+    change_json(single, lambda content: content['frames'][0].pop('estimate_mm'))
+    document = Document.open(single)
+    document.set_truth(0, -0.466, 2.09)
+    assert document.errors(0)[2] < 0.1 and len(read_json(single)['frames'][0]['estimate_mm']) == 3
+    assert 'detections' not in read_json(single)['frames'][0]
 
 
 @pytest.mark.parametrize('break_it', [

@@ -9,7 +9,7 @@ from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.export import COLUMNS, export, rows_of
 from ros_3d_bb_lab.evaluation.noise.tables import read_table
-from support.small_session import change_json, write_small_session
+from support.small_session import change_json
 
 
 def read_rows(path):
@@ -29,7 +29,7 @@ def test_the_table_of_the_session_contains_the_numbers_of_the_thesis(session_fol
         assert header == author_header and set(rows) <= set(author_rows)
         # the author's dictionary keeps equal measurements only once
         assert [row for row in author_rows if row in set(rows)] == sorted(set(rows)) and len(set(rows)) == 103
-    assert header == list(COLUMNS)
+    assert header == list(COLUMNS) and len(read_table(path, 'X').complete().truth_m) == len(document.measurements)
     for index, measurement in enumerate(document.measurements):
         x_m, z_m, _plane_m = document.errors(index)
         assert min(abs(row[4] - 1000 * x_m) + abs(row[6] - 1000 * z_m) for row in rows
@@ -37,14 +37,7 @@ def test_the_table_of_the_session_contains_the_numbers_of_the_thesis(session_fol
                    and row[3] == round(1000 * measurement.truth_m[2])) < 2
 
 
-def test_the_noise_analysis_reads_the_table(session_folder, tmp_path):
-    document = Document.open(session_folder)
-    export(document, str(tmp_path / 'table.csv'))
-    assert len(read_table(str(tmp_path / 'table.csv'), 'X').complete().truth_m) == len(document.measurements)
-
-
-def test_values_are_integer_millimetres_and_errors_measured_minus_true(tmp_path):
-    document = Document.open(write_small_session(str(tmp_path)))
+def test_values_are_integer_millimetres_and_errors_measured_minus_true(document, tmp_path):
     document.set_truth(0, -0.5, 2.1004)
     document.set_truth(1, -0.5, 2.1004)
     document.choose_person(1, 1)
@@ -54,8 +47,7 @@ def test_values_are_integer_millimetres_and_errors_measured_minus_true(tmp_path)
         '-466,-500,2000,2100,34,34,-100,100\n700,-500,3000,2100,1200,1200,900,900\n')
 
 
-def test_only_annotated_measurements_with_an_estimate_are_exported(tmp_path):
-    document = Document.open(write_small_session(str(tmp_path)))
+def test_only_annotated_measurements_with_an_estimate_are_exported(document, tmp_path):
     for index in range(3):
         document.set_truth(index, 0.0, 2.0)
     document.reject(1, 'blurred')
@@ -64,8 +56,7 @@ def test_only_annotated_measurements_with_an_estimate_are_exported(tmp_path):
     assert len(rows_of(document)) == 1
 
 
-def test_an_empty_table_or_an_unwritable_file_raises_an_error(tmp_path):
-    document = Document.open(write_small_session(str(tmp_path)))
+def test_an_empty_table_or_an_unwritable_file_raises_an_error(document, tmp_path):
     with pytest.raises(SessionError, match=str(tmp_path)):
         export(document, str(tmp_path / 'table.csv'))
     document.set_truth(0, 0.0, 2.0)

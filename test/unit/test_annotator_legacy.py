@@ -9,13 +9,13 @@ from ros_3d_bb_annotator.analysis import analyse
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.export import rows_of
 from ros_3d_bb_annotator.validation import problems_of
-from support.old_session import FIRST_CAMPAIGN_LINES, LINES, write_old_session
+from support.old_session import LINES, write_old_session
 from support.small_session import read_json
 
 
 def test_positions_times_and_images_are_read(tmp_path):
     document = Document.open(write_old_session(str(tmp_path)))
-    assert document.is_old_form and document.progress == (0, 5) and document.camera is None
+    assert document.is_old_format and document.progress == (0, 5) and document.camera is None
     assert [measurement.id for measurement in document.measurements] == [
         '30-03-2021-11-49-54', '30-03-2021-11-49-56', '30-03-2021-11-53-28', '30-03-2021-11-53-28-2',
         '30-03-2021-11-53-29']
@@ -23,13 +23,13 @@ def test_positions_times_and_images_are_read(tmp_path):
     assert [detection.estimate_m.tolist() for detection in second.detections] == [[2.971, 0.535, 6.102],
                                                                                   [-0.007, 0.002, 0.3]]
     assert document.measurements[4].detections == () and document.measurements[4].person is None
-    assert document.color(0)[0, 0].tolist() == [100] * 3 and all(m.problem is None for m in document.measurements)
+    assert document.color(0)[0, 0].tolist() == [100] * 3 and list(problems_of(document)) == []
     assert document.measurements[2].color_path == document.measurements[3].color_path
-    assert list(problems_of(document)) == []
 
 
 def test_the_first_campaign_has_no_semicolon_and_no_raw_images(tmp_path):
-    document = Document.open(write_old_session(str(tmp_path), FIRST_CAMPAIGN_LINES, ('color', 'depth')))
+    lines = '[(-2, 5, 288), (123, 24, 288)] 18-03-2021-12-34-53', '[(12, 5, 295)] 18-03-2021-12-34-55'
+    document = Document.open(write_old_session(str(tmp_path), lines, ('color', 'depth')))
     assert [len(measurement.detections) for measurement in document.measurements] == [2, 1]
     assert document.color(0)[0, 0].tolist() == [200] * 3
 
@@ -57,16 +57,11 @@ def test_truth_is_saved_in_another_file_and_the_text_is_unchanged(tmp_path):
     document.reject(0, 'blurred')
     assert (tmp_path / 'measurements.txt').read_text() == '\n'.join(LINES) + '\n'
     reopened = Document.open(str(tmp_path))
-    assert reopened.is_old_form and reopened.notes and len(reopened.measurements) == 5
+    assert reopened.is_old_format and reopened.notes and len(reopened.measurements) == 5
     assert reopened.errors(1)[:2] == pytest.approx((-0.007, 0.0)) and reopened.progress == (2, 5)
     assert rows_of(reopened) == [(-7, 0, 300, 300, -7, 7, 0, 0)]
     assert document.undo() == 0 and Document.open(str(tmp_path)).measurements[0].rejected is None
-
-
-def test_stretched_depth_is_never_used_as_distances(tmp_path):
-    document = Document.open(write_old_session(str(tmp_path)))
-    document.set_truth(0, 0.0, 0.3)
-    assert all('depth' not in entry for entry in read_json(tmp_path)['frames'])
+    assert all('depth' not in entry for entry in read_json(tmp_path)['frames'])  # it must not be used as distances
     with pytest.raises(SessionError, match="'camera'"):
         read_session(str(tmp_path))
 
@@ -81,9 +76,8 @@ def test_the_recorded_positions_are_analysed(tmp_path):
     for index, (x_mm, z_mm) in enumerate(places):
         document.set_truth(index, x_mm / 1000.0, z_mm / 1000.0)
     analysed = analyse(document)
-    assert os.path.dirname(analysed.report_path) == str(tmp_path / 'analysis')
+    assert analysed.folder == str(tmp_path / 'analysis') and 'error_model.yaml' in os.listdir(analysed.folder)
     assert analysed.text.startswith('f(z) = ') and len(analysed.figure_paths) == 7
-    assert os.path.exists(os.path.join(analysed.folder, 'error_model.yaml'))
     with pytest.raises(ValueError, match='recorded'):
         analyse(document, estimator='foreground')
 

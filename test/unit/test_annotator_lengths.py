@@ -18,17 +18,12 @@ def test_lengths_are_parsed(text, unit, expected_m):
     assert str(parse_length(text, unit)) != '-0.0'
 
 
-@pytest.mark.parametrize('text', ['', ' ', 'm', '1 2', '1.2.3', '1,2,3', '1e3', '+ 0', 'nan', 'inf', '1 km', '0x10',
-                                  '--1', '1 M', '__import__("os").getcwd()', '1+1', '(1)', '\u0661', '1_0'])
-def test_invalid_lengths_are_quoted(text):
-    with pytest.raises(ValueError, match=re.escape(repr(text))):
-        parse_length(text, 'mm')
-
-
 @pytest.mark.parametrize('text,unit,named', [
     ('1,230', 'mm', '1230 mm .*1.230 mm'), ('1,230 mm', 'm', '1230 mm .*1.230 mm'), ('1230', 'm', '1230 m'),
-    ('100.1', 'm', '100 m')])
-def test_ambiguous_lengths_are_rejected(text, unit, named):
+    ('100.1', 'm', '100 m')] + [(text, 'mm', re.escape(repr(text))) for text in (
+        '', ' ', 'm', '1 2', '1.2.3', '1,2,3', '1e3', '+ 0', 'nan', 'inf', '1 km', '0x10', '--1', '1 M',
+        '__import__("os").getcwd()', '1+1', '(1)', '\u0661', '1_0')])
+def test_invalid_and_ambiguous_lengths_are_rejected(text, unit, named):
     with pytest.raises(ValueError, match=named):
         parse_length(text, unit)
 
@@ -40,7 +35,7 @@ def test_integer_millimetres_are_restored(value_mm):
 
 
 @given(st.text(max_size=12))
-def test_any_text_is_a_length_or_refused(text):
+def test_any_text_is_a_length_or_rejected(text):
     try:
         assert -100 <= parse_length(text, 'mm') <= 100
     except ValueError as error:

@@ -8,22 +8,17 @@ import pytest
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.measurement import Mark
 from support.small_session import FAR_BOX, NEAR_BOX, change_json
-from support.window import Qt, QtCore, QtWidgets
-
-CONTROL, SHIFT, ALT = Qt.ControlModifier, Qt.ShiftModifier, Qt.AltModifier
-
-
-def opened(folder):
-    """What another program finds in the session."""
-    return Document.open(folder).measurements
+from support.window import ALT, CONTROL, SHIFT, Qt, QtCore, QtWidgets, opened
 
 
 def place_in(view, x, y):
     return view.transform().map(QtCore.QPointF(x, y))
 
 
-def test_typing_a_truth_and_enter_saves_it_and_goes_on(drive, folder):
-    drive.press('-476.5', Qt.Key_Tab, '2050', Qt.Key_Return)
+def test_the_error_of_a_typed_truth_is_shown_and_enter_saves_it_and_goes_on(drive, folder):
+    drive.press('-476.5', Qt.Key_Tab, '2050')
+    assert 'X +10 mm, Z −50 mm' in drive.window.pane.truth.error_label.text() and drive.measurement(0).truth_m is None
+    drive.press(Qt.Key_Return)
     assert opened(folder)[0].truth_m == (-0.4765, None, 2.05)
     assert drive.window.current == 1 and drive.window.progress.text() == '1 of 4 done'
     assert 'X +10 mm, Z −50 mm' in drive.window.last_entry.text()
@@ -42,12 +37,6 @@ def test_the_error_of_a_box_without_estimate_is_shown_when_its_truth_is_entered(
     assert drive.window.last_entry.text().split('Error: ')[1] in drive.window.pane.truth.error_label.text()
 
 
-def test_the_error_is_shown_while_the_truth_is_typed(drive):
-    drive.press('-400', Qt.Key_Tab, '1900')
-    assert 'X −66 mm, Z +100 mm' in drive.window.pane.truth.error_label.text()
-    assert drive.measurement(0).truth_m is None
-
-
 @pytest.mark.parametrize('x, z, problem, field', [
     ('12e', '2000', "X: '12e' is not a length", 'x'), ('100', '', 'Z: a length is missing', 'z'),
     ('100', '-5', 'truth z is -0.005 m', None), ('100', '2000000', 'at most 100 m expected', 'z')])
@@ -59,7 +48,7 @@ def test_invalid_truth_is_reported_next_to_the_fields(drive, x, z, problem, fiel
     assert field is None or truth.fields[field].hasFocus()
 
 
-def test_metres_and_millimetres(drive, folder):
+def test_the_unit_can_be_switched(drive, folder):
     drive.press('1500', (Qt.Key_U, CONTROL))
     assert drive.window.pane.truth.fields['x'].text() == '1.5'
     drive.press(Qt.Key_Tab, '2', Qt.Key_Return)
@@ -68,9 +57,9 @@ def test_metres_and_millimetres(drive, folder):
     assert opened(folder)[1].truth_m == (0.25, None, 3.0)
 
 
-def test_a_digit_chooses_the_person_where_no_text_is_typed(drive, folder):
-    drive.press((Qt.Key_2, ALT))
-    assert opened(folder)[0].person == 1
+def test_digits_select_the_person_outside_fields_and_alt_and_a_digit_keeps_the_typed_text(drive, folder):
+    drive.press('-77', (Qt.Key_2, ALT))
+    assert opened(folder)[0].person == 1 and drive.window.pane.truth.fields['x'].text() == '-77'
     drive.press(Qt.Key_F3, '1')
     assert opened(folder)[0].person == 0
     drive.press(Qt.Key_F4, '2')
@@ -79,13 +68,8 @@ def test_a_digit_chooses_the_person_where_no_text_is_typed(drive, folder):
     assert opened(folder)[0].person == 0 and 'no box 7' in drive.window.statusBar().currentMessage()
 
 
-def test_what_is_typed_survives_choosing_a_box(drive):
-    drive.press('-77', (Qt.Key_2, ALT))
-    assert drive.measurement(0).person == 1 and drive.window.pane.truth.fields['x'].text() == '-77'
-
-
 @pytest.mark.parametrize('name', ['color_view', 'depth_view'])
-def test_a_click_on_a_box_chooses_it_at_any_zoom(drive, folder, name):
+def test_a_click_on_a_box_or_its_list_entry_selects_it(drive, folder, name):
     view = getattr(drive.window.pane, name)
     drive.click(view, place_in(view, *np.mean([FAR_BOX[:2], FAR_BOX[2:]], axis=0)))
     assert opened(folder)[0].person == 1
@@ -94,16 +78,16 @@ def test_a_click_on_a_box_chooses_it_at_any_zoom(drive, folder, name):
     assert opened(folder)[0].person == 0
     drive.click(view, place_in(view, 33, 24))  # between the people
     assert opened(folder)[0].person == 0
-
-
-def test_the_person_is_chosen_in_the_list_of_boxes(drive, folder):
     people = drive.window.pane.people
     drive.click(people.viewport(), QtCore.QPointF(people.visualItemRect(people.item(1)).center()))
     assert opened(folder)[0].person == 1
 
 
-def test_a_box_is_drawn_with_shift_and_drag(drive, folder):
+def test_a_box_is_drawn_with_shift_and_drag_unless_it_is_tiny_or_cancelled(drive, folder):
     view = drive.window.pane.color_view
+    drive.press(Qt.Key_F3, Qt.Key_Space, Qt.Key_Right, Qt.Key_Escape, Qt.Key_Down)
+    drive.drag(view, place_in(view, 20.5, 20.5), place_in(view, 22.5, 22.5), SHIFT)
+    assert len(drive.measurement(0).detections) == 2 and not drive.document.can_undo
     drive.drag(view, place_in(view, 11.5, 5.5), place_in(view, 25.5, 43.5), SHIFT)
     drawn = opened(folder)[0].detections[2]
     assert drawn.box_px == (11, 5, 26, 44) and drawn.by_hand and opened(folder)[0].person == 2
@@ -118,13 +102,6 @@ def test_a_box_is_drawn_by_the_keyboard(drive, folder):
     assert not drive.window.pane.shared.drawing
 
 
-def test_escape_cancels_a_box_and_tiny_boxes_are_ignored(drive):
-    view = drive.window.pane.color_view
-    drive.press(Qt.Key_F3, Qt.Key_Space, Qt.Key_Right, Qt.Key_Escape, Qt.Key_Down)
-    drive.drag(view, place_in(view, 20.5, 20.5), place_in(view, 22.5, 22.5), SHIFT)
-    assert len(drive.measurement(0).detections) == 2 and not drive.document.can_undo
-
-
 def test_a_drag_moves_what_both_views_show(drive):
     pane = drive.window.pane
     drive.press(Qt.Key_F3, '+', '+', '+')
@@ -137,14 +114,9 @@ def test_a_drag_moves_what_both_views_show(drive):
     assert pane.shared.zoom == 1 and pane.shared.center == (0.5, 0.5)
 
 
-def test_the_cursor_reads_pixel_depth_and_position(drive):
+def test_the_readout_contains_pixel_depth_and_position(drive, folder):
     drive.press(Qt.Key_F3, *[Qt.Key_Left, (Qt.Key_Right, CONTROL)])
-    u, v = drive.window.pane.shared.cursor
-    assert (u, v) == (23, 24)
-    assert drive.window.pane.readout.text() == ('pixel (23, 24)    depth 2.000 m    X −0.300  Y +0.000  Z 2.000 m')
-
-
-def test_the_readout_reports_missing_depth(drive, folder):
+    assert drive.window.pane.readout.text() == 'pixel (23, 24)    depth 2.000 m    X −0.300  Y +0.000  Z 2.000 m'
     cv2.imwrite(os.path.join(folder, 'depth', 'm0.png'), np.zeros((48, 64), np.uint16))
     drive.press(Qt.Key_F5, Qt.Key_F3, Qt.Key_Left)
     assert drive.window.pane.readout.text().endswith('no depth there')
@@ -158,12 +130,16 @@ def test_a_click_on_a_mark_sets_the_truth(drive, folder):
     assert opened(folder)[1].truth_m is None
 
 
-def test_marks_are_taken_and_edited_by_the_keyboard(drive, folder):
+def add_mark(dialog, *texts):
+    dialog.add_empty()
+    for column, text in enumerate(texts):
+        dialog.table.item(dialog.table.rowCount() - 1, column).setText(text)
+
+
+def test_marks_are_edited_in_a_dialog_and_selected_by_the_keyboard(drive, folder):
     def add_marks(dialog):
-        for name, x_mm, z_mm in (('B1', '0', '2000'), ('B2', '0', '3000')):
-            dialog.add_empty()
-            for column, text in enumerate((name, x_mm, z_mm)):
-                dialog.table.item(dialog.table.rowCount() - 1, column).setText(text)
+        add_mark(dialog, 'B1', '0', '2000')
+        add_mark(dialog, 'B2', '0', '3000')
         dialog.accept()
     drive.answer(add_marks, lambda: drive.press((Qt.Key_G, CONTROL)))
     assert Document.open(folder).grid == (Mark('A1', -0.5, 2.0), Mark('B1', 0, 2), Mark('B2', 0, 3))
@@ -175,26 +151,24 @@ def test_marks_are_taken_and_edited_by_the_keyboard(drive, folder):
 
 def test_invalid_marks_are_rejected(drive, folder):
     def enter_nonsense(dialog):
-        dialog.add_empty()
-        for column, text in enumerate(('B1', '__import__("os")', '2000')):
-            dialog.table.item(1, column).setText(text)
+        add_mark(dialog, 'B1', '__import__("os")', '2000')
         dialog.accept()
-        return dialog._problem.text(), dialog.isVisible()
+        return dialog.problem.text(), dialog.isVisible()
     problem, still_there = drive.answer(enter_nonsense, lambda: drive.press((Qt.Key_G, CONTROL)))
     assert 'Row 2' in problem and still_there and len(Document.open(folder).grid) == 1
 
 
-def test_same_as_the_last_one(drive, folder):
+def test_same_as_last_copies_the_truth_and_reports_if_there_is_none(drive, folder):
+    drive.press((Qt.Key_L, CONTROL))
+    assert drive.measurement(0).id in drive.window.pane.truth.hint_label.text()
     drive.press('100', Qt.Key_Tab, '2000', Qt.Key_Return, (Qt.Key_L, CONTROL), (Qt.Key_L, CONTROL))
     assert [measurement.truth_m for measurement in opened(folder)] == [(0.1, None, 2.0)] * 3 + [None]
 
 
-def test_same_as_last_without_annotations_is_reported(drive):
-    drive.press((Qt.Key_L, CONTROL))
-    assert drive.measurement(0).id in drive.window.pane.truth.hint_label.text()
-
-
 def test_reject_asks_for_a_reason_and_restore_undoes_it(drive, folder):
+    drive.answer(lambda dialog: dialog.reject(), lambda: drive.press((Qt.Key_R, CONTROL)))
+    assert drive.measurement(0).state == 'new' and drive.window.current == 0
+
     def give_reason(dialog):
         box = dialog.findChild(QtWidgets.QComboBox)
         box.setEditText('moved')
@@ -207,13 +181,10 @@ def test_reject_asks_for_a_reason_and_restore_undoes_it(drive, folder):
     assert opened(folder)[0].state == 'new' and drive.window.last_entry.text() == ''
 
 
-def test_a_cancelled_rejection_changes_nothing(drive):
-    drive.answer(lambda dialog: dialog.reject(), lambda: drive.press((Qt.Key_R, CONTROL)))
-    assert drive.measurement(0).state == 'new' and drive.window.current == 0
-
-
-def test_undo_and_redo_show_where_they_were(drive, folder):
+def test_undo_starts_with_typed_text_and_undo_and_redo_show_their_measurement(drive, folder):
     drive.press('100', Qt.Key_Tab, '2000', Qt.Key_Return, '200', Qt.Key_Tab, '2000', Qt.Key_Return)
+    drive.press('7', (Qt.Key_Z, CONTROL))
+    assert drive.window.pane.truth.fields['x'].text() == '' and opened(folder)[1].state == 'annotated'
     drive.press((Qt.Key_Z, CONTROL), (Qt.Key_Z, CONTROL))
     assert drive.window.current == 0 and [measurement.state for measurement in opened(folder)] == ['new'] * 4
     drive.press((Qt.Key_Y, CONTROL))
@@ -223,24 +194,14 @@ def test_undo_and_redo_show_where_they_were(drive, folder):
     assert not drive.window.actions['redo'].isEnabled()
 
 
-def test_undo_in_a_field_undoes_typing_first(drive, folder):
-    drive.press('100', Qt.Key_Tab, '2000', Qt.Key_Return, '7', (Qt.Key_Z, CONTROL))
-    assert drive.window.pane.truth.fields['x'].text() == '' and opened(folder)[0].state == 'annotated'
-    drive.press((Qt.Key_Z, CONTROL))
-    assert opened(folder)[0].state == 'new'
-
-
-def test_the_list_goes_to_a_measurement_and_filters_by_state(drive):
-    drive.press('1', Qt.Key_Tab, '2000', Qt.Key_Return, Qt.Key_F2, Qt.Key_Down)
-    assert drive.window.current == 2
+def test_the_list_selects_and_filters_and_going_on_can_be_switched_off(drive):
+    drive.press((Qt.Key_T, CONTROL), '1', Qt.Key_Tab, '2000', Qt.Key_Return)
+    assert drive.window.current == 0 and drive.measurement(0).state == 'annotated'
+    drive.press(Qt.Key_F2, Qt.Key_Down)
+    assert drive.window.current == 1
     drive.window.list.filter_box.setCurrentIndex(2)
     shown = drive.window.list.table.model()
     assert shown.rowCount() == 1 and shown.index(0, 0).data() == 'm0'
     assert shown.index(0, 2).data() == '468 mm'
     drive.window.list.filter_box.setCurrentIndex(1)
     assert shown.rowCount() == 3 and drive.window.list.filter_box.itemText(1) == 'new only (3)'
-
-
-def test_going_on_can_be_switched_off(drive):
-    drive.press((Qt.Key_T, CONTROL), '1', Qt.Key_Tab, '2000', Qt.Key_Return)
-    assert drive.window.current == 0 and drive.measurement(0).state == 'annotated'

@@ -15,13 +15,7 @@ def _add_many(folder, name, count):
             content['frames'].append({'id': '%s-%d' % (name, number)})
 
 
-def test_a_missing_description_is_created(tmp_path):
-    with locked_update(str(tmp_path)) as content:
-        content['frames'].append({'id': 'a'})
-    assert json.loads((tmp_path / 'frames.json').read_text()) == {'frames': [{'id': 'a'}]}
-
-
-def test_concurrent_updates_are_not_lost(tmp_path):
+def test_a_description_is_created_and_concurrent_updates_are_not_lost(tmp_path):
     others = [multiprocessing.Process(target=_add_many, args=(str(tmp_path), name, 20)) for name in 'ab']
     for other in others:
         other.start()

@@ -29,7 +29,7 @@ def pillar_before(person, share, beside_m):
 
 
 @example(height_m=0.3, pitch_deg=17.0, roll_deg=90, x_m=2.0, bearing=0.0, share=0.5, beside_m=0)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(height_m=st.floats(0.3, 2.5), pitch_deg=st.floats(-10, 45), roll_deg=ROLLS, x_m=st.floats(2, 6),
        bearing=st.floats(-0.3, 0.3), share=st.floats(0.3, 0.6), beside_m=st.sampled_from([0, 0, 0.65, -0.65]))
 def test_a_pillar_hides_a_person_where_no_ray_reaches_the_body(height_m, pitch_deg, roll_deg, x_m, bearing, share,

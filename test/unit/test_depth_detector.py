@@ -36,8 +36,7 @@ class Room(object):
         self.color[self.depth_m < 9] = 130
 
     def block(self, x, z, low, high, half_width, shade=60, bulge_m=0.0, corners=50, owner=0):
-        """Draw a block from `low` to `high` above the floor, convex by `bulge_m`. Small `corners` give round corners.
-        """
+        """Draw a block from `low` to `high`, convex by `bulge_m`. Small `corners` give round corners."""
         camera = self.camera
         u = (np.arange(camera.width) - camera.cx - x * camera.fx / z) / (half_width * camera.fx / z)
         v = (np.arange(camera.height) - camera.cy) * z / camera.fy - self.height_m + (low + high) / 2
@@ -73,8 +72,10 @@ class Room(object):
         return sorted(depth_people.box_of(blob, shape, grid, self.camera, self.floor)
                       for blob, shape in find_person_clusters(grid, self.camera, params))
 
-    def detections(self, floor='given', **params):
+    def detections(self, floor='given', in_metres=False, **params):
         color, depth = self.images()
+        if in_metres:
+            depth = DepthImage(np.where(self.depth_m < 8, depth.values / np.float32(1000), np.nan), 1.0)
         return DepthPeople(DepthPeopleParams(**params)).detect(color, depth, self.camera,
                                                                self.floor if floor == 'given' else None)
 
@@ -86,21 +87,22 @@ def assert_boxes(boxes, expected, min_iou=0.7):
         assert iou(box, boxes).max() > min_iou, (box, boxes)
 
 
-@pytest.mark.parametrize('height_m,z', [(1.0, 2.5), (1.0, 4.0), (0.6, 3.5), (0.26, 5.0), (1.4, 5.5)])
-@pytest.mark.parametrize('floor', ['given', 'fitted'])
-def test_the_box_of_a_person_extends_from_head_to_feet(height_m, z, floor):
-    room = Room(height_m)
-    expected = room.visible(room.person(0.3, z))
-    detections = room.detections(floor)
-    assert_boxes(detections.boxes, expected, 0.8)
+SIZES = [Camera(320, 240, 300, 300, 159.5, 119.5), Camera(848, 480, 420, 425, 430.2, 236.1),
+         Camera(1280, 720, 920, 920, 640, 360)]
+
+
+@pytest.mark.parametrize('height_m, x, z, camera', [
+    (1.0, 0.3, 2.5, CAMERA), (1.0, 0.3, 4.0, CAMERA), (0.6, 0.3, 3.5, CAMERA), (0.26, 0.3, 5.0, CAMERA),
+    (1.4, 0.3, 5.5, CAMERA), (0.26, 0.1, 2.0, CAMERA)] + [(1.0, -0.4, 3.0, camera) for camera in SIZES])
+@pytest.mark.parametrize('floor, in_metres', [('given', False), ('fitted', False), ('given', True)])
+def test_the_box_of_a_person_extends_from_head_to_feet(height_m, x, z, camera, floor, in_metres):
+    """Or to the border of the image: in the sixth case the head is above it."""
+    room = Room(height_m, camera)
+    expected = room.visible(room.person(x, z))
+    assert (expected[1] == 0) == (z == 2.0)
+    detections = room.detections(floor, in_metres)
+    assert_boxes(detections.boxes, expected, 0.8 if z != 2.0 else 0.7)
     assert 0.7 <= detections.scores[0] <= 1 and detections.classes.tolist() == [0]
-
-
-def test_detects_a_person_whose_head_is_above_the_image():
-    room = Room(0.26)
-    expected = room.visible(room.person(0.1, 2.0))
-    assert expected[1] == 0
-    assert_boxes(room.detections().boxes, expected)
 
 
 def test_finds_a_cluster_cut_by_the_side_of_the_image():
@@ -110,35 +112,11 @@ def test_finds_a_cluster_cut_by_the_side_of_the_image():
     assert_boxes(room.cluster_boxes(), expected)
 
 
-@pytest.mark.parametrize('camera', [Camera(320, 240, 300, 300, 159.5, 119.5), Camera(848, 480, 420, 425, 430.2, 236.1),
-                                    Camera(1280, 720, 920, 920, 640, 360)])
-def test_works_for_any_image_size(camera):
-    room = Room(camera=camera)
-    expected = room.visible(room.person(-0.4, 3.0))
-    assert_boxes(room.detections().boxes, expected)
-
-
-def test_depth_may_be_in_metres_with_nan():
+@pytest.mark.parametrize('one, other', [((0.0, 3.0), (0.4, 3.5)), ((0.0, 3.0), (0.4, 3.7)), ((0.0, 3.0), (0.4, 4.0)),
+                                        ((-0.28, 3.5), (0.28, 3.5))])
+def test_people_who_overlap_in_the_image_are_separated_by_depth_or_between_their_heads(one, other):
     room = Room()
-    expected = room.visible(room.person(0, 3))
-    color, depth = room.images()
-    metres = depth.values.astype(np.float32) / 1000
-    metres[metres > 8] = np.nan
-    detections = DepthPeople().detect(color, DepthImage(metres, 1.0), CAMERA, room.floor)
-    assert_boxes(detections.boxes, expected)
-
-
-@pytest.mark.parametrize('gap_m', [0.5, 0.7, 1.0])
-def test_people_who_overlap_in_the_image_are_separated_by_depth(gap_m):
-    room = Room()
-    near, far = [room.visible(person) for person in (room.person(0.0, 3.0), room.person(0.4, 3.0 + gap_m))]
-    assert far[0] <= near[2]
-    assert_boxes(room.cluster_boxes(), [near, far])
-
-
-def test_people_who_touch_at_one_depth_are_separated_between_their_heads():
-    room = Room()
-    left, right = [room.visible(person) for person in (room.person(-0.28, 3.5), room.person(0.28, 3.5))]
+    left, right = [room.visible(person) for person in (room.person(*one), room.person(*other))]
     assert right[0] <= left[2]
     assert_boxes(room.cluster_boxes(), [left, right])
 
@@ -172,38 +150,23 @@ def test_furniture_is_not_detected(x, z, low, high, half_width, height_m):
     assert len(DepthPeople().detect(color, depth, CAMERA, room.floor).boxes) == 0
 
 
-def test_a_person_beside_a_cabinet_is_detected_without_the_cabinet():
+def test_people_beside_a_cabinet_are_detected_in_order_of_score_without_the_cabinet():
     room = Room()
     room.block(0.9, 4.0, 0.0, 1.9, 0.4)
-    expected = room.visible(room.person(0, 3))
-    assert_boxes(room.detections().boxes, expected)
+    expected = [room.visible(room.person(*position)) for position in ((0, 3), (-1.0, 3.5))]
+    detections = room.detections()
+    assert_boxes(detections.boxes, expected)
+    assert detections.scores[0] >= detections.scores[1]
 
 
-def test_detections_are_sorted_by_score():
-    room = Room()
-    room.person(-0.8, 3)
-    room.person(0.7, 4.5)
-    scores = room.detections(min_score=0.1).scores
-    assert len(scores) == 2 and scores[0] >= scores[1]
-
-
-@pytest.mark.parametrize('floor', ['given', 'fitted'])
-def test_an_empty_room_gives_no_detections(floor):
-    assert Room().detections(floor).boxes.shape == (0, 4)
-
-
-@pytest.mark.parametrize('depth', [DepthImage(np.zeros((480, 640), np.uint16), 0.001),
+@pytest.mark.parametrize('depth', [Room().images()[1], DepthImage(np.zeros((480, 640), np.uint16), 0.001),
                                    DepthImage(np.full((480, 640), np.nan, np.float32), 1.0)])
-def test_no_depth_gives_no_detections(depth):
+def test_nothing_is_detected_in_an_empty_room_or_without_depth(depth):
     assert DepthPeople().detect(Room().color, depth, CAMERA, Room().floor).boxes.shape == (0, 4)
 
 
-def test_the_result_is_none_until_a_floor_is_known():
-    depth = DepthImage(np.zeros((480, 640), np.uint16), 0.001)
-    assert DepthPeople().detect(Room().color, depth, CAMERA) is None
-
-
 def test_the_last_floor_is_used_if_none_is_visible():
+    """The result is None if there was none before."""
     room = Room()
     expected = room.visible(room.person(0, 3))
     color, depth = room.images()
@@ -215,7 +178,6 @@ def test_the_last_floor_is_used_if_none_is_visible():
 
 
 @pytest.mark.parametrize('image,depth,named', [
-    ((480, 640), (240, 320), 'depth .*320 x 240.*camera 640 x 480'),
     ((240, 320), (240, 320), 'depth .*320 x 240.*camera 640 x 480'),
     ((240, 320), (480, 640), 'colour .*320 x 240.*depth image 640 x 480')])
 def test_images_and_cameras_of_different_sizes_are_rejected(image, depth, named):

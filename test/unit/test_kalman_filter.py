@@ -3,10 +3,11 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.tracking.kalman_filter import Measurements, Outliers, negative_log_likelihood, predict, update
+from ros_3d_bb.tracking.kalman_filter import negative_log_likelihood, predict, update
+from ros_3d_bb.tracking.measurement_model import MEASUREMENT
+from ros_3d_bb.tracking.tracker import TrackerParams
 
-NONE = Outliers(probability=0.0)
-AHEAD = np.array([[1.0, 0.0]])
+OUTLIERS, NONE = TrackerParams(), TrackerParams(outlier_share=0.0)
 SECONDS = st.floats(0.01, 2)
 
 
@@ -15,8 +16,12 @@ def state(position=(0, 0), velocity=(0, 0), spread=0.3, speed_spread=0.8):
             np.diag([spread ** 2, spread ** 2, speed_spread ** 2, speed_spread ** 2])[None])
 
 
-def seen(x, y, sigma=0.1):
-    return Measurements(np.array([[x, y]], float), np.eye(2)[None] * sigma ** 2, AHEAD)
+def measured_at(positions_m, sigma=0.1):
+    """Measurements (m,) on viewing rays along x."""
+    measurements = np.zeros(len(positions_m), MEASUREMENT)
+    measurements['position_m'], measurements['noise_m2'] = positions_m, np.eye(2) * sigma ** 2
+    measurements['ray'] = 1.0, 0.0
+    return measurements
 
 
 @given(SECONDS, SECONDS)
@@ -35,24 +40,24 @@ def test_without_outliers_it_is_the_textbook_filter(x, y, sigma):
     matrix = np.eye(2, 4)
     innovation = matrix.dot(covariance[0]).dot(matrix.T) + sigma ** 2 * np.eye(2)
     gain = covariance[0].dot(matrix.T).dot(np.linalg.inv(innovation))
-    got_mean, got_covariance = update(mean, covariance, seen(x, y, sigma), NONE)
+    got_mean, got_covariance = update(mean, covariance, measured_at([(x, y)], sigma), NONE)
     np.testing.assert_allclose(got_mean[0], gain.dot([x, y]), atol=1e-9)
     np.testing.assert_allclose(got_covariance[0], (np.eye(4) - gain.dot(matrix)).dot(covariance[0]), atol=1e-9)
 
 
-def test_a_measurement_behind_the_person_is_not_believed_and_one_beside_is():
+def test_a_measurement_behind_the_person_is_an_outlier_and_one_beside_is_not():
     """0.8 m behind is what a background pixel looks like; 0.8 m beside no background explains."""
     sure = state(spread=0.1)
-    behind, _covariance = update(*sure, measurements=seen(0.8, 0.0), outliers=Outliers())
-    beside, _covariance = update(*sure, measurements=seen(0.0, 0.8), outliers=Outliers())
-    plain, _covariance = update(*sure, measurements=seen(0.8, 0.0), outliers=NONE)
+    behind, _covariance = update(*sure, measurements=measured_at([(0.8, 0.0)]), params=OUTLIERS)
+    beside, _covariance = update(*sure, measurements=measured_at([(0.0, 0.8)]), params=OUTLIERS)
+    plain, _covariance = update(*sure, measurements=measured_at([(0.8, 0.0)]), params=NONE)
     assert abs(behind[0, 0]) < 0.1 and plain[0, 0] == pytest.approx(0.4, abs=1e-4)
     assert beside[0, 1] == pytest.approx(0.4, abs=1e-4)
 
 
 @given(st.floats(-2, 2), st.floats(-2, 2))
 def test_a_mixture_stays_a_covariance(x, y):
-    _mean, covariance = update(*state(), measurements=seen(x, y), outliers=Outliers())
+    _mean, covariance = update(*state(), measurements=measured_at([(x, y)]), params=OUTLIERS)
     np.testing.assert_allclose(covariance, covariance.transpose(0, 2, 1))
     assert np.linalg.eigvalsh(covariance[0]).min() > 0
 
@@ -62,17 +67,15 @@ def test_likelihood_is_a_density():
     mean, covariance = state(spread=0.2)
     step_m = 0.05
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(-3, 4, step_m), np.arange(-3, 3, step_m)))
-    places = Measurements(np.column_stack((x, y)), np.tile(np.eye(2) * 0.01, (x.size, 1, 1)),
-                          np.tile(AHEAD, (x.size, 1)))
-    cost = negative_log_likelihood(mean, covariance, places, Outliers())
+    cost = negative_log_likelihood(mean, covariance, measured_at(np.column_stack((x, y))), OUTLIERS)
     assert np.exp(-cost / 2).sum() * step_m ** 2 / (2 * np.pi) == pytest.approx(1, abs=0.01)
 
 
 def test_all_pairs_are_as_likely_as_each_alone():
     random = np.random.RandomState(3)
     mean, covariance = random.normal(0, 1, (3, 4)), np.tile(np.eye(4) * 0.1, (3, 1, 1))
-    places = Measurements(random.normal(0, 1, (5, 2)), np.tile(np.eye(2) * 0.01, (5, 1, 1)), np.tile(AHEAD, (5, 1)))
-    cost = negative_log_likelihood(mean, covariance, places, Outliers())
+    measurements = measured_at(random.normal(0, 1, (5, 2)))
+    cost = negative_log_likelihood(mean, covariance, measurements, OUTLIERS)
     assert cost.shape == (3, 5)
-    one = Measurements(*(values[2:3] for values in places))
-    assert cost[1, 2] == pytest.approx(negative_log_likelihood(mean[1:2], covariance[1:2], one, Outliers())[0, 0])
+    alone = negative_log_likelihood(mean[1:2], covariance[1:2], measurements[2:3], OUTLIERS)
+    assert cost[1, 2] == pytest.approx(alone[0, 0])

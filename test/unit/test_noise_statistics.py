@@ -1,4 +1,4 @@
-"""Statistics of clusters: known distributions are told apart, known numbers come out."""
+"""Statistics of clusters of known distributions."""
 import numpy as np
 import pytest
 
@@ -31,13 +31,9 @@ def test_no_distribution_predicts_a_gaussian_much_better_than_a_gaussian():
 
 
 @pytest.mark.parametrize('name,fit', DISTRIBUTIONS)
-def test_densities_are_densities(name, fit):
+def test_densities_integrate_to_one_and_are_limited_for_equal_values(name, fit):
     at_m = np.linspace(-20, 20, 400001)
     assert np.trapz(np.exp(fit(drawn('Gaussian', 60))(at_m)), at_m) == pytest.approx(1, abs=0.01)
-
-
-@pytest.mark.parametrize('name,fit', DISTRIBUTIONS)
-def test_equal_values_are_no_proof_of_a_needle(name, fit):
     assert held_out_log_likelihood(np.array([0.01] * 9 + [0.02]), fit) < np.log(1 / 0.001)
 
 
@@ -47,7 +43,7 @@ def test_moments_are_those_of_the_thesis():
     assert found.variance_m2 == pytest.approx(0.0014 / 3)  # divided by n
 
 
-def test_errors_that_are_all_equal_or_few_are_not_tested():
+def test_equal_or_few_errors_are_not_tested():
     equal, few = (cluster_statistics(Cluster(1.0, np.array(values))) for values in ([0.01] * 9, [0.01, 0.02, 0.05]))
     assert equal.variance_m2 == 0 and few.variance_m2 > 0
     for found in (equal, few):
@@ -60,14 +56,11 @@ def test_each_cluster_has_the_same_weight_in_the_polynomial():
     found = axis_statistics(clusters, 1)
     assert found.poly == pytest.approx((0.1, 0.0), abs=1e-9)
     assert found.max_sigma_m == pytest.approx(np.sqrt(2 / 3.0) / 100)
-
-
-def test_too_few_clusters_for_the_polynomial_are_refused():
     with pytest.raises(ValueError, match='2 clusters; at least 3'):
-        axis_statistics([Cluster(x_m, np.array([1, 2, 4.0])) for x_m in (1, 2)], 2)
+        axis_statistics(clusters[:2], 2)
 
 
-def test_variance_between_positions_is_told_from_that_of_repetitions():
+def test_variance_between_positions_is_separated_from_that_of_repetitions():
     x_m, z_m = np.repeat([[-1, 0, 1, -1, 0, 1], [1, 1, 1, 2, 2, 2]], 50, axis=1).astype(float)
     error_m = 0.03 * x_m + 0.01 * np.random.RandomState(0).normal(size=len(x_m))
     table = MeasurementTable('made', np.stack((x_m, x_m, z_m + error_m), axis=1), np.stack((x_m, z_m), axis=1), x_m > 9)
@@ -76,11 +69,8 @@ def test_variance_between_positions_is_told_from_that_of_repetitions():
     assert share_between_positions(table, 'Z') is None
 
 
-def test_focal_length_and_field_of_view():
+def test_stereo_theory():
     assert theory.focal_px(90, 640) == pytest.approx(320) and theory.fov_deg(320, 640) == pytest.approx(90)
     assert theory.focal_px(69, 640) == pytest.approx(465.6, abs=0.1)  # the thesis'
-    assert theory.fov_deg(614.686, 640) == pytest.approx(55.0, abs=0.05)  # what its camera says
-
-
-def test_stereo_error_goes_with_the_square_of_the_distance():
+    assert theory.fov_deg(614.686, 640) == pytest.approx(55.0, abs=0.05)  # of its camera
     assert theory.stereo_rms_m([1, 2, 3], 20.0, 0.1) == pytest.approx([0.005, 0.02, 0.045])

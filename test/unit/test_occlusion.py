@@ -1,22 +1,23 @@
-"""Why somebody is not seen. The camera stands at the origin of the map, 1 m up, and looks along x."""
+"""Visibility of people. The camera stands at the origin of the map, 1 m up, and points along x."""
 import functools
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings, strategies as st
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.tracking.occlusion import classify_visibility, depths_towards
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
+from support.cylinders import mounted
 
 CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
-LOOK = transform_from((0, 0, 1), OPTICAL_ROTATION)
+LOOK = mounted(1.0)
 PLAIN = CameraView(LOOK, CAMERA)
 
 
 def place(x, y, view=PLAIN, others=(), farthest_m=6.0):
-    """What the camera makes of the place (x, y), with others at places of their own."""
+    """Visibility of a person at (x, y), with other people."""
     positions_m = np.array([(x, y, 0.9)] + [tuple(other) + (0.9,) for other in others], float)
     return classify_visibility(view, positions_m[:1], np.array([[0.5, 0.5, 1.7]]), positions_m, farthest_m)[0]
 
@@ -29,12 +30,11 @@ def with_depth(values_mm):
 @pytest.mark.parametrize('x,y,expected', [
     (3, 0, VISIBLE), (3, 1.3, VISIBLE), (3, 1.7, OUT_OF_VIEW), (3, -1.7, OUT_OF_VIEW), (-3, 0, OUT_OF_VIEW),
     (0.2, 0, OUT_OF_VIEW), (7, 0, OUT_OF_VIEW)])
-def test_places_are_in_view_or_not(x, y, expected):
+def test_positions_are_in_view_or_not(x, y, expected):
     assert place(x, y) == expected
 
 
-def test_a_camera_that_looks_to_the_left_sees_to_the_left():
-    """An off-centre principal point: more is seen on one side."""
+def test_an_off_centre_principal_point_shifts_the_field_of_view():
     camera = Camera(640, 480, 600.0, 600.0, 600.0, 239.5)
     view = CameraView(LOOK, camera)
     assert place(3, 2, view) == VISIBLE and place(3, -2, view) == OUT_OF_VIEW
@@ -45,25 +45,8 @@ FOLDING = Camera(640, 480, 280, 280, 320, 240, 'plumb_bob', (-0.35, 0.12, 0, 0, 
 
 @pytest.mark.parametrize('x,y,expected', [
     (3, 0, VISIBLE), (3, 2.5, VISIBLE), (-3, 0, OUT_OF_VIEW), (0.5, 3, OUT_OF_VIEW)])
-def test_a_camera_whose_distortion_folds_before_the_border_has_a_view_with_an_end(x, y, expected):
+def test_the_field_of_view_ends_where_the_distortion_folds(x, y, expected):
     assert place(x, y, CameraView(LOOK, FOLDING)) == expected
-
-
-def mounted(height, pitch, roll=0.0):
-    """The transform of a camera at a height, looking along x, then pitched down and rolled clockwise, degrees."""
-    transform = transform_from((0, 0, height), (0, 0, 0, 1))
-    for axis, angle in ((1, pitch), (0, roll)):
-        half = np.radians(angle) / 2
-        quaternion = np.eye(4)[axis] * np.sin(half) + np.eye(4)[3] * np.cos(half)
-        transform = transform.dot(transform_from((0, 0, 0), quaternion))
-    return transform.dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
-
-
-@pytest.mark.parametrize('height,pitch,x,expected', [
-    (2.5, 45, 2.5, VISIBLE), (2.5, 45, 6, OUT_OF_VIEW), (2.5, 45, 0.3, OUT_OF_VIEW), (3, 90, 0, VISIBLE),
-    (3, 90, 2.5, OUT_OF_VIEW), (0.3, -40, 5, OUT_OF_VIEW), (0.3, -40, 1.2, VISIBLE)])
-def test_the_upper_and_the_lower_border_of_the_image_count(height, pitch, x, expected):
-    assert place(x, 0, CameraView(mounted(height, pitch), CAMERA)) == expected
 
 
 def pixels_on_axis(camera, fixed_from_camera, x, y):
@@ -89,35 +72,35 @@ def test_what_is_visible_is_in_the_image_and_what_is_out_of_view_is_not(height, 
     assert result != OUT_OF_VIEW or narrower < 0.6
 
 
-def test_people_on_opposite_sides_of_a_camera_that_looks_down_do_not_hide_each_other():
+def test_people_on_opposite_sides_of_a_camera_pointing_down_do_not_occlude_each_other():
     view = CameraView(mounted(3, 90), CAMERA)
     assert place(0.02, 0.9, view, others=[(-0.02, 0.4)]) == OCCLUDED
     assert place(0.02, 0.9, view, others=[(-0.02, -0.4)]) == VISIBLE
 
 
-def test_a_view_without_intrinsics_sees_all_that_is_ahead():
+def test_a_view_without_intrinsics_includes_everything_ahead():
     view = CameraView(LOOK)
     assert place(3, 2.9, view) == VISIBLE and place(-1, 0, view) == OUT_OF_VIEW
 
 
 @pytest.mark.parametrize('others,expected', [
     ([(2, 0)], OCCLUDED), ([(4, 0)], VISIBLE), ([(2, 0.8)], VISIBLE), ([(2.9, 0)], VISIBLE), ([], VISIBLE)])
-def test_who_stands_behind_somebody_is_hidden(others, expected):
+def test_a_person_behind_another_one_is_occluded(others, expected):
     assert place(3, 0, others=others) == expected
 
 
 @pytest.mark.parametrize('depth_mm,expected', [(1500, OCCLUDED), (3000, VISIBLE), (4500, VISIBLE), (0, VISIBLE)])
-def test_depth_that_ends_before_the_person_is_something_that_hides_them(depth_mm, expected):
+def test_a_person_is_occluded_if_the_measured_depth_is_nearer(depth_mm, expected):
     assert place(3, 0, with_depth(np.full((480, 640), depth_mm))) == expected
 
 
-def test_a_pole_that_hides_an_arm_hides_nobody():
+def test_a_pole_before_an_arm_does_not_occlude_the_person():
     depth_mm = np.full((480, 640), 5000)
     depth_mm[:, 345:375] = 1500
     assert place(3, 0, with_depth(depth_mm)) == VISIBLE
 
 
-def test_depth_is_asked_for_where_points_are_and_nan_elsewhere():
+def test_depths_towards_points_outside_the_image_are_nan():
     depth_mm = np.arange(480 * 640).reshape(480, 640) % 5000 + 1
     depth = DepthImage(depth_mm.astype(np.uint16), 0.001)
     points = CAMERA.deproject([[10, 20], [639, 479], [-5, 20], [10, 480]], 2.0)

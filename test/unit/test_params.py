@@ -1,4 +1,5 @@
 """Parameters: defaults, types, limits, and unknown keys with the nearest known one."""
+import re
 from typing import NamedTuple
 
 import pytest
@@ -25,32 +26,26 @@ class Filter(NamedTuple):
     shapes: list = Param(('a',), 'What is drawn.', choices=('a', 'b'))
 
 
-def test_what_is_not_given_keeps_its_default():
+def test_missing_values_keep_their_default():
     assert params_from({}, Camera, Filter) == [Camera(), Filter()]
     assert params_from({'rate': 5.0, 'stride': 3}, Camera, Filter) == [Camera(rate=5.0), Filter(rate=5.0, stride=3)]
 
 
-@pytest.mark.parametrize('given,field,value', [
-    ({'rate': 5}, 'rate', 5.0), ({'frame': 0}, 'frame', '0'), ({'frame': ''}, 'frame', ''),
-    ({'enabled': False}, 'enabled', False)])
-def test_values_of_a_kindred_type_are_converted(given, field, value):
-    params, = params_from(given, Camera)
-    assert getattr(params, field) == value and type(getattr(params, field)) is type(value)
-
-
-@pytest.mark.parametrize('given,value', [(['a', 1], ['a', 1]), ('a, b', ['a', 'b']), ('person', ['person']),
-                                         (3, ['3'])])
-def test_lists_can_be_written_with_commas(given, value):
-    assert params_from({'classes': given}, Filter)[0].classes == value
+@pytest.mark.parametrize('kind, name, given, value', [
+    (Camera, 'rate', 5, 5.0), (Camera, 'frame', 0, '0'), (Camera, 'frame', '', ''), (Camera, 'enabled', False, False),
+    (Filter, 'classes', ['a', 1], ['a', 1]), (Filter, 'classes', 'a, b', ['a', 'b']),
+    (Filter, 'classes', 'person', ['person']), (Filter, 'classes', 3, ['3'])])
+def test_values_of_a_related_type_are_converted(kind, name, given, value):
+    params, = params_from({name: given}, kind)
+    assert getattr(params, name) == value and type(getattr(params, name)) is type(value)
 
 
 @pytest.mark.parametrize('given', [{'rate': 'fast'}, {'rate': True}, {'enabled': 1}, {'enabled': 'yes'},
                                    {'stride': 2.5}, {'stride': True}, {'frame': ['a']}, {'classes': {'a': 1}}])
-def test_values_of_another_type_are_named(given):
+def test_values_of_another_type_are_rejected(given):
     (name, value), = given.items()
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match=re.escape('parameter ~%s is %r' % (name, value))):
         params_from(given, Camera, Filter)
-    assert '~' + name in str(error.value) and repr(value) in str(error.value)
 
 
 def test_unknown_keys_name_the_nearest_known_one():
@@ -61,7 +56,7 @@ def test_unknown_keys_name_the_nearest_known_one():
 @pytest.mark.parametrize('given', [
     {'rate': 0.4}, {'rate': 60.1}, {'rate': float('nan')}, {'rate': float('inf')}, {'stride': -1},
     {'stride': 10 ** 9}, {'color': 'RGB'}, {'shapes': ['a', 'c']}])
-def test_values_that_are_not_allowed_are_named(given):
+def test_values_that_are_not_allowed_are_rejected(given):
     (name, _value), = given.items()
     with pytest.raises(ValueError, match='parameter ~%s ' % name):
         params_from(given, Camera, Filter)
@@ -69,8 +64,7 @@ def test_values_that_are_not_allowed_are_named(given):
 
 @pytest.mark.parametrize('given', [{'rate': 0.5}, {'rate': 60}, {'stride': 0}, {'color': 'bgr'}, {'shapes': []}])
 def test_limits_and_choices_are_allowed(given):
-    (name, value), = given.items()
-    assert any(getattr(params, name, None) == value for params in params_from(given, Camera, Filter))
+    assert any(given.items() <= params._asdict().items() for params in params_from(given, Camera, Filter))
 
 
 def test_a_table_has_a_row_for_each_name_with_its_section():
@@ -84,5 +78,5 @@ def test_a_table_has_a_row_for_each_name_with_its_section():
     (Param(True, 'Text.'), ''), (Param(1.0, 'Text.', 'm'), 'Unit: m.'),
     (RATE, 'Unit: Hz. Allowed: 0.5 to 60. Live: 1 to 60.'), (Param(1, 'Text.', limits=(1, 1e6)), 'Allowed: 1 or more.'),
     (Param('a', 'Text.', choices=('a', 'b'), live=True), 'Allowed: one of a, b. Live.')])
-def test_facts_are_what_the_text_does_not_tell(param, facts):
+def test_facts_complete_the_text(param, facts):
     assert param.facts == facts

@@ -72,5 +72,4 @@ def test_hog_has_more_weight_if_the_head_is_visible():
 def test_fill_is_at_least_one_half():
     mask = np.zeros((60, 20), bool)
     mask[::6] = mask[:, 0] = mask[:, 19] = True
-    assert mask.mean() < 0.3
-    assert shape_features_of(mask, np.full(mask.shape, 3.0), 0.3)[0] == 0.5
+    assert mask.mean() < 0.3 and shape_features_of(mask, np.full(mask.shape, 3.0), 0.3)[0] == 0.5

@@ -1,4 +1,4 @@
-"""Where people are now, in which frame, and what ground they take up; all against places known beforehand."""
+"""Positions of people at the current time, frames and footprints, against known positions."""
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -19,26 +19,6 @@ def track_at(position_m, velocity_mps, prediction_m=None, moving=True, covarianc
         prediction_m = position_m + np.outer(STEP_S * np.arange(1, 9), velocity_mps)
     return TrackedObject(number, position_m, np.array([0.5, 0.5, 1.7]), velocity_mps, velocity_mps, VISIBLE, moving, 0,
                          0, np.reshape(prediction_m, (-1, 3)), STEP_S, covariance)
-
-
-@given(st.floats(0, 10), st.floats(-2, 2), st.floats(-2, 2))
-def test_who_walks_straight_is_where_the_velocity_leads_before_and_beyond_the_last_prediction(ahead_s, vx, vy):
-    track = track_at([1, 2, 0.9], [vx, vy, 0])
-    np.testing.assert_allclose(position_after(track, ahead_s), [1 + vx * ahead_s, 2 + vy * ahead_s, 0.9], atol=1e-9)
-    without = track_at([1, 2, 0.9], [vx, vy, 0], np.empty((0, 3)))
-    np.testing.assert_allclose(position_after(without, ahead_s), position_after(track, ahead_s), atol=1e-9)
-
-
-def test_the_prediction_of_the_tracker_is_followed_round_a_bend():
-    track = track_at([0, 0, 1], [1, 0, 0], [[0.25, 0, 1], [0.25, 0.25, 1]])
-    np.testing.assert_allclose(position_after(track, [0, 0.125, 0.25, 0.375, 0.5]),
-                               [[0, 0, 1], [0.125, 0, 1], [0.25, 0, 1], [0.25, 0.125, 1], [0.25, 0.25, 1]])
-
-
-def test_people_who_stand_have_no_velocity_for_planners():
-    stands, walks = predicted_to([track_at([0, 0, 1], [0.1, 0, 0], moving=False), track_at([0, 0, 1], [1, 0, 0])], 0.2)
-    assert not stands.velocity_mps.any() and stands.position_m[0] == pytest.approx(0.02)
-    assert walks.velocity_mps[0] == 1 and walks.position_m[0] == pytest.approx(0.2)
 
 
 @given(st.floats(-np.pi, np.pi), st.floats(-5, 5), st.floats(-5, 5))
@@ -64,12 +44,6 @@ def test_footprints_fill_the_cylinder_and_the_ground_ahead_without_gaps():
     assert np.linalg.norm(strip - points[np.newaxis, :, :2], axis=-1).min(axis=1).max() < 0.05
 
 
-def test_without_prediction_only_the_cylinder_is_there_and_nobody_has_no_points():
-    points = footprint_points([track_at([2, 0, 0.85], [1.5, 0, 0])], 0.0, 0.05)
-    assert np.linalg.norm(points[:, :2] - [2, 0], axis=1).max() == pytest.approx(0.25)
-    assert footprint_points([], 1.0, 0.05).shape == (0, 3)
-
-
 @given(st.floats(0.02, 3), st.floats(0.01, 0.5))
 def test_a_disc_has_its_outline_and_nothing_outside(radius_m, spacing_m):
     disc, ring = disc_points(radius_m, spacing_m), ring_points(radius_m, spacing_m)
@@ -82,30 +56,12 @@ def test_a_disc_has_its_outline_and_nothing_outside(radius_m, spacing_m):
                                      {'size_m': np.array([0, 0, 1.7])}, {'size_m': np.array([0.5, 0.5, 10.0])},
                                      {'prediction_m': np.full((1, 3), np.nan)}, {'prediction_step_s': 0.0},
                                      {'covariance': np.diag([1, 1, 1, 1, 1, np.nan])}])
-def test_a_broken_track_takes_no_others_with_it(changed):
+def test_an_invalid_track_does_not_affect_the_others(changed):
     good = [track_at([number, 0, 1], [1, 0, 0], number=number) for number in (1, 2)]
     broken = track_at([0, 0, 1], [1, 0, 0], number=7)._replace(**changed)
     usable, faults = usable_tracks([good[0], broken, good[1]])
     assert [track.id for track in usable] == [1, 2] and len(faults) == 1 and 'track 7 ' in faults[0]
     assert usable_tracks(good)[1] == []
-
-
-STANDS = track_at([3, 0, 0.85], [0.19, 0, 0], np.empty((0, 3)), moving=False)  # 0.19 m/s: noise of one who stands
-
-
-@given(st.floats(0, 10))
-def test_who_stands_stays_where_nothing_is_predicted(ahead_s):
-    assert (position_after(STANDS, ahead_s) == [3, 0, 0.85]).all()
-    later, = predicted_to([STANDS], ahead_s)
-    assert (later.position_m == [3, 0, 0.85]).all() and not later.velocity_mps.any()
-    beyond = STANDS._replace(prediction_m=np.array([[3.02, 0, 0.85]]))
-    assert position_after(beyond, STEP_S + ahead_s)[0] == pytest.approx(3.02, abs=1e-12)
-
-
-def test_who_stands_covers_no_ground_ahead():
-    assert footprint_points([STANDS], 0.5, 0.05)[:, 0].max() == pytest.approx(3.25)
-    walks = STANDS._replace(moving=True)
-    assert footprint_points([walks], 0.5, 0.05)[:, 0].max() == pytest.approx(3.25 + 0.5 * 0.19)
 
 
 coordinates = st.floats(-1e6, 1e6)
@@ -175,13 +131,6 @@ def test_a_change_of_frame_keeps_distances_and_speeds_on_large_maps(track, yaw, 
     np.testing.assert_allclose(there.position_m - here.position_m, expected, rtol=0, atol=1e-6)
     assert np.linalg.norm(here.velocity_mps) == pytest.approx(
         np.linalg.norm(track.velocity_mps) if track.moving else 0, abs=1e-9)
-
-
-@given(coordinates, coordinates)
-def test_rounding_is_the_most_that_float32_is_off(x, y):
-    """Of all places with such coordinates; the one given is off by no more."""
-    most_m = rounding_m([track_at([x, y, 0.9], [0, 0, 0])], np.eye(4))
-    assert np.abs(np.array([x, y]) - np.float32([x, y]).astype(float)).max() <= most_m
 
 
 def test_rounding_is_a_quarter_of_a_metre_in_utm_coordinates_and_none_near_the_robot():

@@ -13,7 +13,6 @@ from support.meshes import assert_closed
 postures = st.builds(Posture, st.floats(-3, 3), st.floats(0, 1), st.floats(0, 1))
 builds = st.tuples(st.floats(1.4, 2.1), st.floats(.9, 1.4), st.floats(0, 1), st.booleans(), st.booleans()).map(
     lambda values: Build(*values))
-TOUCHING_M = .015  # a sole at less height touches the floor
 
 
 @pytest.fixture(scope='module')
@@ -34,26 +33,10 @@ def shoe(body, side):
 
 
 @given(postures)
-@settings(max_examples=50)
-def test_bones_move_rigidly(posture):
-    for transform in bone_transforms(posture):
-        np.testing.assert_allclose(transform[:, :3].dot(transform[:, :3].T), np.eye(3), atol=1e-12)
-        assert np.linalg.det(transform[:, :3]) == pytest.approx(1)
-
-
-@given(postures)
-@settings(max_examples=50)
+@settings(max_examples=30)
 def test_bones_are_connected_at_their_joints(posture):
     for bone, parent in PARENTS[1:]:
         np.testing.assert_allclose(joint(posture, bone, bone), joint(posture, parent, bone), atol=1e-12)
-
-
-def test_joints_of_a_standing_body_are_nearly_straight():
-    """Only the elbows are slightly bent."""
-    turned = {bone: np.arccos((np.trace(transform[:, :3]) - 1) / 2)
-              for bone, transform in zip(BONES, bone_transforms(Posture(phase=.3)))}
-    assert {bone for bone, angle in turned.items() if angle > .05} == {'forearm_l', 'forearm_r'}
-    assert max(turned.values()) < .25
 
 
 @given(st.floats(-2, 2), st.floats(0, 1), st.floats(0, 1))
@@ -91,32 +74,6 @@ def test_the_ankle_hardly_slides_during_stance(swing, slip_m):
     assert on_floor[0] == pytest.approx(on_floor[-1], abs=1e-9)  # no drift over many steps
 
 
-def sole_heights_and_slips(body, swing, phases, step=.01):
-    """Height of the left shoe above the floor, and slip speed of its parts on the floor relative to the body's speed.
-    """
-    left, rows = shoe(body, 1), []
-    for phase in phases:
-        before, after = (body.posed(Posture(phase + shift, swing)).vertices[left] for shift in (0, step))
-        touching = (before[:, 2] < TOUCHING_M) & (after[:, 2] < TOUCHING_M)
-        speed = (after - before)[touching, 0].mean() / step if touching.any() else -stride_m(TABLE_HEIGHT_M, swing)
-        rows.append((before[:, 2].min(), 1 + speed / stride_m(TABLE_HEIGHT_M, swing)))
-    return np.array(rows).T
-
-
-@pytest.mark.parametrize('swing', [.6, .8, 1])
-def test_the_stance_foot_is_on_the_floor_and_does_not_slide(body, swing):
-    """Measured: height up to 3 cm just after heel strike, slip up to 0.22 of the body's speed, 0.08 on average."""
-    heights_m, slips = sole_heights_and_slips(body, swing, np.arange(.02, STANCE - .02, .02))
-    assert heights_m.max() < .035 and np.mean(heights_m < TOUCHING_M) > .5
-    assert np.abs(slips).max() < .3 and abs(slips.mean()) < .15
-
-
-def test_the_swinging_foot_is_above_the_floor(body):
-    """At full swing; slow people nearly drag their feet."""
-    heights_m, _slips = sole_heights_and_slips(body, 1, np.arange(.6, .92, .02))
-    assert heights_m.min() > .02
-
-
 def test_stride_grows_with_height_and_swing_and_is_realistic():
     assert stride_m(1.75) == pytest.approx(1.2, abs=.1)
     assert stride_m(2 * 1.75) == pytest.approx(2 * stride_m(1.75))
@@ -145,19 +102,6 @@ def test_the_head_is_lowered_by_crouching(body):
     tops = [body.posed(Posture(crouch=crouch)).vertices[:, 2].max() for crouch in np.linspace(0, 1, 11)]
     assert (np.diff(tops) < 0).all()
     assert 1.0 < tops[-1] < 1.3
-
-
-def test_a_walking_body_bobs_by_centimetres(body):
-    tops = [body.posed(Posture(phase, 1)).vertices[:, 2].max() for phase in np.linspace(0, 1, 20)]
-    assert .01 < np.ptp(tops) < .06
-
-
-@given(builds)
-@settings(max_examples=10)
-def test_skinning_weights_sum_to_one(build):
-    body = Body(build, np.random.RandomState(0))
-    np.testing.assert_allclose(body._weights.sum(axis=1), 1, atol=1e-6)
-    assert body._weights.min() >= 0
 
 
 @given(builds)
@@ -208,9 +152,3 @@ def test_clothes_and_hair_are_those_of_the_build():
     assert lowest_hair[1] < lowest_hair[0] - .1
     skin = [(mesh.colors == build.skin).all(axis=1).sum() for mesh in bodies]
     assert skin[2] > skin[0]
-
-
-def test_posed_does_not_change_the_body(body):
-    before = body.posed().vertices.copy()
-    body.posed(Posture(.3, 1, .5)).moved((1, 2, 0), 1)
-    np.testing.assert_array_equal(body.posed().vertices, before)

@@ -4,18 +4,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb_lab.simulation.mesh import CELL_M, Mesh, box, loft, vertex_normals, volume
+from ros_3d_bb_lab.simulation.mesh import CELL_M, box, loft, vertex_normals, volume
 from support.meshes import assert_closed
 
 metres = st.floats(.05, 3)
-places = st.tuples(*[st.floats(-5, 5)] * 3)
+positions = st.tuples(*[st.floats(-5, 5)] * 3)
 angles = st.floats(-7, 7)
 
 
 def tube(length, depth, width, exponent=2.0, sides=64, rings=3):
     """Straight tube along z with half axes `depth` (x) and `width` (y)."""
     z, zero = np.linspace(0, length, rings), np.zeros(rings)
-    return loft(np.c_[zero, zero, z], np.c_[zero + depth, zero, zero], np.c_[zero, zero + width, zero], exponent, sides)
+    return loft(np.c_[zero, zero, z], [(depth, width)] * rings, exponent, sides)
 
 
 def crate(size=(1, 2, 3)):
@@ -38,13 +38,6 @@ def test_a_tube_is_closed_and_wound_outwards(sides, rings, exponent):
     assert len(vertices) == sides * rings
     assert_closed(faces)
     assert volume(vertices, faces) > 0
-
-
-def test_a_tube_with_descending_rings_is_wound_outwards():
-    axes = np.c_[[1, 1], [0, 0], [0, 0]], np.c_[[0, 0], [1, 1], [0, 0]]
-    up, down = loft([(0, 0, 0), (0, 0, 2)], *axes, 2, 32), loft([(0, 0, 2), (0, 0, 0)], *axes, 2, 32)
-    assert volume(*up) == pytest.approx(volume(*down)) and volume(*up) > 0
-    assert volume(up[0], up[1][:, ::-1]) == pytest.approx(-volume(*up))
 
 
 def test_the_cross_section_approaches_a_rectangle_with_growing_exponent():
@@ -81,14 +74,7 @@ def test_faces_of_a_box_are_small_and_agree_with_their_normals(size):
     assert (((corners.mean(axis=1) - (0, 0, size[2] / 2)) * normals).sum(axis=1) > 0).all()
 
 
-def test_a_box_has_its_colour_and_repeatable_mottling():
-    mesh = crate()
-    assert mesh.colors.dtype == np.uint8 and (mesh.colors == (10, 20, 30)).all() and len(mesh.colors) == len(mesh.faces)
-    assert .8 < mesh.tone.min() < mesh.tone.max() < 1.2
-    np.testing.assert_array_equal(mesh.tone, crate().tone)
-
-
-@given(places, angles)
+@given(positions, angles)
 @settings(max_examples=30)
 def test_moved_rotates_counter_clockwise_and_translates(position, heading):
     mesh = crate()
@@ -98,12 +84,3 @@ def test_moved_rotates_counter_clockwise_and_translates(position, heading):
     np.testing.assert_allclose(moved.vertices, mesh.vertices.dot(turn.T) + position, atol=1e-5)
     np.testing.assert_allclose(moved.normals, mesh.normals.dot(turn.T), atol=1e-6)
     assert moved.vertices.dtype == moved.normals.dtype == np.float32
-
-
-@given(places, angles)
-@settings(max_examples=20)
-def test_the_inverse_of_moved_restores_the_mesh(position, heading):
-    mesh = crate()
-    back = mesh.moved(position, heading).moved(-np.array(position), 0).moved((0, 0, 0), -heading)
-    np.testing.assert_allclose(back.vertices, mesh.vertices, atol=1e-5)
-    assert isinstance(back, Mesh) and back.faces is mesh.faces

@@ -63,17 +63,6 @@ def test_people_stay_at_the_end_of_their_last_move(start, person_moves):
         assert speed_of(state) < 1e-9 and state.posture.swing < 1e-9
 
 
-@given(points, st.floats(-3, 3), st.floats(0, 1))
-@settings(max_examples=20)
-def test_a_person_without_moves_keeps_the_start_state(start, facing, crouch):
-    motion = walker(start=start, facing=facing, crouch=crouch)
-    for time_s in (-5, 0, .1, 99):
-        state = motion.at(time_s)
-        np.testing.assert_allclose(state.position_m, start, atol=1e-9)
-        np.testing.assert_allclose((state.heading_rad, speed_of(state)), (facing, 0), atol=1e-9)
-        np.testing.assert_allclose(state.posture, (0, 0, crouch), atol=1e-9)
-
-
 @given(st.floats(.3, 2), st.floats(-3, 3))
 @settings(max_examples=30)
 def test_a_straight_walk_has_its_speed_and_heading(speed, direction):
@@ -83,13 +72,6 @@ def test_a_straight_walk_has_its_speed_and_heading(speed, direction):
     np.testing.assert_allclose(state.velocity_mps, expected, atol=1e-9)
     np.testing.assert_allclose(state.position_m, expected * 3 / speed, atol=1e-9)
     assert angle_between(state.heading_rad, direction) < 1e-9
-
-
-def test_the_duration_of_a_walk_is_distance_by_speed():
-    motion = walker(Move(wait=2.0), Move(to=(3, 0), speed=1.5))
-    assert speed_of(motion.at(2 - SMOOTHING_S / 2)) == 0 and speed_of(motion.at(2)) == pytest.approx(.75)
-    assert motion.at(3).position_m[0] == pytest.approx(1.5)
-    assert speed_of(motion.at(4 + SMOOTHING_S / 2)) == pytest.approx(0, abs=1e-12)
 
 
 @given(st.floats(.3, 2))
@@ -103,13 +85,8 @@ def test_each_gait_cycle_covers_one_stride(speed):
     assert cycles * stride_m(HEIGHT_M, start.posture.swing) == pytest.approx(2 * speed)
 
 
-def test_swing_grows_with_speed():
-    swings = [walker(Move(to=(20, 0), speed=speed)).at(2).posture.swing for speed in (.3, .6, 1.0, 1.3, 2.0)]
-    assert (np.diff(swings[:4]) > .1).all() and swings[3:] == pytest.approx([1, 1])
-
-
 @given(st.floats(-7, 7), st.floats(-3, 3), st.floats(-3, 3), st.floats(0, 1))
-@settings(max_examples=50)
+@settings(max_examples=20)
 def test_people_face_the_direction_of_walking(facing, first, second, share):
     """On two sections of 3 m, except near the corner."""
     corner = 3 * np.array([np.cos(first), np.sin(first)])
@@ -169,33 +146,22 @@ def test_the_robot_turns_before_it_drives():
     assert driving.heading_rad == pytest.approx(np.pi / 2) and driving.posture == (0, 0, 0)
 
 
-@pytest.fixture(scope='module')
-def chase():
+def test_a_following_robot_faces_the_person_and_keeps_its_distance_and_limits():
     person = walker(Move(to=(8.0, 0.0), speed=.8), Move(to=(8.0, 6.0), speed=.8), start=(2.0, 0.0))
     robot = Robot((-1.0, -1.0, 3.0), follow=Follow(1, distance=2.0, speed=1.2, rate=1.0))
     motion = robot_motion(robot, [person], LONG_S)
-    return [(motion.at(time_s), person.at(time_s)) for time_s in np.arange(0, 25, .1)]
+    times_s = np.arange(0, 25, .1)
+    robots = [motion.at(time_s) for time_s in times_s]
+    offsets_m = np.array([person.at(time_s).position_m for time_s in times_s]) - [robot.position_m for robot in robots]
+    distances_m = np.linalg.norm(offsets_m, axis=1)
+    assert distances_m.min() > 1.9 and distances_m[-1] == pytest.approx(2, abs=.01)
+    assert distances_m[100:].max() < 2.4  # while the person walks: lag of some cm per m/s, and the bend
 
+    headings = np.array([robot.heading_rad for robot in robots])
+    angles = angle_between(headings, np.arctan2(offsets_m[:, 1], offsets_m[:, 0]))
+    assert angles[0] > 1 and angles[40:].max() < .1 and angles[-1] < .01
+    assert np.abs(np.diff(headings)).max() <= 1.0 * .1 + 1e-9
 
-def test_a_following_robot_keeps_its_distance(chase):
-    distances_m = [np.linalg.norm(robot.position_m - person.position_m) for robot, person in chase]
-    assert min(distances_m) > 1.9
-    assert max(distances_m[100:]) < 2.4  # while the person walks: lag of some cm per m/s, and the bend
-    assert distances_m[-1] == pytest.approx(2, abs=.01)
-
-
-def test_a_following_robot_faces_the_person(chase):
-    angles = [angle_between(robot.heading_rad, np.arctan2(*(person.position_m - robot.position_m)[::-1]))
-              for robot, person in chase]
-    assert angles[0] > 1 and max(angles[40:]) < .1 and angles[-1] < .01
-
-
-def test_a_following_robot_does_not_drive_while_it_faces_away(chase):
-    assert max(speed_of(robot) for robot, _person in chase[:7]) == 0 < speed_of(chase[20][0])
-
-
-def test_a_following_robot_keeps_its_limits_of_speed_and_rate(chase):
-    states = [robot for robot, _person in chase]
-    assert max(speed_of(state) for state in states) <= 1.2 + 1e-9
-    turned = np.abs(np.diff([state.heading_rad for state in states]))
-    assert max(turned) <= 1.0 * .1 + 1e-9
+    speeds_mps = [speed_of(robot) for robot in robots]
+    assert max(speeds_mps[:7]) == 0 < speeds_mps[20]  # it does not drive while it faces away
+    assert max(speeds_mps) <= 1.2 + 1e-9

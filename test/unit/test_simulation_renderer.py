@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb_lab.simulation import textures
 from ros_3d_bb_lab.simulation.body import Body, Build
-from ros_3d_bb_lab.simulation.color_sensor import ColorSensor
+from ros_3d_bb_lab.simulation.sensors import ColorSensor
 from ros_3d_bb_lab.simulation.mesh import Mesh, box
 from ros_3d_bb_lab.simulation.renderer import render
 from ros_3d_bb_lab.simulation.room import FLOOR, RenderedRoom
@@ -71,7 +71,7 @@ def everywhere(mask):
 
 
 @given(poses, cameras)
-@settings(max_examples=40)
+@settings(max_examples=25)
 def test_depth_of_floor_ceiling_and_walls_agrees_with_ray_casting(room, world_from_camera, camera):
     _color, inverse_depth, surfaces = room.draw(camera, world_from_camera)
     low, high = np.array(BOUNDS[::2] + (0.0,)), np.array(BOUNDS[1::2] + (HEIGHT,))
@@ -83,8 +83,36 @@ def test_depth_of_floor_ceiling_and_walls_agrees_with_ray_casting(room, world_fr
     assert surfaces.max() <= 5
 
 
+@pytest.fixture(scope='module')
+def gradient_room():
+    """Room with a floor and walls whose red and green values grow along the columns and rows of their textures."""
+    def gradient_of(original):
+        def gradient(*arguments):
+            height, width = original(*arguments).shape[:2]
+            u, v = np.meshgrid(np.linspace(0, 255, width), np.linspace(0, 255, height))
+            return np.dstack([u, v, 0 * u]).astype(np.uint8)
+        return gradient
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ('floor', 'wall'):
+            patch.setattr(textures, name, gradient_of(getattr(textures, name)))
+        return RenderedRoom(BOUNDS, HEIGHT, np.random.RandomState(0))
+
+
+@given(poses, cameras)
+@settings(max_examples=25)
+def test_textures_of_floor_and_wall_agree_with_ray_casting(gradient_room, world_from_camera, camera):
+    color, inverse_depth, surfaces = gradient_room.draw(camera, world_from_camera)
+    points = world_from_camera[:3, 3] + rays(camera, world_from_camera) / inverse_depth[..., None]
+    x, y, z = (np.interp(points[..., axis], ends, (0, 255))
+               for axis, ends in enumerate((BOUNDS[:2], BOUNDS[2:], (0, HEIGHT))))
+    for surface, right_and_down in ((FLOOR, (x, y)), (2, (255 - y, 255 - z))):
+        pixels = everywhere(surfaces == surface)
+        np.testing.assert_allclose(color[pixels][:, :2], np.dstack(right_and_down)[pixels], atol=4)
+
+
 @given(cameras, st.floats(2, 6), st.floats(-1, 1), st.floats(-3, 3), st.tuples(*[st.floats(.2, 1.5)] * 3))
-@settings(max_examples=40)
+@settings(max_examples=25)
 def test_depth_of_a_box_is_that_of_rays(room, camera, x, y, yaw, size):
     """Two pixels away from its outline and edges; nearer, it need not be."""
     world_from_camera = pose((0, 0, 1.2), .05, -.1, .03)
@@ -99,43 +127,6 @@ def test_depth_of_a_box_is_that_of_rays(room, camera, x, y, yaw, size):
     for number in range(3):
         on_side = everywhere(hit & (axis == number))
         np.testing.assert_allclose(drawn.inverse_depth[on_side], 1 / near[on_side], rtol=1e-4)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('surface,spot', [('floor', (5.0, 1.0, 0.0)), ('wall', (9.0, .5, 1.5))])
-@given(st.floats(-.1, .1), st.floats(-.15, .05), st.floats(-.1, .1), st.floats(-.5, 1))
-@settings(max_examples=15)
-def test_a_mark_on_a_surface_is_seen_where_it_projects_to(surface, spot, yaw, pitch, roll, y):
-    """Within a pixel: the mark on the floor covers some ten."""
-    original = getattr(textures, surface)
-
-    def marked(*arguments):
-        texture = np.zeros_like(original(*arguments))
-        place = ((spot[0] - BOUNDS[0], spot[1] - BOUNDS[2]), textures.FLOOR_PPM) if surface == 'floor' else (
-            (BOUNDS[3] - spot[1], HEIGHT - spot[2]), textures.WALL_PPM)
-        u, v = (int(round(part * place[1])) for part in place[0])
-        texture[v - 5:v + 6, u - 5:u + 6] = 255
-        return texture
-
-    world_from_camera = pose((0, y, 1.2), yaw, pitch, roll)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(textures, surface, marked)
-        color, _inverse, surfaces = RenderedRoom(BOUNDS, HEIGHT, np.random.RandomState(0)).draw(CAMERA,
-                                                                                                world_from_camera)
-    marks = (color[..., 0] > 128) & (surfaces == (FLOOR if surface == 'floor' else 2))
-    found = np.argwhere(marks).mean(axis=0)[::-1]
-    np.testing.assert_allclose(found, middle_of_mark(surface, spot, np.linalg.inv(world_from_camera)), atol=1)
-
-
-def middle_of_mark(surface, spot, camera_from_world):
-    """Centroid in the image of a mark of 11 x 11 texels; with perspective, the middle of the mark is not there."""
-    half_m = 5.5 / (textures.FLOOR_PPM if surface == 'floor' else textures.WALL_PPM)
-    along = ((1, 0, 0), (0, 1, 0)) if surface == 'floor' else ((0, 1, 0), (0, 0, 1))
-    corners = [np.array(spot) + half_m * (a * np.array(along[0]) + b * np.array(along[1]))
-               for a, b in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
-    outline = CAMERA.project([camera_from_world.dot(tuple(corner) + (1,))[:3] for corner in corners])
-    moments = cv2.moments(outline.astype(np.float32))
-    return moments['m10'] / moments['m00'], moments['m01'] / moments['m00']
 
 
 def test_the_nearest_object_is_visible_in_any_order(room):
@@ -174,14 +165,6 @@ def test_objects_identify_the_object_of_each_pixel(room, person):
         assert rendering.areas[number - 1] == single.areas[0] >= mask.sum() > 0
 
 
-def test_the_area_is_that_of_the_object_alone(room, person):
-    rendering = draw(room, [person.moved((4, 0, 0), 3.0)])
-    assert rendering.areas[0] == pytest.approx((rendering.objects == 1).sum(), rel=.01)  # except for soles in the floor
-    width_px, height_px = .5 * CAMERA.fx / 4, 1.75 * CAMERA.fy / 4
-    assert .4 < rendering.areas[0] / (width_px * height_px) < 1
-    assert rendering.inside == [1]
-
-
 @given(st.sampled_from(['left', 'right', 'top', 'bottom']), st.floats(.15, .85))
 @settings(max_examples=20)
 def test_inside_is_the_share_in_the_image(room, side, share):
@@ -206,7 +189,7 @@ def test_half_a_person_at_the_border_is_half_inside(room, person, cx):
 
 
 @given(st.floats(0, .25))
-@settings(max_examples=20)
+@settings(max_examples=12)
 def test_the_visible_part_ends_at_the_edge_of_a_pillar(room, person, edge_m):
     """The left edge of the pillar projects to a known column; the person is visible to the left of it."""
     camera = Camera(320, 240, 307.4, 307.4, 159.6, 121)
@@ -220,16 +203,11 @@ def test_the_visible_part_ends_at_the_edge_of_a_pillar(room, person, edge_m):
     assert both.areas[0] == alone.areas[0] and both.inside[0] == 1
 
 
-def test_objects_behind_the_camera_are_not_drawn(room, person):
-    behind = [person.moved((-1.5, y, 0), 0) for y in (-.5, 0, .5)] + [crate((1, 1, 2), (-2, 0, 0))]
-    rendering, empty = draw(room, behind), draw(room, [])
+def test_objects_behind_the_camera_or_outside_the_image_are_not_drawn(room, person):
+    hidden = [person.moved((-1.5, 0, 0), 0), crate((1, 1, 2), (-2, 0, 0)), person.moved((2, 3.5, 0), 0)]
+    rendering, empty = draw(room, hidden), draw(room, [])
     np.testing.assert_array_equal(rendering.color, empty.color)
-    assert not rendering.objects.any() and rendering.areas == [0] * 4 and rendering.inside == [0] * 4
-
-
-def test_objects_outside_the_image_are_not_drawn(room, person):
-    rendering = draw(room, [person.moved((2, 3.5, 0), 0)])
-    assert not rendering.objects.any() and rendering.areas == [0] and rendering.inside == [0]
+    assert not rendering.objects.any() and rendering.areas == rendering.inside == [0] * 3
 
 
 @given(st.floats(-.3, .4))
@@ -240,29 +218,11 @@ def test_objects_around_the_camera_give_finite_depth(room, person, x):
     assert all(0 <= inside <= 1 for inside in rendering.inside)
 
 
-def test_rendering_does_not_change_meshes_and_rooms(room, person):
-    meshes = [person.moved((3, 0, 0), 1), crate((1, 1, 1), (4, 1, 0))]
-    before = [[part.copy() for part in mesh] for mesh in meshes]
-    first, second = draw(room, meshes), draw(room, meshes)
-    for mesh, parts in zip(meshes, before):
-        for part, old in zip(mesh, parts):
-            np.testing.assert_array_equal(part, old)
-    np.testing.assert_array_equal(first.color, second.color)
-    assert first.color.dtype == first.objects.dtype == np.uint8 and first.inverse_depth.dtype == np.float32
-
-
 @pytest.mark.parametrize('camera', [Camera(1, 1, 30, 30, 0, 0), Camera(3, 50, 40, 40, 1, 25),
                                     Camera(333, 7, 300, 300, 166, 3)])
 def test_images_of_any_size_can_be_rendered(room, person, camera):
     rendering = draw(room, [person.moved((2, 0, 0), 0)], camera, shadows=[(2, 0, .3)])
     assert rendering.color.shape == (camera.height, camera.width, 3) and rendering.objects[camera.height // 2].any()
-
-
-def test_the_scene_does_not_depend_on_the_resolution(room, person):
-    body = person.moved((3, .2, 0), 1)
-    small, large = (draw(room, [body], camera).objects for camera in (
-        CAMERA, Camera(480, 360, 3 * 153.7, 3 * 153.7, 3 * 79.8 + 1, 3 * 60.5 + 1)))
-    assert np.mean(small != large[1::3, 1::3]) < .01
 
 
 def test_shadows_darken_the_floor_around_the_feet_only(room):
@@ -272,14 +232,9 @@ def test_shadows_darken_the_floor_around_the_feet_only(room):
     assert .55 < share[v, u] < .9
     rows, columns = np.nonzero(share < .97)
     assert np.abs(columns - u).max() < 35 and np.abs(rows - v).max() < 25
-    np.testing.assert_array_equal(lit.inverse_depth, shaded.inverse_depth)
-
-
-def test_shadows_do_not_fall_on_walls(room):
-    lit, shaded = draw(room, []), draw(room, [], shadows=[(8.9, 0, .5)])
+    at_wall = draw(room, [], shadows=[(8.9, 0, .5)])
     _color, _inverse_depth, surfaces = room.draw(CAMERA, pose((0, 0, 1.2)))
-    np.testing.assert_array_equal(shaded.color[surfaces != FLOOR], lit.color[surfaces != FLOOR])
-    assert (shaded.color != lit.color).any()
+    assert set(surfaces[(at_wall.color != lit.color).any(axis=2)]) == {FLOOR}
 
 
 def test_objects_are_lit_from_above(room):
@@ -290,23 +245,9 @@ def test_objects_are_lit_from_above(room):
 
 @pytest.mark.parametrize('height', [1.0, 1.4, 2.4])
 def test_rooms_may_be_low_and_small(height):
-    for seed in range(5):
-        color, inverse_depth, _surfaces = RenderedRoom((-1.5, 3.0, -1.0, 6.0), height,
-                                                       np.random.RandomState(seed)).draw(
-            CAMERA, pose((0, 0, .5)))
-        assert color.mean() > 50 and inverse_depth.min() >= 1 / 7.
-
-
-def test_rooms_depend_on_the_seed(room):
-    images = [RenderedRoom(BOUNDS, HEIGHT, np.random.RandomState(seed)).draw(CAMERA, pose((0, 0, 1.2)))[0]
-              for seed in (3, 3, 4)]
-    np.testing.assert_array_equal(images[0], images[1])
-    assert np.mean(images[0] != images[2]) > .3
-
-
-def test_mottle_has_mean_0_and_standard_deviation_1():
-    shade = textures.mottle(128, np.random.RandomState(0))
-    assert shade.shape == (128, 128) and abs(shade.mean()) < 1e-5 and shade.std() == pytest.approx(1, abs=1e-5)
+    small_room = RenderedRoom((-1.5, 3.0, -1.0, 6.0), height, np.random.RandomState(0))
+    color, inverse_depth, _surfaces = small_room.draw(CAMERA, pose((0, 0, .5)))
+    assert color.mean() > 50 and inverse_depth.min() >= 1 / 7.
 
 
 GREY = np.full((120, 160, 3), 120, np.uint8)
@@ -318,22 +259,8 @@ def test_colour_noise_has_the_given_sigma_and_no_bias(sigma):
     noise = np.stack([sensor.capture(GREY, number) for number in range(10)]) - 120.
     assert noise.std() == pytest.approx(np.hypot(sigma, 12 ** -.5) if sigma else 0, rel=.03)
     assert abs(noise.mean()) < .1
-
-
-def test_colour_noise_depends_on_seed_and_number_only():
-    one, other = ColorSensor(CAMERA, 5, 2.0), ColorSensor(CAMERA, 5, 2.0)
-    forward = [one.capture(GREY, number) for number in range(6)]
-    backward = [other.capture(GREY, number) for number in reversed(range(6))][::-1]
-    np.testing.assert_array_equal(forward, backward)
-    assert len({image.tobytes() for image in forward}) == 6
-    assert ColorSensor(CAMERA, 6, 2.0).capture(GREY, 0).tobytes() != forward[0].tobytes()
-    assert (GREY == 120).all()
-
-
-def test_colour_noise_of_frames_is_independent():
-    sensor = ColorSensor(CAMERA, 2, 3.0)
-    correlation = np.corrcoef([sensor.capture(GREY, number).ravel() for number in range(8)]) - np.eye(8)
-    assert np.abs(correlation).max() < .05
+    if sigma:  # images are independent
+        assert np.abs(np.corrcoef(noise.reshape(10, -1)) - np.eye(10)).max() < .05
 
 
 def test_the_colour_sensor_blurs_slightly_and_saturates():

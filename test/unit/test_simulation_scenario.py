@@ -4,13 +4,10 @@ import os
 
 import numpy as np
 import pytest
-import yaml
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from ros_3d_bb_lab.simulation.motion import person_motion, robot_motion
 from ros_3d_bb_lab.simulation.scenario import (Follow, Furniture, Mount, Move, Person, Robot, Room, Scenario,
-                                               ScenarioError, read_scenario, scenario_from)
+                                               read_scenario, scenario_from)
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'config', 'scenarios')
 SHIPPED = sorted(os.path.basename(path) for path in glob.glob(os.path.join(FOLDER, '*.yaml')))
@@ -32,7 +29,7 @@ KEYS = [(where, name) for where, (kind, _wrap) in PLACES.items() for name in kin
 
 
 def error_of(content):
-    with pytest.raises(ScenarioError) as caught:
+    with pytest.raises(ValueError) as caught:
         scenario_from(content)
     return str(caught.value)
 
@@ -112,17 +109,6 @@ def test_the_error_of_an_impossible_scenario_names_keys_and_values(content, name
     assert [part for part in named if part not in text] == []
 
 
-@given(st.recursive(st.one_of(st.none(), st.booleans(), st.floats(), st.integers(), st.text(max_size=5)),
-                    lambda inner: st.one_of(st.lists(inner, max_size=4), st.dictionaries(
-                        st.sampled_from(sorted({name for _where, name in KEYS}) + ['oops', 7]), inner, max_size=4))))
-@settings(max_examples=150)
-def test_any_content_gives_a_scenario_or_a_scenario_error(content):
-    try:
-        assert isinstance(scenario_from(content), Scenario)
-    except ScenarioError as error:
-        assert str(error)
-
-
 def test_an_empty_file_is_the_default_scenario(tmp_path):
     path = tmp_path / 'empty.yaml'
     path.write_text('# nothing\n')
@@ -160,7 +146,7 @@ def test_the_room_may_be_another_file(tmp_path):
 def test_errors_name_the_file(tmp_path, content, named):
     path = tmp_path / 'scene.yaml'
     path.write_bytes(content)
-    with pytest.raises(ScenarioError, match=r'scene\.yaml.*' + named):
+    with pytest.raises(ValueError, match=r'scene\.yaml.*' + named):
         read_scenario(str(path))
 
 
@@ -182,13 +168,9 @@ def distance_to(furniture, points):
 
 def assert_apart(distances_m, min_m, times_s, objects):
     """Assert that distances, whose first axis is time, exceed a minimum."""
-    place = np.unravel_index(np.argmin(distances_m), distances_m.shape) if distances_m.size else None
-    assert place is None or distances_m[place] > min_m, '%s: %.2f m at %.1f s, numbers %s from 1' % (
-        objects, distances_m[place], times_s[place[0]], [number + 1 for number in place[1:]])
-
-
-def test_scenarios_are_shipped():
-    assert len(SHIPPED) >= 13 and 'demo.yaml' in SHIPPED
+    worst = np.unravel_index(np.argmin(distances_m), distances_m.shape) if distances_m.size else None
+    assert worst is None or distances_m[worst] > min_m, '%s: %.2f m at %.1f s, numbers %s from 1' % (
+        objects, distances_m[worst], times_s[worst[0]], [number + 1 for number in worst[1:]])
 
 
 @pytest.mark.slow
@@ -205,19 +187,3 @@ def test_shipped_scenarios_have_no_collisions(name):
     between = np.linalg.norm(people[:, :, None] - people[:, None], axis=-1)
     assert_apart(between + 9 * np.eye(people.shape[1]), .45, times_s, 'two people')
     assert_apart(np.linalg.norm(people - robot[:, None], axis=-1), .6, times_s, 'a person and the robot')
-
-
-@pytest.mark.parametrize('name', SHIPPED)
-def test_shipped_scenarios_begin_with_a_description(name):
-    with open(os.path.join(FOLDER, name)) as stream:
-        first = stream.readline()
-    assert first.startswith('# ') and first.rstrip().endswith('.') and len(first) > 30
-
-
-def test_furniture_of_shipped_rooms_is_inside_the_room():
-    for path in glob.glob(os.path.join(FOLDER, 'rooms', '*.yaml')):
-        with open(path) as stream:
-            room = scenario_from({'room': yaml.safe_load(stream)}).room
-        for item in room.furniture:
-            assert room.bounds[0] < item.at[0] < room.bounds[1] and room.bounds[2] < item.at[1] < room.bounds[3]
-            assert item.size[2] <= room.height

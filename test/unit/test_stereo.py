@@ -11,7 +11,7 @@ import pytest
 from conftest import DATA
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
-from ros_3d_bb_lab.simulation.stereo import StereoCamera, StereoParams
+from ros_3d_bb_lab.simulation.sensors import StereoCamera, StereoParams
 
 D435I = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)
 SMALL = Camera(160, 120, 153.7, 153.7, 80, 60)
@@ -32,16 +32,12 @@ REAL_TEMPORAL_CORRELATION = (0.927, 0.862, 0.745, 0.517)
 
 
 class Standing(NamedTuple):
-    """Medians over frames of a person in front of the camera, x = 0, at 0.9 to 2.7 m.
+    """Medians over frames of a person in front of the camera, x = 0, at 0.9 to 2.7 m."""
 
-    `person_m` and `wall_m` are the depths at both ends of the shadow to the left of the torso, `shadow_px` its width,
-    `invalid` the share of pixels without depth.
-    """
-
-    person_m: float
+    person_m: float   # depths at both ends of the shadow to the left of the torso
     wall_m: float
-    shadow_px: float
-    invalid: float
+    shadow_px: float  # its width
+    invalid: float    # share of pixels without depth
 
 
 REAL_STANDING = (Standing(0.942, 8.416, 40, 0.0589), Standing(1.246, 6.973, 29, 0.0436),
@@ -181,12 +177,6 @@ def shadow_formula_px(near_m, wall_m, fx=D435I.fx):
     return 0.0606 * fx * (1 / near_m - 1 / wall_m) + 4
 
 
-def assert_within(factor, values, expected):
-    """Assert that each value differs from the expected one by less than `factor`."""
-    ratios = np.array(values) / np.array(expected)
-    assert ratios.min() > 1. / factor and ratios.max() < factor, ratios
-
-
 @pytest.mark.slow
 def test_constants_agree_with_the_real_frames(session_folder):
     """Without the real frames, only the agreement of the constants with the shadow formula is tested."""
@@ -211,13 +201,13 @@ def test_constants_agree_with_the_real_frames(session_folder):
 def test_spatial_noise_agrees_with_real_frames(simulated):
     """At a lag of 8 px the residuals of real windows contain unevenness of the room, too."""
     sigmas_px, correlation = spatial_statistics(simulated)
-    assert_within(1.4, sigmas_px, REAL_SPATIAL_PX)
+    np.testing.assert_allclose(sigmas_px, REAL_SPATIAL_PX, rtol=.35)
     np.testing.assert_array_less(np.abs(correlation - REAL_SPATIAL_CORRELATION), (0.15, 0.15, 0.15, 0.3))
 
 
 def test_temporal_noise_agrees_with_real_frames(simulated):
     sigmas_px, correlation = temporal_statistics(simulated)
-    assert_within(1.4, sigmas_px, REAL_TEMPORAL_PX)
+    np.testing.assert_allclose(sigmas_px, REAL_TEMPORAL_PX, rtol=.35)
     np.testing.assert_allclose(correlation, REAL_TEMPORAL_CORRELATION, atol=0.15)
 
 
@@ -225,46 +215,26 @@ def test_temporal_noise_agrees_with_real_frames(simulated):
 def test_shadow_and_invalid_share_agree_with_real_frames(simulated, place):
     standing = standing_statistics([shot for shot in simulated if shot.place == place])
     assert standing.shadow_px == pytest.approx(REAL_STANDING[place].shadow_px, abs=3)
-    assert_within(1.3, [standing.invalid], [REAL_STANDING[place].invalid])
+    assert standing.invalid == pytest.approx(REAL_STANDING[place].invalid, rel=.25)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize('near_m,wall_m', [(0.5, 2), (0.5, 8), (1, 2), (1, 4), (1, 8), (2, 3), (2, 8), (4, 8)])
 @pytest.mark.parametrize('params', [StereoParams(), NO_NOISE])
-def test_shadow_follows_the_formula(near_m, wall_m, params):
+def test_shadow_follows_the_formula(params):
     camera = Camera(400, 60, 614.686, 614.842, 200, 30)
-    columns = slice(200, 300)
-    depth_mm = StereoCamera(camera, params=params).measure(plate(near_m, wall_m, camera, columns), 0)
-    measured = shadows(Shot(depth_mm, (200, 0, 300, 60), None))
-    assert len(measured) > 3
-    assert np.median(measured[:, 0]) == pytest.approx(shadow_formula_px(near_m, wall_m), abs=1.5)
-    assert np.mean(depth_mm[:, 300:] == 0) < 0.01
+    stereo = StereoCamera(camera, params=params)
+    for near_m, wall_m in ((0.5, 2), (0.5, 8), (1, 2), (1, 4), (1, 8), (2, 3), (2, 8), (4, 8)):
+        depth_mm = stereo.measure(plate(near_m, wall_m, camera, slice(200, 300)), 0)
+        measured = shadows(Shot(depth_mm, (200, 0, 300, 60), None))
+        assert len(measured) > 3
+        assert np.median(measured[:, 0]) == pytest.approx(shadow_formula_px(near_m, wall_m), abs=1.5)
+        assert np.mean(depth_mm[:, 300:] == 0) < 0.01
 
 
-def test_shadow_scales_with_the_image():
-    camera = Camera(320, 60, 307.343, 307.421, 160, 30)
-    depth_mm = StereoCamera(camera, params=NO_NOISE).measure(plate(1, 5, camera, slice(200, 280)), 0)
-    assert (depth_mm == 0).sum(axis=1).tolist() == [int(0.0606 * 307.343 * 0.8) + 4] * 60
-
-
-def test_shadow_ends_at_the_left_border():
-    depth_mm = StereoCamera(SMALL, params=NO_NOISE).measure(plate(0.5, 5, SMALL, slice(8, 40)), 0)
-    assert not depth_mm[:, :8].any() and depth_mm[:, 8:].all()
-
-
-def test_near_objects_at_the_border_cause_no_shadow():
-    """As in the real frames, because the imagers have a wider field of view than the colour camera."""
-    camera = StereoCamera(SMALL, params=NO_NOISE)
-    for columns in (slice(0, 30), slice(0, 160)):
-        assert camera.measure(plate(0.5, 5, SMALL, columns), 0).all()
-
-
-def test_depth_is_quantised_by_disparity(simulated):
-    depths_mm = np.unique([shot.depth_mm for shot in simulated])
-    assert depths_mm[0] == 0
-    level = np.rint(LEVEL_MM / depths_mm[1:])
-    np.testing.assert_array_equal(np.rint(LEVEL_MM / level), depths_mm[1:])
-    assert len(depths_mm) > 300
+@pytest.mark.parametrize('columns, shadow_px', [(slice(8, 40), 8), (slice(0, 30), 0), (slice(0, 160), 0)])
+def test_shadow_ends_at_the_left_border(columns, shadow_px):
+    """Objects at the border cause no shadow, because the imagers have a wider field of view than the colour camera."""
+    depth_mm = StereoCamera(SMALL, params=NO_NOISE).measure(plate(0.5, 5, SMALL, columns), 0)
+    assert not depth_mm[:, :shadow_px].any() and depth_mm[:, shadow_px:].all()
 
 
 def test_without_noise_the_only_error_is_quantisation():
@@ -317,29 +287,4 @@ def test_silhouettes_are_ragged_and_have_flying_pixels(d435i):
 def test_the_share_of_holes_agrees_with_real_frames(d435i):
     """5e-4 of the pixels away from silhouettes."""
     share = np.mean([np.mean(d435i.measure(scene(3), number) == 0) for number in range(10)])
-    assert_within(1.5, [share], [5e-4])
-
-
-@pytest.mark.parametrize('camera', [Camera(1, 1, 30, 30, 0, 0), Camera(31, 17, 30, 40, 9, 9)])
-def test_works_for_images_of_any_size(camera):
-    depth_mm = StereoCamera(camera, seed=2 ** 32 - 1).measure(scene(2, camera), 2 ** 32 - 1)
-    assert depth_mm.shape == (camera.height, camera.width) and abs(np.median(depth_mm) - 2000) < 50
-
-
-@pytest.mark.parametrize('seed,number', [(-1, 0), (0, -1), (2 ** 32, 0), (0, 2 ** 32)])
-def test_seeds_and_numbers_out_of_range_are_rejected(seed, number):
-    with pytest.raises(ValueError):
-        StereoCamera(SMALL, seed).measure(scene(2, SMALL), number)
-
-
-@pytest.mark.parametrize('inverse_depth', [np.ones((160, 120), np.float32), np.ones((120, 160))])
-def test_images_of_wrong_shape_or_type_are_rejected(inverse_depth):
-    with pytest.raises(ValueError, match=r'float(32|64) \((160, 120|120, 160)\).*float32 \(120, 160\)'):
-        StereoCamera(SMALL).measure(inverse_depth, 0)
-
-
-@pytest.mark.parametrize('field,value', [('noise_px', -1), ('jitter_px', float('nan')), ('steps_per_px', 0),
-                                         ('hole_share', 2), ('max_disparity_px', 0.5)])
-def test_parameters_out_of_range_are_rejected(field, value):
-    with pytest.raises(ValueError, match='%s is %g' % (field, value)):
-        StereoCamera(SMALL, params=StereoParams()._replace(**{field: value}))
+    assert share == pytest.approx(5e-4, rel=.4)

@@ -1,11 +1,11 @@
-"""The thesis' tracker: numbers, velocities by the clock of the images, and who ages when."""
+"""The thesis' tracker: IDs, velocities from the stamps of images, and age of tracks."""
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as hnp
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.association import match_greedily, plane_distances
+from ros_3d_bb.tracking.association import match_greedily
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, Detection
 
@@ -30,11 +30,7 @@ def test_matching_takes_the_nearest_pair_first(distances):
         left[row], left[:, column] = np.inf, np.inf
 
 
-def test_distances_are_seen_from_above():
-    np.testing.assert_allclose(plane_distances([(0, 0, 0), (1, 1, 9)], [(3, 4, -7)]), [[5], [np.hypot(2, 3)]])
-
-
-def test_numbers_start_at_1_and_are_not_used_again():
+def test_ids_start_at_1_and_are_not_reused():
     tracker = ThesisTracker(ThesisTrackerParams(disappearance_limit=0.1))
     assert [track.id for track in tracker.update(0, [at(0, 0), at(5, 0)])] == [1, 2]
     assert tracker.update(seconds(1), []) == []
@@ -43,7 +39,7 @@ def test_numbers_start_at_1_and_are_not_used_again():
     assert [track.id for track in tracker.update(0, [at(0, 0)])] == [4]
 
 
-def test_people_who_pass_each_other_keep_their_numbers():
+def test_people_who_pass_each_other_keep_their_ids():
     """Thesis Fig. 4.1: two people pass each other at walking speed, seen at 30 Hz."""
     tracker = ThesisTracker()
     for frame in range(120):
@@ -53,7 +49,7 @@ def test_people_who_pass_each_other_keep_their_numbers():
     assert tracks[0].position_m[0] > 0 or tracks[1].position_m[0] < 0
 
 
-@pytest.mark.parametrize('rate_hz', [5, 10, 30, 60])
+@pytest.mark.parametrize('rate_hz', [5, 60])
 def test_velocity_is_metres_per_second_at_any_rate(rate_hz):
     tracker = ThesisTracker()
     for frame in range(5 * rate_hz):
@@ -61,14 +57,6 @@ def test_velocity_is_metres_per_second_at_any_rate(rate_hz):
     np.testing.assert_allclose(track.velocity_mps, [1.2, -0.5, 0], atol=0.01)
     np.testing.assert_allclose(track.instant_velocity_mps, [1.2, -0.5, 0], atol=1e-6)
     assert track.moving
-
-
-def test_velocity_survives_irregular_and_dropped_images():
-    tracker, random, time_s = ThesisTracker(), np.random.RandomState(0), 0.0
-    for _ in range(200):
-        time_s += random.choice([0.02, 0.033, 0.1, 0.3])
-        track, = tracker.update(seconds(time_s), [at(0.8 * time_s, 0)])
-    np.testing.assert_allclose(track.velocity_mps, [0.8, 0, 0], atol=0.001)
 
 
 def test_velocity_is_averaged_with_alpha():
@@ -91,7 +79,7 @@ def test_prediction_is_straight_on_for_two_seconds():
 
 
 @pytest.mark.parametrize('rate_hz', [5, 30])
-def test_an_unseen_object_stays_for_the_limit_in_seconds_and_is_then_gone(rate_hz):
+def test_an_undetected_object_is_deleted_after_the_limit_in_seconds(rate_hz):
     tracker = ThesisTracker(ThesisTrackerParams(disappearance_limit=1.0))
     tracker.update(0, [at(1, 2)])
     for frame in range(1, rate_hz + 1):
@@ -100,7 +88,7 @@ def test_an_unseen_object_stays_for_the_limit_in_seconds_and_is_then_gone(rate_h
     assert tracker.update(seconds(1 + 1 / rate_hz), []) == []
 
 
-def test_an_object_seen_again_in_time_keeps_its_number_and_its_true_velocity():
+def test_an_object_detected_again_in_time_keeps_its_id_and_velocity():
     tracker = ThesisTracker(ThesisTrackerParams(alpha=1.0))
     tracker.update(0, [at(0, 0)])
     tracker.update(seconds(0.5), [])
@@ -109,14 +97,7 @@ def test_an_object_seen_again_in_time_keeps_its_number_and_its_true_velocity():
     np.testing.assert_allclose(track.velocity_mps, [1, 0, 0])
 
 
-def test_whoever_comes_after_a_long_gap_is_somebody_else():
-    """The camera paused for 10 minutes; nobody was seen meanwhile, and nobody failed to be seen by a lack of tf."""
-    tracker = ThesisTracker(ThesisTrackerParams(disappearance_limit=1.0))
-    tracker.update(0, [at(0, 0)])
-    assert [track.id for track in tracker.update(seconds(600), [at(0.1, 0)])] == [2]
-
-
-def test_time_without_an_answer_ages_nobody():
+def test_tracks_do_not_age_during_skipped_images():
     """tf failed for 10 s: the images in between are skipped."""
     tracker = ThesisTracker(ThesisTrackerParams(disappearance_limit=1.0))
     tracker.update(0, [at(0, 0)])
@@ -127,7 +108,7 @@ def test_time_without_an_answer_ages_nobody():
     assert tracker.update(seconds(11.1), []) == []
 
 
-def test_a_skipped_stamp_far_ahead_holds_nobody_up():
+def test_a_skipped_stamp_far_ahead_has_no_effect():
     """One stamp was wrong by an hour, and so had no transform."""
     tracker = ThesisTracker()
     tracker.update(seconds(1), [at(0, 0)])
@@ -137,17 +118,13 @@ def test_a_skipped_stamp_far_ahead_holds_nobody_up():
 
 
 @pytest.mark.parametrize('stamp_s', [1.0, 0.5])
-def test_a_late_or_repeated_image_is_refused_and_changes_nothing(stamp_s):
+def test_a_late_or_duplicate_image_is_rejected_without_any_change(stamp_s):
     tracker = ThesisTracker()
     tracker.update(seconds(1), [at(0, 0)])
     with pytest.raises(ValueError, match='not later'):
         tracker.update(seconds(stamp_s), [at(5, 5)])
     tracker.skip(seconds(stamp_s))
     assert [track.id for track in tracker.update(seconds(1.1), [at(0, 0)])] == [1]
-
-
-def test_nobody_is_tracked_where_nobody_was_seen():
-    assert ThesisTracker().update(0, []) == []
 
 
 @given(st.lists(st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), max_size=5), max_size=12))
@@ -161,14 +138,8 @@ def test_each_detection_belongs_to_exactly_one_track(frames):
         seen.update(ids)
 
 
-@pytest.mark.parametrize('name,value', [('prediction_step', 0.0), ('prediction_step', 1e-6)])
-def test_parameters_that_make_no_sense_are_named(name, value):
-    with pytest.raises(ValueError, match=name):
-        ThesisTracker(ThesisTrackerParams()._replace(**{name: value}))
-
-
-def test_other_parameters_work_from_the_next_image_on_and_tracks_go_on():
-    """At alpha 1 the velocity is that between the last two sightings."""
+def test_new_parameters_apply_from_the_next_image_on_and_tracks_are_kept():
+    """With alpha 1 the velocity is that between the last two detections."""
     tracker = ThesisTracker()
     for frame in range(5):
         before, = tracker.update(seconds(frame / 10), [at(0.1 * frame, 0)])
@@ -179,8 +150,9 @@ def test_other_parameters_work_from_the_next_image_on_and_tracks_go_on():
     assert (track.id, track.first_seen_ns) == (before.id, before.first_seen_ns)
 
 
-def test_parameters_that_are_refused_leave_the_old_ones():
+@pytest.mark.parametrize('step_s', [0.0, 1e-6])
+def test_rejected_parameters_leave_the_old_ones(step_s):
     tracker = ThesisTracker()
     with pytest.raises(ValueError, match='prediction_step'):
-        tracker.reconfigure(ThesisTrackerParams(prediction_step=0.0, prediction_time=1.0))
+        tracker.reconfigure(ThesisTrackerParams(prediction_step=step_s, prediction_time=1.0))
     assert len(tracker.update(0, [at(0, 0)])[0].prediction_m) == 8

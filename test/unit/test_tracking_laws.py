@@ -23,7 +23,7 @@ def any_covariance(random):
     return axes.dot(np.diag(variances_m2)).dot(axes.T)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(SEEDS)
 def test_covariances_of_tracks_are_positive_definite_whatever_boxes_come(seed):
     """Also of boxes in the place of the camera, for cameras that look anywhere, and after any pause."""
@@ -41,7 +41,7 @@ def test_covariances_of_tracks_are_positive_definite_whatever_boxes_come(seed):
             assert np.isfinite(covariances).all() and (np.linalg.eigvalsh(covariances) > 0).all()
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(SEEDS, st.floats(0, 0.65), st.floats(0.1, 1.0))
 def test_furniture_before_the_legs_leaves_a_person_the_id(seed, hidden_share, hidden_s):
     """A table hides the lower part of the body for a while; the border of the image cuts nothing."""

@@ -17,7 +17,7 @@ STEP_S = 0.25
 
 
 def run_of(status=(VISIBLE, VISIBLE), images=IMAGES, future=True):
-    """Two people who walk; the robot stands at the origin and looks along x."""
+    """Two walking people; the robot stands at the origin and faces along x."""
     found = []
     for number in range(images):
         places_m = PLACES_M + number / 30.0 * VELOCITY_MPS
@@ -36,22 +36,21 @@ def track(track_id, place_m, velocity_mps=VELOCITY_MPS, covariances=None, steps=
                          VISIBLE, True, 0, 0, prediction_m, step_s, covariance, prediction_covariance_m2)
 
 
-def scores(run, outputs):
-    return scores_of([score_run(run, outputs)])
-
-
 def outputs_of(run, make):
-    """What `make(number of the image, truth)` gives for each image."""
+    """Tracks `make(number of the image, truth)` of each image."""
     return [make(number, image.truth) for number, image in enumerate(run.images)]
+
+
+def scores(run, make):
+    return scores_of([score_run(run, outputs_of(run, make))])
 
 
 def right(_number, truth):
     return [track(1, truth.position_m[0]), track(2, truth.position_m[1])]
 
 
-def test_a_tracker_that_is_always_right_gets_everything():
-    run = run_of()
-    result = scores(run, outputs_of(run, right))
+def test_a_perfect_tracker_has_perfect_scores():
+    result = scores(run_of(), right)
     assert [result[key] for key in ('hota', 'mota', 'idf1', 'recall', 'precision')] == pytest.approx([100] * 5)
     assert (result['id_switches'], result['fragmentations']) == (0, 0)
     for key in ('position_rmse_m', 'velocity_rmse_mps', 'ade_1s_m', 'fde_1s_m', 'ade_2s_m', 'fde_2s_m'):
@@ -59,11 +58,10 @@ def test_a_tracker_that_is_always_right_gets_everything():
     assert result['coverage_95_position'] is None and result['coverage_95_2s'] is None
 
 
-def test_numbers_that_two_people_swap_half_way_are_two_switches():
-    run = run_of()
+def test_two_people_who_swap_ids_half_way_are_two_switches():
     late = IMAGES // 2
-    result = scores(run, outputs_of(run, lambda number, truth: [
-        track(1 + (number >= late), truth.position_m[0]), track(2 - (number >= late), truth.position_m[1])]))
+    result = scores(run_of(), lambda number, truth: [
+        track(1 + (number >= late), truth.position_m[0]), track(2 - (number >= late), truth.position_m[1])])
     assert result['id_switches'] == 2
     assert result['mota'] == pytest.approx(100 * (1 - 2 / (2.0 * IMAGES)))
     assert result['idf1'] == pytest.approx(50)
@@ -71,9 +69,8 @@ def test_numbers_that_two_people_swap_half_way_are_two_switches():
     assert result['hota'] == pytest.approx(100 * np.sqrt(1 / 3.0))
 
 
-def test_somebody_who_is_missed_for_a_while_is_a_fragmentation():
-    run = run_of()
-    result = scores(run, outputs_of(run, lambda number, truth: right(number, truth)[10 <= number < 20:]))
+def test_a_gap_in_a_track_is_a_fragmentation():
+    result = scores(run_of(), lambda number, truth: right(number, truth)[10 <= number < 20:])
     assert result['fragmentations'] == 1 and result['id_switches'] == 0
     assert result['recall'] == pytest.approx(100 * (1 - 10 / (2.0 * IMAGES))) == result['mota']
 
@@ -82,43 +79,38 @@ def test_somebody_who_is_missed_for_a_while_is_a_fragmentation():
     ((2.0, -0.8), True), ((5.8, 0.0), True),
     ((5.9, 0.0), False), ((0.4, 0.0), False), ((-2.0, 0.0), False),  # too far, too near, behind the robot
     ((2.0, 1.4), False)])  # outside of the left border
-def test_a_track_of_nobody_counts_only_where_the_camera_sees(place_m, counts):
-    run = run_of()
-    result = scores(run, outputs_of(run, lambda number, truth: right(number, truth) + [track(3, np.array(place_m))]))
+def test_false_tracks_count_only_in_the_field_of_view(place_m, counts):
+    result = scores(run_of(), lambda number, truth: right(number, truth) + [track(3, np.array(place_m))])
     assert result['mota'] == pytest.approx(50 if counts else 100)
     assert result['precision'] == pytest.approx(200 / 3.0 if counts else 100)
 
 
 @pytest.mark.parametrize('status', [OCCLUDED, OUT_OF_VIEW])
 @pytest.mark.parametrize('off_m,mota', [(0.0, 100), (0.7, 100), (0.8, 0)])
-def test_a_track_of_somebody_who_is_not_visible_is_neither_right_nor_wrong(status, off_m, mota):
-    run = run_of((VISIBLE, status))
-    result = scores(run, outputs_of(run, lambda number, truth: [
-        track(1, truth.position_m[0]), track(2, truth.position_m[1] + (0, off_m))]))
+def test_tracks_of_invisible_people_are_not_scored(status, off_m, mota):
+    result = scores(run_of((VISIBLE, status)), lambda number, truth: [
+        track(1, truth.position_m[0]), track(2, truth.position_m[1] + (0, off_m))])
     assert result['mota'] == pytest.approx(mota) and result['recall'] == pytest.approx(100)
 
 
 @pytest.mark.parametrize('off_m,mota,rmse_m', [(0.3, 100, 0.3), (0.7, -100, 0.7), (1.1, -100, None)])
-def test_a_track_far_off_is_no_match_but_its_error_counts_up_to_a_metre(off_m, mota, rmse_m):
-    run = run_of()
-    result = scores(run, outputs_of(run, lambda number, truth: [
-        track(person + 1, truth.position_m[person] - (off_m, 0)) for person in (0, 1)]))
+def test_a_distant_track_is_not_a_match_but_its_error_counts_up_to_a_metre(off_m, mota, rmse_m):
+    result = scores(run_of(), lambda number, truth: [
+        track(person + 1, truth.position_m[person] - (off_m, 0)) for person in (0, 1)])
     assert result['mota'] == pytest.approx(mota)
     assert result['position_rmse_m'] == (None if rmse_m is None else pytest.approx(rmse_m))
 
 
 def test_errors_of_velocity_and_prediction_are_lengths_in_the_plane():
-    run = run_of()
-    result = scores(run, outputs_of(run, lambda _number, truth: [
-        track(person + 1, truth.position_m[person], VELOCITY_MPS + (0.3, 0.4)) for person in (0, 1)]))
+    result = scores(run_of(), lambda _number, truth: [
+        track(person + 1, truth.position_m[person], VELOCITY_MPS + (0.3, 0.4)) for person in (0, 1)])
     assert result['velocity_rmse_mps'] == pytest.approx(0.5)
     assert result['fde_1s_m'] == pytest.approx(0.5) and result['fde_2s_m'] == pytest.approx(1.0)
     assert result['ade_1s_m'] == pytest.approx(0.375) and result['ade_2s_m'] == pytest.approx(0.625)
 
 
-def test_predictions_of_people_of_whom_nobody_knows_where_they_went_do_not_count():
-    run = run_of(future=False)
-    result = scores(run, outputs_of(run, right))
+def test_predictions_without_ground_truth_do_not_count():
+    result = scores(run_of(future=False), right)
     assert result['fde_2s_m'] is None and result['position_rmse_m'] == pytest.approx(0)
 
 
@@ -138,29 +130,28 @@ def test_coverage_is_the_share_of_errors_within_the_ellipse(factor, coverage):
         return [track(person + 1, truth.position_m[person] + random.multivariate_normal((0, 0), position_m2),
                       VELOCITY_MPS + random.multivariate_normal((0, 0), velocity_m2), (covariance, prediction_m2))
                 for person in (0, 1)]
-    result = scores(run, outputs_of(run, noisy))
+    result = scores(run, noisy)
     for key in ('coverage_95_position', 'coverage_95_velocity', 'coverage_95_1s', 'coverage_95_2s'):
         assert result[key] == pytest.approx(coverage, abs=0.025), key
 
 
-def test_runs_together_are_weighed_by_their_images():
+def test_runs_are_weighted_by_their_images():
     one, three = run_of(), run_of(images=3 * IMAGES)
     nothing = outputs_of(one, lambda _number, _truth: [])
     result = scores_of([score_run(one, nothing), score_run(three, outputs_of(three, right))])
     assert result['recall'] == pytest.approx(75) == result['mota']
-    assert score_run(one, nothing).errors.position_m.shape == (0, 2)
+    assert score_run(one, nothing).errors.shape == (0, 6, 3)
 
 
-def test_where_nobody_is_visible_and_nothing_is_tracked_there_is_no_score_but_no_failure_either():
-    run = run_of((OUT_OF_VIEW, OCCLUDED))
-    result = scores(run, outputs_of(run, lambda _number, _truth: []))
+def test_without_visible_people_and_tracks_scores_are_none():
+    result = scores(run_of((OUT_OF_VIEW, OCCLUDED)), lambda _number, _truth: [])
     assert (result['id_switches'], result['position_rmse_m']) == (0, None)
 
 
-def test_predictions_that_do_not_reach_two_seconds_are_refused():
+def test_predictions_shorter_than_two_seconds_are_rejected():
     run = run_of()
     for steps, step_s in ((4, 0.25), (8, 0.3)):
-        with pytest.raises(ValueError, match='%d predictions %g s apart do not hold' % (steps, step_s)):
+        with pytest.raises(ValueError, match='%d predictions at intervals of %g s' % (steps, step_s)):
             score_run(run, outputs_of(run, lambda _number, truth: [
                 track(1, truth.position_m[0], steps=steps, step_s=step_s)]))
 

@@ -1,4 +1,4 @@
-"""Recordings of pedestrians: what is read, what is smoothed, what is refused."""
+"""Recordings of pedestrians: reading, smoothing, and errors."""
 import numpy as np
 import pytest
 from hypothesis import given
@@ -49,45 +49,34 @@ def test_a_recording_is_read_by_name_with_its_people(tmp_path):
     assert np.allclose(plaza.pedestrians[0].velocity_mps([1.0, 2.0]), (1.2, -0.5))
 
 
-def test_a_long_gap_makes_two_people_and_a_short_one_does_not(tmp_path):
-    for gap_s, people in ((LONGEST_GAP_S - 0.1, 1), (LONGEST_GAP_S + 0.1, 2)):
-        times_s = np.append(TIMES_S, TIMES_S[-1] + gap_s + TIMES_S)
-        assert len(read_sequence(csv_file(tmp_path, walk(times_s))).pedestrians) == people
-
-
-def test_the_mark_that_spreadsheets_put_in_front_is_read_over(tmp_path):
-    path = csv_file(tmp_path, walk(), header='\ufefft_s,id,x_m,y_m')
-    assert len(read_sequence(path).pedestrians) == 1
-
-
-def test_points_without_a_position_and_second_points_of_a_time_do_not_count(tmp_path):
-    rows = walk() + [(0.2, 1, 'nan', 3), (0.4, 1, 99, 99)]
-    person, = read_sequence(csv_file(tmp_path, rows)).pedestrians
-    assert np.allclose(person.position_m(TIMES_S)[:, 0], 1 + 1.2 * TIMES_S)
-
-
-def test_people_of_few_points_are_left_out(tmp_path):
-    rows = walk() + [(0.0, 2, 5, 5)] + walk(TIMES_S[:FEWEST_POINTS - 1], person=3)
-    assert len(read_sequence(csv_file(tmp_path, rows)).pedestrians) == 1
+@pytest.mark.parametrize('rows,header,people', [
+    (walk(np.append(TIMES_S, TIMES_S[-1] + LONGEST_GAP_S - 0.1 + TIMES_S)), 't_s,id,x_m,y_m', 1),
+    (walk(np.append(TIMES_S, TIMES_S[-1] + LONGEST_GAP_S + 0.1 + TIMES_S)), 't_s,id,x_m,y_m', 2),
+    (walk() + [(0.0, 2, 5, 5)] + walk(TIMES_S[:FEWEST_POINTS - 1], person=3), 't_s,id,x_m,y_m', 1),  # too few points
+    (walk() + [(0.2, 1, 'nan', 3), (0.4, 1, 99, 99)], 't_s,id,x_m,y_m', 1),  # missing and duplicate points
+    (walk(), '\ufefft_s,id,x_m,y_m', 1)])  # byte order mark of spreadsheets
+def test_segments_with_enough_points_are_people(tmp_path, rows, header, people):
+    sequence = read_sequence(csv_file(tmp_path, rows, header))
+    assert len(sequence.pedestrians) == people
+    assert np.allclose(sequence.pedestrians[0].position_m(TIMES_S)[:, 0], 1 + 1.2 * TIMES_S)
 
 
 @pytest.mark.parametrize('rows,header,message', [
-    ([(0, 1, 2, 3)], 't_s,id,x_m,y_m', 'nobody has 6 points'),
-    ([], 't_s,id,x_m,y_m', 'nobody has 6 points'),
+    ([(0, 1, 2, 3)], 't_s,id,x_m,y_m', 'no person has 6 points'),
+    ([], 't_s,id,x_m,y_m', 'no person has 6 points'),
     ([(0, 1, 2, 3)], 'frame,id,x,y', 'has the columns frame,id,x,y'),
-    ([(0, 1, 2, 3), (0.4, 1, 'left', 3)], 't_s,id,x_m,y_m', 'line 3: 0.4,1,left,3 is no point'),
-    ([('nan', 1, 2, 3)], 't_s,id,x_m,y_m', 'line 2: nan,1,2,3 is no point'),
-    ([(0, 1, 2)], 't_s,id,x_m,y_m', 'line 2: 0,1,2,None is no point')])
-def test_a_file_that_cannot_be_used_is_named(tmp_path, rows, header, message):
+    ([(0, 1, 2, 3), (0.4, 1, 'left', 3)], 't_s,id,x_m,y_m', 'line 3: 0.4,1,left,3 is not a point'),
+    ([('nan', 1, 2, 3)], 't_s,id,x_m,y_m', 'line 2: nan,1,2,3 is not a point'),
+    ([(0, 1, 2)], 't_s,id,x_m,y_m', 'line 2: 0,1,2,None is not a point')])
+def test_invalid_files_are_named(tmp_path, rows, header, message):
     with pytest.raises(ValueError, match='plaza.csv.*' + message):
         read_sequence(csv_file(tmp_path, rows, header))
 
 
-def test_a_folder_without_recordings_is_an_error(tmp_path):
-    with pytest.raises(ValueError, match='has no .csv file'):
-        read_sequences(str(tmp_path))
-    with pytest.raises(OSError):
-        read_sequences(str(tmp_path / 'nowhere'))
+@pytest.mark.parametrize('name,error', [('', ValueError), ('nowhere', OSError)])
+def test_a_folder_without_recordings_is_an_error(tmp_path, name, error):
+    with pytest.raises(error):
+        read_sequences(str(tmp_path / name))
 
 
 def test_made_recordings_are_those_of_their_seed():

@@ -2,7 +2,6 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from hypothesis.extra import numpy as hnp
 
 from ros_3d_bb.detection.boxes import Detections, iou, non_maximum_suppression
 from ros_3d_bb.detection.yolov5.backends import open_runtime
@@ -15,7 +14,7 @@ from ros_3d_bb.sessions.session_reader import read_color, read_session
 class FixedRuntime(object):
     """Returns the same predictions for every image."""
 
-    names, stride, input_hw = ['person', 'cat'], 32, None
+    names, stride, input_hw, description = ['person', 'cat'], 32, None, 'fixed'
 
     def __init__(self, rows=()):
         self.rows = np.array(rows, np.float32).reshape(-1, 7)
@@ -23,7 +22,7 @@ class FixedRuntime(object):
 
     def __call__(self, image, _min_objectness):
         assert image.dtype == np.uint8
-        self.inputs.append(image.shape)
+        self.inputs.append(image)
         return self.rows
 
 
@@ -36,9 +35,7 @@ def test_detects_the_person_in_a_measurement_session(session_folder, weights):
     for frame in session.frames:
         detections = detector.detect(read_color(frame, session.camera))
         overlaps.append(max(iou(np.array(frame.boxes_px[0], float), detections.boxes), default=0))
-    overlaps = np.array(overlaps)
-    print('%d of %d frames, median IoU %.3f' % ((overlaps > 0.5).sum(), len(overlaps), np.median(overlaps)))
-    assert (overlaps > 0.5).sum() >= len(overlaps) * 107 / 110
+    assert np.mean(np.array(overlaps) > 0.5) >= 107 / 110
     assert np.median(overlaps) >= 0.93
 
 
@@ -60,24 +57,16 @@ def test_an_image_of_the_right_size_is_neither_padded_nor_copied():
 
 
 def test_a_batch_has_the_channels_first_and_values_up_to_1():
-    image = np.zeros((4, 6, 3), np.uint8)
-    image[..., 0] = 255
-    batch = batch_of(image)
+    batch = batch_of(np.full((4, 6, 3), (255, 0, 51), np.uint8))
     assert batch.shape == (1, 3, 4, 6) and batch.dtype == np.float32
-    assert batch[0, 0].min() == 1 and batch[0, 1:].max() == 0
-
-
-def test_views_with_reversed_channels_can_be_letterboxed():
-    image = np.arange(300 * 500 * 3, dtype=np.uint8).reshape(300, 500, 3)
-    scaled, _letterbox = apply_letterbox(image[..., ::-1], (640, 640), 32)
-    other, _letterbox = apply_letterbox(image, (640, 640), 32)
-    np.testing.assert_array_equal(scaled[..., ::-1], other)
+    np.testing.assert_allclose(batch[0, :, 0, 0], (1, 0, 0.2))
 
 
 def test_boxes_are_in_image_pixels_and_clipped_to_the_image():
     runtime = FixedRuntime([(320, 320, 320, 160, 0.9, 1, 0), (0, 320, 100, 100, 0.8, 1, 0)])
-    detections = Yolov5(runtime).detect(np.zeros((360, 1280, 3), np.uint8))  # input 640x192, scale 0.5, 6 rows padded
-    assert runtime.inputs == [(192, 640, 3)]
+    image = np.zeros((360, 1280, 3), np.uint8)[..., ::-1]  # a view, as of a bgr8 image
+    detections = Yolov5(runtime).detect(image)  # input 640x192, scale 0.5, 6 rows padded
+    assert runtime.inputs[0].shape == (192, 640, 3)
     np.testing.assert_allclose(detections.boxes[0], [320, 360, 960, 360])
     np.testing.assert_allclose(detections.boxes[1, 0], 0)
 
@@ -88,6 +77,12 @@ def test_predictions_are_filtered_by_class_and_confidence():
     assert filter_predictions(rows, 0.25, [0]).scores.tolist() == pytest.approx([0.81])
     assert filter_predictions(rows, 0.25, [0, 1]).classes.tolist() == [1, 0]
     assert len(filter_predictions(rows[:0], 0.25, [0]).boxes) == 0
+
+
+def test_iou_of_shifted_disjoint_and_empty_boxes():
+    boxes = [(0, 0, 10, 10), (5, 0, 15, 10), (10, 0, 20, 10), (30, 30, 30, 30)]
+    np.testing.assert_allclose(iou(boxes[0], boxes), (1, 1 / 3, 0, 0))
+    assert iou(boxes[3], boxes[3:]) == 0
 
 
 def naive_suppression(detections, limit, max_det):
@@ -108,18 +103,9 @@ def test_suppression_agrees_with_a_naive_implementation(count, limit, max_det, s
     np.testing.assert_array_equal(kept.boxes, detections.boxes[naive_suppression(detections, limit, max_det)])
 
 
-@given(hnp.arrays(float, (4, 4), elements=st.floats(0, 100)))
-def test_iou_is_between_0_and_1_and_1_for_equal_boxes(corners):
-    boxes = np.hstack((np.minimum(corners[:, :2], corners[:, 2:]), np.maximum(corners[:, :2], corners[:, 2:]) + 1))
-    values = iou(boxes[0], boxes)
-    assert (values >= 0).all() and (values <= 1 + 1e-9).all() and values[0] == pytest.approx(1)
-
-
 def test_the_number_of_boxes_is_limited_before_suppression():
     rows = np.tile(np.array([(50, 50, 20, 20, 0.9, 0.9, 0)], np.float32), (20000, 1))
-    detections = filter_predictions(rows, 0.25, [0])
-    assert len(detections.boxes) == 5000
-    assert len(non_maximum_suppression(detections, 0.45, 100).boxes) == 1
+    assert len(filter_predictions(rows, 0.25, [0]).boxes) == 5000
 
 
 @pytest.mark.parametrize('entry,number', [('cat', 1), (1, 1), ('1', 1), ('person', 0)])
@@ -127,27 +113,24 @@ def test_classes_by_name_and_number(entry, number):
     assert class_number(entry, ['person', 'cat']) == number
 
 
-@pytest.mark.parametrize('change,reason', [({'classes': ['ghost']}, "'ghost'"), ({'classes': []}, 'classes'),
-                                           ({'classes': [7]}, '7')])
-def test_parameters_that_make_no_sense_are_named(change, reason):
+@pytest.mark.parametrize('classes, reason', [(['ghost'], "'ghost'"), ([], 'classes'), ([7], '7')])
+def test_unknown_or_no_classes_are_rejected(classes, reason):
     with pytest.raises(ValueError, match=reason):
-        Yolov5(FixedRuntime(), DetectionParams()._replace(**change))
+        Yolov5(FixedRuntime(), DetectionParams(classes=classes))
 
 
 def test_images_for_exports_of_a_fixed_size_are_padded_with_grey():
-    class Fixed(FixedRuntime):
-        input_hw = (64, 128)
-
-        def __call__(self, image, _min_objectness):
-            assert image.shape == (64, 128, 3)
-            edges = np.nonzero(image[32, :, 0] != 114)[0]
-            assert (edges[0], edges[-1]) == (21, 105)  # 85 of 128 columns, 43 of them padded
-            return np.array([(64, 32, 85, 64, 0.9, 1, 0)], np.float32)
-    detections = Yolov5(Fixed()).detect(np.zeros((300, 400, 3), np.uint8))
+    runtime = FixedRuntime([(64, 32, 85, 64, 0.9, 1, 0)])
+    runtime.input_hw = (64, 128)
+    detections = Yolov5(runtime).detect(np.zeros((300, 400, 3), np.uint8))
+    image, = runtime.inputs
+    assert image.shape == (64, 128, 3)
+    inside = np.nonzero(image[32, :, 0] != 114)[0]
+    assert (inside[0], inside[-1]) == (21, 105)  # 85 of 128 columns, 43 of them padded
     np.testing.assert_allclose(detections.boxes, [[0, 0, 400, 300]], atol=3)
 
 
 def test_the_input_is_rounded_up_to_the_stride():
     runtime = FixedRuntime()
     Yolov5(runtime, DetectionParams(image_size=500)).detect(np.zeros((480, 640, 3), np.uint8))
-    assert runtime.inputs == [(384, 512, 3)]
+    assert runtime.inputs[0].shape == (384, 512, 3)

@@ -1,21 +1,21 @@
 """Bags of sessions and scenarios: pixels, intrinsics, and transforms of a robot in the map."""
 import json
 import os
-import subprocess
+import sys
 
 import numpy as np
 import pytest
 import rosbag
 import tf2_ros
 
-from ros_3d_bb.bags.bag_writer import START_NS, SessionBagOptions, images_in, session_images, write_bag
+from ros_3d_bb.bags.bag_writer import (START_NS, SessionBagOptions, images_in, session_images, session_to_bag,
+                                       write_bag)
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from_msg, time_from,
                                                    tracks_from_msg, transform_from_msg)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb_lab.simulation.ground_truth import truth_at
-from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images, scenario_to_bag
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
@@ -78,7 +78,6 @@ def test_transforms_of_a_session_are_those_of_a_jackal_in_the_map(session, messa
 
 
 def test_depth_in_other_units_than_millimetres_keeps_its_scale(session, tmp_path):
-    """The depth unit of the camera is 0.25 mm; the depth in the bag is in metres."""
     path = str(tmp_path / 'fine.bag')
     write_bag(session_images(session._replace(depth_scale_m=0.00025, frames=session.frames[:1])), path, 'none')
     depth = imgmsg_to_depth(messages_in(path)['/camera/aligned_depth_to_color/image_raw'][0])
@@ -86,30 +85,31 @@ def test_depth_in_other_units_than_millimetres_keeps_its_scale(session, tmp_path
     np.testing.assert_allclose(depth.values, read_depth(session.frames[0], session).values * 0.00025, rtol=1e-6)
 
 
-def run_tool(tool, *arguments):
-    return subprocess.run(['rosrun', 'ros_3d_bb', tool] + list(arguments), stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, universal_newlines=True)
+@pytest.fixture
+def run_tool(monkeypatch, capsys, tmp_path):
+    """Runs a command in the folder of the test; returns its exit status and output."""
+    def run(tool, *arguments):
+        monkeypatch.chdir(str(tmp_path))
+        monkeypatch.setattr(sys, 'argv', ['tool'] + [str(argument) for argument in arguments])
+        try:
+            tool()
+            status = 0
+        except SystemExit as error:
+            status = error.code
+        return status, ''.join(capsys.readouterr())
+    return run
 
 
-def test_the_command_prints_the_number_of_images(session_folder, tmp_path):
-    result = run_tool('session_to_bag', session_folder, str(tmp_path / 'out.bag'), '--rate', '15')
-    assert result.returncode == 0 and 'out.bag: ' in result.stdout
-    with rosbag.Bag(str(tmp_path / 'out.bag')) as bag:
-        assert '/yolo_bounding_box' not in bag.get_type_and_topic_info().topics
+def test_a_session_is_written_without_boxes_by_default(folder, run_tool):
+    assert run_tool(session_to_bag, folder, 'out.bag', '--rate', '15') == (0, 'out.bag: 4 images\n')
+    assert '/yolo_bounding_box' not in messages_in('out.bag')
 
 
-@pytest.mark.parametrize('depth', ['depth/missing.png', None])
-def test_an_invalid_session_leaves_no_bag_and_is_named(session_folder, tmp_path, depth):
-    folder, bag = tmp_path / 'broken', str(tmp_path / 'out.bag')
-    folder.mkdir()
-    if depth:
-        with open(os.path.join(session_folder, 'frames.json')) as stream:
-            content = json.load(stream)
-        content['frames'][0]['depth'] = depth
-        (folder / 'frames.json').write_text(json.dumps(content))
-    result = run_tool('session_to_bag', str(folder), bag)
-    assert result.returncode == 1 and str(folder) in result.stdout
-    assert 'Traceback' not in result.stdout and os.listdir(str(tmp_path)) == ['broken']
+@pytest.mark.parametrize('broken', ['depth/m1.png', 'frames.json'])
+def test_an_invalid_session_leaves_no_bag_and_is_named(folder, run_tool, broken):
+    os.remove(os.path.join(folder, broken))
+    status, output = run_tool(session_to_bag, folder, 'out.bag')
+    assert status == 1 and folder in output and not any('out.bag' in name for name in os.listdir(folder))
 
 
 SCENE = {'duration': 0.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}],
@@ -143,7 +143,7 @@ def test_a_scene_contains_the_images_of_the_simulator(scene):
         np.testing.assert_array_equal(depth.values, frame.depth_mm)
         assert camera_from_msg(messages['/camera/color/camera_info'][number]) == simulator.camera
         written, = tracks_from_msg(messages['/ground_truth'][number])
-        person, = truth_at(simulator, frame, START_NS + number * NS // 10)
+        person, = simulator.true_tracks(frame, START_NS + number * NS // 10)
         assert (written.id, written.status, written.moving) == (person.id, person.status, person.moving)
         for field in ('position_m', 'velocity_mps', 'size_m', 'prediction_m'):
             np.testing.assert_allclose(getattr(written, field), getattr(person, field), atol=1e-12)
@@ -162,33 +162,35 @@ def test_the_transforms_of_a_scene_connect_map_and_camera(scene):
                                    simulator.poses_at(simulator.time_s(number)).map_from_camera, atol=1e-9)
 
 
-def raw_messages(path):
-    with rosbag.Bag(str(path)) as bag:
-        return [(topic, data[1], stamp) for topic, data, stamp in bag.read_messages(raw=True)]
-
-
-def test_the_bag_of_a_scenario_depends_on_the_seed_only(tmp_path):
-    scenario = tmp_path / 'scene.yaml'
-    scenario.write_text(json.dumps(dict(SCENE, duration=0.2)))
-    for name, seed in (('one', '5'), ('two', '5'), ('other', '6')):
-        result = run_tool('scenario_to_bag', str(scenario), str(tmp_path / name), '--seed', seed, '--rate', '20')
-        assert result.returncode == 0 and ': 4 images' in result.stdout
-    one, two, other = (raw_messages(tmp_path / name) for name in ('one', 'two', 'other'))
+def test_the_bag_of_a_scenario_depends_on_the_seed_only(tmp_path, run_tool):
+    (tmp_path / 'scene.yaml').write_text(json.dumps(dict(SCENE, duration=0.2)))
+    for name, seed in (('one', 5), ('two', 5), ('other', 6)):
+        status, output = run_tool(scenario_to_bag, 'scene.yaml', name, '--seed', seed, '--rate', 20)
+        assert status == 0 and ': 4 images' in output
+    one, two, other = (messages_in(name) for name in ('one', 'two', 'other'))
     assert one == two and one != other
 
 
-def test_the_number_of_images_and_true_boxes_are_optional(tmp_path):
-    scenario, path = tmp_path / 'scene.yaml', str(tmp_path / 'scene.bag')
-    scenario.write_text(json.dumps(SCENE))
-    result = run_tool('scenario_to_bag', str(scenario), path, '--images', '2', '--boxes')
-    assert result.returncode == 0 and ': 2 images' in result.stdout
-    simulator, messages = Simulator(scenario_from(SCENE)), messages_in(path)
+def test_the_number_of_images_and_true_boxes_are_optional(tmp_path, run_tool):
+    (tmp_path / 'scene.yaml').write_text(json.dumps(SCENE))
+    status, output = run_tool(scenario_to_bag, 'scene.yaml', 'scene.bag', '--images', 2, '--boxes')
+    assert status == 0 and ': 2 images' in output
+    simulator, messages = Simulator(scenario_from(SCENE)), messages_in('scene.bag')
     for number, message in enumerate(messages['/yolo_bounding_box']):
         boxes, (person,) = boxes2d_from_msg(message), simulator.frame(number).people
         assert boxes.stamp_ns == START_NS + number * NS // 10 and boxes.frame_id == 'camera_color_optical_frame'
         assert boxes.boxes.tolist() == [list(person.box_px)]
     assert len(messages['/yolo_bounding_box']) == 2
-    assert run_tool('scenario_to_bag', str(scenario), path, '--images', '0').returncode == 2
+    assert run_tool(scenario_to_bag, 'scene.yaml', 'scene.bag', '--images', 0)[0] == 2
+
+
+@pytest.mark.parametrize('text,option,named', [
+    (json.dumps(SCENE), ('--rate', '0'), 'rate is 0'), (json.dumps(SCENE), ('--rate', 'nan'), 'rate is nan'),
+    (json.dumps(SCENE), ('--seed', '-1'), 'seed is -1'), ('people:\n- {strat: [1, 2]}', (), 'mean start')])
+def test_an_invalid_scenario_leaves_no_bag_and_the_fault_is_named(tmp_path, run_tool, text, option, named):
+    (tmp_path / 'scene.yaml').write_text(text)
+    status, output = run_tool(scenario_to_bag, 'scene.yaml', 'out.bag', *option)
+    assert status == 1 and named in output and os.listdir(str(tmp_path)) == ['scene.yaml']
 
 
 def test_a_bag_is_read_by_image(session, tmp_path):
@@ -201,27 +203,8 @@ def test_a_bag_is_read_by_image(session, tmp_path):
         assert set(topic for topic, _message in messages) == topics
         np.testing.assert_array_equal(imgmsg_to_rgb(dict(messages)['camera/color/image_raw']),
                                       read_color(frame, session.camera))
-    with pytest.raises(ValueError, match='ground_truth'):
-        images_in(path, {'tf', 'ground_truth'})
-    with pytest.raises(ValueError, match='ground_truth'):
-        images_in(path, {'ground_truth'})
-    with pytest.raises(ValueError, match='missing.bag'):
-        images_in(str(tmp_path / 'missing.bag'), topics)
-
-
-@pytest.mark.parametrize('option,named', [(('--rate', '0'), 'rate is 0'), (('--rate', 'nan'), 'rate is nan'),
-                                          (('--seed', '-1'), 'seed is -1')])
-def test_an_invalid_rate_or_seed_leaves_no_bag(tmp_path, option, named):
-    scenario = tmp_path / 'scene.yaml'
-    scenario.write_text(json.dumps(SCENE))
-    result = run_tool('scenario_to_bag', str(scenario), str(tmp_path / 'out.bag'), *option)
-    assert result.returncode == 1 and named in result.stdout and 'Traceback' not in result.stdout
-    assert os.listdir(str(tmp_path)) == ['scene.yaml']
-
-
-def test_an_invalid_scenario_leaves_no_bag_and_the_key_is_named(tmp_path):
-    scenario = tmp_path / 'scene.yaml'
-    scenario.write_text('people:\n- {strat: [1, 2]}\n')
-    result = run_tool('scenario_to_bag', str(scenario), str(tmp_path / 'out.bag'))
-    assert result.returncode == 1 and 'mean start' in result.stdout
-    assert 'Traceback' not in result.stdout and os.listdir(str(tmp_path)) == ['scene.yaml']
+    for wrong_path, wrong_topics, named in ((path, {'tf', 'ground_truth'}, 'ground_truth'),
+                                            (path, {'ground_truth'}, 'ground_truth'),
+                                            (str(tmp_path / 'missing.bag'), topics, 'missing.bag')):
+        with pytest.raises(ValueError, match=named):
+            images_in(wrong_path, wrong_topics)

@@ -10,29 +10,27 @@ import rospy
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.bags.bag_writer import write_bag
-from ros_3d_bb.bags.process_bag import with_tracker
+from ros_3d_bb.bags.process_bag import with_params
 from ros_3d_bb.conversions.perception_msgs import stamp_of
-from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.offline_pipeline import Settings
-from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.demo.scene_report import panels_of, read_recording
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.launching import loaded
 from support.masterless import masterless, on_the_wire
-from support.two_cameras import PERIOD_NS, START_NS, Rig, Transforms
+from support.two_cameras import PERIOD_NS, START_NS, Rig
 
-# Somebody walks from the view of the front camera into that of the left one; somebody stands where both see them.
+# A person walks from the view of the front camera into that of the left one; another one stands in both views.
 SCENE = {'duration': 3.2, 'rate': 6.0, 'robot': {'cameras': [{'name': 'front'}, {'name': 'left', 'yaw': 0.6}]},
          'people': [{'start': [3.0, -0.2], 'moves': [{'to': [2.4, 2.2], 'speed': 0.9}]}, {'start': [4.6, 1.4]}]}
-BOTH = with_tracker(Settings(detector='none'), cameras=['front', 'left'])
+BOTH = with_params(Settings(detector='none'), 'tracker', cameras=['front', 'left'])
 
 
 @pytest.fixture(scope='module')
 def bags(tmp_path_factory):
-    """A bag of the scene with its 2D boxes, and what process_bag makes of it."""
+    """A bag of the scene with its 2D boxes, and the output of process_bag."""
     folder = tmp_path_factory.mktemp('bags')
     write_bag(scenario_images(scenario_from(SCENE), with_boxes=True), str(folder / 'in.bag'))
     process_bag(str(folder / 'in.bag'), str(folder / 'out.bag'), BOTH)
@@ -44,7 +42,7 @@ def messages_on(bag_path, topic):
         return [message for _topic, message, _time in bag.read_messages('/' + topic)]
 
 
-def test_everybody_is_one_track_wherever_they_are_seen(bags):
+def test_each_person_is_one_track_in_both_views(bags):
     with rosbag.Bag(bags[1]) as bag:
         recording = read_recording(bag)
     assert len(recording.moments) == recording.answered == 39
@@ -81,14 +79,15 @@ def test_the_same_bag_gives_the_same_bytes(bags, tmp_path):
     assert digests[0] == digests[1]
 
 
-def test_a_camera_that_a_bag_does_not_have_is_named(bags, tmp_path):
+def test_a_camera_missing_in_a_bag_is_named(bags, tmp_path):
     with pytest.raises(BagError, match='no std_msgs/Int32MultiArray on /rear/yolo_bounding_box; did you mean'):
-        process_bag(bags[0], str(tmp_path / 'out.bag'), with_tracker(BOTH, cameras=['front', 'rear']))
+        process_bag(bags[0], str(tmp_path / 'out.bag'), with_params(BOTH, 'tracker', cameras=['front', 'rear']))
 
 
-def test_a_stamp_of_the_past_in_a_bag_keeps_the_other_camera_out_of_nothing(bags, tmp_path):
-    """The front camera ends with it, 0.7 s after the beginning."""
-    path, last, left = str(tmp_path / 'in.bag'), None, []
+@pytest.mark.parametrize('shift_s', [-10, 3600])
+def test_a_wrong_stamp_in_a_bag_costs_the_other_camera_no_image(bags, tmp_path, shift_s):
+    """The front camera ends with it, 0.7 s after the start."""
+    path, left = str(tmp_path / 'in.bag'), []
     with rosbag.Bag(bags[0]) as bag, rosbag.Bag(path, 'w') as changed:
         start = bag.get_start_time()
         for topic, message, time in bag.read_messages():
@@ -96,35 +95,16 @@ def test_a_stamp_of_the_past_in_a_bag_keeps_the_other_camera_out_of_nothing(bags
             if topic.startswith('/front/') and elapsed_s > 0.7:
                 if elapsed_s > 0.9:
                     continue
-                shift(message, -10)
-                last = time
-            elif topic == '/left/yolo_bounding_box':
+                shift(message, shift_s)
+            elif topic == '/left/yolo_bounding_box' and elapsed_s > 0.9:
                 left.append(time)
             changed.write(topic, message, time)
-    process_bag(path, str(tmp_path / 'out.bag'), BOTH)
+    events = process_bag(path, str(tmp_path / 'out.bag'), BOTH)
     with rosbag.Bag(str(tmp_path / 'out.bag')) as bag:
-        answered = [time for _topic, _message, time in bag.read_messages('/ros_3d_bb/tracks') if time > last]
-    assert answered and answered == [time for time in left if time > last]
-
-
-def test_a_stamp_of_the_future_in_a_bag_keeps_the_other_camera_out_of_nothing(bags, tmp_path):
-    """The front camera ends with it, an hour ahead of the left one."""
-    path, left = str(tmp_path / 'in.bag'), 0
-    with rosbag.Bag(bags[0]) as bag, rosbag.Bag(path, 'w') as changed:
-        start = bag.get_start_time()
-        for topic, message, time in bag.read_messages():
-            elapsed_s = time.to_sec() - start
-            if topic.startswith('/front/') and elapsed_s > 0.7:
-                if elapsed_s > 0.9:
-                    continue
-                shift(message, 3600)
-            left += topic == '/left/yolo_bounding_box' and elapsed_s > 0.9
-            changed.write(topic, message, time)
-    tally = process_bag(path, str(tmp_path / 'out.bag'), BOTH)
-    with rosbag.Bag(str(tmp_path / 'out.bag')) as bag:
-        answered = [time for _topic, _message, time in bag.read_messages('/ros_3d_bb/tracks')
-                    if time.to_sec() - start > 0.9]
-    assert len(answered) == left > 10 and tally.counts['images ahead of other cameras'] >= 1
+        tracked = [time for _topic, _message, time in bag.read_messages('/ros_3d_bb/tracks')
+                   if time.to_sec() - start > 0.9]
+    assert tracked == left and len(left) > 10
+    assert events.counts['images %s other cameras' % ('ahead of' if shift_s > 0 else 'behind')] >= 1
 
 
 def shift(message, seconds):
@@ -152,54 +132,36 @@ def test_the_node_publishes_what_process_bag_writes(bags):
 
 @pytest.fixture
 def rig():
-    return Rig()
+    return Rig('front', 'rear')
 
 
-def test_stamps_of_tracks_never_go_back_whichever_camera_is_late(rig):
+def test_stamps_of_tracks_never_decrease(rig):
     random, stamps = np.random.RandomState(3), []
     for number in range(40):
         for camera, late in (('front', 0), ('rear', 3)):
             if number >= late:
                 stamp_ns = START_NS + (number - late) * PERIOD_NS + random.randint(PERIOD_NS // 2)
-                followed = rig.send(stamp_ns, camera)
-                stamps.append(stamp_of(followed))
-    assert stamps == sorted(stamps) and [track.id for track in followed.tracks] == [1]
+                result = rig.send(stamp_ns, camera)
+                stamps.append(stamp_of(result))
+    assert stamps == sorted(stamps) and [track.id for track in result.tracks] == [1]
 
 
-def test_a_camera_that_is_far_behind_the_other_is_no_jump_in_time(rig):
-    """By 1.5 s: its images are refused, and the tracks go on."""
-    for number in range(30):
-        followed = rig.send(START_NS + number * PERIOD_NS, 'front')
-        assert rig.send(START_NS + (number - 15) * PERIOD_NS, 'rear') is None
-    assert rig.tally.counts['images of the time before'] == 30
-    assert not rig.transforms.jumps and [track.id for track in followed.tracks] == [1]
-
-
-def test_a_camera_without_a_transform_leaves_the_other_to_go_on(rig):
-    rig.transforms.missing.add('rear')
-    for number in range(20):
-        followed = rig.send(START_NS + number * PERIOD_NS, 'front', count=int(number < 10))
-        assert rig.send(START_NS + number * PERIOD_NS + PERIOD_NS // 2, 'rear') is None
-    assert followed.tracks == [] and rig.tally.counts['no transform'] == 20
-
-
-def test_cameras_with_the_same_frame_are_taken_and_pointed_out(rig):
+def test_cameras_with_the_same_frame_are_tracked_and_reported(rig):
     for number in range(10):
         for camera in ('front', 'rear'):
-            followed = rig.send(START_NS + number * PERIOD_NS, camera, frame_id='camera_color_optical_frame')
-    assert [track.id for track in followed.tracks] == [1]
-    assert rig.tally.counts['cameras with one frame'] == 1
-    assert 'front and rear are all in the frame camera_color' in rig.tally.sentences['cameras with one frame']
+            result = rig.send(START_NS + number * PERIOD_NS, camera, frame_id='camera_color_optical_frame')
+    assert [track.id for track in result.tracks] == [1]
+    assert rig.events.counts['cameras sharing a frame'] == 1
 
 
 @pytest.mark.parametrize('params,complaint', [
     ({'cameras': ['front', 'front']}, 'different namespaces expected'),
     ({'cameras': ['front camera']}, 'different namespaces expected'), ({'cameras': [1]}, 'different namespaces'),
-    ({'cameras': ['front', 'rear'], 'camera_frame': 'mount'}, 'one frame serves one camera only'),
-    ({'cameras': ['front'], 'tracker': 'thesis'}, 'knows one camera only')])
-def test_parameters_that_make_no_sense_are_refused(params, complaint):
+    ({'cameras': ['front', 'rear'], 'camera_frame': 'mount'}, 'expected with a single camera only'),
+    ({'cameras': ['front'], 'tracker': 'thesis'}, 'supports a single camera only')])
+def test_inconsistent_parameters_are_rejected(params, complaint):
     with pytest.raises(ValueError, match=complaint):
-        TrackingStage(TrackerNodeParams(**params), [kind() for kind in TRACKING_PARAMS], EventCounter(), Transforms())
+        Rig(*params.pop('cameras'), **params)
 
 
 @pytest.mark.parametrize('cameras', ['front,rear', 'front, left, rear', 'front'])

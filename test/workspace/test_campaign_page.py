@@ -1,4 +1,4 @@
-"""What doc/error_model.md has a user type beside the commands that other tests run."""
+"""Scene and script of doc/error_model.md; other tests run its commands."""
 import os
 import re
 import subprocess
@@ -17,15 +17,13 @@ with open(os.path.join(DOC, 'error_model.md'), encoding='utf-8') as stream:
         SCRIPTS[language].append(text)
 
 
-def test_the_scene_is_one():
+def test_the_scene_is_valid():
     person, = scenario_from(yaml.safe_load(SCRIPTS['yaml'][0])).people
     assert person.start == (1.67, 0.6) and len(person.moves) == 5
 
 
-def test_the_script_enters_the_truth_of_the_marks_and_rejects_what_has_no_box(tmp_path):
-    folder = str(tmp_path / 'campaign')
-    os.mkdir(folder)
-    write_small_session(folder)
+def test_the_script_sets_the_truth_of_the_marks_and_rejects_measurements_without_boxes(tmp_path):
+    folder = write_small_session(str(tmp_path / 'campaign'))
 
     def label(content):
         for frame, name in zip(content['frames'], ('A1', 'B3', 'C6', 'B2')):

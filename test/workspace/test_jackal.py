@@ -1,4 +1,4 @@
-"""The camera in Jackal's description, and what jackal.launch and desk.launch start; nothing of Jackal's is needed."""
+"""Camera in the description of a Jackal, and nodes of jackal.launch and desk.launch, without packages of Jackal."""
 import os
 import xml.etree.ElementTree as ElementTree
 
@@ -11,7 +11,7 @@ from support.launching import (ROOT, RS_CAMERA_ARGUMENTS, dumped, given_to_stand
 from support.urdf import base_from
 
 CAMERA = os.path.join(ROOT, 'urdf', 'jackal_d435i.urdf.xacro')
-# The links to which things are fastened on a Jackal, and where the description takes in what its owner adds. Source:
+# Mounting links of a Jackal, and the hook for extensions of the description. Source:
 # github.com/jackal/jackal, jackal_description/urdf/jackal.urdf.xacro (commit 9978ac0).
 JACKAL = """<robot name="jackal" xmlns:xacro="http://www.ros.org/wiki/xacro">
   <link name="base_link"/> <link name="chassis_link"/> <link name="mid_mount"/> <link name="front_mount"/>
@@ -28,7 +28,7 @@ JACKAL = """<robot name="jackal" xmlns:xacro="http://www.ros.org/wiki/xacro">
 
 @pytest.fixture
 def jackal(tmp_path, monkeypatch):
-    """Jackal's description with the camera, as a function of environment variables."""
+    """Description of a Jackal with the camera, as a function of environment variables."""
     write(tmp_path / 'jackal.urdf.xacro', JACKAL)
 
     def described(**variables):
@@ -38,13 +38,13 @@ def jackal(tmp_path, monkeypatch):
     return described
 
 
-def test_the_camera_is_where_the_thesis_has_it(jackal):
+def test_the_camera_is_at_the_position_in_the_thesis(jackal):
     base_from_camera = base_from('camera_link', jackal())
     np.testing.assert_allclose(base_from_camera, [[1, 0, 0, 0.17], [0, 1, 0, 0], [0, 0, 1, 0.20], [0, 0, 0, 1]],
                                atol=1e-12)
 
 
-def test_its_body_stands_on_the_plate_of_the_robot_and_reaches_not_before_its_lens(jackal):
+def test_the_housing_is_on_the_top_plate_and_behind_the_lens(jackal):
     description = jackal()
     plate_m = base_from('front_mount', description)[2, 3]
     for kind in ('visual', 'collision'):
@@ -55,7 +55,7 @@ def test_its_body_stands_on_the_plate_of_the_robot_and_reaches_not_before_its_le
         assert 0 < 0.20 + z - height / 2 - plate_m < 0.01
 
 
-def test_only_its_link_is_added_as_the_driver_publishes_the_frames_below(jackal):
+def test_only_camera_link_is_added_because_the_driver_publishes_the_others(jackal):
     description = jackal()
     links = [link.get('name') for link in description.findall('link')]
     children = [joint.find('child').get('link') for joint in description.findall('joint')]
@@ -64,14 +64,14 @@ def test_only_its_link_is_added_as_the_driver_publishes_the_frames_below(jackal)
     assert all(np.isfinite(base_from(link, description)).all() for link in links)
 
 
-def test_another_place_and_a_tilt_are_variables_as_of_other_accessories(jackal):
+def test_variables_set_position_and_tilt(jackal):
     base_from_camera = base_from('camera_link', jackal(JACKAL_D435I_OFFSET='0.1 -0.05 0.4',
                                                        JACKAL_D435I_RPY='0 0.5 0'))
     np.testing.assert_allclose(base_from_camera[:3, 3], (0.1, -0.05, 0.4))
-    np.testing.assert_allclose(base_from_camera[:3, 0], (np.cos(0.5), 0, -np.sin(0.5)), atol=1e-12)  # it looks down
+    np.testing.assert_allclose(base_from_camera[:3, 0], (np.cos(0.5), 0, -np.sin(0.5)), atol=1e-12)  # tilted down
 
 
-def test_the_mesh_is_drawn_where_it_is_asked_for_and_bumped_into_as_a_box(jackal):
+def test_a_variable_selects_the_mesh_for_the_visual_geometry_only(jackal):
     link = jackal(JACKAL_D435I_MESH='1').find("link[@name='camera_link']")
     assert link.find('visual/geometry/mesh').get('filename') == 'package://realsense2_description/meshes/d435.dae'
     assert len(link.findall('visual')) == 1 and link.find('visual/geometry/box') is None
@@ -100,22 +100,22 @@ def test_one_command_starts_camera_and_pipeline(packages):
     ('/some/arm.urdf.xacro', [], '0.17 0 0.20 0 0 0 base_link camera_link'),
     ('', ['mount:=0.1 0 0.4 0 0.5 0'], '0.1 0 0.4 0 0.5 0 base_link camera_link'),
     (CAMERA, [], None), ('', ['mount:=none'], None)])
-def test_either_the_description_or_one_node_says_where_the_camera_is(monkeypatch, extras, arguments, expected):
+def test_camera_mount_is_published_unless_the_description_contains_it(monkeypatch, extras, arguments, expected):
     monkeypatch.setenv('JACKAL_URDF_EXTRAS', extras)
     _parameters, nodes = loaded('jackal.launch', 'driver:=pyrealsense2', *arguments)
     assert {'realsense_node', 'yolov5_node', 'bbox3d_node', 'tracker_node'} <= set(nodes) and 'rviz' not in nodes
     assert (nodes['camera_mount'].args if 'camera_mount' in nodes else None) == expected
 
 
-def test_several_cameras_are_started_and_placed_by_their_own_launch_files():
+def test_drivers_and_mounts_of_several_cameras_are_not_started():
     parameters, nodes = loaded('jackal.launch', 'cameras:=front,rear', 'check:=true')
     assert not {'realsense_node', 'realsense2_camera', 'camera_mount'} & set(nodes)
     assert {'yolov5_node', 'bbox3d_node', 'tracker_node', 'doctor'} == set(nodes)
     assert parameters['/tracker_node/cameras'] == 'front,rear' and '/rear/bbox3d_node/estimator' in parameters
 
 
-def test_on_the_robot_nodes_that_die_are_started_again(packages):
-    """Elsewhere only where that is asked for, as a fault of the set-up would be said again and again."""
+def test_nodes_are_respawned_on_the_robot_only(packages):
+    """Elsewhere only with respawn:=true, because configuration errors would be logged repeatedly."""
     arguments = ['driver:=pyrealsense2', 'planner:=costmap']
     _parameters, nodes = loaded('jackal.launch', *arguments)
     assert len(nodes) == 6 and all(node.respawn and node.respawn_delay == 1 for node in nodes.values())
@@ -126,24 +126,18 @@ def test_on_the_robot_nodes_that_die_are_started_again(packages):
     assert given_to_stand_ins(dumped('jackal.launch', packages))['respawn'] == 'true'
 
 
-def test_a_second_computer_gets_the_pipeline_and_the_camera_stays():
+def test_computer_moves_the_pipeline_but_not_the_camera():
     _parameters, nodes = loaded('jackal.launch', 'driver:=pyrealsense2', 'computer:=192.168.131.20',
                                 'planner:=costmap')
-    there = set(name for name, node in nodes.items() if node.machine_name == 'people')
-    assert there == {'yolov5_node', 'bbox3d_node', 'tracker_node', 'planner_bridge_node'}
-    assert {name for name in nodes if name not in there} == {'realsense_node', 'camera_mount'}
+    remote = set(name for name, node in nodes.items() if node.machine_name == 'people')
+    assert remote == {'yolov5_node', 'bbox3d_node', 'tracker_node', 'planner_bridge_node'}
+    assert set(nodes) - remote == {'realsense_node', 'camera_mount'}
 
 
-def test_the_desk_shows_what_the_robot_publishes():
+def test_desk_starts_rviz_or_the_viewer():
     _parameters, nodes = loaded('desk.launch', 'frame_world:=odom')
     assert set(nodes) == {'rviz'} and nodes['rviz'].args.endswith('-f odom')
     parameters, nodes = loaded('desk.launch', 'viewer:=true', 'rviz:=false', 'session:=/some/session',
                                'detector:=depth')
     assert set(nodes) == {'viewer_node'} and parameters['/viewer_node/session'] == '/some/session'
     assert dict(nodes['viewer_node'].remap_args)['detector/enable'] == 'depth_detector_node/enable'
-
-
-@pytest.mark.parametrize('name', ['jackal.launch', 'realsense.launch'])
-def test_arguments_are_documented(name):
-    for argument in ElementTree.parse(os.path.join(ROOT, 'launch', name)).getroot().findall('arg'):
-        assert argument.get('doc'), argument.get('name')

@@ -9,16 +9,17 @@ import time
 import pytest
 
 from ros_3d_bb.bags.bag_writer import write_bag
+from ros_3d_bb_lab.evaluation.latency.latency_probe_node import usage_of
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
-from support.running import processes_naming
+from support.processes import processes_naming
 
 NODES = {'replay_node', 'latency_probe_node', 'bbox3d_node', 'tracker_node'}
 
 
 @pytest.fixture(scope='module')
 def bag(tmp_path_factory):
-    """Half a second of two people who stand, with their 2D boxes."""
+    """Half a second of two standing people, with their 2D boxes."""
     people = [{'start': [3.0, 0.6], 'facing': 3.1}, {'start': [4.0, -0.7], 'facing': 3.1}]
     scenario = scenario_from({'duration': 0.4, 'rate': 20.0, 'robot': {}, 'people': people})
     path = str(tmp_path_factory.mktemp('latency') / 'images.bag')
@@ -28,7 +29,7 @@ def bag(tmp_path_factory):
 
 @pytest.fixture
 def benchmark(tmp_path):
-    """Starts the benchmark as a process of its own; nodes have `tmp_path`, where they log, in their command line."""
+    """Starts the benchmark as a separate process; the command lines of its nodes contain the log folder `tmp_path`."""
     environment = dict(os.environ, ROS_HOSTNAME='localhost', ROS_LOG_DIR=str(tmp_path))
 
     def start(*arguments):
@@ -38,7 +39,7 @@ def benchmark(tmp_path):
     return start
 
 
-def test_images_are_answered_and_everything_ends(bag, benchmark, tmp_path):
+def test_results_are_written_and_no_process_remains(bag, benchmark, tmp_path):
     results = str(tmp_path / 'latency.json')
     process = benchmark('--bag', bag, '--cases', 'free', '--seconds', '5', '--rate', '10', '--json', results)
     printed, _nothing = process.communicate()
@@ -53,7 +54,7 @@ def test_images_are_answered_and_everything_ends(bag, benchmark, tmp_path):
     assert processes_naming(str(tmp_path)) == 0
 
 
-def test_ctrl_c_ends_everything(bag, benchmark, tmp_path):
+def test_no_process_remains_after_ctrl_c(bag, benchmark, tmp_path):
     process = benchmark('--bag', bag, '--cases', 'free+load', '--seconds', '300')
     while process.poll() is None and processes_naming(str(tmp_path)) < 1 + len(NODES):
         time.sleep(0.1)
@@ -62,19 +63,21 @@ def test_ctrl_c_ends_everything(bag, benchmark, tmp_path):
     assert process.returncode == 130 and processes_naming(str(tmp_path)) == 0
 
 
-@pytest.mark.parametrize('arguments,complaint', [(('--cases', 'fre'), "'fre' is unknown"),
-                                                 (('--cases', 'yolov5-512'), 'needs --weights'),
-                                                 (('--seconds', '0'), 'more than 0')])
-def test_arguments_that_make_no_sense_are_refused(benchmark, arguments, complaint):
+@pytest.mark.parametrize('arguments, status, reason', [
+    (('--cases', 'fre'), 2, "'fre' is unknown"), (('--cases', 'yolov5-512'), 2, 'needs --weights'),
+    (('--seconds', '0'), 2, 'more than 0'), (('--cases', 'free', '--bag', __file__), 1, 'cannot be read')])
+def test_invalid_arguments_and_bags_are_rejected(benchmark, arguments, status, reason):
     process = benchmark('--bag', 'some.bag', *arguments)
     printed, _nothing = process.communicate()
-    assert process.returncode == 2 and complaint in printed
+    assert process.returncode == status and reason in printed
 
 
-def test_a_bag_of_something_else_is_refused_with_a_reason(benchmark, tmp_path):
-    path = str(tmp_path / 'not_a.bag')
-    with open(path, 'w') as stream:
-        stream.write('not a bag')
-    process = benchmark('--bag', path, '--cases', 'free')
-    printed, _nothing = process.communicate()
-    assert process.returncode == 1 and 'cannot be read' in printed
+def test_usage_is_the_cpu_time_and_the_memory_of_a_process():
+    before, began_s = usage_of(os.getpid()), time.process_time()
+    held = b'1' * (40 * 10 ** 6)  # so large that malloc does not reuse freed memory
+    while time.process_time() < began_s + 0.1:
+        pass
+    after = usage_of(os.getpid())
+    assert after.rss_mb - before.rss_mb == pytest.approx(len(held) / 1e6, abs=3)
+    assert after.cpu_s - before.cpu_s >= 0.08
+    assert usage_of(2 ** 22 + 1) is None  # no process has such a number

@@ -1,4 +1,4 @@
-"""What measure.launch starts, with a stand-in for realsense2_camera, which is not on every machine."""
+"""Nodes of measure.launch, with a stand-in for realsense2_camera, which may not be installed."""
 import pytest
 
 from support import launching
@@ -11,7 +11,7 @@ def loaded(*arguments):
     return launching.loaded(LAUNCH, *REQUIRED + list(arguments))
 
 
-def test_without_a_camera_of_its_own_it_needs_no_realsense():
+def test_without_camera_realsense2_camera_is_not_needed():
     parameters, nodes = loaded()
     assert set(nodes) == {'yolov5_node', 'bbox3d_node', 'tracker_node', 'viewer_node'}
     assert parameters['/viewer_node/session'] == '/a session' and parameters['/viewer_node/window'] is True
@@ -19,7 +19,7 @@ def test_without_a_camera_of_its_own_it_needs_no_realsense():
     assert nodes['viewer_node'].required
 
 
-def test_the_camera_aligns_depth_and_needs_no_robot(tmp_path):
+def test_the_camera_aligns_depth_and_its_frame_is_the_target(tmp_path):
     stand_in_launch_file(tmp_path, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS)
     parameters = dumped(LAUNCH, tmp_path, 'camera:=true', 'detector:=depth', *REQUIRED)
     assert given_to_stand_ins(parameters)['align_depth'] == 'true'
@@ -27,19 +27,19 @@ def test_the_camera_aligns_depth_and_needs_no_robot(tmp_path):
     assert parameters['/depth_detector_node/floor_frame'] == ''
 
 
-def test_the_camera_needs_no_driver_where_our_node_reads_it():
+def test_the_camera_can_be_read_by_realsense_node():
     _parameters, nodes = loaded('camera:=true', 'driver:=pyrealsense2')
     assert 'realsense_node' in nodes
 
 
 @pytest.mark.parametrize('detector', ['yolov5', 'depth'])
-def test_the_detector_that_runs_is_the_one_that_is_paused(detector):
+def test_the_viewer_pauses_the_running_detector(detector):
     _parameters, nodes = loaded('detector:=' + detector)
     service = dict(nodes['viewer_node'].remap_args)['detector/enable']
     assert service.split('/')[0] in nodes and service.endswith('_node/enable')
 
 
-def test_what_the_viewer_shows_is_what_the_pipeline_works_on():
+def test_viewer_and_pipeline_have_the_same_topics():
     _parameters, nodes = loaded('camera_image:=a/color', 'camera_depth:=a/depth', 'camera_info:=a/info',
                                 'bb_topic:=a/boxes', 'record:=/some where/a.bag')
     remaps = [dict(nodes[name].remap_args) for name in ('viewer_node', 'bbox3d_node')]

@@ -1,5 +1,5 @@
-"""Parts of the nodes by themselves, at moments that no graph comes to at will: threads that meet, and a master that
-takes connections and never answers.
+"""Parts of the nodes in situations that a graph cannot produce on demand: concurrent threads, and a master that accepts
+connections and never responds.
 """
 import contextlib
 import socket
@@ -14,111 +14,87 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.nodes.bbox3d_node import SampleImages
-from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.input_monitor import InputWatch, unheard
-from ros_3d_bb.nodes.common.master import NO_ANSWER
-from ros_3d_bb.nodes.common.subscribers import inputs, subscribe
-from ros_3d_bb.nodes.common.topic_publishers import published_topics, publishers_of
+from ros_3d_bb.nodes.common import master, subscribers
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
 from support.ros import wait_until
 
-PATIENCE_S = 0.2
 
-
-@pytest.fixture
-def hanging_master(monkeypatch):
-    """It takes connections, as the kernel of a machine does whose master hangs, and never answers."""
+def test_a_request_to_a_master_that_hangs_ends(monkeypatch):
+    """The kernel of a machine whose master hangs accepts connections."""
     with contextlib.closing(socket.socket()) as listener:
         listener.bind(('localhost', 0))
         listener.listen(10)
         monkeypatch.setenv('ROS_MASTER_URI', 'http://localhost:%d' % listener.getsockname()[1])
-        monkeypatch.setattr('ros_3d_bb.nodes.common.master.PATIENCE_S', PATIENCE_S)
-        yield
+        monkeypatch.setattr(master, 'TIMEOUT_S', 0.2)
+        with pytest.raises(socket.timeout):
+            master.published_topics()
 
 
-@pytest.mark.parametrize('ask', [published_topics, lambda: publishers_of('/camera/color/image_raw', False)])
-def test_a_question_to_a_master_that_hangs_ends(hanging_master, ask):
-    errors = []
-
-    def asking():
-        try:
-            ask()
-        except NO_ANSWER as error:
-            errors.append(error)
-    thread = threading.Thread(target=asking)
-    thread.daemon = True
-    thread.start()
-    wait_until(lambda: errors, 'an end of the question')
-
-
-def test_a_master_that_hangs_is_asked_once_for_all_silent_inputs():
-    """Each question in vain takes two seconds, in which nothing comes on /diagnostics."""
-    silent = [mock.Mock(came_s=None, count=0, lags_s=(None, None)) for _input in range(3)]
-    for number, noted in enumerate(silent):
-        noted.name, noted.subscriber.resolved_name = 'topic', '/topic%d' % number
-    asked = mock.Mock(side_effect=socket.timeout('timed out'))
-    with mock.patch('ros_3d_bb.nodes.common.input_monitor.inputs', lambda: silent), \
-            mock.patch('ros_3d_bb.nodes.common.input_monitor.published_topics', asked), \
-            mock.patch('ros_3d_bb.nodes.common.input_monitor.SILENT_S', -1.0), \
+def test_a_master_that_hangs_is_queried_once_for_all_silent_inputs():
+    """Each failed query takes two seconds, in which nothing is published on /diagnostics."""
+    silent = [subscribers.Input('topic', Image, None) for _input in range(3)]
+    for number, each in enumerate(silent):
+        each.subscriber = mock.Mock(resolved_name='/topic%d' % number)
+    query = mock.Mock(side_effect=socket.timeout('timed out'))
+    with mock.patch.multiple(subscribers, _inputs=silent, published_topics=query, SILENT_S=-1.0), \
             mock.patch('rospy.get_rostime', lambda: rospy.Time(1)):
-        watch = InputWatch()
-        said = [sentence for _look in range(2) for _event, sentence in watch.faults()]
-    assert asked.call_count == 1
-    assert said == ['nothing comes on /topic%d, and the master does not answer (timed out)' % number
-                    for number in range(3)] * 2
+        monitor = subscribers.InputMonitor()
+        sentences = [sentence for _check in range(2) for _event, sentence in monitor.faults()]
+    assert query.call_count == 1
+    assert sentences == ['no messages on /topic%d, and the master does not respond (timed out)' % number
+                         for number in range(3)] * 2
 
 
 def test_3d_boxes_do_not_wait_for_a_master_to_subscribe_colour():
     """rospy.Subscriber would wait for one, under the node's lock."""
     with mock.patch('rospy.Publisher') as publisher, mock.patch('rospy.Subscriber') as subscriber, \
-            mock.patch('ros_3d_bb.nodes.bbox3d_node.patient_master', side_effect=OSError('no route')) as master:
+            mock.patch('ros_3d_bb.nodes.bbox3d_node.patient_master', side_effect=OSError('no route')) as query:
         publisher.return_value.get_num_connections.return_value = 1
         diagnostics, depth = mock.MagicMock(), DepthImage(np.zeros((4, 4), np.uint16), 0.001)
         images = SampleImages(10 ** 9, None, 6.0, diagnostics)
         images.publish(Header(), depth, [])
         wait_until(lambda: diagnostics.warn.called, 'a warning')
         assert 'no route' in diagnostics.warn.call_args[0][1] and not subscriber.called
-        master.side_effect = None
+        query.side_effect = None
         images.publish(Header(), depth, [])
         wait_until(lambda: subscriber.called, 'a subscription')
 
 
-def test_the_diagnostics_go_on_after_a_report_that_could_not_be_made():
-    with mock.patch('diagnostic_updater.Updater') as updater, mock.patch('rospy.logwarn') as said, \
+def test_the_diagnostics_continue_after_a_failed_report():
+    with mock.patch('diagnostic_updater.Updater') as updater, mock.patch('rospy.logwarn') as log, \
             mock.patch('ros_3d_bb.nodes.common.diagnostics.PERIOD_S', 0.01):
         updater.return_value.force_update.side_effect = [ZeroDivisionError('by nothing')] + 1000 * [None]
         Diagnostics()
         wait_until(lambda: updater.return_value.force_update.call_count >= 3, 'another report')
-    assert 'by nothing' in said.call_args[0][1]
+    assert 'by nothing' in log.call_args[0][1]
 
 
-def test_an_input_subscribed_while_others_are_looked_through_is_kept():
-    """As colour is, when somebody begins to look, while the diagnostics look at the inputs."""
+def test_an_input_subscribed_while_the_others_are_listed_is_kept():
+    """As colour is, when a subscriber of the debug images connects while the diagnostics check the inputs."""
     threads = []
 
     class Inputs(list):
-        """Whoever writes them back gives another thread the time to subscribe the second."""
+        """Gives another thread the time to subscribe, whenever the list is written back."""
 
         def __setitem__(self, index, value):
             if not threads:
-                threads.append(threading.Thread(target=subscribe, args=('second', Image, None)))
+                threads.append(threading.Thread(target=subscribers.subscribe, args=('second', Image, None)))
                 threads[0].start()
                 threads[0].join(0.2)
             super(Inputs, self).__setitem__(index, value)
-    with mock.patch('rospy.Subscriber'), mock.patch('ros_3d_bb.nodes.common.subscribers._inputs', Inputs()):
-        subscribe('first', Image, None)
-        inputs()
+    with mock.patch('rospy.Subscriber'), mock.patch.object(subscribers, '_inputs', Inputs()):
+        subscribers.subscribe('first', Image, None)
+        subscribers.inputs()
         threads[0].join()
-        assert [noted.name for noted in inputs()] == ['first', 'second']
+        assert [each.name for each in subscribers.inputs()] == ['first', 'second']
 
 
-@pytest.mark.parametrize('tuned', ['/parameter_descriptions', '/parameter_updates'])
-def test_what_tools_subscribe_for_tuning_is_no_result(tuned):
-    """Else nobody would be told that nobody sees the tracks while rqt_reconfigure is open."""
-    def publisher(connected):
-        return mock.Mock(has_connections=lambda: connected)
-    pubs = {'/ros_3d_bb/tracks': publisher(False), rospy.get_name() + tuned: publisher(True)}
-    with mock.patch('ros_3d_bb.nodes.common.input_monitor.get_topic_manager') as manager:
-        manager.return_value.pubs = pubs
-        assert unheard() == ['/ros_3d_bb/tracks']
-        pubs['/ros_3d_bb/tracks'] = publisher(True)
-        assert unheard() == []
+def test_topics_of_dynamic_reconfigure_are_no_results():
+    """They have subscribers while rqt_reconfigure is open."""
+    tracks, parameters = mock.Mock(), mock.Mock()
+    tracks.has_connections.return_value, parameters.has_connections.return_value = False, True
+    with mock.patch('ros_3d_bb.nodes.common.diagnostics.get_topic_manager') as manager:
+        manager.return_value.pubs = {'/ros_3d_bb/tracks': tracks, rospy.get_name() + '/parameter_updates': parameters}
+        assert unsubscribed_results() == ['/ros_3d_bb/tracks']
+        tracks.has_connections.return_value = True
+        assert unsubscribed_results() == []

@@ -1,4 +1,4 @@
-"""The package as a whole: what it declares, installs and promises is what it has."""
+"""The package as a whole: dependencies, parameters, launch files and RViz configuration are consistent."""
 import ast
 import glob
 import os
@@ -7,20 +7,19 @@ import sys
 import xml.etree.ElementTree as ElementTree
 
 import pytest
-import roslaunch
 import yaml
 
 from ros_3d_bb.core.params import check, params_from, table_of
 from ros_3d_bb.visualization.markers import NAMESPACES
-from support.pages import node_pages
+from support.launching import loaded
+from support.pages import ROOT, node_pages
 from support.standard_library import STANDARD_LIBRARY, TEST_STANDARD_LIBRARY
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-# rosdep keys of what is no ROS package; None: optional, imported where it is used, with an error that says so.
+# rosdep keys of modules that are no ROS packages; None: optional, imported where it is used.
 KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-torch', 'onnxruntime': None,
         'yaml': 'python3-yaml', 'matplotlib': 'python3-matplotlib', 'scipy': 'python3-scipy',
         'norfair': None, 'trackeval': None, 'pyrealsense2': None,
-        'PyQt5': None}  # comes with python_qt_binding, and serves where that is not
+        'PyQt5': None}  # part of python_qt_binding, and used without it
 TEST_KEYS = {'pytest': 'python3-pytest', 'hypothesis': 'python3-hypothesis',
              'catkin_pkg': 'python3-catkin-pkg-modules'}
 # What Melodic's own Python packages need on Python 3.
@@ -68,7 +67,7 @@ def test_every_import_is_declared_and_every_dependency_is_used():
     assert declared('depend', 'exec_depend') == needed
 
 
-def test_what_the_tests_import_is_declared_or_in_their_requirements():
+def test_imports_of_the_tests_are_declared_or_in_their_requirements():
     names = imported(glob.glob(inside('test', '**', '*.py'), recursive=True))
     names -= {'support', 'fuzz', 'soak', 'conftest'} | TEST_STANDARD_LIBRARY
     with open(inside('test', 'requirements.txt')) as stream:
@@ -80,7 +79,7 @@ def test_what_the_tests_import_is_declared_or_in_their_requirements():
     assert programs == {'rosbash', 'rosservice', 'rostest', 'xdotool', 'xvfb'}
 
 
-def test_nothing_names_a_machine_or_stamps_with_now():
+def test_no_paths_of_this_machine_and_no_stamps_of_the_current_time():
     for path in python_files() + glob.glob(inside('launch', '*')) + (
             glob.glob(inside('config', '**', '*.yaml'), recursive=True) + glob.glob(inside('urdf', '*'))
             + glob.glob(inside('worlds', '*')) + [inside('run')]):
@@ -113,7 +112,7 @@ def test_values_outside_of_the_table_are_rejected(name):
 
 
 @pytest.mark.parametrize('name', sorted(NODES))
-def test_parameters_are_live_only_where_a_node_takes_changes(name):
+def test_parameters_are_live_only_in_nodes_with_a_reconfigure_server(name):
     module = sys.modules[NODES[name].node_class.__module__]
     is_live = any(param.live for param in table_of(node_pages.parameter_types(NODES[name].node_class)).values())
     assert is_live == hasattr(module, 'ReconfigureServer')
@@ -130,54 +129,43 @@ def test_parameter_files_are_read_as_the_defaults(path, node):
          for key, value in kind()._asdict().items()} for kind in kinds]
 
 
-# These need packages that are not on every machine; tests of their own load them with stand-ins.
+# These need packages that are not on every machine; other tests load them with stand-ins.
 @pytest.mark.parametrize('name', sorted(set(os.path.basename(path) for path in glob.glob(inside('launch', '*')))
                                         - {'gazebo.launch', 'jackal.launch', 'realsense.launch'}))
 def test_launch_files_load_and_document_their_arguments(name):
-    path = inside('launch', name)
-    for argument in ElementTree.parse(path).getroot().findall('arg'):
+    for argument in ElementTree.parse(inside('launch', name)).getroot().findall('arg'):
         assert argument.get('doc') or argument.get('value'), '%s: %s' % (name, argument.get('name'))
-    loader = roslaunch.xmlloader.XmlLoader(resolve_anon=False)
-    config = roslaunch.config.ROSLaunchConfig()
-    loader.load(path, config, argv=REQUIRED_ARGUMENTS, verbose=False)
-    assert config.nodes
-    for node in config.nodes:
+    _parameters, nodes = loaded(name, *REQUIRED_ARGUMENTS)
+    assert nodes
+    for node in nodes.values():
         assert node.package != 'ros_3d_bb' or os.path.exists(inside('scripts', node.type))
 
 
 @pytest.mark.parametrize('name', ['yolov5.launch', 'bbox3d.launch', 'tracker.launch', 'depth_detector.launch',
                                   'planner_bridge.launch', 'realsense_node.launch', 'viewer.launch'])
-def test_launch_files_set_no_parameter_that_the_node_does_not_know(name):
-    loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
-    loader.load(inside('launch', name), config, argv=REQUIRED_ARGUMENTS, verbose=False)
-    given = {key.split('/', 2)[2]: parameter.value for key, parameter in config.params.items()}
+def test_launch_files_set_only_parameters_of_the_node(name):
+    parameters, _nodes = loaded(name, *REQUIRED_ARGUMENTS)
     node = NODES[name.replace('_node', '').replace('.launch', '_node')]
-    params_from(given, *node_pages.parameter_types(node.node_class))
+    params_from({key.split('/', 2)[2]: value for key, value in parameters.items()},
+                *node_pages.parameter_types(node.node_class))
 
 
 @pytest.mark.parametrize('arguments, outputs', [([], None), (['planner:=teb, people', 'planner_frame:=odom'],
                                                              'teb, people')])
-def test_the_pipeline_starts_the_planner_bridge_where_it_is_asked_to(arguments, outputs):
-    loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
-    loader.load(inside('launch', 'pipeline.launch'), config, argv=['weights:=yolov5n.pt'] + arguments, verbose=False)
-    given = {key: parameter.value for key, parameter in config.params.items()}
-    assert given.get('/planner_bridge_node/outputs') == outputs
-    assert given.get('/planner_bridge_node/planner_frame') == (outputs and 'odom')
+def test_the_pipeline_starts_the_planner_bridge_on_request(arguments, outputs):
+    parameters, _nodes = loaded('pipeline.launch', 'weights:=yolov5n.pt', *arguments)
+    assert parameters.get('/planner_bridge_node/outputs') == outputs
+    assert parameters.get('/planner_bridge_node/planner_frame') == (outputs and 'odom')
 
 
-def test_waiting_threads_of_torch_leave_the_cores_to_other_nodes():
-    """A library that OpenCV loads too reads it at its start, so only the environment can say it."""
-    loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
-    loader.load(inside('launch', 'yolov5.launch'), config, argv=REQUIRED_ARGUMENTS, verbose=False)
-    assert [node.env_args for node in config.nodes] == [[('OMP_WAIT_POLICY', 'PASSIVE')]]
-
-
-@pytest.mark.parametrize('name', ['bbox3d', 'tracker', 'depth_detector', 'planner_bridge', 'viewer'])
-def test_small_matrices_take_no_second_core(name):
-    """OpenBLAS reads it at its start."""
-    loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
-    loader.load(inside('launch', name + '.launch'), config, argv=REQUIRED_ARGUMENTS, verbose=False)
-    assert [node.env_args for node in config.nodes] == [[('OPENBLAS_NUM_THREADS', '1')]]
+@pytest.mark.parametrize('name, variable', [
+    ('yolov5', ('OMP_WAIT_POLICY', 'PASSIVE')),  # waiting threads of torch leave the cores to other nodes
+    *((name, ('OPENBLAS_NUM_THREADS', '1'))  # small matrices need no second core
+      for name in ('bbox3d', 'tracker', 'depth_detector', 'planner_bridge', 'viewer'))])
+def test_nodes_use_the_cores_that_they_need(name, variable):
+    """The libraries read the variables when they are loaded."""
+    _parameters, nodes = loaded(name + '.launch', *REQUIRED_ARGUMENTS)
+    assert [node.env_args for node in nodes.values()] == [[variable]]
 
 
 def test_rviz_shows_what_the_pipeline_publishes():

@@ -1,9 +1,8 @@
-"""process_bag: what the nodes would publish, the same bytes each time, and broken bags are named."""
+"""process_bag: the messages that the nodes would publish, identical bytes for equal input, and broken bags."""
 import bz2
-import hashlib
+import filecmp
 import os
 import resource
-import stat
 import struct
 import subprocess
 
@@ -19,10 +18,10 @@ from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError, BagReader
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import SessionBagOptions, session_images, write_bag
+from ros_3d_bb.bags.process_bag import main, with_params
 from ros_3d_bb.conversions.camera_msgs import START_NS
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, tracks_from_msg
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.pipeline.detection_stage import Yolov5NodeParams
 from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
@@ -41,9 +40,13 @@ def scene(tmp_path_factory):
     return path
 
 
-def digest(path):
-    with open(str(path), 'rb') as stream:
-        return hashlib.sha256(stream.read()).hexdigest()
+@pytest.fixture
+def session_bag(session_folder, tmp_path):
+    """Writes `in.bag`, a bag of five images of a session, with or without boxes."""
+    session = read_session(session_folder)
+    session = session._replace(frames=session.frames[:5])
+    return lambda with_boxes: write_bag(session_images(session, SessionBagOptions(with_boxes=with_boxes)),
+                                        str(tmp_path / 'in.bag'))
 
 
 def messages_in(path):
@@ -56,7 +59,7 @@ def messages_in(path):
 
 
 def rewritten(source, target, change):
-    """A bag with what `change(topic, message, time)` makes of each message: (topic, message, time) or None."""
+    """Write a bag of the messages that `change(topic, message, time)` returns, (topic, message, time) or None."""
     with rosbag.Bag(str(source)) as old, rosbag.Bag(str(target), 'w', compression='lz4') as new:
         for entry in old.read_messages():
             changed = change(*entry)
@@ -71,13 +74,13 @@ def run_tool(*arguments):
 
 
 def test_people_are_tracked_and_the_input_is_kept(scene, tmp_path):
-    tally = process_bag(scene, str(tmp_path / 'out.bag'), DEPTH)
+    events = process_bag(scene, str(tmp_path / 'out.bag'), DEPTH)
     before, after = messages_in(scene), messages_in(tmp_path / 'out.bag')
     assert {topic: after[topic] for topic in before} == before
     assert set(after) - set(before) == {'/yolo_bounding_box', '/ros_3d_bb/bb_3d', '/ros_3d_bb/tracks',
                                         '/visualization_marker_array'}
-    assert tally.counts['images searched'] == tally.counts['images tracked'] == len(after['/ros_3d_bb/tracks']) == 15
-    assert not tally.sentences
+    assert events.counts['images processed'] == events.counts['images tracked'] == len(after['/ros_3d_bb/tracks']) == 15
+    assert not events.sentences
     truth = {message.header.stamp: tracks_from_msg(message) for message in before['/ground_truth']}
     last = after['/ros_3d_bb/tracks'][-1]
     found = tracks_from_msg(last)
@@ -86,7 +89,7 @@ def test_people_are_tracked_and_the_input_is_kept(scene, tmp_path):
         assert min(np.linalg.norm(track.position_m[:2] - person.position_m[:2]) for track in found) < 0.3
 
 
-def test_twice_alone_and_beside_others_gives_the_same_bytes(scene, tmp_path):
+def test_one_or_several_bags_at_once_give_the_same_bytes(scene, tmp_path):
     (tmp_path / 'others').mkdir()
     names = ['one.bag', 'two.bag']
     for name in names:
@@ -95,28 +98,23 @@ def test_twice_alone_and_beside_others_gives_the_same_bytes(scene, tmp_path):
                       '--detector', 'depth')
     assert result.returncode == 0, result.stdout
     process_bag(scene, str(tmp_path / 'alone.bag'), DEPTH)
-    results = [tmp_path / 'alone.bag'] + [tmp_path / 'out' / name for name in names]
-    assert len(set(digest(path) for path in results)) == 1
+    for name in names:
+        assert filecmp.cmp(str(tmp_path / 'alone.bag'), str(tmp_path / 'out' / name), shallow=False)
 
 
-def test_the_number_of_searches_at_once_does_not_matter(session_folder, weights, tmp_path):
-    session = read_session(session_folder)
-    session = session._replace(frames=session.frames[:6])
-    write_bag(session_images(session), str(tmp_path / 'in.bag'))
-    settings = Settings()._replace(yolov5=(Yolov5NodeParams(weights=weights),) + Settings().yolov5[1:])
+def test_the_number_of_parallel_searches_does_not_matter(session_bag, weights, tmp_path):
+    session_bag(False)
     for searches in (1, 3):
         process_bag(str(tmp_path / 'in.bag'), str(tmp_path / ('%d.bag' % searches)),
-                    settings._replace(searches=searches))
-    assert digest(tmp_path / '1.bag') == digest(tmp_path / '3.bag')
+                    with_params(Settings(searches=searches), 'yolov5', weights=weights))
+    assert filecmp.cmp(str(tmp_path / '1.bag'), str(tmp_path / '3.bag'), shallow=False)
     found = messages_in(tmp_path / '1.bag')
-    assert len(found['/yolo_bounding_box']) == len(found['/ros_3d_bb/bb_3d']) == 6
+    assert len(found['/yolo_bounding_box']) == len(found['/ros_3d_bb/bb_3d']) == 5
     assert any(message.boxes for message in found['/ros_3d_bb/bb_3d'])
 
 
-def test_boxes_in_the_bag_serve_where_no_detector_is_wanted(session_folder, tmp_path):
-    session = read_session(session_folder)
-    session = session._replace(frames=session.frames[:5])
-    write_bag(session_images(session, SessionBagOptions(30.0, with_boxes=True)), str(tmp_path / 'in.bag'))
+def test_without_detector_the_boxes_in_the_bag_are_used(session_bag, tmp_path):
+    session_bag(True)
     process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'),
                 Settings(detector='none', keep=('yolo_bounding_box',)))
     found = messages_in(tmp_path / 'out.bag')
@@ -126,7 +124,7 @@ def test_boxes_in_the_bag_serve_where_no_detector_is_wanted(session_folder, tmp_
         assert len(boxes3d.boxes) == len(boxes2d.data) // 4
 
 
-def test_other_topics_are_named_and_results_go_beside_them(scene, tmp_path):
+def test_topics_can_be_remapped_and_a_missing_one_is_named(scene, tmp_path):
     renamed = rewritten(scene, tmp_path / 'in.bag', lambda topic, *rest: (topic.replace('/camera/', '/front/'),) + rest)
     with pytest.raises(BagError, match='did you mean /front/color/image_raw'):
         process_bag(renamed, str(tmp_path / 'out.bag'), DEPTH)
@@ -138,7 +136,7 @@ def test_other_topics_are_named_and_results_go_beside_them(scene, tmp_path):
     assert len(messages_in(tmp_path / 'out.bag')['/people']) == 15
 
 
-def test_without_transforms_nobody_is_tracked_and_the_summary_says_so(scene, tmp_path):
+def test_without_transforms_there_are_no_tracks_and_the_summary_names_the_cause(scene, tmp_path):
     rewritten(scene, tmp_path / 'in.bag', lambda topic, *rest: None if topic == '/tf' else (topic,) + rest)
     result = run_tool(tmp_path / 'in.bag', tmp_path / 'out.bag', '--detector', 'depth')
     assert result.returncode == 0 and '15  no transform' in result.stdout
@@ -147,27 +145,22 @@ def test_without_transforms_nobody_is_tracked_and_the_summary_says_so(scene, tmp
     assert '/ros_3d_bb/tracks' not in found and len(found['/ros_3d_bb/bb_3d']) == 15
 
 
-def test_without_depth_every_image_is_accounted_for(scene, tmp_path):
+def test_without_depth_every_image_is_counted(scene, tmp_path):
     rewritten(scene, tmp_path / 'in.bag', lambda topic, *rest: None if 'aligned' in topic else (topic,) + rest)
-    tally = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
-    assert tally.counts['colour images without depth'] == 15
+    events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
+    assert events.counts['colour images without depth'] == 15
 
 
-def test_time_that_jumps_back_begins_anew_with_other_numbers(scene, tmp_path):
-    """Stamps and transforms go back by 60 s halfway, as where a bag was recorded from one that was played twice."""
-    half = START_NS + NS * 7 // 10
-
-    def back(stamp):
-        return time_from(stamp.to_nsec() - 60 * NS)
-
+def test_tracks_have_new_ids_after_a_jump_back_in_time(scene, tmp_path):
+    """Stamps and transforms go back by 60 s halfway, as in a recording of a bag that was played twice."""
     def change(topic, message, time):
-        if time.to_nsec() > half:
+        if time.to_nsec() > START_NS + NS * 7 // 10:
             for stamped in message.transforms if topic == '/tf' else [message]:
-                stamped.header.stamp = back(stamped.header.stamp)
+                stamped.header.stamp = time_from(stamped.header.stamp.to_nsec() - 60 * NS)
         return topic, message, time
     rewritten(scene, tmp_path / 'in.bag', change)
-    tally = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
-    assert tally.counts['jumps back in time'] == 1 and 'no transform' not in tally.counts
+    events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
+    assert events.counts['jumps back in time'] == 1 and 'no transform' not in events.counts
     tracks = messages_in(tmp_path / 'out.bag')['/ros_3d_bb/tracks']
     assert len(tracks) == 15
     early, late = (set(track.id for message in tracks for track in message.objects
@@ -175,16 +168,16 @@ def test_time_that_jumps_back_begins_anew_with_other_numbers(scene, tmp_path):
     assert early and late and not early & late
 
 
-def test_transforms_that_come_later_than_the_image_are_waited_for(scene, tmp_path):
+def test_transforms_may_be_later_than_the_image_by_tf_timeout(scene, tmp_path):
     """A tenth of a second is within tf_timeout; half a second is not."""
     for delay_ns, is_known in ((NS // 10, True), (NS // 2, False)):
         rewritten(scene, tmp_path / 'in.bag', lambda topic, message, time: (
             topic, message, time_from(time.to_nsec() + (delay_ns if topic == '/tf' else 0))))
-        tally = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
-        assert ('no transform' not in tally.counts) == is_known
+        events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
+        assert ('no transform' not in events.counts) == is_known
 
 
-def test_static_transforms_hold_after_a_jump():
+def test_static_transforms_are_kept_after_a_jump():
     transforms = BagTransforms()
 
     def message(stamp_s, child):
@@ -207,14 +200,14 @@ def broken_bags(scene, tmp_path_factory):
     with open(scene, 'rb') as stream:
         content = stream.read()
     middle = len(content) // 2
-    contents = {'cut.bag': content[:middle], 'text.bag': b'#ROSBAG V2.0\nnothing of the kind', 'empty.bag': b'',
+    contents = {'cut.bag': content[:middle], 'text.bag': b'#ROSBAG V2.0\nsome text', 'empty.bag': b'',
                 'flipped.bag': content[:middle] + os.urandom(2 ** 20) + content[middle + 2 ** 20:]}
     for name, changed in contents.items():
         (folder / name).write_bytes(changed)
     return [folder / name for name in sorted(contents)] + [folder / 'missing.bag']
 
 
-def test_broken_bags_are_named_and_the_others_go_on(scene, broken_bags, tmp_path):
+def test_broken_bags_are_named_and_the_others_are_processed(scene, broken_bags, tmp_path):
     result = run_tool(*(broken_bags + [scene]), '--out-dir', tmp_path, '--detector', 'depth', '--jobs', 2)
     assert result.returncode == 1 and 'Traceback' not in result.stdout
     for path in broken_bags:
@@ -223,26 +216,27 @@ def test_broken_bags_are_named_and_the_others_go_on(scene, broken_bags, tmp_path
 
 
 @pytest.mark.parametrize('arguments,complaint', [
-    (['a.bag'], 'IN and OUT'), (['a.bag', 'a.bag', '--detector', 'depth'], 'another place'),
-    (['a.bag', 'b.bag'], 'needs --weights'),
-    (['x/a.bag', 'y/a.bag', '--out-dir', 'z', '--detector', 'depth'], 'two bags'),
-    (['a.bag', 'b.bag', '--detector', 'depth', '--remap', 'x'], 'TOPIC_OF_THE_NODES:=')])
-def test_arguments_that_make_no_sense_are_refused(tmp_path, arguments, complaint):
-    result = subprocess.run(['rosrun', 'ros_3d_bb', 'process_bag'] + arguments, cwd=str(tmp_path),
-                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
-    assert result.returncode == 2 and complaint in result.stdout and os.listdir(str(tmp_path)) == []
+    ('a.bag', 'IN and OUT'), ('a.bag a.bag --detector depth', 'also an input'), ('a.bag b.bag', 'needs --weights'),
+    ('x/a.bag y/a.bag --out-dir z --detector depth', 'two inputs'),
+    ('a.bag b.bag --detector depth --remap x', 'TOPIC_OF_THE_NODES:=')])
+def test_invalid_arguments_are_rejected(tmp_path, monkeypatch, capsys, arguments, complaint):
+    monkeypatch.chdir(str(tmp_path))
+    with pytest.raises(SystemExit) as error:
+        main(arguments.split())
+    assert error.value.code == 2 and complaint in capsys.readouterr().err and os.listdir(str(tmp_path)) == []
 
 
 @pytest.mark.parametrize('text,complaint', [('target_frme: odom', 'did you mean ~target_frame'),
                                             ('target_frame: [1]', 'str expected'), ('- 1', 'names and values'),
                                             ('!!python/object/apply:os.system ["true"]', 'could not determine')])
-def test_parameter_files_are_checked(scene, tmp_path, text, complaint):
+def test_parameter_files_are_checked(tmp_path, capsys, text, complaint):
     (tmp_path / 'tracker.yaml').write_text(text + '\n')
-    result = run_tool(scene, tmp_path / 'out.bag', '--detector', 'depth', '--tracker-params', tmp_path / 'tracker.yaml')
-    assert result.returncode == 2 and complaint in result.stdout and 'Traceback' not in result.stdout
+    with pytest.raises(SystemExit) as error:
+        main(['a.bag', 'b.bag', '--detector', 'depth', '--tracker-params', str(tmp_path / 'tracker.yaml')])
+    assert error.value.code == 2 and complaint in capsys.readouterr().err
 
 
-def test_parameter_files_of_the_nodes_serve(scene, tmp_path):
+def test_parameter_files_of_the_nodes_are_used(scene, tmp_path):
     config = os.path.join(os.path.dirname(__file__), '..', '..', 'config')
     (tmp_path / 'tracker.yaml').write_text('tracker: thesis\ntarget_frame: odom\n')
     result = run_tool(scene, tmp_path / 'out.bag', '--detector', 'depth', '--tracker-params', tmp_path / 'tracker.yaml',
@@ -252,17 +246,8 @@ def test_parameter_files_of_the_nodes_serve(scene, tmp_path):
     assert messages_in(tmp_path / 'out.bag')['/ros_3d_bb/tracks'][-1].header.frame_id == 'odom'
 
 
-def test_results_get_the_rights_that_the_user_wants(scene, tmp_path):
-    before = os.umask(0o027)
-    try:
-        process_bag(scene, str(tmp_path / 'out.bag'), DEPTH)
-    finally:
-        os.umask(before)
-    assert stat.S_IMODE(os.stat(str(tmp_path / 'out.bag')).st_mode) == 0o640
-
-
-def test_a_full_disk_is_named_and_an_older_result_stays(scene, tmp_path):
-    """No file may grow beyond 50 kB, as on a disk with so much left; then they may."""
+def test_a_full_disk_is_named_and_an_older_result_is_kept(scene, tmp_path):
+    """A file size limit of 50 kB acts as a full disk."""
     target = tmp_path / 'out.bag'
     target.write_text('an older result')
     command = ['rosrun', 'ros_3d_bb', 'process_bag', '--detector', 'depth', scene, str(target)]
@@ -275,20 +260,20 @@ def test_a_full_disk_is_named_and_an_older_result_stays(scene, tmp_path):
     assert run_tool('--detector', 'depth', scene, target).returncode == 0 and messages_in(target)
 
 
-def test_no_code_is_made_of_the_definitions_in_a_bag(tmp_path, monkeypatch):
-    """rosbag would write Python code for it, and import that."""
+def test_no_code_is_generated_from_the_definitions_in_a_bag(tmp_path, monkeypatch):
+    """rosbag would generate and import Python code."""
     with rosbag.Bag(str(tmp_path / 'in.bag'), 'w') as bag:
         unused = type('Unused', (), {'_md5sum': '0' * 32})
         header = {'topic': '/a', 'type': 'a/B', 'md5sum': '0' * 32, 'message_definition': 'int32 x'}
         bag.write('/a', ('a/B', b'1234', '0' * 32, unused), time_from(1), raw=True, connection_header=header)
-    made = []
-    monkeypatch.setattr(genpy.dynamic, 'generate_dynamic', lambda *given: made.append(given))
+    generated = []
+    monkeypatch.setattr(genpy.dynamic, 'generate_dynamic', lambda *arguments: generated.append(arguments))
     with BagReader(str(tmp_path / 'in.bag')) as reader:
         assert [raw.data for raw in reader.messages()] == [b'1234']
-    assert not made
+    assert not generated
 
 
-def test_a_bag_that_unpacks_to_more_than_the_memory_is_refused(tmp_path):
+def test_a_bag_that_unpacks_to_more_than_the_memory_is_rejected(tmp_path):
     """640 MB of zeros are 500 bytes of bz2."""
     path = tmp_path / 'in.bag'
     with rosbag.Bag(str(path), 'w', compression='bz2') as bag:
@@ -300,7 +285,7 @@ def test_a_bag_that_unpacks_to_more_than_the_memory_is_refused(tmp_path):
     rest = content[start + header.compressed_size:]
     packer = bz2.BZ2Compressor()
     bomb = b''.join(packer.compress(bytes(2 ** 24)) for _part in range(40)) + packer.flush()
-    # Positions behind the chunk are told by the file's header alone.
+    # Only the header of the file contains positions behind the chunk.
     index = struct.unpack('<Q', content[content.index(b'index_pos=') + 10:][:8])[0]
     moved = content.replace(b'index_pos=' + struct.pack('<Q', index),
                             b'index_pos=' + struct.pack('<Q', index + len(bomb) - header.compressed_size), 1)

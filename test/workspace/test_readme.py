@@ -1,6 +1,6 @@
-"""What the README and the pages in doc/ say of the package is so: names, the nodes' own sentences.
+"""Names in the README and in doc/: topics, services, files, arguments, messages and figures exist as written.
 
-The blocks of code are run by test_readme_tools.py, test_readme_graphs.py and test_readme_campaign.py.
+test_readme_tools.py, test_readme_graphs.py and test_readme_campaign.py run the blocks of code.
 """
 import ast
 import glob
@@ -14,7 +14,7 @@ import pytest
 from support.code_blocks import PAGES, ROOT, claimed, unclaimed
 from support.pages import node_pages
 
-NAMED = PAGES + ('doc/error_model.md',)  # whose blocks are the record of a campaign
+NAMED = PAGES + ('doc/error_model.md',)  # its blocks are the record of a campaign
 BENCHMARKS = ['| | here | thesis', '| | `ours` | `thesis`', '| case | markers | 50 %']
 DRAWING = claimed('camera/color/image_raw ──►', 'text')
 FORMAT = re.compile(r'%[-+\d.]*[a-zA-Z]')
@@ -48,37 +48,25 @@ def table_of(page, beginning):
 
 
 def topics_of_nodes(*sections):
-    """{full name: type} of the topics in the nodes' docstrings, which test_node_pages.py compares with the nodes."""
+    """{full name: type} in the nodes' docstrings, which test_node_pages.py compares with the nodes."""
     return {entry.name.replace('~', node.name + '/'): entry.kind for node in node_pages.nodes()
             for section in sections for entry in node.sections.get(section, ())}
 
 
-@pytest.fixture(scope='module')
-def sentences():
-    """All texts in the code, with … for what is put into them."""
-    found = []
-    for path in glob.glob(os.path.join(ROOT, 'src', '**', '*.py'), recursive=True):
-        for node in ast.walk(ast.parse(text_of(path))):
-            text = getattr(node, 'value', getattr(node, 's', None))  # `s` before Python 3.8
-            if isinstance(text, str):
-                found.append(FORMAT.sub('…', text))
-    return found
-
-
 def test_every_block_of_code_is_run():
     for name in ('tools', 'graphs', 'campaign'):
-        importlib.import_module('test_readme_' + name)  # which say what they run
+        importlib.import_module('test_readme_' + name)  # they claim their blocks
     assert unclaimed() == []
 
 
-def test_the_drawing_shows_nodes_and_topics_that_there_are():
+def test_nodes_and_topics_of_the_drawing_exist():
     for node in re.findall(r'\w+_node', DRAWING.text):
         assert os.path.exists(os.path.join(ROOT, 'scripts', node))
     topics = re.findall(r'\w+(?:/\w+)+|yolo_\w+|visualization_\w+', DRAWING.text)
     assert len(topics) > 6 and set(topics) - set(topics_of_nodes('Subscribes', 'Publishes')) == set()
 
 
-def test_the_nodes_publish_the_topics_of_the_table_with_its_types():
+def test_topics_of_the_table_are_published_with_their_types():
     published = topics_of_nodes('Publishes')
     rows = rows_below('README.md', '| topic | type | |')
     assert len(rows) > 8
@@ -90,7 +78,7 @@ def test_the_nodes_publish_the_topics_of_the_table_with_its_types():
                 assert topic in published and kind in ('`%s`' % published[topic], ''), topic
 
 
-def test_the_services_that_the_readme_names_are_those_of_the_nodes():
+def test_services_of_the_readme_are_those_of_the_nodes():
     named = re.findall(r'`(\w+_node/\w+)`(?: and `(\w+_node/\w+)`)? \(`(std_srvs/\w+)`\)', prose_of('README.md'))
     found = {name: kind for *names, kind in named for name in names if name}
     assert len(found) == 3 and found.items() <= topics_of_nodes('Services').items()
@@ -105,16 +93,22 @@ def test_figures_of_the_readme_are_those_of_the_benchmarks(beginning):
         assert figures.items() <= measured[name].items(), name
 
 
-def test_the_nodes_say_what_the_table_of_symptoms_has_them_say(sentences):
+def test_messages_in_the_table_of_symptoms_are_in_the_code():
+    """`…` replaces values, in the code conversion specifiers."""
+    texts = []
+    for path in glob.glob(os.path.join(ROOT, 'src', '**', '*.py'), recursive=True):
+        for node in ast.walk(ast.parse(text_of(path))):
+            text = getattr(node, 'value', getattr(node, 's', None))  # `s` before Python 3.8
+            if isinstance(text, str):
+                texts.append(FORMAT.sub('…', text))
     rows = rows_below('README.md', '| what you see | cause | what to do |')
-    said = [sentence for row in rows for sentence in re.findall(r'`([^`]+)`', row[0]) if ' ' in sentence]
-    assert len(said) > 10
-    for sentence in said:
-        assert any(sentence in text for text in sentences), sentence
+    quoted = [message for row in rows for message in re.findall(r'`([^`]+)`', row[0]) if ' ' in message]
+    assert len(quoted) > 10
+    assert [message for message in quoted if not any(message in text for text in texts)] == []
 
 
 @pytest.mark.parametrize('page', NAMED)
-def test_files_and_launch_arguments_that_are_named_exist(page):
+def test_named_files_and_launch_arguments_exist(page):
     known = set(argument.get('name') for path in glob.glob(os.path.join(ROOT, 'launch', '*'))
                 for argument in ElementTree.parse(path).iter('arg'))
     for code in re.findall(r'`([^`\n]+)`', prose_of(page)):
@@ -126,14 +120,14 @@ def test_files_and_launch_arguments_that_are_named_exist(page):
 
 @pytest.mark.parametrize('page,header,launch_file', [
     ('README.md', '| argument | |', 'pipeline.launch'), ('doc/realsense.md', '| argument | |', 'realsense.launch')])
-def test_tables_of_arguments_have_those_of_the_launch_file(page, header, launch_file):
+def test_arguments_of_tables_are_those_of_the_launch_file(page, header, launch_file):
     tree = ElementTree.parse(os.path.join(ROOT, 'launch', launch_file))
     known = set(argument.get('name') for argument in tree.getroot().findall('arg'))
     listed = set(name for row in rows_below(page, header) for name in re.findall(r'`(\w+)`', row[0]))
     assert len(listed) > 5 and listed <= known
 
 
-def test_figures_of_others_name_their_source():
+def test_figures_of_other_work_name_their_source():
     rows = rows_below('README.md', '| | they | here |')
     assert len(rows) > 4
     for source, _they, _here in rows:

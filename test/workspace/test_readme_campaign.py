@@ -1,4 +1,4 @@
-"""A measurement campaign as the README and doc/campaign.md tell it: measure, annotate, analyse, use the error model."""
+"""The measurement campaign of the README and doc/campaign.md: measure, annotate, analyse, use the error model."""
 import json
 import os
 import re
@@ -21,7 +21,7 @@ VIEWER = claimed('roslaunch ros_3d_bb viewer.launch')
 
 @pytest.fixture(scope='module')
 def campaign(reader, session_folder):
-    """The session at home, as a campaign that has been annotated; its images are links."""
+    """An annotated session in the home folder, with links to the images."""
     folder = reader.home / 'campaign'
     for name in ('color', 'depth'):
         (folder / name).mkdir(parents=True)
@@ -53,12 +53,12 @@ def test_the_annotator_opens_the_campaign(reader, campaign):
 
 def test_scripts_export_analyse_and_validate_it(reader, campaign):
     os.symlink(str(campaign), str(reader.clone / 'SESSION'))
-    assert 'nothing wrong' in reader.types(SCRIPTS, reader.clone)
+    assert ', 0 problems' in reader.types(SCRIPTS, reader.clone)
     assert (reader.clone / 'table.csv').exists() and (campaign / 'analysis' / 'report.html').exists()
 
 
 def test_its_error_model_gives_positions_a_covariance(reader, camera_bag, campaign):
-    assert (campaign / 'analysis' / 'error_model.yaml').exists()  # of the analysis
+    assert (campaign / 'analysis' / 'error_model.yaml').exists()  # written by the analysis
     with reader.running(CORRECTED) as graph:
         graph.starts_camera(camera_bag)
         graph.hears(TRACKS)

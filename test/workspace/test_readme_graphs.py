@@ -1,7 +1,4 @@
-"""Each command of the README and of doc/ that starts nodes, as typed: what it promises comes on the topics.
-
-Each has a master of its own, so that none meets what another one has left.
-"""
+"""Each command of the README and of doc/ that starts nodes, on its own master: its topics receive messages."""
 import re
 import subprocess
 import sys
@@ -17,7 +14,7 @@ from support.realsense_recordings import SUFFIX, colored, sloping_depth, write_r
 TRACKS, BOXES = 'ros_3d_bb/tracks:objects', 'ros_3d_bb/bb_3d:boxes'
 IMAGES = 'camera/color/image_raw:data', 'camera/aligned_depth_to_color/image_raw:data', 'camera/color/camera_info:K'
 MARKERS = 'visualization_marker_array:markers'
-# OpenCV's detector finds people who stand so far from a camera as low as a Jackal's.
+# OpenCV's detector detects people at this distance from a camera at the height of a Jackal's.
 SCENE = {'duration': 1.0, 'rate': 5.0, 'people': [{'start': [4.5, 0.3], 'facing': 3.1}]}
 
 JACKAL = claimed('roslaunch ros_3d_bb jackal.launch')
@@ -42,13 +39,13 @@ FRONT, REAR = (claimed('roslaunch ros_3d_bb realsense.launch camera:=' + name) f
 BOTH = claimed('roslaunch ros_3d_bb pipeline.launch cameras:=front,rear')
 
 
-def test_a_jackal_gets_camera_tracks_and_planner_with_one_command(reader, camera_bag):
+def test_jackal_launch_starts_camera_tracker_and_planner_bridge(reader, camera_bag):
     with reader.running(JACKAL, READER_BAG=camera_bag) as graph:
         graph.start(['rosrun', 'tf2_ros', 'static_transform_publisher', *'0 0 0 0 0 0 odom base_link'.split()])
         graph.hears(TRACKS, 'planner_bridge_node/points:width')
 
 
-def test_the_desk_shows_rviz_on_the_robots_master(reader, camera_bag):
+def test_desk_launch_shows_rviz_on_the_master_of_the_robot(reader, camera_bag):
     with reader.running(PIPELINE) as robot:
         robot.starts_camera(camera_bag)
         robot.hears(TRACKS, MARKERS)
@@ -58,7 +55,7 @@ def test_the_desk_shows_rviz_on_the_robots_master(reader, camera_bag):
             desk.shows('RViz')
 
 
-def test_a_realsense_sends_images_and_another_terminal_tracks_people(reader, camera_bag):
+def test_realsense_and_pipeline_in_two_terminals(reader, camera_bag):
     with reader.running(REALSENSE, READER_BAG=camera_bag) as camera:
         camera.hears(*IMAGES)
         with reader.running(TRIPOD, ROS_MASTER_URI=camera.environment['ROS_MASTER_URI'],
@@ -67,25 +64,25 @@ def test_a_realsense_sends_images_and_another_terminal_tracks_people(reader, cam
             pipeline.shows('RViz')
 
 
-def test_without_the_driver_our_node_looks_for_the_camera(reader):
+def test_without_the_driver_realsense_node_searches_for_the_camera(reader):
     with reader.running(PYREALSENSE) as graph:
         graph.says('no images of a RealSense')
     assert 'pip3 install pyrealsense2' in reader.log.read_text()
 
 
-def test_a_recording_of_a_realsense_is_played(reader):
+def test_recording_of_a_realsense(reader):
     path = write_recording(str(reader.home / ('some' + SUFFIX)), [colored(0)] * 3, [sloping_depth()] * 3)
     with reader.running(RECORDING, replaced=[('/path/to/some.bag', path)]) as graph:
         graph.hears(*IMAGES)
 
 
-def test_a_bag_is_played_and_shown(reader, camera_bag):
+def test_playback_of_a_bag(reader, camera_bag):
     with reader.running(PLAYBACK, replaced=[('$HOME/some.bag', camera_bag)], DISPLAY=reader.screen()) as graph:
         graph.shows('RViz')
         graph.hears(TRACKS)
 
 
-def test_another_detector_publishes_boxes_that_become_3d_boxes(reader, tmp_path):
+def test_another_detector(reader, tmp_path):
     write_bag(scenario_images(scenario_from(SCENE)), str(tmp_path / 'scene.bag'))
     (tmp_path / 'detector.py').write_text(OWN_DETECTOR.text)
     with reader.running(BESIDE_DETECTOR) as graph:
@@ -94,7 +91,7 @@ def test_another_detector_publishes_boxes_that_become_3d_boxes(reader, tmp_path)
         graph.hears('yolo_bounding_box:data', BOXES, TRACKS)
 
 
-def test_planners_get_points_diagnostics_say_how_it_goes_and_parameters_change(reader, camera_bag):
+def test_planner_points_diagnostics_and_live_parameters(reader, camera_bag):
     with reader.running(PLANNER) as graph:
         graph.starts_camera(camera_bag)
         graph.hears('planner_bridge_node/points:width')
@@ -103,21 +100,21 @@ def test_planners_get_points_diagnostics_say_how_it_goes_and_parameters_change(r
         assert 'values' in reader.types(DIAGNOSTICS, **master)
         for block in LIVE + [SLIDERS]:
             reader.types(block, **master)
-        told = subprocess.check_output(['rosparam', 'get', '/tracker_node'], env=graph.environment)
-    parameters = yaml.safe_load(told)
+        printed = subprocess.check_output(['rosparam', 'get', '/tracker_node'], env=graph.environment)
+    parameters = yaml.safe_load(printed)
     assert [parameters[name] for name in ('prediction_time', 'max_missed_time', 'max_age')] == [3.0, 1.0, 8.0]
 
 
-def test_a_scene_is_simulated_and_shown_and_the_doctor_finds_nothing_wrong(reader):
+def test_simulation_and_doctor(reader):
     with reader.running(SIMULATION, DISPLAY=reader.screen()) as graph:
         graph.shows('RViz')
         graph.hears(TRACKS, 'ground_truth:objects')
-        said = reader.types(DOCTOR, appended=' --patience 60', ROS_MASTER_URI=graph.environment['ROS_MASTER_URI'])
-    assert 'doctor: all is well' in said
+        printed = reader.types(DOCTOR, appended=' --patience 60', ROS_MASTER_URI=graph.environment['ROS_MASTER_URI'])
+    assert 'doctor: no faults found' in printed
 
 
-def test_the_pipeline_runs_beside_gazebo(reader, camera_bag):
-    """Of Gazebo and Jackal there are stand-ins; the robot's camera is the bag's."""
+def test_gazebo(reader, camera_bag):
+    """With stand-ins for Gazebo and Jackal; a bag replaces the camera."""
     with reader.running(GAZEBO, DISPLAY=reader.screen()) as graph:
         graph.starts_camera(camera_bag)
         graph.hears(TRACKS)
@@ -126,7 +123,7 @@ def test_the_pipeline_runs_beside_gazebo(reader, camera_bag):
 
 
 def test_two_realsenses_and_one_tracker(reader, camera_bag):
-    """The bag's images, and so those of both cameras, are in one frame."""
+    """Both cameras play the same bag, in one frame."""
     with reader.running(FRONT, READER_BAG=camera_bag) as front:
         front.hears(*(topic.replace('camera/', 'front/', 1) for topic in IMAGES))
         on_it = {'ROS_MASTER_URI': front.environment['ROS_MASTER_URI']}
@@ -137,5 +134,5 @@ def test_two_realsenses_and_one_tracker(reader, camera_bag):
             rear.hears(*(topic.replace('camera/', 'rear/', 1) for topic in IMAGES))
             both.hears('front/' + BOXES, 'rear/' + BOXES, TRACKS, MARKERS)
             both.shows('RViz')
-            told = subprocess.check_output(['rosparam', 'get', '/stub/serial_no'], env=both.environment)
-    assert told.decode().strip() == 'NUMBER_OF_THE_OTHER'
+            serial = subprocess.check_output(['rosparam', 'get', '/stub/serial_no'], env=both.environment)
+    assert serial.decode().strip() == 'NUMBER_OF_THE_OTHER'

@@ -1,4 +1,4 @@
-"""Each command of the README and of doc/ that ends by itself, as typed; long ones on little data, or cut short."""
+"""Each command of the README and of doc/ that ends by itself, on little data."""
 import json
 import os
 import re
@@ -30,7 +30,7 @@ PROCESS_BAGS = claimed('rosrun ros_3d_bb process_bag day1')
 SESSION_TO_BAG = claimed('rosrun ros_3d_bb session_to_bag')
 SCENARIO_TO_BAG = claimed('rosrun ros_3d_bb scenario_to_bag')
 STAMPED = claimed('message = Int32MultiArray', 'python')
-# What ends a benchmark sooner than its own defaults.
+# Options that shorten a benchmark.
 BENCHMARKS = [(claimed('./run bench accuracy --boxes'), ''), (claimed('./run bench accuracy --scenarios'), ''),
               (claimed('./run bench scenes'), ''), (claimed('./run bench speed\n'), ' --images 1'),
               (claimed('./run bench tracking'), ' --seconds 3 --repetitions 1'),
@@ -42,7 +42,7 @@ YAML = [claimed(beginning, 'yaml') for beginning in ('local_costmap:', 'global_c
 
 @pytest.fixture(scope='module')
 def clone(reader):
-    """The reader's clone, whose scenes are short."""
+    """The clone of the repository, with short scenes."""
     scenarios = reader.clone / 'config' / 'scenarios'
     for path in scenarios.glob('*.yaml'):
         if path.name not in ('demo.yaml', 'thesis_a_start.yaml'):
@@ -61,7 +61,7 @@ def data(reader, session_folder):
     recordings.mkdir()
     with open(os.path.join(session_folder, 'frames.json')) as stream:
         content = json.load(stream)
-    content['frames'] = content['frames'][::4]
+    content['frames'] = content['frames'][::8]
     (session / 'frames.json').write_text(json.dumps(content))
     for name in ('color', 'depth'):
         os.symlink(os.path.join(session_folder, name), str(session / name))
@@ -71,7 +71,7 @@ def data(reader, session_folder):
     return str(reader.home / 'data')
 
 
-def test_the_demo_leaves_a_table_a_picture_and_a_bag_and_the_tests_start(reader, clone):
+def test_demo_writes_table_image_and_bag_and_the_tests_start(reader, clone):
     printed = reader.types(DEMO_AND_TESTS, clone)
     assert 'people are found by depth' in printed and 'running all tests' in printed
     for kind in ('bag', 'png'):
@@ -80,11 +80,11 @@ def test_the_demo_leaves_a_table_a_picture_and_a_bag_and_the_tests_start(reader,
     assert 'run_tests -j2' in reader.log.read_text()
 
 
-def test_the_demo_takes_weights(reader, clone, weights):
+def test_demo_with_weights(reader, clone, weights):
     assert re.search(r'people are found by /.*/%s' % os.path.basename(weights), reader.types(DEMO, clone))
 
 
-def test_a_build_is_found_by_its_short_name(reader, clone):
+def test_build_prints_the_short_path(reader, clone):
     printed = reader.types(BUILD, clone, replaced=[('~/.cache/ros_3d_bb', str(reader.cache))],
                            appended='\nprintf "%s\n" "$ROS_PACKAGE_PATH"')
     assert 'source %s/workspace/devel/setup.bash' % reader.cache in printed
@@ -92,27 +92,27 @@ def test_a_build_is_found_by_its_short_name(reader, clone):
 
 
 def test_a_robot_is_set_up(reader):
-    """What is typed, one after the other; what is asked of the system is written down."""
+    """All commands in order; the stand-ins log what they are asked for."""
     for block in (INSTALL, WEIGHTS, RUNTIMES, DESCRIPTION, UPSTART):
         reader.types(block)
-    said = reader.log.read_text().splitlines()
+    logged = reader.log.read_text().splitlines()
     assert os.path.exists(str(reader.home / 'catkin_ws' / 'src' / 'ros_3d_bb' / 'package.xml'))
     for command in ('git clone URL ros_3d_bb', 'rosdep install --from-paths src --ignore-src', 'catkin_make',
                     'pip3 install torch onnxruntime', 'systemctl restart ros', 'systemctl daemon-reload',
                     'systemctl start people'):
-        assert command in said
-    assert [line for line in said if line.startswith('wget https://github.com/ultralytics/yolov5/releases')]
-    assert '/yolov5_node' in said and '/camera_mount' in said  # robot_upstart could load the launch file
+        assert command in logged
+    assert [line for line in logged if line.startswith('wget https://github.com/ultralytics/yolov5/releases')]
+    assert '/yolov5_node' in logged and '/camera_mount' in logged  # robot_upstart could load the launch file
     setup = (reader.etc / 'setup.bash').read_text()
     description = re.search('JACKAL_URDF_EXTRAS=(.*)', setup).group(1)
     assert os.path.exists(description) and '/catkin_ws/devel/setup.bash' in setup
 
 
-def test_a_workspace_of_ones_own_installs_builds_and_tests(reader):
+def test_own_workspace_installs_builds_and_tests(reader):
     for block in (INSTALL_ON_DEBIAN, OWN_TESTS):
         reader.types(block, reader.home / 'catkin_ws')
-    said = reader.log.read_text()
-    assert 'rosdep update' in said and 'catkin_make run_tests -j1' in said
+    logged = reader.log.read_text()
+    assert 'rosdep update' in logged and 'catkin_make run_tests -j1' in logged
 
 
 def test_the_other_computers_script_runs_its_arguments(reader, tmp_path):
@@ -132,7 +132,7 @@ def test_the_arguments_are_listed(reader):
     assert {'detector', 'weights', 'error_model', 'frame_world', 'planner'} <= listed
 
 
-def test_bags_are_processed_one_or_many(reader, camera_bag):
+def test_one_or_many_bags_are_processed(reader, camera_bag):
     (reader.home / 'day1').mkdir()
     for path in ('some.bag', 'day1/one.bag', 'day1/two.bag'):
         with rosbag.Bag(camera_bag) as whole, rosbag.Bag(str(reader.home / path), 'w') as part:
@@ -162,14 +162,14 @@ def test_benchmarks_print_a_table(reader, clone, data, block, shortened):
     assert len(re.findall(r'\d+\.\d+', printed)) > 5, printed
 
 
-def test_the_detector_is_timed_by_runtime(reader, clone, data, official_output):
-    """A checkpoint, as the export that finds people in a made session has one runtime only."""
+def test_detector_speed_by_runtime(reader, clone, data, official_output):
+    """A checkpoint, because the stand-in export has one runtime only."""
     printed = reader.types(DETECTOR_SPEED, clone, appended=' --images 1', ROS_3D_BB_DATA=data,
                            replaced=[('$HOME/yolov5n.pt', official_output[0])])
     assert 'torch' in printed and 'onnxruntime' in printed
 
 
-def test_a_label_written_by_hand_is_read_as_stamp_and_frame():
+def test_stamp_and_frame_in_the_layout_of_2d_boxes():
     image = Image()
     image.header.stamp, image.header.frame_id = time_from(1600000000000000005), 'some_camera'
     names = {'image': image, 'Int32MultiArray': Int32MultiArray, 'MultiArrayDimension': MultiArrayDimension,
@@ -181,8 +181,8 @@ def test_a_label_written_by_hand_is_read_as_stamp_and_frame():
 
 
 @pytest.mark.parametrize('block', YAML, ids=lambda block: block.text.split(':')[0])
-def test_parameters_of_planners_load_as_a_node_would(reader, tmp_path, block):
-    """Without doubles, tabs or other slips: what roslaunch would set is what stands there."""
+def test_parameters_of_planners_can_be_loaded(reader, tmp_path, block):
+    """roslaunch sets the parameters of the block: it has no duplicate keys or tabs."""
     (tmp_path / 'planner.yaml').write_text(block.text)
     (tmp_path / 'planner.launch').write_text(
         '<launch><rosparam command="load" file="%s"/></launch>' % (tmp_path / 'planner.yaml'))

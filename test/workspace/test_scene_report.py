@@ -1,17 +1,20 @@
 """Report on the bag of a scene."""
 import os
+import re
 import subprocess
 
 import cv2
 import numpy as np
 import pytest
 import rosbag
+from matplotlib.colors import to_rgb
 from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_writer import START_NS, write_bag
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg, time_from, tracks_from_msg, tracks_to_msg
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb_lab.evaluation.demo.scene_report import BOXES_TOPIC, TRACKS_TOPIC, paths_of, read_recording, write_report
+from ros_3d_bb_lab.evaluation.demo.scene_report import (BOXES_TOPIC, ROBOT_COLOR, SIZE_IN, TRACKS_TOPIC, TRUTH_COLOR,
+                                                        draw_scene, main, paths_of, read_recording, write_report)
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 
@@ -45,47 +48,57 @@ def test_tracks_are_compared_with_the_truth_of_their_stamp(bag):
         recording = read_recording(opened)
     assert [moment.stamp_ns for moment in recording.moments] == [START_NS + n * NS // 10 for n in range(10)]
     assert recording.answered == 9 and recording.moments[0].tracks == []
-    paths = paths_of(recording)
-    np.testing.assert_allclose(np.array(paths.tracks[7]) - paths.people[1][1:], [[0, SHIFT_M]] * 9)
-    assert paths.robot.shape == (10, 2) and 0.2 < paths.robot[-1, 0] < 1.0
-
-
-def test_the_report_has_a_table_and_an_image(bag, tmp_path):
-    picture = str(tmp_path / 'report.png')
-    lines = write_report(bag, picture)
-    assert lines[1].split()[0] == '1' and '0.200 m' in lines[1] and ' 7 ' in lines[1]
-    assert ' 90 %' in lines[1] and lines[-1] == '9 of 10 images answered'
-    assert cv2.imread(picture).shape[1] == 1456
+    people, tracks = paths_of(recording)
+    np.testing.assert_allclose(np.array(tracks[7]) - people[1][1:], [[0, SHIFT_M]] * 9)
+    assert recording.robot.shape == (10, 2) and 0.2 < recording.robot[-1, 0] < 1.0
 
 
 def test_the_command_prints_the_table_and_writes_the_image_next_to_the_bag(bag):
     output = subprocess.check_output(['rosrun', 'ros_3d_bb', 'scene_report', bag], universal_newlines=True)
-    assert '0.200 m' in output and 'picture: %s' % bag.replace('.bag', '.png') in output
-    assert os.path.exists(bag.replace('.bag', '.png'))
+    _titles, person, _images, answered, picture = output.splitlines()
+    assert person.split()[0] == '1' and '0.200 m' in person and ' 7 ' in person and ' 90 %' in person
+    assert answered == '9 of 10 images answered'
+    assert picture == 'picture: %s' % bag.replace('.bag', '.png') and os.path.exists(bag.replace('.bag', '.png'))
 
 
-def test_an_image_that_cannot_be_written_is_named(bag, tmp_path):
-    with pytest.raises(OSError, match=r'/picture .*\.png'):
-        write_report(bag, str(tmp_path / 'picture'))
+@pytest.mark.parametrize('picture', ['no_such_folder/report.png', 'report.xyz'])
+def test_an_image_that_cannot_be_written_is_an_error(bag, tmp_path, picture):
+    with pytest.raises((OSError, ValueError)):
+        write_report(bag, str(tmp_path / picture))
 
 
-@pytest.mark.parametrize('images,named', [
-    (lambda: scenario_images(scenario_from(SCENE)), 'no messages on /ros_3d_bb/tracks'),
-    (lambda: images_with_tracks('odom'), 'frames map, odom')])
-def test_incomparable_bags_are_rejected(tmp_path, images, named):
-    path = str(tmp_path / 'other.bag')
-    write_bag(images(), path)
-    result = subprocess.run(['rosrun', 'ros_3d_bb', 'scene_report', path], stdout=subprocess.PIPE,
-                            stderr=subprocess.STDOUT, universal_newlines=True)
-    assert result.returncode == 1 and named in result.stdout
-    assert 'Traceback' not in result.stdout and os.listdir(str(tmp_path)) == ['other.bag']
+@pytest.mark.parametrize('make, reason', [
+    (lambda path: write_bag(scenario_images(scenario_from(SCENE)), path), 'no messages on /ros_3d_bb/tracks'),
+    (lambda path: write_bag(images_with_tracks('odom'), path), 'frames map, odom'),
+    (lambda path: open(path, 'w').write('not a bag'), ''), (lambda _path: None, 'No such file')])
+def test_unusable_bags_are_rejected(tmp_path, monkeypatch, make, reason):
+    path = str(tmp_path / 'some.bag')
+    make(path)
+    monkeypatch.setattr('sys.argv', ['scene_report', path])
+    with pytest.raises(SystemExit, match='%s: .*%s.*no report was written' % (re.escape(path), reason)):
+        main()
+    assert set(os.listdir(str(tmp_path))) <= {'some.bag'}
 
 
-@pytest.mark.parametrize('content', [None, b'not a bag'])
-def test_files_that_are_not_bags_are_rejected(tmp_path, content):
-    path = tmp_path / 'some.bag'
-    if content:
-        path.write_bytes(content)
-    result = subprocess.run(['rosrun', 'ros_3d_bb', 'scene_report', str(path)], stdout=subprocess.PIPE,
-                            stderr=subprocess.STDOUT, universal_newlines=True)
-    assert result.returncode == 1 and str(path) in result.stdout and 'Traceback' not in result.stdout
+def drawn(tmp_path, *content):
+    path = str(tmp_path / 'scene.png')
+    draw_scene(path, *content)
+    return cv2.imread(path)[..., ::-1]
+
+
+def rows_of(image, color):
+    return np.nonzero((image == np.rint(255 * np.array(to_rgb(color)))).all(axis=-1))[0]
+
+
+def test_the_top_view_shows_truth_tracks_and_robot(tmp_path):
+    image = drawn(tmp_path, [], {1: [(2, 1), (4, 1)]}, {3: [(2, -1), (4, -1)]}, np.array([(0, 0), (1, 0)]), [])
+    truth, robot, track = (rows_of(image, color) for color in (TRUTH_COLOR, ROBOT_COLOR, 'C0'))
+    assert 0 < truth.mean() < robot.mean() < track.mean()  # y points up
+
+
+def test_images_are_arranged_in_rows_of_three(tmp_path):
+    panels = [np.full((480, 640, 3), 10 * number, np.uint8) for number in range(1, 5)]
+    image = drawn(tmp_path, panels, {}, {}, np.zeros((0, 2)), ['a scene without people'])
+    assert image.shape[1] == 100 * SIZE_IN[0]
+    assert [int(image[100, 250 + 470 * column, 0]) for column in range(3)] == [10, 20, 30]
+    assert 40 in image[:, 250, 0] and 40 not in image[:, 700, 0]

@@ -1,66 +1,68 @@
-"""When a detector is said to be silent, without a master."""
+"""When a detector is reported to hang, without a master."""
+from types import SimpleNamespace
 from unittest import mock
 
 import pytest
 from std_srvs.srv import SetBoolRequest
 
-from ros_3d_bb.nodes.common.detector_output import Switch
-
-
-class Noting(object):
-    """In place of Diagnostics: keeps what it is to show and to check."""
-
-    def show(self, _name, text):
-        self.text = text
-
-    def check(self, faults):
-        self.faults = faults
+from ros_3d_bb.core.event_counter import EventCounter
+from ros_3d_bb.nodes.common.detector_output import DetectorWorker
 
 
 @pytest.fixture
-def switch():
-    """A detector's switch, what it shows and checks, the clock of the machine as [seconds], and its service."""
-    diagnostics, now_s = Noting(), [1000.0]
-    with mock.patch('time.monotonic', lambda: now_s[0]), mock.patch('rospy.Service') as service:
-        switch = Switch(True, diagnostics)
-        yield switch, diagnostics, now_s, service.call_args[0][2]
+def now_s():
+    """The clock of the machine, as [seconds]."""
+    seconds = [1000.0]
+    with mock.patch('time.monotonic', lambda: seconds[0]):
+        yield seconds
 
 
-def test_a_detector_whose_search_does_not_end_is_silent_unless_it_is_paused(switch):
-    switch, diagnostics, now_s, enable = switch
-    switch.offered()
+@pytest.fixture
+def rig(now_s):
+    """The worker, its service, the state and faults that it reports, and its detector, which takes a second."""
+    def detect(image):
+        now_s[0] += 1
+        if image == 'unusable':
+            raise ValueError('an unusable image')
+
+    diagnostics, path = EventCounter(), 'ros_3d_bb.nodes.common.detector_output.'
+    diagnostics.show, diagnostics.check = mock.Mock(), mock.Mock()
+    with mock.patch(path + 'rospy') as rospy, mock.patch(path + 'NewestWorker') as thread:
+        worker = DetectorWorker(SimpleNamespace(enabled=True, publish_empty=True), diagnostics, detect, ())
+    yield SimpleNamespace(offer=worker.offer, enable=rospy.Service.call_args[0][2], work=thread.call_args[0][0],
+                          state=diagnostics.show.call_args[0][1],
+                          faults=lambda: list(diagnostics.check.call_args[0][0]()))
+
+
+def test_a_detector_that_hangs_is_reported_unless_it_is_paused(rig, now_s):
+    rig.offer('image')
     now_s[0] += 4
-    switch.offered()  # images go on
-    assert list(diagnostics.faults()) == [] and diagnostics.text() == 'working'
+    rig.offer('image')  # images continue
+    assert rig.faults() == [] and rig.state() == 'working'
     now_s[0] += 2
-    (event, sentence), = diagnostics.faults()
-    assert event == 'no answers' and 'images come, and none has been answered for 6 s' in sentence
-    enable(SetBoolRequest(False))
+    (event, sentence), = rig.faults()
+    assert event == 'detector hangs' and '6 s' in sentence
+    rig.enable(SetBoolRequest(False))
     now_s[0] += 60
-    assert list(diagnostics.faults()) == [] and diagnostics.text() == 'paused'
-    enable(SetBoolRequest(True))
-    assert list(diagnostics.faults()) == []
+    assert rig.faults() == [] and rig.state() == 'paused'
+    rig.enable(SetBoolRequest(True))
+    assert rig.faults() == []
 
 
-def test_a_detector_is_not_silent_where_it_had_nothing_to_search(switch):
-    """After a pause of the camera the first image is on its way through the detector."""
-    switch, diagnostics, now_s, _enable = switch
+def test_a_detector_without_images_is_not_reported(rig, now_s):
+    """After a pause of the camera, the first image is still being processed."""
     now_s[0] += 60
-    switch.offered()
-    assert list(diagnostics.faults()) == []
-    with switch.searching():
-        now_s[0] += 1
+    rig.offer('image')
+    assert rig.faults() == []
+    rig.work(('image',))
     now_s[0] += 60
-    switch.offered()
+    rig.offer('image')
     now_s[0] += 1
-    assert list(diagnostics.faults()) == []
+    assert rig.faults() == []
 
 
-def test_a_refused_image_is_an_answer(switch):
-    switch, diagnostics, now_s, _enable = switch
+def test_a_rejected_image_is_a_completed_detection(rig):
     for _image in range(10):
-        switch.offered()
-        with pytest.raises(ValueError), switch.searching():
-            raise ValueError('an image that cannot be used')
-        now_s[0] += 1
-        assert list(diagnostics.faults()) == []
+        rig.offer('unusable')
+        rig.work(('unusable',))
+        assert rig.faults() == []

@@ -37,20 +37,20 @@ def why_not(transforms, camera):
     return str(error.value)
 
 
-def test_each_camera_is_told_of_its_own_frame(transforms):
+def test_the_missing_frame_of_each_camera_is_named(transforms):
     for camera in CAMERAS + CAMERAS:
-        assert 'tf knows no frame %s;' % camera in why_not(transforms, camera)
+        assert 'tf has no frame %s;' % camera in why_not(transforms, camera)
 
 
 def test_the_age_is_that_of_each_camera(transforms):
-    assert transforms.age() == 'not asked for yet'
+    assert transforms.age() == 'not requested yet'
     why_not(transforms, 'rear')
     assert transforms.age() == 'none from rear to map'
     why_not(transforms, 'front')
     assert transforms.age() == 'none from front to map, none from rear to map'
 
 
-def test_while_one_camera_is_explained_transforms_are_taken_and_others_found(transforms, monkeypatch):
+def test_lookups_of_other_cameras_succeed_while_a_fault_is_explained(transforms, monkeypatch):
     """The tree is read while the other thread holds it up."""
     looked = []
 
@@ -64,8 +64,7 @@ def test_while_one_camera_is_explained_transforms_are_taken_and_others_found(tra
     assert why_not(transforms, 'front') == 'gone' and len(looked) == 1
 
 
-def test_a_transform_of_the_future_blocks_its_frame_for_two_lookups_whatever_else_is_found():
-    """Lookups of the front camera succeed meanwhile."""
+def test_a_transform_of_the_future_blocks_its_frame_for_one_lookup():
     with masterless() as connections:
         transforms, missed = Transforms(wait_s=0.0), []
         for number in range(50):

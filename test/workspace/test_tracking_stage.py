@@ -1,133 +1,94 @@
-"""From 3D boxes and transforms to tracks, without a master: what one wrong or untimely message does to the next."""
+"""From 3D boxes and transforms to tracks, without a master: effects of one invalid or untimely message on the next."""
 import numpy as np
 import pytest
-import tf2_ros
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.conversions.perception_msgs import time_from
-from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray
-from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
-from ros_3d_bb.tracking.types import VISIBLE
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
+from support.two_cameras import START_NS, Rig, boxes
 
-START_NS = 1000 * NS
-
-
-class Transforms(object):
-    """A camera that stands still, unknown at the stamps in `missing`."""
-
-    def __init__(self):
-        self.missing, self.jumps = set(), 0
-
-    def lookup(self, _target, _source, stamp):
-        if stamp.to_nsec() in self.missing:
-            raise tf2_ros.LookupException('no such frame')
-        return transform_from((0, 0, 1), OPTICAL_ROTATION)
-
-    def go_back(self):
-        self.jumps += 1
+PERIOD_NS = NS // 30
 
 
 @pytest.fixture
-def transforms():
-    return Transforms()
+def rig():
+    return Rig()
 
 
-@pytest.fixture
-def tally():
-    return EventCounter()
+def stand(rig):
+    """A person stands there for a second; returns the stamp of the last image and the IDs of the tracks."""
+    for frame in range(30):
+        result = rig.send(START_NS + frame * PERIOD_NS)
+    return START_NS + 29 * PERIOD_NS, ids(result)
 
 
-@pytest.fixture
-def follower(transforms, tally):
-    return TrackingStage(TrackerNodeParams(), [kind() for kind in TRACKING_PARAMS], tally, transforms)
+def ids(result):
+    return [track.id for track in result.tracks]
 
 
-def boxes(stamp_ns, z=3.0, count=1):
-    box = BoundingBox3D()
-    box.center.position.z = z
-    box.size.x, box.size.y, box.size.z = 0.5, 1.7, 0.5
-    return BoundingBox3DArray(header=header(stamp_ns), boxes=[box] * count)
-
-
-def header(stamp_ns):
-    return Header(stamp=time_from(stamp_ns), frame_id='camera')
-
-
-def stand(follower, seconds=1.0):
-    """Somebody stands there; returns the stamp of the last image and what was followed."""
-    for frame in range(int(30 * seconds)):
-        stamp_ns = START_NS + frame * NS // 30
-        followed = follower.add_boxes(boxes(stamp_ns), 0)
-    return stamp_ns, followed
-
-
-def test_tracks_have_the_stamp_of_an_image_that_was_taken(follower, transforms):
-    """One image 0.9 s ahead has no transform, another one is nonsense: what follows is stamped as it is."""
-    stamp_ns, _followed = stand(follower)
-    ahead_ns = stamp_ns + 9 * NS // 10
-    transforms.missing.add(ahead_ns)
-    assert follower.add_boxes(boxes(ahead_ns), 0) is None
-    with pytest.raises(ValueError, match='2000 3D boxes'):
-        follower.add_boxes(boxes(ahead_ns + 1, count=2000), 0)
-    followed = follower.add_boxes(boxes(stamp_ns + NS // 30), 0)
-    assert followed.header.stamp == time_from(stamp_ns + NS // 30) and len(followed.tracks) == 1
-
-
-def test_a_stamp_far_ahead_that_cannot_be_used_ends_nobody(follower, transforms):
-    stamp_ns, before = stand(follower)
-    transforms.missing.add(stamp_ns + 100 * NS)
-    follower.add_boxes(boxes(stamp_ns + 100 * NS), 0)
-    after = follower.add_boxes(boxes(stamp_ns + NS // 30), 0)
-    assert [track.id for track in after.tracks] == [track.id for track in before.tracks] and not transforms.jumps
-
-
-def test_time_that_goes_back_is_followed_once(follower, transforms, tally):
-    stamp_ns, before = stand(follower)
-    transforms.missing.add(stamp_ns - 20 * NS)
-    follower.add_boxes(boxes(stamp_ns - 20 * NS), 0)
-    assert follower.add_boxes(boxes(stamp_ns - 19 * NS), 0).tracks == []
-    assert transforms.jumps == 1 and tally.counts['jumps back in time'] == 1
-    assert follower.add_boxes(boxes(stamp_ns - 19 * NS + NS // 30), 0).header.stamp < before.header.stamp
-
-
-def test_a_depth_image_that_cannot_be_used_does_not_keep_the_boxes_out(follower, tally):
-    follower.add_camera_info(CameraInfo(header=header(START_NS), width=4, height=3, K=[4, 0, 2, 0, 4, 1, 0, 0, 1]))
-    depth = Image(header=header(START_NS), width=4, height=3, encoding='nonsense', step=8, data=b'0' * 24)
-    follower.add_depth(depth, 0)
-    assert follower.add_boxes(boxes(START_NS), 0) is not None
-    assert tally.counts['depth images refused'] == 1
-
-
-def test_more_boxes_than_people_can_be_are_refused(follower):
+@pytest.mark.parametrize('ahead_ns', [9 * NS // 10, 100 * NS])
+def test_an_image_ahead_without_a_result_changes_neither_stamps_nor_tracks(rig, ahead_ns):
+    """One has no transform, another one has too many boxes."""
+    stamp_ns, before = stand(rig)
+    rig.transforms.missing.add(stamp_ns + ahead_ns)
+    assert rig.send(stamp_ns + ahead_ns) is None
     with pytest.raises(ValueError, match='2000 3D boxes in one image; at most 1000'):
-        follower.add_boxes(boxes(START_NS, count=2000), 0)
-    assert np.isfinite(follower.add_boxes(boxes(START_NS), 0).header.stamp.to_sec())
+        rig.send(stamp_ns + 9 * NS // 10 + 1, count=2000)
+    result = rig.send(stamp_ns + PERIOD_NS)
+    assert result.header.stamp == time_from(stamp_ns + PERIOD_NS) and ids(result) == before
+    assert not rig.transforms.jumps
 
 
-def test_a_box_that_cannot_be_used_takes_no_other_with_it(follower, tally):
-    """A box as wide as a wall, and one without a place, come with each image of a person who stands there."""
-    _stamp_ns, alone = stand(follower)
+def test_a_backward_jump_in_time_is_handled_once(rig):
+    stamp_ns, _before = stand(rig)
+    rig.transforms.missing.add(stamp_ns - 20 * NS)
+    assert rig.send(stamp_ns - 20 * NS) is None
+    assert rig.send(stamp_ns - 19 * NS).tracks == []
+    assert rig.transforms.jumps == 1 and rig.events.counts['jumps back in time'] == 1
+    assert rig.send(stamp_ns - 19 * NS + PERIOD_NS).header.stamp < time_from(stamp_ns)
+
+
+def add_images(rig, stamp_ns, encoding='16UC1'):
+    """camera_info, and a depth image of a wall 1.5 m ahead."""
+    header, depth_mm = Header(stamp=time_from(stamp_ns), frame_id='camera'), np.full((48, 64), 1500, '<u2')
+    rig.add_camera_info(CameraInfo(header=header, width=64, height=48, K=[60, 0, 32, 0, 60, 24, 0, 0, 1]))
+    rig.add_depth(Image(header=header, width=64, height=48, encoding=encoding, step=128, data=depth_mm.tobytes()), 0)
+
+
+def test_a_person_behind_something_in_the_depth_image_is_occluded(rig):
+    """The person is not detected for a second, which is longer than a missed person is published."""
+    stamp_ns, before = stand(rig)
+    for number in range(1, 31):
+        add_images(rig, stamp_ns + number * PERIOD_NS)
+        result = rig.send(stamp_ns + number * PERIOD_NS, count=0)
+    assert ids(result) == before and result.tracks[0].status == OCCLUDED
+
+
+def test_boxes_are_tracked_without_their_depth_image_if_it_is_invalid(rig):
+    add_images(rig, START_NS, encoding='nonsense')
+    assert rig.send(START_NS) is not None
+    assert rig.events.counts['depth images rejected'] == 1
+
+
+def test_invalid_boxes_do_not_affect_the_others(rig):
+    """A box as wide as a wall, and one without a position, are in each image of a person."""
+    _stamp_ns, before = stand(rig)
     for frame in range(30, 60):
-        message = boxes(START_NS + frame * NS // 30)
-        wall, nowhere = boxes(0).boxes + boxes(0, z=float('nan')).boxes
-        wall.size.x, wall.size.y = 9.34, 10.93
-        message.boxes = [wall, nowhere] + message.boxes
-        track, = follower.add_boxes(message, 0).tracks
-    assert track.id == alone.tracks[0].id and track.status == VISIBLE
-    assert tally.counts['3D boxes left out'] == 60 and tally.counts['images tracked'] == 60
-    assert '3D boxes refused' not in tally.counts
+        message = boxes(START_NS + frame * PERIOD_NS, 'camera', [(0, 0, 3), (0, 0, float('nan')), (0, 0, 3)])
+        message.boxes[0].size.x, message.boxes[0].size.y = 9.34, 10.93
+        rig.add_boxes(message, 0)
+    result = rig.send(START_NS + 60 * PERIOD_NS)
+    assert ids(result) == before and result.tracks[0].status == VISIBLE
+    assert rig.events.counts['3D boxes dropped'] == 60 and rig.events.counts['images tracked'] == 61
 
 
-def test_an_image_none_of_whose_boxes_can_be_used_does_not_age_tracks(follower, tally):
-    """It does not say that there are no people. The track is still published after a second of such images."""
-    stamp_ns, before = stand(follower)
+def test_an_image_without_any_valid_box_does_not_age_tracks(rig):
+    """It differs from an image without people. The track is still published after a second of such images."""
+    stamp_ns, before = stand(rig)
     for number in range(1, 31):
         with pytest.raises(ValueError, match='none'):
-            follower.add_boxes(boxes(stamp_ns + number * NS // 30, z=float('nan')), 0)
-    after = follower.add_boxes(boxes(stamp_ns + 31 * NS // 30), 0)
-    assert [track.id for track in after.tracks] == [before.tracks[0].id]
-    assert tally.counts['3D boxes left out'] == 30
+            rig.send(stamp_ns + number * PERIOD_NS, z=float('nan'))
+    assert ids(rig.send(stamp_ns + 31 * PERIOD_NS)) == before
+    assert rig.events.counts['3D boxes dropped'] == 30

@@ -24,7 +24,7 @@ people:
 
 
 class Host(NamedTuple):
-    """A computer: its address, and what to put before a command to run it there."""
+    """A computer: its address, and the prefix of commands that run on it."""
 
     address: str
     enter: tuple
@@ -32,7 +32,7 @@ class Host(NamedTuple):
 
 @contextlib.contextmanager
 def processes():
-    """Start processes; all that still run at the end are ended, the last first."""
+    """Start processes; at the end, those still running are ended, the last first."""
     started = []
 
     def start(command, **options):
@@ -51,10 +51,9 @@ def processes():
 
 
 def network(start):
-    """Two hosts, (robot, other), in network namespaces of their own with a cable between them.
+    """Two hosts, (robot, other), in network namespaces with a cable between them.
 
-    Where namespaces may not be made (in some containers), two addresses of this machine: all is the same then but that
-    the kernel does not keep them apart.
+    If namespaces are not permitted (in some containers), two addresses of this machine, which are not isolated.
     """
     own = [] if os.geteuid() == 0 else ['--user', '--map-root-user']
     holders, enters = [], [()]
@@ -81,7 +80,7 @@ def network(start):
 
 
 def environment_script(folder, host):
-    """What README has the user write: it sets up the other computer and runs its arguments."""
+    """The environment script of the README for the other computer."""
     path = folder / 'env.sh'
     path.write_text('#!/bin/sh\nexport ROS_IP=%s PYTHONPATH=%s:$PYTHONPATH CLOCK_AHEAD_S=%s\nunset ROS_HOSTNAME\n'
                     'exec "$@"\n' % (host.address, os.path.join(SUPPORT, 'other_clock'), AHEAD_S))
@@ -90,8 +89,8 @@ def environment_script(folder, host):
 
 
 @pytest.fixture(scope='module')
-def heard(tmp_path_factory):
-    """What a listener on the robot has heard, and the two hosts."""
+def received(tmp_path_factory):
+    """Messages received by a listener on the robot, and the two hosts."""
     folder = tmp_path_factory.mktemp('two_machines')
     (folder / 'scene.yaml').write_text(SCENE)
     with processes() as start:
@@ -112,19 +111,19 @@ def heard(tmp_path_factory):
         listener = os.path.join(SUPPORT, 'two_machines', 'listener.py')
         output = subprocess.check_output(run + [listener, str(WANTED), '90'], env=environment,
                                          universal_newlines=True)
-    line, = [line for line in output.splitlines() if line.startswith('HEARD ')]
-    return json.loads(line[len('HEARD '):]), robot, other
+    line, = [line for line in output.splitlines() if line.startswith('RECEIVED ')]
+    return json.loads(line[len('RECEIVED '):]), robot, other
 
 
-def test_the_pipeline_runs_on_the_other_computer_and_the_rest_on_the_robot(heard):
-    message, robot, other = heard
+def test_the_pipeline_runs_on_the_other_computer(received):
+    message, robot, other = received
     assert message['nodes']['/tracker_node'].startswith('http://%s:' % other.address)
     for name in ('/simulator_node', '/camera_mount'):
         assert message['nodes'][name].startswith('http://%s:' % robot.address)
 
 
-def test_tracks_carry_the_stamps_of_the_images_whatever_the_clock_of_the_other_computer(heard):
-    message, _robot, _other = heard
+def test_tracks_have_the_stamps_of_the_images_with_another_clock(received):
+    message, _robot, _other = received
     assert message['clocks']['tracker_node'] == pytest.approx(AHEAD_S, abs=20)
     assert message['clocks']['simulator_node'] == pytest.approx(0, abs=20)
     found = [stamp for stamp, frame, people in message['tracks'] if people == 1 and frame == 'odom']

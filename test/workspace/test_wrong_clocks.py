@@ -1,4 +1,4 @@
-"""One of several cameras has a wrong clock, lags or hangs: when the images of the others are tracked again."""
+"""Recovery of the other cameras when the clock of one camera is wrong, lags or hangs."""
 import pytest
 
 from ros_3d_bb.core.time_sync import NS
@@ -85,7 +85,7 @@ def test_each_image_of_a_healthy_camera_is_tracked_again(fault, ahead_ns, when, 
     begun_ns = play.now_ns
     play.run(4, count=0)
     for camera in play.cameras - {'rear'}:
-        assert play.lost(camera, begun_ns + RECOVERY_NS) == 0 < len(play.answers)
+        assert play.lost(camera, begun_ns + RECOVERY_NS) == 0 < len(play.results)
 
 
 @pytest.mark.parametrize('fault,ahead_ns', [(stays_ahead, -6 * NS // 5), (stays_ahead, -3 * NS), (hangs, 0)])

@@ -28,14 +28,12 @@ class Raw(NamedTuple):
     connection_header: Any
 
 
-class Unread(object):
-    """Replaces the class that rosbag would generate from a definition in a bag."""
-
-    _md5sum, _full_text = '*', ''
+# Replaces the classes that rosbag would generate from the definitions in a bag.
+UNREAD = type('Unread', (), {'_md5sum': '*', '_full_text': ''})
 
 
 class BagReader(object):
-    """Open bag, a context manager. Raises BagError if the bag cannot be opened."""
+    """Open bag, a context manager; `topics` is {name: type}. Raises BagError if the bag cannot be opened."""
 
     def __init__(self, path):
         self._path = path
@@ -43,10 +41,10 @@ class BagReader(object):
             self._bag = rosbag.Bag(path)
             if self._bag.version != 200:
                 raise ValueError('its format has the version %s; 200 (2.0) expected' % self._bag.version)
-            self._types = {connection.topic: connection.datatype for connection in self._bag._get_connections()}
-            self._unread = (set(connection.md5sum for connection in self._bag._get_connections())
-                            - set(rosbag.bag._message_types))
-            rosbag.bag._message_types.update((md5sum, Unread) for md5sum in self._unread)
+            connections = list(self._bag._get_connections())
+            self.topics = {connection.topic: connection.datatype for connection in connections}
+            self._unread = set(connection.md5sum for connection in connections) - set(rosbag.bag._message_types)
+            rosbag.bag._message_types.update((md5sum, UNREAD) for md5sum in self._unread)
         except rosbag.ROSBagUnindexedException:
             raise BagError('%s has no index, because its recording was interrupted; repair it with: rosbag reindex'
                            % path)
@@ -68,16 +66,11 @@ class BagReader(object):
             return 0, 0
         return tuple(int(1e9 * time_s) for time_s in (self._bag.get_start_time(), self._bag.get_end_time()))
 
-    @property
-    def topics(self):
-        """{name: type} of the topics in the bag."""
-        return dict(self._types)
-
     def check_topic(self, topic, kind):
         """Raise BagError if a bag has no such topic of a message class. The error names topics of this type."""
-        if self._types.get(topic) == kind._type:
+        if self.topics.get(topic) == kind._type:
             return
-        others = sorted(name for name, datatype in self._types.items() if datatype == kind._type)
+        others = sorted(name for name, datatype in self.topics.items() if datatype == kind._type)
         raise BagError('%s has no %s on %s; %s' % (
             self._path, kind._type, topic, 'did you mean %s? Remap it with --remap. Topics of this type: %s'
             % (nearest_name(topic, others), ', '.join(others)) if others else 'it has no topic of this type'))

@@ -10,9 +10,8 @@ from ros_3d_bb.core.time_sync import JUMP_NS
 class BagTransforms(object):
     """tf2 buffer without ROS, which contains transforms of the near future as for a node that waits for a transform.
 
-    Call `ahead` with each tf message when it is read, and `passed` when it is processed. The time between the two is
-    the time that a node would wait. After a backward jump in time, transforms become available only when they are
-    processed.
+    Call `ahead` with each tf message when it is read, and `passed` when it is processed; a node would wait in between.
+    After a backward jump in time, transforms become available only when they are processed.
     """
 
     def __init__(self):

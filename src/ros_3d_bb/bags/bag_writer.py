@@ -21,11 +21,8 @@ MOUNT_M = (0.17, 0.0, 0.20)  # position of the camera of a Jackal in base_link: 
 
 
 class SessionBagOptions(NamedTuple):
-    """Options for bags of sessions.
-
-    `rate_hz`: frames per second; `mount_m`: position of the forward-facing camera in base_link (x forward, y left,
-    z up), metres; `with_boxes`: whether the 2D boxes of the session are written to yolo_bounding_box.
-    """
+    """Options for bags of sessions: frames per second, position of the forward-facing camera in base_link (x forward,
+    y left, z up) in metres, and whether the 2D boxes of the session are written to yolo_bounding_box."""
 
     rate_hz: float = 30.0
     mount_m: Tuple[float, float, float] = MOUNT_M
@@ -33,19 +30,9 @@ class SessionBagOptions(NamedTuple):
 
 
 def write_bag(images, path, compression='lz4'):
-    """Write the messages of images to a bag. The bag has a temporary name until it is complete.
+    """Write `images`, an iterable of (stamp_ns, iterable of (topic, message)), to a bag, and return their number.
 
-    Parameters
-    ----------
-    images : iterable of (stamp_ns, iterable of (topic, message))
-    path : str
-    compression : str
-        none, bz2 or lz4.
-
-    Returns
-    -------
-    int
-        Number of images. If `images` raises an exception, no bag remains.
+    If `images` raises an exception, no bag remains. `compression` is none, bz2 or lz4.
     """
     count = 0
     with new_bag(path, compression) as bag:
@@ -69,23 +56,14 @@ def new_bag(path, compression):
 
 
 def remove_partial(path):
-    """Remove the temporary file of an incomplete bag, if there is one."""
-    if os.path.exists(path + PARTIAL):
+    with contextlib.suppress(FileNotFoundError):
         os.remove(path + PARTIAL)
 
 
 def images_in(path, topics):
-    """Read the messages of a bag on some topics, grouped by image.
+    """Read the messages of a bag on some topics, grouped by image: a list of lists of (topic, message).
 
-    Returns
-    -------
-    list of list of (topic, message)
-        Topics have no leading slash.
-
-    Raises
-    ------
-    ValueError
-        If the bag cannot be read, or an image lacks one of the topics.
+    Topics have no leading slash. Raises ValueError if the bag cannot be read, or an image lacks one of the topics.
     """
     images = collections.OrderedDict()
     try:
@@ -97,8 +75,8 @@ def images_in(path, topics):
     for stamp_ns, messages in images.items():
         missing = set(topics) - set(topic for topic, _message in messages)
         if missing:
-            raise ValueError('the image at %.3f in the bag %s has no %s; a bag written by scenario_to_bag or '
-                             'session_to_bag expected' % (stamp_ns / NS, path, ', '.join(sorted(missing))))
+            raise ValueError('the image at %.3f in the bag %s has no %s; expected a bag written by scenario_to_bag or '
+                             'session_to_bag' % (stamp_ns / NS, path, ', '.join(sorted(missing))))
     if not images:
         raise ValueError('the bag %s has no messages on %s' % (path, ', '.join(sorted(topics))))
     return list(images.values())
@@ -136,7 +114,6 @@ def session_to_bag():
 
 
 def bag_command_parser(name, doc):
-    """Create the argument parser of a command that writes a bag."""
     parser = argparse.ArgumentParser(prog=name, description=doc.split(': ', 1)[1])
     parser.add_argument('--compression', choices=('none', 'bz2', 'lz4'), default='lz4', help='default: lz4')
     return parser

@@ -6,7 +6,7 @@ import resource
 import sys
 import time
 from multiprocessing.connection import wait
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import yaml
 
@@ -34,51 +34,43 @@ class Job(NamedTuple):
     memory: int
 
 
-class Running(NamedTuple):
-    """A running job: its process and the connection on which it reports its progress."""
-
-    job: Job
-    process: Any
-    news: Any
-
-
 def main(arguments=None):
     """Run the command. The exit status is 1 if a bag could not be processed."""
     parser = _parser()
     given = parser.parse_args(arguments)
     try:
-        jobs = jobs_from(given)
+        jobs = _jobs_from(given)
     except (ValueError, OSError, yaml.YAMLError) as error:
         parser.error(str(error))
     try:
-        failed = run_jobs(jobs, given.jobs, sys.stderr.isatty())
+        failed = _run_jobs(jobs, given.jobs, sys.stderr.isatty())
     except KeyboardInterrupt:
-        print('process_bag: stopped; bags that were not complete are not there', file=sys.stderr)
+        print('process_bag: interrupted; incomplete bags were removed', file=sys.stderr)
         sys.exit(130)
     sys.exit(1 if failed else 0)
 
 
-def jobs_from(given):
+def _jobs_from(given):
     """Return the jobs for the command line arguments. Raises ValueError or OSError if they are invalid."""
     if given.out_dir is None and len(given.bags) != 2:
-        raise ValueError('IN and OUT expected, or bags and --out-dir')
+        raise ValueError('expected IN and OUT, or bags and --out-dir')
     pairs = [tuple(given.bags)] if given.out_dir is None else [
         (bag, os.path.join(given.out_dir, os.path.basename(bag))) for bag in given.bags]
-    targets = [os.path.realpath(target) for _source, target in pairs]
-    for source, target in pairs:
-        if os.path.realpath(target) in [os.path.realpath(other) for other, _target in pairs]:
-            raise ValueError('%s is one of the bags to be processed; another place for its result expected' % target)
-        if targets.count(os.path.realpath(target)) > 1:
-            raise ValueError('two bags are called %s; other names, or one call for each, expected' % target)
+    sources, targets = ([os.path.realpath(path) for path in paths] for paths in zip(*pairs))
+    for target in targets:
+        if target in sources:
+            raise ValueError('the output %s is also an input; choose another output' % target)
+        if targets.count(target) > 1:
+            raise ValueError('two inputs have the output %s; rename one, or process them separately' % target)
     if not (given.jobs >= 1 and given.searches >= 0 and given.memory > 0):
         raise ValueError('--jobs, --searches and --memory: more than 0 expected')
-    settings = settings_from(given)
+    settings = _settings_from(given)
     if given.out_dir is not None:
         os.makedirs(given.out_dir, exist_ok=True)
     return [Job(source, target, settings, int(given.memory * GIB)) for source, target in pairs]
 
 
-def settings_from(given):
+def _settings_from(given):
     """Return the settings for the command line arguments. Raises ValueError, OSError or yaml.YAMLError."""
     settings = Settings()._replace(detector=given.detector, names=_names(given.remap), compression=given.compression,
                                    keep=None if given.keep is None else tuple(t.lstrip('/') for t in given.keep))
@@ -86,23 +78,23 @@ def settings_from(given):
         path = getattr(given, option[2:].replace('-', '_'))
         settings = settings._replace(**{node: read_params(path, getattr(settings, node))})
     if given.weights:
-        settings = settings._replace(yolov5=(settings.yolov5[0]._replace(weights=given.weights),) + settings.yolov5[1:])
+        settings = with_params(settings, 'yolov5', weights=given.weights)
     if given.error_model:
-        settings = settings._replace(bbox3d=(settings.bbox3d[0]._replace(error_model=given.error_model),))
+        settings = with_params(settings, 'bbox3d', error_model=given.error_model)
     if given.target_frame:
-        settings = with_tracker(settings, target_frame=given.target_frame)
+        settings = with_params(settings, 'tracker', target_frame=given.target_frame)
     if given.cameras:
-        settings = with_tracker(settings, cameras=[camera.strip() for camera in given.cameras.split(',')])
+        settings = with_params(settings, 'tracker', cameras=[camera.strip() for camera in given.cameras.split(',')])
     if settings.detector == 'yolov5' and not settings.yolov5[0].weights:
-        raise ValueError('detector yolov5 needs --weights FILE, a checkpoint such as yolov5n.pt; --detector depth '
+        raise ValueError('--detector yolov5 needs --weights FILE, a checkpoint such as yolov5n.pt; --detector depth '
                          'needs none')
-    return settings._replace(searches=given.searches or max(1, _cores() // given.jobs))
+    return settings._replace(searches=given.searches or max(1, len(os.sched_getaffinity(0)) // given.jobs))
 
 
-def with_tracker(settings, **changed):
-    """Return settings with changed parameters of the tracker (`tracking_stage.TrackerNodeParams`)."""
-    params, *others = settings.tracker
-    return settings._replace(tracker=(params._replace(**changed),) + tuple(others))
+def with_params(settings, node, **changed):
+    """Return settings with changed parameters of a node, which are in the first of its parameter classes."""
+    first, *others = getattr(settings, node)
+    return settings._replace(**{node: (first._replace(**changed), *others)})
 
 
 def read_params(path, defaults):
@@ -110,47 +102,48 @@ def read_params(path, defaults):
     if path is None:
         return defaults
     with open(path) as stream:
-        content = load_yaml(stream)
-    if not (isinstance(content or {}, dict) and all(isinstance(key, str) for key in content or {})):
+        content = load_yaml(stream) or {}
+    if not (isinstance(content, dict) and all(isinstance(key, str) for key in content)):
         raise ValueError('%s: names and values of parameters expected' % path)
     try:
-        found = params_from(content or {}, *[type(part) for part in defaults])
+        found = params_from(content, *[type(part) for part in defaults])
     except ValueError as error:
         raise ValueError('%s: %s' % (path, error))
-    return tuple(part._replace(**{key: getattr(new, key) for key in part._fields if key in (content or {})})
+    return tuple(part._replace(**{key: getattr(new, key) for key in part._fields if key in content})
                  for part, new in zip(defaults, found))
 
 
-def run_jobs(jobs, at_once, with_bar):
-    """Process bags, at most `at_once` in parallel, each in a separate process, and print the result of each.
-
-    Returns
-    -------
-    int
-        Number of failed jobs.
-    """
+def _run_jobs(jobs, at_once, with_bar):
+    """Process bags, at most `at_once` in parallel, each in a separate process. Print results, and count failed jobs."""
     context = multiprocessing.get_context('spawn')
     # In a catkin workspace, the source folder, which lacks the generated messages, precedes the imported package in the
     # search path.
     sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(ros_3d_bb.__file__))))
-    todo, running, shares, failed = list(jobs), [], {}, 0
+    todo, running, shares, failed = list(jobs), {}, {}, 0  # running: {connection: (job, process)}
     try:
         while todo or running:
             while todo and len(running) < at_once:
-                running.append(_started(context, todo.pop(0)))
-            wait([one.news for one in running], POLL_S)
-            for one in list(running):
-                done, text = _news_of(one, shares)
+                job = todo.pop(0)
+                news, process = _started(context, job)
+                running[news] = job, process
+            wait(list(running), POLL_S)
+            for news, (job, process) in list(running.items()):
+                done, text = _news_of(news, job, process, shares)
                 if done is None:
                     continue
-                running.remove(one)
+                del running[news]
+                process.join()
+                shares[job.target] = 1.0
                 failed += not done
                 print(('\r' + 79 * ' ' + '\r' if with_bar else '') + text, file=sys.stdout if done else sys.stderr)
             if with_bar:
-                _show(sum(shares.values()) / len(jobs), len(jobs) - len(todo) - len(running), len(jobs))
+                share = sum(shares.values()) / len(jobs)
+                print('\r[%-*s] %3d %%  %d of %d bags' % (BAR, '#' * int(BAR * share), 100 * share,
+                                                          len(jobs) - len(todo) - len(running), len(jobs)),
+                      end='', file=sys.stderr, flush=True)
     finally:
-        for one in running:
-            one.process.join()  # the process was interrupted, too, and removes its incomplete bag
+        for _job, process in running.values():
+            process.join()  # the process was interrupted, too, and removes its incomplete bag
         if with_bar:
             print(file=sys.stderr)
     return failed
@@ -161,41 +154,36 @@ def _started(context, job):
     process = context.Process(target=_work, args=(job, sender))
     process.start()
     sender.close()
-    return Running(job, process, news)
+    return news, process
 
 
-def _news_of(one, shares):
+def _news_of(news, job, process, shares):
     """Return whether a job has succeeded (None while it runs) and the text to print."""
     try:
-        while one.news.poll():
-            kind, content = one.news.recv()
-            if kind == 'share':
-                shares[one.job.target] = content
-                continue
-            one.process.join()
-            shares[one.job.target] = 1.0
-            return kind == 'done', content
+        while news.poll():
+            kind, content = news.recv()
+            if kind != 'share':
+                return kind == 'done', content
+            shares[job.target] = content
     except EOFError:  # killed, for example by the kernel when out of memory
-        one.process.join()
-        shares[one.job.target] = 1.0
-        remove_partial(one.job.target)
-        return False, '%s: its process ended with status %s; no bag was written' % (one.job.source,
-                                                                                    one.process.exitcode)
+        process.join()
+        remove_partial(job.target)
+        return False, '%s: its process ended with status %s; no bag was written' % (job.source, process.exitcode)
     return None, ''
 
 
 def _work(job, sender):
-    """Main function of the process of a job."""
     resource.setrlimit(resource.RLIMIT_DATA, (job.memory, resource.getrlimit(resource.RLIMIT_DATA)[1]))
-    said_s = [0.0]
+    reported_s = 0.0
 
     def progress(share):
-        if time.monotonic() - said_s[0] >= POLL_S:
-            said_s[0] = time.monotonic()
+        nonlocal reported_s
+        if time.monotonic() - reported_s >= POLL_S:
+            reported_s = time.monotonic()
             sender.send(('share', share))
     try:
-        tally = process_bag(job.source, job.target, job.settings, progress)
-        sender.send(('done', '\n'.join(_summary(job, tally))))
+        events = process_bag(job.source, job.target, job.settings, progress)
+        sender.send(('done', '\n'.join(['%s:' % job.target] + _summary(events))))
     except KeyboardInterrupt:
         pass
     except Exception as error:  # a failed bag must not stop the others
@@ -213,16 +201,9 @@ def _reason(job, error):
     return '%s: %s: %s' % (job.source, type(error).__name__, cause(error))
 
 
-def _summary(job, tally):
-    yield '%s:' % job.target
-    for event, count in tally.counts.items():
-        said = tally.sentences.get(event)
-        yield '  %7d  %s%s' % (count, event, '. The first: %s' % said if said else '')
-
-
-def _show(share, done, count):
-    print('\r[%-*s] %3d %%  %d of %d bags' % (BAR, '#' * int(BAR * share), 100 * share, done, count), end='',
-          file=sys.stderr, flush=True)
+def _summary(events):
+    return ['  %7d  %s%s' % (count, event, '. The first: %s' % events.sentences[event]
+                             if event in events.sentences else '') for event, count in events.counts.items()]
 
 
 def _names(remaps):
@@ -235,31 +216,27 @@ def _names(remaps):
     return names
 
 
-def _cores():
-    return len(os.sched_getaffinity(0))
-
-
 def _parser():
-    parser = argparse.ArgumentParser(prog='process_bag', description='Write bags with what others hold and with 2D '
-                                     'boxes, 3D boxes, tracks and markers; the same input gives the same bytes.')
-    parser.add_argument('bags', nargs='+', metavar='BAG', help='IN OUT; or, with --out-dir, bags to be processed')
-    parser.add_argument('--out-dir', metavar='DIR', help='where the results go, under the names of the bags')
-    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='bags at once (default: 1)')
+    parser = argparse.ArgumentParser(prog='process_bag', description='Copy bags and add 2D boxes, 3D boxes, tracks and '
+                                     'markers. Equal inputs give identical bytes.')
+    parser.add_argument('bags', nargs='+', metavar='BAG', help='IN OUT; or, with --out-dir, the input bags')
+    parser.add_argument('--out-dir', metavar='DIR', help='folder of the outputs, which have the names of the inputs')
+    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='number of parallel bags (default: 1)')
     parser.add_argument('--detector', choices=DETECTORS, default='yolov5',
-                        help='none: the 2D boxes are in the bag (default: yolov5)')
+                        help='none: use the 2D boxes in the bag (default: yolov5)')
     parser.add_argument('--weights', metavar='FILE', help='checkpoint or export for yolov5')
     for option, node in FILES:
         config = {'depth': 'depth_detector'}.get(node, node)
-        parser.add_argument(option, metavar='FILE', help='parameter file, as config/%s.yaml' % config)
+        parser.add_argument(option, metavar='FILE', help='parameter file in the format of config/%s.yaml' % config)
     parser.add_argument('--error-model', metavar='FILE', help='error model for the 3D boxes')
-    parser.add_argument('--target-frame', metavar='FRAME', help='of the tracks (default: map)')
+    parser.add_argument('--target-frame', metavar='FRAME', help='frame of the tracks (default: map)')
     parser.add_argument('--cameras', metavar='NAMES', help='namespaces of several cameras, separated by commas (front, '
                         'rear: topics front/color/image_raw, ...)')
     parser.add_argument('--remap', action='append', default=[], metavar='TOPIC:=TOPIC',
-                        help="a topic of the nodes, and what it is called in the bag")
+                        help="a topic of the nodes and its name in the bag")
     parser.add_argument('--keep', nargs='*', metavar='TOPIC', help='topics of the input to copy (default: all)')
-    parser.add_argument('--searches', type=int, default=0, metavar='N',
-                        help='images that yolov5 searches at once (default: cores / jobs); no matter for the result')
-    parser.add_argument('--memory', type=float, default=8.0, metavar='GIB', help='for each bag (default: 8)')
+    parser.add_argument('--searches', type=int, default=0, metavar='N', help='number of images that yolov5 processes '
+                        'in parallel (default: cores / jobs); does not affect the result')
+    parser.add_argument('--memory', type=float, default=8.0, metavar='GIB', help='limit for each bag (default: 8)')
     parser.add_argument('--compression', choices=('none', 'bz2', 'lz4'), default='lz4', help='default: lz4')
     return parser

@@ -156,13 +156,13 @@ def boxes3d_to_msg(boxes, header, camera):
 
 def boxes3d_from_msg(message):
     """Convert a BoundingBox3DArray to a tuple of `box3d_estimator.Box3D`. Inverse of `boxes3d_to_msg`."""
-    return tuple(_box3d_from_msg(box) for box in message.boxes)
+    return tuple(map(_box3d_from_msg, message.boxes))
 
 
 def _box3d_from_msg(box):
     roi, covariance_m2 = box.roi, np.reshape(box.position_covariance, (3, 3))
     rect_px = (roi.x_offset, roi.y_offset, roi.x_offset + roi.width, roi.y_offset + roi.height)
-    edges = tuple(bool(box.truncated_edges & flag) for flag in EDGE_FLAGS)
+    edges = tuple([bool(box.truncated_edges & flag) for flag in EDGE_FLAGS])
     if box.truncated and not any(edges):
         edges = (True,) * len(EDGE_FLAGS)  # the truncated edges are unknown, so no edge is trusted
     return Box3D(_xyz(box.center.position), _xyz(box.size), rect_px, box.support, edges,
@@ -214,19 +214,20 @@ def tracks_to_msg(tracks, header):
 
 
 def _track_to_msg(track):
-    message = msg.TrackedObject(id=track.id, status=track.status, moving=track.moving)
-    message.pose = _pose_at(track.position_m)
-    _set_xyz(message.twist.twist.linear, track.velocity_mps)
+    message = msg.TrackedObject(id=track.id, status=track.status, moving=track.moving,
+                                first_seen=time_from(track.first_seen_ns), last_seen=time_from(track.last_seen_ns),
+                                prediction_step=genpy.Duration.from_sec(track.prediction_step_s))
+    message.size = Vector3(*map(float, track.size_m))
+    message.twist.twist.linear = Vector3(*map(float, track.velocity_mps))
+    message.prediction = [PoseWithCovariance() for _position_m in track.prediction_m]
+    for pose, position_m in zip([message.pose] + message.prediction, [track.position_m, *track.prediction_m]):
+        pose.pose.position, pose.pose.orientation.w = Point(*map(float, position_m)), 1.0
     if track.covariance is not None:
-        message.pose.covariance = _covariance_6x6(track.covariance[:3, :3])
-        message.twist.covariance = _covariance_6x6(track.covariance[3:, 3:])
-    _set_xyz(message.size, track.size_m)
-    message.first_seen, message.last_seen = time_from(track.first_seen_ns), time_from(track.last_seen_ns)
-    message.prediction = [_pose_at(position_m) for position_m in track.prediction_m]
+        message.pose.covariance, message.twist.covariance = _covariances_6x6([track.covariance[:3, :3],
+                                                                              track.covariance[3:, 3:]])
     if track.prediction_covariance_m2 is not None:
-        for pose, covariance_m2 in zip(message.prediction, track.prediction_covariance_m2):
-            pose.covariance = _covariance_6x6(covariance_m2)
-    message.prediction_step = genpy.Duration.from_sec(track.prediction_step_s)
+        for pose, covariance in zip(message.prediction, _covariances_6x6(track.prediction_covariance_m2)):
+            pose.covariance = covariance
     return message
 
 
@@ -252,29 +253,16 @@ def _track_from_msg(track):
                          prediction_m, track.prediction_step.to_sec(), covariance, prediction_covariance_m2)
 
 
-def _covariance_6x6(covariance):
-    """Return a flattened 6x6 covariance as in geometry_msgs, with zeros for the rotation: an upright cylinder is
-    rotationally symmetric.
-    """
-    full = np.zeros((6, 6))
-    full[:3, :3] = covariance
-    return full.ravel().tolist()
+def _covariances_6x6(covariances):
+    """Flattened 6x6 covariances as in geometry_msgs, with zeros for the rotation: an upright cylinder is rotationally
+    symmetric."""
+    full = np.zeros((len(covariances), 6, 6))
+    full[:, :3, :3] = covariances
+    return full.reshape(-1, 36).tolist()
 
 
 def _covariance_3x3(with_covariance):
     return np.reshape(with_covariance.covariance, (6, 6))[:3, :3]
-
-
-def _pose_at(position_m):
-    """Return a pose with identity orientation and unknown covariance (zeros)."""
-    pose = PoseWithCovariance()
-    _set_xyz(pose.pose.position, position_m)
-    pose.pose.orientation.w = 1.0
-    return pose
-
-
-def _set_xyz(message, values):
-    message.x, message.y, message.z = (float(value) for value in values)
 
 
 def _xyz(message):

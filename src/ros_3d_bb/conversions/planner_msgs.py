@@ -30,8 +30,8 @@ def obstacles_to_msg(tracks, header, costmap_converter):
     for track in tracks_to_msg(tracks, header).objects:
         obstacle = costmap_converter.ObstacleMsg(header=header, id=track.id, radius=track.size.x / 2,
                                                  orientation=Quaternion(w=1.0), velocities=track.twist)
-        place = track.pose.pose.position
-        obstacle.polygon.points = [Point32(place.x, place.y, place.z)]
+        position = track.pose.pose.position
+        obstacle.polygon.points = [Point32(position.x, position.y, position.z)]
         obstacles.append(obstacle)
     return costmap_converter.ObstacleArrayMsg(header=header, obstacles=obstacles)
 

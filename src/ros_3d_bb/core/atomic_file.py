@@ -10,15 +10,9 @@ FILE_NAME = 'frames.json'
 
 @contextlib.contextmanager
 def locked_update(folder):
-    """Lock the description of a session, and write it when the block ends without an error.
+    """Lock the description of a session in an existing folder, and write it when the block ends without an error.
 
-    Other programs wait for the lock, so that the viewer can add measurements to a session that is being annotated. The
-    file is replaced atomically: after a crash it contains the old or the new content.
-
-    Parameters
-    ----------
-    folder : str
-        An existing folder.
+    Other programs wait for the lock, so that the viewer can add measurements to a session that is being annotated.
 
     Yields
     ------
@@ -30,7 +24,7 @@ def locked_update(folder):
     OSError
         If the folder cannot be read or written.
     ValueError
-        If frames.json is not the description of a session.
+        If frames.json is not the description of a session, or the new content has nan or inf.
     """
     path = os.path.join(str(folder), FILE_NAME)
     with open(os.path.join(str(folder), '.lock'), 'a') as lock:
@@ -58,10 +52,7 @@ def atomic_write(path, data):
 
 
 def _text_of(content):
-    """Format a description with one line per field and frame: readable, and faster than an indented dump.
-
-    Raises ValueError for nan and inf.
-    """
+    """Format a description with one line per field and frame: readable, and faster than an indented dump."""
     frames = ',\n'.join(' ' + json.dumps(frame, allow_nan=False) for frame in content['frames'])
     fields = ['%s: %s' % (json.dumps(str(key)), json.dumps(value, allow_nan=False))
               for key, value in content.items() if key != 'frames']

@@ -37,29 +37,21 @@ class CameraClocks(object):
 
     def __init__(self):
         self._clocks, self._tracked = {}, {}  # by camera: clock of the latest image, and of the latest tracked image
+        self._newest_ns = {}  # newest stamp of the tracked images, by camera
+
+    @property
+    def newest_ns(self):
+        """The newest stamp of a tracked image; None if there is none since the last `restart`."""
+        return max(self._newest_ns.values(), default=None)
 
     def accept(self, stamp_ns, now_ns, camera):
-        """Check the stamp of an image that arrived at `now_ns`.
+        """Check the stamp of an image that arrived at `now_ns`, see `time_sync.arrival_clock_ns`.
 
-        Parameters
-        ----------
-        stamp_ns : int
-        now_ns : int
-            Arrival time, see `time_sync.arrival_clock_ns`.
-        camera : str
-
-        Returns
-        -------
-        str or None
-            None if the image is accepted; otherwise the camera with the correct time.
-
-        Raises
-        ------
-        ValueError
-            If the latest tracked image of the camera has this stamp.
+        Returns None if the image is accepted; otherwise the camera with the correct time. Raises ValueError if the
+        latest tracked image of the camera has this stamp.
         """
         if camera in self._tracked and stamp_ns == self._tracked[camera].stamp_ns:
-            raise ValueError('stamp %.9f of camera %r comes a second time' % (stamp_ns / NS, camera))
+            raise ValueError('duplicate stamp %.9f of camera %r' % (stamp_ns / NS, camera))
         alive = {name: clock for name, clock in self._clocks.items() if now_ns - clock.arrival_ns <= ALIVE_NS}
         clock = alive[camera] = self._continued(_Clock(stamp_ns, now_ns), camera, alive)
 
@@ -67,10 +59,10 @@ class CameraClocks(object):
             own = alive[name]
             supporters = sum(own.is_near(other, LONGEST_LAG_NS) for other in alive.values())
             return supporters, -own.since_ns, own.stamp_ns - own.arrival_ns
-        right = max([name for name in alive if name == camera or self.is_tracked(name, now_ns)], key=rank)
-        is_accepted = clock.is_near(alive[right], JUMP_NS)
+        trusted = max([name for name in alive if name == camera or self._is_tracked(name, now_ns)], key=rank)
+        is_accepted = clock.is_near(alive[trusted], JUMP_NS)
         self._clocks[camera] = clock._replace(since_ns=min(clock.since_ns, now_ns) if is_accepted else NEVER)
-        return None if is_accepted else right
+        return None if is_accepted else trusted
 
     def _continued(self, clock, camera, alive):
         """The clock with `since_ns` from the camera's previous image, or from the other cameras with the same time."""
@@ -81,10 +73,22 @@ class CameraClocks(object):
         return clock._replace(since_ns=min((other.since_ns for name, other in alive.items()
                                             if name != camera and clock.is_near(other, limit_ns)), default=NEVER))
 
-    def track(self, camera):
-        """Record that the latest image of a camera was tracked."""
+    def track(self, stamp_ns, camera):
+        """Record that the latest accepted image of a camera was tracked. Returns the newest stamp of tracked images."""
         self._tracked[camera] = self._clocks[camera]
+        self._newest_ns[camera] = max(stamp_ns, self._newest_ns.get(camera, stamp_ns))
+        return self.newest_ns
 
-    def is_tracked(self, camera, now_ns):
+    def is_jump_back(self, stamp_ns, now_ns, camera):
+        """Whether an accepted image is a backward jump in time, and not a camera that lags behind an ended one."""
+        ahead = {other: newest_ns for other, newest_ns in self._newest_ns.items() if stamp_ns < newest_ns - JUMP_NS}
+        return (camera in ahead or any(self._is_tracked(other, now_ns) for other in ahead)
+                or stamp_ns < max(ahead.values(), default=stamp_ns) - LONGEST_LAG_NS)
+
+    def restart(self):
+        """Forget the newest stamps, after a backward jump in time."""
+        self._newest_ns = {}
+
+    def _is_tracked(self, camera, now_ns):
         """Whether an image of a camera was tracked within the last `ALIVE_NS`."""
         return camera in self._tracked and now_ns - self._tracked[camera].arrival_ns <= ALIVE_NS

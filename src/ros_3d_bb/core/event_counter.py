@@ -3,36 +3,22 @@ import collections
 import contextlib
 import threading
 
-
 MOST_LAGS = 10000  # maximum number of stored latencies
 
 
 class EventCounter(object):
     """Counts events, and keeps the first message about each.
 
-    Parameters
-    ----------
-    clock : callable, optional
-        Returns ROS time (genpy.Time), for the latencies of `record_latency`.
-
-    Attributes
-    ----------
-    counts : dict
-        Number of occurrences of each event, in the order of first occurrence.
-    sentences : dict
-        First message of each event that has one.
-    received : dict
-        Number of inputs of each kind that `receiving` counted.
-    lags_ns : collections.deque
-        Latencies of the newest results, nanoseconds.
+    `clock` returns ROS time (genpy.Time), for `record_latency`.
     """
 
     def __init__(self, clock=None):
         self._lock = threading.Lock()  # a topic with two publishers has two threads
         self._clock = clock
-        self.counts, self.received = collections.OrderedDict(), collections.OrderedDict()
-        self.sentences = {}
-        self.lags_ns = collections.deque(maxlen=MOST_LAGS)
+        self.counts = collections.OrderedDict()  # by event, in the order of first occurrence
+        self.received = collections.OrderedDict()  # number of inputs of each kind
+        self.sentences = {}  # first message of each event that has one
+        self.lags_ns = collections.deque(maxlen=MOST_LAGS)  # latencies of the newest results
 
     def count(self, event, amount=1):
         """Count an expected event."""
@@ -54,10 +40,10 @@ class EventCounter(object):
         """Count rejected or missing input; `sentence` states what failed, why, and what happens next."""
         self.note(event, sentence)
 
-    def leave_out(self, parts, faults):
+    def count_dropped(self, parts, faults):
         """Count unusable parts of an input; `faults` has one message for each. The other parts are used."""
         for fault in faults:
-            self.warn('%s left out' % parts, '%s; the others in this image are used' % fault)
+            self.warn('%s dropped' % parts, '%s; the others in this image are used' % fault)
 
     def receiving(self, inputs):
         """Context manager for a callback: `rejecting`, and count the message as received.
@@ -74,7 +60,7 @@ class EventCounter(object):
         try:
             yield
         except ValueError as error:
-            self.warn('%s refused' % inputs, '%s refused: %s; waiting for the next' % (inputs, error))
+            self.warn('%s rejected' % inputs, '%s rejected: %s; waiting for the next' % (inputs, error))
         except Exception as error:
             if not self.is_harmless(error):
                 raise

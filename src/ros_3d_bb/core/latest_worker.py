@@ -3,22 +3,16 @@ import threading
 
 
 class NewestWorker(object):
-    """Runs `work(item)` in a separate thread, always on the newest item offered; older waiting items are dropped.
+    """Calls `work(item)` in a separate thread, always with the newest item offered; older waiting items are dropped.
 
-    Parameters
-    ----------
-    work : callable
-        Called with one item at a time.
-    on_error : callable
-        Called with an exception raised by `work`; the thread continues with the next item.
+    An exception of `work` is passed to `on_error`, and the thread continues with the next item.
     """
 
     def __init__(self, work, on_error):
         self._work, self._on_error = work, on_error
         self._news = threading.Condition()
         self._newest, self._waiting, self._stopped = None, False, False
-        self._thread = threading.Thread(target=self._run)
-        self._thread.daemon = True
+        self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def offer(self, item):

@@ -7,31 +7,15 @@ LARGEST = 1e6
 
 
 class Param(NamedTuple):
-    """Schema of one parameter, given as the default of a field of a NamedTuple.
+    """Schema of one parameter, given as the default of a field of a NamedTuple."""
 
-    Attributes
-    ----------
-    default : bool, int, float, str or tuple
-    text : str
-        Description in full sentences. Empty if the `doc=` of the corresponding launch argument describes it.
-    unit : str
-    limits : (number, number)
-        Values outside this range are rejected.
-    choices : tuple of str
-        Other values are rejected; empty if any text is allowed.
-    live : bool or (number, number)
-        Whether the parameter can be changed at run time. For a number: range of the slider in rqt_reconfigure.
-    section : str
-        Heading in config/*.yaml and group in rqt_reconfigure.
-    """
-
-    default: Any
-    text: str = ''
+    default: Any  # bool, int, float, str or tuple
+    text: str = ''  # description in sentences; empty if the `doc=` of the corresponding launch argument describes it
     unit: str = ''
-    limits: Tuple[float, float] = (0, LARGEST)
-    choices: Tuple[str, ...] = ()
-    live: Union[bool, Tuple[float, float]] = False
-    section: str = ''
+    limits: Tuple[float, float] = (0, LARGEST)  # values outside this range are rejected
+    choices: Tuple[str, ...] = ()  # other values are rejected; empty if any text is allowed
+    live: Union[bool, Tuple[float, float]] = False  # whether it can be changed at run time; for numbers, slider range
+    section: str = ''  # heading in config/*.yaml and group in rqt_reconfigure
 
     @property
     def allowed(self):
@@ -68,15 +52,15 @@ def parameters(section=''):
     The Params are stored by name in the class attribute `PARAMS`. A Param without a section gets the given one.
     """
     def decorate(kind):
-        kind.PARAMS = OrderedDict((name, _in_section(kind._field_defaults[name], section)) for name in kind._fields)
+        kind.PARAMS = OrderedDict()
+        for name in kind._fields:
+            param = kind._field_defaults[name]
+            own_section = param.section or (section if param.text else SET_BY_LAUNCH)
+            kind.PARAMS[name] = param._replace(section=own_section)
         kind._field_defaults = {name: param.default for name, param in kind.PARAMS.items()}
         kind.__new__.__defaults__ = tuple(kind._field_defaults[name] for name in kind._fields)
         return kind
     return decorate
-
-
-def _in_section(param, section):
-    return param._replace(section=param.section or (section if param.text else SET_BY_LAUNCH))
 
 
 def table_of(kinds):
@@ -85,20 +69,10 @@ def table_of(kinds):
 
 
 def params_from(given, *kinds):
-    """Fill NamedTuple types from a flat dictionary; missing keys keep their defaults.
+    """Fill types decorated with `parameters` from a flat dictionary; missing keys keep their defaults.
 
-    A float may be given as an int, a str as a number (roslaunch converts `0` to one), a list as `a, b`.
-
-    Parameters
-    ----------
-    given : dict
-    *kinds : NamedTuple classes
-        Decorated with `parameters`; fields annotated with bool, int, float, str or list.
-
-    Returns
-    -------
-    list
-        One instance of each class.
+    A float may be given as an int, a str as a number (roslaunch converts `0` to one), a list as `a, b`. Returns a list
+    with one instance of each type.
 
     Raises
     ------

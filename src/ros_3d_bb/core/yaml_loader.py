@@ -17,17 +17,9 @@ class _Loader(yaml.SafeLoader):
 
 
 def load_yaml(stream):
-    """Load one YAML document from a stream.
-
-    Raises
-    ------
-    yaml.YAMLError
-        If the text is not YAML, contains aliases or object tags, or is nested too deeply.
-    """
+    """Load one YAML document from a stream. Raises yaml.YAMLError also for aliases, object tags and deep nesting."""
     try:
         return yaml.load(stream, Loader=_Loader)
-    except yaml.YAMLError:
-        raise
     except RecursionError:
         raise yaml.YAMLError('it is nested too deeply')
     except (ValueError, OverflowError) as error:  # not text, an impossible date, a number with too many digits

@@ -16,19 +16,8 @@ class Detections(NamedTuple):
 
 
 def non_maximum_suppression(detections, iou_limit, max_det):
-    """Remove boxes that overlap a box of the same class and a higher score by more than `iou_limit`.
-
-    Parameters
-    ----------
-    detections : Detections
-        In order of decreasing score.
-    iou_limit : float
-    max_det : int
-        Maximum number of boxes that are kept.
-
-    Returns
-    -------
-    Detections
+    """Remove the Detections that overlap one of the same class and a higher score by more than `iou_limit`, and those
+    after the first `max_det`.
     """
     boxes, kept = detections.boxes, []
     remaining = np.ones(len(boxes), bool)

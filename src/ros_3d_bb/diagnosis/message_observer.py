@@ -1,41 +1,40 @@
-"""Convert received messages to observations, for running graphs and bags alike."""
+"""Convert messages to observations, for running graphs and bags alike, and observe the first seconds of a bag."""
 import collections
+import contextlib
 
-from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb, units_fault
-from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg
+import tf2_ros
+from genpy.message import get_message_class
+from sensor_msgs.msg import CameraInfo
+from tf2_msgs.msg import TFMessage
+
+from ros_3d_bb.bags.bag_reader import BagReader, message_in
+from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
+from ros_3d_bb.conversions.camera_msgs import INFO_TOPICS, STATIC_TOPIC, TF_TOPIC
+from ros_3d_bb.conversions.image_msgs import checked_depth_from, imgmsg_to_rgb
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.diagnosis.observations import CameraSeen, ImageSeen, Stream
+from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, INFO
+from ros_3d_bb.diagnosis.observations import Newest, Observations, Stream, TfSeen
+from ros_3d_bb.diagnosis.tf_tree import links_in
 from ros_3d_bb.diagnosis.topic_roles import ROLES
 
 KEPT = 1000  # stamps per topic
+BAG_SECONDS = 10.0  # cache length of tf2
 
 
 class Observation(object):
     """Statistics of the messages of one topic: their count, stamps and arrival times, and the newest message.
 
-    Parameters
-    ----------
-    key : str
-        Key of the role, see `topic_roles.ROLES`.
-    topic : str
+    `role` is that of the topic (see `topic_roles.ROLES`), or None.
     """
 
-    def __init__(self, key, topic):
-        self.role, self.topic, self.newest = ROLES[key], topic, None
+    def __init__(self, role, topic):
+        self.role, self.topic, self.newest = role, topic, None
         self._count, self._first_ns, self._last_ns = 0, None, None
         self._stamps_ns, self._lags_s = collections.deque(maxlen=KEPT), (None, None)
 
     def take(self, message, ros_ns, machine_s=None):
-        """Record a message.
-
-        Parameters
-        ----------
-        message : genpy.Message
-        ros_ns : int
-            Arrival in ROS time, nanoseconds; 0 before the first /clock message.
-        machine_s : float, optional
-            Arrival by the clock of the machine, seconds.
-        """
+        """Record a message with its arrival in ROS time (0 before the first /clock message) and in machine time."""
         self._count += 1
         self._first_ns, self._last_ns = ros_ns if self._first_ns is None else self._first_ns, ros_ns
         self.newest = message
@@ -45,16 +44,74 @@ class Observation(object):
         if stamp_ns and ros_ns:
             self._lags_s = (ros_ns - stamp_ns) / NS, None if machine_s is None else machine_s - stamp_ns / NS
 
-    @property
-    def middle_ns(self):
-        """The middle one of the stamps, for which transforms must have arrived; None without stamps."""
-        return self._stamps_ns[len(self._stamps_ns) // 2] if self._stamps_ns else None
-
     def stream(self, published_kind, publishers=()):
         """Return the observations as a Stream."""
         passed_s = (self._last_ns - self._first_ns) / NS if self._count > 1 else 0.0  # negative after a jump in time
         return Stream(self.role, self.topic, published_kind, publishers, self._count,
                       (self._count - 1) / passed_s if passed_s > 0 else 0.0, tuple(self._stamps_ns), *self._lags_s)
+
+    def tf_seen(self, lookup, frames_as_yaml, target_frame, source_frame=''):
+        """Look up the pose of the camera in the fixed frame at the stamp of an image. None without images.
+
+        `lookup` and `frames_as_yaml` are methods of a tf2 buffer; `source_frame` replaces the frame_id of the image.
+        """
+        if not self._stamps_ns:
+            return None
+        stamp_ns = self._stamps_ns[len(self._stamps_ns) // 2]  # the middle one: its transforms must have arrived
+        target, source = target_frame.lstrip('/'), (source_frame or self.newest.header.frame_id).lstrip('/')
+        stamp, fault = time_from(stamp_ns), ''
+        try:
+            lookup(target, source, stamp)
+        except tf2_ros.TransformException as error:
+            fault = str(error)
+        return TfSeen(target, source, stamp.to_sec(), links_in(frames_as_yaml()), fault)
+
+
+def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda _observation: (), **others):
+    """Return the Observations of recorded messages; `topics`, `seconds` and `others` are fields of it.
+
+    `observed` has an Observation for each role, `depth_info` is that of the camera_info of depth, and `publishers_of`
+    returns the publishers of an Observation.
+    """
+    streams = {key: one.stream(topics.get(one.topic, ''), publishers_of(one)) for key, one in observed.items()}
+    return Observations(streams, topics, seconds,
+                        color_info=_newest(observed[INFO].newest, camera_from_msg),
+                        depth_info=_newest(depth_info.newest, camera_from_msg),
+                        color=_newest(observed[COLOR].newest, imgmsg_to_rgb),
+                        depth=_newest(observed[DEPTH].newest, checked_depth_from), **others)
+
+
+def observe_bag(path, name_of, target_frame):
+    """Return the Observations of the first BAG_SECONDS of a bag. Raises BagError if it cannot be read.
+
+    `name_of` maps the name of a topic of the nodes to its name in the bag, with a leading slash.
+    """
+    observed = {key: Observation(role, name_of(role.name)) for key, role in ROLES.items()}
+    depth_info, transforms = Observation(None, name_of(INFO_TOPICS[1])), BagTransforms()
+    with BagReader(path) as reader:
+        topics = reader.topics
+        _read(reader, observed, depth_info, transforms)
+    return observations_of(observed, depth_info, topics, BAG_SECONDS, is_bag=True,
+                           tf=observed[DEPTH].tf_seen(transforms.lookup, transforms.frames_as_yaml, target_frame))
+
+
+def _read(reader, observed, depth_info, transforms):
+    """Read the first seconds of a bag. Messages that have another type or are damaged are ignored."""
+    for raw in reader.messages(['/' + STATIC_TOPIC]):
+        with contextlib.suppress(ValueError):
+            transforms.set_static(message_in(raw, TFMessage))
+    takers = {one.topic: (one.take, get_message_class(one.role.kind)) for one in observed.values()}
+    takers[depth_info.topic] = depth_info.take, CameraInfo
+    takers['/' + TF_TOPIC] = lambda message, _time_ns: transforms.ahead(message), TFMessage
+    begin_ns = None
+    for raw in reader.messages(sorted(takers)):
+        time_ns = raw.time.to_nsec()
+        begin_ns = time_ns if begin_ns is None else begin_ns
+        if time_ns - begin_ns > BAG_SECONDS * NS:
+            break
+        take, kind = takers[raw.topic]
+        with contextlib.suppress(ValueError):
+            take(message_in(raw, kind), time_ns)
 
 
 def _stamp_in(message):
@@ -67,31 +124,10 @@ def _stamp_in(message):
         return None
 
 
-def camera_seen(message):
-    """Convert a CameraInfo, or None, to CameraSeen, or None."""
+def _newest(message, convert):
     if message is None:
         return None
     try:
-        return CameraSeen(camera_from_msg(message), message.header.frame_id)
+        return Newest(message, convert(message))
     except ValueError as error:
-        return CameraSeen(None, message.header.frame_id, str(error))
-
-
-def color_seen(message):
-    """Convert a colour image, or None, to ImageSeen, or None."""
-    return _image_seen(message, imgmsg_to_rgb, lambda _pixels: '')
-
-
-def depth_seen(message):
-    """Convert a depth image, or None, to ImageSeen, or None."""
-    return _image_seen(message, imgmsg_to_depth, units_fault)
-
-
-def _image_seen(message, read, fault_of):
-    if message is None:
-        return None
-    try:
-        fault = fault_of(read(message))
-    except ValueError as error:
-        fault = str(error)
-    return ImageSeen(message.width, message.height, message.encoding, message.header.frame_id, fault)
+        return Newest(message, None, str(error))

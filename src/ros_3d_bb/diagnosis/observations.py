@@ -3,108 +3,76 @@ from typing import Any, Dict, NamedTuple, Optional, Tuple
 
 
 class Role(NamedTuple):
-    """A topic of the pipeline.
+    """A topic of the pipeline."""
 
-    `title`: content of the topic; `name`: its name in the nodes; `kind`: its type; `argument`: the launch argument that
-    renames it, or empty; `source`: its publisher; `when_silent`: what to do if the publisher is silent.
-    """
-
-    title: str
-    name: str
+    title: str  # content of the topic
+    name: str  # in the nodes, before remapping
     kind: str
-    argument: str
-    source: str
-    when_silent: str
+    argument: str  # launch argument that renames the topic, or empty
+    source: str  # its publisher
+    when_silent: str  # what to do if the publisher is silent
 
 
 class Publisher(NamedTuple):
-    """A node that publishes a topic; `problem` states why it cannot be received here, empty if it can."""
+    """A node that publishes a topic."""
 
     node: str
-    problem: str = ''
+    problem: str = ''  # why it cannot be received here
 
 
 class Stream(NamedTuple):
-    """Observations on the topic of a role.
-
-    `topic`: its resolved name; `published_kind`: its published type, empty without publishers; `stamps_ns`: stamps
-    of the messages that have one; `lag_s`: ROS time minus stamp at the arrival of the newest message, None if unknown;
-    `machine_lag_s`: the same by the clock of the machine.
-    """
+    """Observations on the topic of a role."""
 
     role: Role
-    topic: str
-    published_kind: str = ''
+    topic: str  # resolved name
+    published_kind: str = ''  # empty without publishers
     publishers: Tuple[Publisher, ...] = ()
     count: int = 0
     rate_hz: float = 0.0
-    stamps_ns: Tuple[int, ...] = ()
-    lag_s: Optional[float] = None
-    machine_lag_s: Optional[float] = None
+    stamps_ns: Tuple[int, ...] = ()  # of the messages that have one
+    lag_s: Optional[float] = None  # ROS time minus stamp at the arrival of the newest message
+    machine_lag_s: Optional[float] = None  # the same by the clock of the machine
 
 
-class CameraSeen(NamedTuple):
-    """A camera_info: `camera` is a `camera_model.Camera`, or None if it cannot be used; `fault` states why."""
+class Newest(NamedTuple):
+    """The newest message of a topic, and its conversion to a type of this package, or why it cannot be converted."""
 
-    camera: Any
-    frame_id: str
-    fault: str = ''
-
-
-class ImageSeen(NamedTuple):
-    """The newest image of a topic; `fault` states why it cannot be used, empty if it can."""
-
-    width: int
-    height: int
-    encoding: str
-    frame_id: str
+    message: Any
+    converted: Any
     fault: str = ''
 
 
 class TfSeen(NamedTuple):
-    """Result of a tf lookup at a stamp.
-
-    `links`: {frame: `tf_tree.Link`}; `fault`: why there is no transform, empty if there is one.
-    """
+    """Result of a tf lookup at a stamp."""
 
     target: str
     source: str
     stamp_s: float
-    links: dict
-    fault: str
-
-
-class Clock(NamedTuple):
-    """Whether the graph uses simulated time, and the number of received /clock messages."""
-
-    use_sim_time: bool
-    count: int
+    links: dict  # of all frames, {frame: tf_tree.Link}
+    fault: str  # why there is no transform; empty if there is one
 
 
 class Observations(NamedTuple):
-    """All observations; fields are None if nothing was received. `clock` is None for a bag.
-
-    `topics`: {name: type} of all published topics; `nodes`: {name: (level, sentence)} from the diagnostics of nodes;
-    `seconds`: duration of the observation.
-    """
+    """All observations; fields are None if nothing was received."""
 
     streams: Dict[str, Stream]
-    topics: Dict[str, str]
-    seconds: float
+    topics: Dict[str, str]  # types of all published topics
+    seconds: float  # duration
     is_bag: bool = False
-    color_camera: Optional[CameraSeen] = None
-    depth_camera: Optional[CameraSeen] = None
-    color: Optional[ImageSeen] = None
-    depth: Optional[ImageSeen] = None
+    color_info: Optional[Newest] = None
+    depth_info: Optional[Newest] = None
+    color: Optional[Newest] = None
+    depth: Optional[Newest] = None
     tf: Optional[TfSeen] = None
-    clock: Optional[Clock] = None
-    nodes: dict = {}
+    use_sim_time: bool = False
+    clock_count: int = 0  # number of /clock messages
+    nodes: dict = {}  # {name: (level, sentence)} from the diagnostics of nodes
     stamp_tolerance_s: float = 0.005
     cache_length_s: float = 1.0
 
 
 class Finding(NamedTuple):
-    """Result of a check: its subject, and either a fault with its fix or a fact. `fault` is empty if there is none."""
+    """Result of a check: its subject, and either a fact or a fault with its fix."""
 
     subject: str
     fact: str = ''
@@ -112,13 +80,8 @@ class Finding(NamedTuple):
     fix: str = ''
 
     @property
-    def is_wrong(self):
-        """Whether the check found a fault."""
-        return bool(self.fault)
-
-    @property
     def lines(self):
         """The finding as printed lines."""
-        if self.is_wrong:
+        if self.fault:
             return ['wrong  %s: %s' % (self.subject, self.fault), '       fix: %s' % self.fix]
         return ['ok     %s: %s' % (self.subject, self.fact)]

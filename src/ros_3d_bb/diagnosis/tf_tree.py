@@ -16,11 +16,6 @@ class Link(NamedTuple):
     oldest_s: float
     newest_s: float
 
-    @property
-    def is_static(self):
-        """Whether the transform is valid at all times."""
-        return self.newest_s == 0
-
 
 def links_in(text):
     """Parse the output of all_frames_as_yaml (tf2) to {frame: Link}. Empty if a frame name makes it invalid YAML."""
@@ -33,12 +28,11 @@ def links_in(text):
             for frame, entry in entries.items()}
 
 
-def chain(links, frame):
-    """Return the list of frames from a frame to the root."""
-    found = [frame]
-    while found[-1] in links and links[found[-1]].parent not in found:
-        found.append(links[found[-1]].parent)
-    return found
+def _path_to_root(links, frame):
+    path = [frame]
+    while path[-1] in links and links[path[-1]].parent not in path:
+        path.append(links[path[-1]].parent)
+    return path
 
 
 def why_missing(links, target, source, stamp_s):
@@ -58,55 +52,49 @@ def why_missing(links, target, source, stamp_s):
     str, str
         The fault and its fix; both empty if the links show no fault.
     """
-    frames = set(links) | set(link.parent for link in links.values())
+    frames = sorted(set(links) | set(link.parent for link in links.values()))
     if not frames:
-        return ('tf knows no frames at all: nobody publishes /tf or /tf_static',
-                "start the robot's description (robot_state_publisher) and localisation; for a camera alone: "
-                'frame_world:=%s' % source)
+        return ('tf has no frames: no transforms on /tf or /tf_static',
+                'start robot_state_publisher and the localisation of the robot; for a camera alone: frame_world:=%s'
+                % source)
     if source not in frames:
-        return _unknown_source(frames, source)
-    up, down = chain(links, source), chain(links, target)
+        more = ' and %d more' % (len(frames) - NAMED) if len(frames) > NAMED else ''
+        return ('tf has no frame %s; its frames: %s%s' % (source, ', '.join(frames[:NAMED]), more),
+                'publish the pose of the camera: rosrun tf2_ros static_transform_publisher X Y Z YAW PITCH ROLL '
+                'base_link %s; or, if it has another name in tf, such as %s: frame_id:=%s'
+                % ((source,) + 2 * (nearest_name(source, frames),)))
+    up, down = _path_to_root(links, source), _path_to_root(links, target)
     if target not in frames:
-        return ('tf knows no frame %s; it knows %s, and there it ends' % (target, ' < '.join(up)),
-                'start what localises the robot in %s, or track in another frame: frame_world:=%s' % (target, up[-1]))
+        return ('tf has no frame %s; the tree of the camera is %s' % (target, ' < '.join(up)),
+                'start the localisation of the robot in %s, or track in another frame: frame_world:=%s'
+                % (target, up[-1]))
     if up[-1] != down[-1]:
-        return ('tf has two trees, %s and %s, and nothing links them'
-                % (' < '.join(up), ' < '.join(down)), _missing_link(frames, up[-1], target))
-    return _why_untimely(links, up, down, stamp_s)
-
-
-def _unknown_source(frames, source):
-    known = sorted(frames)
-    return ('tf knows no frame %s; it knows %s%s'
-            % (source, ', '.join(known[:NAMED]), ' and %d more' % (len(known) - NAMED) if len(known) > NAMED else ''),
-            'publish where the camera is: rosrun tf2_ros static_transform_publisher X Y Z YAW PITCH ROLL base_link %s; '
-            'or, if it has another name in tf, such as %s: frame_id:=%s'
-            % ((source,) + 2 * (nearest_name(source, known),)))
+        return ('tf has two trees, %s and %s, without a transform between them' % (' < '.join(up), ' < '.join(down)),
+                _missing_link(frames, up[-1], target))
+    return _outdated_link(links, up, down, stamp_s)
 
 
 def _missing_link(frames, root, target):
     parent = 'base_link' if root != 'base_link' and 'base_link' in frames else target
     if root in ('odom', 'base_link'):
-        return 'start what localises the robot (publishes %s to %s), or frame_world:=%s' % (target, root, root)
+        return 'start the localisation of the robot (publishes %s to %s), or frame_world:=%s' % (target, root, root)
     return 'rosrun tf2_ros static_transform_publisher X Y Z YAW PITCH ROLL %s %s' % (parent, root)
 
 
-def _why_untimely(links, up, down, stamp_s):
+def _outdated_link(links, up, down, stamp_s):
     """Find the link between two frames of one tree that has no transform at the stamp; 0 means the latest."""
-    if not stamp_s:
-        return '', ''
-    between = [frame for frame in up if frame not in down] + [frame for frame in down if frame not in up]
-    moving = [(links[frame], frame) for frame in between if not links[frame].is_static]
+    between = [(links[frame], frame) for frame in set(up) ^ set(down)]
+    moving = [(link, frame) for link, frame in between if link.newest_s != 0]
     behind = [(link.newest_s, link, frame) for link, frame in moving if link.newest_s < stamp_s]
-    if behind:
+    ahead = [(link.oldest_s, link, frame) for link, frame in moving if link.oldest_s > stamp_s]
+    if stamp_s and behind:
         newest_s, link, frame = min(behind)
         return ('the transform from %s to %s ends %.3f s before the stamp of the image'
                 % (frame, link.parent, stamp_s - newest_s),
-                'is what publishes %s still running, in time, and on a machine with the same clock?' % frame)
-    ahead = [(link.oldest_s, link, frame) for link, frame in moving if link.oldest_s > stamp_s]
-    if ahead:
+                'is the publisher of %s still running, in time, and on a machine with the same clock?' % frame)
+    if stamp_s and ahead:
         oldest_s, link, frame = max(ahead)
         return ('the transform from %s to %s begins %.3f s after the stamp of the image'
                 % (frame, link.parent, oldest_s - stamp_s),
-                'images from before the start need nothing; else compare the clocks of the machines (chrony)')
+                'no action for images from before the start; otherwise compare the clocks of the machines (chrony)')
     return '', ''

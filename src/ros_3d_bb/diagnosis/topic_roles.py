@@ -6,8 +6,8 @@ from ros_3d_bb.diagnosis.observations import Role
 
 IMAGE, CAMERA = 'sensor_msgs/Image', 'the camera (roslaunch ros_3d_bb realsense.launch)'
 CAMERA_SILENT = 'is the camera plugged in, the bag still playing (not paused), the network fast enough for images?'
-DETECTOR_SILENT = ('is the detector paused (its service ~enable takes true), still loading its weights, or '
-                   'told to say nothing of empty images (publish_empty: false)?')
+DETECTOR_SILENT = ('is the detector paused (call its service ~enable with true), still loading its weights, or '
+                   'configured to publish no empty arrays (publish_empty: false)?')
 ROLES = {
     COLOR: Role('colour images', COLOR_TOPIC, IMAGE, 'camera_image', CAMERA, CAMERA_SILENT),
     DEPTH: Role('depth images', DEPTH_TOPIC, IMAGE, 'camera_depth', CAMERA, CAMERA_SILENT),
@@ -15,14 +15,12 @@ ROLES = {
     BOXES2D: Role('2D boxes', BOXES_TOPIC, 'std_msgs/Int32MultiArray', 'bb_topic',
                   'a detector (pipeline.launch detector:=yolov5 or depth)', DETECTOR_SILENT),
     BOXES3D: Role('3D boxes', BOXES3D_TOPIC, 'ros_3d_bb/BoundingBox3DArray', '', 'bbox3d_node (pipeline.launch)',
-                  'see what bbox3d_node says in its log'),
+                  'see the log of bbox3d_node'),
     TRACKS: Role('tracks', TRACKS_TOPIC, 'ros_3d_bb/TrackedObjectArray', '', 'tracker_node (pipeline.launch)',
-                 'see what tracker_node says in its log')}
+                 'see the log of tracker_node')}
 
 
 def role_named(name, kind):
     """Return the Role of a topic by its name in the nodes; a generic Role for topics outside the pipeline."""
-    for role in ROLES.values():
-        if role.name == name:
-            return role
-    return Role(kind, name, kind, '', 'its publisher', 'is its publisher at work?')
+    other = Role(kind, name, kind, '', 'its publisher', 'check its publisher')
+    return next((role for role in ROLES.values() if role.name == name), other)

@@ -56,9 +56,8 @@ class RgbdFrame(NamedTuple):
 class Stamps(object):
     """Conversion of librealsense's timestamps to nanoseconds since 1970.
 
-    Timestamps in global time or in time of arrival already count from 1970. A camera without metadata uses its own
-    clock instead, which has an arbitrary origin and overflows after 71 minutes. In this case the first image gets its
-    time of arrival, and the camera's clock gives the intervals to the following images.
+    A camera without metadata uses its own clock, which has an arbitrary origin and overflows after 71 minutes. In this
+    case the first image gets its time of arrival, and the camera's clock gives the intervals to the following images.
     """
 
     def __init__(self):
@@ -79,27 +78,20 @@ class Stamps(object):
 class RealSense(object):
     """Open camera, or recording (`file`) of a camera, with depth aligned to colour. Call `close` after use.
 
+    Raises CameraLost if no such camera is connected, and ValueError if the recording cannot be played.
+
     Attributes
     ----------
     camera : Camera
         Intrinsics of the colour stream and of the aligned depth.
     link_from_color : numpy.ndarray, (4, 4)
-        Transform from the body frame of the colour camera to that of the depth camera, which is the camera's `_link`; x
-        points forward, z up.
+        Transform between the body frames, x forward and z up, of the colour and the depth camera (the `_link`).
     is_over : bool
         Whether a recording that is not repeated has ended.
-
-    Raises
-    ------
-    CameraLost
-        If no such camera is connected.
-    ValueError
-        If pyrealsense2 is not installed, a parameter is invalid, or the recording cannot be played.
     """
 
     def __init__(self, params):
-        check_params(params)
-        self._rs = librealsense()
+        self._rs = librealsense(params)
         self._stamps, self.is_over, self._last_image_s = Stamps(), False, time.monotonic()
         self._align, self._filters = self._rs.align(self._rs.stream.color), _filters(self._rs, params.filters)
         self._pipeline = self._rs.pipeline()
@@ -124,14 +116,10 @@ class RealSense(object):
         self.camera = camera_from_intrinsics(color.get_intrinsics())
 
     def read(self):
-        """Return the next pair of images, or None if no images arrive within POLL_MS.
+        """Return the next RgbdFrame, or None if no images arrive within POLL_MS.
 
-        Raises
-        ------
-        CameraLost
-            If no images have arrived for `LOST_S`: the camera is unplugged, or hangs.
-        ValueError
-            If the images are incomplete. Later images may be complete.
+        Raises CameraLost if the camera is unplugged or has sent no images for `LOST_S`, and ValueError if the images
+        are incomplete; later images may be complete.
         """
         try:
             has_frames, frames = self._pipeline.try_wait_for_frames(POLL_MS)
@@ -140,7 +128,7 @@ class RealSense(object):
         now_s = time.monotonic()
         if has_frames:
             self._last_image_s = now_s
-            return self._pair(frames)
+            return self._frame_from(frames)
         if self._playback is not None:
             self.is_over = self._playback.current_status() == self._rs.playback_status.stopped
         elif now_s - self._last_image_s > LOST_S:
@@ -154,10 +142,10 @@ class RealSense(object):
         except RuntimeError:
             pass  # the camera is already disconnected
 
-    def _pair(self, frames):
+    def _frame_from(self, frames):
         try:
             if not (frames.get_depth_frame() and frames.get_color_frame()):
-                raise ValueError('colour came without depth, or depth without colour')
+                raise ValueError('colour without depth, or depth without colour')
             for a_filter in self._filters:
                 frames = a_filter.process(frames).as_frameset()
             frames = self._align.process(frames)
@@ -184,20 +172,16 @@ class RealSense(object):
             _set(color, option.exposure, round(params.exposure / EXPOSURE_UNIT_S))
 
 
-def librealsense():
-    """Import the package pyrealsense2. Raises ValueError if it is not installed."""
+def librealsense(params):
+    """Import pyrealsense2. ValueError if it is not installed, or `file` is not the absolute path of a recording."""
+    if params.file and not (os.path.isabs(params.file) and os.path.isfile(params.file)):
+        raise ValueError('parameter ~file is %r; the absolute path of a recording expected' % params.file)
     try:
         import pyrealsense2
     except ImportError as error:
         raise ValueError('pyrealsense2 is not installed (%s); pip3 install pyrealsense2, or use realsense2_camera '
                          '(launch argument driver:=realsense2_camera)' % error)
     return pyrealsense2
-
-
-def check_params(params):
-    """Raise ValueError if `file` is set, but is not the absolute path of a recording."""
-    if params.file and not (os.path.isabs(params.file) and os.path.isfile(params.file)):
-        raise ValueError('parameter ~file is %r; the absolute path of a recording expected' % params.file)
 
 
 def camera_from_intrinsics(intrinsics):
@@ -211,40 +195,21 @@ def camera_from_intrinsics(intrinsics):
 
 
 def link_from_color(extrinsics):
-    """Transform (4, 4) between the body frames from librealsense's extrinsics between the optical frames.
-
-    Parameters
-    ----------
-    extrinsics : pyrealsense2.extrinsics
-        From colour to depth: `rotation` by columns, `translation` in metres.
-    """
+    """Transform (4, 4) between the body frames from librealsense's extrinsics between the optical frames."""
     depth_from_color = np.eye(4)
-    depth_from_color[:3, :3] = np.reshape(extrinsics.rotation, (3, 3)).T
+    depth_from_color[:3, :3] = np.reshape(extrinsics.rotation, (3, 3)).T  # librealsense's matrices are by columns
     depth_from_color[:3, 3] = extrinsics.translation
     body_from_optical = transform_from((0, 0, 0), OPTICAL_ROTATION)
     return body_from_optical.dot(depth_from_color).dot(np.linalg.inv(body_from_optical))
 
 
 def frame_links(prefix, link_from_color_body):
-    """Frames of a camera with the names of realsense2_camera: ((parent, child, parent_from_child), ...).
-
-    Parameters
-    ----------
-    prefix : str
-        For `camera` the frames are camera_link, camera_color_frame, camera_color_optical_frame, and the same for depth.
-    link_from_color_body : numpy.ndarray, (4, 4)
-    """
+    """Frames of a camera with the names of realsense2_camera: [(parent, child, parent_from_child (4, 4)), ...]."""
     links, body_from_optical = [], transform_from((0, 0, 0), OPTICAL_ROTATION)
     for stream, link_from_body in (('depth', np.eye(4)), ('color', link_from_color_body)):
-        body = '%s_%s_frame' % (prefix, stream)
-        links.append(('%s_link' % prefix, body, link_from_body))
-        links.append((body, optical_frame(prefix, stream), body_from_optical))
-    return tuple(links)
-
-
-def optical_frame(prefix, stream):
-    """Name of the optical frame of a stream, color or depth."""
-    return '%s_%s_optical_frame' % (prefix, stream)
+        body, optical = '%s_%s_frame' % (prefix, stream), '%s_%s_optical_frame' % (prefix, stream)
+        links += [('%s_link' % prefix, body, link_from_body), (body, optical, body_from_optical)]
+    return links
 
 
 def rgb_of(pixels, format_name):

@@ -1,6 +1,6 @@
 """ROS node that converts tracks to the input messages of local planners and costmaps."""
 import threading
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import rospy
 import tf2_ros
@@ -17,7 +17,7 @@ from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.planning.planner_outputs import outputs_from
 from ros_3d_bb.planning.planner_view import SAME_FRAME, predicted_to, rounding_m, usable_tracks
 
-MOST_ROUNDING_M = 0.005  # largest rounding error of a coordinate: a tenth of a typical costmap cell
+MAX_ROUNDING_M = 0.005  # largest rounding error of a coordinate: a tenth of a typical costmap cell
 
 
 @parameters()
@@ -45,7 +45,7 @@ class PlannerBridgeParams(NamedTuple):
         'marked; 0: no ring. At least the raytrace_range of the costmap.', 'm')
 
 
-class News(NamedTuple):
+class ReceivedTracks(NamedTuple):
     """The latest tracks, in the frame in which they were received.
 
     `transforms` maps the frame of each output to the 4x4 matrix from the tracks' frame to it; frames that are unknown
@@ -59,37 +59,27 @@ class News(NamedTuple):
     transforms: dict
 
 
-class Sent(NamedTuple):
-    """The last message published on a topic: arrival time of its tracks, its frame, and the 4x4 matrix from the
-    tracks' frame to it.
-    """
-
-    arrival_ns: int
-    frame_id: str
-    frame_from_tracks: Any
-
-
 class PlannerTopic(object):
-    """An output topic. `sent` is None if the planner currently holds no tracks from it."""
+    """An output topic. `arrival_ns` is the arrival time of the published tracks, None if the planner holds none."""
 
     def __init__(self, output):
-        self.output = output
-        self.sent = None
+        self.output, self.arrival_ns = output, None
         self._publisher = rospy.Publisher(output.topic, output.kind, queue_size=2)
 
-    def send(self, tracks, stamp_ns, sent):
-        """Publish tracks."""
-        self._publish(tracks, stamp_ns, sent)
-        self.sent = sent
+    def send(self, tracks, stamp_ns, received):
+        """Publish tracks in the output frame; `received` are the ReceivedTracks from which they were predicted."""
+        self._frame_id = self.output.frame or received.frame_id
+        self._frame_from_tracks, self.arrival_ns = received.transforms[self._frame_id], received.arrival_ns
+        self._publish(tracks, stamp_ns)
 
     def empty(self, stamp_ns):
         """Publish an empty array in the frame of the last one."""
-        self._publish([], stamp_ns, self.sent)
-        self.sent = None
+        self.arrival_ns = None
+        self._publish([], stamp_ns)
 
-    def _publish(self, tracks, stamp_ns, sent):
-        header = Header(stamp=time_from(stamp_ns), frame_id=sent.frame_id)
-        self._publisher.publish(self.output.write(tracks, sent.frame_from_tracks, header))
+    def _publish(self, tracks, stamp_ns):
+        header = Header(stamp=time_from(stamp_ns), frame_id=self._frame_id)
+        self._publisher.publish(self.output.write(tracks, self._frame_from_tracks, header))
 
 
 class PlannerBridgeNode(object):
@@ -126,10 +116,11 @@ class PlannerBridgeNode(object):
 
     def __init__(self):
         self._params, = read_params(PlannerBridgeParams)
-        _check(self._params)
+        if not self._params.robot_frame:
+            raise ValueError('parameter ~robot_frame is empty; a frame such as base_link expected')
         self._topics = [PlannerTopic(output) for output in outputs_from(self._params)]
         self._lock = threading.Lock()
-        self._news = None
+        self._received = None
         self._diagnostics = Diagnostics()
         self._transforms = Transforms(self._params.tf_timeout)
         self._diagnostics.show('tf age', self._transforms.age)
@@ -139,26 +130,25 @@ class PlannerBridgeNode(object):
 
     def _on_tracks(self, message):
         with self._diagnostics.receiving('tracks'):
-            news = self._read(message)
+            received = self._read(message)
             with self._lock:
-                self._news = news
+                self._received = received
                 for topic in self._topics:
                     self._send(topic, _now_ns())
-            self._diagnostics.count('tracks handed on')
+            self._diagnostics.count('tracks forwarded')
             self._diagnostics.record_latency(message.header.stamp)
 
     def _read(self, message):
-        """Convert a message to `News`. Raises ValueError if the tracks must not be passed to planners."""
+        """Convert a message to `ReceivedTracks`. Raises ValueError if the tracks must not be passed to planners."""
         stamp_ns, now_ns = stamp_of(message), _now_ns()
         if abs(now_ns - stamp_ns) > self._params.timeout * NS:
             raise ValueError('their stamp is %.3f s before the clock, more than ~timeout (%g s); a bag needs '
                              'use_sim_time' % ((now_ns - stamp_ns) / NS, self._params.timeout))
-        if self._news is not None and stamp_ns < self._news.stamp_ns:
+        if self._received is not None and stamp_ns < self._received.stamp_ns:
             self._transforms.go_back()
         tracks, faults = usable_tracks(tracks_from_msg(message))
-        for fault in faults:
-            self._diagnostics.warn('broken tracks', '%s; planners do not get it' % fault)
-        return News(stamp_ns, now_ns, message.header.frame_id, tracks, self._transforms_at(message.header))
+        self._diagnostics.count_dropped('tracks', faults)
+        return ReceivedTracks(stamp_ns, now_ns, message.header.frame_id, tracks, self._transforms_at(message.header))
 
     def _transforms_at(self, header):
         """Return {frame: 4x4 matrix} from the tracks' frame to the output frames known to tf at the tracks' stamp."""
@@ -167,7 +157,7 @@ class PlannerBridgeNode(object):
             try:
                 transforms[frame] = self._transforms.lookup(frame, header.frame_id, header.stamp)
             except tf2_ros.TransformException as error:
-                self._diagnostics.warn('no transform', 'no transform from %s to %s at %.3f: %s; planners get nothing '
+                self._diagnostics.warn('no transform', 'no transform from %s to %s at %.3f: %s; nothing is published '
                                        'in %s, and an empty array after ~timeout'
                                        % (header.frame_id, frame, header.stamp.to_sec(), error, frame))
         return transforms
@@ -176,55 +166,46 @@ class PlannerBridgeNode(object):
         """Publish the latest tracks on one topic, in the form its planner requires. Does nothing if the required
         transform is unknown.
         """
-        news, tracks, stamp_ns = self._news, self._news.tracks, self._news.stamp_ns
-        frame_id = topic.output.frame or news.frame_id
-        if frame_id not in news.transforms:
+        received, output = self._received, topic.output
+        frame_from_tracks = received.transforms.get(output.frame or received.frame_id)
+        if frame_from_tracks is None:
             return
-        if topic.output.to_now:
-            stamp_ns = max(now_ns, news.stamp_ns)
-            tracks = predicted_to(tracks, (stamp_ns - news.stamp_ns) / NS)
-        if topic.output.float32:
-            self._warn_of_rounding(topic, tracks, frame_id, news.transforms[frame_id])
-        topic.send(tracks, stamp_ns, Sent(news.arrival_ns, frame_id, news.transforms[frame_id]))
-
-    def _warn_of_rounding(self, topic, tracks, frame_id, frame_from_tracks):
-        off_m = rounding_m(tracks, frame_from_tracks)
-        if off_m > MOST_ROUNDING_M:
-            self._diagnostics.warn('coordinates rounded', '%s is up to %.2g m off, as its coordinates in %s are large '
+        tracks, stamp_ns = received.tracks, received.stamp_ns
+        if output.to_now:
+            stamp_ns = max(now_ns, stamp_ns)
+            tracks = predicted_to(tracks, (stamp_ns - received.stamp_ns) / NS)
+        error_m = rounding_m(tracks, frame_from_tracks) if output.float32 else 0.0
+        if error_m > MAX_ROUNDING_M:
+            self._diagnostics.warn('coordinates rounded', '%s has errors of up to %.2g m, as its coordinates are large '
                                    'and float32; set ~planner_frame to a frame with its origin near the robot'
-                                   % (topic.output.topic, off_m, frame_id))
+                                   % (output.topic, error_m))
+        topic.send(tracks, stamp_ns, received)
 
     def _on_timer(self, _event):
         """Republish the outputs that planners interpret as current, and empty the outdated ones."""
         with self._diagnostics.rejecting('outputs'), self._lock:
             now_ns = _now_ns()
             for topic in self._topics:
-                if topic.sent is None:
+                if topic.arrival_ns is None:
                     continue
-                if not 0 <= now_ns - topic.sent.arrival_ns <= self._params.timeout * NS:
-                    self._diagnostics.warn('outputs emptied', 'no tracks that can be handed on for %g s: %s is '
-                                           'emptied, and goes on with the next ones'
-                                           % (self._params.timeout, topic.output.topic))
+                if not 0 <= now_ns - topic.arrival_ns <= self._params.timeout * NS:
+                    self._diagnostics.warn('outputs emptied', 'no valid tracks for %g s: %s is emptied until the next '
+                                           'ones arrive' % (self._params.timeout, topic.output.topic))
                     topic.empty(now_ns)
-                elif topic.output.to_now and now_ns - self._news.arrival_ns >= self._params.resend_period * NS:
+                elif topic.output.to_now and now_ns - self._received.arrival_ns >= self._params.resend_period * NS:
                     self._send(topic, now_ns)
 
     def _empty_all(self):
-        """Publish empty arrays at shutdown, so that no planner keeps the people of the last one."""
+        """Publish empty arrays at shutdown, so that planners do not keep the last tracks."""
         with self._lock:
             for topic in self._topics:
-                if topic.sent is not None:
+                if topic.arrival_ns is not None:
                     topic.empty(_now_ns())
 
 
 def _now_ns():
     """Return the ROS time to which positions are predicted; image stamps use the same clock."""
     return rospy.get_rostime().to_nsec()
-
-
-def _check(params):
-    if not params.robot_frame:
-        raise ValueError('parameter ~robot_frame is empty; base_link or the like expected')
 
 
 def main():

@@ -10,16 +10,15 @@ import tf2_ros
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
-from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, TYPES, CameraFrame,
+from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, TYPES, CameraFrame, frame_id_of,
                                                image_messages_of, transform_messages)
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.params import SET_BY_LAUNCH, WAIT_FOR_SUBSCRIBERS, Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.drivers.realsense import (CameraLost, RealSense, RealSenseParams, check_params, frame_links,
-                                         librealsense, optical_frame)
-from ros_3d_bb.nodes.common.diagnostics import Diagnostics, is_ending
-from ros_3d_bb.nodes.common.startup import read_params, run_node
-from ros_3d_bb.nodes.common.wait_for_subscribers import wait_for_subscribers
+from ros_3d_bb.drivers.realsense import CameraLost, RealSense, RealSenseParams, frame_links, librealsense
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.master import is_ending
+from ros_3d_bb.nodes.common.startup import read_params, run_node, wait_for_subscribers
 
 RETRY_S = 2.0
 CLOSING_S = 5.0  # upper limit
@@ -59,16 +58,14 @@ class RealSenseNode(object):
 
     def __init__(self):
         self._params, self._camera_params = read_params(RealSenseNodeParams, RealSenseParams)
-        check_params(self._camera_params)
-        librealsense()
+        librealsense(self._camera_params)  # report its errors before the worker waits for subscribers
         self._diagnostics = Diagnostics()
         self._pubs = {topic: rospy.Publisher(topic, TYPES[topic], queue_size=10)
                       for topic in (COLOR_TOPIC, DEPTH_TOPIC) + INFO_TOPICS}
         self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=10) if self._params.publish_clock else None
         self._static_transforms = tf2_ros.StaticTransformBroadcaster()
         self.failed = False
-        self._worker = threading.Thread(target=self._run)
-        self._worker.daemon = True
+        self._worker = threading.Thread(target=self._run, daemon=True)
         self._worker.start()
         rospy.on_shutdown(self._wait)
 
@@ -84,7 +81,7 @@ class RealSenseNode(object):
         """
         try:
             wait_for_subscribers(self._pubs[COLOR_TOPIC], self._params.wait_for_subscribers,
-                                 lambda: self._tell_time(START_NS))
+                                 lambda: self._publish_time(START_NS))
             while not is_ending():
                 try:
                     with contextlib.closing(RealSense(self._camera_params)) as camera:
@@ -96,33 +93,33 @@ class RealSenseNode(object):
         except Exception as error:  # without this thread the node is useless, so it is shut down
             if not is_ending():
                 self.failed = True
-                rospy.logfatal('the camera is read no more: %s', error)
+                rospy.logfatal('the camera cannot be read: %s; the node exits', error)
                 rospy.signal_shutdown('the camera cannot be read')
 
     def _read(self, camera):
         links = frame_links(self._params.frame_prefix, camera.link_from_color)
         while not (is_ending() or camera.is_over):
             with self._diagnostics.rejecting('images'):
-                pair = camera.read()
-                if pair is not None:
-                    self._publish(camera, pair, links)
+                frame = camera.read()
+                if frame is not None:
+                    self._publish(camera, frame, links)
                     links = ()  # /tf_static is latched
         if camera.is_over:
             rospy.loginfo('the recording is over')
             rospy.signal_shutdown('the recording is over')
 
-    def _publish(self, camera, pair, links):
-        stamp = time_from(pair.stamp_ns)
-        self._tell_time(pair.stamp_ns)
+    def _publish(self, camera, frame, links):
+        stamp = time_from(frame.stamp_ns)
+        self._publish_time(frame.stamp_ns)
         if links:
             self._static_transforms.sendTransform(transform_messages(stamp, links))
-        header = Header(stamp=stamp, frame_id=optical_frame(self._params.frame_prefix, 'color'))
-        for topic, message in image_messages_of(CameraFrame(header, camera.camera, pair.color, pair.depth, ())):
+        header = Header(stamp=stamp, frame_id=frame_id_of(self._params.frame_prefix))
+        for topic, message in image_messages_of(CameraFrame(header, camera.camera, frame.color, frame.depth, ())):
             self._pubs[topic].publish(message)
         self._diagnostics.count('images')
         self._diagnostics.record_latency(stamp)
 
-    def _tell_time(self, stamp_ns):
+    def _publish_time(self, stamp_ns):
         if self._clock_pub is not None:
             self._clock_pub.publish(Clock(time_from(stamp_ns)))
 

@@ -1,6 +1,5 @@
 """ROS node that tracks 3D boxes in a fixed frame."""
 import functools
-import threading
 
 import rospy
 from sensor_msgs.msg import CameraInfo, Image
@@ -8,16 +7,20 @@ from visualization_msgs.msg import MarkerArray
 
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS, topic_of
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_msg
+from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.persistent_track_ids import PersistentTrackIds
+from ros_3d_bb.nodes.common.master import on_new_master
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
 from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
+
+RESERVED_IDS = 1000  # IDs per reservation: a restarted tracker continues with the next thousand
+LARGEST_PARAM = 2 ** 31 - 1  # largest integer of a ROS parameter
 
 
 class TrackerNode(object):
@@ -52,58 +55,89 @@ class TrackerNode(object):
     def __init__(self):
         params, marker_params, *tracking = given = read_params(TrackerNodeParams, MarkerParams, *TRACKING_PARAMS)
         self._markers = MarkerWriter(marker_params)
-        self._lock = threading.Lock()
         self._diagnostics = Diagnostics()
         transforms = Transforms(params.tf_timeout)
         self._diagnostics.show('tf age', transforms.age)
-        self._tracking_stage = TrackingStage(params, tracking, self._diagnostics, transforms)
-        self._numbers = PersistentTrackIds(self._diagnostics)
+        self._track_ids = TrackIdReservation(self._diagnostics)
+        self._stage = TrackingStage(params, tracking, self._diagnostics, transforms, self._on_tracks,
+                                    self._track_ids.last_id)
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
-        for camera in self._tracking_stage.cameras:
+        for camera in self._stage.cameras:
             self._subscribe(camera)
-        self._tuning = ReconfigureServer(given, self._tune)
-
-    def _tune(self, _params, marker_params, *tracking):
-        with self._lock:
-            self._tracking_stage.reconfigure(tracking)
-            self._markers.reconfigure(marker_params)
+        self._reconfigure_server = ReconfigureServer(given, self._reconfigure)
 
     def _subscribe(self, camera):
         def of_camera(callback):
             return functools.partial(callback, camera=camera)
         subscribe(topic_of(camera, BOXES3D_TOPIC), BoundingBox3DArray, of_camera(self._on_boxes))
-        with_camera, with_depth = self._tracking_stage.looks
-        if with_camera:
+        if self._stage.uses_camera_info:
             subscribe(topic_of(camera, INFO_TOPICS[0]), CameraInfo, of_camera(self._on_camera_info), 1)
-        if with_depth:
+        if self._stage.uses_depth:
             subscribe(topic_of(camera, DEPTH_TOPIC), Image, of_camera(self._on_depth), KEPT_AT_ONCE)
+
+    def _reconfigure(self, _params, marker_params, *tracking):
+        with self._stage.lock:
+            self._stage.reconfigure(tracking)
+            self._markers.reconfigure(marker_params)
 
     def _on_camera_info(self, message, camera):
         with self._diagnostics.receiving('camera_info'):
-            self._tracking_stage.add_camera_info(message, camera)
+            self._stage.add_camera_info(message, camera)
 
     def _on_depth(self, message, camera):
         with self._diagnostics.receiving('depth images'):
-            self._tracking_stage.add_depth(message, arrival_clock_ns(), camera)
+            self._stage.add_depth(message, arrival_clock_ns(), camera)
 
     def _on_boxes(self, message, camera):
         with self._diagnostics.receiving('3D boxes'):
-            # Not under the lock: waiting for the transform of one camera must not delay the others.
-            located = self._tracking_stage.locate(message, arrival_clock_ns(), camera)
-            if located is None:
-                return
-            with self._lock:
-                followed = self._tracking_stage.follow(located)
-                if followed is not None:
-                    self._publish(followed)
+            self._stage.add_boxes(message, arrival_clock_ns(), camera)
 
-    def _publish(self, followed):
-        tracks = self._numbers.assign(followed.tracks)
-        self._tracks_pub.publish(tracks_to_msg(tracks, followed.header))
-        self._diagnostics.record_latency(followed.header.stamp)
+    def _on_tracks(self, tracks, header):
+        self._track_ids.reserve(tracks)
+        self._tracks_pub.publish(tracks_to_msg(tracks, header))
+        self._diagnostics.record_latency(header.stamp)
         if self._markers_pub.get_num_connections():
-            self._markers_pub.publish(self._markers.write(tracks, followed.header))
+            self._markers_pub.publish(self._markers.write(tracks, header))
+
+
+class TrackIdReservation(object):
+    """Reserves track IDs, so that they remain unique when the tracker is killed and restarted.
+
+    The largest reserved ID is stored on the parameter server, which outlives the node. The parameter is outside the
+    node's namespace (`/tracker_node_numbers`), because roslaunch clears private parameters. IDs are also assigned while
+    the master is unreachable. `last_id` is the last ID that was reserved before the node was started.
+
+    Raises
+    ------
+    ValueError
+        If the parameter is not a valid ID.
+    """
+
+    def __init__(self, diagnostics):
+        self._diagnostics, self._name = diagnostics, rospy.get_name() + '_numbers'
+        self.last_id = rospy.get_param(self._name, 0)
+        if type(self.last_id) is not int or not 0 <= self.last_id <= LARGEST_PARAM - RESERVED_IDS:
+            raise ValueError('parameter %s is %r; the largest track ID so far expected' % (self._name, self.last_id))
+        self._reserved = self.last_id + RESERVED_IDS
+        rospy.set_param(self._name, self._reserved)
+        on_new_master(lambda: self._worker.offer(self._reserved))
+        # In a separate thread, because an unresponsive master must not block the tracks.
+        self._worker = NewestWorker(self._store, self._on_error)
+
+    def reserve(self, tracks):
+        """Reserve further IDs before those of the tracks, which are ordered by ID, reach the last reserved one."""
+        if tracks and tracks[-1].id > self._reserved - RESERVED_IDS // 2:
+            self._worker.offer(tracks[-1].id + RESERVED_IDS)
+
+    def _store(self, last_id):
+        rospy.set_param(self._name, last_id)
+        self._reserved = last_id
+
+    def _on_error(self, error):
+        self._diagnostics.warn('track IDs not reserved', 'the ROS master does not accept the parameter %s (%s): a '
+                               'restarted tracker may assign the same track IDs again; trying again'
+                               % (self._name, error))
 
 
 def main():

@@ -1,19 +1,21 @@
 """ROS node that displays images and boxes, and stores measurements in a session."""
+import collections
+import contextlib
 import os
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import rospy
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, boxes2d_from_msg, boxes3d_from_msg,
-                                                   camera_from_msg, stamp_if_any, stamp_of, time_from,
-                                                   usable_boxes3d)
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes2d_from_msg, boxes3d_from_msg,
+                                                   camera_from_msg, stamp_if_any, stamp_of, time_from, usable_boxes3d)
 from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
@@ -23,11 +25,10 @@ from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.sessions.frame_synchronizer import Snapshots
 from ros_3d_bb.sessions.session_writer import MeasurementRecord, append
-from ros_3d_bb.visualization.cv_window import Window, WindowError
+from ros_3d_bb.visualization.cv_window import Window
 from ros_3d_bb.visualization.viewer_layout import FrameRate, ViewerContent, compose, text_image
 
-COLOR_TOPIC, DEPTH_TOPIC = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
-CAMERA_INFO_TOPIC = 'camera/color/camera_info'
+CAMERA_INFO_TOPIC = INFO_TOPICS[0]
 ENABLE_SERVICE = 'detector/enable'
 KEYS = 'keys: s saves, p pauses the detector, q quits'
 
@@ -42,20 +43,16 @@ class ViewerParams(NamedTuple):
     frame_id: str = Param('')
     depth_scale: float = DEPTH_SCALE
     cache_length: float = Param(
-        1.0, 'How long images wait for their boxes. Where boxes take longer, the images are shown and stored without.',
+        1.0, 'How long images wait for their boxes. If boxes take longer, the images are shown and stored without.',
         's')
     stamp_tolerance: float = STAMP_TOLERANCE
     window_rate: float = Param(
-        15.0, 'Largest rate at which the window is drawn; it is drawn for new images only.', 'Hz', limits=(0.1, 10000))
+        15.0, 'Maximum rate of drawing the window, which is drawn for new images only.', 'Hz', limits=(0.1, 10000))
     panel_width: int = Param(480, 'Width of each of the three images in the window.', 'pixels', limits=(80, 10000))
     depth_image_range: float = Param(6.0, 'Depth at the far end of the colours.', 'm', limits=(0.1, 10000))
 
 
-class Color(NamedTuple):
-    """A colour image (RGB) and the frame of its camera."""
-
-    pixels: Any
-    frame_id: str
+Color = collections.namedtuple('Color', 'pixels frame_id')  # RGB image and the frame of its camera
 
 
 class ViewerNode(object):
@@ -90,45 +87,51 @@ class ViewerNode(object):
 
     def __init__(self):
         self._params, = read_params(ViewerParams)
-        _check(self._params)
-        self._window = _window() if self._params.window else None
+        if self._params.session and not os.path.isabs(self._params.session):
+            raise ValueError('parameter ~session is %r; an absolute path expected' % self._params.session)
+        self._window = Window('ros_3d_bb viewer') if self._params.window else None
         self._snapshots = Snapshots(int(self._params.cache_length * NS), int(self._params.stamp_tolerance * NS),
                                     self._on_lost)
         self._lock, self._capture_lock = threading.Lock(), threading.Lock()
-        self._rate, self._came, self._answer = FrameRate(), set(), ''
-        self._captured_ns, self._is_said, self._is_paused = None, False, False
+        self._rate, self._received_topics, self._answer = FrameRate(), set(), ''
+        self._captured_ns, self._is_warned, self._is_paused = None, False, False
         self._label, self._diagnostics = Label(self._params.label), Diagnostics()
         rospy.Service('~capture', Trigger, lambda _request: TriggerResponse(*self.capture()))
         for topic, kind, callback in ((BOXES3D_TOPIC, BoundingBox3DArray, self._on_boxes3d),
-                                      ('yolo_bounding_box', Int32MultiArray, self._on_boxes2d),
+                                      (BOXES_TOPIC, Int32MultiArray, self._on_boxes2d),
                                       (CAMERA_INFO_TOPIC, CameraInfo, self._on_camera_info),
                                       (DEPTH_TOPIC, Image, self._on_depth), (COLOR_TOPIC, Image, self._on_color)):
             subscribe(topic, kind, callback, KEPT_AT_ONCE)
 
     def _on_color(self, message):
-        with self._diagnostics.receiving('colour images'), self._lock:
+        with self._receiving('colour images', COLOR_TOPIC):
             color, now_ns = Color(imgmsg_to_rgb(message), message.header.frame_id), arrival_clock_ns()
             self._rate.add(now_ns)
             self._snapshots.add_color(stamp_of(message), now_ns, color)
-            self._note(COLOR_TOPIC)
 
     def _on_depth(self, message):
-        with self._diagnostics.receiving('depth images'), self._lock:
+        with self._receiving('depth images', DEPTH_TOPIC):
             depth = imgmsg_to_depth(message, self._params.depth_scale)
             self._snapshots.add_depth(stamp_of(message), arrival_clock_ns(), depth)
-            self._note(DEPTH_TOPIC)
 
     def _on_camera_info(self, message):
-        with self._diagnostics.receiving('camera_info'), self._lock:
+        with self._receiving('camera_info', CAMERA_INFO_TOPIC):
             camera = camera_from_msg(message)
             self._snapshots.add_camera(stamp_if_any(message), arrival_clock_ns(), camera)
-            self._note(CAMERA_INFO_TOPIC)
+
+    @contextlib.contextmanager
+    def _receiving(self, inputs, topic):
+        """Context manager for a message of the camera, which is recorded unless it is rejected."""
+        with self._diagnostics.receiving(inputs), self._lock:
+            yield
+            self._received_topics.add(topic)
+            self._diagnostics.count('messages of the camera')
 
     def _on_boxes2d(self, message):
         with self._diagnostics.receiving('2D boxes'), self._lock:
             boxes = boxes2d_from_msg(message)
             if boxes.stamp_ns is None:
-                rospy.loginfo_once('the 2D boxes carry no stamp: only those of which 3D boxes are made are stored')
+                rospy.loginfo_once('the 2D boxes have no stamp; only those with a 3D box are stored')
                 return
             self._snapshots.add_boxes2d(boxes.stamp_ns, arrival_clock_ns(),
                                         tuple(tuple(rect_px) for rect_px in boxes.boxes.tolist()))
@@ -136,28 +139,16 @@ class ViewerNode(object):
     def _on_boxes3d(self, message):
         with self._diagnostics.receiving('3D boxes'), self._lock:
             usable, faults = usable_boxes3d(message)
-            self._diagnostics.leave_out('3D boxes', faults)
+            self._diagnostics.count_dropped('3D boxes', faults)
             self._snapshots.add_boxes3d(stamp_of(message), arrival_clock_ns(), boxes3d_from_msg(usable))
-            self._is_said = False
-
-    def _note(self, topic):
-        """Record the arrival of a camera message on a topic."""
-        self._came.add(topic)
-        self._diagnostics.count('messages of the camera')
+            self._is_warned = False
 
     def _on_lost(self, stamp_ns):
-        """Warn that no depth image arrived for a colour image."""
         self._diagnostics.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f '
-                               'of the colour image came; waiting for the next' % (stamp_ns / NS))
+                               'of the colour image received; waiting for the next' % (stamp_ns / NS))
 
     def capture(self):
-        """Append the newest image and its boxes to the session.
-
-        Returns
-        -------
-        bool, str
-            Whether the measurement was stored, and a message with its ID or the reason for the failure.
-        """
+        """Append the newest image and its boxes to the session. Returns whether it was stored, and a message."""
         with self._capture_lock:
             try:
                 done, self._answer = True, self._stored()
@@ -173,14 +164,14 @@ class ViewerNode(object):
         if not self._params.session:
             raise ValueError('no session is given; start the viewer with session:=FOLDER')
         snapshot = self._snapshot_to_store()
-        label = self._label.asked()
-        appended = append(self._params.session, MeasurementRecord(
+        label = self._label.from_master()
+        name, count = append(self._params.session, MeasurementRecord(
             snapshot.color.pixels, snapshot.depth, snapshot.camera, self._params.frame_id or snapshot.color.frame_id,
             snapshot.stamp_ns, snapshot.boxes2d or (), snapshot.boxes3d or (), label))
         self._captured_ns = snapshot.stamp_ns
         found = ('without 3D boxes' if snapshot.boxes3d is None else
                  'with %d 3D box%s' % (len(snapshot.boxes3d), '' if len(snapshot.boxes3d) == 1 else 'es'))
-        return 'saved %s %s%s: number %d in %s' % (appended.id, found, label and ', label %s' % label, appended.count,
+        return 'saved %s %s%s: number %d in %s' % (name, found, label and ', label %s' % label, count,
                                                    self._params.session)
 
     def _snapshot_to_store(self):
@@ -193,35 +184,35 @@ class ViewerNode(object):
         if snapshot is None:
             raise ValueError(self._why_nothing())
         if snapshot.stamp_ns == self._captured_ns:
-            raise ValueError('nothing new has come since the last measurement')
+            raise ValueError('no new image received since the last measurement')
         if snapshot.boxes3d is None and is_early:
-            raise ValueError('the 3D boxes of the first images may still be on their way; try again')
-        if snapshot.boxes3d is None and not self._is_said:
-            self._is_said = True
-            raise ValueError('no 3D boxes have come on %s for the images of the last %.1f s; once more saves the '
-                             'images without' % (rospy.resolve_name(BOXES3D_TOPIC), self._params.cache_length))
+            raise ValueError('the 3D boxes of the first images are not available yet; try again')
+        if snapshot.boxes3d is None and not self._is_warned:
+            self._is_warned = True
+            raise ValueError('no 3D boxes received on %s for the images of the last %.1f s; try again to save the '
+                             'images without boxes' % (rospy.resolve_name(BOXES3D_TOPIC), self._params.cache_length))
         return snapshot
 
     def _why_nothing(self):
         missing = [rospy.resolve_name(topic) for topic in (COLOR_TOPIC, DEPTH_TOPIC, CAMERA_INFO_TOPIC)
-                   if topic not in self._came]
+                   if topic not in self._received_topics]
         if missing:
-            return 'nothing has come on %s' % ', '.join(missing)
-        return 'no depth image with the stamp of a colour image has come on %s' % rospy.resolve_name(DEPTH_TOPIC)
+            return 'no messages received on %s' % ', '.join(missing)
+        return 'no depth image with the stamp of a colour image received on %s' % rospy.resolve_name(DEPTH_TOPIC)
 
     def pause_or_resume(self):
         """Pause or resume the detector, and show the result in the window."""
         try:
             answer = rospy.ServiceProxy(ENABLE_SERVICE, SetBool)(self._is_paused)
         except rospy.ServiceException as error:
-            self._answer = 'the detector cannot be paused: nobody answers on the service %s (%s)' % (
+            self._answer = 'the detector cannot be paused: the service %s does not respond (%s)' % (
                 rospy.resolve_name(ENABLE_SERVICE), error)
             rospy.logwarn('%s', self._answer)
             return
         self._answer = answer.message
         if answer.success:
             self._is_paused = not self._is_paused
-            self._is_said = self._is_paused  # the user paused the detector and expects no boxes
+            self._is_warned = self._is_paused  # the user paused the detector and expects no boxes
 
     def run(self):
         """Show the window until it is closed or ROS shuts down. Runs in the main thread, which must not publish."""
@@ -251,10 +242,10 @@ class ViewerNode(object):
         if snapshot is None:
             self._window.show(text_image((KEYS,), (self._why_nothing(),), 3 * self._params.panel_width))
             return None
-        label = self._label.heard()
-        news = (snapshot.stamp_ns, snapshot.boxes2d, snapshot.boxes3d is None, rate_hz == 0, self._answer,
-                self._is_paused, label)
-        if news == shown:
+        label = self._label.from_cache()
+        content = (snapshot.stamp_ns, snapshot.boxes2d, snapshot.boxes3d is None, rate_hz == 0, self._answer,
+                   self._is_paused, label)
+        if content == shown:
             return shown
         lines = ('%.1f images/s    stamp %d.%09d    %s' % ((rate_hz,) + divmod(snapshot.stamp_ns, NS) + (
                      'no 3D boxes' if snapshot.boxes3d is None else '3D boxes: %d' % len(snapshot.boxes3d),)),
@@ -263,34 +254,20 @@ class ViewerNode(object):
                              tuple(self._warnings(snapshot, is_early, rate_hz)))
         self._window.show(compose(view, self._params.panel_width, self._params.depth_image_range))
         self._diagnostics.record_latency(time_from(snapshot.stamp_ns))
-        return news
+        return content
 
     def _warnings(self, snapshot, is_early, rate_hz):
         if self._is_paused:
             yield 'the detector is paused'
         elif snapshot.boxes3d is None and not is_early:
-            yield 'no 3D boxes come on %s' % rospy.resolve_name(BOXES3D_TOPIC)
+            yield 'no 3D boxes on %s' % rospy.resolve_name(BOXES3D_TOPIC)
         if rate_hz == 0:
-            yield 'no new images come on %s' % rospy.resolve_name(COLOR_TOPIC)
-
-
-def _check(params):
-    """Raise ValueError if a parameter is invalid."""
-    if params.session and not os.path.isabs(params.session):
-        raise ValueError('parameter ~session is %r; an absolute path expected' % params.session)
-
-
-def _window():
-    try:
-        return Window('ros_3d_bb viewer')
-    except WindowError as error:
-        raise ValueError('%s; ~window:=false (launch argument window:=false) does without' % error)
+            yield 'no new images on %s' % rospy.resolve_name(COLOR_TOPIC)
 
 
 def _complain(future):
-    """Log an unexpected exception of a key's action."""
     if future.exception() is not None:
-        rospy.logerr('the key did nothing: %r', future.exception())
+        rospy.logerr('the action of the key failed: %r', future.exception())
 
 
 def main():

@@ -3,6 +3,7 @@ import os
 from typing import NamedTuple
 
 import genpy
+import numpy as np
 import tf2_ros
 
 from ros_3d_bb.camera.camera_model import transform_from
@@ -43,7 +44,7 @@ class DepthDetectorParams(NamedTuple):
 
 
 def opened_yolov5(weights, detection, running, warn):
-    """Load and warm up a YOLOv5 detector.
+    """Return a `Yolov5` detector.
 
     Parameters
     ----------
@@ -54,10 +55,6 @@ def opened_yolov5(weights, detection, running, warn):
     warn : callable
         Called with the text of each warning.
 
-    Returns
-    -------
-    Yolov5
-
     Raises
     ------
     ValueError
@@ -67,22 +64,14 @@ def opened_yolov5(weights, detection, running, warn):
         raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
                          'checkpoint such as yolov5n.pt')
     detector = Yolov5(open_runtime(os.path.abspath(os.path.expanduser(weights)), running, warn), detection)
-    detector.warm_up()
+    detector.detect(np.zeros((480, 640, 3), np.uint8))  # the first detection takes several times as long as others
     return detector
 
 
-def search_color(detector, message):
-    """Detect objects in a colour image with a `detector.Yolov5`.
+def detect_in_color(detector, message):
+    """Return a colour image as RGB, (height, width, 3), and the Detections of a `detector.Yolov5` in it.
 
-    Returns
-    -------
-    (numpy.ndarray, ros_3d_bb.detection.boxes.Detections)
-        The RGB image, (height, width, 3), and its detections.
-
-    Raises
-    ------
-    ValueError
-        If the image cannot be used.
+    Raises ValueError if the image or its stamp cannot be used.
     """
     stamp_of(message)
     image = imgmsg_to_rgb(message)
@@ -92,52 +81,43 @@ def search_color(detector, message):
 class RgbdDetectionStage(object):
     """Pair colour images with the depth image and camera model of the same stamp, and detect people in them.
 
-    Each `add_` method validates a message and passes it to the synchronizer together with its arrival time (integer
-    nanoseconds, see `time_sync.StampSynchronizer`). The synchronizer calls `on_frame` with each complete frame, which
-    the caller passes to `search`.
+    Each `add_` method adds a message with its arrival time (integer nanoseconds, see `time_sync.StampSynchronizer`), or
+    raises ValueError if it cannot be used.
 
     Parameters
     ----------
     params : DepthDetectorParams
     people : DepthPeopleParams
-    tally : event_counter.EventCounter
+    events : event_counter.EventCounter
     on_frame : callable
-        Called with two sensor_msgs/Image, colour and depth, and a `camera_model.Camera` of one stamp.
+        Called with two sensor_msgs/Image, colour and depth, and a `camera_model.Camera` of one stamp, for `detect`.
     transforms
         As for `tracking_stage.TrackingStage`; None if no floor frame is given.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is invalid.
     """
 
     names = ('person',)
 
-    def __init__(self, params, people, tally, on_frame, transforms):
-        self._params, self._tally, self._transforms = params, tally, transforms
+    def __init__(self, params, people, events, on_frame, transforms):
+        self._params, self._events, self._transforms = params, events, transforms
         self._detector = DepthPeople(people)
         self._sync = StampSynchronizer(CACHE_NS, int(params.stamp_tolerance * NS), 0, on_frame, self._on_lost)
 
     def reconfigure(self, params, people):
-        """Use another floor height and other `people` parameters for the next images.
-
-        Raises ValueError and keeps the old parameters if the new ones are invalid.
-        """
+        """Change the parameters. If they are invalid, raise ValueError and keep the old ones."""
         self._detector.reconfigure(people)
         self._params = params
 
     def add_camera_info(self, message, now_ns):
-        """Add a sensor_msgs/CameraInfo. Raises ValueError if it cannot be used."""
+        """Add a sensor_msgs/CameraInfo."""
         camera = camera_from_msg(message)
         self._sync.add_camera(stamp_if_any(message), now_ns, camera)
 
     def add_depth(self, message, now_ns):
-        """Add a depth image. Raises ValueError if it has no stamp."""
+        """Add a depth image."""
         self._sync.add_depth(stamp_of(message), now_ns, message)
 
     def add_color(self, message, now_ns):
-        """Add a colour image. Raises ValueError if it has no stamp."""
+        """Add a colour image."""
         self._sync.add_boxes(stamp_of(message), now_ns, message)
 
     def end(self):
@@ -146,39 +126,26 @@ class RgbdDetectionStage(object):
 
     def _on_lost(self, color_msg, of_time_before):
         if of_time_before:
-            self._tally.count('colour images of a time before')
+            self._events.count('colour images of a time before')
             return
-        self._tally.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f of the '
-                         'colour image came; waiting for the next' % (stamp_of(color_msg) / NS))
+        self._events.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f of the '
+                          'colour image arrived; waiting for the next' % (stamp_of(color_msg) / NS))
 
-    def search(self, color_msg, depth_msg, camera):
-        """Detect people in a frame.
+    def detect(self, color_msg, depth_msg, camera):
+        """Return the RGB image, (height, width, 3), and the Detections in it; None while the floor is unknown.
 
-        Parameters
-        ----------
-        color_msg, depth_msg : sensor_msgs.msg.Image
-        camera : camera_model.Camera
-
-        Returns
-        -------
-        (numpy.ndarray, ros_3d_bb.detection.boxes.Detections) or None
-            The RGB image, (height, width, 3), and the people detected in it. None while the floor is unknown.
-
-        Raises
-        ------
-        ValueError
-            If the images cannot be used.
+        Raises ValueError if the images cannot be used.
         """
         image = imgmsg_to_rgb(color_msg)
         camera_frame = self._params.frame_id or color_msg.header.frame_id
         depth = imgmsg_to_depth(depth_msg, check_unit=True)
-        found = self._detector.detect(image, depth, camera, self._floor(camera_frame))
-        if found is None:
-            self._tally.warn('images without floor', 'no floor is known from tf nor seen in the depth image: nobody is '
-                             'looked for; waiting for the next image')
+        detections = self._detector.detect(image, depth, camera, self._floor(camera_frame))
+        if detections is None:
+            self._events.warn('images without floor', 'tf gives no floor, and none is visible in the depth image; no '
+                              'detection; waiting for the next image')
             return None
-        self._tally.count('images searched')
-        return image, found
+        self._events.count('images processed')
+        return image, detections
 
     def _floor(self, camera_frame):
         """Return the floor plane from tf, or None if it is unknown, so that the detector fits it.
@@ -190,8 +157,8 @@ class RgbdDetectionStage(object):
         try:
             camera_from_base = self._transforms.lookup(camera_frame, self._params.floor_frame, NEWEST)
         except tf2_ros.TransformException as error:
-            self._tally.warn('images without transform', 'no transform from %s to %s: %s; the floor is looked for in '
-                             'the depth image' % (self._params.floor_frame, camera_frame, error))
+            self._events.warn('images without transform', 'no transform from %s to %s: %s; fitting the floor to the '
+                              'depth image' % (self._params.floor_frame, camera_frame, error))
             return None
         base_from_floor = transform_from((0, 0, self._params.floor_height), (0, 0, 0, 1))
         return floor_from_transform(camera_from_base.dot(base_from_floor))

@@ -27,10 +27,9 @@ DETECTORS = 'yolov5', 'depth', 'none'
 
 
 class Settings(NamedTuple):
-    """Settings for processing bags: the detector and the parameters of each node.
+    """Settings for processing bags: detector, parameters of each node, topics, concurrent searches, and compression.
 
-    `names` maps topics of the nodes to topics of the bag; `keep` lists the topics to copy (None: all); `searches` is
-    the number of images that are searched concurrently.
+    `names` maps topics of the nodes to topics of the bag; `keep` lists the topics to copy (None: all).
     """
 
     detector: str = 'yolov5'
@@ -57,55 +56,48 @@ class Settings(NamedTuple):
 class Pipeline(object):
     """Detection and estimation stages of each camera and one tracking stage.
 
-    `take` accepts a message and returns the messages that the nodes would publish.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is invalid.
+    `take` accepts a message and returns the messages that the nodes would publish. Raises ValueError if a parameter is
+    invalid.
     """
 
-    def __init__(self, settings, tally, transforms):
-        self._tally = tally
-        follower, marker_params, *tracking = settings.tracker
-        self._tracking_stage, self._markers = TrackingStage(follower, tracking, tally,
-                                                            transforms), MarkerWriter(marker_params)
-        self._estimation_stages = {camera: EstimationStage(settings.bbox3d[0], tally,
-                                                           functools.partial(self._on_frame, camera),
-                                                           settings.name(DEPTH_TOPIC, camera),
-                                                           settings.name(INFO_TOPIC, camera))
-                                   for camera in settings.cameras}
-        self._searches, self._publish_empty = {}, settings.yolov5[0].publish_empty
+    def __init__(self, settings, events, transforms):
+        self._events = events
+        tracker_params, marker_params, *tracking = settings.tracker
+        self._tracking_stage = TrackingStage(tracker_params, tracking, events, transforms, self._on_tracks)
+        self._markers = MarkerWriter(marker_params)
+        self._estimation_stages, self._detection_stages = {}, {}
+        for camera in settings.cameras:
+            self._estimation_stages[camera] = EstimationStage(
+                settings.bbox3d[0], events, functools.partial(self._on_frame, camera),
+                settings.name(DEPTH_TOPIC, camera), settings.name(INFO_TOPIC, camera))
+        self._publish_empty = settings.yolov5[0].publish_empty
         if settings.detector == 'depth':
             params, people = settings.depth
-            transforms = transforms if params.floor_frame else None
-            self._searches = {camera: RgbdDetectionStage(params, people, tally,
-                                                         functools.partial(self._on_images, camera),
-                                                         transforms) for camera in settings.cameras}
             self._publish_empty = params.publish_empty
+            for camera in settings.cameras:
+                self._detection_stages[camera] = RgbdDetectionStage(
+                    params, people, events, functools.partial(self._on_images, camera),
+                    transforms if params.floor_frame else None)
         self._now_ns, self._outputs = 0, []  # time and outputs of the message that is being processed
 
     def take(self, topic, message, now_ns, camera=''):
         """Process a message recorded at `now_ns` on an input topic of the nodes. Returns [(topic, message), ...]."""
         self._now_ns, self._outputs = now_ns, []
-        search, lifter = self._searches.get(camera), self._estimation_stages[camera]
-        with_camera, with_depth = self._tracking_stage.looks
+        stages = [stages[camera] for stages in (self._detection_stages, self._estimation_stages) if camera in stages]
         if topic == INFO_TOPIC:
-            if with_camera:
+            if self._tracking_stage.uses_camera_info:
                 self._tracking_stage.add_camera_info(message, camera)
-            if search is not None:
-                search.add_camera_info(message, now_ns)
-            lifter.add_camera_info(message, now_ns)
+            for stage in stages:
+                stage.add_camera_info(message, now_ns)
         elif topic == DEPTH_TOPIC:
-            if with_depth:
+            if self._tracking_stage.uses_depth:
                 self._tracking_stage.add_depth(message, now_ns, camera)
-            if search is not None:
-                search.add_depth(message, now_ns)
-            lifter.add_depth(message, now_ns)
+            for stage in stages:
+                stage.add_depth(message, now_ns)
         elif topic == COLOR_TOPIC:
-            search.add_color(message, now_ns)
+            self._detection_stages[camera].add_color(message, now_ns)
         else:
-            lifter.add_boxes(message, now_ns)
+            self._estimation_stages[camera].add_boxes(message, now_ns)
         return self._outputs
 
     def found(self, header, found, now_ns, camera=''):
@@ -118,20 +110,20 @@ class Pipeline(object):
     def searching(self):
         """Context manager for the detection in one image. Exceptions are reported and do not stop the pipeline."""
         try:
-            with self._tally.rejecting('images'):
+            with self._events.rejecting('images'):
                 yield
         except Exception as error:  # as in the worker threads of the nodes
-            self._tally.warn('searches failed', 'the detector failed: %s; waiting for the next image' % cause(error))
+            self._events.warn('detections failed', 'the detector failed: %s; waiting for the next image' % cause(error))
 
     def end(self):
         """Report inputs that are still waiting for others. Call at the end of the input."""
-        for part in list(self._searches.values()) + list(self._estimation_stages.values()):
-            part.end()
+        for stage in [*self._detection_stages.values(), *self._estimation_stages.values()]:
+            stage.end()
 
     def _on_images(self, camera, color_msg, depth_msg, camera_model):
         """Detect people in the images of one stamp, as depth_detector_node does."""
         with self.searching():
-            found = self._searches[camera].search(color_msg, depth_msg, camera_model)
+            found = self._detection_stages[camera].detect(color_msg, depth_msg, camera_model)
             if found is not None:
                 _image, detections = found
                 self._on_detections(camera, color_msg.header, detections)
@@ -145,17 +137,15 @@ class Pipeline(object):
         self._estimation_stages[camera].add_boxes(message, self._now_ns)
 
     def _on_frame(self, camera, boxes2d, depth_msg, camera_model):
-        """Output the 3D boxes of one image, as bbox3d_node does."""
-        with self._tally.rejecting('2D boxes'):
+        """Output the 3D boxes of one image, as bbox3d_node does, and track them."""
+        with self._events.rejecting('2D boxes'):
             header, _depth, boxes3d = self._estimation_stages[camera].estimate(boxes2d, depth_msg, camera_model)
             message = boxes3d_to_msg(boxes3d, header, camera_model)
             self._outputs.append((topic_of(camera, BOXES3D_TOPIC), message))
-            self._on_boxes3d(camera, message)
+            with self._events.rejecting('3D boxes'):
+                self._tracking_stage.add_boxes(message, self._now_ns, camera)
 
-    def _on_boxes3d(self, camera, message):
+    def _on_tracks(self, tracks, header):
         """Output tracks and markers, as tracker_node does."""
-        with self._tally.rejecting('3D boxes'):
-            followed = self._tracking_stage.add_boxes(message, self._now_ns, camera)
-            if followed is not None:
-                self._outputs.append((TRACKS_TOPIC, tracks_to_msg(followed.tracks, followed.header)))
-                self._outputs.append((MARKERS_TOPIC, self._markers.write(followed.tracks, followed.header)))
+        self._outputs += [(TRACKS_TOPIC, tracks_to_msg(tracks, header)),
+                          (MARKERS_TOPIC, self._markers.write(tracks, header))]

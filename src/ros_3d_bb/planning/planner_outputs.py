@@ -1,5 +1,4 @@
 """Outputs of planner_bridge_node: topics, message types, and the packages that define them."""
-import functools
 import importlib
 from typing import Any, Callable, NamedTuple
 
@@ -33,34 +32,19 @@ class Output(NamedTuple):
     float32: bool = False
 
 
-class OptionalOutput(NamedTuple):
-    """An output whose message type is defined in a package that may not be installed."""
-
-    topic: str
-    package: str
-    kind: str
-    write: Callable
-    in_planner_frame: bool = False
-    to_now: bool = False
-    float32: bool = False
-
-
+# Outputs whose message type, given by name, is defined in a package that may not be installed. `write` takes tracks in
+# the output frame, the header and the `msg` module of the package. `frame` is the name of a parameter.
 OPTIONAL = {
-    'people': OptionalOutput('/people', 'people_msgs', 'People', people_to_msg, to_now=True),
-    'teb': OptionalOutput('~obstacles', 'costmap_converter', 'ObstacleArrayMsg', obstacles_to_msg,
-                          in_planner_frame=True, to_now=True, float32=True),
-    'mpc': OptionalOutput('~objects', 'derived_object_msgs', 'ObjectArray', objects_to_msg,
-                          in_planner_frame=True, to_now=True),
-    'vision': OptionalOutput('~detections', 'vision_msgs', 'Detection3DArray', detections3d_to_msg)}
+    'people': Output('/people', 'people_msgs/People', people_to_msg, to_now=True),
+    'teb': Output('~obstacles', 'costmap_converter/ObstacleArrayMsg', obstacles_to_msg, 'planner_frame', to_now=True,
+                  float32=True),
+    'mpc': Output('~objects', 'derived_object_msgs/ObjectArray', objects_to_msg, 'planner_frame', to_now=True),
+    'vision': Output('~detections', 'vision_msgs/Detection3DArray', detections3d_to_msg)}
 NAMES = ['costmap'] + sorted(OPTIONAL)
 
 
 def outputs_from(params):
-    """Create the outputs that the parameters select.
-
-    Returns
-    -------
-    list of Output
+    """Create the list of Output that the parameters (`PlannerBridgeParams`) select.
 
     Raises
     ------
@@ -73,24 +57,23 @@ def outputs_from(params):
         if name not in NAMES:
             raise ValueError('parameter ~outputs has %r; did you mean %s? Known: %s'
                              % (name, nearest_name(str(name), NAMES), ', '.join(NAMES)))
-    found = [_optional_output(name, params.planner_frame) for name in OPTIONAL if name in params.outputs]
+    found = [_optional_output(name, params) for name in OPTIONAL if name in params.outputs]
     return found + (_costmap_outputs(params) if 'costmap' in params.outputs else [])
 
 
-def _optional_output(name, planner_frame):
-    wanted = OPTIONAL[name]
+def _optional_output(name, params):
+    output = OPTIONAL[name]
+    package, kind = output.kind.split('/')
     try:
-        messages = importlib.import_module(wanted.package + '.msg')
+        messages = importlib.import_module(package + '.msg')
     except ImportError as error:
         raise ValueError('output %s needs the package %s (%s): install it (rosdep key %s, on Noetic: apt install '
-                         'ros-noetic-%s) or take %s out of ~outputs'
-                         % (name, wanted.package, error, wanted.package, wanted.package.replace('_', '-'), name))
-    return Output(wanted.topic, getattr(messages, wanted.kind), functools.partial(_converted, wanted.write, messages),
-                  planner_frame if wanted.in_planner_frame else '', wanted.to_now, wanted.float32)
+                         'ros-noetic-%s) or remove %s from ~outputs'
+                         % (name, package, error, package, package.replace('_', '-'), name))
 
-
-def _converted(write, messages, tracks, frame_from_tracks, header):
-    return write(in_frame(tracks, frame_from_tracks), header, messages)
+    def write(tracks, frame_from_tracks, header):
+        return output.write(in_frame(tracks, frame_from_tracks), header, messages)
+    return output._replace(kind=getattr(messages, kind), write=write, frame=getattr(params, output.frame, ''))
 
 
 def _costmap_outputs(params):
@@ -99,18 +82,15 @@ def _costmap_outputs(params):
     Both are in the robot's frame, because coordinates are float32 and stay small there in any map. They are level in
     the frame of the tracks even if the robot is tilted, because costmaps filter points by height in the fixed frame.
     """
-    outputs = [Output('~points', PointCloud2, functools.partial(_footprints, params), params.robot_frame, float32=True)]
+    def footprints(tracks, robot_from_tracks, header):
+        points_m = footprint_points(tracks, params.points_prediction, params.point_spacing)
+        return points_to_msg(transform_points(robot_from_tracks, points_m), header)
+
+    def ring(_tracks, robot_from_tracks, header):
+        return points_to_msg(ring_m.dot(robot_from_tracks[:3, :3].T), header)
+
+    outputs = [Output('~points', PointCloud2, footprints, params.robot_frame, float32=True)]
     if params.clearing_range:
         ring_m = ring_points(params.clearing_range, CLEARING_SPACING_M) + [0, 0, CLEARING_HEIGHT_M]
-        outputs.append(Output('~clearing_points', PointCloud2, functools.partial(_ring, ring_m), params.robot_frame))
+        outputs.append(Output('~clearing_points', PointCloud2, ring, params.robot_frame))
     return outputs
-
-
-def _footprints(params, tracks, robot_from_tracks, header):
-    points_m = footprint_points(tracks, params.points_prediction, params.point_spacing)
-    return points_to_msg(transform_points(robot_from_tracks, points_m), header)
-
-
-def _ring(ring_m, _tracks, robot_from_tracks, header):
-    """Message with a ring around the robot's origin, level in the frame of the tracks."""
-    return points_to_msg(ring_m.dot(robot_from_tracks[:3, :3].T), header)

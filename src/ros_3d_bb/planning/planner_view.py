@@ -13,14 +13,7 @@ LOWEST, HIGHEST = 0.25, 0.75  # fractions of a cylinder's height: off the floor 
 
 
 def usable_tracks(tracks):
-    """Separate valid from invalid tracks, so that an invalid track does not affect the others.
-
-    Returns
-    -------
-    usable : list of types.TrackedObject
-    faults : list of str
-        Description of the fault of each invalid track.
-    """
+    """Separate valid from invalid tracks. Returns the valid ones, and a description of the fault of each other one."""
     faults = [_fault_of(track) for track in tracks]
     return [track for track, fault in zip(tracks, faults) if not fault], [fault for fault in faults if fault]
 
@@ -29,10 +22,9 @@ def _fault_of(track):
     """Fault of a track: a value is not finite or implausibly large, or a size or step is not positive; '' if valid."""
     values = np.concatenate([track.position_m, track.velocity_mps, track.size_m, track.prediction_m.ravel()])
     if not ((np.abs(values) < FARTHEST_M).all() and (0 < track.size_m).all() and (track.size_m < LARGEST_M).all()):
-        shown = tuple(np.asarray(value).tolist() for value in (track.position_m, track.velocity_mps, track.size_m,
-                                                               track.prediction_m))
         return ('track %d has position %s, velocity %s, size %s and prediction %s; finite numbers and a size of more '
-                'than 0 and less than 10 m expected' % ((track.id,) + shown))
+                'than 0 and less than %g m expected' % (track.id, track.position_m, track.velocity_mps, track.size_m,
+                                                        track.prediction_m.tolist(), LARGEST_M))
     if track.covariance is not None and not (np.abs(track.covariance) < FARTHEST_M).all():
         return 'track %d has a covariance that is not finite' % track.id
     if len(track.prediction_m) and not track.prediction_step_s > 0:
@@ -41,57 +33,38 @@ def _fault_of(track):
     return ''
 
 
-def walking_velocity(track):
-    """Velocity (3,) of a moving track, m/s; zero for a track that does not move, because its velocity is noise that
-    planners would extrapolate.
-    """
+def _walking_velocity(track):
+    """Velocity (3,), m/s; zero for a track that does not move: it is noise that planners would extrapolate."""
     return track.velocity_mps if track.moving else np.zeros(3)
 
 
 def position_after(track, ahead_s):
-    """Interpolate the predicted positions of a track linearly; extrapolate beyond the last with `walking_velocity`.
+    """Positions (..., 3) of a track `ahead_s` (...) seconds after its stamp, metres.
 
-    Parameters
-    ----------
-    track : types.TrackedObject
-    ahead_s : array_like, (...)
-        Seconds after the stamp of the tracks, 0 or more.
-
-    Returns
-    -------
-    numpy.ndarray, (..., 3)
-        Positions in the frame of the tracks, metres.
+    The predicted positions are interpolated linearly. Beyond the last one, only moving tracks move on, at their
+    velocity.
     """
     ahead_s = np.asarray(ahead_s, float)
     times_s = track.prediction_step_s * np.arange(len(track.prediction_m) + 1)
     known_m = np.vstack((track.position_m, track.prediction_m))
     position_m = np.stack([np.interp(ahead_s, times_s, axis_m) for axis_m in known_m.T], axis=-1)
-    return position_m + np.maximum(ahead_s - times_s[-1], 0)[..., np.newaxis] * walking_velocity(track)
+    return position_m + np.maximum(ahead_s - times_s[-1], 0)[..., np.newaxis] * _walking_velocity(track)
 
 
 def predicted_to(tracks, ahead_s):
-    """Predict tracks `ahead_s` seconds ahead (see `position_after`), with `walking_velocity` and without predictions.
+    """Predict tracks `ahead_s` seconds ahead, see `position_after`; the result has no predictions, and no velocity
+    where a track does not move.
     """
-    return [track._replace(position_m=position_after(track, ahead_s), velocity_mps=walking_velocity(track),
+    return [track._replace(position_m=position_after(track, ahead_s), velocity_mps=_walking_velocity(track),
                            prediction_m=np.empty((0, 3)), prediction_covariance_m2=None) for track in tracks]
 
 
 def in_frame(tracks, b_from_a):
-    """Transform tracks from frame a to frame b, without their predictions.
-
-    Parameters
-    ----------
-    tracks : list of types.TrackedObject
-    b_from_a : numpy.ndarray, (4, 4)
-        Both frames have z up.
-
-    Returns
-    -------
-    list of types.TrackedObject
-    """
+    """Transform tracks from frame a to frame b, which both have z up; the result has no predictions."""
+    both = np.kron(np.eye(2), b_from_a[:3, :3])
     return [track._replace(position_m=transform_points(b_from_a, track.position_m),
                            velocity_mps=b_from_a[:3, :3].dot(track.velocity_mps),
-                           covariance=_turned(track.covariance, b_from_a[:3, :3]),
+                           covariance=None if track.covariance is None else both.dot(track.covariance).dot(both.T),
                            prediction_m=np.empty((0, 3)), prediction_covariance_m2=None) for track in tracks]
 
 
@@ -101,27 +74,9 @@ def rounding_m(tracks, b_from_a):
     return float(np.spacing(np.float32(farthest_m))) / 2
 
 
-def _turned(covariance, rotation):
-    if covariance is None:
-        return None
-    both = np.kron(np.eye(2), rotation)
-    return both.dot(covariance).dot(both.T)
-
-
 def footprint_points(tracks, ahead_s, spacing_m):
-    """Sample people's cylinders at three heights, and the discs that they are predicted to cover at half their height.
-
-    Parameters
-    ----------
-    tracks : list of types.TrackedObject
-    ahead_s : float
-        Prediction time, seconds; 0 for the current positions only.
-    spacing_m : float
-        Distance between the points of a disc.
-
-    Returns
-    -------
-    numpy.ndarray, (n, 3)
+    """Points (n, 3) of people's cylinders at three heights, and of the discs that they are predicted to cover up to
+    `ahead_s` seconds ahead, at half their height. The points of a disc are `spacing_m` apart.
     """
     later_s = np.linspace(0, ahead_s, int(np.ceil(ahead_s / SWATH_STEP_S)) + 1)[1:]
     points = [np.empty((0, 3))]

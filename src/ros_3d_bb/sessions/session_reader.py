@@ -29,8 +29,8 @@ class SessionError(ValueError):
 class RecordedDetection(NamedTuple):
     """Detected person in an image. Values that are not stored are None.
 
-    `box_px` is (x1, y1, x2, y2), `estimate_m` (x, y, z) is in the optical frame, `size_m` is (width, height), `support`
-    and `truncated` are as in box3d_estimator.Box3D. `by_hand`: a user drew the box.
+    `box_px` is (x1, y1, x2, y2), `estimate_m` (x, y, z) in the optical frame, `size_m` (width, height). `support` and
+    `truncated` are those of box3d_estimator.Box3D. `by_hand`: a user drew the box.
     """
 
     box_px: Optional[Tuple[int, int, int, int]]
@@ -91,14 +91,17 @@ class Session(NamedTuple):
 def read_session(folder):
     """Read the `frames.json` of a session, without rejected frames. `read_color` and `read_depth` read the images.
 
-    Raises
-    ------
-    SessionError
-        If the folder is not a session, or a field is missing or invalid.
+    Raises SessionError if the folder is not a session, or a field is missing or invalid.
     """
     content, path = read_description(folder), os.path.join(str(folder), FILE_NAME)
+    frames = []
     with session_errors(path):
-        return Session(*camera_of(content), tuple(_used_frames(str(folder), content['frames'], path)))
+        camera = camera_of(content)
+        for number, entry in enumerate(content['frames'], 1):
+            if not (isinstance(entry, dict) and entry.get('rejected')):
+                with session_errors('%s, measurement number %d' % (path, number)):
+                    frames.append(frame_of(str(folder), entry))
+        return Session(*camera, tuple(frames))
 
 
 def read_description(folder):
@@ -107,12 +110,12 @@ def read_description(folder):
     try:
         with session_errors(path), open(path, encoding='utf-8') as stream:
             content = json.load(stream)
+            if not isinstance(content, dict):
+                raise ValueError('an object with frames expected')
+            return content
     except OSError as error:
         raise SessionError('%s: not a measurement session (%s); expected a folder with frames.json, color/ and depth/'
                            % (folder, error.strerror))
-    if not isinstance(content, dict):
-        raise SessionError('%s: not the description of a measurement session; an object with frames expected' % path)
-    return content
 
 
 @contextlib.contextmanager
@@ -139,7 +142,7 @@ def camera_of(content):
 
 
 def frame_of(folder, entry):
-    """Frame of an entry of a description. For exceptions see `session_errors`."""
+    """Measurement of an entry of a description. For exceptions see `session_errors`."""
     if not isinstance(entry, dict):
         raise ValueError('a measurement is %.60r; an object expected' % (entry,))
     # sessions with one box per frame store the fields of the detection in the frame
@@ -147,17 +150,19 @@ def frame_of(folder, entry):
     person, truth_mm, stamp = int(entry.get('person', 0)), entry.get('truth_mm'), entry.get('stamp')
     if not 0 <= person < max(1, len(detections)):
         raise ValueError('person is %d, but there are %d detections' % (person, len(detections)))
+    truth_m = truth_y_m = None
+    if truth_mm is not None:
+        truth_m = _metres([truth_mm['x'], truth_mm['z']], 2)
+        truth_y_m = None if truth_mm.get('y') is None else _metres([truth_mm['y']], 1)[0]
     return Measurement(
         str(entry['id']), os.path.join(folder, entry['color']), os.path.join(folder, entry['depth']),
-        tuple(_detection_from(detection) for detection in detections), person,
-        None if truth_mm is None else _numbers([truth_mm['x'], truth_mm['z']], 2) / 1000,
-        None if truth_mm is None or truth_mm.get('y') is None else _numbers([truth_mm['y']], 1)[0] / 1000,
-        None if not entry.get('rejected') else str(entry['rejected']), None if stamp is None else _stamp_ns_from(stamp),
+        tuple(_detection_from(detection) for detection in detections), person, truth_m, truth_y_m,
+        str(entry['rejected']) if entry.get('rejected') else None, None if stamp is None else _stamp_ns_from(stamp),
         str(entry.get('label', '')))
 
 
 def read_color(frame, camera):
-    """Read the colour image of a frame, (height, width, 3), uint8, RGB. If `camera` is None, any size is accepted.
+    """Read the colour image of a frame, (height, width, 3), uint8, RGB, of any size if `camera` is None.
 
     Raises SessionError.
     """
@@ -168,7 +173,7 @@ def read_color(frame, camera):
 
 
 def read_depth(frame, session):
-    """Read the depth image of a frame. Raises SessionError."""
+    """Read the DepthImage of a frame. Raises SessionError."""
     image = read_image(frame.depth_path, session.camera)
     if image.dtype != np.uint16 or image.ndim != 2:
         raise SessionError('%s: 16-bit depth image with one channel expected; 8-bit images have no depth scale'
@@ -196,35 +201,28 @@ def boxes_of_others(box_px, boxes_px):
     return tuple(other_px for other_px, overlap in zip(boxes_px, overlaps) if overlap <= SAME_PERSON_IOU)
 
 
-def _used_frames(folder, entries, path):
-    """Yield the Frames of entries that are not rejected. Raises SessionError with the number of an invalid entry."""
-    for number, entry in enumerate(entries, 1):
-        if not (isinstance(entry, dict) and entry.get('rejected')):
-            with session_errors('%s, measurement number %d' % (path, number)):
-                yield frame_of(folder, entry)
-
-
 def _detection_from(entry):
-    box, size_mm, support = entry.get('box'), entry.get('size_mm'), entry.get('support')
-    estimate_mm = entry.get('estimate_mm', entry.get('original_mm'))
-    return RecordedDetection(None if not box else tuple(int(edge) for edge in _numbers(box, 4)),
-                             None if estimate_mm is None else _numbers(estimate_mm, 3) / 1000,
-                             None if size_mm is None else _numbers(size_mm, 2) / 1000,
+    estimate_m = _metres(entry.get('estimate_mm', entry.get('original_mm')), 3)
+    support, truncated = entry.get('support'), entry.get('truncated')
+    return RecordedDetection(tuple(int(edge) for edge in _numbers(entry['box'], 4)) if entry.get('box') else None,
+                             estimate_m, _metres(entry.get('size_mm'), 2),
                              None if support is None else float(_numbers([support], 1)[0]),
-                             None if entry.get('truncated') is None else bool(entry['truncated']),
-                             entry.get('by') == 'hand')
+                             None if truncated is None else bool(truncated), entry.get('by') == 'hand')
 
 
 def _stamp_ns_from(text):
-    """Parse '<secs>.<nsecs, 9 digits>' to nanoseconds. Raises ValueError."""
+    """Parse '<secs>.<nsecs, 9 digits>' to nanoseconds."""
     match = re.match(r'([0-9]{1,12})\.([0-9]{9})$', str(text))
     if match is None:
         raise ValueError('stamp is %.40r; seconds, a point and nine digits of nanoseconds expected' % (text,))
     return int(match.group(1)) * 10 ** 9 + int(match.group(2))
 
 
+def _metres(values_mm, count):
+    return None if values_mm is None else _numbers(values_mm, count) / 1000
+
+
 def _numbers(values, count):
-    """Convert `count` numbers to an array. Raises ValueError."""
     numbers = np.array(values, float)
     if numbers.shape != (count,) or not np.isfinite(numbers).all():
         raise ValueError('%s are not %d finite numbers' % (str(values)[:100], count))

@@ -25,22 +25,9 @@ ID_FORMAT = re.compile(r'(\d+)_\d+_\d{9}$')
 class MeasurementRecord(NamedTuple):
     """One measurement to be stored.
 
-    Attributes
-    ----------
-    color : numpy.ndarray, (height, width, 3), uint8
-        RGB.
-    depth : DepthImage
-        Aligned to colour.
-    camera : Camera
-    frame_id : str
-        Frame of the camera.
-    stamp_ns : int
-    rects_px : tuple of (x1, y1, x2, y2)
-        2D boxes.
-    boxes : tuple of Box3D
-        3D boxes that were estimated from the 2D boxes; some may be missing.
-    label : str
-        Name given by the user; may be empty.
+    `color` is (height, width, 3), uint8, RGB; `depth` is aligned to it. `frame_id` is the frame of the camera.
+    `rects_px` are the 2D boxes (x1, y1, x2, y2), and `boxes` the 3D boxes that were estimated from them; some may be
+    missing. `label` is given by the user.
     """
 
     color: np.ndarray
@@ -53,21 +40,13 @@ class MeasurementRecord(NamedTuple):
     label: str = ''
 
 
-class Appended(NamedTuple):
-    """ID of a new measurement, and the number of measurements in its session."""
-
-    id: str
-    count: int
-
-
 def append(folder, measurement):
-    """Append a measurement to the session in a folder. The folder is created if it does not exist.
-
-    The ID consists of the next free number and the stamp. Nothing is overwritten.
+    """Append a MeasurementRecord to the session in a folder, which is created if it does not exist.
 
     Returns
     -------
-    Appended
+    str, int
+        ID of the measurement (the next free number and the stamp), and number of measurements in the session.
 
     Raises
     ------
@@ -78,7 +57,10 @@ def append(folder, measurement):
         If the session cannot be written. It is unchanged.
     """
     depth = stored_depth(measurement.depth)
-    _check_sizes(measurement)
+    for name, pixels in (('colour', measurement.color), ('depth', measurement.depth.values)):
+        if pixels.shape[:2] != (measurement.camera.height, measurement.camera.width):
+            raise ValueError('the %s image has %d x %d pixels and the camera has %d x %d; depth aligned to colour '
+                             'expected' % ((name,) + pixels.shape[1::-1] + measurement.camera[:2]))
     for name in ('color', 'depth'):
         os.makedirs(os.path.join(folder, name), exist_ok=True)
     written = []
@@ -86,9 +68,13 @@ def append(folder, measurement):
         with locked_update(folder) as content:
             _check_camera(folder, measurement, depth.scale_m)
             content.setdefault('camera', _camera_entry(measurement, depth.scale_m))
-            entry = _frame_entry(measurement, _next_id(content['frames'], measurement.stamp_ns))
-            for name, pixels in (('color', measurement.color[..., ::-1]), ('depth', depth.values)):
-                path = os.path.join(folder, entry[name])
+            name = _next_id(content['frames'], measurement.stamp_ns)
+            entry = {'id': name, 'color': 'color/%s.png' % name, 'depth': 'depth/%s.png' % name,
+                     'stamp': '%d.%09d' % divmod(measurement.stamp_ns, NS), 'detections': _detections(measurement)}
+            if measurement.label:
+                entry['label'] = measurement.label
+            for kind, pixels in (('color', measurement.color[..., ::-1]), ('depth', depth.values)):
+                path = os.path.join(folder, entry[kind])
                 atomic_write(path, _png(pixels))
                 written.append(path)
             content['frames'].append(entry)
@@ -96,7 +82,7 @@ def append(folder, measurement):
         for path in written:
             os.unlink(path)
         raise
-    return Appended(entry['id'], len(content['frames']))
+    return entry['id'], len(content['frames'])
 
 
 def stored_depth(depth):
@@ -113,14 +99,6 @@ def stored_depth(depth):
     return DepthImage(np.where(valid, depth_mm, 0).astype(np.uint16), MILLIMETRE)
 
 
-def _check_sizes(measurement):
-    expected = (measurement.camera.height, measurement.camera.width)
-    for name, pixels in (('colour', measurement.color), ('depth', measurement.depth.values)):
-        if pixels.shape[:2] != expected:
-            raise ValueError('the %s image has %d x %d pixels and the camera has %d x %d; depth aligned to colour '
-                             'expected' % ((name,) + pixels.shape[1::-1] + measurement.camera[:2]))
-
-
 def _check_camera(folder, measurement, scale_m):
     """Raise ValueError if the folder contains a session of another camera."""
     if not os.path.exists(os.path.join(folder, FILE_NAME)):
@@ -135,25 +113,18 @@ def _check_camera(folder, measurement, scale_m):
 
 
 def _next_id(entries, stamp_ns):
-    numbers = [int(match.group(1)) for match in (ID_FORMAT.match(str(entry['id'])) for entry in entries) if match]
+    matches = [ID_FORMAT.match(str(entry['id'])) for entry in entries]
+    numbers = [int(match.group(1)) for match in matches if match]
     return '%05d_%d_%09d' % ((max([len(entries)] + numbers) + 1,) + divmod(stamp_ns, NS))
 
 
 def _camera_entry(measurement, scale_m):
-    camera = measurement.camera._asdict()
+    camera = dict(measurement.camera._asdict())
     model, distortion = camera.pop('distortion_model'), list(camera.pop('distortion'))
     camera.update(distortion=distortion or [0.0] * 5, depth_scale=scale_m, frame=measurement.frame_id)
     if model:
         camera['distortion_model'] = model
-    return dict(camera)
-
-
-def _frame_entry(measurement, name):
-    entry = {'id': name, 'color': 'color/%s.png' % name, 'depth': 'depth/%s.png' % name,
-             'stamp': '%d.%09d' % divmod(measurement.stamp_ns, NS), 'detections': _detections(measurement)}
-    if measurement.label:
-        entry['label'] = measurement.label
-    return entry
+    return camera
 
 
 def _detections(measurement):

@@ -11,54 +11,40 @@ HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the 
 HIDDEN_FEET_COST = 8.0  # cost of a box whose top matches but whose height does not: its lower part is occluded
 
 
-def associate(tracks, batch, stamp_ns, params, outliers):
-    """Assign detections to tracks in a cascade: recently matched, then missed, then tentative tracks.
+def associate(tracks, measurements, stamp_ns, params):
+    """Assign measurements to tracks (arrays of TRACK and MEASUREMENT) in a cascade: recently matched, then missed, then
+    tentative tracks. Returns the rows of the tracks and the columns of the measurements of the pairs.
 
     A pair is allowed only if the track explains the detection better than a new target does.
-
-    Parameters
-    ----------
-    tracks : numpy.ndarray of track.TRACK, (n,)
-        Predicted to the stamp.
-    batch : measurement_model.MeasurementBatch
-        m measurements.
-    stamp_ns : int
-    params : tracker.TrackerParams
-    outliers : kalman_filter.Outliers
-
-    Returns
-    -------
-    rows, columns : numpy.ndarray of int, (k,)
-        Row of the track and column of the measurement of each pair.
     """
-    cost = kalman_filter.negative_log_likelihood(tracks['mean'], tracks['covariance'], batch.ground, outliers)
-    cost += _height_cost(tracks, batch, params.height_sigma)
+    cost = kalman_filter.negative_log_likelihood(tracks['mean'], tracks['covariance'], measurements, params)
+    cost += _height_cost(tracks, measurements, params.height_sigma)
     # An uncertain detection fits a new target and a track about equally well; the track takes precedence.
-    largest_density = 1 / (2 * np.pi * np.sqrt(np.linalg.det(batch.ground.noise_m2)))
+    largest_density = 1 / (2 * np.pi * np.sqrt(np.linalg.det(measurements['noise_m2'])))
     density = np.minimum(params.new_target_density, UNSURE_SHARE * largest_density)
     cost[cost >= -2 * np.log(2 * np.pi * density)] = np.inf
     is_missed = stamp_ns - tracks['last_ns'] >= RECENT_NS
     priority = np.where(tracks['confirmed'], is_missed.astype(int), 2)
-    pairs, free = [], np.arange(cost.shape[1])
+    pairs, free = [np.zeros((2, 0), int)], np.arange(cost.shape[1])
     for rank in range(3):
-        rows = np.flatnonzero(priority == rank)
-        if len(rows) and len(free):
-            matches = assign(cost[np.ix_(rows, free)])
-            pairs += [(rows[row], free[column]) for row, column in matches]
-            free = np.delete(free, [column for _row, column in matches])
-    return np.array(pairs, int).reshape(-1, 2).T
+        candidates = np.flatnonzero(priority == rank)
+        if len(candidates) and len(free):
+            rows, columns = assign(cost[np.ix_(candidates, free)])
+            pairs.append((candidates[rows], free[columns]))
+            free = np.delete(free, columns)
+    return np.concatenate(pairs, axis=1)
 
 
-def _height_cost(tracks, batch, sigma_m):
+def _height_cost(tracks, measurements, sigma_m):
     """Association cost (n, m) of the height differences, as a negative log likelihood.
 
     The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track. The
     tops of the heads are then compared if both are known; otherwise the cost is 0. Where the height is known, the cost
     is at most that of the tops plus `HIDDEN_FEET_COST`, because furniture occludes only the lower part of a body.
     """
-    seen, cut = tracks['end_hits'] > 0, batch.vertical_cuts
-    cost = ((tracks['size_m'][:, 2:] - batch.sizes_m[:, 2]) / sigma_m) ** 2 / 2
-    tops_m = tracks['z_m'] + tracks['size_m'][:, 2] / 2, batch.z_m + batch.sizes_m[:, 2] / 2
+    seen, cut = tracks['end_hits'] > 0, measurements['cut_ends']
+    cost = ((tracks['size_m'][:, 2:] - measurements['size_m'][:, 2]) / sigma_m) ** 2 / 2
+    tops_m = tracks['z_m'] + tracks['size_m'][:, 2] / 2, measurements['z_m'] + measurements['size_m'][:, 2] / 2
     top_cost = ((tops_m[0][:, None] - tops_m[1]) / (HEAD_SIGMAS * sigma_m)) ** 2 / 2
     top_cost[~(seen[:, 1:] & ~cut[:, 1])] = 0
     heights_known = seen.all(axis=1)[:, None] & ~cut.any(axis=1)
@@ -66,16 +52,9 @@ def _height_cost(tracks, batch, sigma_m):
 
 
 def match_greedily(distances):
-    """Pair rows with columns greedily, in order of distance (thesis 3.6). Each row and column is used at most once.
+    """Pair rows with columns of `distances` (n, m) greedily (thesis 3.6). Each row and column is used at most once.
 
-    Parameters
-    ----------
-    distances : array_like, (n, m)
-
-    Returns
-    -------
-    list of (int, int)
-        min(n, m) pairs (row, column) by increasing distance; ties are ordered by row, then column.
+    Returns a list of min(n, m) pairs (row, column) by increasing distance; ties are ordered by row, then column.
     """
     distances = np.asarray(distances, float)
     pairs, rows, columns = [], set(), set()
@@ -94,29 +73,18 @@ def plane_distances(positions, others):
 
 
 def assign(costs):
-    """Pair rows with columns: the maximum number of allowed pairs, with the minimum total cost.
-
-    Parameters
-    ----------
-    costs : array_like, (n, m)
-        inf for pairs that are not allowed.
-
-    Returns
-    -------
-    list of (int, int)
-        Pairs (row, column).
+    """Rows and columns (k,) of the maximum number of allowed pairs with the minimum total cost; `costs` (n, m) are inf
+    for pairs that are not allowed.
     """
-    costs = np.asarray(costs, float)
     allowed = np.isfinite(costs)
-    if not allowed.any():
-        return []
     forbidden = 1e6 + np.abs(costs[allowed]).sum()
-    pairs = zip(*linear_sum_assignment(np.where(allowed, costs, forbidden)))
-    return [(int(row), int(column)) for row, column in pairs if allowed[row, column]]
+    rows, columns = linear_sum_assignment(np.where(allowed, costs, forbidden))
+    is_allowed = allowed[rows, columns]
+    return rows[is_allowed], columns[is_allowed]
 
 
-def unmatched(count, numbers):
-    """Indices (k,) below `count` that are not in `numbers`, in increasing order."""
-    left = np.ones(count, bool)
-    left[numbers] = False
-    return np.flatnonzero(left)
+def unmatched(count, matched):
+    """Indices (k,) below `count` that are not in `matched`, in increasing order. Faster than np.setdiff1d."""
+    is_matched = np.zeros(count, bool)
+    is_matched[matched] = True
+    return np.flatnonzero(~is_matched)

@@ -1,75 +1,33 @@
 """Constant-velocity Kalman filter in the plane, vectorised over objects, with a model of outliers behind the object.
 
 Convention: a state is (x, y, vx, vy), metres and m/s, in the fixed frame; `mean` is (n, 4), `covariance` (n, 4, 4).
-A measurement is (x, y). If the depth of a box is that of the background, the measurement lies behind the person on the
+`measurements` is an array of `measurement_model.MEASUREMENT`, `params` has the `outlier_` fields of
+`tracker.TrackerParams`. If the depth of a box is that of the background, the measurement lies behind the person on the
 viewing ray. The measurement error is therefore a mixture of two Gaussians, one of them shifted along the ray.
 """
-from typing import NamedTuple
-
 import numpy as np
 
 
-class Measurements(NamedTuple):
-    """Positions (m, 2) measured in one image, their covariances (m, 2, 2), and the unit vectors (m, 2) of the viewing
-    rays from the camera to them."""
-
-    positions_m: np.ndarray
-    noise_m2: np.ndarray
-    rays: np.ndarray
-
-
-class Outliers(NamedTuple):
-    """Probability that a measurement lies behind the object, and mean and standard deviation of the offset, metres."""
-
-    probability: float = 0.1
-    offset: float = 0.45
-    spread: float = 0.3
-
-    def components(self):
-        """(weight, offset_m, spread_m) of the inlier and of the outlier component."""
-        return (1 - self.probability, 0.0, 0.0), (self.probability, self.offset, self.spread)
-
-
 def predict(mean, covariance, elapsed_s, density):
-    """Predict the states `elapsed_s` ahead, with white-noise acceleration of `density` m²/s³.
-
-    Returns
-    -------
-    mean, covariance : numpy.ndarray
-    """
+    """Mean and covariance `elapsed_s` ahead, with white-noise acceleration of `density` m²/s³ (Bar-Shalom et al., 2001,
+    6.2.2)."""
     step = np.eye(4)
     step[0, 2] = step[1, 3] = elapsed_s
-    return mean.dot(step.T), step.dot(covariance).transpose(1, 0, 2).dot(step.T) + density * _white(elapsed_s)
-
-
-def _white(elapsed_s):
-    """Process noise (4, 4) of white-noise acceleration of density 1 over `elapsed_s` (Bar-Shalom et al., 2001, 6.2.2).
-    """
     position, both = elapsed_s ** 3 / 3, elapsed_s ** 2 / 2
-    return np.array([[position, 0, both, 0], [0, position, 0, both], [both, 0, elapsed_s, 0], [0, both, 0, elapsed_s]])
+    white = np.array([[position, 0, both, 0], [0, position, 0, both], [both, 0, elapsed_s, 0], [0, both, 0, elapsed_s]])
+    return mean.dot(step.T), step.dot(covariance).transpose(1, 0, 2).dot(step.T) + density * white
 
 
-def negative_log_likelihood(mean, covariance, measurements, outliers):
-    """Negative log likelihood of each measurement given each object.
-
-    Returns
-    -------
-    numpy.ndarray, (n, m)
-        -2 log(2 pi p), where p is the density of the measurement given the object, per m².
-    """
-    return -2 * np.logaddexp(*(_fit(mean[:, None], covariance[:, None], measurements, component)[0]
-                               for component in outliers.components()))
+def negative_log_likelihood(mean, covariance, measurements, params):
+    """-2 log(2 pi p) (n, m), where p is the density of each measurement given each object, per m²."""
+    logs = [_fit(mean[:, None], covariance[:, None], measurements, component)[0] for component in _components(params)]
+    return -2 * np.logaddexp(*logs)
 
 
-def update(mean, covariance, measurements, outliers):
-    """Update each state with one measurement; the mixture of both components is reduced to one Gaussian.
-
-    Returns
-    -------
-    mean, covariance : numpy.ndarray
-    """
+def update(mean, covariance, measurements, params):
+    """Mean and covariance after one measurement for each state; the mixture is reduced to one Gaussian."""
     means, covariances, logs = [], [], []
-    for component in outliers.components():
+    for component in _components(params):
         log, innovation, inverse = _fit(mean, covariance, measurements, component)
         inverse_xx, inverse_xy, inverse_yy = inverse
         gain = covariance[:, :, :2] @ np.array([[inverse_xx, inverse_xy], [inverse_xy, inverse_yy]]).transpose(2, 0, 1)
@@ -83,16 +41,22 @@ def update(mean, covariance, measurements, outliers):
     return means[0] + share[:, None] * shift, (mixed + mixed.transpose(0, 2, 1)) / 2
 
 
+def _components(params):
+    """(weight, offset_m, spread_m) of the inlier and of the outlier component."""
+    return ((1 - params.outlier_share, 0.0, 0.0),
+            (params.outlier_share, params.outlier_offset, params.outlier_spread))
+
+
 def _fit(mean, covariance, measurements, component):
     """Log likelihood, innovation (x, y) and inverse innovation covariance (xx, xy, yy) of one mixture component.
 
     Computed element by element, because numpy is several times slower on stacks of 2x2 matrices.
     """
     weight, offset_m, spread_m = component
-    ray_x, ray_y = measurements.rays[..., 0], measurements.rays[..., 1]
-    x = measurements.positions_m[..., 0] - offset_m * ray_x - mean[..., 0]
-    y = measurements.positions_m[..., 1] - offset_m * ray_y - mean[..., 1]
-    noise_m2, spread_m2 = measurements.noise_m2, spread_m ** 2
+    ray_x, ray_y = measurements['ray'][..., 0], measurements['ray'][..., 1]
+    x = measurements['position_m'][..., 0] - offset_m * ray_x - mean[..., 0]
+    y = measurements['position_m'][..., 1] - offset_m * ray_y - mean[..., 1]
+    noise_m2, spread_m2 = measurements['noise_m2'], spread_m ** 2
     xx = covariance[..., 0, 0] + (noise_m2[..., 0, 0] + spread_m2 * ray_x * ray_x)
     xy = covariance[..., 0, 1] + (noise_m2[..., 0, 1] + spread_m2 * ray_x * ray_y)
     yy = covariance[..., 1, 1] + (noise_m2[..., 1, 1] + spread_m2 * ray_y * ray_y)

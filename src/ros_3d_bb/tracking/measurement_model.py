@@ -4,9 +4,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.core.params import Param, parameters
-from ros_3d_bb.tracking.kalman_filter import Measurements
-from ros_3d_bb.tracking.occlusion import NEARER_M, wrapped
+from ros_3d_bb.tracking.types import NEARER_M, wrapped
 
+# Position (x, y), its covariance, and the unit vector from the camera to it in the ground plane; extents; height of the
+# centre and its variance; whether the image border truncates the width, and the lower and the upper end.
+MEASUREMENT = np.dtype([('position_m', float, 2), ('noise_m2', float, (2, 2)), ('ray', float, 2), ('size_m', float, 3),
+                        ('z_m', float), ('z_m2', float), ('cut_sideways', bool), ('cut_ends', bool, 2)])
 FLOOR_M = 0.02  # lower bound of the standard deviation of a centre: people sway as they walk
 PERSON_WIDTH_M = 0.5
 USUAL_PERIOD_S = 1 / 30.0  # image period assumed for the first image of a camera
@@ -28,114 +31,62 @@ class NoiseParams(NamedTuple):
     noise_correlation_time: float = Param(0.15, 'How long they are correlated.', 's', live=(0, 1))
 
 
-class MeasurementBatch(NamedTuple):
-    """The detections of one image as arrays: positions on the ground plane, extents (n, 3), height of the centre and
-    its variance, (n,), and whether the image border truncates the box at the left, top, right and bottom, (n, 4)."""
-
-    ground: Measurements
-    sizes_m: np.ndarray
-    z_m: np.ndarray
-    z_m2: np.ndarray
-    truncated_edges: np.ndarray
-
-    @property
-    def cut_sideways(self):
-        """Whether the image border truncates the width, (n,)."""
-        return self.truncated_edges[:, 0] | self.truncated_edges[:, 2]
-
-    @property
-    def vertical_cuts(self):
-        """Whether the image border truncates the lower and the upper end, (n, 2)."""
-        return self.truncated_edges[:, [3, 1]]
-
-    def select(self, columns):
-        """The batch reduced to the measurements in `columns`."""
-        ground, *others = self
-        return MeasurementBatch(Measurements(*(values[columns] for values in ground)),
-                                *(values[columns] for values in others))
-
-
-class _ObservedDetections(NamedTuple):
-    """Detections relative to the camera in the ground plane: positions and rays (n, 2); distances, bearings and angular
-    half widths (n,), radians."""
-
-    positions_m: np.ndarray
-    rays: np.ndarray
-    distances_m: np.ndarray
-    bearings: np.ndarray
-    half_widths: np.ndarray
-
-    @property
-    def sides(self):
-        """Unit vectors (n, 2) perpendicular to the rays, to the left."""
-        return np.stack((-self.rays[:, 1], self.rays[:, 0]), axis=1)
-
-
-def measurement_batch_of(detections, view, elapsed_s, params):
-    """Convert the detections of one image to measurements for the Kalman filter.
-
-    Position errors are correlated from image to image. A filter that treats them as independent underestimates its
-    covariance. The correlated part of the covariance is therefore multiplied by the number of images over which it is
-    correlated, which makes the filter independent of the frame rate.
+def measurements_of(detections, view, elapsed_s, params):
+    """Convert the detections of one image to an array of MEASUREMENT; `elapsed_s` is the time since the previous image
+    of the same camera, 0 for the first.
 
     If a nearer person partly occludes a detection, or the image border leaves only a part of its width, the centre is
     shifted to half a person's width from the visible edge. The lateral position of such a box is less certain.
-
-    Parameters
-    ----------
-    detections : sequence of Detection, n
-    view : CameraView
-    elapsed_s : float
-        Time since the previous image of the same camera; 0 for the first.
-    params : NoiseParams
-
-    Returns
-    -------
-    MeasurementBatch
     """
-    positions_m = np.array([detection.position_m for detection in detections]).reshape(-1, 3)
-    sizes_m = np.array([detection.size_m for detection in detections]).reshape(-1, 3)
-    truncated_edges = np.array([detection.truncated_edges for detection in detections], bool).reshape(-1, 4)
-    unknown = np.eye(3) * params.noise_unknown ** 2
-    covariances = np.array([unknown if detection.covariance_m2 is None else detection.covariance_m2
-                            for detection in detections]).reshape(-1, 3, 3)
-    seen = _seen(positions_m[:, :2], sizes_m[:, 0], view)
-    hidden = _hidden_side(seen)
-    is_part = sizes_m[:, 0] < PART_M
-    cut_left, cut_right = truncated_edges[:, 0], truncated_edges[:, 2]
-    cut = cut_left | cut_right
-    side = np.where(cut, (cut_left.astype(int) - cut_right) * is_part, hidden)
-    shift_m = np.clip((PERSON_WIDTH_M - sizes_m[:, 0]) / 2, 0, MAX_SHIFT_M)
-    noise_m2 = _noise(covariances[:, :2, :2], seen, cut | (hidden != 0), elapsed_s, params)
-    ground = Measurements(seen.positions_m + (side * shift_m)[:, None] * seen.sides, noise_m2, seen.rays)
-    return MeasurementBatch(ground, sizes_m, positions_m[:, 2], covariances[:, 2, 2], truncated_edges)
+    measurements = np.zeros(len(detections), MEASUREMENT)
+    if not len(detections):
+        return measurements
+    positions_m, sizes_m, covariances_m2, truncated_edges = zip(*detections)
+    positions_m, sizes_m, truncated_edges = np.array(positions_m), np.array(sizes_m), np.array(truncated_edges, bool)
+    unknown_m2 = np.eye(3) * params.noise_unknown ** 2
+    covariances_m2 = np.array([unknown_m2 if known is None else known for known in covariances_m2])
 
-
-def _seen(positions_m, widths_m, view):
     distances_m, bearings = view.bearings(positions_m)
     is_near = distances_m < NEAR_M
     distances_m = np.maximum(distances_m, NEAR_M)
-    rays = (positions_m - view.fixed_from_camera[:2, 3]) / distances_m[:, None]
+    rays = (positions_m[:, :2] - view.fixed_from_camera[:2, 3]) / distances_m[:, None]
     rays[is_near] = view.ahead
-    return _ObservedDetections(positions_m, rays, distances_m, bearings, np.arctan2(widths_m / 2, distances_m))
+    left_of_rays = np.stack((-rays[:, 1], rays[:, 0]), axis=1)
+
+    hidden = _hidden_side(distances_m, bearings, np.arctan2(sizes_m[:, 0] / 2, distances_m))
+    cut_left, top, cut_right, bottom = truncated_edges.T
+    cut_sideways = cut_left | cut_right
+    cut_side = (cut_left.astype(int) - cut_right) * (sizes_m[:, 0] < PART_M)
+    shift_m = np.where(cut_sideways, cut_side, hidden) * np.clip((PERSON_WIDTH_M - sizes_m[:, 0]) / 2, 0, MAX_SHIFT_M)
+
+    measurements['position_m'] = positions_m[:, :2] + shift_m[:, None] * left_of_rays
+    lateral_m2 = (cut_sideways | (hidden != 0)) * CUT_SIGMA_M ** 2
+    for axes, extra_m2 in ((rays, 0), (left_of_rays, lateral_m2)):
+        measurements['noise_m2'] += _noise_along(axes, covariances_m2[:, :2, :2], extra_m2, elapsed_s, params)
+    measurements['ray'], measurements['size_m'] = rays, sizes_m
+    measurements['z_m'], measurements['z_m2'] = positions_m[:, 2], covariances_m2[:, 2, 2]
+    measurements['cut_sideways'], measurements['cut_ends'] = cut_sideways, np.stack((bottom, top), axis=1)
+    return measurements
 
 
-def _hidden_side(seen):
+def _hidden_side(distances_m, bearings, half_widths):
     """Side on which a nearer detection partly occludes each detection: 1 left, -1 right, 0 neither or both; (n,)."""
-    depths_m = seen.distances_m * np.cos(seen.bearings)
-    to_left = wrapped(seen.bearings[None, :] - seen.bearings[:, None])
-    gaps = np.abs(to_left) - seen.half_widths[None, :] - seen.half_widths[:, None]
+    depths_m = distances_m * np.cos(bearings)
+    to_left = wrapped(bearings[None, :] - bearings[:, None])
+    gaps = np.abs(to_left) - half_widths[None, :] - half_widths[:, None]
     hides = (depths_m[None, :] < depths_m[:, None] - NEARER_M) & (gaps < TOUCHING_RAD)
     left, right = (hides & (to_left > 0)).any(axis=1), (hides & (to_left <= 0)).any(axis=1)
     return left.astype(int) - right
 
 
-def _noise(covariances, seen, cut, elapsed_s, params):
-    """Covariances (n, 2, 2) for the filter, from the single-image covariances."""
+def _noise_along(axes, covariances_m2, extra_m2, elapsed_s, params):
+    """Covariances (n, 2, 2) along unit vectors (n, 2), from the single-image covariances.
+
+    Position errors are correlated from image to image. A filter that treats them as independent underestimates its
+    covariance. The correlated part is therefore multiplied by the number of images over which it is correlated, which
+    makes the filter independent of the frame rate.
+    """
     images = max(1.0, 2 * params.noise_correlation_time / (elapsed_s or USUAL_PERIOD_S))
-    noise = np.zeros(covariances.shape)
-    for axes, extra_m2 in ((seen.rays, 0), (seen.sides, cut * CUT_SIGMA_M ** 2)):
-        variance = ((covariances @ axes[..., None])[..., 0] * axes).sum(axis=1)
-        variance += (images - 1) * np.minimum(variance, params.noise_correlated ** 2) + FLOOR_M ** 2 + extra_m2
-        noise += variance[:, None, None] * axes[:, :, None] * axes[:, None, :]
-    return noise
+    variance = ((covariances_m2 @ axes[..., None])[..., 0] * axes).sum(axis=1)
+    variance += (images - 1) * np.minimum(variance, params.noise_correlated ** 2) + FLOOR_M ** 2 + extra_m2
+    return variance[:, None, None] * axes[:, :, None] * axes[:, None, :]

@@ -1,76 +1,103 @@
-"""Visibility of tracked people in a camera: visible, occluded by a person or an object, or out of view."""
+"""Visibility of tracked people in one or several cameras: visible, occluded by a person or an object, or out of view.
+
+The latest image of each camera classifies each undetected track, and the best result is used. A track that one camera
+cannot see is therefore neither out of view nor missed while another camera detects it, sees it occluded or should
+detect it. A camera that stops sending images is ignored after a short time.
+"""
+from typing import NamedTuple
+
 import numpy as np
 
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.track import position_std_of
+from ros_3d_bb.tracking.types import NEARER_M, OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, wrapped
 
 EDGE_RAD = 0.04  # people this close to the image border are not detected reliably
-NEAREST_M = 0.45  # nor are people this close to the camera
+NEAREST_M = 0.45  # neither are people this close to the camera
 LEAST_IN_IMAGE = 0.2  # minimum share of the body axis inside the image for a person to be detected
 AXIS_SAMPLES = np.linspace(-0.48, 0.48, 11)  # samples of the body axis, as fractions of the height from the centre
 BODY_RADIUS_M = 0.27
-NEARER_M = 0.25  # an occluding person is at least this much nearer
-SEEN_BESIDE = 0.2  # and leaves at most this share of a half width visible, which is too narrow for a detector
+SEEN_BESIDE = 0.2  # an occluding person leaves at most this share of a half width visible: too narrow for a detector
 HIDDEN_BEHIND_M = 0.5  # measured depth nearer than the person by more than this belongs to another object
 HIDDEN_SHARE = 0.5
 ACROSS, ALONG = np.meshgrid((-0.6, 0, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))  # depth sample points, in half extents
 
+# Detected: ranks before the results of `classify_visibility` for undetected tracks, VISIBLE, OCCLUDED, OUT_OF_VIEW.
+SEEN = -1
+STATUS = np.array([OCCLUDED, OCCLUDED, OUT_OF_VIEW, VISIBLE])  # indexed by the result; the last entry is for SEEN
+RECENT_NS = NS  # a camera whose latest image is older is ignored
+BEHIND_M = 0.45  # upper bound of the position's standard deviation of a person who stays behind an occluder
+OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
 
-def classify_visibility(view, positions_m, sizes_m, others_m, farthest_m):
-    """Classify the visibility of people at their estimated positions.
 
-    Parameters
-    ----------
-    view : CameraView
-    positions_m, sizes_m : numpy.ndarray, (n, 3)
-        Centres and extents in the fixed frame.
-    others_m : numpy.ndarray, (m, 3)
-        Centres of possible occluders; may contain the people themselves.
-    farthest_m : float
-        Range of the detector: people farther away are not detected.
+class CameraVisibility(NamedTuple):
+    """The latest image of a camera, and SEEN or the result of `classify_visibility` for each track (n,)."""
 
-    Returns
-    -------
-    numpy.ndarray of int, (n,)
-        VISIBLE: a detection is expected; OCCLUDED: by a person, or by something nearer in the depth image;
-        OUT_OF_VIEW.
+    stamp_ns: int
+    view: CameraView
+    visibility: np.ndarray
+
+
+def mark_missed(tracks, before, rows, cameras, camera, observed_s, max_range_m):
+    """Update the status of the undetected tracks in `rows`, and the times for which they are undetected and missed.
+
+    An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
+    track keeps its previous position.
+
+    `tracks` are predicted to the stamp of the image, `before` are the same tracks after the previous image. `cameras`
+    maps each camera to its CameraVisibility; `camera` is that of the image, which accounts for `observed_s` seconds.
+    Modifies `tracks` and the `visibility` of the image.
+    """
+    image, missed, before = cameras[camera], tracks[rows], before[rows]
+    visibility = _visibility(missed, tracks, image.view, max_range_m)
+    held = (visibility == VISIBLE) & (missed['status'] == OCCLUDED)
+    held[held] = _visibility(before[held], tracks, image.view, max_range_m) == OCCLUDED
+    visibility[held] = OCCLUDED
+    image.visibility[rows] = visibility
+    best = visibility
+    for name, other in cameras.items():
+        if name != camera and image.stamp_ns - other.stamp_ns <= RECENT_NS:
+            # The person may also stay behind what occludes the view of another camera.
+            hidden = (other.visibility[rows] == OCCLUDED) & (missed['status'] == OCCLUDED) & (visibility != VISIBLE)
+            hidden[hidden] = _visibility(missed[hidden], tracks, other.view, max_range_m) == VISIBLE
+            hidden[hidden] = _visibility(before[hidden], tracks, other.view, max_range_m) == OCCLUDED
+            held |= hidden
+            best = np.minimum(best, other.visibility[rows])
+    held &= best == OCCLUDED
+    missed['mean'][held] = before['mean'][held]
+    held &= position_std_of(missed) > BEHIND_M
+    missed['covariance'][held] = before['covariance'][held]
+    missed['unseen_s'] += np.where(best == SEEN, 0, observed_s)
+    missed['missed_s'] += np.where(best == VISIBLE, observed_s, 0)
+    missed['status'] = STATUS[best]
+    tracks[rows] = missed
+
+
+def _visibility(missed, tracks, view, max_range_m):
+    """Visibility (k,) of missed tracks in a camera's view."""
+    if not len(missed):
+        return np.zeros(0, int)
+    occluding = tracks[tracks['confirmed'] & (tracks['missed_s'] < OCCLUDING_S)]
+    return classify_visibility(view, _positions_of(missed), missed['size_m'], _positions_of(occluding), max_range_m)
+
+
+def _positions_of(tracks):
+    return np.column_stack((tracks['mean'][:, :2], tracks['z_m']))
+
+
+def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
+    """Classify the visibility (n,) of people with centres and extents (n, 3) in a CameraView.
+
+    VISIBLE: a detection is expected. OCCLUDED: by a person at one of the centres `others_m` (m, 3), which may contain
+    the people themselves, or by something nearer in the depth image. OUT_OF_VIEW: also beyond the detector's range.
     """
     distances_m, bearings = view.bearings(positions_m)
-    places = np.full(len(positions_m), VISIBLE)
-    places[_behind_others(distances_m, bearings, *view.bearings(others_m))] = OCCLUDED
+    visibility = np.full(len(positions_m), VISIBLE)
+    visibility[_behind_people(distances_m, bearings, *view.bearings(others_m))] = OCCLUDED
     if view.depth_at is not None:
-        places[_behind_something(view, positions_m, sizes_m)] = OCCLUDED
-    places[_out_of_view(view, positions_m, sizes_m, distances_m, bearings, farthest_m)] = OUT_OF_VIEW
-    return places
-
-
-def share_in_image(view, positions_m, heights_m, margin_rad=0.0):
-    """Share of the axes of upright bodies that lies inside the image, regardless of occlusion.
-
-    Parameters
-    ----------
-    view : CameraView
-        With intrinsics.
-    positions_m : numpy.ndarray, (n, 3)
-        Centres in the fixed frame.
-    heights_m : numpy.ndarray, (n,)
-    margin_rad : float
-        Width of an excluded strip along the image border, as an angle near the optical axis.
-
-    Returns
-    -------
-    numpy.ndarray, (n,)
-        0..1. Points for which the lens distortion defines no pixel count as outside the image.
-    """
-    camera, rotation = view.intrinsics, view.fixed_from_camera[:3, :3]  # its inverse is its transpose
-    centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
-    points = centers[:, None] + (AXIS_SAMPLES * heights_m[:, None])[..., None] * rotation[2]
-    in_front = points[..., 2] > 0
-    points[..., 2][~in_front] = 1  # they have no pixel
-    size = np.array([camera.width, camera.height])
-    half_px = size / 2.0 - margin_rad * np.array([camera.fx, camera.fy])
-    with np.errstate(invalid='ignore'):  # nan is outside
-        inside = (np.abs(camera.project(points) - (size - 1) / 2.0) <= half_px).all(axis=-1)
-    return (in_front & inside).mean(axis=1)
+        visibility[_behind_objects(view, positions_m, sizes_m)] = OCCLUDED
+    visibility[_out_of_view(view, positions_m, sizes_m, distances_m, bearings, max_range_m)] = OUT_OF_VIEW
+    return visibility
 
 
 def depths_towards(camera, depth, points):
@@ -98,26 +125,38 @@ def depths_towards(camera, depth, points):
     return np.where(inside & measured, depths_m, np.nan)
 
 
-def _out_of_view(view, positions_m, sizes_m, distances_m, bearings, farthest_m):
+def _out_of_view(view, positions_m, sizes_m, distances_m, bearings, max_range_m):
     """People that the camera cannot detect, (n,) bool: too close, too far, or with too little of the body in the image.
     """
     above_m = np.abs(positions_m[:, 2] - view.fixed_from_camera[2, 3]) - sizes_m[:, 2] / 2
     distances_m = np.hypot(distances_m, np.maximum(above_m, 0))
-    outside = (distances_m < NEAREST_M) | (distances_m > farthest_m)
+    outside = (distances_m < NEAREST_M) | (distances_m > max_range_m)
     if view.intrinsics is None:
         return outside | (np.abs(bearings) > np.pi / 2)
-    return outside | (share_in_image(view, positions_m, sizes_m[:, 2], EDGE_RAD) < LEAST_IN_IMAGE)
+    return outside | (_share_in_image(view, positions_m, sizes_m[:, 2]) < LEAST_IN_IMAGE)
 
 
-def _behind_others(distances_m, bearings, others_m, others_bearings):
+def _share_in_image(view, positions_m, heights_m):
+    """Share (n,) of the axes of upright bodies inside the image, less a margin of `EDGE_RAD`, regardless of occlusion.
+
+    Points for which the lens distortion defines no pixel count as outside.
+    """
+    camera, rotation = view.intrinsics, view.fixed_from_camera[:3, :3]  # its inverse is its transpose
+    centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
+    points = centers[:, None] + (AXIS_SAMPLES * heights_m[:, None])[..., None] * rotation[2]
+    in_front = points[..., 2] > 0
+    points[..., 2][~in_front] = 1  # they have no pixel
+    size = np.array([camera.width, camera.height])
+    half_px = size / 2.0 - EDGE_RAD * np.array([camera.fx, camera.fy])
+    with np.errstate(invalid='ignore'):  # nan is outside
+        inside = (np.abs(camera.project(points) - (size - 1) / 2.0) <= half_px).all(axis=-1)
+    return (in_front & inside).mean(axis=1)
+
+
+def _behind_people(distances_m, bearings, others_m, others_bearings):
     apart = np.abs(wrapped(others_bearings - bearings[:, None]))
     covered = apart < _half_widths(others_m) + SEEN_BESIDE * _half_widths(distances_m)[:, None]
     return (covered & (others_m < distances_m[:, None] - NEARER_M)).any(axis=1)
-
-
-def wrapped(angles):
-    """Wrap angles to -pi..pi, radians."""
-    return angles - 2 * np.pi * np.rint(angles / (2 * np.pi))
 
 
 def _half_widths(distances_m):
@@ -125,7 +164,7 @@ def _half_widths(distances_m):
     return np.arcsin(np.clip(BODY_RADIUS_M / np.maximum(distances_m, 0.01), 0, 1))
 
 
-def _behind_something(view, positions_m, sizes_m):
+def _behind_objects(view, positions_m, sizes_m):
     """People occluded by objects, (n,) bool: most of the depth measured towards the body is clearly nearer."""
     rotation = view.fixed_from_camera[:3, :3]  # its inverse is its transpose
     centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)

@@ -1,5 +1,6 @@
 """Out-of-sequence measurements: process late images in the order of their stamps, with stable track IDs."""
 import collections
+import functools
 from typing import NamedTuple
 
 from ros_3d_bb.core.time_sync import MAX_RATE_HZ, NS
@@ -23,15 +24,6 @@ class DetectedImage(NamedTuple):
         return self.stamp_ns, self.view.camera
 
 
-class Matches(NamedTuple):
-    """The tracks matched in an image: their IDs, whether they were confirmed before it, and the indices of their
-    detections."""
-
-    ids: list
-    confirmed: list
-    columns: list
-
-
 class OutOfSequenceBuffer(object):
     """Processes images in the order of their stamps, independent of the order of arrival.
 
@@ -41,9 +33,9 @@ class OutOfSequenceBuffer(object):
     Parameters
     ----------
     step : callable
-        step(state, image, observed_s, id_of) returns the state after an image and the image's Matches. A state has
-        `tracks` and `now_ns`. `observed_s` is the time in seconds that the image accounts for; id_of(column) returns
-        the ID of the track that a detection starts.
+        step(state, image, observed_s, id_of) returns the state after an image, which has `tracks` and `now_ns`, and the
+        matches: (track ID, whether the track was confirmed before, index of the detection). `observed_s` is the time
+        in seconds that the image accounts for; id_of(column) returns the ID of the track that a detection starts.
     state
         State before the first image.
     last_id : int
@@ -58,7 +50,7 @@ class OutOfSequenceBuffer(object):
 
     def insert(self, image):
         """Process an image. Raises ValueError without any change if the image is too late or a duplicate."""
-        self._check(image)
+        self._check(image.stamp_ns, image.view.camera)
         later = self._rewind(image.order)
         self._replay([image] + later, self.last_id if later else None)
 
@@ -69,17 +61,17 @@ class OutOfSequenceBuffer(object):
                for state, image in self._history):
             self._replay(self._rewind((stamp_ns, camera)), self.last_id)
 
-    def _check(self, image):
-        stamp_ns, now_ns = image.stamp_ns, self.state.now_ns
-        stamps_ns = [other.stamp_ns for _state, other in self._history if other.view.camera == image.view.camera]
+    def _check(self, stamp_ns, camera):
+        now_ns = self.state.now_ns
+        stamps_ns = [other.stamp_ns for _state, other in self._history if other.view.camera == camera]
         if stamp_ns in stamps_ns:
-            raise ValueError('stamp %.9f of camera %r comes a second time' % (stamp_ns / NS, image.view.camera))
+            raise ValueError('duplicate stamp %.9f of camera %r' % (stamp_ns / NS, camera))
         if now_ns is not None and stamp_ns < now_ns - LATEST_NS:
-            raise ValueError('stamp %.9f is %.3f s before the latest, more than %.1f s late'
+            raise ValueError('stamp %.9f is %.3f s older than the newest image; at most %.1f s expected'
                              % (stamp_ns / NS, (now_ns - stamp_ns) / NS, LATEST_NS / NS))
         if len(stamps_ns) >= MOST_KEPT and stamp_ns <= stamps_ns[0] + LATEST_NS:
-            raise ValueError('stamp %.9f is within %.1f s of those of %d images of camera %r; its stamps stand still'
-                             % (stamp_ns / NS, LATEST_NS / NS, MOST_KEPT, image.view.camera))
+            raise ValueError('stamp %.9f is within %.1f s of those of %d images of camera %r; its clock hangs'
+                             % (stamp_ns / NS, LATEST_NS / NS, MOST_KEPT, camera))
 
     def _rewind(self, order):
         """Rewind to the state before the images after `order`; return those images, oldest first."""
@@ -92,33 +84,30 @@ class OutOfSequenceBuffer(object):
     def _replay(self, images, known_id):
         """Process images; `known_id` is the last ID assigned before a rewind, None without a rewind."""
         for image in images:
-            before = self.state
-            self._history.append((before, image))
-            self.state, matches = self._step(before, image, self._observed_s(image), self._ids_for(image))
+            self._history.append((self.state, image))
+            self.state, matches = self._step(self.state, image, self._observed_s(*image.order),
+                                             functools.partial(self._id_of, image.order))
             if known_id is not None:
-                self._restore_ids(image, matches, known_id)
+                self._restore_ids(image.order, matches, known_id)
         self._forget()
 
-    def _observed_s(self, image):
+    def _observed_s(self, stamp_ns, camera):
         """Time since the previous image, or since a later skipped image of the same camera, seconds."""
-        stamp_ns, camera = image.stamp_ns, image.view.camera
         before_ns = stamp_ns if self.state.now_ns is None else self.state.now_ns
         skipped_ns = [skipped_ns for skipped_ns, other in self._skipped if other == camera and skipped_ns < stamp_ns]
         return (stamp_ns - max(skipped_ns + [before_ns])) / NS
 
-    def _ids_for(self, image):
-        def id_of(column):
-            key = image.order + (column,)
-            if key not in self._ids:
-                self.last_id += 1
-                self._ids[key] = self.last_id
-            return self._ids[key]
-        return id_of
+    def _id_of(self, order, column):
+        key = order + (column,)
+        if key not in self._ids:
+            self.last_id += 1
+            self._ids[key] = self.last_id
+        return self._ids[key]
 
-    def _restore_ids(self, image, matches, known_id):
+    def _restore_ids(self, order, matches, known_id):
         """Restore the ID of a track that now starts in a late image, but started in a later image before the rewind."""
-        for track_id, was_confirmed, column in zip(*matches):
-            key = image.order + (column,)
+        for track_id, was_confirmed, column in matches:
+            key = order + (column,)
             if key in self._ids and (track_id > known_id or not was_confirmed):
                 former = self._ids.pop(key)
                 self._ids = {other: former if known == track_id else known for other, known in self._ids.items()}
@@ -131,4 +120,4 @@ class OutOfSequenceBuffer(object):
             self._history.popleft()
         before_ns = self._history[0][0].now_ns or 0  # earlier entries have no effect any more
         self._skipped = collections.deque((entry for entry in self._skipped if entry[0] > before_ns), MOST_SKIPPED)
-        self._ids = {key: number for key, number in self._ids.items() if key[0] >= oldest_ns}
+        self._ids = {key: track_id for key, track_id in self._ids.items() if key[0] >= oldest_ns}

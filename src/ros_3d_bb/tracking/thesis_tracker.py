@@ -31,30 +31,11 @@ class ThesisTrackerParams(NamedTuple):
     moving_speed: float = MOVING_SPEED
 
 
-class _Track(object):
-    """State of one tracked object."""
-
-    def __init__(self, track_id, stamp_ns, detection):
-        self.id = track_id
-        self.first_seen_ns = self.last_seen_ns = stamp_ns
-        self.unseen_ns = 0
-        self.position_m, self.size_m = detection.position_m, detection.size_m
-        self.velocity_mps = self.instant_velocity_mps = np.zeros(3)
-
-    def update(self, stamp_ns, detection, alpha):
-        """Set the position and size of a detection, and update the velocities."""
-        elapsed_s = (stamp_ns - self.last_seen_ns) / float(NS)
-        self.instant_velocity_mps = (detection.position_m - self.position_m) / elapsed_s
-        self.velocity_mps = alpha * self.instant_velocity_mps + (1 - alpha) * self.velocity_mps
-        self.position_m, self.size_m = detection.position_m, detection.size_m
-        self.last_seen_ns, self.unseen_ns = stamp_ns, 0
-
-
 class ThesisTracker(object):
     """Tracks objects from image to image.
 
     Call `update` with the detections of each image in the order of their stamps, `skip` for an image whose detections
-    are unusable, and `reset` after a jump in time.
+    are unusable, and `reset` after a jump in time. The IDs of tracks are greater than `last_id`.
 
     Raises
     ------
@@ -62,11 +43,10 @@ class ThesisTracker(object):
         If a parameter is invalid; the message names it.
     """
 
-    def __init__(self, params=ThesisTrackerParams()):
+    def __init__(self, params=ThesisTrackerParams(), last_id=0):
         self.reconfigure(params)
-        self._tracks = []
-        self._last_id = 0
-        self._now_ns, self._skipped_ns = None, 0
+        self._last_id = last_id
+        self.reset()
 
     def reconfigure(self, params):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
@@ -74,43 +54,40 @@ class ThesisTracker(object):
         self._params = params
 
     def update(self, stamp_ns, detections, view=None):
-        """Update the tracks with the detections of one image.
+        """Update the tracks with the detections of one image, as `Tracker.update`.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Stamp of the image, nanoseconds; later than that of the previous image.
-        detections : list of Detection
-        view : CameraView, optional
-            Unused: the thesis' tracker does not consider the field of view.
-
-        Returns
-        -------
-        list of TrackedObject
-            Ordered by ID.
-
-        Raises
-        ------
-        ValueError
-            If the stamp is not later than the previous one; the tracks are unchanged.
+        The thesis' tracker does not consider the view. Raises ValueError without any change if the stamp is not later
+        than the previous one.
         """
-        elapsed_ns = self._advance(stamp_ns)
-        limit_ns = self._params.disappearance_limit * NS
-        for track in self._tracks:
-            track.unseen_ns += elapsed_ns
-        self._tracks = [track for track in self._tracks if track.unseen_ns <= limit_ns]
+        params, elapsed_ns = self._params, self._advance(stamp_ns)
+        tracks = [(track, unseen_ns + elapsed_ns) for track, unseen_ns in self._tracks
+                  if unseen_ns + elapsed_ns <= params.disappearance_limit * NS]
         pairs = []
-        if self._tracks and detections:
-            pairs = match_greedily(plane_distances([track.position_m for track in self._tracks],
+        if tracks and detections:
+            pairs = match_greedily(plane_distances([track.position_m for track, _unseen_ns in tracks],
                                                    [detection.position_m for detection in detections]))
         for row, column in pairs:
-            self._tracks[row].update(stamp_ns, detections[column], self._params.alpha)
+            tracks[row] = self._matched(tracks[row][0], stamp_ns, detections[column]), 0
         matched = set(column for _row, column in pairs)
         for column, detection in enumerate(detections):
             if column not in matched:
                 self._last_id += 1
-                self._tracks.append(_Track(self._last_id, stamp_ns, detection))
-        return [self._published(track) for track in self._tracks]
+                tracks.append((TrackedObject(self._last_id, detection.position_m, detection.size_m, np.zeros(3),
+                                             np.zeros(3), VISIBLE, False, stamp_ns, stamp_ns, None, None), 0))
+        self._tracks = tracks
+        times_s = prediction_times_s(params.prediction_time, params.prediction_step)[:, None]
+        return [track._replace(status=OCCLUDED if unseen_ns else VISIBLE, prediction_step_s=params.prediction_step,
+                               moving=bool(np.linalg.norm(track.velocity_mps) >= params.moving_speed),
+                               prediction_m=track.position_m + times_s * track.velocity_mps)
+                for track, unseen_ns in tracks]
+
+    def _matched(self, track, stamp_ns, detection):
+        """A track with the position and size of a detection, and updated velocities."""
+        elapsed_s = (stamp_ns - track.last_seen_ns) / float(NS)
+        velocity_mps, alpha = (detection.position_m - track.position_m) / elapsed_s, self._params.alpha
+        return track._replace(position_m=detection.position_m, size_m=detection.size_m, last_seen_ns=stamp_ns,
+                              instant_velocity_mps=velocity_mps,
+                              velocity_mps=alpha * velocity_mps + (1 - alpha) * track.velocity_mps)
 
     def skip(self, stamp_ns, _camera=''):
         """Skip an image whose detections are unusable: tracks do not age. Never raises, as the stamp may be wrong."""
@@ -118,7 +95,8 @@ class ThesisTracker(object):
 
     def reset(self):
         """Delete all tracks, as after a jump in time. IDs are not reused."""
-        self._tracks, self._now_ns, self._skipped_ns = [], None, 0
+        self._tracks = []  # (TrackedObject, nanoseconds since its last detection without skipped images)
+        self._now_ns, self._skipped_ns = None, 0
 
     def _advance(self, stamp_ns):
         """Nanoseconds since the previous image, skipped or not; 0 for the first."""
@@ -127,12 +105,3 @@ class ThesisTracker(object):
         elapsed_ns = 0 if self._now_ns is None else max(stamp_ns - max(self._now_ns, self._skipped_ns), 0)
         self._now_ns, self._skipped_ns = stamp_ns, 0
         return elapsed_ns
-
-    def _published(self, track):
-        params = self._params
-        times_s = prediction_times_s(params.prediction_time, params.prediction_step)
-        return TrackedObject(
-            track.id, track.position_m, track.size_m, track.velocity_mps, track.instant_velocity_mps,
-            OCCLUDED if track.unseen_ns else VISIBLE, bool(np.linalg.norm(track.velocity_mps) >= params.moving_speed),
-            track.first_seen_ns, track.last_seen_ns, track.position_m + times_s[:, None] * track.velocity_mps,
-            params.prediction_step)

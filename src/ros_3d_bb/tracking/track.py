@@ -1,9 +1,15 @@
-"""Tracks as a structured array: update of matched tracks and start of new ones. Fixed frame, metres, nanoseconds."""
+"""Tracks as a structured array: update of matched tracks, start of new ones, and prediction for publishing.
+
+Fixed frame, metres, nanoseconds.
+"""
+from typing import NamedTuple
+
 import numpy as np
 
+from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
-from ros_3d_bb.tracking.types import VISIBLE
+from ros_3d_bb.tracking.types import PREDICTION_STEP, PREDICTION_TIME, VISIBLE, TrackedObject, prediction_times_s
 
 # `hits` counts the detections of a track, `end_hits` those that showed the lower and the upper end of the body.
 # `unseen_s` is the time since the last detection, `missed_s` the part of it during which a detection was expected.
@@ -15,60 +21,52 @@ RECENTLY_MATCHED_NS = NS // 5  # no track starts near a track that was matched l
 SMOOTHING = 0.1  # weight of the newest detection in size and height
 CUT_SMOOTHING = 0.02  # the same for boxes that the image border truncates sideways: the head may be outside
 LEAST_HEIGHT_M = 0.1
+AXES = [[0], [1], [3], [4]]  # indices of x, y and their velocities among x, y, z and their velocities
 STILL_MOVING = 0.5  # hysteresis: a moving track stops below this share of `moving_speed`
 
 
-def update_matched(tracks, rows, batch, stamp_ns, params, outliers):
-    """Update the tracks in `rows`, in place, with one detection each.
+@parameters('kalman: how certain predictions are')
+class PredictionParams(NamedTuple):
+    """Parameters of the prediction of tracks."""
 
-    Parameters
-    ----------
-    tracks : numpy.ndarray of TRACK, (n,)
-        Predicted to the stamp.
-    rows : numpy.ndarray of int, (m,)
-    batch : measurement_model.MeasurementBatch
-        m measurements.
-    stamp_ns : int
-    params : tracker.TrackerParams
-    outliers : kalman_filter.Outliers
-    """
+    prediction_time: float = PREDICTION_TIME
+    prediction_step: float = PREDICTION_STEP
+    prediction_acceleration: float = Param(
+        0.03, 'How much more people turn than the filter models: density of a white acceleration.', 'm²/s³',
+        live=(0, 1))
+    standing_speed: float = Param(
+        0.15, 'A velocity much lower than this is not extrapolated: it is mostly noise.', 'm/s', live=(0, 1))
+    position_bias: float = Param(
+        0.05, 'Standard deviation added for errors that stay the same for seconds.', 'm', live=(0, 0.5))
+
+
+def update_matched(tracks, rows, measurements, stamp_ns, params):
+    """Update the tracks in `rows` in place, which are predicted to the stamp, with one measurement each."""
     matched = tracks[rows]
-    matched['mean'], matched['covariance'] = kalman_filter.update(matched['mean'], matched['covariance'], batch.ground,
-                                                                  outliers)
+    matched['mean'], matched['covariance'] = kalman_filter.update(matched['mean'], matched['covariance'], measurements,
+                                                                  params)
     matched['hits'] += 1
     matched['last_ns'], matched['unseen_s'], matched['missed_s'], matched['status'] = stamp_ns, 0, 0, VISIBLE
     is_old_enough = stamp_ns - matched['first_ns'] >= params.min_age * NS
     matched['confirmed'] |= is_old_enough & (matched['hits'] >= params.min_hits)
     speed_mps = np.linalg.norm(matched['mean'][:, 2:], axis=1)
     matched['moving'] = speed_mps >= params.moving_speed * np.where(matched['moving'], STILL_MOVING, 1)
-    _update_size(matched, batch)
+    _update_size(matched, measurements)
     tracks[rows] = matched
 
 
-def new_targets(tracks, batch, stamp_ns, params):
+def new_targets(tracks, measurements, stamp_ns, params):
     """Start tracks from unmatched measurements, except duplicate detections of recently matched or new tracks.
 
-    Parameters
-    ----------
-    tracks : numpy.ndarray of TRACK, (n,)
-    batch : measurement_model.MeasurementBatch
-        m measurements.
-    stamp_ns : int
-    params : tracker.TrackerParams
-
-    Returns
-    -------
-    new : numpy.ndarray of TRACK, (k,)
-        New tracks; their IDs are not set.
-    kept : list of int
-        Indices of the measurements that started them.
+    Returns the new tracks, whose IDs are not set, and the indices of the measurements that started them.
     """
-    new = np.zeros(len(batch.z_m), TRACK)
-    new['mean'][:, :2] = batch.ground.positions_m
-    new['covariance'][:, :2, :2] = batch.ground.noise_m2
+    new = np.zeros(len(measurements), TRACK)
+    new['mean'][:, :2] = measurements['position_m']
+    new['covariance'][:, :2, :2] = measurements['noise_m2']
     new['covariance'][:, [2, 3], [2, 3]] = params.initial_speed ** 2
-    new['size_m'], new['z_m'], new['z_m2'] = batch.sizes_m, batch.z_m, batch.z_m2
-    new['end_hits'] = ~batch.vertical_cuts
+    for name in ('size_m', 'z_m', 'z_m2'):
+        new[name] = measurements[name]
+    new['end_hits'] = ~measurements['cut_ends']
     new['hits'], new['first_ns'], new['last_ns'] = 1, stamp_ns, stamp_ns
     occupied_m = tracks['mean'][stamp_ns - tracks['last_ns'] < RECENTLY_MATCHED_NS, :2]
     kept = []
@@ -79,24 +77,71 @@ def new_targets(tracks, batch, stamp_ns, params):
     return new[kept], kept
 
 
-def _update_size(matched, batch):
-    """Smooth the size and the height of each track with one detection.
+def _update_size(matched, measurements):
+    """Smooth the size and the height of each track with one measurement.
 
     The lower and the upper end are smoothed separately. A truncated end moves with the other one, so that the height
     stays constant. An end that has never been visible is placed where the estimator expects it.
     """
-    cut = batch.vertical_cuts
+    cut, cut_sideways = measurements['cut_ends'], measurements['cut_sideways']
     matched['end_hits'] += ~cut
     held = cut & (matched['end_hits'] > 0)
     end_share = np.where(held, 0, np.maximum(SMOOTHING, 1 / np.maximum(matched['end_hits'], 1)))
     share = np.maximum(SMOOTHING, 1 / matched['hits'])
-    share[batch.cut_sideways] = CUT_SMOOTHING
-    end_share = np.minimum(end_share, np.where(batch.cut_sideways, CUT_SMOOTHING, 1)[:, None])
-    up_m, taller_m = batch.z_m - matched['z_m'], batch.sizes_m[:, 2] - matched['size_m'][:, 2]
+    share[cut_sideways] = CUT_SMOOTHING
+    end_share = np.minimum(end_share, np.where(cut_sideways, CUT_SMOOTHING, 1)[:, None])
+    change_m = measurements['size_m'] - matched['size_m']
+    up_m, taller_m = measurements['z_m'] - matched['z_m'], change_m[:, 2]
     lower_m, upper_m = end_share[:, 0] * (up_m - taller_m / 2), end_share[:, 1] * (up_m + taller_m / 2)
     lower_m = np.where(held[:, 0], upper_m, lower_m)
     upper_m = np.where(held[:, 1], lower_m, upper_m)
-    matched['size_m'][:, :2] += share[:, None] * (batch.sizes_m[:, :2] - matched['size_m'][:, :2])
+    matched['size_m'][:, :2] += share[:, None] * change_m[:, :2]
     matched['size_m'][:, 2] = np.maximum(matched['size_m'][:, 2] + upper_m - lower_m, LEAST_HEIGHT_M)
     matched['z_m'] += (lower_m + upper_m) / 2
-    matched['z_m2'] += end_share.mean(axis=1) * (batch.z_m2 - matched['z_m2'])
+    matched['z_m2'] += end_share.mean(axis=1) * (measurements['z_m2'] - matched['z_m2'])
+
+
+def position_std_of(tracks):
+    """Standard deviations (n,) of the positions, the larger one of x and y, metres."""
+    return np.sqrt(np.maximum(tracks['covariance'][:, 0, 0], tracks['covariance'][:, 1, 1]))
+
+
+def objects_of(tracks, params):
+    """Convert tracks to a list of TrackedObject with predictions at constant velocity; `params` are PredictionParams.
+
+    A low velocity is mostly noise of a standing person. The predicted velocity v is therefore scaled by
+    v² / (v² + standing_speed²). The covariance of the filter does not include errors that stay constant for seconds,
+    such as those of a wrong calibration; `position_bias` is added for them. `prediction_acceleration` accounts for
+    turns.
+    """
+    if not len(tracks):
+        return []
+    times_s = prediction_times_s(params.prediction_time, params.prediction_step)
+    velocities_mps, level = tracks['mean'][:, 2:], np.eye(3)[:, :2]
+    speed2 = (velocities_mps ** 2).sum(axis=1, keepdims=True)
+    expected_mps = velocities_mps * speed2 / (speed2 + params.standing_speed ** 2 + 1e-12)
+    velocities_mps = velocities_mps.dot(level.T)
+
+    positions_m = np.column_stack((tracks['mean'][:, :2], tracks['z_m']))
+    predictions_m = positions_m[:, None] + times_s[:, None] * expected_mps.dot(level.T)[:, None]
+    predictions_m2 = level @ _covariances_ahead(tracks['covariance'], times_s, params) @ level.T
+    predictions_m2[..., 2, 2] = tracks['z_m2'][:, None]
+    covariances = np.zeros((len(tracks), 6, 6))
+    covariances[:, AXES, np.transpose(AXES)] = tracks['covariance']
+    covariances[:, [0, 1], [0, 1]] += params.position_bias ** 2
+    covariances[:, 2, 2] = tracks['z_m2']
+
+    known = [tracks[name].tolist() for name in ('id', 'status', 'moving', 'first_ns', 'last_ns')]
+    return [TrackedObject(track_id, position_m, size_m, velocity_mps, velocity_mps, status, moving, first_ns, last_ns,
+                          prediction_m, params.prediction_step, covariance, prediction_m2)
+            for track_id, status, moving, first_ns, last_ns, position_m, size_m, velocity_mps, prediction_m, covariance,
+            prediction_m2 in zip(*known, positions_m, tracks['size_m'].copy(), velocities_mps, predictions_m,
+                                 covariances, predictions_m2)]
+
+
+def _covariances_ahead(covariance, times_s, params):
+    """Covariances (n, steps, 2, 2) of the predicted positions."""
+    position, velocity, both = covariance[:, None, :2, :2], covariance[:, None, 2:, 2:], covariance[:, None, :2, 2:]
+    times = times_s[:, None, None]
+    turned = params.prediction_acceleration * times ** 3 / 3 + params.position_bias ** 2
+    return position + times * (both + both.transpose(0, 1, 3, 2)) + times ** 2 * velocity + turned * np.eye(2)

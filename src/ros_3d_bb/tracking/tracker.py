@@ -4,7 +4,7 @@ Each person is tracked by a constant-velocity Kalman filter in the plane (`kalma
 tracks by maximum total likelihood (`association`). A detection that a new target explains better starts a track, which
 is published after a minimum number of detections (`track`). Undetected people are not dropped immediately: their tracks
 stay published for a short time if a camera should detect them, and for longer if a person or an object occludes them
-(`occlusion`, `missed_detections`). Unpublished tracks are kept for longer still, so that people who reappear keep their
+(`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep their
 track ID.
 """
 from typing import NamedTuple
@@ -15,11 +15,10 @@ from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
 from ros_3d_bb.tracking.association import associate, unmatched
-from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurement_batch_of
-from ros_3d_bb.tracking.missed_detections import SEEN, CameraVisibility, carried, mark_missed, others_of, sigma_of
-from ros_3d_bb.tracking.out_of_sequence import DetectedImage, Matches, OutOfSequenceBuffer
-from ros_3d_bb.tracking.prediction import PredictionParams, objects_of
-from ros_3d_bb.tracking.track import TRACK, new_targets, update_matched
+from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
+from ros_3d_bb.tracking.occlusion import SEEN, CameraVisibility, mark_missed
+from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
+from ros_3d_bb.tracking.track import TRACK, PredictionParams, new_targets, objects_of, position_std_of, update_matched
 from ros_3d_bb.tracking.types import MOVING_SPEED, OUT_OF_VIEW, VISIBLE, check_steps
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new
@@ -71,21 +70,21 @@ class TrackerParams(NamedTuple):
 
 
 class _State(NamedTuple):
-    """State of the tracker after an image: the tracks, the stamp of the latest image, and by camera the stamp of its
-    latest image and its `missed_detections.CameraVisibility`.
+    """State of the tracker after an image: the tracks, the stamp of the latest image, and the `CameraVisibility` of the
+    latest image of each camera.
     """
 
     tracks: np.ndarray
     now_ns: int
-    stamps_ns: dict
-    looks: dict
+    cameras: dict
 
 
 class Tracker(object):
     """Tracks people from image to image.
 
     Call `update` with the detections of each image, `skip` for an image whose detections are unusable, and `reset`
-    after a jump in time. Images of several cameras may arrive late and in any order.
+    after a jump in time. Images of several cameras may arrive late and in any order. The IDs of tracks are greater than
+    `last_id`.
 
     Raises
     ------
@@ -93,19 +92,21 @@ class Tracker(object):
         If a parameter is invalid; the message names it.
     """
 
-    def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams()):
+    def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams(), last_id=0):
         self.reconfigure(params, noise, prediction)
-        self._buffer = OutOfSequenceBuffer(self._step, _State(np.zeros(0, TRACK), None, {}, {}))
+        self._start(last_id)
+
+    def _start(self, last_id):
+        self._buffer = OutOfSequenceBuffer(self._step, _State(np.zeros(0, TRACK), None, {}), last_id)
 
     def reconfigure(self, params, noise, prediction):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
         check_steps(prediction.prediction_time, prediction.prediction_step)
         self._params, self._noise, self._prediction = params, noise, prediction
-        self._outliers = kalman_filter.Outliers(params.outlier_share, params.outlier_offset, params.outlier_spread)
 
     def reset(self):
         """Delete all tracks, as after a jump in time. IDs are not reused."""
-        self._buffer = OutOfSequenceBuffer(self._step, _State(np.zeros(0, TRACK), None, {}, {}), self._buffer.last_id)
+        self._start(self._buffer.last_id)
 
     def skip(self, stamp_ns, camera=''):
         """Skip an image whose detections are unusable: tracks do not age. Never raises, as the image may be late."""
@@ -138,52 +139,42 @@ class Tracker(object):
         """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image."""
         tracks, params = self._buffer.state.tracks, self._params
         tracks = tracks[np.argsort(tracks['id'])]
-        published = (tracks['missed_s'] <= params.max_missed_time) & (sigma_of(tracks) < params.max_position_std)
+        published = (tracks['missed_s'] <= params.max_missed_time) & (position_std_of(tracks) < params.max_position_std)
         published |= tracks['status'] == VISIBLE
         published &= (tracks['status'] != OUT_OF_VIEW) | (tracks['unseen_s'] <= params.out_of_view_limit)
         return objects_of(tracks[tracks['confirmed'] & published], self._prediction)
 
     def _step(self, state, image, observed_s, id_of):
-        """One cycle of the tracker: the state after an image and the image's Matches, see OutOfSequenceBuffer."""
-        stamp_ns, view, params = image.stamp_ns, image.view, self._params
-        tracks = self._predict(state, stamp_ns)
-        batch = self._measure(state, image)
-        rows, columns = associate(tracks, batch, stamp_ns, params, self._outliers)
-        matches = Matches(tracks['id'][rows].tolist(), tracks['confirmed'][rows].tolist(), columns.tolist())
-        update_matched(tracks, rows, batch.select(columns), stamp_ns, params, self._outliers)
-
-        others = others_of(state.looks, view, stamp_ns)
-        missed = unmatched(len(tracks), rows)
-        places = mark_missed(tracks, state.tracks, missed, view, others, observed_s, params.max_range)
-
-        kept = self._is_kept(tracks)
-        tracks, unmatched_columns = tracks[kept], unmatched(len(image.detections), columns)
-        new = np.zeros(0, TRACK)
-        if len(unmatched_columns):
-            new, started = new_targets(tracks, batch.select(unmatched_columns), stamp_ns, params)
-            new['id'] = [id_of(column) for column in unmatched_columns[started].tolist()]
-            tracks = np.concatenate((tracks, new))
-
-        looks = carried(others, kept, len(new))
-        looks[view.camera] = CameraVisibility(stamp_ns, view, np.concatenate((places[kept], np.full(len(new), SEEN))))
-        stamps_ns = {camera: last_ns for camera, last_ns in state.stamps_ns.items() if stamp_ns - last_ns <= KNOWN_NS}
-        stamps_ns[view.camera] = stamp_ns
-        return _State(tracks, stamp_ns, stamps_ns, looks), matches
-
-    def _predict(self, state, stamp_ns):
-        """The tracks (n,), predicted to a stamp."""
+        """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
+        stamp_ns, detections, view = image
+        params, camera = self._params, view.camera
         tracks = state.tracks.copy()
         elapsed_s = 0.0 if state.now_ns is None else (stamp_ns - state.now_ns) / NS
         tracks['mean'], tracks['covariance'] = kalman_filter.predict(tracks['mean'], tracks['covariance'], elapsed_s,
-                                                                     self._params.acceleration)
-        return tracks
+                                                                     params.acceleration)
 
-    def _measure(self, state, image):
-        """The detections of an image as a MeasurementBatch."""
-        last_ns = state.stamps_ns.get(image.view.camera, image.stamp_ns)
-        return measurement_batch_of(image.detections, image.view, (image.stamp_ns - last_ns) / NS, self._noise)
+        period_s = (stamp_ns - state.cameras[camera].stamp_ns) / NS if camera in state.cameras else 0.0
+        measurements = measurements_of(detections, view, period_s, self._noise)
+        rows, columns = associate(tracks, measurements, stamp_ns, params)
+        matches = list(zip(tracks['id'][rows].tolist(), tracks['confirmed'][rows].tolist(), columns.tolist()))
+        update_matched(tracks, rows, measurements[columns], stamp_ns, params)
 
-    def _is_kept(self, tracks):
-        """Which tracks are kept, (n,) bool; tentative ones only for `TENTATIVE_TIMEOUT_S`."""
-        limit_s = np.where(tracks['confirmed'], self._params.max_age, TENTATIVE_TIMEOUT_S)
-        return (tracks['unseen_s'] < limit_s) & (sigma_of(tracks) < MAX_POSITION_STD_M)
+        cameras = {name: latest for name, latest in state.cameras.items() if stamp_ns - latest.stamp_ns <= KNOWN_NS}
+        cameras[camera] = CameraVisibility(stamp_ns, view, np.full(len(tracks), SEEN))
+        missed = unmatched(len(tracks), rows)
+        if len(missed):
+            mark_missed(tracks, state.tracks, missed, cameras, camera, observed_s, params.max_range)
+
+        # Tentative tracks are kept for a short time only.
+        max_unseen_s = np.where(tracks['confirmed'], params.max_age, TENTATIVE_TIMEOUT_S)
+        kept = (tracks['unseen_s'] < max_unseen_s) & (position_std_of(tracks) < MAX_POSITION_STD_M)
+        tracks, unmatched_columns = tracks[kept], unmatched(len(detections), columns)
+        new = tracks[:0]
+        if len(unmatched_columns):
+            new, started = new_targets(tracks, measurements[unmatched_columns], stamp_ns, params)
+            new['id'] = [id_of(column) for column in unmatched_columns[started].tolist()]
+            tracks = np.concatenate((tracks, new))
+        for name, latest in cameras.items():
+            added = np.full(len(new), SEEN if name == camera else OUT_OF_VIEW)
+            cameras[name] = latest._replace(visibility=np.concatenate((latest.visibility[kept], added)))
+        return _State(tracks, stamp_ns, cameras), matches

@@ -8,6 +8,7 @@ from ros_3d_bb.core.limits import USUAL_HEIGHT_M, USUAL_WIDTH_M
 from ros_3d_bb.core.params import Param
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
+NEARER_M = 0.25  # an occluding person is at least this much nearer to the camera than an occluded one
 MOST_STEPS = 1000  # maximum number of prediction steps, to limit memory
 VERTICAL = 0.02  # upper bound of the horizontal part of the optical axis of a camera that points straight up or down
 # Parameters of both trackers.
@@ -34,19 +35,10 @@ class Detection(NamedTuple):
 
 
 def detection_from_box(box, fixed_from_camera):
-    """Convert a 3D box of an image to a Detection in the fixed frame.
+    """Convert a `box3d_estimator.Box3D` of an image to a Detection in the fixed frame.
 
     The cylinder is upright in the fixed frame, independent of which edge of the image is up: for a camera mounted in
     portrait, width and height are swapped.
-
-    Parameters
-    ----------
-    box : box3d_estimator.Box3D
-    fixed_from_camera : numpy.ndarray, (4, 4)
-
-    Returns
-    -------
-    Detection
     """
     rotation, turns = fixed_from_camera[:3, :3], upright_turns(fixed_from_camera)
     center_m, (width_m, height_m) = box.center_m, box.size_m[:2]
@@ -90,8 +82,8 @@ class CameraView(NamedTuple):
 
     @property
     def ahead(self):
-        """Unit vector (2,) of the horizontal direction of the optical axis. For a camera that points straight up or
-        down, it is the direction of the upper edge of the image."""
+        """Unit vector (2,) of the horizontal direction of the optical axis; of the upper edge of the image for a camera
+        that points straight up or down."""
         ahead = self.fixed_from_camera[:2, 2]
         if ahead.dot(ahead) < VERTICAL ** 2:
             ahead = -self.fixed_from_camera[:2, 1]
@@ -129,6 +121,11 @@ class TrackedObject(NamedTuple):
     prediction_step_s: float
     covariance: Optional[np.ndarray] = None
     prediction_covariance_m2: Optional[np.ndarray] = None
+
+
+def wrapped(angles):
+    """Wrap angles to -pi..pi, radians."""
+    return angles - 2 * np.pi * np.rint(angles / (2 * np.pi))
 
 
 def prediction_times_s(time_s, step_s):

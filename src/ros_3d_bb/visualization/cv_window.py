@@ -8,33 +8,23 @@ import numpy as np
 
 FLAGS = 0x10  # WINDOW_GUI_NORMAL, which old versions do not define: no toolbar, resizable with fixed aspect ratio
 NO_KEY = 255
-
-
-class WindowError(ValueError):
-    """A window cannot be opened."""
+REMEDY = 'set ~window:=false (launch argument window:=false) to run without a window'
 
 
 class Window(object):
-    """Window that shows images and reads keys.
-
-    Raises
-    ------
-    WindowError
-        If there is no display, or OpenCV was built without a GUI.
-    """
+    """Window that shows images and reads keys. Raises ValueError if there is no display, or OpenCV has no GUI."""
 
     def __init__(self, title):
-        check_display()
+        _check_display()
         self._title = title
         try:
             cv2.namedWindow(title, cv2.WINDOW_NORMAL | FLAGS)
         except cv2.error as error:
-            raise WindowError('OpenCV cannot open a window: %s' % str(error).strip())
+            raise ValueError('OpenCV cannot open a window: %s; %s' % (str(error).strip(), REMEDY))
         self._size_px = None
 
     @property
     def is_closed(self):
-        """Whether the user has closed the window."""
         return self._size_px is not None and cv2.getWindowProperty(self._title, cv2.WND_PROP_VISIBLE) < 1
 
     def show(self, picture):
@@ -53,18 +43,14 @@ class Window(object):
         return '' if code == NO_KEY else chr(code)
 
     def close(self):
-        """Close the window."""
         cv2.destroyAllWindows()
         cv2.waitKey(1)  # the toolkit closes the window in its event loop
 
 
-def check_display():
-    """Raise WindowError if no window can be opened.
-
-    The check runs in a separate process, because OpenCV's toolkit aborts the process if the display does not respond.
-    """
+def _check_display():
+    """Try to open a window in a separate process, because OpenCV aborts the process if the display does not respond."""
     if not (os.environ.get('DISPLAY') or os.environ.get('WAYLAND_DISPLAY')):
-        raise WindowError('there is no display (DISPLAY is not set)')
+        raise ValueError('there is no display (DISPLAY is not set); %s' % REMEDY)
     trial = [sys.executable, '-c', 'import cv2; cv2.namedWindow("trial")']
     if subprocess.call(trial, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
-        raise WindowError('no window can be opened on the display %s' % os.environ.get('DISPLAY'))
+        raise ValueError('no window can be opened on the display %s; %s' % (os.environ.get('DISPLAY'), REMEDY))

@@ -13,18 +13,14 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 
 MARKERS_TOPIC = 'visualization_marker_array'
-CYLINDER, ID, VELOCITY, PREDICTION, HISTORY, ELLIPSE, PREDICTION_ELLIPSE = NAMESPACES = (
-    'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse', 'prediction_ellipse')
+NAMESPACES = 'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse', 'prediction_ellipse'
 BLUE, GREEN, RED = (0.1, 0.3, 1.0), (0.1, 0.9, 0.2), (0.95, 0.1, 0.1)
 AMBER, GREY, WHITE = (1.0, 0.65, 0.1), (0.65, 0.65, 0.65), (0.95, 0.95, 0.95)
 # Neighbours differ most. None is red, green or grey, because arrows and tracks that are not visible have these colours.
 PALETTE = ((0.15, 0.4, 1.0), (1.0, 0.6, 0.1), (0.9, 0.35, 0.9), (0.1, 0.8, 0.85), (0.95, 0.9, 0.25),
            (0.55, 0.3, 0.95), (1.0, 0.6, 0.65), (0.6, 0.8, 1.0), (0.7, 0.45, 0.2), (0.75, 0.65, 1.0))
 STATUS_COLORS = {VISIBLE: BLUE, OCCLUDED: AMBER, OUT_OF_VIEW: GREY}
-COLORS = {'id': lambda track: PALETTE[(track.id - 1) % len(PALETTE)],
-          'status': lambda track: STATUS_COLORS[track.status],
-          'thesis': lambda _track: BLUE}
-TEXT_COLORS = {'id': WHITE, 'status': WHITE, 'thesis': GREEN}
+TEXT_COLORS = {'id': WHITE, 'status': WHITE, 'thesis': GREEN}  # by ~marker_color
 VELOCITY_SHOWN_S = 1.0  # the velocity arrow ends at the position after this time
 MIN_ARROW_M = 0.05  # RViz cannot orient an arrow without length
 # Diameters of shaft and head. If both arrows have the same direction, the tip of the thin one remains visible.
@@ -49,17 +45,10 @@ class MarkerParams(NamedTuple):
     marker_color: str = Param(
         'id', 'Colour of cylinders, history and ellipses. id: one of ten colours by track ID, which shows ID '
         'switches; status: blue for visible, amber for occluded, grey for out of view; thesis: blue. Undetected '
-        'people are paler.', choices=tuple(COLORS), live=True)
+        'people are paler.', choices=tuple(TEXT_COLORS), live=True)
     marker_history: float = Param(4.0, 'Length of the history; 0: none.', 's', live=(0, 30))
     marker_lifetime: float = Param(
         2.0, 'RViz removes markers that are not updated for this long; 0: never.', 's', live=(0, 10))
-
-
-class PathHistory(NamedTuple):
-    """Path of a track on the floor, oldest first: [(stamp_ns, Point relative to `anchor_m`)]."""
-
-    anchor_m: np.ndarray
-    steps: list
 
 
 class MarkerWriter(object):
@@ -74,31 +63,20 @@ class MarkerWriter(object):
 
     def __init__(self, params=MarkerParams()):
         self._drawn = set()  # (namespace, id)
-        self._histories = {}  # {track ID: PathHistory}
+        self._histories = {}  # by track ID: an anchor (3,), and the path relative to it, [(stamp_ns, Point)]
         self.reconfigure(params)
 
     def reconfigure(self, params):
         """Draw the next tracks with other parameters."""
         self._params = params
         self._lifetime = genpy.Duration.from_sec(params.marker_lifetime)
-        shapes = {CYLINDER: self._cylinder, ID: self._number, VELOCITY: self._velocity, PREDICTION: self._prediction,
-                  HISTORY: self._history, ELLIPSE: self._ellipse, PREDICTION_ELLIPSE: self._prediction_ellipses}
-        self._shapes = [(namespace, shapes[namespace]) for namespace in NAMESPACES
-                        if namespace in params.marker_namespaces]
+        shapes = (self._cylinder, self._id, self._velocity, self._prediction, self._history, self._ellipse,
+                  self._prediction_ellipses)
+        self._shapes = [(name, shape) for name, shape in zip(NAMESPACES, shapes) if name in params.marker_namespaces]
 
     def write(self, tracks, header):
-        """Create the markers of the tracks of one image.
-
-        Parameters
-        ----------
-        tracks : list of types.TrackedObject
-        header : std_msgs.msg.Header
-            Stamp of the image, and fixed frame.
-
-        Returns
-        -------
-        visualization_msgs.msg.MarkerArray
-        """
+        """Create the visualization_msgs/MarkerArray of the tracks (`types.TrackedObject`) of one image; the header has
+        its stamp and the fixed frame."""
         now_ns = header.stamp.to_nsec()
         self._histories = {track.id: self._extended_history(track, now_ns) for track in tracks}
         markers = []
@@ -108,9 +86,9 @@ class MarkerWriter(object):
                 marker.pose.position, marker.pose.orientation.w = Point(*track.position_m), 1.0
                 if shape(marker, track):
                     markers.append(marker)
-        drawn = set((marker.ns, marker.id) for marker in markers)
-        markers += [Marker(header=header, ns=namespace, id=number, action=Marker.DELETE)
-                    for namespace, number in sorted(self._drawn - drawn)]
+        drawn = {(marker.ns, marker.id) for marker in markers}
+        markers += [Marker(header=header, ns=namespace, id=track_id, action=Marker.DELETE)
+                    for namespace, track_id in sorted(self._drawn - drawn)]
         self._drawn = drawn
         return MarkerArray(markers=markers)
 
@@ -118,26 +96,28 @@ class MarkerWriter(object):
         """History of a track with its current position, without steps that a jump back in time makes future ones."""
         oldest_ns = now_ns - int(self._params.marker_history * NS)
         foot_m = track.position_m + _to_foot(track)
-        before = self._histories.get(track.id, PathHistory(foot_m, []))
-        steps = [step for step in before.steps if oldest_ns <= step[0] < now_ns]
+        anchor_m, steps = self._histories.get(track.id, (foot_m, []))
+        steps = [step for step in steps if oldest_ns <= step[0] < now_ns]
         spacing_s = max(HISTORY_SPACING_S, self._params.marker_history / HISTORY_POINTS)
         if len(steps) > 1 and steps[-1][0] - steps[-2][0] < spacing_s * NS:
             steps.pop()
-        anchor_m = before.anchor_m if steps else foot_m
-        return PathHistory(anchor_m, steps + [(now_ns, Point(*(foot_m - anchor_m)))])
+        if not steps:
+            anchor_m = foot_m
+        return anchor_m, steps + [(now_ns, Point(*(foot_m - anchor_m)))]
 
     # Each shape fills in a marker and returns whether there is anything to draw.
 
     def _cylinder(self, marker, track):
-        marker.type, marker.color = Marker.CYLINDER, _color(self._rgb(track), 0.65 if _is_visible(track) else 0.2)
+        marker.type, marker.color = Marker.CYLINDER, _color(self._rgb(track), 0.65 if track.status == VISIBLE else 0.2)
         marker.scale.x, marker.scale.y, marker.scale.z = track.size_m
         return True
 
-    def _number(self, marker, track):
+    def _id(self, marker, track):
         marker.type, marker.scale.z = Marker.TEXT_VIEW_FACING, 0.35
         marker.pose.position = Point(*(track.position_m + [0, 0, track.size_m[2] / 2 + 0.2]))
-        marker.text = '%d' % track.id if _is_visible(track) else '%d?' % track.id
-        marker.color = _color(TEXT_COLORS[self._params.marker_color] if _is_visible(track) else GREY, 1.0)
+        is_visible = track.status == VISIBLE
+        marker.text = '%d' % track.id if is_visible else '%d?' % track.id
+        marker.color = _color(TEXT_COLORS[self._params.marker_color] if is_visible else GREY, 1.0)
         return True
 
     def _velocity(self, marker, track):
@@ -177,11 +157,9 @@ class MarkerWriter(object):
         return bool(marker.points)
 
     def _rgb(self, track):
-        return COLORS[self._params.marker_color](track)
-
-
-def _is_visible(track):
-    return track.status == VISIBLE
+        if self._params.marker_color == 'status':
+            return STATUS_COLORS[track.status]
+        return PALETTE[(track.id - 1) % len(PALETTE)] if self._params.marker_color == 'id' else BLUE
 
 
 def _to_foot(track):
@@ -191,19 +169,14 @@ def _to_foot(track):
 
 def _fill_arrow(marker, track, offset_m, rgb, widths_m):
     """Make the marker an arrow from the centre of the track along `offset_m`."""
-    marker.type, marker.color = Marker.ARROW, _color(rgb, 1.0 if _is_visible(track) else 0.4)
+    marker.type, marker.color = Marker.ARROW, _color(rgb, 1.0 if track.status == VISIBLE else 0.4)
     marker.points = [Point(), Point(*offset_m)]
     marker.scale.x, marker.scale.y = widths_m
     return np.linalg.norm(offset_m) >= MIN_ARROW_M
 
 
 def _ellipses(covariances_m2, centers_m):
-    """Closed outlines of the 95 % confidence ellipses of planar covariances (n, 2, 2) at centres (n, 3).
-
-    Returns
-    -------
-    list of list of geometry_msgs.msg.Point
-    """
+    """Closed outlines of the 95 % confidence ellipses of covariances (n, 2, 2) at centres (n, 3), as lists of Point."""
     variances_m2, axes = np.linalg.eigh(covariances_m2)
     semi_axes_m = np.sqrt(CHI2_95 * np.maximum(variances_m2, 0))
     offsets_m = np.matmul(CIRCLE * semi_axes_m[:, np.newaxis], axes.transpose(0, 2, 1))

@@ -22,11 +22,7 @@ TITLES = ('colour', 'depth', 'boxes')
 
 
 class ViewerContent(NamedTuple):
-    """Content of the window: an image, its boxes, and text.
-
-    `rects_px` are the 2D boxes, `boxes` the 3D boxes; None if they have not been received. `lines` are shown as plain
-    text, `warnings` are highlighted.
-    """
+    """Content of the window: an image, its 2D and 3D boxes or None, lines of text, and highlighted warnings."""
 
     color: np.ndarray
     depth: DepthImage
@@ -43,20 +39,16 @@ class FrameRate(object):
         self._arrivals_ns = collections.deque()
 
     def add(self, arrival_ns):
-        """Register the arrival of an image."""
         self._arrivals_ns.append(arrival_ns)
-        self._drop_before(arrival_ns - RATE_WINDOW_NS)  # limits the memory if the rate is never read
+        self.at(arrival_ns)  # limits the memory if the rate is never read
 
     def at(self, now_ns):
         """Recent number of images per second; 0 if fewer than two have arrived."""
-        self._drop_before(now_ns - RATE_WINDOW_NS)
+        while self._arrivals_ns and self._arrivals_ns[0] < now_ns - RATE_WINDOW_NS:
+            self._arrivals_ns.popleft()
         if len(self._arrivals_ns) < 2:
             return 0.0
         return (len(self._arrivals_ns) - 1) * NS / max(1, self._arrivals_ns[-1] - self._arrivals_ns[0])
-
-    def _drop_before(self, oldest_ns):
-        while self._arrivals_ns and self._arrivals_ns[0] < oldest_ns:
-            self._arrivals_ns.popleft()
 
 
 def compose(view, panel_width_px, farthest_m):
@@ -66,7 +58,7 @@ def compose(view, panel_width_px, farthest_m):
     color = cv2.resize(np.ascontiguousarray(view.color), size_px, interpolation=cv2.INTER_LINEAR)
     # depth must not be interpolated
     grey = cv2.resize(depth_to_grey(view.depth, farthest_m), size_px, interpolation=cv2.INTER_NEAREST)
-    panels = [color, draw_range_bar(colorize_depth(grey), farthest_m), _annotated(color.copy(), view)]
+    panels = [color, _with_range_bar(colorize_depth(grey), farthest_m), _annotated(color.copy(), view)]
     for panel, title in zip(panels, TITLES):
         _write(panel, title, (MARGIN_PX, panel.shape[0] - MARGIN_PX))  # labels of boxes are at the top
     row = np.concatenate(panels, axis=1)
@@ -74,8 +66,8 @@ def compose(view, panel_width_px, farthest_m):
     return np.concatenate((row, text_image(lines, view.warnings, row.shape[1])))
 
 
-def draw_range_bar(image, farthest_m):
-    """Draw the colour scale of depth along the right border, labelled in metres. Returns the image."""
+def _with_range_bar(image, farthest_m):
+    """Draw the colour scale of depth along the right border, labelled in metres."""
     height, width = image.shape[:2]
     left, right, bottom = width - MARGIN_PX - BAR_WIDTH_PX, width - MARGIN_PX, height - BAR_TOP_PX
     grey = np.rint(np.linspace(255, 1, bottom - BAR_TOP_PX)).astype(np.uint8)
@@ -92,12 +84,12 @@ def draw_range_bar(image, farthest_m):
 def box_lines(boxes):
     """One line per 3D box: number as in the image, position in the camera's optical frame, width and height."""
     return tuple('%d: x %+.2f  y %+.2f  z %.2f m,  %.2f m wide, %.2f m high%s'
-                 % ((number,) + tuple(box.center_m) + tuple(box.size_m[:2]) + (', cut' if box.truncated else '',))
+                 % ((number,) + tuple(box.center_m) + tuple(box.size_m[:2]) + (', truncated' if box.truncated else '',))
                  for number, box in enumerate(boxes, 1))
 
 
 def _annotated(panel, view):
-    """Draw 3D boxes with number and distance, and 2D boxes without a 3D box. Returns the panel."""
+    """Draw 3D boxes with number and distance, and 2D boxes without a 3D box."""
     boxes = view.boxes or ()
     located = set(tuple(box.rect_px) for box in boxes)
     height, width = view.color.shape[:2]

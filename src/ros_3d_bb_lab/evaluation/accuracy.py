@@ -24,15 +24,12 @@ from ros_3d_bb_lab.simulation.simulator import Simulator
 
 LENGTHS = ('rmse_x_m', 'rmse_z_m', 'rmse_plane_m', 'p95_plane_m', 'bias_x_m', 'bias_z_m', 'repeatability_x_m',
            'repeatability_z_m', 'rmse_x_truncated_m')
+SHARES = ('coverage_68', 'coverage_95')
 CALIBRATIONS = ('leave-one-position-out', 'error model')
 
 
 class Estimates(NamedTuple):
-    """Positions from one estimator.
-
-    `raw_m` and `position_m` (corrected) are (n, 3), NaN for frames without an estimate; `covariances` is (n, 3, 3), or
-    None if unknown.
-    """
+    """Raw and corrected positions (n, 3) from one estimator, NaN if missing, and covariances (n, 3, 3) or None."""
 
     raw_m: np.ndarray
     position_m: np.ndarray
@@ -40,14 +37,9 @@ class Estimates(NamedTuple):
 
 
 def boxes_of(session, weights=None):
-    """2D box of the annotated person in each frame, or None.
+    """2D box of the annotated person in each frame, or None: the recorded one, or with `weights` that of YOLOv5.
 
-    Without `weights`, the recorded box is used; otherwise the YOLOv5 box that overlaps it most.
-
-    Raises
-    ------
-    ValueError
-        If a frame with ground truth has no recorded box.
+    Raises ValueError if a frame with ground truth has no recorded box.
     """
     for frame in session.frames:
         if not frame.boxes_px:
@@ -65,16 +57,9 @@ def boxes_of(session, weights=None):
     return chosen
 
 
-def estimates_of(session, boxes, estimator, model=None):
-    """Estimate positions and correct them by an error model.
-
-    If `model` is None, each position is corrected by a model fitted to the other positions.
-
-    Returns
-    -------
-    Estimates
-    """
-    raw_m, truth_m = raw_positions(session, boxes, estimator), truth_of(session)
+def _estimates_of(session, boxes, estimator, model=None):
+    """Estimates corrected by an error model, by default one fitted to all other positions for each position."""
+    raw_m, truth_m = _raw_positions(session, boxes, estimator), truth_of(session)
     seen = np.isfinite(raw_m[:, 0])
     position_m, covariances = raw_m.copy(), np.full(raw_m.shape + (3,), np.nan)
     if model is not None:
@@ -85,7 +70,7 @@ def estimates_of(session, boxes, estimator, model=None):
     return Estimates(raw_m, position_m, covariances)
 
 
-def raw_positions(session, boxes, estimator):
+def _raw_positions(session, boxes, estimator):
     """Estimated position in each frame, (n, 3), NaN if there is no estimate."""
     raw_m = np.full((len(boxes), 3), np.nan)
     for number, (frame, rect_px) in enumerate(zip(session.frames, boxes)):
@@ -96,86 +81,61 @@ def raw_positions(session, boxes, estimator):
 
 
 def truth_of(session):
-    """Ground truth (x, z) of the frames, (n, 2), metres."""
     return np.array([frame.truth_m for frame in session.frames])
 
 
 def scores_of(estimates, truth_m, truncated):
-    """Scores of estimates as a dictionary. A score that cannot be computed is None.
+    """Scores of estimates against the truth (n, 2) as a dictionary. A score that cannot be computed is None.
 
-    Parameters
-    ----------
-    estimates : Estimates
-    truth_m : numpy.ndarray, (n, 2)
-    truncated : numpy.ndarray, (n,), bool
-        Whether the image border truncates the box.
+    `truncated` (n,) is whether the image border truncates the box.
     """
     seen = np.isfinite(estimates.position_m[:, 0])
     error_m = (estimates.position_m[:, [0, 2]] - truth_m)[seen]
     rmse_m = np.sqrt(np.mean(error_m ** 2, axis=0))
-    scores = dict(zip(LENGTHS, (rmse_m[0], rmse_m[1], np.hypot(*rmse_m),
-                                np.percentile(np.hypot(*error_m.T), 95)) + tuple(error_m.mean(axis=0))
-                      + tuple(_repeatability_m(error_m, truth_m[seen]))
-                      + (np.sqrt(np.mean(error_m[truncated[seen], 0] ** 2)) if truncated[seen].any() else np.nan,)))
-    if estimates.covariances is not None:
-        scores.update(zip(('coverage_68', 'coverage_95'), coverage(error_m, estimates.covariances[seen])))
-    else:
-        scores.update(coverage_68=None, coverage_95=None)
-    scores['missed'] = int(np.count_nonzero(~seen))
-    return {name: None if value is None or not np.isfinite(value) else value if name == 'missed' else float(value)
-            for name, value in scores.items()}
+    truncated_x_m = error_m[truncated[seen], 0]
+    shares = (np.nan, np.nan) if estimates.covariances is None else coverage(error_m, estimates.covariances[seen])
+    values = (*rmse_m, np.hypot(*rmse_m), np.percentile(np.hypot(*error_m.T), 95), *error_m.mean(axis=0),
+              *_repeatability_m(error_m, truth_m[seen]),
+              np.sqrt(np.mean(truncated_x_m ** 2)) if truncated_x_m.size else np.nan, *shares)
+    scores = dict(zip(LENGTHS + SHARES, _numbers(values)))
+    return dict(scores, missed=int(np.count_nonzero(~seen)))
 
 
 def _repeatability_m(error_m, truth_m):
-    """Standard deviation of repeated measurements, (2,).
-
-    It is the root mean square over the positions with at least three measurements.
-    """
-    variances = [error_m[same].var(axis=0) for same in (
-        (truth_m == place).all(axis=1) for place in np.unique(truth_m, axis=0)) if np.count_nonzero(same) > 2]
+    """Standard deviation of repeated measurements, (2,): RMS over the positions with at least three measurements."""
+    repeated = [error_m[(truth_m == position_m).all(axis=1)] for position_m in np.unique(truth_m, axis=0)]
+    variances = [errors_m.var(axis=0) for errors_m in repeated if len(errors_m) > 2]
     return np.sqrt(np.mean(variances, axis=0)) if variances else np.full(2, np.nan)
 
 
 def compare(session, boxes, estimator, model=None):
-    """Compare the estimators on a session.
-
-    Returns
-    -------
-    dict
-        Scores of each estimator, and positions of each frame.
-    numpy.ndarray, (n, 3)
-        Our uncorrected positions.
-    """
+    """Compare the estimators on a session. Returns scores and positions as a dictionary, and our `Estimates`."""
     truth_m = truth_of(session)
     truncated = np.array([any(truncated_edges(rect_px or frame.boxes_px[0], session.camera))
                           for rect_px, frame in zip(boxes, session.frames)])
-    ours = estimates_of(session, boxes, estimator, model)
+    ours = _estimates_of(session, boxes, estimator, model)
     thesis = _thesis_estimates(session, boxes)
-    nobody_m = np.full(3, np.nan)
-    recorded_m = np.array([nobody_m if frame.estimate_m is None or rect_px is None else frame.estimate_m
+    recorded_m = np.array([np.full(3, np.nan) if frame.estimate_m is None or rect_px is None else frame.estimate_m
                            for rect_px, frame in zip(boxes, session.frames)])
     recorded = Estimates(recorded_m, recorded_m, None) if np.isfinite(recorded_m[:, 0]).any() else None
-    columns = zip(session.frames, ours.position_m, thesis.position_m, truth_m, ours.raw_m, thesis.raw_m)
+    names = 'ours', 'thesis', 'truth', 'ours_raw', 'thesis_raw'
+    rows = zip(session.frames, ours.position_m, thesis.position_m, truth_m, ours.raw_m, thesis.raw_m)
     return {'frames': len(session.frames), 'positions': len(np.unique(truth_m, axis=0)),
             'calibration': CALIBRATIONS[model is not None],
             'thesis_calibration': 'none' if thesis.covariances is None else CALIBRATIONS[0],
             'ours': scores_of(ours, truth_m, truncated),
             'thesis': scores_of(thesis, truth_m, truncated),
             'recorded': None if recorded is None else scores_of(recorded, truth_m, truncated),
-            'per_frame': [dict(zip(('id', 'ours', 'thesis', 'truth', 'ours_raw', 'thesis_raw'),
-                                   [column[0].id] + [_numbers(values) for values in column[1:]]))
-                          for column in columns]}, ours.raw_m
+            'per_frame': [dict([('id', frame.id), *zip(names, map(_numbers, values))])
+                          for frame, *values in rows]}, ours
 
 
 def _thesis_estimates(session, boxes):
-    """Estimates of the thesis' estimator, corrected by the other positions.
-
-    They are uncorrected if there are too few positions.
-    """
+    """Estimates of the thesis' estimator, uncorrected if there are too few positions."""
     try:
-        return estimates_of(session, boxes, estimator_named('median'))
+        return _estimates_of(session, boxes, estimator_named('median'))
     except ValueError:
-        raw_m = raw_positions(session, boxes, estimator_named('median'))
+        raw_m = _raw_positions(session, boxes, estimator_named('median'))
         return Estimates(raw_m, raw_m, None)
 
 
@@ -184,10 +144,9 @@ def _numbers(values):
 
 
 def table(result):
-    """Format the scores as lines of text."""
     names = [name for name in ('ours', 'thesis', 'recorded') if result[name] is not None]
     lines = ['%-20s' % '' + ''.join('%12s' % name for name in names)]
-    for key in LENGTHS + ('coverage_68', 'coverage_95', 'missed'):
+    for key in LENGTHS + SHARES + ('missed',):
         values = [result[name][key] for name in names]
         lines.append('%-20s' % key + ''.join('%12s' % ('-' if value is None else '%d' % value if key == 'missed'
                                                        else '%.4f' % value) for value in values))
@@ -222,12 +181,12 @@ def main():
         if model is not None:
             model.check_estimator(arguments.estimator)
         boxes = boxes_of(session, arguments.weights if arguments.boxes == 'yolov5' else None)
-        result, raw_m = compare(session, boxes, estimator_named(arguments.estimator), model)
+        result, ours = compare(session, boxes, estimator_named(arguments.estimator), model)
         result.update(boxes=arguments.boxes, estimator=arguments.estimator)
         if arguments.fit:
-            seen = np.isfinite(raw_m[:, 0])
+            seen = np.isfinite(ours.raw_m[:, 0])
             write_error_model(arguments.fit, fit_error_model(
-                raw_m[seen], truth_of(session)[seen], source=arguments.source, estimator=arguments.estimator,
+                ours.raw_m[seen], truth_of(session)[seen], source=arguments.source, estimator=arguments.estimator,
                 camera=arguments.camera, date=arguments.date))
         if arguments.json:
             with open(arguments.json, 'w') as stream:
@@ -259,14 +218,15 @@ def _arguments():
                         help='a measurement session (default: $ROS_3D_BB_DATA/data/thesis)')
     parser.add_argument('--scenarios', nargs='+', type=scenario_path, metavar='SCENARIO',
                         help='simulated scenes instead of a session')
-    parser.add_argument('--error-model', metavar='FILE', help='correct by this instead of by the other positions')
-    parser.add_argument('--fit', metavar='FILE', help='also write the error model of all frames')
+    parser.add_argument('--error-model', metavar='FILE', help='error model for the correction (default: models fitted '
+                        'to the other positions)')
+    parser.add_argument('--fit', metavar='FILE', help='also write an error model fitted to all frames')
     parser.add_argument('--boxes', choices=('recorded', 'yolov5'), default='recorded', help='default: recorded')
     parser.add_argument('--weights', default=default_weights(), help='checkpoint or export, for --boxes yolov5')
     parser.add_argument('--estimator', default='foreground', metavar='NAME', help='default: foreground')
-    parser.add_argument('--json', metavar='FILE', help='also write the scores there')
+    parser.add_argument('--json', metavar='FILE', help='also write the scores as JSON')
     for name in ('source', 'camera', 'date'):
-        parser.add_argument('--' + name, default='', help='kept in the file of --fit')
+        parser.add_argument('--' + name, default='', help='stored in the file of --fit')
     arguments = parser.parse_args()
     if not arguments.data and not arguments.scenarios:
         parser.error('no --data given, and ROS_3D_BB_DATA is not set')

@@ -26,21 +26,12 @@ class Moment(NamedTuple):
     tracks: List[TrackedObject]
 
 
-class MatchedPair(NamedTuple):
-    """Matched person and track in one image; `error_m` (2,) is the position error of the track in x and y."""
-
-    person: int
-    track: int
-    error_m: np.ndarray
-
-
 class PersonScore(NamedTuple):
     """Tracking scores of one person.
 
-    `visible_s`: total time in which the person is visible; `longest_s`: longest uninterrupted interval; `followed`:
-    share 0..1 of the images with the person visible that have a matched track; `ids`: track IDs in order, with an entry
-    for each change; `rmse_m` and `worst_m`: RMS and maximum position error of the matched tracks, NaN if there are
-    none.
+    `visible_s` is the total time in view and `longest_s` the longest uninterrupted interval; `followed` is the share
+    0..1 of the images with the person visible that have a matched track; `ids` has an entry for each change of the
+    track ID; `rmse_m` and `worst_m` are position errors of the matched tracks, NaN if there are none.
     """
 
     person: int
@@ -66,24 +57,14 @@ class SceneScore(NamedTuple):
 
 
 def score(moments):
-    """Compare tracks with ground truth.
-
-    Parameters
-    ----------
-    moments : list of Moment
-        Ordered by stamp.
-
-    Returns
-    -------
-    SceneScore
-    """
-    pairs, false, matcher = [], 0, ClearMatcher()
+    """Compare tracks with ground truth. Takes a list of Moment ordered by stamp, returns a SceneScore."""
+    matches, false, matcher = [], 0, ClearMatcher()
     for moment in moments:
-        seen = [track for track in moment.tracks if track.status == VISIBLE]
-        pairs.append(matcher.match(moment.truth, seen))
-        false += len(seen) - len(pairs[-1])
+        visible = [track for track in moment.tracks if track.status == VISIBLE]
+        matches.append(matcher.match(moment.truth, visible))
+        false += len(visible) - len(matches[-1])
     people = sorted(set(person.id for moment in moments for person in moment.truth))
-    return SceneScore([_person_score(person, moments, pairs) for person in people], len(moments),
+    return SceneScore([_person_score(person, moments, matches) for person in people], len(moments),
                       false / float(max(1, len(moments))))
 
 
@@ -94,52 +75,50 @@ class ClearMatcher(object):
         self._gate_m, self._last_matches = gate_m, {}
 
     def match(self, people, tracks):
-        """Match one image. Returns a list of MatchedPair: kept matches first, then the others by distance."""
+        """Match one image. Returns pairs (person, track): kept matches first, then the others by distance."""
         if not people or not tracks:
             return []
         distances_m = plane_distances([person.position_m for person in people], [track.position_m for track in tracks])
         near = distances_m <= self._gate_m
         kept = np.array([[self._last_matches.get(person.id) == track.id for track in tracks] for person in people])
         scores = np.where(near, KEPT * kept + 1 - distances_m / (2 * self._gate_m), 0)
-        matches = sorted((match for match in assign(-scores) if near[match]), key=lambda match: -scores[match])
-        pairs = [MatchedPair(people[row].id, tracks[column].id,
-                             tracks[column].position_m[:2] - people[row].position_m[:2])
-                 for row, column in matches]
-        self._last_matches = {pair.person: pair.track for pair in pairs}
+        matches = sorted((match for match in zip(*assign(-scores)) if near[match]), key=lambda match: -scores[match])
+        pairs = [(people[row], tracks[column]) for row, column in matches]
+        self._last_matches = {person.id: track.id for person, track in pairs}
         return pairs
 
 
-def _person_score(person, moments, pairs):
-    ids, errors_m, shown_ns = [], [], []
-    for moment, found in zip(moments, pairs):
-        if not any(other.id == person and other.status == VISIBLE for other in moment.truth):
+def _person_score(person_id, moments, matches):
+    ids, errors_m, visible_ns = [], [], []
+    for moment, pairs in zip(moments, matches):
+        if not any(person.id == person_id and person.status == VISIBLE for person in moment.truth):
             continue
-        shown_ns.append(moment.stamp_ns)
-        for pair in found:
-            if pair.person == person:
-                errors_m.append(np.linalg.norm(pair.error_m))
-                if ids[-1:] != [pair.track]:
-                    ids.append(pair.track)
-    lengths_s = _stretches_s(shown_ns, [moment.stamp_ns for moment in moments])
-    return PersonScore(person, sum(lengths_s), max(lengths_s, default=0.0),
-                       len(errors_m) / float(max(1, len(shown_ns))), ids,
+        visible_ns.append(moment.stamp_ns)
+        for person, track in pairs:
+            if person.id == person_id:
+                errors_m.append(np.linalg.norm((track.position_m - person.position_m)[:2]))
+                if ids[-1:] != [track.id]:
+                    ids.append(track.id)
+    lengths_s = _visible_intervals_s(visible_ns, [moment.stamp_ns for moment in moments])
+    return PersonScore(person_id, sum(lengths_s), max(lengths_s, default=0.0),
+                       len(errors_m) / float(max(1, len(visible_ns))), ids,
                        float(np.sqrt(np.mean(np.square(errors_m)))) if errors_m else float('nan'),
                        max(errors_m, default=float('nan')))
 
 
-def _stretches_s(shown_ns, all_ns):
-    """Durations of the intervals in which a person is visible, without longer gaps between images."""
+def _visible_intervals_s(visible_ns, all_ns):
     period_ns = np.median(np.diff(all_ns)) if len(all_ns) > 1 else 0
-    gaps = np.flatnonzero(np.diff(shown_ns) > LONGEST_GAP * period_ns) + 1
-    return [(stretch[-1] - stretch[0]) / NS for stretch in np.split(np.array(shown_ns, np.int64), gaps) if len(stretch)]
+    gaps = np.flatnonzero(np.diff(visible_ns) > LONGEST_GAP * period_ns) + 1
+    intervals = np.split(np.array(visible_ns, np.int64), gaps)
+    return [(interval[-1] - interval[0]) / NS for interval in intervals if len(interval)]
 
 
 def table(scene_score):
     """Format the scores as lines of text."""
-    lines = ['person  visible  followed  switches  numbers     RMSE     worst']
+    lines = ['person  visible   tracked  ID switches  track IDs     RMSE     worst']
     for person in scene_score.people:
-        lines.append('%6d  %5.1f s  %6.0f %%  %8d  %-9s  %6.3f m  %6.3f m'
+        lines.append('%6d  %5.1f s  %6.0f %%  %11d  %-9s  %6.3f m  %6.3f m'
                      % (person.person, person.visible_s, 100 * person.followed, person.switches,
                         ' '.join(map(str, person.ids)) or '-', person.rmse_m, person.worst_m))
-    lines.append('%d images, %.3f tracks of nobody for each' % (scene_score.images, scene_score.false_share))
+    lines.append('%d images, %.3f false tracks per image' % (scene_score.images, scene_score.false_share))
     return lines

@@ -3,7 +3,7 @@ import argparse
 import glob
 import os
 
-from ros_3d_bb.detection.yolov5.onnx_cache import export_folder
+from ros_3d_bb.detection.yolov5.onnx_backend import export_folder
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))  # repository root
 SCENARIOS = os.path.join(ROOT, 'config', 'scenarios')

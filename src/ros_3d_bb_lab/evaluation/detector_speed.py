@@ -1,4 +1,4 @@
-"""CPU and wall time of the detector per image, by runtime, input size and number of threads."""
+"""CPU and wall time of the detector per image, by runtime and input size, with one thread."""
 import time
 
 import numpy as np
@@ -6,57 +6,32 @@ import numpy as np
 WARM_UPS = 2  # images that are not timed
 
 
-def detector_speed(images, weights, runtimes=('torch', 'onnxruntime'), sizes=(640, 512), threads=(1,)):
-    """Measure the time of detection, from the image to the boxes.
+def detector_speed(images, weights, runtimes=('torch', 'onnxruntime'), sizes=(640, 512)):
+    """Measure the time of detection on the CPU, from the image to the boxes.
 
-    For each number of threads, all runtimes and sizes process each image in turn, so that other load on the machine
-    affects all of them equally and their ratios remain valid.
+    All runtimes and sizes process each of the `images`, (height, width, 3) RGB, in turn, so that other load on the
+    machine affects all of them equally and their ratios remain valid. `weights` is a checkpoint (.pt), the only format
+    that every runtime supports; `sizes` are the longer side of the input in pixels.
 
-    Parameters
-    ----------
-    images : list of numpy.ndarray, (height, width, 3), uint8, RGB
-    weights : str
-        A checkpoint (.pt), the only format that every runtime supports.
-    runtimes : sequence of str
-        See `ros_3d_bb.detection.yolov5.backends`. All runtimes use the CPU.
-    sizes : sequence of int
-        Longer side of the input, pixels.
-    threads : sequence of int
-
-    Returns
-    -------
-    list of dict
-        runtime, size, threads, cpu_ms (of all threads of this process) and wall_ms. Times are medians over the images.
-
-    Raises
-    ------
-    ValueError
-        If there are no images, or a runtime does not support these weights.
+    Returns a list of {runtime, size, threads, cpu_ms (of all threads of this process), wall_ms}, medians over the
+    images. Raises ValueError if there are no images, or a runtime does not support these weights.
     """
     if not len(images):
-        raise ValueError('there are no images to time the detector on')
-    rows = []
-    for count in threads:
-        cases = [(runtime, size, _detector(weights, runtime, size, count)) for runtime in runtimes for size in sizes]
-        times_ms = np.median(_times_ms([detector for _runtime, _size, detector in cases], images), axis=0)
-        rows += [{'runtime': runtime, 'size': size, 'threads': count, 'cpu_ms': cpu_ms, 'wall_ms': wall_ms}
-                 for (runtime, size, _detector), (cpu_ms, wall_ms) in zip(cases, times_ms.tolist())]
-    return rows
+        raise ValueError('no images; at least one image is required to measure the speed of the detector')
+    cases = [(runtime, size, _detector(weights, runtime, size)) for runtime in runtimes for size in sizes]
+    for _image in range(WARM_UPS):
+        for _runtime, _size, detector in cases:
+            detector.detect(images[0])
+    times_ms = [[_time_ms(detector, image) for _runtime, _size, detector in cases] for image in images]
+    return [{'runtime': runtime, 'size': size, 'threads': 1, 'cpu_ms': cpu_ms, 'wall_ms': wall_ms}
+            for (runtime, size, _detector), (cpu_ms, wall_ms) in zip(cases, np.median(times_ms, axis=0).tolist())]
 
 
-def _detector(weights, runtime, size, threads):
+def _detector(weights, runtime, size):
     from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
     from ros_3d_bb.detection.yolov5.detector import DetectionParams, Yolov5
-    running = RuntimeParams(runtime=runtime, device='cpu', threads=threads)
+    running = RuntimeParams(runtime=runtime, device='cpu', threads=1)
     return Yolov5(open_runtime(weights, running), DetectionParams(image_size=size))
-
-
-def _times_ms(detectors, images):
-    """CPU and wall time of each detector for each image, (images, detectors, 2)."""
-    for image in images[:1] * WARM_UPS:
-        for detector in detectors:
-            detector.detect(image)
-    return np.array([[_time_ms(detector, image) for detector in detectors] for image in images])
 
 
 def _time_ms(detector, image):

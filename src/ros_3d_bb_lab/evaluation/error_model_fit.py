@@ -21,22 +21,17 @@ SHARES = np.array([(far / (1 + far + near), near / (1 + far + near)) for far in 
 GROWTH_OUTSIDE = 0.2  # approximately the steepest bias in the thesis' data
 OFF_THE_MIDDLE_M = 0.1
 CHI_SQUARE_68_95 = -2 * np.log(1 - np.array([0.68, 0.95]))  # 2 degrees of freedom
-NOBODY = Provenance('', '', '', '', 0, 0)
+UNKNOWN = Provenance('', '', '', '', 0, 0)
 
 
 class Data(NamedTuple):
-    """Measurements with ground truth.
-
-    `measured_m` (n, 3) is the measured position, `truth_m` (n, 2) the true (x, z), both in metres, and `position` (n,)
-    the index of the true position.
-    """
+    """Measured positions (n, 3), true (x, z) (n, 2), both in metres, and indices of the true positions (n,)."""
 
     measured_m: np.ndarray
     truth_m: np.ndarray
     position: np.ndarray
 
     def part(self, mask):
-        """Select the measurements of a mask (n,)."""
         return Data(*(values[mask] for values in self))
 
     def weights(self):
@@ -45,28 +40,11 @@ class Data(NamedTuple):
 
 
 def fit_error_model(measured_m, truth_m, source='', estimator='', camera='', date=''):
-    """Fit an error model, selecting the number of coefficients by cross-validation.
+    """Fit an ErrorModel. More coefficients are selected only if they predict held-out positions clearly better.
 
-    A model with more coefficients is selected only if it predicts held-out positions clearly better.
-
-    Parameters
-    ----------
-    measured_m : array_like, (n, 3)
-        Estimated x, y, z in metres.
-    truth_m : array_like, (n, 2)
-        True x, z in metres. Measurements with equal truth are repetitions at one position.
-    source, estimator, camera, date : str
-        Provenance, stored in the model.
-
-    Returns
-    -------
-    ErrorModel
-
-    Raises
-    ------
-    ValueError
-        If there are too few positions, if all have the same range or the same x, or if the bias is too steep to be
-        inverted.
+    `measured_m` (n, 3) are the estimated x, y, z and `truth_m` (n, 2) the true x, z in metres. Measurements with equal
+    truth are repetitions at one position. Raises ValueError if there are too few positions, if all have the same range
+    or the same x, or if the bias is too steep to be inverted.
     """
     data = data_of(measured_m, truth_m)
     model = _fit(data)
@@ -95,12 +73,10 @@ def data_of(measured_m, truth_m):
 def held_out(data):
     """Correct the measurements of each position by a model fitted to all other positions.
 
-    Returns
-    -------
-    tuple
-        Corrected positions (n, 3) and their covariances (n, 3, 3).
+    Returns corrected positions (n, 3) and their covariances (n, 3, 3).
     """
-    corrected_m, covariances = np.empty((len(data.truth_m), 3)), np.empty((len(data.truth_m), 3, 3))
+    count = len(data.truth_m)
+    corrected_m, covariances = np.empty((count, 3)), np.empty((count, 3, 3))
     for held, others in _folds(data):
         model = _fit(others)
         corrected_m[held] = model.corrected(data.measured_m[held])
@@ -132,7 +108,6 @@ def _folds(data):
 
 
 def _fit(data):
-    """Fit a model without provenance and scores."""
     degrees = [degree for degree in DEGREES if degree + 2 <= len(np.unique(data.truth_m[:, 1]))]
     degree = _simplest([(degree, _residuals(data, degree, X_TERMS[0])[:, 1]) for degree in degrees], data)
     terms = _simplest([(terms, _residuals(data, degree, terms)[:, 0]) for terms in X_TERMS], data)
@@ -140,14 +115,12 @@ def _fit(data):
     x_sigma, z_sigma = (_fit_spread(residuals_m[:, axis], data) for axis in (0, 1))
     sigmas_m = np.stack([spread.at(data.truth_m[:, 1]) for spread in (x_sigma, z_sigma)], axis=1)
     widening = _widening(sigmas_m, residuals_m, int(data.position.max()) + 1)
-    return _fit_bias(data, degree, terms)._replace(x_sigma=_wider(x_sigma, widening), z_sigma=_wider(z_sigma, widening))
+    x_sigma, z_sigma = (Spread(*(widening * part for part in spread)) for spread in (x_sigma, z_sigma))
+    return _fit_bias(data, degree, terms)._replace(x_sigma=x_sigma, z_sigma=z_sigma)
 
 
 def _simplest(candidates, data):
-    """Select the simplest of the candidates (value, residuals (n,)) whose cost is close to the best.
-
-    Candidates are ordered from simple to complex. Returns the value.
-    """
+    """Select the simplest of the candidates (value, residuals), ordered by complexity, with nearly the best cost."""
     costs = [np.sqrt(np.average(residuals_m ** 2, weights=data.weights())) for _what, residuals_m in candidates]
     best = 0
     for number, cost in enumerate(costs):
@@ -166,7 +139,6 @@ def _residuals(data, degree, terms):
 
 
 def _fit_bias(data, degree, terms):
-    """Fit the bias by weighted least squares."""
     x_m, z_m = data.truth_m.T
     roots = np.sqrt(data.weights())
     z_bias = np.polyfit(z_m, data.measured_m[:, 2] - z_m, degree, w=roots)
@@ -177,23 +149,18 @@ def _fit_bias(data, degree, terms):
         z_m.min(), z_m.max(), np.abs(x_m).max(), z_m[aside].min() if aside.any() else z_m.min())))
     spread = Spread(LEAST_SIGMA_M, 0.0, 0.0)
     return ErrorModel(tuple(z_bias.tolist()), XBias(*x_bias.tolist()), spread, spread, Y_SIGMA_M, limits,
-                      GROWTH_OUTSIDE, NOBODY, None)
+                      GROWTH_OUTSIDE, UNKNOWN, None)
 
 
 def _widening(sigmas_m, residuals_m, positions):
-    """Inflation factor, at least 1, with which the 95 % ellipses contain 95 % of the residuals.
+    """Inflation factor, at least 1, with which the 95 % ellipses contain 95 % of the residuals (n, 2).
 
-    `sigmas_m` and `residuals_m` are (n, 2). The errors have longer tails than a Gaussian, and planners rely on the 95 %
-    ellipse. The quantile is slightly above 95 %, as in conformal prediction, to account for the finite number of
-    positions.
+    The errors have longer tails than a Gaussian, and planners rely on the 95 % ellipse. The quantile is slightly above
+    95 %, as in conformal prediction, to account for the finite number of positions.
     """
     distances = ((residuals_m / sigmas_m) ** 2).sum(axis=1)
     quantile = np.percentile(distances, min(100, 95.0 * (positions + 1) / positions))
     return max(1.0, float(np.sqrt(quantile / CHI_SQUARE_68_95[1])))
-
-
-def _wider(spread, factor):
-    return Spread(*(factor * part for part in spread))
 
 
 def _fit_spread(residuals_m, data):
@@ -201,19 +168,14 @@ def _fit_spread(residuals_m, data):
     z_m, weights = data.truth_m[:, 1], data.weights()
     likelihoods = [0.0, 0.0]
     for with_near in (False, True):
-        for number in range(data.position.max() + 1):
-            held = data.position == number
+        for held, _others in _folds(data):
             sigma_m = _spread_of(residuals_m[~held], z_m[~held], weights[~held], with_near).at(z_m[held])
             likelihoods[with_near] -= np.mean(np.log(sigma_m) + (residuals_m[held] / sigma_m) ** 2 / 2)
     return _spread_of(residuals_m, z_m, weights, likelihoods[True] > likelihoods[False] + LIKELIER)
 
 
 def _spread_of(residuals_m, z_m, weights, with_near):
-    """Maximum-likelihood Spread of weighted Gaussian residuals.
-
-    The shares of the variance components are searched on a grid. For given shares, the scale has a closed-form
-    solution.
-    """
+    """Maximum-likelihood Spread of weighted Gaussian residuals, by grid search over the shares of its components."""
     shares = SHARES if with_near else SHARES[SHARES[:, 1] == 0]
     far, near = shares.T[..., np.newaxis]
     nearest_m, farthest_m = z_m.min(), z_m.max()

@@ -6,20 +6,26 @@ import sys
 
 import numpy as np
 
+from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
 from ros_3d_bb.estimation.error_model import read_error_model
-from ros_3d_bb_lab.evaluation.clear_mot import score
+from ros_3d_bb.tracking.association import plane_distances
+from ros_3d_bb.tracking.types import VISIBLE
+from ros_3d_bb_lab.evaluation.clear_mot import ClearMatcher, score
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path, scenario_paths
-from ros_3d_bb_lab.evaluation.scene_tracks import is_in_image, score_tracks
 from ros_3d_bb_lab.evaluation.scenes import LEAST_SHOWN, run_scene, score_detections
-from ros_3d_bb_lab.simulation.scenario import ScenarioError, read_scenario
+from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
 
 RANGE_M = {'yolov5': (2.0, 8.0), 'depth': (2.0, 6.0), 'exact': (0.5, 8.0)}  # evaluated range of each detector
 EVERY = {'yolov5': 2, 'depth': 2, 'exact': 1}  # every n-th image is used
 JITTER_PX = 1.0  # standard deviation of the box edges of the `exact` detector
+NEAREST_M = 0.5  # minimum distance from the camera in the plane
+HELD_M = 0.5  # maximum distance between a person and a matching track
+HORIZON_S = 1.0  # evaluated prediction horizon
+ROUNDING_M = 1e-6
 COLUMNS = '%-20s %-8s %6s %6s %6s %8s %7s %7s %4s %11s %9s %9s'
 HEADINGS = ('scene', 'detector', 'images', 'recall', 'false', 'switches', 'RMSE', 'worst', 'IDs', 'not visible',
             'velocity', '1 s ahead')
@@ -43,8 +49,7 @@ def yolov5_detector(weights):
 def exact_detector(simulator):
     """Detector for `run_scene` that returns the true boxes, with edges jittered by `JITTER_PX`.
 
-    People that are mostly occluded or outside the image are left out. A person is returned if
-    `scene_tracks.is_in_image` holds, or if at least `LEAST_SHOWN` of the body is visible.
+    It returns people with `is_in_image`, or with at least `LEAST_SHOWN` of the body visible.
     """
     seed, camera = simulator.scenario.seed, simulator.camera
 
@@ -59,8 +64,68 @@ def exact_detector(simulator):
     return detect
 
 
+def is_in_image(person, map_from_camera, camera):
+    """Whether the body axis of a PersonTruth is between the left and right image borders, and not mostly occluded."""
+    x_m, _y, z_m = transform_points(np.linalg.inv(map_from_camera), person.position_m)
+    if person.box_px is None or person.hidden > 1 - LEAST_SHOWN or z_m <= 0:
+        return False
+    return bool(0 <= camera.fx * x_m / z_m + camera.cx < camera.width)
+
+
+def score_tracks(steps, camera):
+    """Compare the VISIBLE tracks of a scene with the people in the image at `NEAREST_M` or more from the camera.
+
+    `track_ids` is the number of IDs of VISIBLE tracks near people; `not_visible` counts, summed over people, the images
+    after the first match in which a person has no VISIBLE track; the RMS errors of the velocity and of the position
+    predicted for `HORIZON_S` are in the plane, None if no track was matched.
+
+    People whose body axis is in the image are scored. `clear_mot` scores people of whose body an image shows a minimum
+    share. A person directly in front of the camera fills the image and shows less than that, but is the most important
+    one for a robot.
+    """
+    track_ids, not_visible, velocity_errors, prediction_errors = set(), 0, [], []
+    followed, matcher = set(), ClearMatcher(HELD_M)
+    for step in steps:
+        people = _scored_people(step, camera)
+        tracks = [track for track in step.moment.tracks if track.status == VISIBLE]
+        near_m = plane_distances([person.position_m for person in people] or np.zeros((0, 3)),
+                                 [track.position_m for track in tracks] or np.zeros((0, 3))) <= HELD_M
+        track_ids.update(track.id for track, near in zip(tracks, near_m.T) if near.any())
+        not_visible += sum(person.id in followed and not near.any() for person, near in zip(people, near_m))
+        for person, track in matcher.match(people, tracks):
+            followed.add(person.id)
+            velocity_errors.append(_distance(track.velocity_mps, person.velocity_mps))
+            predicted_m, true_m = _predicted_m(track), _predicted_m(person)
+            if predicted_m is not None and true_m is not None:
+                prediction_errors.append(_distance(predicted_m, true_m))
+    return {'track_ids': len(track_ids), 'not_visible': not_visible, 'velocity_rmse_mps': _rms(velocity_errors),
+            'prediction_1s_m': _rms(prediction_errors)}
+
+
+def _scored_people(step, camera):
+    map_from_camera = step.frame.poses.map_from_camera
+    shown = set(person.id for person in step.frame.people if is_in_image(person, map_from_camera, camera)
+                and _distance(person.position_m, map_from_camera[:3, 3]) >= NEAREST_M - ROUNDING_M)
+    return [person for person in step.moment.truth if person.id in shown]
+
+
+def _predicted_m(track):
+    """Predicted position (3,) of a track after `HORIZON_S`; None if the prediction is shorter."""
+    number = int(round(HORIZON_S / track.prediction_step_s)) - 1 if len(track.prediction_m) else 0
+    return track.prediction_m[number] if number < len(track.prediction_m) else None
+
+
+def _distance(one, other):
+    """Distance in the plane."""
+    return float(np.hypot(*(np.asarray(one) - other)[:2]))
+
+
+def _rms(errors):
+    return float(np.sqrt(np.mean(np.square(errors)))) if errors else None
+
+
 def result_of(steps, detector, camera=D435I_COLOR):
-    """Scores of a run as a dictionary, as `./run bench scenes` writes them. `detector` is yolov5, depth or exact.
+    """Scores of a run as a dictionary. `detector` is yolov5, depth or exact.
 
     Lengths are in metres and shares are 0..1. Errors are aggregated over all people in the scene.
     """
@@ -68,9 +133,9 @@ def result_of(steps, detector, camera=D435I_COLOR):
     followed = [person for person in tracked.people if person.ids]
     result = {'detector': detector, 'images': found.images, 'people': len(tracked.people), 'recall': found.recall,
               'false_boxes': found.false_rate, 'id_switches': sum(person.switches for person in tracked.people),
-              'rmse_m': float(np.sqrt(np.mean([person.rmse_m ** 2 for person in followed]))) if followed else None,
+              'rmse_m': _rms([person.rmse_m for person in followed]),
               'worst_m': max([person.worst_m for person in followed], default=None)}
-    result.update(score_tracks(steps, camera)._asdict())
+    result.update(score_tracks(steps, camera))
     return result
 
 
@@ -87,7 +152,7 @@ def main():
         if arguments.json:
             with open(arguments.json, 'w') as stream:
                 json.dump({'scenes': results}, stream, indent=1)
-    except (ScenarioError, ValueError, OSError) as error:
+    except (ValueError, OSError) as error:
         sys.exit('./run bench scenes: %s' % error)
 
 
@@ -96,12 +161,12 @@ def _parser():
     parser.add_argument('scenarios', nargs='*', type=scenario_path, metavar='SCENARIO',
                         default=scenario_paths('thesis_*', 'approach_*'),
                         help='names in config/scenarios or files (default: thesis_*, approach_*)')
-    parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, it is left out')
+    parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, YOLOv5 is not run')
     parser.add_argument('--error-model', default=SIMULATED_ERROR_MODEL, metavar='FILE',
                         help='error model for the boxes of the detector `exact` (default: that of simulation.launch)')
     parser.add_argument('--every', type=int, metavar='N',
                         help='use one image of N (default: %s)' % ', '.join('%s %d' % item for item in EVERY.items()))
-    parser.add_argument('--json', metavar='FILE', help='also write the scores there')
+    parser.add_argument('--json', metavar='FILE', help='also write the scores to FILE')
     return parser
 
 
@@ -114,20 +179,17 @@ def _run(path, yolov5, error_model, every):
         if detect is not None:
             steps = run_scene(simulator, detect, every[detector], error_model=model)
             results.append(dict(result_of(steps, detector, simulator.camera), scene=name))
-            print(COLUMNS % _row(results[-1]), flush=True)
+            _print_row(results[-1])
     return results
 
 
-def _row(result):
-    """Values of a result as printed in the table."""
-    texts = [result['scene'], result['detector'], result['images'], '%.3f' % result['recall'],
-             '%.3f' % result['false_boxes'], result['id_switches']]
-    texts += [_text(result[key], 'm') for key in ('rmse_m', 'worst_m')] + [result['track_ids'], result['not_visible']]
-    return tuple(texts + [_text(result['velocity_rmse_mps'], 'm/s'), _text(result['prediction_1s_m'], 'm')])
-
-
-def _text(value, unit):
-    return '-' if value is None else '%.3f %s' % (value, unit)
+def _print_row(result):
+    texts = {key: '-' if result[key] is None else '%.3f %s' % (result[key], 'm/s' if key.endswith('mps') else 'm')
+             for key in ('rmse_m', 'worst_m', 'velocity_rmse_mps', 'prediction_1s_m')}
+    print(COLUMNS % (result['scene'], result['detector'], result['images'], '%.3f' % result['recall'],
+                     '%.3f' % result['false_boxes'], result['id_switches'], texts['rmse_m'], texts['worst_m'],
+                     result['track_ids'], result['not_visible'], texts['velocity_rmse_mps'],
+                     texts['prediction_1s_m']), flush=True)
 
 
 if __name__ == '__main__':

@@ -13,9 +13,8 @@ from ros_3d_bb.estimation.error_model import corrected_boxes
 from ros_3d_bb.tracking.association import match_greedily
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import CameraView, Detection, TrackedObject, detection_from_box
+from ros_3d_bb.tracking.types import CameraView, Detection, detection_from_box
 from ros_3d_bb_lab.evaluation.clear_mot import Moment
-from ros_3d_bb_lab.simulation.ground_truth import truth_at
 from ros_3d_bb_lab.simulation.simulator import SimulatedFrame
 
 LEAST_SHOWN = 0.3  # visible share of the body below which its position cannot be estimated
@@ -31,14 +30,11 @@ class Step(NamedTuple):
 
 
 class SceneImage(NamedTuple):
-    """One image: its frame without pixels, the detected 2D boxes (n, 4), the inputs of a tracker, and the truth."""
+    """One image as a Step without tracks, and the inputs of a tracker."""
 
-    stamp_ns: int
-    frame: SimulatedFrame
-    boxes: np.ndarray
+    step: Step
     detections: List[Detection]
     view: CameraView
-    truth: List[TrackedObject]
 
 
 class DetectionScore(NamedTuple):
@@ -51,7 +47,7 @@ class DetectionScore(NamedTuple):
 
     @property
     def recall(self):
-        """Recall 0..1; 1 if there were no people to be detected."""
+        """0..1; 1 if there were no people to be detected."""
         return self.found / float(self.people) if self.people else 1.0
 
     @property
@@ -60,74 +56,55 @@ class DetectionScore(NamedTuple):
         return self.false / float(max(1, self.images))
 
 
-def look_at_scene(simulator, detect, every=1, estimator=estimator_named('foreground'), error_model=None):
+def detect_in_scene(simulator, detect, every=1, error_model=None):
     """Render a scene and detect the people in it, image by image.
 
-    Parameters
-    ----------
-    simulator : Simulator
-    detect : callable
-        Called with a Frame; returns 2D boxes (n, 4).
-    every : int
-        Use every n-th image.
-    estimator : Estimator
-    error_model : ErrorModel, optional
-        Corrects the 3D boxes and provides their covariance, as in bbox3d_node.
-
-    Yields
-    ------
-    SceneImage
+    `detect` is called with a SimulatedFrame and returns 2D boxes (n, 4). Every `every`-th image is used. An error model
+    corrects the 3D boxes and provides their covariance, as in bbox3d_node. Yields SceneImage.
     """
     for number in range(0, simulator.frame_count, every):
         frame = simulator.frame(number)
         boxes = np.asarray(detect(frame), float).reshape(-1, 4)
+        depth = DepthImage(frame.depth_mm, 0.001)
         stamp_ns = int(round(frame.time_s * NS))
-        yield SceneImage(stamp_ns, frame._replace(color=None, depth_mm=None), boxes,
-                         _detections(frame, boxes, simulator.camera, estimator, error_model),
-                         _view(frame, simulator.camera), truth_at(simulator, frame, stamp_ns))
+        yield SceneImage(Step(frame._replace(color=None, depth_mm=None), boxes,
+                              Moment(stamp_ns, simulator.true_tracks(frame, stamp_ns), [])),
+                         _detections(depth, boxes, simulator.camera, frame.poses.map_from_camera, error_model),
+                         CameraView(frame.poses.map_from_camera, simulator.camera, frame.camera,
+                                    functools.partial(depths_towards, simulator.camera, depth)))
 
 
 def track_scene(images, trackers):
     """Run trackers on the images (SceneImage) of a scene. Returns a list of Step for each tracker."""
     steps = [[] for _tracker in trackers]
-    for image in images:
+    for step, detections, view in images:
         for tracker, own_steps in zip(trackers, steps):
-            tracks = tracker.update(image.stamp_ns, image.detections, image.view)
-            own_steps.append(Step(image.frame, image.boxes, Moment(image.stamp_ns, image.truth, tracks)))
+            tracks = tracker.update(step.moment.stamp_ns, detections, view)
+            own_steps.append(step._replace(moment=step.moment._replace(tracks=tracks)))
     return steps
 
 
-def run_scene(simulator, detect, every=1, estimator=estimator_named('foreground'), error_model=None):
-    """Run the pipeline on a scene: `look_at_scene`, then `track_scene` with our tracker. Returns a list of Step."""
-    steps, = track_scene(look_at_scene(simulator, detect, every, estimator, error_model), [Tracker()])
+def run_scene(simulator, detect, every=1, error_model=None):
+    """Run the pipeline on a scene: `detect_in_scene`, then `track_scene` with our tracker. Returns a list of Step."""
+    steps, = track_scene(detect_in_scene(simulator, detect, every, error_model), [Tracker()])
     return steps
 
 
-def _detections(frame, boxes, camera, estimator, error_model):
+def _detections(depth, boxes, camera, map_from_camera, error_model):
     """Convert 2D boxes to detections in the map, as bbox3d_node and tracker_node do."""
     rects_px = [tuple(rect) for rect in np.rint(boxes).astype(int).tolist() if rect[0] < rect[2] and rect[1] < rect[3]]
-    estimated = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, camera, estimator)
+    estimated = estimate_boxes(depth, rects_px, camera, estimator_named('foreground'))
     found = [box for box in estimated if box is not None]
     if error_model is not None:
         found = corrected_boxes(found, error_model)
-    return [detection_from_box(box, frame.poses.map_from_camera) for box in found]
-
-
-def _view(frame, camera):
-    """Camera view for the tracker, as in tracker_node."""
-    depth = DepthImage(frame.depth_mm, 0.001)
-    depth_at = functools.partial(depths_towards, camera, depth)
-    return CameraView(frame.poses.map_from_camera, camera, frame.camera, depth_at)
+    return [detection_from_box(box, map_from_camera) for box in found]
 
 
 def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6.0):
     """Position errors in the plane, in metres, of an estimator with exact boxes, for people in a range of depth.
 
-    Only people with at least `LEAST_SHOWN` of the body visible are evaluated. The error is NaN if there is no estimate.
-
-    Returns
-    -------
-    numpy.ndarray, (n,)
+    Only people with at least `LEAST_SHOWN` of the body visible are evaluated. Returns an array (n,), NaN for people
+    without an estimate.
     """
     errors_m = []
     for number in range(0, simulator.frame_count, every):
@@ -146,11 +123,7 @@ def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6
 def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):
     """Count true and false detections of sufficiently visible people in a range of depth.
 
-    In each image, boxes and people are matched one to one in order of decreasing IoU.
-
-    Returns
-    -------
-    DetectionScore
+    In each image, boxes and people are matched one to one in order of decreasing IoU. Returns a DetectionScore.
     """
     people = found = false = 0
     for step in steps:

@@ -23,24 +23,20 @@ REPETITIONS = 3
 
 
 def write_simulated_session(folder, ranges_m=RANGES_M, tangents=TANGENTS, repetitions=REPETITIONS):
-    """Write a session of simulated people with exact 2D boxes. Returns the folder.
-
-    People outside the image are skipped.
-    """
+    """Write a session of simulated people with exact 2D boxes, except outside the image. Returns the folder."""
     for name in ('color', 'depth'):
         os.makedirs(os.path.join(folder, name), exist_ok=True)
-    places = [(z_m, round(tangent * z_m, 3)) for z_m in ranges_m for tangent in tangents]
-    frames = [_write_frame(folder, number, places[number // repetitions])
-              for number in range(len(places) * repetitions)]
+    positions_m = [(z_m, round(tangent * z_m, 3)) for z_m in ranges_m for tangent in tangents]
+    frames = [_write_frame(folder, number, *positions_m[number // repetitions])
+              for number in range(len(positions_m) * repetitions)]
     camera = dict(D435I_COLOR._asdict(), distortion=[0] * 5, depth_scale=0.001, frame='camera_color_optical_frame')
     with open(os.path.join(folder, 'frames.json'), 'w') as stream:
         json.dump({'camera': camera, 'frames': [frame for frame in frames if frame is not None]}, stream, indent=1)
     return folder
 
 
-def _write_frame(folder, number, place):
-    """Render a person at a place (z, x) in the camera frame. Returns None if the person is not in the image."""
-    z_m, x_m = place
+def _write_frame(folder, number, z_m, x_m):
+    """Render a person at a position in the camera frame. Returns None if the person is not in the image."""
     simulator = Simulator(_scenario(np.array([ROBOT.pose[0] + ROBOT.mount[0] + z_m, ROBOT.pose[1] - x_m]), number))
     frame = simulator.frame(simulator.frame_count - 1)
     person = frame.people[0]
@@ -55,26 +51,22 @@ def _write_frame(folder, number, place):
             'truth_mm': {'x': round(1000 * truth_m[0]), 'z': round(1000 * truth_m[2])}}
 
 
-def _scenario(place_m, number):
-    """Scenario whose person is at the place (x, y) of the map in the last image.
-
-    People with an even `number` stand; people with an odd `number` walk across the place.
-    """
+def _scenario(position_m, number):
+    """Scenario whose person is at a position (x, y) of the map in the last image. Every second person walks."""
     heading_rad = float(np.random.RandomState(number).uniform(-np.pi, np.pi))
     step_m = WALK_S * SPEED_MPS * np.array([np.cos(heading_rad), np.sin(heading_rad)])
     if number % 2:
-        walk = Move(to=tuple(place_m + step_m), speed=SPEED_MPS)
-        person = Person(tuple(place_m - step_m), heading_rad, moves=(walk,))
+        walk = Move(to=tuple(position_m + step_m), speed=SPEED_MPS)
+        person = Person(tuple(position_m - step_m), heading_rad, moves=(walk,))
     else:
-        person = Person(tuple(place_m), heading_rad)
+        person = Person(tuple(position_m), heading_rad)
     # two images: at the start, and when the walker passes the place
     return Scenario(duration=2 * WALK_S, rate=1 / WALK_S, seed=number, room=ROOM, robot=ROBOT, people=(person,))
 
 
 def main():
-    """Write the session of the whole grid."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('folder', help='where to write it')
+    parser.add_argument('folder', help='output folder')
     print(write_simulated_session(parser.parse_args().folder))
 
 

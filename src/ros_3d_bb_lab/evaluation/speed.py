@@ -1,30 +1,31 @@
 """CPU time of 3D boxes and tracks by the number of people, for our and the thesis' algorithms (thesis, Fig. 4.2).
 
-The benchmark measures the CPU time of the algorithms, from the depth image and the 2D boxes to tracks with predictions,
-without messages and waiting. Estimation computes 3D boxes in the camera's frame. Tracking transforms them to the fixed
-frame, tracks them and predicts. The people of a measurement session are placed side by side in one wide depth image,
-and their boxes are jittered between images. Both algorithms process the same image and boxes alternately, so that other
-load on the machine affects both equally and their ratio remains valid.
+The times are from the depth image and the 2D boxes to tracks with predictions, without messages and waiting. Estimation
+computes 3D boxes in the camera's frame; tracking transforms them to the fixed frame, tracks them and predicts. The
+people of a measurement session are placed side by side in one wide depth image. Both algorithms process the same image
+and boxes alternately, so that other load on the machine affects both equally and their ratio remains valid.
 """
 import argparse
 import functools
+import itertools
 import json
 import os
 import sys
 import tempfile
 import time
+from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from, transform_points
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_median, estimator_named, sample_depth
-from ros_3d_bb.sessions.session_reader import read_color, read_session
+from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, Detection, detection_from_box
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
-from ros_3d_bb_lab.evaluation.crowd import crowd_of, people_of
 from ros_3d_bb_lab.evaluation.defaults import default_weights
 from ros_3d_bb_lab.evaluation.detector_speed import detector_speed
 from ros_3d_bb_lab.evaluation.machine import describe_machine
@@ -36,8 +37,58 @@ PERIOD_NS = NS // 30
 FIXED_FROM_CAMERA = transform_from((0.0, 0.0, 1.0), OPTICAL_ROTATION)
 AHEAD_S = 2.0  # horizon of the thesis' prediction
 ALGORITHMS, STAGES = ('ours', 'thesis'), ('estimation', 'tracking', 'both')
+CURVES = (('both', 'both', 'tab:green'), ('estimation', '3D boxes', 'tab:blue'),
+          ('tracking', 'tracking and prediction', 'tab:orange'))
 DETECTOR_IMAGES = 40
+COVERED = 0.2  # share of a box that its neighbour covers
+JITTER_PX = 2  # maximum change of the edges of a box between images
 SIMULATED = (2.0, 4.0), (-0.2, 0.2), 2  # simulated session, used if no session is given
+
+
+class Crowd(NamedTuple):
+    """Wide depth image, its camera, and the 2D boxes of the people in it."""
+
+    depth: DepthImage
+    camera: Camera
+    rects_px: Tuple[Tuple[int, int, int, int], ...]
+
+    def jittered(self, random):
+        """Boxes [(x1, y1, x2, y2)] with random jitter, as those of a detector in another image of the same scene."""
+        edges = np.array(self.rects_px) + random.randint(-JITTER_PX, JITTER_PX + 1, (len(self.rects_px), 4))
+        size = self.camera.width, self.camera.height
+        return [tuple(rect_px) for rect_px in np.clip(edges, 0, size + size).tolist()]
+
+
+def people_of(session):
+    """Cut out the annotated person of each frame that has a box.
+
+    Returns (depth values in the camera's units (height, width), top row) of each person. Raises SessionError.
+    """
+    people = []
+    for frame in session.frames:
+        if frame.boxes_px:
+            x1, y1, x2, y2 = np.clip(frame.boxes_px[0], 0, (session.camera.width, session.camera.height) * 2)
+            people.append((read_depth(frame, session).values[y1:y2, x1:x2], int(y1)))
+    return people
+
+
+def crowd_of(people, count, session):
+    """Place `count` people of `people_of`, repeated cyclically, side by side in one depth image. Returns a Crowd.
+
+    Each person covers a part of the person to the left.
+    """
+    rects_px, left = [], 0
+    chosen = list(itertools.islice(itertools.cycle(people), count))
+    for depth, top in chosen:
+        height, width = depth.shape
+        rects_px.append((left, top, left + width, top + height))
+        left += int(width * (1 - COVERED))
+    width, camera = max(rect_px[2] for rect_px in rects_px), session.camera
+    values = np.zeros((camera.height, width), chosen[0][0].dtype)
+    for (x1, y1, x2, y2), (depth, _top) in zip(rects_px, chosen):
+        values[y1:y2, x1:x2] = depth
+    return Crowd(DepthImage(values, session.depth_scale_m),
+                 Camera(width, camera.height, camera.fx, camera.fy, width / 2.0, camera.cy), tuple(rects_px))
 
 
 class Ours(object):
@@ -49,7 +100,7 @@ class Ours(object):
         self._view = CameraView(FIXED_FROM_CAMERA, crowd.camera, depth_at=depth_at)
 
     def estimate(self, depth, rects_px):
-        """Estimate 3D boxes in the frame of the camera."""
+        """3D boxes in the frame of the camera."""
         return [box for box in estimate_boxes(depth, rects_px, self._camera, self._estimator) if box is not None]
 
     def track(self, stamp_ns, boxes):
@@ -61,16 +112,16 @@ class Ours(object):
 class Theirs(object):
     """Algorithms of the thesis in the optimised version that its chapter 3 describes.
 
-    Boxes are processed one by one, with arrays for the samples of a box (section 3.4.2). The proof of concept, which
-    loops over samples and is 2.5 times slower according to the thesis, is not used. Objects are processed one by one,
-    with distances in one array (section 3.6), and one prediction along the filtered velocity.
+    Boxes are processed one by one, with arrays for the samples of a box (section 3.4.2) instead of the loops of the
+    proof of concept, which is 2.5 times slower. Objects are processed one by one, with distances in one array (section
+    3.6), and one prediction along the filtered velocity.
     """
 
     def __init__(self, crowd):
         self._camera, self._tracker = crowd.camera, OriginalTracker()
 
     def estimate(self, depth, rects_px):
-        """Estimate 3D boxes in the frame of the camera."""
+        """3D boxes in the frame of the camera."""
         boxes = [estimate_median(sample_depth(depth, rect_px, 20), rect_px, self._camera) for rect_px in rects_px]
         return [box for box in boxes if box is not None]
 
@@ -82,30 +133,13 @@ class Theirs(object):
 
 
 def speed(session, counts=OBJECTS, images=60, seed=0):
-    """Measure the CPU time of both algorithms.
+    """Measure the CPU time of both algorithms in `images` images for each number of people in `counts`.
 
-    Parameters
-    ----------
-    session : session_reader.Session
-    counts : sequence of int
-        Numbers of people.
-    images : int
-        Number of timed images for each number of people.
-    seed : int
-        Seed of the order of the people and of the jitter.
-
-    Returns
-    -------
-    dict
-        `machine`, `people`, `images`, `objects` (= `counts`), and for `ours` and `thesis` the median, mean and standard
-        deviation of the times in ms by stage. `ratio`: median ratio of our time to that of the thesis over both stages,
-        by number of people. `growth`: our time relative to that for 5 people, or for the smallest number of people if 5
-        is not in `counts`.
-
-    Raises
-    ------
-    ValueError
-        If no frame of the session has a box.
+    `seed` is that of the order of the people and of the jitter. Returns a dictionary: `machine`, `people`, `images`,
+    `objects` (= `counts`); for `ours` and `thesis` the median, mean and standard deviation of the times in ms by stage;
+    and medians by number of people: `ratio` of our time to that of the thesis over both stages, and `growth` of our
+    time relative to that for 5 people, or for the fewest without 5 in `counts`. Raises ValueError if no frame of the
+    session has a box.
     """
     people, random = people_of(session), np.random.RandomState(seed)
     if not people:
@@ -163,10 +197,37 @@ def table(result):
                 '%22s' % ('%.2f (%.2f ± %.2f)' % column) for column in columns))
     for key, title in (('ratio', 'ours / thesis'), ('growth', 'ours / ours for few')):
         lines.append('%-20s' % title + ''.join('%22.2f' % value for value in result[key]))
-    lines += ['detector, %s at %d, %d thread%s: %.1f ms of CPU, %.1f ms of time'
-              % (row['runtime'], row['size'], row['threads'], 's' * (row['threads'] > 1), row['cpu_ms'],
-                 row['wall_ms']) for row in result['detector']]
+    lines += ['detector, %s at %d: %.1f ms CPU time, %.1f ms wall time'
+              % (row['runtime'], row['size'], row['cpu_ms'], row['wall_ms']) for row in result['detector']]
     return lines
+
+
+def draw(result, path):
+    """Plot the mean and the standard deviation of the times, as in Fig. 4.2 of the thesis. The suffix of `path` is that
+    of an image format.
+    """
+    import matplotlib  # slow
+    matplotlib.use('Agg')
+    from matplotlib import pyplot
+    figure, panels = pyplot.subplots(1, 2, sharey=True, figsize=(9, 4))
+    for panel, name, title in zip(panels, ALGORITHMS, ('this package', "the thesis' algorithms")):
+        for stage, label, color in CURVES:
+            mean_ms, sd_ms = (np.array(result[name][stage + suffix]) for suffix in ('_mean_ms', '_sd_ms'))
+            panel.plot(result['objects'], mean_ms, 'o-', markersize=3, color=color, label=label)
+            low_ms = np.maximum(mean_ms - sd_ms, mean_ms / 10)  # positive, for the logarithmic axis
+            panel.fill_between(result['objects'], low_ms, mean_ms + sd_ms, color=color, alpha=0.2, linewidth=0)
+        panel.set(title=title, xlabel='people', xscale='log', yscale='log')
+        panel.set_xticks(result['objects'])
+        panel.set_xticklabels(result['objects'])
+        panel.minorticks_off()
+        panel.yaxis.set_major_formatter(pyplot.FuncFormatter(lambda time_ms, _number: '%g' % time_ms))
+        panel.grid(True, alpha=0.3)
+    panels[0].set_ylabel('CPU time of an image, ms')
+    panels[0].legend(loc='upper left')
+    figure.text(0.5, 0.01, result['machine'], ha='center', fontsize=7, color='gray')
+    figure.tight_layout(rect=(0, 0.03, 1, 1))
+    figure.savefig(path, dpi=120)
+    pyplot.close(figure)
 
 
 def main():
@@ -183,13 +244,12 @@ def main():
             with open(arguments.json, 'w') as stream:
                 json.dump(result, stream, indent=1)
         if arguments.picture:
-            from ros_3d_bb_lab.evaluation.speed_plot import draw_speed  # slow import
-            draw_speed(result, arguments.picture)
+            draw(result, arguments.picture)
     except (ValueError, OSError) as error:
         sys.exit('./run bench speed: %s' % error)
     print('%s\n%d people of %s, %d images each' % (
-        result['machine'], result['people'], 'the session %s' % arguments.data if arguments.data else
-        'the simulated camera, as no --data was given and ROS_3D_BB_DATA is not set', result['images']))
+        result['machine'], result['people'], 'the session ' + arguments.data if arguments.data else
+        'a simulated session (no --data, and ROS_3D_BB_DATA is not set)', result['images']))
     print('\n'.join(table(result)))
 
 
@@ -197,14 +257,14 @@ def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench speed', description=__doc__)
     data = os.environ.get('ROS_3D_BB_DATA')
     parser.add_argument('--data', default=data and os.path.join(data, 'data', 'thesis'), metavar='DIR',
-                        help='a measurement session (default: $ROS_3D_BB_DATA/data/thesis, or else a simulated one)')
+                        help='measurement session (default: $ROS_3D_BB_DATA/data/thesis, or simulated)')
     parser.add_argument('--weights', default=default_weights(), metavar='FILE',
-                        help='a YOLOv5 checkpoint: the detector is timed as well')
-    parser.add_argument('--images', type=int, default=60, help='of each number of people (default: 60)')
+                        help='YOLOv5 checkpoint; also measures the detector')
+    parser.add_argument('--images', type=int, default=60, help='timed images per number of people (default: 60)')
     parser.add_argument('--seed', type=int, default=0,
-                        help='of the order of the people, and of the jitter of their boxes (default: 0)')
-    parser.add_argument('--json', metavar='FILE', help='also write the times there')
-    parser.add_argument('--picture', metavar='FILE', help='also draw them there (png, svg, pdf)')
+                        help='seed of the order of the people and the jitter of their boxes (default: 0)')
+    parser.add_argument('--json', metavar='FILE', help='also write the times to FILE')
+    parser.add_argument('--picture', metavar='FILE', help='also plot the times to FILE (png, svg, pdf)')
     arguments = parser.parse_args()
     if arguments.images < 1:
         parser.error('--images is %d; at least 1 expected' % arguments.images)

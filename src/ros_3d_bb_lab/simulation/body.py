@@ -9,7 +9,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 
 from ros_3d_bb_lab.simulation.gait import BONES, JOINTS_M, TABLE_HEIGHT_M, Posture, bone_transforms
-from ros_3d_bb_lab.simulation.mesh import Mesh, loft, vertex_normals
+from ros_3d_bb_lab.simulation.mesh import Mesh, loft, merged, vertex_normals
 
 Color = Tuple[int, int, int]
 
@@ -44,13 +44,11 @@ SHOE = ((-.09, .043, .024, .025), (-.065, .05, .046, .036), (-.015, .055, .052, 
 
 
 class Build(NamedTuple):
-    """Appearance of a person. `girth` scales the body horizontally, 1 is slim; `hips` ranges from 0 (wide shoulders) to
-    1 (wide hips); colours are RGB.
-    """
+    """Appearance of a person. Colours are RGB."""
 
     height_m: float = TABLE_HEIGHT_M
-    girth: float = 1.0
-    hips: float = 0.0
+    girth: float = 1.0  # scales the body horizontally, 1 is slim
+    hips: float = 0.0   # 0 (wide shoulders) to 1 (wide hips)
     long_hair: bool = False
     short_sleeves: bool = False
     skin: Color = (225, 180, 150)
@@ -61,28 +59,19 @@ class Build(NamedTuple):
 
 
 class Body(object):
-    """Body of one person.
-
-    Parameters
-    ----------
-    build : Build
-    random : numpy.random.RandomState
-        Source of the creases in the clothes.
-    """
+    """Body of one person. `random` determines the creases in the clothes."""
 
     def __init__(self, build, random):
         self.build = build
         parts = list(_parts(build))
-        counts = [len(vertices) for vertices, _faces, _color, _bones in parts]
-        offsets = np.cumsum([0] + counts[:-1])
-        scale = build.height_m / TABLE_HEIGHT_M
-        vertices = np.concatenate([part[0] for part in parts]) * scale
-        faces = np.concatenate([part[1] + offset for part, offset in zip(parts, offsets)])
-        self._rest = Mesh(vertices, vertex_normals(vertices, faces), faces,
-                          np.concatenate([np.tile(part[2], (len(part[1]), 1)) for part in parts]).astype(np.uint8),
+        self._scale = build.height_m / TABLE_HEIGHT_M
+        vertices, faces = merged([part[:2] for part in parts])
+        vertices *= self._scale
+        colors = np.concatenate([np.tile(color, (len(faces), 1)) for _vertices, faces, color, _bones in parts])
+        self._rest = Mesh(vertices, vertex_normals(vertices, faces), faces, colors.astype(np.uint8),
                           _tone(parts, random))
-        weights = np.concatenate([_weights(part[0], part[3]) for part in parts])
-        self._weights, self._scale = weights.astype(np.float32), scale
+        weights = np.concatenate([_weights(vertices, bones) for vertices, _faces, _color, bones in parts])
+        self._weights = weights.astype(np.float32)
         self._points = np.c_[vertices, np.ones(len(vertices))].astype(np.float32)
         self._normals = self._rest.normals.astype(np.float32)
 
@@ -92,12 +81,7 @@ class Body(object):
         return 2 * (JOINTS_M['arm_l'][1] + SHOULDER_M * self.build.girth) * self._scale
 
     def posed(self, posture=Posture()):
-        """Return the body in a posture, with its lowest point on the floor.
-
-        Returns
-        -------
-        Mesh
-        """
+        """Return the body in a posture as a Mesh, with its lowest point on the floor."""
         bones = bone_transforms(posture).astype(np.float32)
         bones[:, :, 3] *= self._scale
         skin = self._weights.dot(bones.reshape(len(BONES), 12)).reshape(-1, 3, 4)
@@ -109,9 +93,8 @@ class Body(object):
 def _parts(build):
     """Yield (vertices, faces, colour, bones) of each part. Bones: [(bone, z above which only this bone moves it)]."""
     def trunk(rings):
-        table = np.array(rings)
-        return np.c_[table[:, :3], table[:, 3] + build.hips * (table[:, 4] - table[:, 3])] * [1, 1, build.girth,
-                                                                                              build.girth]
+        z, x, depth, slim, wide = np.array(rings).T
+        return np.c_[z, x, depth * build.girth, (slim + build.hips * (wide - slim)) * build.girth]
 
     yield _upright(trunk(TORSO), 16, 2.4) + (build.shirt, (('pelvis', 1.0), ('chest', 1.2)))
     yield _upright(trunk(SEAT), 14, 2.3) + (build.trousers, (('pelvis', 0),))
@@ -133,8 +116,7 @@ def _parts(build):
 
 def _upright(rings, sides, exponent=2.1):
     z, x, depth, width = np.array(rings).T
-    zero = np.zeros_like(z)
-    return loft(np.c_[x, zero, z], np.c_[depth, zero, zero], np.c_[zero, width, zero], exponent, sides)
+    return loft(np.c_[x, np.zeros_like(z), z], np.c_[depth, width], exponent, sides)
 
 
 def _limb(rings, joints, sign, sides, girth):
@@ -142,16 +124,13 @@ def _limb(rings, joints, sign, sides, girth):
     z, shift, depth, width = np.array(rings)[::-1].T
     line = np.array([JOINTS_M[name + '_l'] for name in joints])[::-1]
     x, y = (np.interp(z, line[:, 2], line[:, axis]) for axis in range(2))
-    zero = np.zeros_like(z)
-    return loft(np.c_[x + shift, sign * y, z], np.c_[depth * girth, zero, zero], np.c_[zero, width * girth, zero], 2.1,
-                sides)
+    return loft(np.c_[x + shift, sign * y, z], np.c_[depth, width] * girth, 2.1, sides)
 
 
 def _shoe(sign):
     x, z, height, width = np.array(SHOE).T
     y = np.full_like(x, sign * (JOINTS_M['foot_l'][1] + .005))
-    zero = np.zeros_like(x)
-    return loft(np.c_[x, y, z], np.c_[zero, width, zero], np.c_[zero, zero, height], 2.4, 10)
+    return loft(np.c_[x, y, z], np.c_[width, height], 2.4, 10, axes=(1, 2))
 
 
 def _weights(vertices, bones):

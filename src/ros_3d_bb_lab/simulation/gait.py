@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_3d_bb_lab.simulation.mesh import rotation
+
 TABLE_HEIGHT_M = 1.75
 PARENTS = (('pelvis', None), ('chest', 'pelvis'), ('head', 'chest'),
            ('arm_l', 'chest'), ('forearm_l', 'arm_l'), ('thigh_l', 'pelvis'), ('shin_l', 'thigh_l'),
@@ -29,17 +31,17 @@ KNEE = np.radians([5, 15, 18, 14, 9, 14, 43, 63, 49, 18, 5])
 ANKLE = np.radians([1, -3, -1, 3, 8, 16, -12, -4, 2, 2, 1])
 ARM_SWING, ELBOW = 0.42, 0.18
 STANCE = 0.5  # stance phase of one foot as a share of the cycle
+X, Y, Z = range(3)
 # Deep crouch: flexion of hip, knee and ankle, and inclination of the chest.
 CROUCH = np.radians([105, 130, 25, 20])
 
 
 class Posture(NamedTuple):
-    """`phase` of the gait in cycles since left heel strike; `swing` from 0 (standing) to 1 (walking); `crouch` 0 to 1.
-    """
+    """Posture while walking, standing or crouching."""
 
-    phase: float = 0.0
-    swing: float = 0.0
-    crouch: float = 0.0
+    phase: float = 0.0   # of the gait, in cycles since left heel strike
+    swing: float = 0.0   # 0 (standing) to 1 (walking)
+    crouch: float = 0.0  # 0 to 1
 
 
 def bone_transforms(posture):
@@ -74,31 +76,18 @@ def stride_m(height_m, swing=1.0):
 def _joint_turns(posture):
     swing, crouch = posture.swing, posture.crouch
     twist = .10 * swing * np.cos(2 * np.pi * posture.phase)
-    turns = {'pelvis': _about_z(-twist), 'chest': _about_z(1.2 * twist).dot(_about_y(.03 * swing + CROUCH[3] * crouch)),
-             'head': _about_z(-.3 * twist).dot(_about_y(-.7 * CROUCH[3] * crouch))}
+    turns = {'pelvis': rotation(Z, -twist),
+             'chest': rotation(Z, 1.2 * twist).dot(rotation(Y, .03 * swing + CROUCH[3] * crouch)),
+             'head': rotation(Z, -.3 * twist).dot(rotation(Y, -.7 * CROUCH[3] * crouch))}
     for side, offset, sign in (('_l', 0, 1), ('_r', .5, -1)):
         phase = (posture.phase + offset) % 1
         hip, knee, ankle = (swing * (1 - crouch) * np.interp(phase, CYCLE, curve) + crouch * bend
                             for curve, bend in zip((HIP, KNEE, ANKLE), CROUCH))
-        turns['thigh' + side] = _about_y(-hip).dot(_about_x(-.03 * sign))
-        turns['shin' + side] = _about_y(knee)
-        turns['foot' + side] = _about_y(-ankle)
+        turns['thigh' + side] = rotation(Y, -hip).dot(rotation(X, -.03 * sign))
+        turns['shin' + side] = rotation(Y, knee)
+        turns['foot' + side] = rotation(Y, -ankle)
         arm = ARM_SWING * swing * np.cos(2 * np.pi * phase) - .5 * crouch
-        turns['arm' + side] = _about_y(arm).dot(_about_x(.03 * sign))
-        turns['forearm' + side] = _about_y(-ELBOW * (1 + swing * max(0, np.sin(2 * np.pi * phase))) - .8 * crouch)
+        turns['arm' + side] = rotation(Y, arm).dot(rotation(X, .03 * sign))
+        elbow = ELBOW * (1 + swing * max(0, np.sin(2 * np.pi * phase)))
+        turns['forearm' + side] = rotation(Y, -elbow - .8 * crouch)
     return turns
-
-
-def _about_x(angle):
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
-
-
-def _about_y(angle):
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-
-
-def _about_z(angle):
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])

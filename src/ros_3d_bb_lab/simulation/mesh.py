@@ -10,45 +10,41 @@ CELL_M = 0.5  # maximum edge of a face of a box; faces that are partly behind th
 
 
 class Mesh(NamedTuple):
-    """`vertices` and unit `normals` (n, 3); `faces` (m, 4), indices of vertices; `colors` (m, 3) of the faces, uint8
-    RGB; `tone` (n,), factor of brightness of the vertices.
-    """
+    """Surface of quadrilaterals."""
 
-    vertices: np.ndarray
-    normals: np.ndarray
-    faces: np.ndarray
-    colors: np.ndarray
-    tone: np.ndarray
+    vertices: np.ndarray  # (n, 3)
+    normals: np.ndarray   # (n, 3), unit vectors
+    faces: np.ndarray     # (m, 4), indices of vertices
+    colors: np.ndarray    # (m, 3) of the faces, uint8 RGB
+    tone: np.ndarray      # (n,), factor of brightness of the vertices
 
     def moved(self, position_m, heading_rad):
         """Return the mesh rotated about z (counter-clockwise seen from above), then translated by (x, y, z)."""
-        c, s = np.cos(heading_rad), np.sin(heading_rad)
-        turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]], np.float32)
+        turn = rotation(2, -heading_rad).astype(np.float32)  # applied to row vectors
         return self._replace(vertices=self.vertices.dot(turn) + np.asarray(position_m, np.float32),
                              normals=self.normals.dot(turn))
 
 
-def loft(centers, forward, sideways, exponent, sides):
-    """Closed tube through rings.
+def rotation(axis, angle):
+    """Rotation matrix (3, 3) about x (0), y (1) or z (2)."""
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    c, s = np.cos(angle), np.sin(angle)
+    matrix = np.eye(3)
+    matrix[first, first] = matrix[second, second] = c
+    matrix[first, second], matrix[second, first] = -s, s
+    return matrix
 
-    Parameters
-    ----------
-    centers, forward, sideways : array_like, (rings, 3)
-        Centre and the two half axes of each ring.
-    exponent : float
-        Exponent of the superellipse: 2 is an ellipse, larger values approach a rectangle.
-    sides : int
-        Even number of vertices in a ring.
 
-    Returns
-    -------
-    vertices : numpy.ndarray, (rings * sides, 3)
-    faces : numpy.ndarray, (m, 4)
+def loft(centers, half_axes, exponent, sides, axes=(0, 1)):
+    """Vertices and faces of a closed tube through superelliptic rings.
+
+    `centers` (rings, 3) and `half_axes` (rings, 2), whose directions are the coordinate axes `axes`; an `exponent` of 2
+    is an ellipse, larger values approach a rectangle; `sides` is the even number of vertices in a ring.
     """
-    centers, forward, sideways = (np.asarray(axis, float)[:, None] for axis in (centers, forward, sideways))
     angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
-    ring = [np.sign(f) * np.abs(f) ** (2.0 / exponent) for f in (np.cos(angles), np.sin(angles))]
-    vertices = centers + ring[0][:, None] * forward + ring[1][:, None] * sideways
+    vertices = np.repeat(np.asarray(centers, float)[:, None], sides, axis=1)
+    for axis, lengths, f in zip(axes, np.transpose(half_axes), (np.cos(angles), np.sin(angles))):
+        vertices[..., axis] += lengths[:, None] * np.sign(f) * np.abs(f) ** (2.0 / exponent)
     low = np.arange((len(centers) - 1) * sides).reshape(-1, sides)
     walls = np.stack([low, np.roll(low, -1, 1), np.roll(low, -1, 1) + sides, low + sides], axis=-1).reshape(-1, 4)
     strip = np.arange(sides // 2 - 1)
@@ -57,6 +53,13 @@ def loft(centers, forward, sideways, exponent, sides):
     faces = np.concatenate([walls, cap, top])
     vertices = vertices.reshape(-1, 3)
     return vertices, faces if volume(vertices, faces) > 0 else faces[:, ::-1]
+
+
+def merged(parts):
+    """Vertices and faces of several surfaces [(vertices, faces), ...] as one."""
+    offsets = np.cumsum([0] + [len(vertices) for vertices, _faces in parts[:-1]])
+    return (np.concatenate([vertices for vertices, _faces in parts]),
+            np.concatenate([faces + offset for (_vertices, faces), offset in zip(parts, offsets)]))
 
 
 def volume(vertices, faces):
@@ -77,15 +80,11 @@ def vertex_normals(vertices, faces):
 
 def box(size_m, color, random):
     """Box of size (x, y, z) that stands on z = 0 at the origin, with slightly mottled sides that share no vertices."""
-    parts, offset = [], 0
-    for axis in range(3):
-        for side in (-1, 1):
-            corners, faces = _side(np.asarray(size_m, float), axis, side)
-            normal = np.zeros(3)
-            normal[axis] = side
-            parts.append((corners, np.tile(normal, (len(corners), 1)), faces + offset))
-            offset += len(corners)
-    vertices, normals, faces = (np.concatenate(column) for column in zip(*parts))
+    sides = [(axis, side) for axis in range(3) for side in (-1, 1)]
+    parts = [_side(np.asarray(size_m, float), axis, side) for axis, side in sides]
+    normals = np.concatenate([np.tile(side * np.eye(3)[axis], (len(corners), 1))
+                              for (axis, side), (corners, _faces) in zip(sides, parts)])
+    vertices, faces = merged(parts)
     return Mesh(vertices.astype(np.float32), normals.astype(np.float32), faces,
                 np.tile(np.asarray(color, np.uint8), (len(faces), 1)),
                 (1 + 0.05 * random.standard_normal(len(vertices)).clip(-2, 2)).astype(np.float32))

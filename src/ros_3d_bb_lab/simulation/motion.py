@@ -27,14 +27,9 @@ class State(NamedTuple):
 
 
 class Motion(object):
-    """Motion through knots.
+    """Motion through knots at ascending times (n,), with values (n, 6) in the order of `COLUMNS`.
 
-    Parameters
-    ----------
-    times_s : array_like, (n,)
-        Times of the knots in ascending order; two knots at the same time are a jump.
-    values : array_like, (n, 6)
-        Values at the knots, in the order of `COLUMNS`.
+    Two knots at the same time are a jump.
     """
 
     def __init__(self, times_s, values):
@@ -64,88 +59,82 @@ class Motion(object):
 
 def person_motion(person, height_m, duration_s):
     """Motion of a person (`scenario.Person`) of the height `height_m`."""
-    knots = _Knots(person.start, person.facing, crouch=person.crouch)
-    for move in _moves_of(person, knots, duration_s):
-        if move.to is not None:
-            knots.walk(move.to, move.speed, height_m)
-        elif move.turn is not None:
-            knots.turn(move.turn, move.rate)
-        else:
-            knots.wait(move)
-    return knots.motion()
+    return _Knots(person.start, person.facing, person.crouch, height_m).motion(person, duration_s)
 
 
 def robot_motion(robot, people, duration_s):
     """Motion of the robot (`scenario.Robot`). `people` is the list of the motions of people, which it may follow."""
     if robot.follow is not None:
         return _following_motion(robot, people[robot.follow.person - 1], duration_s)
-    knots = _Knots(robot.pose[:2], robot.pose[2])
-    for move in _moves_of(robot, knots, duration_s):
-        if move.to is not None:
-            knots.turn(knots.angle_to(move.to), move.rate)
-            knots.walk(move.to, move.speed)
-        elif move.turn is not None:
-            knots.turn(move.turn, move.rate)
-        else:
-            knots.wait(move)
-    return knots.motion()
+    return _Knots(robot.pose[:2], robot.pose[2]).motion(robot, duration_s)
 
 
 class _Knots(object):
-    """Builds the knots of a motion from moves."""
+    """Builds the knots of a motion from moves. Without a body height it is a robot: it turns before it drives."""
 
-    def __init__(self, place, heading, crouch=0.0):
-        self.time_s = 0.0
-        self._value = np.array([place[0], place[1], heading, 0, 0, crouch], float)
+    def __init__(self, position, heading, crouch=0.0, height_m=None):
+        self._height_m, self._time_s = height_m, 0.0
+        self._value = np.array([position[0], position[1], heading, 0, 0, crouch], float)
         self._times_s, self._values = [0.0], [self._value.copy()]
 
-    def motion(self):
+    def motion(self, mover, duration_s):
+        """With `repeat`, the moves are repeated until `AFTER_S` after the scene."""
+        start_s = -np.inf
+        while self._time_s <= duration_s + AFTER_S and self._time_s >= start_s + MIN_ROUND_S:
+            start_s = self._time_s
+            for move in mover.moves:
+                self._move(move)
+            if not mover.repeat:
+                break
         return Motion(self._times_s, self._values)
 
-    def angle_to(self, place):
-        """Angle between the heading and the direction to a place, -pi to pi."""
-        x, y = place - self._value[:2]
-        return (np.arctan2(y, x) - self._value[HEADING] + np.pi) % (2 * np.pi) - np.pi if x or y else 0.0
+    def _move(self, move):
+        if move.to is not None:
+            if self._height_m is None:
+                self._turn(self._angle_to(move.to), move.rate)
+            self._walk(move.to, move.speed)
+        elif move.turn is not None:
+            self._turn(move.turn, move.rate)
+        else:
+            self._wait(move)
 
-    def walk(self, place, speed_mps, height_m=None):
-        """Go straight to a place. The posture changes only if a body height is given."""
-        place = np.array(place, float)
-        distance_m = np.linalg.norm(place - self._value[:2])
-        swing = min(1.0, speed_mps / WALKING_MPS) ** .5 if height_m else 0.0
-        self._value[HEADING] += self.angle_to(place)
+    def _angle_to(self, position):
+        """Angle between the heading and the direction to a position, -pi to pi."""
+        x, y = position - self._value[:2]
+        return _wrapped(np.arctan2(y, x) - self._value[HEADING]) if x or y else 0.0
+
+    def _walk(self, position, speed_mps):
+        position = np.array(position, float)
+        distance_m = np.linalg.norm(position - self._value[:2])
+        swing = min(1.0, speed_mps / WALKING_MPS) ** .5 if self._height_m else 0.0
+        self._value[HEADING] += self._angle_to(position)
         self._value[SWING], self._value[CROUCH] = swing, 0
         self._add(0)
-        self._value[:2] = place
-        self._value[PHASE] += distance_m / stride_m(height_m, swing) if height_m else 0
+        self._value[:2] = position
+        self._value[PHASE] += distance_m / stride_m(self._height_m, swing) if self._height_m else 0
         self._add(distance_m / speed_mps)
         self._value[SWING] = 0
         self._add(0)
 
-    def turn(self, angle, rate):
+    def _turn(self, angle, rate):
         self._value[HEADING] += angle
         self._add(abs(angle) / rate)
 
-    def wait(self, move):
+    def _wait(self, move):
         if move.facing is not None:
-            self._value[HEADING] += (move.facing - self._value[HEADING] + np.pi) % (2 * np.pi) - np.pi
+            self._value[HEADING] += _wrapped(move.facing - self._value[HEADING])
         self._value[CROUCH] = move.crouch
         self._add(0)
         self._add(move.wait)
 
     def _add(self, elapsed_s):
-        self.time_s += elapsed_s
-        self._times_s.append(self.time_s)
+        self._time_s += elapsed_s
+        self._times_s.append(self._time_s)
         self._values.append(self._value.copy())
 
 
-def _moves_of(mover, knots, duration_s):
-    """Yield the moves of a person or a robot. With `repeat`, they are repeated until `AFTER_S` after the scene."""
-    while True:
-        start_s = knots.time_s
-        for move in mover.moves:
-            yield move
-        if not mover.repeat or knots.time_s > duration_s + AFTER_S or knots.time_s < start_s + MIN_ROUND_S:
-            return
+def _wrapped(angle):
+    return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 def _following_motion(robot, person, duration_s):
@@ -155,7 +144,7 @@ def _following_motion(robot, person, duration_s):
     for time_s in times_s:
         values.append([x, y, heading, 0, 0, 0])
         dx, dy = person.at(time_s).position_m - (x, y)
-        angle = (np.arctan2(dy, dx) - heading + np.pi) % (2 * np.pi) - np.pi
+        angle = _wrapped(np.arctan2(dy, dx) - heading)
         heading += np.clip(angle, -follow.rate * FOLLOW_STEP_S, follow.rate * FOLLOW_STEP_S)
         step_m = np.clip(np.hypot(dx, dy) - follow.distance, 0, follow.speed * FOLLOW_STEP_S) * max(0, np.cos(angle))
         x, y = x + step_m * np.cos(heading), y + step_m * np.sin(heading)

@@ -1,8 +1,7 @@
 """Renderer of a room with meshes: colour, inverse depth, and the object in each pixel.
 
 The faces of each object are painted from back to front into an image of face numbers. The planes of the faces give the
-inverse depth and the brightness of each pixel, and the nearest object wins. Convention: as in `geometry`; inverse depth
-is 1/m along the optical axis.
+inverse depth (1/m along the optical axis) and the brightness of each pixel, and the nearest object wins.
 """
 from typing import NamedTuple
 
@@ -20,74 +19,30 @@ SHADOW_DARKNESS, SHADOW_REDUCTION = .38, 4
 
 
 class Rendering(NamedTuple):
-    """Rendered images.
+    """Rendered images."""
 
-    Attributes
-    ----------
-    color : numpy.ndarray, (h, w, 3), uint8
-        RGB.
-    inverse_depth : numpy.ndarray, (h, w), float32
-    objects : numpy.ndarray, (h, w), uint8
-        1 + the index of the object; 0 is the room.
-    areas : list of int
-        Number of pixels of each object if it were alone in the room.
-    inside : list of float
-        Share of each object that lies inside the image, 0..1.
-    """
-
-    color: np.ndarray
-    inverse_depth: np.ndarray
-    objects: np.ndarray
-    areas: list
-    inside: list
-
-
-class _Layer(NamedTuple):
-    """One object without the others, in its bounding rectangle."""
-
-    rows: slice
-    columns: slice
-    color: np.ndarray
-    inverse_depth: np.ndarray
-    inside: float
+    color: np.ndarray          # (h, w, 3), uint8, RGB
+    inverse_depth: np.ndarray  # (h, w), float32
+    objects: np.ndarray        # (h, w), uint8: 1 + the index of the object; 0 is the room
+    areas: list                # number of pixels of each object if it were alone in the room
+    inside: list               # share of each object that lies inside the image, 0..1
 
 
 def render(room, meshes, shadows, camera, world_from_camera):
-    """Render a room and the meshes in it.
+    """Render a room (RenderedRoom) and at most 254 meshes in it, in world coordinates. Returns a Rendering.
 
-    Parameters
-    ----------
-    room : Room
-    meshes : list of Mesh
-        At most 254, in world coordinates.
-    shadows : list of (x, y, radius)
-        Soft shadows on the floor, in metres.
-    camera : camera_model.Camera
-    world_from_camera : numpy.ndarray, (4, 4)
-
-    Returns
-    -------
-    Rendering
+    `shadows` [(x, y, radius), ...] are soft shadows on the floor, in metres.
     """
     color, inverse_depth, surfaces = room.draw(camera, world_from_camera)
     _draw_shadows(color, surfaces, shadows, camera, world_from_camera)
-    objects, areas, inside = np.zeros(inverse_depth.shape, np.uint8), [], []
-    for number, mesh in enumerate(meshes):
-        layer = _render_layer(mesh, camera, world_from_camera)
-        areas.append(0 if layer is None else cv2.countNonZero(layer.inverse_depth))
-        inside.append(0.0 if layer is None else layer.inside)
-        if layer is None:
-            continue
-        place = layer.rows, layer.columns
-        nearer = cv2.compare(layer.inverse_depth, inverse_depth[place], cv2.CMP_GT)
-        copy_where(nearer, layer.inverse_depth, inverse_depth[place])
-        copy_where(nearer, layer.color, color[place])
-        objects[place][nearer > 0] = number + 1
-    return Rendering(color, inverse_depth, objects, areas, inside)
+    rendering = Rendering(color, inverse_depth, np.zeros(inverse_depth.shape, np.uint8), [], [])
+    for mesh in meshes:
+        _render_object(rendering, mesh, camera, world_from_camera)
+    return rendering
 
 
-def _render_layer(mesh, camera, world_from_camera):
-    """Render one object. Returns None if it is out of view."""
+def _render_object(rendering, mesh, camera, world_from_camera):
+    """Add one object to a rendering."""
     rotation, position = (part.astype(np.float32) for part in (world_from_camera[:3, :3], world_from_camera[:3, 3]))
     points = (mesh.vertices - position).dot(rotation)
     inverse = 1 / np.maximum(points[:, 2], np.float32(MIN_DEPTH_M))
@@ -95,8 +50,10 @@ def _render_layer(mesh, camera, world_from_camera):
                        points[:, 1] * inverse * np.float32(camera.fy) + np.float32(camera.cy)])
     corners = pixels[:, mesh.faces.T]
     visible, inside = _visible_faces(corners, points[:, 2][mesh.faces.T], camera)
+    rendering.areas.append(0)
+    rendering.inside.append(inside if visible.size else 0.0)
     if visible.size == 0:
-        return None
+        return
     faces, corners = mesh.faces[visible], corners[:, :, visible]
     low, high = corners.min(axis=(1, 2)), corners.max(axis=(1, 2))
     x0, y0 = np.maximum(low.astype(int) - 1, 0).tolist()
@@ -109,18 +66,19 @@ def _render_layer(mesh, camera, world_from_camera):
     brightness = (brightness * BRIGHTNESS_STEPS).astype(np.uint8)
     colors = np.concatenate([np.zeros((1, 3), np.uint8), mesh.colors[visible]])
     color = cv2.multiply(np.take(colors, numbers, axis=0), cv2.merge([brightness] * 3), scale=1. / BRIGHTNESS_STEPS)
-    return _Layer(slice(y0, y1), slice(x0, x1), color, inverse_depth, inside)
+
+    rendering.areas[-1] = cv2.countNonZero(inverse_depth)
+    window = slice(y0, y1), slice(x0, x1)
+    nearer = cv2.compare(inverse_depth, rendering.inverse_depth[window], cv2.CMP_GT)
+    copy_where(nearer, inverse_depth, rendering.inverse_depth[window])
+    copy_where(nearer, color, rendering.color[window])
+    rendering.objects[window][nearer > 0] = len(rendering.areas)
 
 
 def _visible_faces(corners, depth_m, camera):
-    """Faces of an object that can be visible in the image.
+    """Indices of the faces that are turned towards the camera, in front of it, and at least partly in the image.
 
-    Returns
-    -------
-    faces : numpy.ndarray, (k,)
-        Indices of the faces that are turned towards the camera, in front of it, and at least partly in the image.
-    inside : float
-        Share of the area of the faces in front of the camera that lies in the image.
+    Also returns the share of the area of the faces in front of the camera that lies in the image.
     """
     area = _cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     facing = (area < -.04) & (depth_m.min(axis=0) > MIN_DEPTH_M)

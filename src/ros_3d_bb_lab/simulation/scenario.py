@@ -1,4 +1,4 @@
-"""Scenario files: a room, a robot and people in YAML. `config/scenarios/README.md` describes the format."""
+"""Scenario files: a room, a robot and people in YAML. `config/scenarios/README.md` describes all keys and units."""
 import os
 import re
 from typing import NamedTuple, Optional, Tuple
@@ -12,12 +12,8 @@ Color = Tuple[int, int, int]
 Point = Tuple[float, float]
 
 
-class ScenarioError(ValueError):
-    """Invalid scenario file. The message names the key, its value, and what was expected."""
-
-
 class Furniture(NamedTuple):
-    """Box on the floor: centre (x, y), size (x, y, z) in metres, rotated by `yaw`, RGB colour."""
+    """Box on the floor."""
 
     at: Point
     size: Tuple[float, float, float]
@@ -26,7 +22,7 @@ class Furniture(NamedTuple):
 
 
 class Room(NamedTuple):
-    """`bounds` (x0, x1, y0, y1) and `height` in metres."""
+    """`bounds` are x0, x1, y0, y1."""
 
     bounds: Tuple[float, float, float, float] = (-3.0, 9.0, -4.0, 4.0)
     height: float = 2.8
@@ -34,9 +30,7 @@ class Room(NamedTuple):
 
 
 class Move(NamedTuple):
-    """One of: go `to` a point at `speed` (m/s); `turn` by an angle at `rate` (rad/s); `wait` (s). A waiting person may
-    face a direction (`facing`, map frame) and `crouch` (0 to 1).
-    """
+    """One of `to`, `turn` and `wait`; the other keys belong to one of them, see `MOVE_KEYS`."""
 
     to: Optional[Point] = None
     speed: float = 1.2
@@ -48,7 +42,7 @@ class Move(NamedTuple):
 
 
 class Follow(NamedTuple):
-    """Follow a person (number from 1) at a `distance` in metres, with at most `speed` (m/s) and `rate` (rad/s)."""
+    """Follow a person (number from 1) instead of moves."""
 
     person: int
     distance: float = 2.5
@@ -57,9 +51,7 @@ class Follow(NamedTuple):
 
 
 class Mount(NamedTuple):
-    """One of several cameras: `name`, the namespace of its topics; position `mount` in base_link, turned to the left by
-    `yaw` and tilted up by `pitch`.
-    """
+    """One of several cameras; its name is the namespace of its topics."""
 
     name: str
     mount: Tuple[float, float, float] = (0.17, 0.0, 0.20)
@@ -68,27 +60,7 @@ class Mount(NamedTuple):
 
 
 class Robot(NamedTuple):
-    """Robot with one camera or several.
-
-    Attributes
-    ----------
-    pose : (x, y, yaw)
-        At the start.
-    moves : tuple of Move
-    repeat : bool
-    follow : Follow, optional
-    mount : (x, y, z)
-        Position of the only camera in base_link.
-    pitch : float
-        Upward tilt of the only camera.
-    cameras : tuple of Mount
-        Several cameras.
-    base_height : float
-        Height of base_link above the floor (Jackal: the wheels have a radius of 0.098 m and their axis is 0.033 m above
-        base_link).
-    odometry_drift : (x, y, yaw)
-        Drift per second of the odom frame in the map.
-    """
+    """Robot with one camera (`mount`, `pitch`) or several (`cameras`)."""
 
     pose: Tuple[float, float, float] = (0.0, 0.0, 0.0)
     moves: Tuple[Move, ...] = ()
@@ -97,7 +69,7 @@ class Robot(NamedTuple):
     mount: Tuple[float, float, float] = (0.17, 0.0, 0.20)
     pitch: float = 0.0
     cameras: Tuple[Mount, ...] = ()
-    base_height: float = 0.065
+    base_height: float = 0.065  # Jackal: the wheels have a radius of 0.098 m, their axis is 0.033 m above base_link
     odometry_drift: Tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
@@ -107,9 +79,7 @@ class Robot(NamedTuple):
 
 
 class Person(NamedTuple):
-    """Person: start, moves, and appearance (see `body.Build`). Attributes of the appearance that are None are random by
-    the seed.
-    """
+    """Attributes of the appearance (see `body.Build`) that are None are random by the seed."""
 
     start: Point
     facing: float = 0.0
@@ -128,10 +98,7 @@ class Person(NamedTuple):
 
 
 class Scenario(NamedTuple):
-    """Scene of `duration` seconds with `rate` images per second. The same `seed` gives the same images.
-
-    `depth_noise`: whether depth has the errors of a D435 or is exact; `color_noise`: standard deviation in grey levels.
-    """
+    """Scene. The same `seed` gives the same images."""
 
     duration: float = 12.0
     rate: float = 15.0
@@ -149,10 +116,18 @@ LISTS = {'furniture': Furniture, 'people': Person, 'moves': Move, 'cameras': Mou
 VECTORS = {'bounds': 4, 'at': 2, 'size': 3, 'to': 2, 'start': 2, 'pose': 3, 'mount': 3, 'odometry_drift': 3, 'color': 3,
            'skin': 3, 'hair': 3, 'shirt': 3, 'trousers': 3}
 FLAGS, WHOLE = {'repeat', 'long_hair', 'short_sleeves', 'depth_noise'}, {'seed', 'person'}
-COLORS = {'color', 'skin', 'hair', 'shirt', 'trousers'}
-POSITIVE = {'duration', 'rate', 'height', 'speed', 'girth', 'distance', 'size'}
-FRACTIONS = {'crouch', 'hips'}
 NAME = re.compile(r'[A-Za-z]\w*$')  # a topic namespace
+TYPES = (  # keys, check of a value, and its description
+    (LISTS, lambda value: isinstance(value, list), 'a list'),
+    (FLAGS, lambda value: isinstance(value, bool), 'true or false'),
+    ({'name'}, lambda value: isinstance(value, str) and NAME.match(value), 'a name such as front'))
+RANGES = (  # the same for numbers
+    (WHOLE, lambda number: number == int(number) and 0 <= number < 2 ** 32, 'an integer from 0 to 4294967295'),
+    ({'duration', 'rate', 'height', 'speed', 'girth', 'distance', 'size'}, lambda number: number > 0, 'more than 0'),
+    ({'rate'}, lambda number: number <= 1000, 'at most 1000'),
+    ({'wait', 'color_noise'}, lambda number: number >= 0, 'at least 0'),
+    ({'crouch', 'hips'}, lambda number: 0 <= number <= 1, '0 to 1'),
+    ({'color', 'skin', 'hair', 'shirt', 'trousers'}, lambda number: 0 <= number <= 255, '0 to 255'))
 
 
 def read_scenario(path):
@@ -160,8 +135,8 @@ def read_scenario(path):
 
     Raises
     ------
-    ScenarioError
-        If the file is not YAML, or has an unknown key or an invalid value.
+    ValueError
+        If the file is not YAML, or has an unknown key or an invalid value. The message names the key and the value.
     OSError
         If the file cannot be opened.
     """
@@ -170,8 +145,8 @@ def read_scenario(path):
         content['room'] = _load(os.path.join(os.path.dirname(path), content['room']))
     try:
         return scenario_from(content)
-    except ScenarioError as error:
-        raise ScenarioError('%s: %s' % (path, error))
+    except ValueError as error:
+        raise ValueError('%s: %s' % (path, error))
 
 
 def _load(path):
@@ -179,16 +154,16 @@ def _load(path):
         try:
             content = load_yaml(stream)
         except yaml.YAMLError as error:
-            raise ScenarioError('%s is not YAML: %s' % (path, error))
+            raise ValueError('%s is not YAML: %s' % (path, error))
     return {} if content is None else content
 
 
 def scenario_from(content):
-    """Convert the content of a scenario file to a Scenario. Raises ScenarioError."""
+    """Convert the content of a scenario file to a Scenario. Raises ValueError."""
     scenario = _record(Scenario, content, 'scenario')
     room, robot = scenario.room, scenario.robot
     if not (room.bounds[0] < room.bounds[1] and room.bounds[2] < room.bounds[3]):
-        raise ScenarioError('room.bounds is %s; x0 < x1 and y0 < y1 expected' % (list(room.bounds),))
+        raise ValueError('room.bounds is %s; x0 < x1 and y0 < y1 expected' % (list(room.bounds),))
     # The cameras must stay inside the room at any heading of the robot.
     camera_m = max(sum(abs(part) for part in camera.mount[:2]) for camera in robot.mounts)
     _check_inside(room.bounds, 'robot', robot.pose[:2], robot.moves, camera_m)
@@ -196,12 +171,12 @@ def scenario_from(content):
         _check_inside(room.bounds, 'people[%d]' % number, person.start, person.moves)
     _check_cameras(robot, room)
     if robot.follow is not None and not 1 <= robot.follow.person <= len(scenario.people):
-        raise ScenarioError('robot.follow.person is %d; 1 to %d expected' % (robot.follow.person, len(scenario.people)))
+        raise ValueError('robot.follow.person is %d; 1 to %d expected' % (robot.follow.person, len(scenario.people)))
     return scenario
 
 
 def with_overrides(scenario, rate=None, seed=None):
-    """Replace the rate and the seed of a scenario unless they are None. Raises ScenarioError if one is invalid."""
+    """Replace the rate and the seed of a scenario unless they are None. Raises ValueError if one is invalid."""
     given = {name: _value(name, value, name) for name, value in (('rate', rate), ('seed', seed)) if value is not None}
     return scenario._replace(**given)
 
@@ -209,34 +184,34 @@ def with_overrides(scenario, rate=None, seed=None):
 def _check_cameras(robot, room):
     names = [camera.name for camera in robot.cameras]
     if len(set(names)) < len(names):
-        raise ScenarioError('robot.cameras have the names %s; unique names expected' % ', '.join(names))
+        raise ValueError('robot.cameras have the names %s; unique names expected' % ', '.join(names))
     if robot.cameras and (robot.mount, robot.pitch) != (Robot().mount, Robot().pitch):
-        raise ScenarioError('robot has mount or pitch as well as cameras; only one of both is allowed')
+        raise ValueError('robot has mount or pitch as well as cameras; only one of both is allowed')
     for camera in robot.mounts:
         if not 0 < robot.base_height + camera.mount[2] < room.height:
-            raise ScenarioError('robot.mount is %s with robot.base_height %g, outside the room of height %g'
-                                % (list(camera.mount), robot.base_height, room.height))
+            raise ValueError('robot.mount is %s with robot.base_height %g, outside the room of height %g'
+                             % (list(camera.mount), robot.base_height, room.height))
 
 
 def _check_inside(bounds, name, start, moves, margin_m=0.0):
     x0, x1, y0, y1 = bounds = [bound + sign * margin_m for bound, sign in zip(bounds, (1, -1, 1, -1))]
     for x, y in [start] + [move.to for move in moves if move.to is not None]:
         if not (x0 < x < x1 and y0 < y < y1):
-            raise ScenarioError('%s is at (%g, %g), outside the room %s' % (name, x, y, bounds))
+            raise ValueError('%s is at (%g, %g), outside the room %s' % (name, x, y, bounds))
 
 
 def _record(kind, given, where):
     if not isinstance(given, dict):
-        raise ScenarioError('%s is %r; a mapping expected' % (where, given))
+        raise ValueError('%s is %r; a mapping expected' % (where, given))
     for name in given:
         if name not in kind._fields:
-            raise ScenarioError('%s has the unknown key %r; did you mean %s? Known keys: %s'
-                                % (where, name, nearest_name(str(name), kind._fields), ', '.join(kind._fields)))
+            raise ValueError('%s has the unknown key %r; did you mean %s? Known keys: %s'
+                             % (where, name, nearest_name(str(name), kind._fields), ', '.join(kind._fields)))
     try:
         record = kind(**{name: _value(name, value, '%s.%s' % (where, name)) for name, value in given.items()})
     except TypeError:
         required = [name for name in kind._fields if name not in kind._field_defaults]
-        raise ScenarioError('%s has the keys %s; %s expected, too' % (
+        raise ValueError('%s has the keys %s; %s expected, too' % (
             where, list(given), ', '.join(name for name in required if name not in given)))
     if kind is Move:
         _check_move(given, where)
@@ -246,52 +221,40 @@ def _record(kind, given, where):
 def _check_move(given, where):
     verbs = [name for name in MOVE_KEYS if given.get(name) is not None]
     if len(verbs) != 1:
-        raise ScenarioError('%s is %s; exactly one of to, turn, wait expected' % (where, given))
+        raise ValueError('%s is %s; exactly one of to, turn, wait expected' % (where, given))
     for name in given:
         if name not in MOVE_KEYS[verbs[0]]:
-            raise ScenarioError('%s is %s; %s is only allowed with %s'
-                                % (where, given, name, ' or '.join(v for v in MOVE_KEYS if name in MOVE_KEYS[v])))
+            raise ValueError('%s is %s; %s is only allowed with %s'
+                             % (where, given, name, ' or '.join(v for v in MOVE_KEYS if name in MOVE_KEYS[v])))
 
 
 def _value(name, value, where):
+    _check(TYPES, name, value, where)
     if name in RECORDS:
         return _record(RECORDS[name], value, where)
     if name in LISTS:
-        if not isinstance(value, list):
-            raise ScenarioError('%s is %r; a list expected' % (where, value))
         return tuple(_record(LISTS[name], entry, '%s[%d]' % (where, number)) for number, entry in enumerate(value, 1))
     if name in VECTORS:
         if not (isinstance(value, list) and len(value) == VECTORS[name]):
-            raise ScenarioError('%s is %r; %d numbers expected' % (where, value, VECTORS[name]))
+            raise ValueError('%s is %r; %d numbers expected' % (where, value, VECTORS[name]))
         return tuple(_checked(name, _number(entry, where), where) for entry in value)
-    if name == 'name':
-        if not (isinstance(value, str) and NAME.match(value)):
-            raise ScenarioError('%s is %r; a name such as front expected' % (where, value))
-        return value
-    if name in FLAGS:
-        if not isinstance(value, bool):
-            raise ScenarioError('%s is %r; true or false expected' % (where, value))
+    if name in FLAGS or name == 'name':
         return value
     return _checked(name, _number(value, where), where)
 
 
+def _check(checks, name, value, where):
+    for names, is_valid, expected in checks:
+        if name in names and not is_valid(value):
+            raise ValueError('%s is %r; %s expected' % (where, value, expected))
+
+
 def _checked(name, number, where):
-    if name in WHOLE and not (number == int(number) and 0 <= number < 2 ** 32):
-        raise ScenarioError('%s is %r; an integer from 0 to 4294967295 expected' % (where, number))
-    if name in POSITIVE and not number > 0:
-        raise ScenarioError('%s is %g; more than 0 expected' % (where, number))
-    if name in FRACTIONS and not 0 <= number <= 1:
-        raise ScenarioError('%s is %g; 0 to 1 expected' % (where, number))
-    if name in COLORS and not 0 <= number <= 255:
-        raise ScenarioError('%s has %g; 0 to 255 expected' % (where, number))
-    if name in ('wait', 'color_noise') and not number >= 0:
-        raise ScenarioError('%s is %g; at least 0 expected' % (where, number))
-    if name == 'rate' and number > 1000:
-        raise ScenarioError('%s is %g; at most 1000 expected' % (where, number))
+    _check(RANGES, name, number, where)
     return int(number) if name in WHOLE else float(number)
 
 
 def _number(value, where):
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e10:
-        raise ScenarioError('%s is %r; a number expected' % (where, value))
+        raise ValueError('%s is %r; a number expected' % (where, value))
     return value

@@ -1,21 +1,25 @@
 """Simulator: images of a scenario, poses of the robot, and ground truth."""
-from typing import List, NamedTuple, Tuple
+from typing import List, NamedTuple, Optional, Tuple
 
 import cv2
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
-from ros_3d_bb_lab.simulation import mesh
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject, prediction_times_s
 from ros_3d_bb_lab.simulation.body import Body, Build
-from ros_3d_bb_lab.simulation.color_sensor import ColorSensor
+from ros_3d_bb_lab.simulation.mesh import box, rotation
 from ros_3d_bb_lab.simulation.motion import person_motion, robot_motion
 from ros_3d_bb_lab.simulation.renderer import render
 from ros_3d_bb_lab.simulation.room import RenderedRoom
-from ros_3d_bb_lab.simulation.stereo import StereoCamera
+from ros_3d_bb_lab.simulation.sensors import ColorSensor, StereoCamera
 
 D435I_COLOR = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)  # camera of the measurements in the thesis
 FRONT_FROM_OPTICAL = transform_from((0, 0, 0), OPTICAL_ROTATION)
 SHADOW_RADIUS_M = 0.28
+MIN_VISIBLE = 0.25  # minimum share of the body in the image of a person with the status VISIBLE
+MOVING_MPS = 0.05
+PREDICTION_S, PREDICTION_STEP_S = 2.0, 0.25
 SKINS = ((225, 180, 150), (215, 170, 140), (185, 140, 110), (230, 185, 155), (145, 105, 80))
 HAIRS = ((60, 45, 35), (35, 30, 25), (25, 22, 20), (130, 95, 60), (120, 120, 120))
 SHIRTS = ((30, 40, 60), (170, 45, 50), (185, 180, 165), (70, 130, 80), (60, 150, 190), (200, 150, 60), (90, 60, 120))
@@ -24,35 +28,16 @@ SHOES = ((45, 40, 40), (35, 35, 35), (205, 200, 200))
 
 
 class PersonTruth(NamedTuple):
-    """Ground truth of a person in one frame, in the map frame.
+    """Ground truth of a person in one frame, in the map frame. Shares are 0..1."""
 
-    Attributes
-    ----------
-    id : int
-        From 1, in the order of the scenario.
-    position_m : numpy.ndarray, (3,)
-        Centre of the body's vertical axis.
-    velocity_mps : numpy.ndarray, (3,)
-    size_m : numpy.ndarray, (3,)
-        Width, width, height.
-    visible : float
-        Share of the body that the image shows, 0..1.
-    hidden : float
-        Share of the body inside the image that other objects hide, 0..1.
-    inside : float
-        Share of the body that lies inside the image, 0..1.
-    box_px : (int, int, int, int) or None
-        Bounding box (x1, y1, x2, y2) of the visible part; None if no part is visible.
-    """
-
-    id: int
-    position_m: np.ndarray
-    velocity_mps: np.ndarray
-    size_m: np.ndarray
-    visible: float
-    hidden: float
-    inside: float
-    box_px: Tuple[int, int, int, int]
+    id: int                   # from 1, in the order of the scenario
+    position_m: np.ndarray    # (3,), centre of the body's vertical axis
+    velocity_mps: np.ndarray  # (3,)
+    size_m: np.ndarray        # width, width, height
+    visible: float            # share of the body that the image shows
+    hidden: float             # share of the body inside the image that other objects hide
+    inside: float             # share of the body that lies inside the image
+    box_px: Optional[Tuple[int, int, int, int]]  # bounding box (x1, y1, x2, y2) of the visible part, if there is one
 
 
 class Poses(NamedTuple):
@@ -69,34 +54,32 @@ class Poses(NamedTuple):
 
 
 class SimulatedFrame(NamedTuple):
-    """`time_s` since the start; `color` (h, w, 3), uint8 RGB; `depth_mm` (h, w), uint16, aligned to colour, 0 means no
-    depth; `camera`, the name of the camera, or '' if there is only one.
-    """
+    """One image of one camera."""
 
     number: int
-    time_s: float
-    color: np.ndarray
-    depth_mm: np.ndarray
+    time_s: float         # since the start
+    color: np.ndarray     # (h, w, 3), uint8 RGB
+    depth_mm: np.ndarray  # (h, w), uint16, aligned to colour; 0 means no depth
     poses: Poses
     people: List[PersonTruth]
-    camera: str = ''
+    camera: str = ''      # its name, '' if there is only one
 
 
 class Simulator(object):
-    """Renders a scenario. A frame depends only on the scenario and the number of the frame.
+    """Renders a scenario (scenario.Scenario). A frame depends only on the scenario and the number of the frame.
 
-    Several cameras take turns at equal intervals: of n cameras the first one has the frames 0, n, 2 n, ...
-
-    Parameters
-    ----------
-    scenario : scenario.Scenario
-    camera : camera_model.Camera
+    Several cameras take turns at equal intervals: of n cameras the first one has the frames 0, n, 2 n, ... All have the
+    intrinsics of `camera` (camera_model.Camera).
     """
 
     def __init__(self, scenario, camera=D435I_COLOR):
         self.scenario, self.camera = scenario, camera
+        self.cameras = [mount.name for mount in scenario.robot.mounts]  # [''] if there is only one
+        self.rate = scenario.rate * len(self.cameras)  # frames per second of all cameras together
+        self.frame_count = int(np.ceil(scenario.duration * self.rate))
         self._room = RenderedRoom(scenario.room.bounds, scenario.room.height, np.random.RandomState(scenario.seed))
-        self._furniture = [_furniture(item, number) for number, item in enumerate(scenario.room.furniture)]
+        self._furniture = [box(item.size, item.color, np.random.RandomState(number)).moved(item.at + (0,), item.yaw)
+                           for number, item in enumerate(scenario.room.furniture)]
         self._bodies = [Body(_build(person, scenario.seed, number), np.random.RandomState(number))
                         for number, person in enumerate(scenario.people)]
         self._motions = [person_motion(person, body.build.height_m, scenario.duration)
@@ -105,32 +88,12 @@ class Simulator(object):
         self._color_sensor = ColorSensor(camera, scenario.seed, scenario.color_noise)
         self._stereo = StereoCamera(camera, scenario.seed) if scenario.depth_noise else None
 
-    @property
-    def cameras(self):
-        """Names of the cameras; [''] if there is only one."""
-        return [mount.name for mount in self.scenario.robot.mounts]
-
-    @property
-    def rate(self):
-        """Frames per second of all cameras together."""
-        return self.scenario.rate * len(self.cameras)
-
-    @property
-    def frame_count(self):
-        """Number of frames in the scene."""
-        return int(np.ceil(self.scenario.duration * self.rate))
-
     def time_s(self, number):
         """Time of a frame since the start."""
         return number / self.rate
 
     def frame(self, number):
-        """Render a frame.
-
-        Returns
-        -------
-        SimulatedFrame
-        """
+        """Render a frame. Returns a SimulatedFrame."""
         time_s, turn = self.time_s(number), number % len(self.cameras)
         poses, states = self.poses_at(time_s, turn), [motion.at(time_s) for motion in self._motions]
         bodies = [body.posed(state.posture).moved(np.append(state.position_m, 0), state.heading_rad)
@@ -140,31 +103,37 @@ class Simulator(object):
         depth_mm = (self._stereo.measure(rendering.inverse_depth, number) if self._stereo is not None
                     else np.rint(1000 / rendering.inverse_depth).clip(0, 65535).astype(np.uint16))
         people = [self._truth(index, state, bodies[index], rendering) for index, state in enumerate(states)]
-        return SimulatedFrame(number, time_s, self._color_sensor.capture(rendering.color, number), depth_mm, poses,
-                              people,
-                              self.cameras[turn])
+        color = self._color_sensor.capture(rendering.color, number)
+        return SimulatedFrame(number, time_s, color, depth_mm, poses, people, self.cameras[turn])
 
     def poses_at(self, time_s, camera=0):
-        """Poses of odometry, robot and camera at a time. `camera` is the index of the camera.
-
-        Returns
-        -------
-        Poses
-        """
+        """Poses of odometry, robot and camera at a time. `camera` is the index of the camera."""
         robot, state = self.scenario.robot, self._robot.at(time_s)
         mount = robot.mounts[camera]
         x, y, yaw = np.array(robot.odometry_drift) * time_s
         map_from_odom = _upright(x, y, 0, yaw)
         map_from_base = _upright(state.position_m[0], state.position_m[1], robot.base_height, state.heading_rad)
         base_from_mount, tilted = _upright(*mount.mount + (mount.yaw,)), np.eye(4)
-        c, s = np.cos(mount.pitch), np.sin(mount.pitch)
-        tilted[:3, :3] = [[c, 0, -s], [0, 1, 0], [s, 0, c]]
+        tilted[:3, :3] = rotation(1, -mount.pitch)
         return Poses(map_from_odom, np.linalg.inv(map_from_odom).dot(map_from_base),
                      base_from_mount.dot(tilted).dot(FRONT_FROM_OPTICAL))
 
     def positions_at(self, time_s):
         """Positions (n, 2) of the people in the map. The time may be after the end of the scene."""
         return np.array([motion.at(time_s).position_m for motion in self._motions]).reshape(-1, 2)
+
+    def true_tracks(self, frame, stamp_ns):
+        """Convert the people of a frame to tracks (TrackedObject) in the map, first seen at the start of the scene.
+
+        Their predictions are their actual future positions.
+        """
+        times_s = prediction_times_s(PREDICTION_S, PREDICTION_STEP_S)
+        paths = np.stack([self.positions_at(frame.time_s + time_s) for time_s in times_s], axis=1)
+        start_ns = stamp_ns - int(round(frame.time_s * NS))
+        return [TrackedObject(person.id, person.position_m, person.size_m, person.velocity_mps, person.velocity_mps,
+                              _status(person), bool(np.linalg.norm(person.velocity_mps) > MOVING_MPS), start_ns,
+                              stamp_ns, np.c_[path, np.full(len(path), person.position_m[2])], PREDICTION_STEP_S)
+                for person, path in zip(frame.people, paths)]
 
     def _truth(self, index, state, body, rendering):
         height_m = float(body.vertices[:, 2].max())
@@ -179,14 +148,17 @@ class Simulator(object):
                            (x, y, x + width, y + height) if count else None)
 
 
+def _status(person):
+    if person.visible >= MIN_VISIBLE:
+        return VISIBLE
+    return OCCLUDED if person.hidden > 1 - person.inside else OUT_OF_VIEW  # the larger share decides
+
+
 def _upright(x, y, z, yaw):
     """Transform (4, 4) of a translation and a rotation about z."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    return np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, z], [0, 0, 0, 1]], float)
-
-
-def _furniture(item, number):
-    return mesh.box(item.size, item.color, np.random.RandomState(number)).moved(item.at + (0,), item.yaw)
+    transform = np.eye(4)
+    transform[:3, :3], transform[:3, 3] = rotation(2, yaw), (x, y, z)
+    return transform
 
 
 def _build(person, seed, number):
@@ -200,7 +172,5 @@ def _build(person, seed, number):
     build = Build(random.uniform(1.58, 1.92), random.uniform(.95, 1.25), float(random.randint(2)),
                   bool(random.randint(2)), bool(random.randint(2)), choice(SKINS), choice(HAIRS),
                   SHIRTS[shirts[number % len(SHIRTS)]], choice(TROUSERS), choice(SHOES))
-    specified = {name: getattr(person, name) for name in (
-        'girth', 'hips', 'long_hair', 'short_sleeves', 'skin', 'hair', 'shirt', 'trousers')}
-    specified['height_m'] = person.height
-    return build._replace(**{name: value for name, value in specified.items() if value is not None})
+    specified = dict(person._asdict(), height_m=person.height)
+    return build._replace(**{name: specified[name] for name in Build._fields if specified.get(name) is not None})

@@ -68,8 +68,8 @@ def _draw_poster(image, left_m, random):
     picture = cv2.resize(random.uniform(40, 220, (3, 3, 3)), (int(width * WALL_PPM), int(height * WALL_PPM)),
                          interpolation=cv2.INTER_CUBIC)
     x, y = _pixel(image, left_m, min(1.9, image.shape[0] / WALL_PPM))
-    place = image[y:y + picture.shape[0], x:x + picture.shape[1]]
-    place[:] = picture[:place.shape[0], :place.shape[1]]
+    window = image[y:y + picture.shape[0], x:x + picture.shape[1]]
+    window[:] = picture[:window.shape[0], :window.shape[1]]
     return 1.6
 
 

@@ -1,4 +1,4 @@
-"""On the robot: what the two computers send, as JSON on the standard output once there are enough tracks."""
+"""On the robot: print what the two computers send as JSON once there are enough tracks."""
 import json
 import sys
 import time
@@ -28,7 +28,7 @@ def main():
         time.sleep(0.1)
     nodes = {name: rospy.get_master().lookupNode(name)[2]
              for name in ('/tracker_node', '/simulator_node', '/camera_mount')}
-    print('HEARD ' + json.dumps({'images': images, 'tracks': tracks, 'clocks': clocks, 'nodes': nodes}))
+    print('RECEIVED ' + json.dumps({'images': images, 'tracks': tracks, 'clocks': clocks, 'nodes': nodes}))
 
 
 if __name__ == '__main__':

@@ -1,4 +1,4 @@
-"""In place of paramiko: roslaunch's ssh to the other computer is a process there (two_machines.Hosts)."""
+"""Replaces paramiko: runs commands of roslaunch for the other computer as local processes with ENTER_OTHER."""
 import os
 import socket
 import subprocess
@@ -26,8 +26,6 @@ class SSHConfig(object):
 
 
 class SSHClient(object):
-    """Connects to nothing but the computer whose address is in OTHER_COMPUTER; runs its commands with ENTER_OTHER."""
-
     _system_host_keys = types.SimpleNamespace(lookup=lambda _address: True)
 
     def load_system_host_keys(self, *_path):
@@ -47,7 +45,7 @@ class SSHClient(object):
 
 
 class _Pipe(object):
-    """What a process writes, read without waiting."""
+    """Output of a process, read without blocking."""
 
     channel = types.SimpleNamespace(settimeout=lambda _seconds: None)
 

@@ -11,32 +11,24 @@ from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.detection.depth.ground_plane import check_upright, fit_floor
 from ros_3d_bb.detection.depth.person_classifier import (BEST_HOG, PersonHog, PersonWindow, person_score, pyramid_of,
                                                          shape_features_of)
-from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, check_params, find_person_clusters, grid_of
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_person_clusters, grid_of
 
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
 MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person
 
 
 class DepthDetection(NamedTuple):
-    """A detected person: box (x1, y1, x2, y2), score 0..1, and position to the right of and ahead of the camera."""
+    """A detected person: box (x1, y1, x2, y2), score 0..1, and position to the right and ahead of the camera."""
 
     box: Tuple[float, float, float, float]
     score: float
-    x_m: float
-    depth_m: float
+    position_m: Tuple[float, float]
 
 
 class DepthPeople(object):
     """Detector of people in depth and colour images.
 
-    Parameters
-    ----------
-    params : DepthPeopleParams
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range, or this OpenCV has no HOG detector.
+    Raises ValueError if two parameters contradict each other, or this OpenCV has no HOG detector.
     """
 
     def __init__(self, params=DepthPeopleParams()):
@@ -44,21 +36,25 @@ class DepthPeople(object):
         self._hog, self._floor = PersonHog(), None
 
     def reconfigure(self, params):
-        """Change the parameters. If one is out of range, raise ValueError and keep the old ones."""
-        check_params(params)
+        """Change the DepthPeopleParams. If two contradict each other, raise ValueError and keep the old ones."""
+        for name in ('depth', 'width', 'top'):
+            low, high = getattr(params, 'min_%s' % name), getattr(params, 'max_%s' % name)
+            if not low < high:
+                raise ValueError('min_%s is %g and max_%s is %g; min_%s must be smaller'
+                                 % (name, low, name, high, name))
         self._params = params
 
     def detect(self, image, depth, camera, floor=None):
-        """Find people.
+        """Detect people.
 
         Parameters
         ----------
         image : numpy.ndarray, (height, width, 3), uint8, RGB
-        depth : ros_3d_bb.estimation.box3d_estimator.DepthImage
+        depth : ros_3d_bb.camera.depth_image.DepthImage
             Aligned to the colour image.
         camera : ros_3d_bb.camera.camera_model.Camera
         floor : ros_3d_bb.detection.depth.ground_plane.Floor, optional
-            If not given, the floor is fitted to this image. If that fails, the last fitted floor is used.
+            By default, the floor is fitted to this image. If that fails, the last fitted floor is used.
 
         Returns
         -------
@@ -93,7 +89,7 @@ class DepthPeople(object):
             if score >= self._params.min_score:
                 box = box_of(blob, shape, grid, camera, floor)
                 x_m = ((box[0] + box[2]) / 2.0 - camera.cx) / camera.fx * shape.depth_m
-                people.append(DepthDetection(box, score, x_m, shape.depth_m))
+                people.append(DepthDetection(box, score, (x_m, shape.depth_m)))
         return _merged_detections(people)
 
 
@@ -112,7 +108,7 @@ def person_window_of(blob, shape, grid, camera, floor):
 def box_of(blob, shape, grid, camera, floor):
     """Box (x1, y1, x2, y2) of the visible part of a person.
 
-    Visible feet lie within the floor margin, outside the blob. The box of a person seen nearly to the ground is
+    Visible feet lie within the floor margin, outside the blob. The box of a person visible nearly to the ground is
     therefore extended to the floor.
     """
     rows, columns = blob.mask.shape
@@ -124,28 +120,19 @@ def box_of(blob, shape, grid, camera, floor):
 
 
 def _merged_detections(people):
-    """Convert a list of Found to Detections. People closer together than MIN_DISTANCE_M are merged."""
+    """Merge parts of one person, closer together than MIN_DISTANCE_M, and convert DepthDetections to Detections.
+
+    The position of the largest part is kept, as it is more accurate.
+    """
     merged = []
-    for person in sorted(people, key=lambda person: -_area(person.box)):
-        near = [index for index, other in enumerate(merged) if _distance_m(person, other) < MIN_DISTANCE_M]
-        if near:
-            merged[near[0]] = _merge(merged[near[0]], person)
+    for part in sorted(people, key=lambda person: -np.subtract(person.box[2:], person.box[:2]).prod()):
+        for index, person in enumerate(merged):
+            if np.hypot(*np.subtract(person.position_m, part.position_m)) < MIN_DISTANCE_M:
+                box = np.hstack((np.minimum(person.box[:2], part.box[:2]), np.maximum(person.box[2:], part.box[2:])))
+                merged[index] = person._replace(box=box, score=max(person.score, part.score))
+                break
         else:
-            merged.append(person)
+            merged.append(part)
     merged.sort(key=lambda person: -person.score)
     return Detections(np.array([person.box for person in merged], float).reshape(-1, 4),
                       np.array([person.score for person in merged], float), np.zeros(len(merged), int))
-
-
-def _area(box):
-    return (box[2] - box[0]) * (box[3] - box[1])
-
-
-def _distance_m(one, other):
-    return float(np.hypot(one.x_m - other.x_m, one.depth_m - other.depth_m))
-
-
-def _merge(large, small):
-    """Merge two detected parts of one person. The position of the larger part is kept, as it is more accurate."""
-    low, high = np.minimum(large.box, small.box)[:2], np.maximum(large.box, small.box)[2:]
-    return large._replace(box=tuple(low) + tuple(high), score=max(large.score, small.score))

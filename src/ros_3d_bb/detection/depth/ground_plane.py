@@ -36,13 +36,7 @@ class Floor(NamedTuple):
 
 
 def floor_from_transform(camera_from_floor):
-    """Convert the z = 0 plane of a frame to a Floor.
-
-    Parameters
-    ----------
-    camera_from_floor : numpy.ndarray, (4, 4)
-        Transform to the camera optical frame from a frame whose z axis points up and whose z = 0 plane is the floor.
-    """
+    """Floor from the transform (4, 4) to the camera optical frame from a frame whose z = 0 plane is the floor, z up."""
     normal = camera_from_floor[:3, 2]
     return Floor(normal, -float(np.dot(normal, camera_from_floor[:3, 3])))
 
@@ -56,31 +50,21 @@ def check_upright(floor):
                          % (tuple(floor.normal) + (floor.offset_m,)))
 
 
-def fit_floor(depth, camera, seed=0):
+def fit_floor(depth, camera):
     """Fit the floor to a depth image by RANSAC and least squares on the inliers.
 
     The camera must be 0.15 m to 2 m above the floor and tilted by less than 25 degrees. Points below a plane count
-    against it, so that tables and shelves are not taken for the floor.
-
-    Parameters
-    ----------
-    depth : ros_3d_bb.estimation.box3d_estimator.DepthImage
-    camera : ros_3d_bb.camera.camera_model.Camera
-    seed : int
-        Seed of the random numbers. The same image always gives the same floor.
-
-    Returns
-    -------
-    Floor or None
-        None if no credible floor is visible.
+    against it, so that tables and shelves are not detected as the floor. The same image always gives the same floor.
+    Returns None if no credible floor is visible.
     """
     points = _points(depth, camera)
     if len(points) < MIN_POINTS:
         return None
-    random = np.random.RandomState(seed)
+    random = np.random.RandomState(0)
     normals, offsets = _hypotheses(points, random)
     if not len(normals):
         return None
+
     sample = points[random.randint(0, len(points), SCORING_POINTS)]
     heights_m = sample.dot(normals.T) + offsets
     tolerance_m = _tolerance_m(sample)[:, None]
@@ -112,8 +96,8 @@ def _hypotheses(points, random):
 
 
 def _is_upright(normals, offsets):
-    low, high = CAMERA_HEIGHT_M
-    return (-normals[..., 1] > np.cos(MAX_FITTED_TILT_RAD)) & (offsets > low) & (offsets < high)
+    return ((-normals[..., 1] > np.cos(MAX_FITTED_TILT_RAD))
+            & (offsets > CAMERA_HEIGHT_M[0]) & (offsets < CAMERA_HEIGHT_M[1]))
 
 
 def _tolerance_m(points):

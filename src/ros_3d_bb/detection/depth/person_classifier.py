@@ -30,13 +30,7 @@ class PersonWindow(NamedTuple):
 
 
 class PersonHog(object):
-    """OpenCV's HOG people detector at known positions.
-
-    Raises
-    ------
-    ValueError
-        If this OpenCV has no HOG detector.
-    """
+    """OpenCV's HOG people detector at known positions. ValueError if this OpenCV has none."""
 
     def __init__(self):
         if not hasattr(cv2, 'HOGDescriptor'):
@@ -47,14 +41,7 @@ class PersonHog(object):
         self._hog.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())
 
     def score(self, pyramid, window):
-        """Best SVM score near a window: positive for a person, at least LOW_SCORE.
-
-        Parameters
-        ----------
-        pyramid : list of numpy.ndarray
-            See `pyramid_of`.
-        window : PersonWindow
-        """
+        """Best SVM score near a PersonWindow: positive for a person, at least LOW_SCORE. See `pyramid_of`."""
         scores = [LOW_SCORE]
         for scale in SCALES:
             patch = _patch(pyramid, window, PERSON_PX / ((window.soles - window.crown) * scale))
@@ -70,19 +57,8 @@ def shape_features_of(mask, ahead_m, thickness_m):
     noise only (relief 1). Fill is at least 0.5, so that structures sparser than a person (a shelf, fragments of a far
     wall) do not score higher than a person.
 
-    Parameters
-    ----------
-    mask : numpy.ndarray, (rows, columns), bool
-        Cells of the cluster in its rectangle.
-    ahead_m : numpy.ndarray, (rows, columns)
-        Distance of the surface along the floor.
-    thickness_m : float
-        Extent along the line of sight.
-
-    Returns
-    -------
-    numpy.ndarray, (3,)
-        Fill, relief, and thickness in metres.
+    `mask` are the cells of the cluster in its rectangle, `ahead_m` the distance of the surface along the floor there,
+    and `thickness_m` the extent along the line of sight. Returns fill, relief, and thickness in metres, (3,).
     """
     columns = mask.sum(axis=0) >= max(4, mask.shape[0] // 4)
     relief_m = 0.0
@@ -97,16 +73,9 @@ def shape_features_of(mask, ahead_m, thickness_m):
 
 
 def person_score(features, hog, headless):
-    """Probability that a cluster is a person.
+    """Probability that a cluster is a person, from `shape_features_of` and `PersonHog.score`.
 
-    Parameters
-    ----------
-    features : numpy.ndarray, (3,)
-        See `shape_features_of`.
-    hog : float
-        HOG score, see `PersonHog.score`.
-    headless : bool
-        True if the top of the cluster is cut by the image border.
+    `headless`: the top of the cluster is cut by the image border.
     """
     weights = WEIGHTS_HEADLESS if headless else WEIGHTS
     return float(1 / (1 + np.exp(-weights.dot(np.hstack((1, hog, features))))))

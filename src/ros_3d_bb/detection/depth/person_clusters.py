@@ -50,23 +50,11 @@ class DepthPeopleParams(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """Depth image sampled every `step` pixels. Arrays are (rows, columns), float32, metres.
+    """Depth image sampled every `step` pixels. Arrays are (rows, columns), float32, metres."""
 
-    Attributes
-    ----------
-    depth_m : numpy.ndarray
-        Depth; 0 where it is unknown.
-    height_m : numpy.ndarray
-        Height above the floor.
-    ahead_m : numpy.ndarray
-        Distance along the floor. It is constant over an upright surface, even if the camera is tilted.
-    step : int
-        Pixels per cell.
-    """
-
-    depth_m: np.ndarray
-    height_m: np.ndarray
-    ahead_m: np.ndarray
+    depth_m: np.ndarray  # 0 where it is unknown
+    height_m: np.ndarray  # above the floor
+    ahead_m: np.ndarray  # along the floor: constant over an upright surface, even if the camera is tilted
     step: int
 
 
@@ -88,7 +76,7 @@ class Blob(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """Size of a blob, heights above the floor, and which image borders cut it."""
+    """Size of a blob, heights above the floor, and the image borders that cut it."""
 
     depth_m: float
     width_m: float
@@ -98,14 +86,6 @@ class Shape(NamedTuple):
     cut_top: bool
     cut_bottom: bool
     cut_side: bool
-
-
-def check_params(params):
-    """Raise ValueError, naming the values, where two parameters contradict each other."""
-    for name in ('depth', 'width', 'top'):
-        low, high = getattr(params, 'min_%s' % name), getattr(params, 'max_%s' % name)
-        if not low < high:
-            raise ValueError('min_%s is %g and max_%s is %g; min_%s must be smaller' % (name, low, name, high, name))
 
 
 def grid_of(depth, camera, floor, params):
@@ -124,13 +104,11 @@ def grid_of(depth, camera, floor, params):
 
 
 def find_person_clusters(grid, camera, params):
-    """Find blobs of human size. Returns a list of (Blob, Shape)."""
-    clusters = []
+    """Yield (Blob, Shape) of the blobs of human size."""
     for blob in _merge_stacked(_split_blobs(grid, camera, params), grid, camera, params):
         shape = shape_of(blob, grid, camera)
         if _is_human(shape, params):
-            clusters.append((blob, shape))
-    return clusters
+            yield blob, shape
 
 
 def _foreground_cells(grid, params):
@@ -181,7 +159,7 @@ def _connected(cells, row=0, column=0):
 
 
 def _split_blobs(grid, camera, params):
-    """Foreground blobs. Blobs that have two heads or are too large for one person are split."""
+    """Foreground blobs; those that have two heads or are too large for one person are split."""
     to_split = [(blob, 0) for blob in _connected(_foreground_cells(grid, params))]
     parts = []
     while to_split:
@@ -233,15 +211,15 @@ def _split_between_heads(blob, grid):
 
 def _merge_stacked(parts, grid, camera, params):
     """Merge parts at one depth and above each other, such as a person behind the arm of another person."""
-    parts = sorted(parts, key=lambda part: -part.mask.size)
-    shapes = [shape_of(part, grid, camera) for part in parts]
+    remaining = [(part, shape_of(part, grid, camera)) for part in sorted(parts, key=lambda part: -part.mask.size)]
     merged = []
-    while parts:
-        blob, shape = parts.pop(0), shapes.pop(0)
-        for i in range(len(parts) - 1, -1, -1):
-            if _are_stacked(blob, shape, parts[i], shapes[i], params):
-                blob = _union(blob, parts.pop(i))
-                shapes.pop(i)
+    while remaining:
+        blob, shape = remaining.pop(0)
+        for i in range(len(remaining) - 1, -1, -1):
+            other, other_shape = remaining[i]
+            if _are_stacked(blob, shape, other, other_shape, params):
+                blob = _union(blob, other)
+                del remaining[i]
         merged.append(blob)
     return merged
 

@@ -1,5 +1,6 @@
 """Inference backends: the common interface of torch and ONNX Runtime.
 
+`open_runtime` chooses the backend by the suffix of the model file; `detector.Yolov5` turns its predictions into boxes.
 A backend is called with an RGB image (height, width, 3), uint8, and a minimum objectness. It returns the predictions
 above it (rows, 5 + classes), float32: x, y, width, height in pixels of the image, objectness, class scores.
 Attributes: `names`, the class names; `stride`, of which height and width must be multiples; `input_hw`, the only
@@ -10,12 +11,10 @@ import os
 import warnings
 from typing import NamedTuple
 
-from ros_3d_bb.core.params import Param, parameters
+from ros_3d_bb.core.params import Param, check, parameters
 from ros_3d_bb.detection.yolov5.checkpoint import WeightsError
-from ros_3d_bb.detection.yolov5.onnx_backend import OnnxRuntime, OnnxUnusable
-from ros_3d_bb.detection.yolov5.onnx_cache import export_folder, open_exported
+from ros_3d_bb.detection.yolov5.onnx_backend import OnnxRuntime, OnnxUnusable, export_folder, open_exported
 
-RUNTIMES = ('auto', 'onnxruntime', 'torch')
 MAX_THREADS = 4  # default maximum; small networks gain little from more threads
 
 
@@ -26,7 +25,8 @@ class RuntimeParams(NamedTuple):
     runtime: str = Param(
         'auto', 'What runs the network. ONNX Runtime takes half of the time of torch on a CPU; only torch runs on a '
         'GPU (device:=), in half precision. auto: torch on a GPU, else ONNX Runtime, or torch where that is not '
-        'installed. A checkpoint (.pt) is exported to ONNX once, see export_folder.', choices=RUNTIMES)
+        'installed. A checkpoint (.pt) is exported to ONNX once, see export_folder.',
+        choices=('auto', 'onnxruntime', 'torch'))
     device: str = Param('auto')
     threads: int = Param(
         0, 'CPU threads of the network. 0: as many as this machine has cores, at most 4.', limits=(0, 1024))
@@ -55,7 +55,10 @@ def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
     ValueError
         If a parameter is out of range, the device does not exist, or the requested runtime cannot run this file.
     """
-    threads = thread_count(params)
+    check(params)
+    if params.runtime == 'onnxruntime' and params.device not in ('auto', 'cpu'):
+        raise ValueError('runtime onnxruntime works on the CPU, and device is %r; use runtime torch' % params.device)
+    threads = params.threads or min(physical_cores(), MAX_THREADS)
     try:
         return _open_file(str(path), params, threads, warn)
     except ImportError as error:
@@ -66,23 +69,23 @@ def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
 
 
 def _open_file(path, params, threads, warn):
-    """Open a file by its suffix. Torch is large and optional, so it is imported only if it is needed."""
+    """Choose the backend. A checkpoint runs in torch on a GPU, and on a CPU in ONNX Runtime, which is twice as fast.
+
+    Torch is large and optional, so it is imported only if it is needed.
+    """
     if path.endswith('.onnx'):
         if params.runtime == 'torch':
             raise ValueError('runtime torch cannot run %s; use auto or onnxruntime, or the .pt checkpoint' % path)
         if params.device not in ('auto', 'cpu'):
             raise ValueError('device is %r, but %s runs on the CPU; use the .pt checkpoint' % (params.device, path))
         return OnnxRuntime(path, threads)
+
     if path.endswith(('.torchscript', '.torchscript.pt')):
         if params.runtime == 'onnxruntime':
             raise ValueError('runtime onnxruntime cannot run %s; use auto or torch, or the .pt checkpoint' % path)
         from ros_3d_bb.detection.yolov5.torch_backend import TorchScriptRuntime, torch_device
         return TorchScriptRuntime(path, torch_device(params.device), threads)
-    return _open_checkpoint(path, params, threads, warn)
 
-
-def _open_checkpoint(path, params, threads, warn):
-    """Open a checkpoint: in torch on a GPU; on a CPU in ONNX Runtime, which is twice as fast, and else in torch."""
     if params.runtime == 'onnxruntime' or params.runtime == 'auto' and not on_gpu(params.device):
         try:
             return open_exported(path, export_folder(params.export_folder), threads, warn)
@@ -95,9 +98,8 @@ def _open_checkpoint(path, params, threads, warn):
 
 
 def on_gpu(device):
-    """Whether a network runs on a GPU if `device` is set to this value, which may be 'auto'.
-
-    Importing torch takes a second and 200 MB, so it is imported only if NVIDIA's driver reports a GPU.
+    """Whether the network runs on a GPU. For 'auto', torch, which takes a second and 200 MB, is imported only if
+    NVIDIA's driver reports a GPU.
     """
     if device != 'auto':
         return not device.startswith('cpu')
@@ -120,21 +122,6 @@ def gpu_count():
     except (OSError, AttributeError):  # no driver, or an incomplete one
         pass
     return count.value
-
-
-def thread_count(params):
-    """Number of threads of a backend: the parameter, or by default the number of cores up to MAX_THREADS.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range.
-    """
-    if params.runtime not in RUNTIMES:
-        raise ValueError('runtime is %r; one of %s expected' % (params.runtime, ', '.join(RUNTIMES)))
-    if params.runtime == 'onnxruntime' and params.device not in ('auto', 'cpu'):
-        raise ValueError('runtime onnxruntime works on the CPU, and device is %r; use runtime torch' % params.device)
-    return params.threads or min(physical_cores(), MAX_THREADS)
 
 
 def physical_cores():

@@ -6,10 +6,8 @@ inert stand-ins. No class is imported and torch is not used, so a file controls 
 the network. Known limitation: a malicious file can keep Python's unpickler busy for very long by hashing nested tuples.
 """
 import collections
-import hashlib
 import pickle
 import zipfile
-from typing import Dict, List, NamedTuple
 
 import numpy as np
 
@@ -30,28 +28,17 @@ class WeightsError(ValueError):
     """Weights that cannot be used. The message names the file, the reason, and what was expected."""
 
 
-class Checkpoint(NamedTuple):
-    """Content of a checkpoint: `layout` (its `yaml`, see `network.Network`), class `names` and `weights` by name."""
-
-    layout: dict
-    names: List[str]
-    weights: Dict[str, np.ndarray]
-
-
 def read_checkpoint(path):
-    """Read a checkpoint without executing code from it or instantiating classes that it names.
+    """Return the layout (its `yaml`, see `network.Network`), the class names, and {name: array} of the weights.
 
-    Raises
-    ------
-    WeightsError
-        If the file is missing, damaged, not a YOLOv5 detection model, or names anything outside the allow-list.
+    Raises WeightsError if the file is missing, damaged, not a YOLOv5 detection model, or names anything outside the
+    allow-list.
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            root = _Unpickler(archive).load()
-        return _checkpoint_from(root)
-    except FileNotFoundError:
-        raise _missing(path)
+            return _content_of(_Unpickler(archive).load())
+    except OSError as error:
+        raise unreadable(path, error)
     except zipfile.BadZipFile as error:
         raise WeightsError('weights %s: truncated, not a checkpoint, or written by torch before 1.6 (%s); %s'
                            % (path, cause(error), EXPECTED))
@@ -59,19 +46,9 @@ def read_checkpoint(path):
         raise WeightsError('weights %s: rejected (%s); %s' % (path, cause(error), EXPECTED))
 
 
-def checkpoint_digest(path):
-    """SHA-256 of a file, in hexadecimal. Raises WeightsError if the file cannot be read."""
-    try:
-        with open(path, 'rb') as stream:
-            return hashlib.sha256(stream.read()).hexdigest()
-    except FileNotFoundError:
-        raise _missing(path)
-    except OSError as error:
-        raise WeightsError('weights %s: %s; %s' % (path, cause(error), EXPECTED))
-
-
-def _missing(path):
-    return WeightsError('weights %s: no such file; %s' % (path, EXPECTED))
+def unreadable(path, error):
+    """WeightsError for an OSError."""
+    return WeightsError('weights %s: cannot be read (%s); %s' % (path, error.strerror, EXPECTED))
 
 
 class Inert(object):
@@ -104,10 +81,8 @@ class _Unpickler(pickle.Unpickler):
         super(_Unpickler, self).__init__(archive.open(pickles[0]), encoding='utf-8')
 
     def find_class(self, module, name):
-        """Return the stand-in for a name in the pickle, without importing anything.
-
-        The functions are created on each call, because a pickle can set attributes of the objects that it names.
-        """
+        """Return the stand-in for a name in the pickle, without importing anything."""
+        # Functions are created on each call, because a pickle can set attributes of the objects that it names.
         allowed = {('collections', 'OrderedDict'): collections.OrderedDict, ('__builtin__', 'set'): set,
                    ('builtins', 'set'): set, ('torch', 'Size'): tuple,
                    ('torch._utils', '_rebuild_tensor_v2'): lambda *arguments: _tensor(*arguments),
@@ -145,8 +120,8 @@ def _tensor(storage, offset, size, stride, *_unused):
                                            writeable=False)
 
 
-def _checkpoint_from(root):
-    """Checkpoint of an unpickled file. As in YOLOv5, the averaged model (`ema`) is preferred if there is one."""
+def _content_of(root):
+    """As `read_checkpoint`. As in YOLOv5, the averaged model (`ema`) is preferred if there is one."""
     model = (root.get('ema') or root.get('model')) if isinstance(root, dict) else None
     origin = getattr(model, 'origin', type(model).__name__)
     if origin not in ('models.yolo.Model', 'models.yolo.DetectionModel'):
@@ -160,14 +135,13 @@ def _checkpoint_from(root):
     declared = str(layout.get('activation') or 'nn.SiLU()')[:MAX_NAME]
     if activations - {declared.partition('(')[0].rpartition('.')[2]}:
         raise ValueError('its layers use %s, but its yaml declares %s' % (', '.join(sorted(activations)), declared))
-    return Checkpoint(layout, class_names(model.state.get('names'), layout['nc']), tensors)
+    return layout, class_names(model.state.get('names'), layout['nc']), tensors
 
 
 def class_names(names, count):
     """Class names as a list, from the list or the {number: name} dict in a file.
 
-    If a file has no names and 80 classes, the classes of COCO are assumed, whose first is person. Other classes without
-    a name are named by their number.
+    Without names, 80 classes are those of COCO, whose first is person. Other classes are named by their number.
     """
     if isinstance(names, (list, tuple)):
         names = dict(enumerate(names))
@@ -179,14 +153,7 @@ def class_names(names, count):
 
 
 def _walk(model):
-    """Collect the parameters and buffers below an inert module, and the class names of its activations.
-
-    Returns
-    -------
-    tensors : dict
-        {name: array}, with the names of torch's state_dict.
-    activations : set of str
-    """
+    """Return {name in torch's state_dict: array} of all modules below an inert one, and the classes of activations."""
     tensors, activations, visited, to_visit = {}, set(), set(), [('', model)]
     while to_visit:
         prefix, module = to_visit.pop()

@@ -48,23 +48,16 @@ class Letterbox(NamedTuple):
 
 
 class Yolov5(object):
-    """YOLOv5 detector.
+    """YOLOv5 detector. `runtime` is a backend, see `ros_3d_bb.detection.yolov5.backends`.
 
-    Parameters
-    ----------
-    runtime : callable
-        See `ros_3d_bb.detection.yolov5.backends`.
-    params : DetectionParams
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of range, or the model does not have one of the classes.
+    Raises ValueError if there is no class to detect, or the model does not have one of the classes.
     """
 
     def __init__(self, runtime, params=DetectionParams()):
-        check_params(params)
+        if not params.classes:
+            raise ValueError('classes is empty; at least one class expected, such as person')
         self._runtime, self._params = runtime, params
+        self.names, self.description = runtime.names, runtime.description  # class names by number; text for logs
         self._classes = [class_number(entry, runtime.names) for entry in params.classes]
         size = int(np.ceil(params.image_size / float(runtime.stride))) * runtime.stride
         self._input_hw = runtime.input_hw or (size, size)
@@ -74,38 +67,13 @@ class Yolov5(object):
         """Return a detector with the same network and other parameters. Raises ValueError like the constructor."""
         return Yolov5(self._runtime, params)
 
-    @property
-    def names(self):
-        """Class names by number."""
-        return self._runtime.names
-
-    @property
-    def description(self):
-        """Description of the backend for logs."""
-        return self._runtime.description
-
-    def warm_up(self):
-        """Run the network on a black image, because the first run takes several times as long as later ones."""
-        self.detect(np.zeros((480, 640, 3), np.uint8))
-
     def detect(self, image):
-        """Detect objects in an RGB image (height, width, 3), uint8.
-
-        Returns
-        -------
-        Detections
-        """
+        """Return the Detections in an RGB image (height, width, 3), uint8."""
         scaled, letterbox = apply_letterbox(image, self._input_hw, self._stride)
         rows = self._runtime(scaled, self._params.confidence)
         candidates = filter_predictions(rows, self._params.confidence, self._classes)
         detections = non_maximum_suppression(candidates, self._params.iou, self._params.max_det)
         return detections._replace(boxes=letterbox.undo(detections.boxes, image.shape[:2]))
-
-
-def check_params(params):
-    """Raise ValueError where there is nothing to detect."""
-    if not params.classes:
-        raise ValueError('classes is empty; at least one class expected, such as person')
 
 
 def class_number(entry, names):
@@ -120,19 +88,8 @@ def class_number(entry, names):
 def apply_letterbox(image, input_hw, stride=None):
     """Scale an image to the network's input and pad it, keeping the aspect ratio.
 
-    Parameters
-    ----------
-    image : numpy.ndarray, (height, width, 3), uint8, RGB
-    input_hw : (int, int)
-        Maximum size of the input.
-    stride : int, optional
-        If given, the image is padded to the next multiple of the stride instead of `input_hw`.
-
-    Returns
-    -------
-    scaled : numpy.ndarray, (height, width, 3), uint8, RGB
-        The input itself if it already has this size.
-    letterbox : Letterbox
+    It is padded to `input_hw`, or to the next multiple of a stride. Returns the image, which is the given one if it
+    already has this size, and its Letterbox.
     """
     height, width = image.shape[:2]
     scale = min(input_hw[0] / float(height), input_hw[1] / float(width))
@@ -149,19 +106,9 @@ def apply_letterbox(image, input_hw, stride=None):
 
 
 def filter_predictions(rows, confidence, classes):
-    """Select the predictions whose best class is in `classes` with a score above `confidence`.
+    """Select the predictions of a backend whose best class is in `classes` with a score above `confidence`.
 
-    Parameters
-    ----------
-    rows : numpy.ndarray, (n, 5 + classes)
-        x, y, width, height, objectness, class scores; output of the network.
-    confidence : float
-    classes : list of int
-
-    Returns
-    -------
-    Detections
-        In order of decreasing score, at most MAX_CANDIDATES; boxes in pixels of the network's input.
+    Returns at most MAX_CANDIDATES Detections, boxes in pixels of the network's input.
     """
     rows = rows[rows[:, 4] > confidence]
     best = rows[:, 5:].argmax(axis=1)

@@ -16,7 +16,7 @@ MAX_LAYERS, MAX_REPEATS, MAX_KERNEL, MAX_SCALES, MAX_ANCHORS, MAX_PARAMETERS = 1
 
 
 class Conv(nn.Module):
-    """Convolution, batch normalisation and activation. `fuse` folds the normalisation into the convolution."""
+    """Convolution, batch normalisation and activation."""
 
     def __init__(self, in_channels, out_channels, kernel=1, stride=1, padding=None):
         super(Conv, self).__init__()
@@ -27,11 +27,6 @@ class Conv(nn.Module):
 
     def forward(self, x):
         return self.act(self.bn(self.conv(x)))
-
-    def fuse(self):
-        """Fold the batch normalisation into the convolution, for evaluation only."""
-        self.conv = nn.utils.fusion.fuse_conv_bn_eval(self.conv, self.bn)
-        self.bn = nn.Identity()
 
 
 class Focus(nn.Module):
@@ -147,16 +142,8 @@ class Detect(nn.Module):
 class Network(nn.Module):
     """YOLOv5 detection network.
 
-    Parameters
-    ----------
-    layout : dict
-        The `yaml` of a checkpoint: nc, anchors, depth_multiple, width_multiple, backbone and head, whose rows are
-        [inputs, repeats, layer, arguments].
-
-    Raises
-    ------
-    ValueError
-        If the layout contains a layer or a size that no YOLOv5 release has.
+    `layout` is the `yaml` of a checkpoint: nc, anchors, depth_multiple, width_multiple, backbone and head, whose rows
+    are [inputs, repeats, layer, arguments]. ValueError if it contains a layer or a size that no YOLOv5 release has.
     """
 
     def __init__(self, layout):
@@ -164,8 +151,7 @@ class Network(nn.Module):
         backbone, head = layout['backbone'], layout['head']
         if not (isinstance(backbone, list) and isinstance(head, list) and len(backbone) + len(head) <= MAX_LAYERS):
             raise ValueError('backbone and head are not lists of at most %d layers in total' % MAX_LAYERS)
-        rows = backbone + head
-        builder = _Builder(layout)
+        rows, builder = backbone + head, _Builder(layout)
         self.model = nn.ModuleList([builder.layer(*row) for row in rows])
         self.inputs = [row[0] for row in rows]
         if not isinstance(self.model[-1], Detect):
@@ -180,12 +166,16 @@ class Network(nn.Module):
         return x
 
     def fuse(self):
-        """Fold all batch normalisations and switch to evaluation mode. Returns self."""
+        """Fold all batch normalisations into the convolutions and switch to evaluation mode. Returns self."""
         self.eval()
         for module in self.modules():
             if isinstance(module, Conv):
-                module.fuse()
+                module.conv = nn.utils.fusion.fuse_conv_bn_eval(module.conv, module.bn)
+                module.bn = nn.Identity()
         return self
+
+
+BLOCKS = {'Conv': Conv, 'C3': C3, 'SPP': SPP, 'SPPF': SPPF, 'Focus': Focus}
 
 
 class _Builder(object):
@@ -214,16 +204,16 @@ class _Builder(object):
         repeats = max(int(round(repeats * self._depth)), 1) if repeats > 1 else repeats
         if repeats > MAX_REPEATS:
             raise ValueError('%s is repeated %d times, more than %d' % (kind[:20], repeats, MAX_REPEATS))
-        if kind in ('Conv', 'C3', 'SPP', 'SPPF', 'Focus'):
+        factor = 1
+        if kind in BLOCKS:
             layer, channels, factor = self._block(kind, channels, repeats, list(arguments))
         elif kind == 'nn.Upsample':
             layer, factor = nn.Upsample(scale_factor=2, mode='nearest'), 0.5
         elif kind == 'Concat':
-            layer, channels, factor = Concat(), sum(self._channels[i] for i in inputs), 1
+            layer, channels = Concat(), sum(self._channels[i] for i in inputs)
         elif kind == 'Detect':
-            strides = [int(self._strides[i]) for i in inputs]
-            layer, factor = Detect(self._class_count, self._anchor_count, [self._channels[i] for i in inputs],
-                                   strides), 1
+            layer = Detect(self._class_count, self._anchor_count, [self._channels[i] for i in inputs],
+                           [int(self._strides[i]) for i in inputs])
         else:
             raise ValueError('unknown layer %r' % kind[:50])
         self._channels.append(channels)
@@ -232,22 +222,26 @@ class _Builder(object):
 
     def _block(self, kind, in_channels, repeats, arguments):
         """Build a layer with weights. Returns the layer, its output channels, and its stride."""
-        out_channels, rest = self._scaled(arguments[0]), arguments[1:]
+        out_channels, rest = arguments[0], arguments[1:]
+        if out_channels != self._anchor_count * (self._class_count + 5):  # rounded up to a multiple of 8 as in YOLOv5
+            out_channels = int(math.ceil(out_channels * self._width / 8) * 8)
+        if out_channels <= 0:
+            raise ValueError('a layer has %d channels; at least 1 expected' % out_channels)
         sizes = rest[0] if kind == 'SPP' and rest else rest
         if len(sizes) > 4 or not all(isinstance(n, int) and 0 <= n <= MAX_KERNEL for n in sizes):
             raise ValueError('kernel, stride and padding of %s are not integers from 0 to %d' % (kind, MAX_KERNEL))
         self._count_parameters(kind, in_channels, out_channels, repeats, sizes)
-        make = {'Conv': Conv, 'SPP': SPP, 'SPPF': SPPF, 'Focus': Focus, 'C3': C3}[kind]
         if kind == 'C3':
             layers = [C3(in_channels, out_channels, repeats, *rest)]
         else:
-            layers = [make(in_channels if i == 0 else out_channels, out_channels, *rest) for i in range(repeats)]
-        for layer in layers:
-            for module in layer.modules():
-                if isinstance(module, Conv):
-                    module.act = self._activation()
-        factor = {'Conv': rest[1] if len(rest) > 1 else 1, 'Focus': 2}.get(kind, 1)
-        return layers[0] if len(layers) == 1 else nn.Sequential(*layers), out_channels, factor
+            layers = [BLOCKS[kind](in_channels if i == 0 else out_channels, out_channels, *rest)
+                      for i in range(repeats)]
+        layer = layers[0] if len(layers) == 1 else nn.Sequential(*layers)
+        for module in layer.modules():
+            if isinstance(module, Conv):
+                module.act = self._activation()
+        stride = {'Conv': rest[1] if len(rest) > 1 else 1, 'Focus': 2}.get(kind, 1)
+        return layer, out_channels, stride
 
     def _count_parameters(self, kind, in_channels, out_channels, repeats, sizes):
         """Count the weights of a layer before memory is allocated. Raises ValueError above MAX_PARAMETERS."""
@@ -260,12 +254,3 @@ class _Builder(object):
             'SPPF': repeats * (in_channels ** 2 / 2.0 + 2 * in_channels * out_channels)}[kind]
         if self._parameters > MAX_PARAMETERS:
             raise ValueError('the layout has more than %d million parameters' % (MAX_PARAMETERS / 1e6))
-
-    def _scaled(self, channels):
-        """Channels times the width multiple, rounded up to a multiple of 8 as in YOLOv5."""
-        if channels == self._anchor_count * (self._class_count + 5):
-            return channels
-        scaled = int(math.ceil(channels * self._width / 8) * 8)
-        if scaled <= 0:
-            raise ValueError('a layer has %d channels; at least 1 expected' % scaled)
-        return scaled

@@ -1,14 +1,24 @@
-"""ONNX Runtime backends, on the CPU. See `ros_3d_bb.detection.yolov5.backends`."""
+"""ONNX Runtime backends, on the CPU: ONNX files, and a cache of checkpoints that are exported to ONNX. See `backends`.
+
+A cached file is named by the SHA-256 of its checkpoint and by `VERSION`, and accepts images of any size. It ends with
+its own SHA-256, and contains the output of torch for a reference image, which ONNX Runtime must reproduce each time the
+file is loaded. Loading a cached file executes no code from it; torch is needed only to create it.
+"""
 import ast
 import base64
+import hashlib
 import json
+import os
 
 import numpy as np
 
+from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.error_text import cause
-from ros_3d_bb.detection.yolov5.checkpoint import WeightsError, class_names
+from ros_3d_bb.detection.yolov5.checkpoint import WeightsError, class_names, unreadable
+from ros_3d_bb.detection.yolov5.onnx_writer import metadata_entry
 from ros_3d_bb.detection.yolov5.predictions import batch_of, check_stride, decode_heads, predictions
 
+VERSION = 1  # of the cached files; increase it when network.py or onnx_export.py change their content
 # Maximum difference between ONNX Runtime and torch. Measured with yolov5n: 3e-4 px, 1e-6.
 MAX_DIFFERENCE_PX, MAX_DIFFERENCE = 0.05, 1e-3
 INSTALL = 'ONNX Runtime is not installed; install it with "pip3 install onnxruntime"'
@@ -22,11 +32,7 @@ class OnnxRuntime(object):
     """Model that was exported to ONNX by YOLOv5's export.py."""
 
     def __init__(self, path, threads):
-        try:
-            import onnxruntime  # noqa: F401
-        except ImportError:
-            raise WeightsError('weights %s: %s, or use the .pt checkpoint' % (path, INSTALL))
-        self.description = description_of(threads)
+        self.description = 'ONNX Runtime on the CPU, threads: %d' % threads
         try:
             self._session = session_of(path, threads)
             entry = self._session.get_inputs()[0]
@@ -37,6 +43,8 @@ class OnnxRuntime(object):
             self.stride = check_stride(metadata.get('stride', 32))
             columns = self(np.zeros((self.input_hw or (self.stride,) * 2) + (3,), np.uint8), 0).shape[1]
             names = ast.literal_eval(metadata.get('names', 'None'))  # executes no code
+        except ImportError:
+            raise WeightsError('weights %s: %s, or use the .pt checkpoint' % (path, INSTALL))
         except Exception as error:  # a damaged file can raise any exception
             raise WeightsError('weights %s: not a YOLOv5 ONNX export (%s); expected the file that its export.py writes'
                                % (path, cause(error)))
@@ -49,24 +57,15 @@ class OnnxRuntime(object):
 
 
 class ExportedRuntime(object):
-    """Checkpoint that was exported to ONNX by `ros_3d_bb.detection.yolov5.onnx_cache`.
+    """Checkpoint that was exported to ONNX by `onnx_export`; `model` is the content of the ONNX file.
 
-    Parameters
-    ----------
-    model : bytes
-        Content of the ONNX file.
-    threads : int
-
-    Raises
-    ------
-    OnnxUnusable
-        If the file has another origin, or if the output for the reference image differs from torch's.
+    Raises OnnxUnusable if the file has another origin, or if the output for the reference image differs from torch's.
     """
 
     input_hw = None
 
     def __init__(self, model, threads):
-        self.description = description_of(threads)
+        self.description = 'ONNX Runtime on the CPU, threads: %d' % threads
         try:
             self._session = session_of(model, threads)
             about = json.loads(self._session.get_modelmeta().custom_metadata_map['about'])
@@ -74,9 +73,11 @@ class ExportedRuntime(object):
             self._anchors_px, self._strides = np.array(about['anchors_px'], np.float32), about['strides']
             expected = np.frombuffer(base64.b64decode(about['reference']), '<f4')
             rows = self(reference_image(self.stride), -1)
+            difference = np.abs(rows - expected.reshape(rows.shape)).max(axis=0)
         except Exception as error:  # a foreign file can raise any exception
             raise OnnxUnusable('ONNX Runtime cannot run the exported network (%s)' % cause(error))
-        if rows.size != expected.size or not are_close(rows, expected.reshape(rows.shape)):
+        # False for numbers that are not finite.
+        if not ((difference[:4] <= MAX_DIFFERENCE_PX).all() and (difference[4:] <= MAX_DIFFERENCE).all()):
             raise OnnxUnusable('the output of ONNX Runtime differs from that of torch')
 
     def __call__(self, image, min_objectness):
@@ -89,27 +90,80 @@ def reference_image(stride):
     return np.random.RandomState(0).randint(0, 256, (2 * stride, 3 * stride, 3)).astype(np.uint8)
 
 
-def are_close(rows, expected):
-    """Whether two arrays of predictions are equal within rounding errors; False if a number is not finite."""
-    difference = np.abs(rows - expected).max(axis=0)
-    return bool((difference[:4] <= MAX_DIFFERENCE_PX).all() and (difference[4:] <= MAX_DIFFERENCE).all())
-
-
 def session_of(model, threads):
-    """Create an onnxruntime.InferenceSession from a path or from bytes.
+    """Create an onnxruntime.InferenceSession, from a path or from bytes, whose waiting threads sleep.
 
-    Waiting threads sleep. Spinning, which is the default, takes a core from other nodes, and doubles the inference time
-    if two threads share one free core.
+    By default they spin, which takes a core from other nodes, and doubles the inference time if two share a free core.
     """
     import onnxruntime
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
     options.log_severity_level = 3
-    if hasattr(options, 'add_session_config_entry'):  # since 1.5
-        options.add_session_config_entry('session.intra_op.allow_spinning', '0')
+    options.add_session_config_entry('session.intra_op.allow_spinning', '0')
     return onnxruntime.InferenceSession(model, options, providers=['CPUExecutionProvider'])
 
 
-def description_of(threads):
-    """Description of the backend for logs."""
-    return 'ONNX Runtime, %d thread%s' % (threads, '' if threads == 1 else 's')
+def open_exported(path, folder, threads, warn):
+    """Open a checkpoint as an `ExportedRuntime`, from the cache in `folder` if it is there.
+
+    The folder is created if missing. If it cannot be written, the export is used from memory. `warn` is called with one
+    line of text for problems that are worked around.
+
+    Raises
+    ------
+    WeightsError
+        If the checkpoint cannot be used.
+    OnnxUnusable
+        If ONNX Runtime is not installed, or its output differs from torch's.
+    """
+    try:
+        import onnxruntime  # noqa: F401
+    except ImportError:
+        raise OnnxUnusable(INSTALL)
+    try:
+        with open(path, 'rb') as stream:
+            digest = hashlib.sha256(stream.read()).hexdigest()
+    except OSError as error:
+        raise unreadable(path, error)
+
+    file_path = os.path.join(folder, '%s-%d.onnx' % (digest, VERSION))
+    try:
+        return _open_cached(file_path, digest, threads)
+    except FileNotFoundError:
+        pass
+    except (OSError, ValueError) as error:
+        warn('%s cannot be used (%s); exporting the checkpoint again' % (file_path, cause(error)))
+    from ros_3d_bb.detection.yolov5 import onnx_export  # imports torch, which takes a second and 200 MB
+    model = onnx_export.export(path, digest)
+    runtime = ExportedRuntime(model, threads)
+    try:
+        os.makedirs(folder, mode=0o700, exist_ok=True)
+        atomic_write(file_path, with_checksum(model))
+    except OSError as error:
+        warn('the ONNX export cannot be saved (%s); the checkpoint will be exported again at the next start'
+             % cause(error))
+    return runtime
+
+
+def export_folder(folder=''):
+    """Absolute path of the cache: `folder`, or by default a folder in the user's cache, the same that ./run uses."""
+    cache = os.environ.get('ROS_3D_BB_CACHE') or os.path.join(
+        os.environ.get('XDG_CACHE_HOME') or os.path.join('~', '.cache'), 'ros_3d_bb')
+    return os.path.abspath(os.path.expanduser(folder or os.path.join(cache, 'onnx')))
+
+
+def with_checksum(model):
+    """Append the SHA-256 of a model to its metadata. The result is still a valid ONNX file."""
+    return model + metadata_entry('sha256', hashlib.sha256(model).hexdigest())
+
+
+def _open_cached(path, digest, threads):
+    with open(path, 'rb') as stream:
+        content = stream.read()
+    model = content[:-len(with_checksum(b''))]
+    if with_checksum(model) != content:
+        raise ValueError('its checksum is wrong')
+    runtime = ExportedRuntime(model, threads)
+    if runtime.checkpoint != digest:
+        raise ValueError('it was exported from another checkpoint')
+    return runtime

@@ -3,32 +3,32 @@
 The input of the model is an RGB image (1, height, width, 3), uint8, whose height and width are multiples of the stride.
 The outputs are the heads of the network (see `ros_3d_bb.detection.yolov5.predictions`).
 """
+import base64
+import json
+
 import numpy as np
 from torch import nn
 
 from ros_3d_bb.detection.yolov5 import network as yolov5
+from ros_3d_bb.detection.yolov5.onnx_backend import reference_image
 from ros_3d_bb.detection.yolov5.onnx_writer import FLOAT, UINT8, Graph
+from ros_3d_bb.detection.yolov5.torch_backend import network_of, run
 
 
-def onnx_model_of(network, metadata):
-    """Export a network to ONNX.
-
-    Parameters
-    ----------
-    network : ros_3d_bb.detection.yolov5.network.Network
-        Fused, float32, on the CPU.
-    metadata : dict of str to str
-        Metadata of the model.
-
-    Returns
-    -------
-    bytes
-        Content of an ONNX file.
+def export(path, digest):
+    """Bytes of an ONNX file with the network, class names and anchors of a checkpoint, the SHA-256 (`digest`) of the
+    checkpoint, and the output of torch for the reference image.
     """
-    return _Exporter().model(network, metadata)
+    network, names = network_of(path)
+    detect, stride = network.model[-1], int(network.stride)
+    reference = run(network, reference_image(stride)).numpy()
+    anchors_px = detect.anchors.numpy() * np.reshape(detect.strides, (-1, 1, 1))
+    return Exporter().model(network, {'about': json.dumps({
+        'checkpoint': digest, 'names': names, 'stride': stride, 'strides': detect.strides,
+        'anchors_px': anchors_px.tolist(), 'reference': base64.b64encode(reference.astype('<f4').tobytes()).decode()})})
 
 
-class _Exporter(object):
+class Exporter(object):
     """Adds the layers of a network to a graph; each method returns the name of the layer's output."""
 
     def __init__(self):
@@ -37,7 +37,12 @@ class _Exporter(object):
         self._layers = {
             nn.Sequential: self._sequence, yolov5.Conv: self._convolution, yolov5.Bottleneck: self._bottleneck,
             yolov5.C3: self._c3, yolov5.Focus: self._focus, yolov5.SPP: self._spp, yolov5.SPPF: self._sppf,
-            yolov5.Concat: lambda _layer, inputs: self._concat(inputs), nn.Upsample: self._upsample,
+            yolov5.Concat: lambda _layer, inputs: self._concat(inputs),
+            nn.Upsample: lambda layer, x: self._graph.node(
+                'Resize', [x, '', self._graph.constant(np.float32([1, 1, layer.scale_factor, layer.scale_factor]))],
+                mode='nearest', coordinate_transformation_mode='asymmetric', nearest_mode='floor'),
+            nn.MaxPool2d: lambda layer, x: self._graph.node(
+                'MaxPool', [x], kernel_shape=[layer.kernel_size] * 2, pads=[layer.padding] * 4),
             yolov5.Detect: lambda layer, inputs: [self._conv2d(head, x) for head, x in zip(layer.m, inputs)],
             nn.SiLU: lambda _layer, x: self._graph.node('Mul', [x, self._graph.node('Sigmoid', [x])]),
             nn.ReLU: lambda _layer, x: self._graph.node('Relu', [x]),
@@ -46,6 +51,7 @@ class _Exporter(object):
                 'Mul', [x, self._graph.node('HardSigmoid', [x], alpha=1 / 6.0, beta=0.5)])}
 
     def model(self, network, metadata):
+        """Bytes of an ONNX file with a fused float32 network on the CPU, and {key: text}."""
         x = self._graph.node('Cast', [self._graph.node('Transpose', ['image'], perm=[0, 3, 1, 2])], to=FLOAT)
         outputs = []
         for inputs, layer in zip(network.inputs, network.model):
@@ -93,18 +99,10 @@ class _Exporter(object):
 
     def _spp(self, layer, x):
         x = self._add(layer.cv1, x)
-        return self._add(layer.cv2, self._concat([x] + [self._pool(pool, x) for pool in layer.m]))
+        return self._add(layer.cv2, self._concat([x] + [self._add(pool, x) for pool in layer.m]))
 
     def _sppf(self, layer, x):
         levels = [self._add(layer.cv1, x)]
         for _ in range(3):
-            levels.append(self._pool(layer.m, levels[-1]))
+            levels.append(self._add(layer.m, levels[-1]))
         return self._add(layer.cv2, self._concat(levels))
-
-    def _pool(self, layer, x):
-        return self._graph.node('MaxPool', [x], kernel_shape=[layer.kernel_size] * 2, pads=[layer.padding] * 4)
-
-    def _upsample(self, layer, x):
-        factor = float(layer.scale_factor)
-        return self._graph.node('Resize', [x, '', self._graph.constant(np.array([1, 1, factor, factor], np.float32))],
-                                mode='nearest', coordinate_transformation_mode='asymmetric', nearest_mode='floor')

@@ -10,6 +10,7 @@ import numpy as np
 IR_VERSION, OPSET = 7, 13  # of ONNX 1.8; supported by ONNX Runtime since 1.6
 FLOAT, UINT8 = 1, 2
 ELEMENTS = {'float32': FLOAT, 'uint8': UINT8, 'int64': 7}
+ATTRIBUTE_FIELDS = {float: (2, 1), int: (3, 2), str: (4, 3), list: (8, 7)}  # field and AttributeType of a value
 
 
 class Graph(object):
@@ -19,12 +20,14 @@ class Graph(object):
         self._nodes, self._constants, self._count = [], [], 0
 
     def node(self, kind, inputs, **attributes):
-        """Add an operator with one output. Attributes are int, float, str or lists of int. Returns the output's name.
-        """
+        """Add an operator with one output. Attributes: int, float, str or list of int. Returns the output's name."""
         self._count += 1
         name = 'v%d' % self._count
-        self._nodes.append(_fields((1, list(inputs)), (2, name), (4, kind),
-                                   (5, [_attribute(key, attributes[key]) for key in sorted(attributes)])))
+        encoded = []
+        for key in sorted(attributes):
+            field, attribute_type = ATTRIBUTE_FIELDS[type(attributes[key])]
+            encoded.append(_fields((1, key), (field, attributes[key]), (20, attribute_type)))
+        self._nodes.append(_fields((1, list(inputs)), (2, name), (4, kind), (5, encoded)))
         return name
 
     def constant(self, values):
@@ -36,18 +39,9 @@ class Graph(object):
         return name
 
     def model(self, inputs, outputs, metadata):
-        """Serialize the graph.
+        """Serialize the graph to the bytes of an ONNX file.
 
-        Parameters
-        ----------
-        inputs, outputs : list of (name, element, shape)
-            Element: FLOAT or UINT8. Shape: numbers, or names for dynamic dimensions.
-        metadata : dict of str to str
-
-        Returns
-        -------
-        bytes
-            Content of an ONNX file.
+        Inputs and outputs are (name, element, shape): FLOAT or UINT8, and numbers or, for dynamic dimensions, names.
         """
         graph = _fields((1, self._nodes), (2, 'network'), (5, self._constants),
                         (11, [_value(*entry) for entry in inputs]), (12, [_value(*entry) for entry in outputs]))
@@ -58,17 +52,6 @@ class Graph(object):
 def metadata_entry(key, value):
     """One entry of the metadata of a model, as bytes. It may be appended to a serialized model."""
     return _fields((14, _fields((1, key), (2, value))))
-
-
-def _attribute(name, value):
-    """AttributeProto; field 20 is the type of the value."""
-    if isinstance(value, float):
-        return _fields((1, name), (2, value), (20, 1))
-    if isinstance(value, int):
-        return _fields((1, name), (3, value), (20, 2))
-    if isinstance(value, str):
-        return _fields((1, name), (4, value), (20, 3))
-    return _fields((1, name), (8, list(value)), (20, 7))
 
 
 def _value(name, element, shape):

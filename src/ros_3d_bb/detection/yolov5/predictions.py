@@ -14,43 +14,24 @@ def batch_of(image):
 
 
 def check_stride(stride):
-    """Return a stride as int. Raises ValueError if it is not in 1..1024."""
     if not 1 <= int(stride) <= 1024:
         raise ValueError('its stride is %s; 1 to 1024 expected' % stride)
     return int(stride)
 
 
 def predictions(output):
-    """Predictions (rows, 5 + classes) of the only image in an output (1, rows, 5 + classes).
-
-    Raises
-    ------
-    ValueError
-        If the output has another shape, because the model is not a YOLOv5 detector.
-    """
+    """Predictions (rows, 5 + classes) of the only image in an output (1, rows, 5 + classes), else ValueError."""
     if len(output.shape) != 3 or output.shape[0] != 1 or output.shape[2] < 6:
         raise ValueError('its output has shape %s; (1, rows, 5 + classes) expected' % (tuple(output.shape),))
     return output[0]
 
 
 def decode_heads(heads, anchors_px, strides, min_objectness):
-    """Decode the heads of a network. Predictions whose objectness is not above `min_objectness` are skipped.
+    """Predictions of the heads of a network, without those whose objectness is not above `min_objectness`.
 
-    Parameters
-    ----------
-    heads : list of numpy.ndarray, (1, anchors * (5 + classes), lines, columns), float32
-        One per scale, before the sigmoid.
-    anchors_px : numpy.ndarray, (scales, anchors, 2)
-        Width and height in pixels.
-    strides : list of int
-        Pixels per cell of each scale.
-    min_objectness : float
-        Objectness, 0..1.
-
-    Returns
-    -------
-    numpy.ndarray, (rows, 5 + classes), float32
-        Ordered by scale, anchor, line and column as in YOLOv5.
+    For each scale there is a head (1, anchors * (5 + classes), lines, columns), float32, before the sigmoid; the
+    width and height of its anchors in pixels, (anchors, 2); and its stride, the pixels per cell. Predictions are
+    ordered by scale, anchor, line and column as in YOLOv5.
     """
     with np.errstate(divide='ignore'):
         min_logit = np.log(np.clip(min_objectness, 0, 1) / np.float64(1 - np.clip(min_objectness, 0, 1)))

@@ -24,32 +24,21 @@ def torch_device(name):
 
 
 def network_of(path):
-    """Build the network of a checkpoint.
+    """Return the `network.Network` of a checkpoint, fused, float32, on the CPU, and its class names.
 
-    Returns
-    -------
-    network : ros_3d_bb.detection.yolov5.network.Network
-        Fused, float32, on the CPU.
-    names : list of str
-        Class names.
-
-    Raises
-    ------
-    WeightsError
-        If the checkpoint cannot be read, or its weights do not match its layout.
+    Raises WeightsError if the checkpoint cannot be read, or its weights do not match its layout.
     """
-    checkpoint = read_checkpoint(path)
+    layout, names, weights = read_checkpoint(path)
     try:
-        network = Network(checkpoint.layout)
-        network.load_state_dict({name: torch.from_numpy(array.astype(np.float32))
-                                 for name, array in checkpoint.weights.items()
+        network = Network(layout)
+        network.load_state_dict({name: torch.from_numpy(array.astype(np.float32)) for name, array in weights.items()
                                  if not name.endswith('.anchor_grid')})  # a second copy of the anchors in release 5.0
         stride = check_stride(network.stride)
         run(network.fuse(), np.zeros((stride, stride, 3), np.uint8))
     except Exception as error:  # an invalid layout can raise any exception
         raise WeightsError('weights %s: the network cannot be built from its yaml (%s); %s'
                            % (path, cause(error), EXPECTED))
-    return network, checkpoint.names
+    return network, names
 
 
 def run(network, image):
@@ -60,14 +49,15 @@ def run(network, image):
 
 
 class TorchRuntime(object):
-    """Official checkpoint in the network of this package, in half precision on a GPU."""
+    """Official checkpoint in the network of this package."""
 
     input_hw = None
 
     def __init__(self, path, device, threads):
         network, self.names = network_of(path)
         self.stride = int(network.stride)
-        self._network = on_device(network, device)
+        # In half precision on a GPU; predictions are decoded in single precision.
+        self._network = network.to(device).half() if device.type == 'cuda' else network
         self.description = description_of(device, threads)
 
     def __call__(self, image, min_objectness):
@@ -100,14 +90,9 @@ class TorchScriptRuntime(object):
         return rows[rows[:, 4] > min_objectness].cpu().numpy()
 
 
-def on_device(network, device):
-    """Move a network to a device, in half precision on a GPU. Predictions are decoded in single precision."""
-    return network.to(device).half() if device.type == 'cuda' else network
-
-
 def description_of(device, threads):
     """Set the number of threads of torch. Returns a description of the backend for logs."""
     if device.type != 'cpu':
         return 'torch on %s' % device
     torch.set_num_threads(threads)
-    return 'torch on the CPU, %d thread%s' % (threads, '' if threads == 1 else 's')
+    return 'torch on the CPU, threads: %d' % threads

@@ -1,5 +1,4 @@
-"""Common interface of the 2D detector nodes: published boxes and image, and the service that pauses them."""
-import contextlib
+"""Worker of the 2D detector nodes: it detects, publishes, and can be paused."""
 import time
 
 import rospy
@@ -9,13 +8,17 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg
+from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.visualization.image_overlay import draw_boxes
 
 SILENT_S = 5.0  # time without a completed detection after which a fault is reported
 
 
-class BoxesOutput(object):
-    """Publish detections for bbox3d_node and as an annotated image.
+class DetectorWorker(object):
+    """Detect objects in the newest images, and publish them for bbox3d_node and as an annotated image.
+
+    `params` has `enabled` and `publish_empty`. `detect(*images)` is called in a thread of its own. It returns the RGB
+    image and its Detections, or None if there is no result; `names` are the names of the classes.
 
     Publishes
     ---------
@@ -23,27 +26,6 @@ class BoxesOutput(object):
         x1, y1, x2, y2 of each person, in pixels; stamp and frame of the image are in `layout.dim[0].label`.
     yolo_result_out : sensor_msgs/Image
         Colour image with the 2D boxes; published only if there are subscribers.
-    """
-
-    def __init__(self, publish_empty):
-        self._publish_empty = publish_empty
-        self._boxes_pub = rospy.Publisher('yolo_bounding_box', Int32MultiArray, queue_size=10)
-        self._image_pub = rospy.Publisher('yolo_result_out', Image, queue_size=1)
-
-    def publish(self, header, image, found, names):
-        """Publish the detections in an RGB image with a header; `names` maps class indices to names."""
-        if len(found.boxes) or self._publish_empty:
-            self._boxes_pub.publish(boxes2d_to_msg(found.boxes, header))
-        if self._image_pub.get_num_connections():
-            labels = ['%s %.2f' % (names[number], score) for number, score in zip(found.classes, found.scores)]
-            drawn = draw_boxes(image.copy(), found.boxes, labels)
-            self._image_pub.publish(fill_image(Image(header=header), drawn, 'rgb8'))
-
-
-class Switch(object):
-    """State of the detector: enabled or paused.
-
-    The state is shown in the diagnostics, with a warning if an image was accepted and no detection completes.
 
     Services
     --------
@@ -51,35 +33,60 @@ class Switch(object):
         Enables (true) or pauses (false) the detector.
     """
 
-    def __init__(self, on, diagnostics):
-        self.on = on
+    def __init__(self, params, diagnostics, detect, names):
+        self._publish_empty, self._diagnostics, self._detect, self._names = (
+            params.publish_empty, diagnostics, detect, names)
+        self._enabled = params.enabled
         self._waits_since_s = None  # arrival of the oldest image since the last completed detection
-        diagnostics.show('detector', lambda: 'working' if self.on else 'paused')
+        self._boxes_pub = rospy.Publisher('yolo_bounding_box', Int32MultiArray, queue_size=10)
+        self._image_pub = rospy.Publisher('yolo_result_out', Image, queue_size=1)
+        self._worker = NewestWorker(self._work, self._on_error)
+        rospy.on_shutdown(self._worker.stop)
+        diagnostics.show('detector', lambda: 'working' if self._enabled else 'paused')
         diagnostics.check(self._faults)
         rospy.Service('~enable', SetBool, self._on_request)
 
-    def offered(self):
-        """Record that an image was passed to the detector."""
+    def offer(self, *images):
+        """Detect objects in these images, of which the first is the colour image, unless newer ones arrive first."""
+        if not self._enabled:
+            self._diagnostics.count('images while paused')
+            return
         if self._waits_since_s is None:
             self._waits_since_s = time.monotonic()
+        if self._worker.offer(images):
+            self._diagnostics.count('images skipped for a newer one')
 
-    @contextlib.contextmanager
-    def searching(self):
-        """Context manager for one detection. Any outcome (boxes, no floor, rejected image) shows that the detector
-        is working.
-        """
+    def _work(self, images):
+        if not self._enabled:  # the detector was paused after the images arrived
+            self._diagnostics.count('images while paused')
+            return
         try:
-            yield
-        finally:
+            with self._diagnostics.rejecting('images'):
+                result = self._detect(*images)
+                if result is not None:
+                    self._publish(images[0].header, *result)
+                    self._diagnostics.record_latency(images[0].header.stamp)
+        finally:  # any outcome, such as a rejected image, shows that the detector works
             self._waits_since_s = None
+
+    def _publish(self, header, image, detections):
+        if len(detections.boxes) or self._publish_empty:
+            self._boxes_pub.publish(boxes2d_to_msg(detections.boxes, header))
+        if self._image_pub.get_num_connections():
+            labels = ['%s %.2f' % (self._names[number], score)
+                      for number, score in zip(detections.classes, detections.scores)]
+            drawn = draw_boxes(image.copy(), detections.boxes, labels)
+            self._image_pub.publish(fill_image(Image(header=header), drawn, 'rgb8'))
+
+    def _on_error(self, error):
+        self._diagnostics.warn('detections failed', 'the detector failed: %s; waiting for the next image' % error)
 
     def _faults(self):
         since_s, now_s = self._waits_since_s, time.monotonic()
-        if self.on and since_s is not None and now_s - since_s > SILENT_S:
-            yield 'no answers', ('the detector is silent: images come, and none has been answered for %.0f s; it '
-                                 'hangs or is starved of CPU' % (now_s - since_s))
+        if self._enabled and since_s is not None and now_s - since_s > SILENT_S:
+            yield 'detector hangs', ('images arrive, but no detection has completed for %.0f s; the detector hangs or '
+                                     'lacks CPU time' % (now_s - since_s))
 
     def _on_request(self, request):
-        self.on = request.data
-        self._waits_since_s = None
+        self._enabled, self._waits_since_s = request.data, None
         return SetBoolResponse(True, 'detector %s' % ('enabled' if request.data else 'paused'))

@@ -6,20 +6,18 @@ import time
 import diagnostic_updater
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
+from rospy.topics import get_topic_manager
 
 from ros_3d_bb.core.event_counter import MOST_LAGS, EventCounter
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.nodes.common.input_monitor import InputWatch, unheard
+from ros_3d_bb.nodes.common.master import is_ending
+from ros_3d_bb.nodes.common.subscribers import InputMonitor
 
 PERIOD_S = 1.0
 WARNING_LASTS_S = 5.0
 REMINDER_S = 30.0  # between two log lines about a persistent fault
-UNHEARD_S = 5.0  # without subscribers, which may still be starting
-
-
-def is_ending():
-    """Whether rospy is shutting down. rospy closes publishers during running callbacks before it sets is_shutdown."""
-    return rospy.is_shutdown() or rospy.core.is_shutdown_requested()
+UNSUBSCRIBED_S = 5.0  # without subscribers, which may still be starting
+NO_RESULTS = '/rosout', '/diagnostics', '/clock', '/tf', '/tf_static'
 
 
 class Diagnostics(EventCounter):
@@ -38,17 +36,15 @@ class Diagnostics(EventCounter):
 
     def __init__(self):
         super(Diagnostics, self).__init__(clock=rospy.get_rostime)
-        self._warning, self._warned_at = '', None
-        self._logged_at, self._lasted = {}, set()
-        self._looked_s, self._heard_s = time.monotonic(), time.monotonic()
-        inputs = InputWatch()
+        self._warning, self._warned_at = '', float('-inf')
+        self._logged_at, self._current_events = {}, set()
+        self._reported_s = self._subscribed_s = time.monotonic()
+        inputs = InputMonitor()
         self._shown, self._checks = [inputs.values], [inputs.faults]
         self._updater = diagnostic_updater.Updater()
         self._updater.setHardwareID('none')
         self._updater.add('pipeline', self._report)
-        thread = threading.Thread(target=self._run)
-        thread.daemon = True
-        thread.start()
+        threading.Thread(target=self._run, daemon=True).start()
 
     def note(self, event, sentence):
         """Count an event and log `sentence` as information."""
@@ -73,33 +69,34 @@ class Diagnostics(EventCounter):
         """Whether an exception results from shutdown, when rospy closes publishers during running callbacks."""
         return isinstance(error, rospy.ROSException) and is_ending()
 
+    def counters(self):
+        """Return the published counters: a list of (event, count) and ('<inputs> received', count)."""
+        return list(self.counts.items()) + [('%s received' % inputs, amount)
+                                            for inputs, amount in list(self.received.items())]
+
     def _report(self, status):
-        recent = self._warned_at is not None and time.monotonic() - self._warned_at < WARNING_LASTS_S
-        lasting = self._lasting()
-        self._note_unheard()
-        if recent:
+        is_recent = time.monotonic() - self._warned_at < WARNING_LASTS_S
+        faults = self._current_faults()
+        self._log_missing_subscribers()
+        if is_recent:
             status.summary(DiagnosticStatus.WARN, self._warning)
-        elif lasting:
-            status.summary(DiagnosticStatus.WARN, lasting[0])
+        elif faults:
+            status.summary(DiagnosticStatus.WARN, faults[0])
         elif not self.counts:
             status.summary(DiagnosticStatus.STALE, 'no input yet')
         else:
             status.summary(DiagnosticStatus.OK, 'working')
         for event, amount in self.counters():
             status.add(event, str(amount))
-        for name, text in self._answers() + [entry for shown in self._shown for entry in shown()]:
-            status.add(name, text)
+        for values in [self._rate_and_latency] + self._shown:
+            for name, text in values():
+                status.add(name, text)
         return status
 
-    def counters(self):
-        """Return the published counters: a list of (event, count) and ('<inputs> received', count)."""
-        return list(self.counts.items()) + [('%s received' % inputs, amount)
-                                            for inputs, amount in list(self.received.items())]
-
-    def _lasting(self):
+    def _current_faults(self):
         """Return the sentences about current faults. Each is logged when it first occurs and then every REMINDER_S."""
         faults = [fault for check in self._checks for fault in check()]
-        before, self._lasted = self._lasted, set(event for event, _sentence in faults)
+        before, self._current_events = self._current_events, set(event for event, _sentence in faults)
         for event, sentence in faults:
             self._log(event, sentence, REMINDER_S if event in before else WARNING_LASTS_S)
         return [sentence for _event, sentence in faults]
@@ -111,25 +108,24 @@ class Diagnostics(EventCounter):
             self._logged_at[event] = now_s
             rospy.logwarn('%s', sentence)
 
-    def _note_unheard(self):
+    def _log_missing_subscribers(self):
         """Log once if the results have no subscribers, and again after subscribers left. This is not a fault."""
-        now_s, topics = time.monotonic(), unheard()
+        now_s, topics = time.monotonic(), unsubscribed_results()
         if not topics:
-            self._heard_s = now_s
-        elif self._heard_s is not None and now_s - self._heard_s > UNHEARD_S:
-            self._heard_s = None
-            rospy.loginfo('nobody subscribes %s: nobody sees what this node finds', ' or '.join(topics))
+            self._subscribed_s = now_s
+        elif self._subscribed_s is not None and now_s - self._subscribed_s > UNSUBSCRIBED_S:
+            self._subscribed_s = None
+            rospy.loginfo('no subscribers on %s', ' or '.join(topics))
 
-    def _answers(self):
-        """Return (name, text) of the rate and latency of the results since the last report."""
+    def _rate_and_latency(self):
+        """Yield (name, text) of the rate and latency of the results since the last report."""
         lags_ns, self.lags_ns = self.lags_ns, collections.deque(maxlen=MOST_LAGS)
         now_s = time.monotonic()
-        passed_s, self._looked_s = max(now_s - self._looked_s, 1e-3), now_s
-        answers = [('rate', '%.1f Hz' % (len(lags_ns) / passed_s))]
+        passed_s, self._reported_s = max(now_s - self._reported_s, 1e-3), now_s
+        yield 'rate', '%.1f Hz' % (len(lags_ns) / passed_s)
         if lags_ns:
-            mean_ms, most_ms = (1000 * lag_ns / NS for lag_ns in (sum(lags_ns) / len(lags_ns), max(lags_ns)))
-            answers.append(('latency', 'mean %.1f ms, most %.1f ms from stamp to result' % (mean_ms, most_ms)))
-        return answers
+            mean_ms, max_ms = (1000 * lag_ns / NS for lag_ns in (sum(lags_ns) / len(lags_ns), max(lags_ns)))
+            yield 'latency', 'mean %.1f ms, maximum %.1f ms from stamp to result' % (mean_ms, max_ms)
 
     def _run(self):
         while not rospy.is_shutdown():
@@ -137,6 +133,14 @@ class Diagnostics(EventCounter):
                 self._updater.force_update()
             except Exception as error:  # a failed report must not end the thread
                 if not is_ending():
-                    self._log('no report', 'what this node did cannot be reported on /diagnostics (%r); trying again'
-                              % error, WARNING_LASTS_S)
+                    self._log('no report', 'the report on /diagnostics failed (%r); trying again' % error,
+                              WARNING_LASTS_S)
             time.sleep(PERIOD_S)
+
+
+def unsubscribed_results():
+    """Return the result topics of this node if none of them has subscribers, otherwise an empty list."""
+    reconfigure = rospy.get_name() + '/parameter_'
+    results = {topic: publisher for topic, publisher in sorted(get_topic_manager().pubs.items())
+               if topic not in NO_RESULTS and not topic.startswith(reconfigure)}
+    return [] if any(publisher.has_connections() for publisher in results.values()) else list(results)

@@ -1,23 +1,21 @@
 """Observe the topics of a running ROS graph for some seconds, as input of the checks."""
-import functools
 import os
 import time
 
 import rospy
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
-from rosgraph_msgs.msg import Clock as ClockMessage
+from genpy.message import get_message_class
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo
 
 from ros_3d_bb.conversions.camera_msgs import topic_of
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
-from ros_3d_bb.diagnosis.bag_observer import CLASSES, tf_seen
-from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, INFO
-from ros_3d_bb.diagnosis.message_observer import Observation, camera_seen, color_seen, depth_seen
-from ros_3d_bb.diagnosis.observations import Clock, Observations
+from ros_3d_bb.diagnosis.checks import BOXES3D, DEPTH
+from ros_3d_bb.diagnosis.message_observer import Observation, observations_of
 from ros_3d_bb.diagnosis.topic_roles import ROLES
+from ros_3d_bb.nodes.common.master import published_topics, publishers_of
 from ros_3d_bb.nodes.common.subscribers import IMAGE_BUFFER
-from ros_3d_bb.nodes.common.topic_publishers import published_topics, publishers_of
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams
 
@@ -33,20 +31,21 @@ class GraphObserver(object):
     """
 
     def __init__(self, target_frame='', camera=''):
-        self._target_frame, self._camera, self._statuses = target_frame, camera, {}
-        self._clocks, self._depth_info = [], None
+        self._target_frame, self._camera = target_frame, camera
+        self._statuses, self._clocks = {}, []
         self._buffer = tf2_ros.Buffer(debug=False)
         self._listener = tf2_ros.TransformListener(self._buffer)
         self._subscribers = [rospy.Subscriber('/diagnostics', DiagnosticArray, self._on_diagnostics),
-                             rospy.Subscriber('/clock', ClockMessage, self._clocks.append, queue_size=10)]
+                             rospy.Subscriber('/clock', Clock, self._clocks.append, queue_size=10)]
         time.sleep(NAMES_S)
         self._topics = published_topics()
-        self._observed = {key: Observation(key, self._topic_of(role.name)) for key, role in ROLES.items()}
+        self._observed = {key: Observation(role, self._topic_of(role.name)) for key, role in ROLES.items()}
+        self._depth_info = Observation(None, os.path.dirname(self._observed[DEPTH].topic) + '/camera_info')
         self._began_s = time.monotonic()
-        for key, one in self._observed.items():
+        for one in self._observed.values():
             if self._topics.get(one.topic) == one.role.kind:
-                self._subscribe(one.topic, CLASSES[key], functools.partial(self._on_message, one))
-        self._subscribe(os.path.dirname(self._observed[DEPTH].topic) + '/camera_info', CameraInfo, self._on_depth_info)
+                self._subscribe(one, get_message_class(one.role.kind))
+        self._subscribe(self._depth_info, CameraInfo)
 
     def close(self):
         """Unsubscribe from all topics."""
@@ -57,36 +56,23 @@ class GraphObserver(object):
     def observations(self):
         """Return the Observations up to now."""
         self._topics.update(published_topics())
-        streams = {key: one.stream(self._topics.get(one.topic, ''), self._publishers(one))
-                   for key, one in self._observed.items()}
-        newest = {key: one.newest for key, one in self._observed.items()}
-        return Observations(
-            streams, _to_be_suggested(self._topics), time.monotonic() - self._began_s,
-            color_camera=camera_seen(newest[INFO]), depth_camera=camera_seen(self._depth_info),
-            color=color_seen(newest[COLOR]), depth=depth_seen(newest[DEPTH]), tf=self._tf(newest[BOXES3D]),
-            clock=Clock(bool(rospy.get_param('/use_sim_time', False)), len(self._clocks)),
+        boxes3d = self._observed[BOXES3D].newest
+        target_frame = self._target_frame or tracker_param('target_frame')
+        camera_frame = tracker_param('camera_frame') or (
+            boxes3d.header.frame_id if boxes3d is not None else self._bbox3d_param('frame_id'))
+        return observations_of(
+            self._observed, self._depth_info, self._topics, time.monotonic() - self._began_s, self._publishers_of,
+            tf=self._observed[DEPTH].tf_seen(self._buffer.lookup_transform, self._buffer.all_frames_as_yaml,
+                                             target_frame, camera_frame),
+            use_sim_time=bool(rospy.get_param('/use_sim_time', False)), clock_count=len(self._clocks),
             nodes={name: status[:2] for name, status in list(self._statuses.items())},
             stamp_tolerance_s=self._bbox3d_param('stamp_tolerance'),
             cache_length_s=self._bbox3d_param('cache_length'))
 
-    def lookup(self, target_frame, source_frame, stamp):
-        """Look up a transform, as `BagTransforms.lookup`."""
-        return self._buffer.lookup_transform(target_frame.lstrip('/'), source_frame.lstrip('/'), stamp)
-
-    def frames_as_yaml(self):
-        """Return all frames, as `BagTransforms.frames_as_yaml`."""
-        return self._buffer.all_frames_as_yaml()
-
-    def _tf(self, boxes3d):
-        target = self._target_frame or tracker_param('target_frame')
-        source = tracker_param('camera_frame') or (
-            boxes3d.header.frame_id if boxes3d is not None else self._bbox3d_param('frame_id'))
-        return tf_seen(self, self._observed[DEPTH], target, source)
-
     def _bbox3d_param(self, name):
         return _param(topic_of(self._camera, 'bbox3d_node'), name, Bbox3dParams())
 
-    def _publishers(self, one):
+    def _publishers_of(self, one):
         return () if one.newest is not None or one.topic not in self._topics else publishers_of(one.topic, False)
 
     def _topic_of(self, name):
@@ -95,19 +81,15 @@ class GraphObserver(object):
         resolved = rospy.resolve_name(wanted)
         if resolved != rospy.get_namespace() + wanted:
             return resolved
-        beside = (rospy.get_namespace() + self._camera).strip('/') + '/'  # prefix of the nodes of this camera
-        said = [values.get('input ' + (name if node.startswith(beside) else wanted), '')
-                for node, (_level, _sentence, values) in list(self._statuses.items())]
-        return next((text.split()[0] for text in said if text), resolved)
+        prefix = (rospy.get_namespace() + self._camera).strip('/') + '/'  # of the nodes of this camera
+        reported = [values.get('input ' + (name if node.startswith(prefix) else wanted), '')
+                    for node, (_level, _sentence, values) in list(self._statuses.items())]
+        return next((text.split()[0] for text in reported if text), resolved)
 
-    def _subscribe(self, topic, kind, callback):
-        self._subscribers.append(rospy.Subscriber(topic, kind, callback, queue_size=10, buff_size=IMAGE_BUFFER))
-
-    def _on_message(self, one, message):
-        one.take(message, rospy.get_rostime().to_nsec(), time.time())
-
-    def _on_depth_info(self, message):
-        self._depth_info = message
+    def _subscribe(self, one, kind):
+        def take(message):
+            one.take(message, rospy.get_rostime().to_nsec(), time.time())
+        self._subscribers.append(rospy.Subscriber(one.topic, kind, take, queue_size=10, buff_size=IMAGE_BUFFER))
 
     def _on_diagnostics(self, message):
         prefix = rospy.get_namespace()[1:]  # ends in a slash, so that robot1 does not match robot10
@@ -129,8 +111,3 @@ def tracker_param(name):
 
 def _param(node, name, defaults):
     return rospy.get_param(rospy.resolve_name('%s/%s' % (node, name)), getattr(defaults, name))
-
-
-def _to_be_suggested(topics):
-    """Remove the debug images of this package, which are not camera images."""
-    return {name: kind for name, kind in topics.items() if '/ros_3d_bb/' not in name or not kind.endswith('/Image')}

@@ -4,38 +4,32 @@ import contextlib
 import rospy
 from rosgraph.masterapi import MasterError
 
-from ros_3d_bb.nodes.common.master import NO_ANSWER, patient_master
-from ros_3d_bb.nodes.common.master_registration import on_new_master
+from ros_3d_bb.nodes.common.master import NO_ANSWER, on_new_master, patient_master
 
 
 class Label(object):
-    """The parameter ~label.
+    """The parameter ~label; `default` is its value if it is not set.
 
     Its last value is kept if the master does not respond, and is set again on a restarted master.
-
-    Parameters
-    ----------
-    first : str
-        Value if the parameter is not set.
     """
 
-    def __init__(self, first):
-        self._first, self._newest = first, first
+    def __init__(self, default):
+        self._default, self._newest = default, default
         on_new_master(self._restore)
 
-    def asked(self):
+    def from_master(self):
         """Request the label from the master, because rospy's cache is updated with a delay."""
         with contextlib.suppress(*NO_ANSWER):
             try:
                 self._newest = str(patient_master().getParam(rospy.resolve_name('~label')))
             except MasterError:  # the parameter is not set
-                self._newest = self._first
+                self._newest = self._default
         return self._newest
 
-    def heard(self):
+    def from_cache(self):
         """Return the label from rospy's cache, without a request to the master."""
         with contextlib.suppress(*NO_ANSWER):
-            self._newest = str(rospy.get_param_cached('~label', self._first))
+            self._newest = str(rospy.get_param_cached('~label', self._default))
         return self._newest
 
     def _restore(self):

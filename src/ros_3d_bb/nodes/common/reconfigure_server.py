@@ -1,14 +1,16 @@
 """Server for changing the parameters of a running node with the dynamic_reconfigure tools."""
 import threading
+from collections import OrderedDict
 
 import rospy
-from dynamic_reconfigure.encoding import decode_config, encode_config, encode_description, get_tree
-from dynamic_reconfigure.msg import Config, ConfigDescription
+from dynamic_reconfigure.encoding import decode_config, encode_config, get_tree
+from dynamic_reconfigure.msg import Config, ConfigDescription, Group, ParamDescription
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
-from ros_3d_bb.core.params import params_from
-from ros_3d_bb.nodes.common.live_parameters import description_of, live_in, plain_values
-from ros_3d_bb.nodes.common.master_registration import on_new_master
+from ros_3d_bb.core.params import params_from, table_of
+from ros_3d_bb.nodes.common.master import on_new_master
+
+TYPES = {bool: 'bool', int: 'int', float: 'double', str: 'str', tuple: 'str'}  # the protocol has no lists
 
 
 class ReconfigureServer(object):
@@ -22,7 +24,7 @@ class ReconfigureServer(object):
     ----------
     params : list of NamedTuple
         All parameters of the node, as returned by `startup.read_params`.
-    take : callable
+    apply : callable
         Called with the changed parameters, in the same order. Raises ValueError without changing anything if they are
         invalid.
 
@@ -39,20 +41,18 @@ class ReconfigureServer(object):
         Changes the parameters that are marked Live, as used by rqt_reconfigure.
     """
 
-    def __init__(self, params, take):
-        self._params, self._take, self._lock = list(params), take, threading.Lock()
-        kinds = [type(each) for each in params]
-        self._names = list(live_in(kinds))
-        description = encode_description(description_of(kinds))
+    def __init__(self, params, apply):
+        self._params, self._apply, self._lock = list(params), apply, threading.Lock()
+        self._live = live_in(type(each) for each in params)
+        description = _description_of(self._live)
         self._groups = get_tree(description)
-        self._descriptions_pub, self._updates_pub = (
-            rospy.Publisher('~parameter_' + name, kind, queue_size=1, latch=True)
-            for name, kind in (('descriptions', ConfigDescription), ('updates', Config)))
-        self._keep_in_step(rospy.get_param('~', {}))
-        self._descriptions_pub.publish(description)
+        descriptions_pub = rospy.Publisher('~parameter_descriptions', ConfigDescription, queue_size=1, latch=True)
+        self._updates_pub = rospy.Publisher('~parameter_updates', Config, queue_size=1, latch=True)
+        self._store_changes(rospy.get_param('~', {}))
+        descriptions_pub.publish(description)
         self._updates_pub.publish(self._message())
         rospy.Service('~set_parameters', Reconfigure, self._on_request)
-        on_new_master(lambda: self._keep_in_step({}))
+        on_new_master(lambda: self._store_changes({}))
 
     def _on_request(self, request):
         with self._lock:
@@ -60,19 +60,19 @@ class ReconfigureServer(object):
             try:
                 self._change(decode_config(request.config))
             except ValueError as error:
-                rospy.logwarn('change of parameters refused: %s; all stay as they are', error)
-            for name in self._keep_in_step(before):
-                rospy.loginfo('~%s is %s now, %s before', name, self._values()[name], before[name])
+                rospy.logwarn('parameter change rejected: %s; all parameters keep their values', error)
+            for name in self._store_changes(before):
+                rospy.loginfo('~%s changed from %s to %s', name, before[name], self._values()[name])
             message = self._message()
             self._updates_pub.publish(message)  # also if nothing changed, to reset the sliders
             return ReconfigureResponse(message)
 
     def _change(self, given):
-        for name in sorted(set(given) & set(self._values()) - set(self._names)):
-            raise ValueError('parameter ~%s is read at the start only; those that can be changed: %s'
-                             % (name, ', '.join(sorted(self._names))))
+        for name in sorted(set(given) & set(self._values()) - set(self._live)):
+            raise ValueError('parameter ~%s is read only at startup; parameters that can be changed: %s'
+                             % (name, ', '.join(sorted(self._live))))
         params = params_from(dict(self._values(), **given), *(type(each) for each in self._params))
-        self._take(*params)
+        self._apply(*params)
         self._params = params
 
     def _values(self):
@@ -80,15 +80,53 @@ class ReconfigureServer(object):
         return {name: list(value) if isinstance(value, tuple) else value
                 for each in self._params for name, value in each._asdict().items()}
 
-    def _keep_in_step(self, known):
+    def _store_changes(self, known):
         """Set the live parameters that differ from `known` on the parameter server. Returns their names."""
         values = self._values()
-        changed = [name for name in self._names if name not in known or known[name] != values[name]]
+        changed = [name for name in self._live if name not in known or known[name] != values[name]]
         for name in changed:
             rospy.set_param('~' + name, values[name])
         return changed
 
     def _message(self):
-        """Return the current values as a Config message."""
-        values = plain_values(self._params)
-        return encode_config(dict({name: values[name] for name in self._names}, groups=self._groups))
+        values = self._values()
+        return encode_config(dict({name: _plain(values[name]) for name in self._live}, groups=self._groups))
+
+
+def live_in(kinds):
+    """Return the live parameters of NamedTuple types, {name: Param}."""
+    return OrderedDict((name, param) for name, param in table_of(kinds).items() if param.live)
+
+
+def _description_of(live):
+    """Return the ConfigDescription of live parameters, with a group for each section."""
+    groups = []
+    for section in [''] + sorted(set(param.section for param in live.values()) - {''}):
+        described = [ParamDescription(name, TYPES[type(param.default)], 0, param.text + ' ' + param.facts,
+                                      _choices_of(param))
+                     for name, param in live.items() if param.section == section]
+        groups.append(Group(name=section or 'Default', parameters=described, id=len(groups)))
+    limits = {name: _slider(param) for name, param in live.items()}
+    return ConfigDescription(groups=groups, min=encode_config({name: low for name, (low, _high) in limits.items()}),
+                             max=encode_config({name: high for name, (_low, high) in limits.items()}),
+                             dflt=encode_config({name: _plain(param.default) for name, param in live.items()}))
+
+
+def _plain(value):
+    return ', '.join(map(str, value)) if isinstance(value, (list, tuple)) else value
+
+
+def _slider(param):
+    """Return the minimum and maximum of a parameter; empty strings for text."""
+    kind = type(param.default)
+    if kind is bool:
+        return False, True
+    return (kind(param.live[0]), kind(param.live[1])) if kind in (int, float) else ('', '')
+
+
+def _choices_of(param):
+    """Return the choices as the text of a Python dictionary, as the protocol requires; empty without choices."""
+    if not param.choices or not isinstance(param.default, str):
+        return ''
+    words = [{'name': word, 'type': 'str', 'value': word, 'description': ''} for word in param.choices]
+    return repr({'enum': words, 'enum_description': param.text})

@@ -1,11 +1,18 @@
-"""Start-up of a node: read its parameters, create it, and report errors."""
+"""Start-up of a node: read its parameters, create it, report errors, and wait for subscribers."""
+import ctypes
 import sys
+import time
 
 import rospy
 
 from ros_3d_bb.core.params import params_from
-from ros_3d_bb.nodes.common.allocator import reuse_freed_memory
-from ros_3d_bb.nodes.common.master_registration import Registration
+from ros_3d_bb.nodes.common.master import Registration
+
+POLL_S = 0.05
+SETTLING_S = 1.0  # a node that has connected to one topic may still be connecting to the others
+LONGEST_WAIT_S = 60.0  # after this time, missing subscribers are an error
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # glibc's malloc.h
+LARGEST_BYTES = 32 * 2 ** 20  # limit of glibc
 
 
 def read_params(*kinds):
@@ -28,3 +35,35 @@ def run_node(name, node_class, run=lambda _node: rospy.spin()):
         sys.exit(1)
     run(node)
     return node
+
+
+def wait_for_subscribers(publisher, wanted, meanwhile):
+    """Wait until a publisher has `wanted` subscribers, and call `meanwhile` repeatedly.
+
+    Raises RuntimeError if there are fewer after LONGEST_WAIT_S.
+    """
+    began_s = time.monotonic()
+    while publisher.get_num_connections() < wanted and not rospy.is_shutdown():
+        if time.monotonic() - began_s > LONGEST_WAIT_S:
+            raise RuntimeError('%s has %d subscribers after %.0f s; %d expected (~wait_for_subscribers)' % (
+                publisher.resolved_name, publisher.get_num_connections(), LONGEST_WAIT_S, wanted))
+        meanwhile()
+        time.sleep(POLL_S)
+    if wanted:
+        time.sleep(SETTLING_S)
+
+
+def reuse_freed_memory():
+    """Let glibc reuse the memory of freed images. Returns whether the settings were applied; not by other C libraries.
+
+    By default, glibc returns large blocks to the system and requests them again, and the kernel clears them page by
+    page. For a rospy node this is two thirds of the cost of receiving an image. All threads share one heap, so the
+    retained memory does not exceed the peak use: rospy starts one thread per connection, and with one heap per thread
+    (glibc's default) the memory of a node would grow with each subscriber that connects and disconnects.
+    """
+    try:
+        mallopt = ctypes.CDLL(None).mallopt
+    except (AttributeError, OSError):
+        return False
+    return all([mallopt(M_MMAP_THRESHOLD, LARGEST_BYTES) == 1, mallopt(M_TRIM_THRESHOLD, 4 * LARGEST_BYTES) == 1,
+                mallopt(M_ARENA_MAX, 1) == 1])

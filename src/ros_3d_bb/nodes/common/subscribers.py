@@ -1,9 +1,15 @@
-"""Subscribers of the nodes, without TCP delay and with queues that keep the newest messages."""
+"""Subscribers of the nodes, and the faults that show in their inputs: silent topics, wrong stamps, a stopped clock."""
 import threading
 import time
 
 import rospy
+from rospy.topics import get_topic_manager
 from sensor_msgs.msg import Image
+
+from ros_3d_bb.diagnosis.observations import Stream
+from ros_3d_bb.diagnosis.topic_faults import NO_CLOCK, clock_fault, silence_fault
+from ros_3d_bb.diagnosis.topic_roles import role_named
+from ros_3d_bb.nodes.common.master import NO_ANSWER, published_topics, publishers_of
 
 # Queue size for messages that are cached until others arrive and must not be lost: this many may arrive at once after
 # the machine was busy. If more arrive, only the newest are kept.
@@ -11,65 +17,110 @@ KEPT_AT_ONCE = 10
 AT_ONCE = 5  # queue size for messages that are processed directly; limits their age
 IMAGE_BUFFER = 2 ** 24  # bytes; if smaller than the images that arrive at once, rospy delivers outdated images
 SMALL_BUFFER = 2 ** 16  # rospy's default
-
+SILENT_S = 5.0
+QUERY_PERIOD_S = 10.0  # between two requests to the master about one topic
 
 _inputs, _lock = [], threading.Lock()  # of the process, which is one node
 
 
 class Input(object):
-    """Statistics of the messages received on a topic of the node.
-
-    Attributes
-    ----------
-    name, kind : str, class
-        Name of the topic before remapping, and its message class.
-    count, came_s : int, float
-        Number of received messages, and arrival of the newest on time.monotonic(); None before the first.
-    subscriber : rospy.Subscriber
-    """
+    """Statistics of the messages received on a topic of the node."""
 
     def __init__(self, name, kind, callback):
-        self.name, self.kind, self._callback = name, kind, callback
-        self.count, self.came_s, self._newest = 0, None, None
-        self.subscriber = None
+        self.name, self._kind, self._callback, self.subscriber = name, kind, callback, None
+        self.count, self.received_s, self._newest = 0, None, None  # `received_s` on time.monotonic()
+        self.reported_count = 0  # at the last report of the rate
+        self.silence, self.queried_s = '', -QUERY_PERIOD_S  # cause of a silence, and when the master was asked for it
 
     def take(self, message):
         """Record a message and pass it to the callback."""
         self.count += 1
-        self.came_s = time.monotonic()
+        self.received_s = time.monotonic()
         header = getattr(message, 'header', None)
         if header is not None:
             self._newest = header.stamp, rospy.get_rostime(), time.time()
         self._callback(message)
 
-    @property
-    def lags_s(self):
-        """Age of the newest message at its arrival, in seconds, by ROS time and by the clock of the machine.
-
-        (None, None) if it has no stamp, or arrived before the first /clock message.
-        """
-        if self._newest is None or not self._newest[0] or not self._newest[1]:
-            return None, None
-        stamp, ros_time, machine_s = self._newest
-        return ros_time.to_sec() - stamp.to_sec(), machine_s - stamp.to_sec()
+    def stream(self):
+        """Return the statistics as a Stream. Lags are unknown without a stamp, and before the first /clock message."""
+        stamp, ros_time, machine_s = self._newest or (None, None, None)
+        has_lag = bool(stamp and ros_time)
+        return Stream(role_named(self.name, self._kind._type), self.subscriber.resolved_name, count=self.count,
+                      lag_s=ros_time.to_sec() - stamp.to_sec() if has_lag else None,
+                      machine_lag_s=machine_s - stamp.to_sec() if has_lag else None)
 
 
 def subscribe(topic, kind, callback, at_once=AT_ONCE):
-    """Create a rospy.Subscriber with TCP_NODELAY.
+    """Create a rospy.Subscriber with TCP_NODELAY, whose messages are recorded, see `inputs`.
 
-    Without it, the kernel delays small messages by up to 40 ms, until previous ones are acknowledged. Received messages
-    are recorded, see `inputs`.
+    Without TCP_NODELAY, the kernel delays small messages by up to 40 ms, until previous ones are acknowledged.
     """
-    noted = Input(topic, kind, callback)
-    noted.subscriber = rospy.Subscriber(topic, kind, noted.take, queue_size=at_once, tcp_nodelay=True,
-                                        buff_size=IMAGE_BUFFER if kind is Image else SMALL_BUFFER)
+    created = Input(topic, kind, callback)
+    created.subscriber = rospy.Subscriber(topic, kind, created.take, queue_size=at_once, tcp_nodelay=True,
+                                          buff_size=IMAGE_BUFFER if kind is Image else SMALL_BUFFER)
     with _lock:
-        _inputs.append(noted)
-    return noted.subscriber
+        _inputs.append(created)
+    return created.subscriber
 
 
 def inputs():
     """Return the Input of each topic that is currently subscribed."""
     with _lock:
-        _inputs[:] = [noted for noted in _inputs if noted.subscriber.impl is not None]
+        _inputs[:] = [each for each in _inputs if each.subscriber.impl is not None]
         return list(_inputs)
+
+
+class InputMonitor(object):
+    """Check the inputs once per second. The only cost for their callbacks is to record each message."""
+
+    def __init__(self):
+        self._began_s = self._reported_s = time.monotonic()
+        self._failed_s, self._failure = -QUERY_PERIOD_S, None  # time and error of the last failed request to the master
+
+    def values(self):
+        """Yield (name, text) of each input: its topic and its rate since the last call."""
+        now_s = time.monotonic()
+        passed_s, self._reported_s = max(now_s - self._reported_s, 1e-3), now_s
+        for each in inputs():
+            new, each.reported_count = each.count - each.reported_count, each.count
+            yield 'input ' + each.name, '%s %.1f Hz' % (each.subscriber.resolved_name, new / passed_s)
+
+    def faults(self):
+        """Yield (event, sentence) for each current fault."""
+        now_s = time.monotonic()
+        if now_s - self._began_s > SILENT_S and not rospy.get_rostime():
+            yield 'no clock', '%s; %s' % NO_CLOCK
+            return
+        for each in inputs():
+            silent_s = now_s - (each.received_s or self._began_s)
+            if silent_s > SILENT_S:
+                yield 'silence on ' + each.name, self._silence(each, now_s, silent_s)
+            elif each.count:
+                fault = clock_fault(each.stream(), not rospy.rostime.is_wallclock())
+                if fault[0]:
+                    yield 'clocks', '%s; %s' % fault
+
+    def _silence(self, silent, now_s, silent_s):
+        """Return why an input is silent. The master is queried at most every QUERY_PERIOD_S per topic.
+
+        After a failed query, which takes seconds, the other topics wait for the same time.
+        """
+        if now_s - silent.queried_s < QUERY_PERIOD_S:
+            return silent.silence
+        if now_s - self._failed_s >= QUERY_PERIOD_S:
+            try:
+                silent.silence, silent.queried_s = _cause_of_silence(silent, silent_s), now_s
+                return silent.silence
+            except NO_ANSWER as error:
+                self._failed_s, self._failure = time.monotonic(), error
+        return 'no messages on %s, and the master does not respond (%s)' % (silent.subscriber.resolved_name,
+                                                                            self._failure)
+
+
+def _cause_of_silence(silent, silent_s):
+    """Return a sentence with the cause of the silence of an input. Raises one of `NO_ANSWER`."""
+    used = set(other.subscriber.resolved_name for other in inputs() if other.count) | set(get_topic_manager().pubs)
+    topics, topic = published_topics(), silent.subscriber.resolved_name
+    publishers = publishers_of(topic, silent.subscriber.get_num_connections() > 0)
+    stream = silent.stream()._replace(published_kind=topics.get(topic, ''), publishers=publishers)
+    return '%s; %s' % silence_fault(stream, topics, used, silent_s)

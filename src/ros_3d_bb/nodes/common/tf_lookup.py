@@ -11,13 +11,13 @@ from ros_3d_bb.diagnosis.tf_tree import links_in, why_missing
 LONGEST_WAIT_S = 0.05  # without new transforms; bounds the delay of a shutdown
 EXPLAINED_S = 2.0  # between two searches of the whole tree for a pair of frames, as each costs as much as some images
 CACHE_S = 10.0  # the tf2 buffer rejects transforms that are older than the newest one of their frame by more
-ASKED_S = 10.0  # time for which the age of a pair of frames is shown after its last lookup
+REQUESTED_S = 10.0  # time for which the age of a pair of frames is shown after its last lookup
 
 
 class _Listener(tf2_ros.TransformListener):
     """Receive transforms and notify the threads that wait for them.
 
-    `has_refused` becomes true if a transform is rejected by tf2 as too old compared with the newest of its frame.
+    `has_rejected` becomes true if tf2 rejects a transform as too old compared with the newest of its frame.
     """
 
     def __init__(self, buffer):
@@ -27,38 +27,30 @@ class _Listener(tf2_ros.TransformListener):
 
     def clear(self):
         """Reset the state after the buffer was cleared."""
-        self.has_refused, self._newest_s = False, {}  # by child frame
+        self.has_rejected, self._newest_s = False, {}  # by child frame
 
     def callback(self, data):
         """Process a message of /tf."""
-        if not _are_usable(data):
-            return
-        for transform in data.transforms:
-            stamp_s, child = transform.header.stamp.to_sec(), transform.child_frame_id
-            newest_s = self._newest_s[child] = max(stamp_s, self._newest_s.get(child, stamp_s))
-            self.has_refused |= stamp_s < newest_s - CACHE_S
-        tf2_ros.TransformListener.callback(self, data)
-        self._tell()
+        if self._add(tf2_ros.TransformListener.callback, data):
+            for transform in data.transforms:
+                stamp_s, child = transform.header.stamp.to_sec(), transform.child_frame_id
+                newest_s = self._newest_s[child] = max(stamp_s, self._newest_s.get(child, stamp_s))
+                self.has_rejected |= stamp_s < newest_s - CACHE_S
 
     def static_callback(self, data):
         """Process a message of /tf_static."""
-        if not _are_usable(data):
-            return
-        tf2_ros.TransformListener.static_callback(self, data)
-        self._tell()
+        self._add(tf2_ros.TransformListener.static_callback, data)
 
-    def _tell(self):
+    def _add(self, add, data):
+        try:
+            check_transforms(data)
+        except ValueError as error:
+            rospy.logwarn_throttle(5.0, 'transforms rejected: %s; waiting for the next' % error)
+            return False
+        add(self, data)
         with self.news:
             self.news.notify_all()
-
-
-def _are_usable(message):
-    try:
-        check_transforms(message)
         return True
-    except ValueError as error:
-        rospy.logwarn_throttle(5.0, 'transforms refused: %s; waiting for the next' % error)
-        return False
 
 
 class Transforms(object):
@@ -69,7 +61,7 @@ class Transforms(object):
         self._buffer = tf2_ros.Buffer(debug=False)
         self._from_before = False
         self._listener = _Listener(self._buffer)
-        self._asked, self._explanations = {}, {}  # by (target, source): time; (sentence, time)
+        self._requested, self._explanations = {}, {}  # by (target, source): time; (sentence, time)
 
     def lookup(self, target_frame, source_frame, stamp):
         """Look up `target_from_source` at a stamp.
@@ -83,28 +75,26 @@ class Transforms(object):
         tf2_ros.TransformException
             If the transform is not available within the timeout. The message names the frames and the state of tf.
         """
-        asked = target_frame.lstrip('/'), source_frame.lstrip('/')
-        self._asked[asked] = time.monotonic()
-        try:
-            return transform_from_msg(self._awaited(asked, stamp))
-        except tf2_ros.TransformException as error:
-            explained = type(error)(self._explained(asked, stamp) or str(error))
-            self._forget_time_before()
-            raise explained
-
-    def _awaited(self, asked, stamp):
+        frames = target_frame.lstrip('/'), source_frame.lstrip('/')
+        self._requested[frames] = time.monotonic()
         deadline_s = time.monotonic() + self._wait_s
         with self._listener.news:
             while True:
                 try:
-                    found = self._buffer.lookup_transform(asked[0], asked[1], stamp)
+                    transform = self._buffer.lookup_transform(frames[0], frames[1], stamp)
                     self._from_before = False
-                    return found
-                except tf2_ros.TransformException:
-                    left_s = deadline_s - time.monotonic()
-                    if left_s <= 0 or rospy.is_shutdown():
-                        raise
+                    return transform_from_msg(transform)
+                except tf2_ros.TransformException as error:
+                    left_s, fault = deadline_s - time.monotonic(), error
+                if left_s <= 0 or rospy.is_shutdown():
+                    break
                 self._listener.news.wait(min(left_s, LONGEST_WAIT_S))
+        explained = type(fault)(self._explanation(frames, stamp) or str(fault))
+        if self._from_before or self._listener.has_rejected:
+            self._buffer.clear()
+            self._listener.clear()
+            self._from_before = False
+        raise explained
 
     def go_back(self):
         """Handle a backward jump in time: the buffer is cleared if the next lookup fails.
@@ -116,35 +106,30 @@ class Transforms(object):
 
     def age(self):
         """Return the age of the newest transform of each recently requested pair of frames, as text."""
-        latest_s = max(list(self._asked.values()), default=0.0)
-        for asked, when_s in list(self._asked.items()):
-            if when_s < latest_s - ASKED_S:
-                self._asked.pop(asked)
-        ages = ['%s from %s to %s' % ((self._age_of(asked),) + asked[::-1]) for asked in sorted(self._asked)]
-        return ', '.join(ages) or 'not asked for yet'
+        latest_s = max(list(self._requested.values()), default=0.0)
+        for frames, when_s in list(self._requested.items()):
+            if when_s < latest_s - REQUESTED_S:
+                self._requested.pop(frames)
+        ages = ['%s from %s to %s' % (self._age_of(target, source), source, target)
+                for target, source in sorted(self._requested)]
+        return ', '.join(ages) or 'not requested yet'
 
-    def _age_of(self, asked):
+    def _age_of(self, target_frame, source_frame):
         try:
-            newest = self._buffer.get_latest_common_time(*asked)
+            newest = self._buffer.get_latest_common_time(target_frame, source_frame)
         except tf2_ros.TransformException:
             return 'none'
         return '%.3f s' % (rospy.get_rostime() - newest).to_sec() if newest else 'static'
 
-    def _explained(self, asked, stamp):
+    def _explanation(self, frames, stamp):
         """Return why a transform is missing, from the whole tf tree; empty if no cause is found.
 
         The search is slow, so it must not run under the lock, where other cameras would wait for it.
         """
         now_s = time.monotonic()
-        recent = {frames: said for frames, said in list(self._explanations.items()) if now_s - said[1] < EXPLAINED_S}
-        if asked not in recent:
+        recent = {key: entry for key, entry in list(self._explanations.items()) if now_s - entry[1] < EXPLAINED_S}
+        if frames not in recent:
             links = links_in(self._buffer.all_frames_as_yaml())
-            recent[asked] = why_missing(links, *asked, stamp_s=stamp.to_sec())[0], now_s
+            recent[frames] = why_missing(links, *frames, stamp_s=stamp.to_sec())[0], now_s
         self._explanations = recent
-        return recent[asked][0]
-
-    def _forget_time_before(self):
-        if self._from_before or self._listener.has_refused:
-            self._buffer.clear()
-            self._listener.clear()
-            self._from_before = False
+        return recent[frames][0]

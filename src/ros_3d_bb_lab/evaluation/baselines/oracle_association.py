@@ -7,37 +7,22 @@ COASTS_S = 1.0
 
 
 def outputs_with_perfect_association(make_tracker, run):
-    """Run a separate tracker for each person, without false detections.
-
-    Returns
-    -------
-    list of list of TrackedObject
-        Published tracks after each image.
-    """
-    followed, last_number, outputs = {}, 0, []
+    """Run a separate tracker for each person, without false detections. Returns the published tracks of each image."""
+    trackers, track_ids, seen_ns, last_id, outputs = {}, {}, {}, 0, []
     for image in run.images:
         found = {source: detection for source, detection in zip(image.sources, image.detections) if source >= 0}
         for person in found:
-            if person not in followed or image.stamp_ns - followed[person].seen_ns > FORGOTTEN_S * NS:
-                last_number += 1
-                followed[person] = _Followed(last_number, make_tracker())
-        objects = [followed[person].update(image, found.get(person)) for person in sorted(followed)]
-        outputs.append([thing for thing in objects if thing is not None])
+            if person not in trackers or image.stamp_ns - seen_ns[person] > FORGOTTEN_S * NS:
+                last_id += 1
+                trackers[person], track_ids[person] = make_tracker(), last_id
+            seen_ns[person] = image.stamp_ns
+        tracks = []
+        for person in sorted(trackers):
+            if image.stamp_ns - seen_ns[person] <= COASTS_S * NS:
+                detections = [found[person]] if person in found else []
+                updated = trackers[person].update(image.stamp_ns, detections, image.view)
+                if updated:
+                    newest = max(updated, key=lambda track: track.last_seen_ns)
+                    tracks.append(newest._replace(id=track_ids[person]))
+        outputs.append(tracks)
     return outputs
-
-
-class _Followed(object):
-    """Person with a track ID and a tracker."""
-
-    def __init__(self, number, tracker):
-        self._number, self._tracker, self.seen_ns = number, tracker, None
-
-    def update(self, image, detection):
-        """Track of the person as a TrackedObject, or None if the tracker publishes none."""
-        if detection is not None:
-            self.seen_ns = image.stamp_ns
-        elif image.stamp_ns - self.seen_ns > COASTS_S * NS:
-            return None
-        things = self._tracker.update(image.stamp_ns, [] if detection is None else [detection], image.view)
-        newest = max(things, key=lambda thing: thing.last_seen_ns, default=None)
-        return newest and newest._replace(id=self._number)

@@ -24,14 +24,13 @@ MOVING_MPS = 0.2
 
 def as_it_arrived(run):
     """Transform a run to the inputs of the original: images stamped on arrival, with the camera pose at that time."""
-    return run._replace(images=tuple(_as_it_arrived(image) for image in run.images))
-
-
-def _as_it_arrived(image):
-    later = image.arrival_view.fixed_from_camera.dot(np.linalg.inv(image.view.fixed_from_camera))
-    moved = [detection._replace(position_m=transform_points(later, detection.position_m))
-             for detection in image.detections]
-    return image._replace(stamp_ns=image.arrival_ns, detections=moved, view=image.arrival_view)
+    images = []
+    for image in run.images:
+        later = image.arrival_view.fixed_from_camera.dot(np.linalg.inv(image.view.fixed_from_camera))
+        moved = [detection._replace(position_m=transform_points(later, detection.position_m))
+                 for detection in image.detections]
+        images.append(image._replace(stamp_ns=image.arrival_ns, detections=moved, view=image.arrival_view))
+    return run._replace(images=tuple(images))
 
 
 class _OriginalTrack(object):
@@ -60,12 +59,7 @@ class OriginalTracker(object):
         self._tracks, self._last_id, self._now_ns, self._rate_hz = [], 0, None, USUAL_RATE_HZ
 
     def update(self, stamp_ns, detections, view=None):
-        """Update the tracks with the detections of one image, as `ThesisTracker.update`.
-
-        Returns
-        -------
-        list of TrackedObject
-        """
+        """Update the tracks with the detections of one image, as `ThesisTracker.update`."""
         return [self._published(track) for track in self.step(stamp_ns, detections)]
 
     def step(self, stamp_ns, detections):

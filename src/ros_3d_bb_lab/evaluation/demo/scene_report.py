@@ -4,7 +4,7 @@ import os
 import sys
 from typing import NamedTuple
 
-import cv2
+import matplotlib
 import numpy as np
 import rosbag
 
@@ -16,41 +16,27 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_caption
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score, table
-from ros_3d_bb_lab.evaluation.demo.scene_plot import Paths, scene_picture
 from ros_3d_bb_lab.simulation.ros.simulator_msgs import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
 
-PANELS = 6
+matplotlib.use('Agg')
+from matplotlib import gridspec, pyplot  # noqa: E402 (the backend must be selected first)
+
+PANELS, COLUMNS = 6, 3
+SIZE_IN, LINE_IN, DPI = (14.56, 14.5), 0.17, 100
+TRUTH_COLOR, ROBOT_COLOR = '#aaaaaa', '#141414'
 
 
 class Recording(NamedTuple):
-    """Scene in a bag.
+    """Scene in a bag."""
 
-    Attributes
-    ----------
-    moments : list of Moment
-        One per image, with an empty list of tracks if the tracker did not publish a message for the image.
-    answered : int
-        Number of images for which the tracker published a message.
-    boxes : dict
-        2D boxes (n, 4) by stamp.
-    robot : numpy.ndarray, (n, 2)
-        Path of the robot in the map.
-    """
-
-    moments: list
-    answered: int
-    boxes: dict
-    robot: np.ndarray
+    moments: list      # a Moment per image, without tracks if the tracker did not publish a message for the image
+    answered: int      # number of images for which the tracker published a message
+    boxes: dict        # 2D boxes (n, 4) by stamp
+    robot: np.ndarray  # path of the robot in the map, (n, 2)
 
 
 def read_recording(bag):
-    """Read the tracks and the ground truth in an open bag.
-
-    Raises
-    ------
-    ValueError
-        If one of them is missing, or their frames differ.
-    """
+    """Read a Recording from an open bag. Raises ValueError if tracks or truth are missing, or their frames differ."""
     truth, tracks, boxes, links, robot = {}, {}, {}, {}, []
     boxes_topics = topics_of_cameras(bag, BOXES_TOPIC)
     for topic, message, _time in bag.read_messages(['/' + TRUTH_TOPIC, '/' + TRACKS_TOPIC, '/tf'] + boxes_topics):
@@ -84,7 +70,7 @@ def topics_of_cameras(bag, topic):
 
 
 def paths_of(recording):
-    """Paths of people, tracks and robot, for the top view."""
+    """Paths of people and visible tracks in the map by ID."""
     people, tracks = {}, {}
     for moment in recording.moments:
         for person in moment.truth:
@@ -92,7 +78,7 @@ def paths_of(recording):
         for track in moment.tracks:
             if track.status == VISIBLE:
                 tracks.setdefault(track.id, []).append(track.position_m[:2])
-    return Paths(people, tracks, recording.robot)
+    return people, tracks
 
 
 def panels_of(bag, recording, count=PANELS):
@@ -110,32 +96,60 @@ def panels_of(bag, recording, count=PANELS):
     return panels
 
 
+def draw_scene(path, panels, people, tracks, robot, lines):
+    """Write the image of a scene: panels (h, w, 3), uint8 RGB, a top view of the paths in the map, and lines of text.
+
+    `people` and `tracks` are paths {ID: (n, 2)} and `robot` is a path (n, 2) in metres. The suffix of the file selects
+    its format.
+    """
+    rows = (len(panels) + COLUMNS - 1) // COLUMNS
+    text_share = LINE_IN * (len(lines) + 3) / SIZE_IN[1]  # with the labels of the axis
+    grid = gridspec.GridSpec(rows + 1, COLUMNS, height_ratios=[1] * rows + [1.8], left=0.03, right=0.99, top=0.99,
+                             bottom=text_share, wspace=0.02, hspace=0.08)
+    figure = pyplot.figure(figsize=SIZE_IN, dpi=DPI)
+    for number, panel in enumerate(panels):
+        axes = figure.add_subplot(grid[divmod(number, COLUMNS)])
+        axes.imshow(panel)
+        axes.set_axis_off()
+    _draw_paths(figure.add_subplot(grid[rows, :]), people, tracks, robot)
+    figure.text(0.03, 0.01, '\n'.join(lines), family='monospace')
+    figure.savefig(path, dpi=DPI)
+    pyplot.close(figure)
+
+
+def _draw_paths(axes, people, tracks, robot):
+    for number, path in sorted(people.items()):
+        axes.plot(*zip(*path), color=TRUTH_COLOR, linewidth=6)
+        axes.annotate('person %d' % number, path[-1])
+    for number, path in sorted(tracks.items()):
+        line, = axes.plot(*zip(*path))
+        axes.annotate(str(number), path[0], color=line.get_color(), weight='bold')
+    axes.plot(robot[:, 0], robot[:, 1], color=ROBOT_COLOR, marker='o', markevery=[-1] if len(robot) else [])
+    axes.set_aspect('equal', 'datalim')
+    axes.grid(True)
+    axes.set(title='map in metres: true paths (grey), tracks with their IDs (colour), robot (black)')
+
+
 def write_report(bag_path, picture_path):
-    """Write the picture and return the table, a list of lines. Raises ValueError as `read_recording`."""
+    """Write the picture and return the table, a list of lines. Raises ValueError or OSError."""
     with rosbag.Bag(bag_path) as bag:
         recording = read_recording(bag)
         lines = table(score(recording.moments))
         lines.append('%d of %d images answered' % (recording.answered, len(recording.moments)))
-        picture = scene_picture(panels_of(bag, recording), paths_of(recording), lines)
-    try:
-        written = cv2.imwrite(picture_path, np.ascontiguousarray(picture[..., ::-1]))
-    except cv2.error:  # unknown suffix
-        written = False
-    if not written:
-        raise OSError('%s cannot be written; a file name with the suffix .png or .jpg expected' % picture_path)
+        people, tracks = paths_of(recording)
+        draw_scene(picture_path, panels_of(bag, recording), people, tracks, recording.robot, lines)
     return lines
 
 
 def main():
     """Run the command `scene_report`."""
     parser = argparse.ArgumentParser(prog='scene_report', description=__doc__)
-    parser.add_argument('bag', help='a bag recorded by simulation.launch record:=...')
+    parser.add_argument('bag', help='bag recorded by simulation.launch record:=...')
     parser.add_argument('picture', nargs='?', help='image file to write (default: the name of the bag with .png)')
     arguments = parser.parse_args()
     picture = arguments.picture or os.path.splitext(arguments.bag)[0] + '.png'
     try:
         lines = write_report(arguments.bag, picture)
     except (ValueError, OSError, rosbag.ROSBagException) as error:
-        print('scene_report: %s: %s; no report was written' % (arguments.bag, error), file=sys.stderr)
-        sys.exit(1)
+        sys.exit('scene_report: %s: %s; no report was written' % (arguments.bag, error))
     print('\n'.join(lines + ['picture: %s' % picture]))

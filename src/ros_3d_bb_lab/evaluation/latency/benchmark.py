@@ -16,27 +16,19 @@ from ros_3d_bb_lab.evaluation.machine import describe_machine
 
 IMAGES = 60  # first images of the scene, played forwards and backwards: 2 s, 90 MB
 ENDING_S = 40.0  # roslaunch waits up to 17 s for its nodes
-EATS_A_CORE = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    pass'
+BUSY_LOOP = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    pass'
 HARNESS = ('replay_node', 'latency_probe_node', 'rosout')  # nodes of the benchmark, which do not run on a robot
 COLUMNS = '%-16s %6s %6s %8s %8s %8s %8s %9s %9s %9s %7s'
 TITLES = ('case', 'in Hz', 'out Hz', 'p50 ms', 'p95 ms', 'p99 ms', 'dropped', 'CPU %', 'camera %', 'memory MB', 'load')
 
 
 class Case(NamedTuple):
-    """Case of the benchmark.
-
-    `detector` is that of pipeline.launch, `image_size` is that of YOLOv5, and `loaded` is whether another process loads
-    a core.
-    """
+    """Case of the benchmark."""
 
     name: str
-    detector: str
-    image_size: int
-    loaded: bool
-
-
-class CaseFailed(Exception):
-    """A case could not be measured. The message contains the reason."""
+    detector: str    # of pipeline.launch
+    image_size: int  # of YOLOv5
+    loaded: bool     # whether another process loads a core
 
 
 DETECTORS = (('free', 'none', 0), ('depth', 'depth', 0), ('yolov5-512', 'yolov5', 512), ('yolov5-640', 'yolov5', 640))
@@ -47,42 +39,33 @@ CASES = [Case(name + ('+load' if loaded else ''), detector, size, loaded)
 def measured(case, arguments, bag, folder):
     """Run one case with a separate ROS master. Returns its results as a dictionary, see `latency_result.result_of`.
 
-    Raises
-    ------
-    CaseFailed
+    Raises RuntimeError if nothing was measured.
     """
-    record, log = os.path.join(folder, 'record.json'), os.path.join(folder, 'launch.log')
-    if os.path.exists(record):
-        os.remove(record)
+    record, log = (os.path.join(folder, case.name + suffix) for suffix in ('.json', '.log'))
     options = {'bag': bag, 'record': record, 'detector': case.detector, 'weights': arguments.weights or '',
                'image_size': case.image_size, 'seconds': arguments.seconds, 'rate': arguments.rate}
-    with eating_a_core(case.loaded), open(log, 'w') as stream:
+    with cpu_load(int(case.loaded)), open(log, 'w') as stream:
         launch(['%s:=%s' % option for option in options.items()], arguments.seconds + 200, stream)
     try:
         with open(record) as stream:
             recorded = json.load(stream)
     except OSError:
         with open(log) as stream:
-            raise CaseFailed('%s: nothing was measured. The log:\n%s' % (case.name, stream.read()))
+            raise RuntimeError('%s: nothing was measured. The log:\n%s' % (case.name, stream.read()))
     result = dict(name=case.name, detector=case.name.split('+')[0], load='one core' if case.loaded else 'none')
     return dict(result, load_average=recorded['load_average'], **result_of(recorded))
 
 
 @contextlib.contextmanager
-def eating_a_core(really):
-    """Context in which another process loads one core, if `really` is true.
-
-    The process ends at the end of the context, or with this process in any case.
-    """
-    if not really:
-        yield
-        return
-    process = subprocess.Popen([sys.executable, '-c', EATS_A_CORE])
+def cpu_load(cores):
+    """Context in which other processes load some cores. They end with this process in any case."""
+    processes = [subprocess.Popen([sys.executable, '-c', BUSY_LOOP]) for _core in range(cores)]
     try:
         yield
     finally:
-        process.kill()
-        process.wait()
+        for process in processes:
+            process.kill()
+            process.wait()
 
 
 def launch(arguments, timeout_s, log):
@@ -95,16 +78,14 @@ def launch(arguments, timeout_s, log):
                                stderr=subprocess.STDOUT, start_new_session=True,
                                env=dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % port))
     try:
-        process.wait(timeout_s)
-    except subprocess.TimeoutExpired:
-        pass  # the missing record is reported
+        with contextlib.suppress(subprocess.TimeoutExpired):  # the missing record is reported
+            process.wait(timeout_s)
     finally:
-        if process.poll() is None:
-            end(process)
+        end(process)
 
 
 def end(roslaunch):
-    """Terminate roslaunch with its nodes."""
+    """Terminate roslaunch with its nodes, if it is still running."""
     roslaunch.send_signal(signal.SIGINT)
     try:
         roslaunch.wait(ENDING_S)
@@ -118,12 +99,6 @@ def free_port():
     with contextlib.closing(socket.socket()) as probe:
         probe.bind(('localhost', 0))
         return probe.getsockname()[1]
-
-
-def make_bag(path, scenario):
-    """Render the first images of a scene, with their true 2D boxes, to a bag."""
-    subprocess.check_call(['rosrun', 'ros_3d_bb', 'scenario_to_bag', scenario, path, '--boxes', '--images', str(IMAGES),
-                           '--compression', 'none'], stdout=subprocess.DEVNULL)
 
 
 def row(result):
@@ -163,7 +138,8 @@ def main():
             bag = arguments.bag and os.path.abspath(arguments.bag)
             if not bag:
                 bag = os.path.join(folder, 'images.bag')
-                make_bag(bag, arguments.scenario)
+                subprocess.check_call(['rosrun', 'ros_3d_bb', 'scenario_to_bag', arguments.scenario, bag, '--boxes',
+                                       '--images', str(IMAGES), '--compression', 'none'], stdout=subprocess.DEVNULL)
             print(COLUMNS % TITLES, flush=True)
             for case in cases:
                 results.append(measured(case, arguments, bag, folder))
@@ -173,33 +149,33 @@ def main():
                         json.dump({'machine': describe_machine(), 'cases': results}, stream, indent=1)
     except KeyboardInterrupt:
         sys.exit(130)
-    except (CaseFailed, OSError, subprocess.SubprocessError) as error:
+    except (RuntimeError, OSError, subprocess.SubprocessError) as error:
         sys.exit('./run bench latency: %s' % error)
 
 
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench latency', description=__doc__)
-    parser.add_argument('--cases', help='some of %s, separated by commas (default: all that the weights allow)'
+    parser.add_argument('--cases', help='some of %s, separated by commas (default: all; yolov5 needs weights)'
                         % ', '.join(case.name for case in CASES))
-    parser.add_argument('--seconds', type=float, default=20.0, help='to measure in each case (default: 20)')
-    parser.add_argument('--rate', type=float, default=30.0, metavar='HZ', help='images a second (default: 30)')
+    parser.add_argument('--seconds', type=float, default=20.0, help='duration of a measurement (default: 20)')
+    parser.add_argument('--rate', type=float, default=30.0, metavar='HZ', help='images per second (default: 30)')
     parser.add_argument('--weights', default=default_weights(), help='checkpoint or export of YOLOv5')
     images = parser.add_mutually_exclusive_group()
     images.add_argument('--scenario', type=scenario_path, default='demo', metavar='SCENARIO',
-                        help='scenario of which the first %d images are played (default: demo)' % IMAGES)
-    images.add_argument('--bag', help='a bag of scenario_to_bag or session_to_bag, with --boxes')
-    parser.add_argument('--json', metavar='FILE', help='also write the figures there')
+                        help='scenario; its first %d images are played (default: demo)' % IMAGES)
+    images.add_argument('--bag', help='bag written by scenario_to_bag or session_to_bag with --boxes')
+    parser.add_argument('--json', metavar='FILE', help='also write the results to this file')
     arguments = parser.parse_args()
     if not (arguments.seconds > 0 and arguments.rate > 0):
         parser.error('--seconds %g, --rate %g: more than 0 expected' % (arguments.seconds, arguments.rate))
     arguments.weights = arguments.weights and os.path.abspath(arguments.weights)
     known = {case.name: case for case in CASES}
-    names = arguments.cases.split(',') if arguments.cases else [
-        case.name for case in CASES if arguments.weights or case.detector != 'yolov5']
+    measurable = [case.name for case in CASES if arguments.weights or case.detector != 'yolov5']
+    names = arguments.cases.split(',') if arguments.cases else measurable
     for name in names:
         if name not in known:
             parser.error('case %r is unknown; known: %s' % (name, ', '.join(known)))
-        if known[name].detector == 'yolov5' and not arguments.weights:
+        if name not in measurable:
             parser.error('case %s needs --weights' % name)
     return arguments, [known[name] for name in names]
 

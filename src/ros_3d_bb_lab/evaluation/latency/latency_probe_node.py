@@ -12,18 +12,25 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Int32MultiArray
 from visualization_msgs.msg import MarkerArray
 
-from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
-from ros_3d_bb_lab.evaluation.latency.process_usage import usage_of
+from ros_3d_bb_lab.evaluation.latency.latency_result import STAGES
 
 START_TIMEOUT_S = 120.0  # includes the time for exporting the network of a detector
 SAMPLE_S = 1.0
 GRACE_S = 1.0  # waiting time for results of the last images
-STAGES = (('boxes_2d', BOXES_TOPIC, Int32MultiArray), ('boxes_3d', 'ros_3d_bb/bb_3d', BoundingBox3DArray),
-          ('tracks', TRACKS_TOPIC, TrackedObjectArray), ('markers', 'visualization_marker_array', MarkerArray))
+OUTPUTS = ((BOXES_TOPIC, Int32MultiArray), (BOXES3D_TOPIC, BoundingBox3DArray), (TRACKS_TOPIC, TrackedObjectArray),
+           ('visualization_marker_array', MarkerArray))  # of `STAGES`
+
+
+class Usage(NamedTuple):
+    """CPU time of all threads since the start of a process in seconds, and its current resident memory in megabytes."""
+
+    cpu_s: float
+    rss_mb: float
 
 
 @parameters()
@@ -57,13 +64,11 @@ class LatencyProbeNode(object):
 
     def __init__(self):
         self._params, = read_params(LatencyProbeParams)
-        self._sent_ns, self._arrivals = [], {stage: [] for stage, _topic, _kind in STAGES}
-        for stage, topic, kind in STAGES:
+        self._sent_ns, self._arrivals = [], {stage: [] for stage in STAGES}
+        for stage, (topic, kind) in zip(STAGES, OUTPUTS):
             subscribe(topic, kind, functools.partial(self._on_answer, self._arrivals[stage]), KEPT_AT_ONCE)
-        subscribe('camera/color/camera_info', CameraInfo, self._on_image, KEPT_AT_ONCE)
-
-    def _on_image(self, message):
-        self._sent_ns.append(message.header.stamp.to_nsec())
+        subscribe('camera/color/camera_info', CameraInfo,
+                  lambda message: self._sent_ns.append(message.header.stamp.to_nsec()), KEPT_AT_ONCE)
 
     def _on_answer(self, arrivals, message):
         arrival_s, stamp_ns = time.time(), stamp_in(message)
@@ -72,7 +77,11 @@ class LatencyProbeNode(object):
 
     def measure(self):
         """Wait for markers, measure, and write the record."""
-        self._wait_for_markers()
+        deadline_s = time.monotonic() + START_TIMEOUT_S
+        while not self._arrivals['markers'] and not rospy.is_shutdown():
+            if time.monotonic() > deadline_s:
+                raise ValueError('no markers within %.0f s' % START_TIMEOUT_S)
+            time.sleep(0.1)
         time.sleep(self._params.warm_up)
         pids, began_s = pids_of_nodes(), time.time()
         usage = {node: [] for node in pids}
@@ -92,13 +101,6 @@ class LatencyProbeNode(object):
         with open(self._params.record, 'w') as stream:
             json.dump(record, stream)
 
-    def _wait_for_markers(self):
-        deadline_s = time.monotonic() + START_TIMEOUT_S
-        while not self._arrivals['markers'] and not rospy.is_shutdown():
-            if time.monotonic() > deadline_s:
-                raise ValueError('no markers came within %.0f s' % START_TIMEOUT_S)
-            time.sleep(0.1)
-
 
 def stamp_in(message):
     """Stamp of the image that a message belongs to, in integer nanoseconds; None for an empty MarkerArray."""
@@ -117,6 +119,17 @@ def pids_of_nodes():
         _code, _text, uri = master.lookupNode(node)
         pids[node.lstrip('/')] = ServerProxy(uri).getPid(rospy.get_name())[2]
     return pids
+
+
+def usage_of(pid):
+    """Usage of a process by /proc. None if it does not exist."""
+    try:
+        with open('/proc/%d/stat' % pid) as stream:
+            fields = stream.read().rpartition(')')[2].split()  # the name may contain any character
+    except (FileNotFoundError, ProcessLookupError):
+        return None
+    utime, stime, rss_pages = (int(fields[number - 3]) for number in (14, 15, 24))  # numbered as in proc(5)
+    return Usage((utime + stime) / float(os.sysconf('SC_CLK_TCK')), rss_pages * os.sysconf('SC_PAGE_SIZE') / 1e6)
 
 
 def main():

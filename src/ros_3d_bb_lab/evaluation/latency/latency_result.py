@@ -1,27 +1,21 @@
 """Results of one case of the latency benchmark, computed from the record of latency_probe_node."""
 import numpy as np
 
-STAGES = ('boxes_2d', 'boxes_3d', 'tracks', 'markers')  # in processing order
+STAGES = 'boxes_2d', 'boxes_3d', 'tracks', 'markers'  # in processing order
 EDGE_S = 60.0  # intervals at the start and at the end that are compared in `trend`
 
 
 def result_of(record):
     """Compute the results of a case.
 
-    Parameters
-    ----------
-    record : dict
-        `began_s`, `ended_s`: start and end of the measurement; `sent_ns`: stamps of the images; `arrivals`: by stage,
-        [stamp in ns, arrival in seconds]; `usage`: by node, [time in s, CPU time in s, memory in MB]. All times are
-        from the same clock. Only images with a stamp during the measurement are evaluated.
+    A record has the start and the end of the measurement, the stamps of the images, `arrivals` by stage [stamp in ns,
+    arrival in seconds], and `usage` by node [time in s, CPU time in s, memory in MB]. All times are from the same
+    clock. Only images with a stamp during the measurement are evaluated.
 
-    Returns
-    -------
-    dict
-        Rates in Hz, latencies from the stamp to the arrival of the markers in ms, CPU usage in percent of a core,
-        memory at the end in MB. `stages_ms`: median latency by stage. `trend`: `first` and `last` minute (or half of
-        the measurement, if that is shorter), and the memory growth of each node in MB per minute. The growth is that of
-        the second half, because caches are filled in the first minute.
+    Latencies of the result are from the stamp to the arrival of the markers, CPU usage is in percent of a core, memory
+    is that at the end. `stages_ms`: median latency by stage. `trend`: `first` and `last` minute (or half of the
+    measurement, if that is shorter), and the memory growth of the second half, because caches are filled in the first
+    minute.
     """
     began_s, ended_s = record['began_s'], record['ended_s']
     window_s = ended_s - began_s
@@ -32,27 +26,20 @@ def result_of(record):
               'dropped': len(sent_ns) - len(answered)}
     result.update(percentiles(answered[:, 1]))
     result['stages_ms'] = {stage: percentiles(found[:, 1])['p50_ms'] for stage, found in stages.items()}
-    result.update(_usage(record['usage']))
+    samples = {node: np.array(rows) for node, rows in record['usage'].items() if len(rows) > 1}
+    result['cpu_percent'] = {node: float(100 * (rows[-1, 1] - rows[0, 1]) / (rows[-1, 0] - rows[0, 0]))
+                             for node, rows in samples.items()}
+    result['rss_mb'] = {node: float(rows[-1, 2]) for node, rows in samples.items()}
     edge_s = min(EDGE_S, window_s / 2)
     first, last = answered[:, 0] < began_s + edge_s, answered[:, 0] >= ended_s - edge_s
-    result['trend'].update(edge_s=edge_s, first=percentiles(answered[first, 1]), last=percentiles(answered[last, 1]))
+    result['trend'] = {
+        'rss_mb_per_minute': {node: _growth(rows[len(rows) // 2 - 1:]) for node, rows in samples.items()},
+        'edge_s': edge_s, 'first': percentiles(answered[first, 1]), 'last': percentiles(answered[last, 1])}
     return result
 
 
 def latencies(sent_ns, arrivals):
-    """Stamps and latencies of images.
-
-    Parameters
-    ----------
-    sent_ns : list of int
-    arrivals : list of (int, float)
-        Stamp in ns and arrival in seconds. The first arrival of each stamp is used.
-
-    Returns
-    -------
-    numpy.ndarray, (n, 2)
-        Stamp in seconds and latency in ms of the images with an arrival.
-    """
+    """Stamp in seconds and latency in ms, (n, 2), of the images with an arrival; the first arrival counts."""
     arrived_s = {}
     for stamp_ns, arrival_s in arrivals:
         arrived_s.setdefault(stamp_ns, arrival_s)
@@ -65,16 +52,6 @@ def percentiles(values_ms):
     if not len(values_ms):
         return {'p50_ms': None, 'p95_ms': None, 'p99_ms': None}
     return {'p%d_ms' % share: float(np.percentile(values_ms, share)) for share in (50, 95, 99)}
-
-
-def _usage(usage):
-    """CPU usage, memory and memory growth by node."""
-    samples = {node: np.array(rows) for node, rows in usage.items() if len(rows) > 1}
-    return {'cpu_percent': {node: float(100 * (rows[-1, 1] - rows[0, 1]) / (rows[-1, 0] - rows[0, 0]))
-                            for node, rows in samples.items()},
-            'rss_mb': {node: float(rows[-1, 2]) for node, rows in samples.items()},
-            'trend': {'rss_mb_per_minute': {node: _growth(rows[len(rows) // 2 - 1:])
-                                            for node, rows in samples.items()}}}
 
 
 def _growth(rows):

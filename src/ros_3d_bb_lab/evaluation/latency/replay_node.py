@@ -1,6 +1,5 @@
 """ROS node that plays the images of a bag from memory, as a simulated camera with minimal CPU usage."""
 import itertools
-import threading
 import time
 from typing import NamedTuple
 
@@ -52,33 +51,27 @@ class ReplayNode(object):
         self._diagnostics = Diagnostics()
         self._pubs = {topic: rospy.Publisher('/tf' if topic == 'tf' else topic, kind, queue_size=10)
                       for topic, kind in types.items()}
-        thread = threading.Thread(target=self._run)
-        thread.daemon = True
-        thread.start()
 
-    def _run(self):
+    def run(self):
         """Publish at the configured rate. Images that are late by more than a period are skipped."""
         period_s, due_s = 1.0 / self._params.rate, time.monotonic()
         for messages in itertools.cycle(self._images + self._images[-2:0:-1]):
             due_s += period_s
             late_s = time.monotonic() - due_s
             if late_s > period_s:
-                self._diagnostics.count('images left out')
+                self._diagnostics.count('images skipped')
                 continue
             time.sleep(max(0.0, -late_s))
             if rospy.is_shutdown():
                 return
-            self._publish(messages)
-
-    def _publish(self, messages):
-        stamp = rospy.get_rostime()
-        with self._diagnostics.rejecting('images'):
-            for topic, message in messages:
-                self._pubs[topic].publish(with_stamp(message, stamp))
-            self._diagnostics.count('images')
-            self._diagnostics.record_latency(stamp)
+            stamp = rospy.get_rostime()
+            with self._diagnostics.rejecting('images'):
+                for topic, message in messages:
+                    self._pubs[topic].publish(with_stamp(message, stamp))
+                self._diagnostics.count('images')
+                self._diagnostics.record_latency(stamp)
 
 
 def main():
     """Run the node."""
-    run_node('replay_node', ReplayNode)
+    run_node('replay_node', ReplayNode, ReplayNode.run)

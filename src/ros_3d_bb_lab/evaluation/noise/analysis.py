@@ -16,10 +16,7 @@ RMS_FIT_FROM_M = 1.5  # below, the error is not quadratic in the distance (thesi
 
 
 class Inputs(NamedTuple):
-    """Measurements for z, for x, and for the variance of x, with the estimator and the camera that produced them.
-
-    The measurements for the variance of x exclude people truncated by the image border, as in the thesis.
-    """
+    """Measurements for z, for x, and for its variance (no truncated people, as in the thesis), and their origin."""
 
     z: MeasurementTable
     x: MeasurementTable
@@ -50,23 +47,31 @@ class Analysis(NamedTuple):
     model: Optional[ErrorModel]
     no_model: str
 
+    @property
+    def variance_clusters(self):
+        """Pairs (axis, ClusterStatistics) of the clusters that the variances are computed from."""
+        return [(name, cluster) for name, axis in (('Z', self.z), ('X', self.x_variance)) for cluster in axis.clusters]
+
 
 def analyse(inputs):
-    """Run the analysis. Raises ValueError if there are too few measurements."""
+    """Analyse `inputs`, and return an Analysis. Raises ValueError if there are too few measurements."""
     z, x, x_variance = (axis_statistics(clusters_of(measurements, axis), degree) for measurements, axis, degree in (
         (inputs.z, 'Z', Z_DEGREE), (inputs.x, 'X', X_DEGREE), (inputs.x_variance, 'X', X_DEGREE)))
-    thesis_form, reason = _or_reason(_thesis_form, inputs, z, x, x_variance)
-    known, (source, camera, date) = inputs.x.complete(), _origin(inputs)
-    model, reason = _or_reason(fit_error_model, known.measured_m, known.truth_m, source, inputs.estimator, camera, date)
+    names = set(os.path.basename(os.path.abspath(table.name)) for table in (inputs.z, inputs.x, inputs.x_variance))
+    origin = {'source': ', '.join(sorted(names)), 'estimator': inputs.estimator, 'camera': inputs.camera,
+              'date': datetime.date.today().isoformat()}
+    thesis_form, _reason = _or_reason(_thesis_form, z, x, x_variance, origin)
+    known = inputs.x.complete()
+    model, reason = _or_reason(fit_error_model, known.measured_m, known.truth_m, **origin)
     return Analysis(inputs, z, x, x_variance, _rms_poly(z), share_between_positions(inputs.z, 'Z'),
                     share_between_positions(inputs.x_variance, 'X'), thesis_form, model, reason)
 
 
 def summary_of(analysis):
     """Summary of the analysis as a dictionary, as stored in summary.json. Lengths are in metres."""
-    x = dict(_axis_summary(analysis.x), max_variance_m2=analysis.x_variance.max_variance_m2,
-             max_sigma_m=analysis.x_variance.max_sigma_m,
-             variance_clusters=_axis_summary(analysis.x_variance)['clusters'])
+    x, variance = _axis_summary(analysis.x), _axis_summary(analysis.x_variance)
+    x.update(max_variance_m2=variance['max_variance_m2'], max_sigma_m=variance['max_sigma_m'],
+             variance_clusters=variance['clusters'])
     scores = None if analysis.model is None else dict(analysis.model.cross_validated._asdict())
     return {'z': _axis_summary(analysis.z), 'x': x, 'cross_validated': scores, 'theory': {
         'subpixel_px': theory.SUBPIXEL_PX, 'focal_times_baseline_px_m': theory.STEREO_PX_M,
@@ -79,31 +84,23 @@ def _axis_summary(axis):
             'clusters': [dict(cluster._asdict()) for cluster in axis.clusters]}
 
 
-def _or_reason(function, *arguments):
+def _or_reason(function, *arguments, **origin):
     """Call a function. Returns (result, '') or, if it raises ValueError, (None, message)."""
     try:
-        return function(*arguments), ''
+        return function(*arguments, **origin), ''
     except ValueError as error:
         return None, str(error)
 
 
-def _origin(inputs):
-    """Source, camera and date for the provenance."""
-    paths = [measurements.name for measurements in (inputs.z, inputs.x, inputs.x_variance)]
-    names = set(os.path.basename(os.path.abspath(path)) for path in paths)
-    return ', '.join(sorted(names)), inputs.camera, datetime.date.today().isoformat()
-
-
-def _thesis_form(inputs, z, x, x_variance):
+def _thesis_form(z, x, x_variance, origin):
     """Error model in the form of the thesis, from these statistics."""
-    source, camera, date = _origin(inputs)
     z_m, x_m = ([cluster.truth_m for cluster in axis.clusters] for axis in (z, x))
     count = sum(cluster.count for cluster in z.clusters)
     return checked(ErrorModel(
         z.poly, XBias(x.poly[0], 0.0, x.poly[1]), Spread(max(z.max_sigma_m, LEAST_SIGMA_M), 0.0, 0.0),
         Spread(max(x_variance.max_sigma_m, LEAST_SIGMA_M), 0.0, 0.0), Y_SIGMA_M,
         MeasuredRange(min(z_m), max(z_m), max(abs(value) for value in x_m), min(z_m)), GROWTH_OUTSIDE,
-        Provenance(source, inputs.estimator, camera, date, count, len(z_m)), None))
+        Provenance(measurements=count, positions=len(z_m), **origin), None))
 
 
 def _rms_poly(z):

@@ -5,6 +5,7 @@ from scipy import stats
 
 from ros_3d_bb_lab.evaluation.noise import theory
 from ros_3d_bb_lab.evaluation.noise.analysis import RMS_FIT_FROM_M
+from ros_3d_bb_lab.evaluation.noise.tables import clusters_of
 
 matplotlib.use('Agg')  # works without a display
 import matplotlib.pyplot as plt  # noqa: E402
@@ -15,15 +16,14 @@ MANY_CLUSTERS = 12
 MEASURED, FITTED, THEORY, OTHER = 'tab:blue', 'tab:orange', 'tab:green', '0.55'
 
 
-def write_figures(folder, analysis, z_clusters, x_clusters):
-    """Write all figures into a folder. The errors of the clusters are used for the histograms."""
-    rms(folder / 'figure_5_2.png', analysis)
-    error_by_truth(folder / 'figure_5_3.png', analysis.z, 'Z')
-    variances(folder / 'figure_5_4.png', analysis.z, 'Z')
-    error_by_truth(folder / 'figure_5_5.png', analysis.x, 'X')
-    variances(folder / 'figure_5_6.png', analysis.x_variance, 'X')
-    histograms(folder / 'figure_5_7.png', z_clusters, 'Z')
-    histograms(folder / 'figure_5_8.png', x_clusters, 'X')
+def write_figures(folder, analysis):
+    _rms(folder / 'figure_5_2.png', analysis)
+    _error_by_truth(folder / 'figure_5_3.png', analysis.z, 'Z')
+    _variances(folder / 'figure_5_4.png', analysis.z, 'Z')
+    _error_by_truth(folder / 'figure_5_5.png', analysis.x, 'X')
+    _variances(folder / 'figure_5_6.png', analysis.x_variance, 'X')
+    _histograms(folder / 'figure_5_7.png', clusters_of(analysis.inputs.z, 'Z'), 'Z')
+    _histograms(folder / 'figure_5_8.png', clusters_of(analysis.inputs.x_variance, 'X'), 'X')
 
 
 def polynomial_text(poly, variable):
@@ -36,14 +36,14 @@ def polynomial_text(poly, variable):
     return text
 
 
-def rms(path, analysis):
+def _rms(path, analysis):
     """Figure 5.2: RMS of the depth error by distance, and the theoretical error of stereo cameras."""
-    clusters = analysis.z.clusters
-    distance_m = np.linspace(0, 1.05 * max(cluster.truth_m for cluster in clusters), 100)
+    truth_m = [cluster.truth_m for cluster in analysis.z.clusters]
+    distance_m = np.linspace(0, 1.05 * max(truth_m), 100)
     figure, axes = plt.subplots(figsize=SIZE_IN)
-    axes.plot([cluster.truth_m for cluster in clusters], [cluster.rms_m for cluster in clusters], 'o', color=MEASURED,
+    axes.plot(truth_m, [cluster.rms_m for cluster in analysis.z.clusters], 'o', color=MEASURED,
               label='measured RMS, bias included')
-    axes.plot([cluster.truth_m for cluster in clusters], [cluster.sigma_m for cluster in clusters], 'x', color=MEASURED,
+    axes.plot(truth_m, [cluster.sigma_m for cluster in analysis.z.clusters], 'x', color=MEASURED,
               label='measured standard deviation')
     if analysis.rms_poly is not None:
         far_m = distance_m[distance_m >= RMS_FIT_FROM_M]
@@ -59,7 +59,7 @@ def rms(path, analysis):
     _finish(figure, axes, path, 'distance [m]', 'depth error [m]')
 
 
-def error_by_truth(path, axis, name):
+def _error_by_truth(path, axis, name):
     """Figures 5.3 and 5.5: mean error by true value, with bars of one standard deviation, and the fitted polynomial."""
     truth_m = np.array([cluster.truth_m for cluster in axis.clusters])
     figure, axes = plt.subplots(figsize=SIZE_IN)
@@ -73,22 +73,22 @@ def error_by_truth(path, axis, name):
     _finish(figure, axes, path, 'true %s [m]' % name, '%s error [m]' % name)
 
 
-def variances(path, axis, name):
+def _variances(path, axis, name):
     """Figures 5.4 and 5.6: variance of each cluster."""
     figure, axes = plt.subplots(figsize=SIZE_IN)
-    places = np.arange(len(axis.clusters))
-    axes.bar(places, [cluster.variance_m2 for cluster in axis.clusters], color=MEASURED)
+    positions = np.arange(len(axis.clusters))
+    axes.bar(positions, [cluster.variance_m2 for cluster in axis.clusters], color=MEASURED)
     axes.axhline(axis.max_variance_m2, color=FITTED, linestyle='--',
                  label='largest: %.5f m² (standard deviation %.4f m)' % (axis.max_variance_m2, axis.max_sigma_m))
-    axes.set_xticks(places)
-    crowded = {'fontsize': 7, 'rotation': 90} if len(places) > MANY_CLUSTERS else {}
+    axes.set_xticks(positions)
+    crowded = {'fontsize': 7, 'rotation': 90} if len(positions) > MANY_CLUSTERS else {}
     axes.set_xticklabels(['%.2f\nn=%d' % (cluster.truth_m, cluster.count) for cluster in axis.clusters], **crowded)
     axes.set_ylim(0, 1.2 * axis.max_variance_m2 or 1)
     _finish(figure, axes, path, 'true %s of the cluster [m], number of measurements' % name,
             'variance of the %s error [m²]' % name)
 
 
-def histograms(path, clusters, name):
+def _histograms(path, clusters, name):
     """Figures 5.7 and 5.8: density of the errors of each cluster, with the fitted Gaussian."""
     rows = -(-len(clusters) // COLUMNS)
     figure, grid = plt.subplots(rows, COLUMNS, figsize=(9, 2.4 * rows), squeeze=False)

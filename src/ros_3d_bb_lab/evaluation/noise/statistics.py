@@ -18,10 +18,9 @@ LEAST_TO_TEST = 8  # measurements; the critical values of Anderson-Darling are u
 class ClusterStatistics(NamedTuple):
     """Statistics of one cluster, in metres.
 
-    `variance_m2` is divided by n, as in the thesis; `shapiro_p` is the p-value of the Shapiro-Wilk test; `anderson` is
-    the Anderson-Darling statistic, with its critical value at 5 %; `log_likelihoods` are the held-out log-likelihoods
-    per measurement of the distributions in DISTRIBUTIONS. The last four fields are None if all errors are equal, or if
-    there are fewer than 8.
+    `variance_m2` is divided by n, as in the thesis. The other fields are results of the Shapiro-Wilk and
+    Anderson-Darling tests and held-out log-likelihoods per measurement; None if all errors are equal, or if there are
+    fewer than 8.
     """
 
     truth_m: float
@@ -29,14 +28,13 @@ class ClusterStatistics(NamedTuple):
     mean_m: float
     variance_m2: float
     rms_m: float
-    shapiro_p: Optional[float]
-    anderson: Optional[float]
-    anderson_critical: Optional[float]
-    log_likelihoods: Optional[dict]
+    shapiro_p: Optional[float] = None
+    anderson: Optional[float] = None
+    anderson_critical: Optional[float] = None
+    log_likelihoods: Optional[dict] = None
 
     @property
     def sigma_m(self):
-        """Standard deviation."""
         return float(np.sqrt(self.variance_m2))
 
     @property
@@ -58,23 +56,15 @@ class AxisStatistics(NamedTuple):
 
     @property
     def max_variance_m2(self):
-        """Largest variance of the clusters."""
         return max(cluster.variance_m2 for cluster in self.clusters)
 
     @property
     def max_sigma_m(self):
-        """Largest standard deviation of the clusters."""
         return float(np.sqrt(self.max_variance_m2))
 
 
 def axis_statistics(clusters, degree):
-    """Compute the statistics of clusters, and fit a polynomial to their means with equal weights (as in the thesis).
-
-    Raises
-    ------
-    ValueError
-        If there are too few clusters for the degree.
-    """
+    """Compute the statistics of clusters, and fit a polynomial to their means with equal weights (as in the thesis)."""
     if len(clusters) <= degree:
         raise ValueError('%d clusters; at least %d needed for a polynomial of degree %d'
                          % (len(clusters), degree + 1, degree))
@@ -84,10 +74,9 @@ def axis_statistics(clusters, degree):
 
 
 def share_between_positions(measurements, axis):
-    """Share 0..1 of the variance within the clusters of an axis that the other axis explains.
+    """Share 0..1 of the variance within the clusters of an axis that is between positions on the other axis.
 
-    This is the variance between positions with different true values on the other axis. None if no measurement has
-    both.
+    None if no measurement has both.
     """
     known = measurements.complete()
     number = AXES.index(axis)
@@ -107,16 +96,16 @@ def _variance_within(values, group):
 
 
 def cluster_statistics(cluster):
-    """Compute the ClusterStatistics of a Cluster."""
     error_m = cluster.error_m
-    moments = (cluster.truth_m, len(error_m), float(error_m.mean()), float(error_m.var()),
-               float(np.sqrt((error_m ** 2).mean())))
+    found = ClusterStatistics(cluster.truth_m, len(error_m), float(error_m.mean()), float(error_m.var()),
+                              float(np.sqrt((error_m ** 2).mean())))
     if len(error_m) < LEAST_TO_TEST or np.ptp(error_m) == 0:
-        return ClusterStatistics(*(moments + (None,) * 4))
+        return found
     anderson = stats.anderson(error_m, 'norm')
-    return ClusterStatistics(*moments + (
-        float(stats.shapiro(error_m)[1]), float(anderson[0]), float(anderson[1][list(anderson[2]).index(5.0)]),
-        {name: held_out_log_likelihood(error_m, fit) for name, fit in DISTRIBUTIONS}))
+    return found._replace(
+        shapiro_p=float(stats.shapiro(error_m)[1]), anderson=float(anderson[0]),
+        anderson_critical=float(anderson[1][list(anderson[2]).index(5.0)]),
+        log_likelihoods={name: held_out_log_likelihood(error_m, fit) for name, fit in DISTRIBUTIONS})
 
 
 def held_out_log_likelihood(values_m, fit):
@@ -132,13 +121,13 @@ def fit_gaussian(values_m):
 
 
 def fit_laplace(values_m):
-    """Log-density function of the maximum-likelihood Laplace distribution (sharper peak, longer tails)."""
+    """Log-density function of the maximum-likelihood Laplace distribution."""
     location, scale = stats.laplace.fit(values_m)
     return stats.laplace(location, max(scale, LEAST_SCALE_M)).logpdf
 
 
 def fit_student(values_m):
-    """Log-density function of the maximum-likelihood Student t distribution, a Gaussian with outliers."""
+    """Log-density function of the maximum-likelihood Student t distribution."""
     candidates = [stats.t(freedom, *_student_location_scale(values_m, freedom)).logpdf for freedom in FREEDOMS]
     return max(candidates, key=lambda density: density(values_m).sum())
 
@@ -154,11 +143,7 @@ def _student_location_scale(values_m, freedom):
 
 
 def fit_mixture(values_m):
-    """Log-density function of a mixture of two Gaussians.
-
-    The mixture is fitted by expectation maximisation, which is initialised with the lower and the upper half of the
-    values.
-    """
+    """Log-density function of a mixture of two Gaussians, fitted by expectation maximisation from both halves."""
     upper = values_m > np.median(values_m)
     narrowest_m = max(LEAST_SCALE_M, NARROWEST_PART * values_m.std())
     share = np.stack((~upper, upper)).astype(float)  # (2, n): responsibilities

@@ -17,15 +17,10 @@ LEAST_IN_CLUSTER = 3
 ROUNDING_MM = 1.01  # errors may have been computed before the values were rounded
 
 
-class TableError(ValueError):
-    """Measurements that cannot be used. The message contains the place, the fault, and what was expected."""
-
-
 class MeasurementTable(NamedTuple):
-    """Measured positions with ground truth.
+    """Positions x, y, z (n, 3) and ground truth x, z (n, 2) in metres, NaN if not measured, and name of the source.
 
-    `measured_m` (n, 3) as x, y, z and `truth_m` (n, 2) as x, z are in metres, NaN if not measured. `name` is the source
-    of the measurements. `cut` (n,) is whether the left or right image border truncates the person, if known.
+    `cut` (n,) is whether the left or right image border truncates the person, if known.
     """
 
     name: str
@@ -35,13 +30,11 @@ class MeasurementTable(NamedTuple):
 
     def complete(self):
         """Select the measurements with x and z."""
-        return self._part(np.isfinite(self.measured_m[:, [0, 2]]).all(axis=1) & np.isfinite(self.truth_m).all(axis=1))
+        values_m = np.concatenate((self.measured_m[:, [0, 2]], self.truth_m), axis=1)
+        return self._part(np.isfinite(values_m).all(axis=1))
 
     def whole(self):
-        """Select the measurements of people that the left and right image borders do not truncate.
-
-        Clusters of true x with fewer than 3 such measurements are left out.
-        """
+        """Select the measurements of people that are not truncated, in clusters of true x with at least 3 of them."""
         whole = self._part(~self.cut)
         values_m, counts = np.unique(whole.truth_m[:, 0], return_counts=True)
         return whole._part(np.isin(whole.truth_m[:, 0], values_m[counts >= LEAST_IN_CLUSTER]))
@@ -58,90 +51,62 @@ class Cluster(NamedTuple):
 
 
 def clusters_of(measurements, axis):
-    """Group the errors of an axis, 'X' or 'Z', by true value.
-
-    Raises
-    ------
-    TableError
-        If there are no measurements of the axis, if there is only one cluster, or if a cluster has fewer than 3
-        measurements.
-    """
+    """Group the errors of an axis, 'X' or 'Z', by true value. Raises ValueError if there are too few measurements."""
     number = AXES.index(axis)
     truth_m, measured_m = measurements.truth_m[:, number], measurements.measured_m[:, 2 * number]
     known = np.isfinite(truth_m) & np.isfinite(measured_m)
     if not known.any():
-        raise TableError('%s: no measurement of %s' % (measurements.name, axis))
+        raise ValueError('%s: no measurement of %s' % (measurements.name, axis))
     truth_m, error_m = truth_m[known], (measured_m - truth_m)[known]
     clusters = [Cluster(float(value), error_m[truth_m == value]) for value in np.unique(truth_m)]
     if len(clusters) == 1:
-        raise TableError('%s: all measurements have %s true = %g m; several true values are needed to see how the '
-                         'error goes with it' % (measurements.name, axis, clusters[0].truth_m))
+        raise ValueError('%s: all measurements have %s true = %g m; the error as a function of it needs several values'
+                         % (measurements.name, axis, clusters[0].truth_m))
     for cluster in clusters:
         if len(cluster.error_m) < LEAST_IN_CLUSTER:
-            raise TableError('%s: only %d measurements with %s true = %g m; at least %d needed for a variance'
+            raise ValueError('%s: only %d measurements with %s true = %g m; at least %d needed for a variance'
                              % (measurements.name, len(cluster.error_m), axis, cluster.truth_m, LEAST_IN_CLUSTER))
     return clusters
 
 
 def read_table(path, axis):
-    """Read a CSV table that has at least the columns of an axis, 'X' or 'Z'.
+    """Read a CSV table that has at least the columns of an axis, 'X' or 'Z', as a MeasurementTable.
 
-    Returns
-    -------
-    MeasurementTable
-
-    Raises
-    ------
-    TableError
-        If the file cannot be read, a column is missing, or a cell is not a number. The message contains the line
-        number.
+    Raises ValueError, with the number of the line, if the table is invalid.
     """
     try:
         with open(path, encoding='utf-8-sig', newline='') as stream:
             reader = csv.DictReader(stream)
-            columns = [name.strip() for name in reader.fieldnames or ()]
-            reader.fieldnames = columns
-            for kind in ('measured', 'true'):
-                if '%s %s' % (axis, kind) not in columns:
-                    raise TableError('%s: no column "%s %s"; there are: %s'
-                                     % (path, axis, kind, ', '.join(columns) or 'none'))
+            columns = reader.fieldnames = [name.strip() for name in reader.fieldnames or ()]
+            for column in (axis + ' measured', axis + ' true'):
+                if column not in columns:
+                    raise ValueError('%s: no column "%s"; there are: %s' % (path, column, ', '.join(columns) or 'none'))
             rows = [[_axis_of(row, name, '%s, line %d' % (path, reader.line_num)) for name in AXES] for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise TableError('%s: cannot be read as a table (%s)' % (path, error))
+        raise ValueError('%s: cannot be read as a table (%s)' % (path, error))
     if not rows:
-        raise TableError('%s: a table without rows' % path)
+        raise ValueError('%s: a table without rows' % path)
     values_m = np.array(rows).reshape(-1, 2, 2) / 1000  # row, axis, (measured, true)
     measured_m = np.stack((values_m[:, 0, 0], np.zeros(len(rows)), values_m[:, 1, 0]), axis=1)
     return MeasurementTable(path, measured_m, values_m[:, :, 1], np.zeros(len(rows), bool))
 
 
 def read_session_measurements(folder, estimator):
-    """Apply an estimator to a measurement session.
+    """Apply an estimator to the frames with ground truth of a measurement session, and return a MeasurementTable.
 
-    Parameters
-    ----------
-    folder : str
-    estimator : str
-        Name for `estimator_named`, or 'recorded' for the estimates stored in the session.
-
-    Returns
-    -------
-    MeasurementTable
-        Measurements of the frames with ground truth and an estimate.
-
-    Raises
-    ------
-    ValueError
-        If the session cannot be read, or none of its frames can be used.
+    `estimator` is a name for `estimator_named`, or 'recorded' for the estimates stored in the session. Raises
+    ValueError if the session cannot be read, or none of its frames has ground truth and an estimate.
     """
-    session = read_session(folder)
-    found = [(frame, _estimate(frame, session, estimator)) for frame in session.frames if frame.truth_m is not None]
-    found = [(frame, position_m) for frame, position_m in found if position_m is not None]
-    if not found:
-        raise TableError('%s: no frame with ground truth and an estimate (%s)' % (folder, estimator))
-    return MeasurementTable(str(folder), np.array([position_m for _frame, position_m in found]),
-                            np.array([frame.truth_m for frame, _position in found]),
-                            np.array([_is_cut(frame, session.camera) for frame, _position in found]))
+    session, measured_m, truth_m, cut = read_session(folder), [], [], []
+    for frame in session.frames:
+        position_m = None if frame.truth_m is None else _estimate(frame, session, estimator)
+        if position_m is not None:
+            measured_m.append(position_m)
+            truth_m.append(frame.truth_m)
+            cut.append(_is_cut(frame, session.camera))
+    if not measured_m:
+        raise ValueError('%s: no frame with ground truth and an estimate (%s)' % (folder, estimator))
+    return MeasurementTable(str(folder), np.array(measured_m), np.array(truth_m), np.array(cut))
 
 
 def _estimate(frame, session, name):
@@ -162,10 +127,10 @@ def _axis_of(row, axis, where):
     measured, true, error = (_number(row.get('%s %s' % (axis, kind)), where, '%s %s' % (axis, kind))
                              for kind in ('measured', 'true', 'error'))
     if np.isnan(measured) != np.isnan(true):
-        raise TableError('%s: "%s measured" is %g and "%s true" is %g; both or none expected'
+        raise ValueError('%s: "%s measured" is %g and "%s true" is %g; both or none expected'
                          % (where, axis, measured, axis, true))
     if abs(measured - true - error) > ROUNDING_MM:
-        raise TableError('%s: "%s error" is %g, but measured minus true is %g'
+        raise ValueError('%s: "%s error" is %g, but measured minus true is %g'
                          % (where, axis, error, measured - true))
     return measured, true
 
@@ -178,5 +143,5 @@ def _number(text, where, column):
     except ValueError:
         number = np.inf
     if not np.isfinite(number):
-        raise TableError('%s: "%s" is %.40r; a number of millimetres expected' % (where, column, text))
+        raise ValueError('%s: "%s" is %.40r; a number of millimetres expected' % (where, column, text))
     return number

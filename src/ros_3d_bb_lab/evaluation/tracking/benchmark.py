@@ -1,29 +1,31 @@
 """Comparison of our tracker, the thesis' and Norfair on the same detections from robots among pedestrians."""
+import time
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb_lab.evaluation.baselines.norfair_baseline import Norfair
 from ros_3d_bb_lab.evaluation.baselines.oracle_association import outputs_with_perfect_association
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker, as_it_arrived
+from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
+from ros_3d_bb_lab.evaluation.tracking.detection_generator import SimulatedDetection
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
-from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, simulate
-from ros_3d_bb_lab.evaluation.tracking.timing import PEOPLE, cpu_ms
+from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, detection_of, simulate, view_of
 
-ROWS = (('hota', '%.1f'), ('assa', '%.1f'), ('deta', '%.1f'), ('mota', '%.1f'), ('idf1', '%.1f'),
-        ('id_switches', '%d'), ('fragmentations', '%d'), ('recall', '%.1f'), ('precision', '%.1f'),
-        ('position_rmse_m', '%.3f'), ('velocity_rmse_mps', '%.3f'), ('ade_1s_m', '%.3f'), ('fde_1s_m', '%.3f'),
-        ('ade_2s_m', '%.3f'), ('fde_2s_m', '%.3f'), ('coverage_95_position', '%.3f'),
-        ('coverage_95_velocity', '%.3f'), ('coverage_95_1s', '%.3f'), ('coverage_95_2s', '%.3f'))
+# CPU time: people walk in circles around fixed places, on an area that grows with their number
+PEOPLE = (5, 20, 100)
+AREA_M2 = 1.0  # per person
+CIRCLE_M, TURNS_HZ = 0.3, 0.3
+WARM_UP, MEASURED, RATE_HZ = 15, 45, 30
+SIZE_M = (0.5, 1.7)
 
 
 class Contestant(NamedTuple):
-    """Tracker to be compared.
-
-    `name` is its name in the results, `make` creates a tracker, and `outputs(make, run)` returns what it publishes on a
-    run.
-    """
+    """Tracker to be compared: `make` creates it, and `outputs(make, run)` returns what it publishes on a run."""
 
     name: str
     make: Any
@@ -51,41 +53,64 @@ def runs_of(sequences, seed, repetitions, seconds=SECONDS):
                 yield simulate(sequence, motion, (seed, repetition), seconds=seconds)
 
 
-def compare(runs, contestants, on_run=None):
-    """Score each tracker on all runs. Returns {name: scores}, without `cpu_ms`.
+def compare(runs, contestants):
+    """Score each tracker on all runs, and print its HOTA on each. Returns {name: scores}, without `cpu_ms`.
 
-    Parameters
-    ----------
-    runs : iterable of run_generator.Run
-    contestants : sequence of Contestant
-    on_run : callable, optional
-        Called after each run with the run and its {name: scores}.
-
-    Raises
-    ------
-    ValueError
-        If there are no runs, or an optional library is not installed.
+    Raises ValueError if an optional library is not installed.
     """
     scores = {contestant.name: [] for contestant in contestants}
     for run in runs:
         for contestant in contestants:
             scores[contestant.name].append(score_run(run, contestant.outputs(contestant.make, run)))
-        if on_run is not None:
-            on_run(run, {name: scores_of(run_scores[-1:]) for name, run_scores in scores.items()})
+        print('  %-24s %4d images, HOTA %s' % (run.name, len(run.images), ', '.join(
+            '%s %.1f' % (name, scores_of(run_scores[-1:])['hota']) for name, run_scores in scores.items())), flush=True)
     return {name: scores_of(run_scores) for name, run_scores in scores.items()}
 
 
-def cpu_times(contestants):
-    """Median CPU time of an update in milliseconds, {name: {number of people as text: time}}."""
-    return {contestant.name: {'%d' % people: cpu_ms(contestant.make, people) for people in PEOPLE}
-            for contestant in contestants}
+def cpu_ms(make_tracker, people):
+    """Median CPU time of an update in milliseconds, with `people` people that are detected in every image."""
+    tracker, spent_s = make_tracker(), []
+    for stamp_ns, detections, view in crowd(people, WARM_UP + MEASURED):
+        begin_s = time.process_time()
+        tracker.update(stamp_ns, detections, view)
+        spent_s.append(time.process_time() - begin_s)
+    return 1e3 * float(np.median(spent_s[WARM_UP:]))
+
+
+def crowd(people, images):
+    """Yield images (stamp_ns, detections, view) of a crowd in the field of view."""
+    random, camera = np.random.RandomState(people), CameraModel()
+    view = view_of(np.zeros(3), camera)
+    farthest_m = np.sqrt(2 * people * AREA_M2 / camera.field_of_view + 1)
+    range_m = np.sqrt(random.uniform(1, farthest_m ** 2, people))
+    bearing = random.uniform(-0.45, 0.45, people) * camera.field_of_view
+    phase = random.uniform(0, 2 * np.pi, people)
+    for number in range(images):
+        angle = phase + 2 * np.pi * TURNS_HZ * number / RATE_HZ
+        depth_m = range_m * np.cos(bearing) + CIRCLE_M * np.cos(angle)
+        left_m = range_m * np.sin(bearing) + CIRCLE_M * np.sin(angle)
+        depth_m += random.normal(size=people) * camera.depth_sigma_m(depth_m)
+        left_m += random.normal(size=people) * camera.side_floor_m
+        found = [SimulatedDetection(np.arctan2(left_m[row], depth_m[row]), depth_m[row], SIZE_M[0], SIZE_M[1], False,
+                                    row)
+                 for row in range(people)]
+        yield (number + 1) * NS // RATE_HZ, [detection_of(box, view, camera) for box in found], view
 
 
 def table(trackers):
     """Format {name: scores} as lines of text."""
     lines = ['%-22s' % '' + ''.join('%20s' % name for name in trackers)]
-    rows = [(key, [form % scores[key] if scores[key] is not None else '-' for scores in trackers.values()])
-            for key, form in ROWS]
-    rows += [('cpu_ms, %s people' % people, ['%.2f' % scores['cpu_ms'][people] for scores in trackers.values()])
-             for people in list(trackers.values())[0]['cpu_ms']]
-    return lines + ['%-22s' % key + ''.join('%20s' % value for value in values) for key, values in rows]
+    for key in list(trackers.values())[0]:
+        if key != 'cpu_ms':
+            lines.append('%-22s' % key + ''.join('%20s' % _text(key, scores[key]) for scores in trackers.values()))
+    for people in list(trackers.values())[0]['cpu_ms']:
+        times = ''.join('%20.2f' % scores['cpu_ms'][people] for scores in trackers.values())
+        lines.append('%-22s' % ('cpu_ms, %s people' % people) + times)
+    return lines
+
+
+def _text(key, value):
+    """Percentages have one digit, lengths and shares three."""
+    if value is None or isinstance(value, int):
+        return '-' if value is None else str(value)
+    return '%.3f' % value if '_' in key else '%.1f' % value

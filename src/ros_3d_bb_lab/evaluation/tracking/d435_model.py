@@ -18,24 +18,16 @@ HEIGHT_SIGMA_M = 0.1  # of the centre, as in the error models in config/error_mo
 
 
 class CameraModel(NamedTuple):
-    """Camera with its detector and its calibration.
+    """Camera with its detector and its calibration; lengths in metres, times in seconds.
 
-    `field_of_view` is in radians; the image is sharp from the depth `nearest_m` to the range `farthest_m`.
-
-    Depth errors consist of the stereo error with `matching_px`, `focal_px` and `baseline_m`, of `depth_floor_m`
-    (independent in each image), and of `slow_depth_m` with the correlation time `slow_s`. Lateral errors consist of
-    `side_floor_m` and `slow_side_m`. `sway_m` is the amplitude of the lateral sway of a walking person. `bias_left` is
-    the share of the thesis' bias that remains after calibration. An outlier has a depth error in the interval
-    `outlier_m` (from, to), as from background in the box.
-
-    `outlier_share` and `miss_share` are shares of the time, in intervals of the mean length `outlier_s` and `miss_s`.
-    `false_rate` is the probability per image of a new false detection, which lasts for `false_s` on average.
-    `double_share` is the probability that a detection has a duplicate.
+    Depth errors consist of the stereo error with `matching_px`, of `depth_floor_m` (independent in each image), and of
+    `slow_depth_m` with the correlation time `slow_s`. Outliers are intervals with a depth error between the limits
+    `outlier_m`, as from background in the box. Outliers and misses have a share of the time and a mean length.
     """
 
-    field_of_view: float = np.radians(69.0)
-    nearest_m: float = 0.3
-    farthest_m: float = 6.0
+    field_of_view: float = np.radians(69.0)  # radians
+    nearest_m: float = 0.3  # depth from which the image is sharp
+    farthest_m: float = 6.0  # range up to which it is
     focal_px: float = 614.7
     baseline_m: float = 0.05
     matching_px: float = 0.08
@@ -44,16 +36,16 @@ class CameraModel(NamedTuple):
     slow_depth_m: float = 0.035
     slow_side_m: float = 0.015
     slow_s: float = 0.5
-    sway_m: float = 0.02
-    bias_left: float = 0.2
+    sway_m: float = 0.02  # amplitude of the lateral sway of a walking person
+    bias_left: float = 0.2  # share of the thesis' bias that remains after calibration
     outlier_share: float = 0.05
     outlier_s: float = 0.05
     outlier_m: tuple = (0.15, 1.0)
     miss_share: float = 0.1
     miss_s: float = 0.1
-    false_rate: float = 0.01
-    false_s: float = 0.1
-    double_share: float = 0.02
+    false_rate: float = 0.01  # probability per image of a new false detection
+    false_s: float = 0.1  # its mean duration
+    double_share: float = 0.02  # probability that a detection has a duplicate
 
     @property
     def intrinsics(self):
@@ -67,10 +59,7 @@ class CameraModel(NamedTuple):
         return np.hypot(self.depth_floor_m, np.square(depth_m) * self.matching_px / (self.focal_px * self.baseline_m))
 
     def covariance_m2(self, bearing, depth_m):
-        """Covariance of a position according to an error model, (3, 3) in the optical frame, square metres.
-
-        The errors along and across the ray include the slow part, as in a fit to many measurements.
-        """
+        """Covariance of a position, (3, 3) in the optical frame, of the independent and the slow errors."""
         along_m2 = self.depth_sigma_m(depth_m) ** 2 + self.slow_depth_m ** 2
         across_m2 = self.side_floor_m ** 2 + self.slow_side_m ** 2
         right, forward = -np.sin(bearing), np.cos(bearing)
@@ -81,10 +70,9 @@ class CameraModel(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """Visibility of people (n,) in an image.
+    """Visibility of people (n,) in an image: the largest visible part of each.
 
-    `share` is the width of the largest visible part relative to the width of the person, 0..1, `middle` is its bearing,
-    and `cut` is whether the image border truncates it.
+    `share` is its share of the width of the person, `middle` its bearing, `cut` whether the image border truncates it.
     """
 
     share: np.ndarray
@@ -106,18 +94,10 @@ def half_width(range_m):
 
 
 def shown(bearing, half, range_m, half_view):
-    """Visible parts of cylinders with angular half-widths around their bearings, occluded by nearer ones.
+    """Visible parts of cylinders (n,) with angular half-widths around their bearings, occluded by nearer ones.
 
-    The field of view extends from -`half_view` to `half_view`.
-
-    Parameters
-    ----------
-    bearing, half, range_m : numpy.ndarray, (n,)
-
-    Returns
-    -------
-    Shown
-        `middle` is equal to `bearing` for people that are not visible.
+    The field of view extends from -`half_view` to `half_view`. Returns Shown; `middle` is equal to `bearing` for people
+    that are not visible.
     """
     result = Shown(np.zeros(len(bearing)), np.array(bearing, float), np.zeros(len(bearing), bool))
     nearer = []

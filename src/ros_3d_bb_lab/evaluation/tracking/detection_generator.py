@@ -17,11 +17,7 @@ FALSE_SIDE_M, FALSE_DEPTH_M = 0.02, 0.04
 
 
 class SimulatedDetection(NamedTuple):
-    """3D box of a simulated detector.
-
-    `depth_m` is along the optical axis, width and height are in metres, `cut` is whether the image border truncates the
-    box, and `source` is the ID of the person, or FALSE or DOUBLE.
-    """
+    """3D box; `cut` is whether the image border truncates it, `source` the ID of the person, or FALSE or DOUBLE."""
 
     bearing: float
     depth_m: float
@@ -32,11 +28,7 @@ class SimulatedDetection(NamedTuple):
 
 
 class DetectablePerson(NamedTuple):
-    """Person that is visible in an image.
-
-    `person` is the ID, `depth_m` is the depth of the centre, `middle`, `share` and `cut` are as in `d435_model.Shown`,
-    and `heading` is relative to the camera.
-    """
+    """Person visible in an image, with the fields of `d435_model.Shown`; `heading` is relative to the camera."""
 
     person: int
     depth_m: float
@@ -49,16 +41,7 @@ class DetectablePerson(NamedTuple):
 
 
 class Detector(object):
-    """Detector of people (0 .. people - 1) with errors that are correlated between images.
-
-    Parameters
-    ----------
-    camera : CameraModel
-    people : int
-    period_s : float
-        Interval between images.
-    random : numpy.random.RandomState
-    """
+    """Detector of people (0 .. people - 1) in images every `period_s`, with errors correlated between images."""
 
     def __init__(self, camera, people, period_s, random):
         self._camera, self._period_s, self._random = camera, period_s, random
@@ -70,10 +53,7 @@ class Detector(object):
         self._false_m = np.zeros((0, 2))
 
     def advance(self, pose):
-        """Advance to the next image, taken at the true camera pose `pose`.
-
-        This must be called for each image, including lost ones.
-        """
+        """Advance to the next image, taken at the true camera pose `pose`. To be called for lost images, too."""
         camera, random = self._camera, self._random
         kept = np.exp(-self._period_s / camera.slow_s)
         self._slow = kept * self._slow + np.sqrt(1 - kept ** 2) * random.normal(size=self._slow.shape)
@@ -87,18 +67,10 @@ class Detector(object):
             self._false_m = np.concatenate((self._false_m, [place_m]))
 
     def find(self, seen, pose, time_s):
-        """Detect people in the current image. The detections are in random order.
+        """Detect people in the current image.
 
-        Parameters
-        ----------
-        seen : list of DetectablePerson
-        pose : numpy.ndarray, (3,)
-            True pose of the camera.
-        time_s : float
-
-        Returns
-        -------
-        list of SimulatedDetection
+        `seen` is a list of DetectablePerson and `pose` (3,) the true camera pose. Returns a list of SimulatedDetection
+        in random order.
         """
         found = []
         for person in seen:
@@ -110,10 +82,7 @@ class Detector(object):
         return [found[number] for number in self._random.permutation(len(found))]
 
     def _switched(self, on, share, stretch_s):
-        """Next state of a two-state Markov chain.
-
-        The state is on for a `share` of the time, in intervals of the mean length `stretch_s`.
-        """
+        """Next state of a Markov chain that is on for a `share` of the time, for `stretch_s` on average."""
         ends = -np.expm1(-self._period_s / stretch_s)
         drawn = self._random.uniform(size=len(on))
         return np.where(on, drawn > ends, drawn < ends * share / (1 - share))
@@ -127,7 +96,6 @@ class Detector(object):
         return self._random.uniform() <= FOUND_WHEN_HARD + (1 - FOUND_WHEN_HARD) * ease
 
     def _found(self, seen, time_s):
-        """Detection of a person."""
         camera, random, person = self._camera, self._random, seen.person
         sway_m = (camera.sway_m * np.sin(2 * np.pi * STEP_HZ * time_s + self._phase[person])
                   * min(1.0, seen.speed_mps / WALKING_MPS))
@@ -143,7 +111,6 @@ class Detector(object):
         return SimulatedDetection(seen.middle + side_m / seen.range_m, depth_m, width_m, height_m, seen.cut, person)
 
     def _double(self, box):
-        """Duplicate detection of the same person."""
         random = self._random
         depth_m = box.depth_m + abs(random.normal(0, DEEP_DOUBLE_M))
         side_m = box.depth_m * np.tan(box.bearing) + random.normal(0, SIDE_DOUBLE_M)
@@ -151,7 +118,6 @@ class Detector(object):
                                   self._height_m[box.source] * random.uniform(0.6, 1), box.cut, DOUBLE)
 
     def _false(self, pose):
-        """False detections in the field of view."""
         random, found = self._random, []
         for forward_m, left_m in to_frame(pose, self._false_m):
             if forward_m > 0 and abs(np.arctan2(left_m, forward_m)) < self._camera.field_of_view / 2:

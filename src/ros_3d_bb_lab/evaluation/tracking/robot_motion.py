@@ -15,9 +15,8 @@ STANDING, DRIVING = 'standing', 'driving'
 class OdometryModel(NamedTuple):
     """Errors of the odometry.
 
-    `distance_scale` and `turn_scale` are standard deviations of constant scale errors. `step_m` (metres) and `turn`
-    (radians) are those of the random walk over one metre; they grow with the square root of the distance. `position_m`
-    and `heading` (radians) are those of the noise of a single pose.
+    Standard deviations of the constant scale errors, of the random walk over one metre (`step_m`, `turn`), which grows
+    with the square root of the distance, and of the noise of a single pose (`position_m`, `heading`).
     """
 
     distance_scale: float = 0.02
@@ -28,30 +27,11 @@ class OdometryModel(NamedTuple):
     heading: float = np.radians(0.15)
 
 
-class Path(NamedTuple):
-    """True and odometry poses of a robot, (n, 3) every `PERIOD_S`. Both start at the same pose."""
-
-    true: np.ndarray
-    odometry: np.ndarray
-
-    def true_at(self, time_s):
-        """True pose (3,)."""
-        return _at(self.true, time_s)
-
-    def odometry_at(self, time_s):
-        """Odometry pose (3,)."""
-        return _at(self.odometry, time_s)
-
-
-def _at(poses, time_s):
+def pose_at(poses, time_s):
+    """Pose (3,) at a time, interpolated from poses (n, 3) every `PERIOD_S`."""
     row = time_s / PERIOD_S
     before = int(np.clip(np.floor(row), 0, len(poses) - 2))
     return poses[before] + (row - before) * (poses[before + 1] - poses[before])
-
-
-def standing(place_m, heading, seconds):
-    """Poses (n, 3) of a standing robot."""
-    return np.tile(np.append(place_m, heading), (int(round(seconds / PERIOD_S)) + 1, 1))
 
 
 def driving(place_m, heading, phase, seconds):
@@ -67,8 +47,8 @@ def driving(place_m, heading, phase, seconds):
     return np.stack((place_m[0] + cos * x_m - sin * y_m, place_m[1] + sin * x_m + cos * y_m, towards + heading), axis=1)
 
 
-def with_odometry(true, model, random):
-    """Simulate odometry for true poses (n, 3) by integrating noisy steps. Returns a Path."""
+def odometry_of(true, model, random):
+    """Simulate the odometry poses (n, 3) for true poses by integrating noisy steps from the first true pose."""
     steps = np.diff(true, axis=0)
     cos, sin = np.cos(true[:-1, 2]), np.sin(true[:-1, 2])
     forward_m, left_m = cos * steps[:, 0] + sin * steps[:, 1], cos * steps[:, 1] - sin * steps[:, 0]
@@ -80,12 +60,7 @@ def with_odometry(true, model, random):
     cos, sin = np.cos(heading[:-1]), np.sin(heading[:-1])
     moves_m = np.stack((cos * forward_m - sin * left_m, sin * forward_m + cos * left_m), axis=1)
     places_m = true[0, :2] + np.concatenate((np.zeros((1, 2)), np.cumsum(moves_m, axis=0)))
-    return Path(true, np.column_stack((places_m, heading)))
-
-
-def jittered(pose, model, random):
-    """Odometry pose (3,) with the noise of a single tf lookup."""
-    return pose + random.normal(0, (model.position_m, model.position_m, model.heading))
+    return np.column_stack((places_m, heading))
 
 
 def to_frame(pose, points_m):

@@ -13,8 +13,7 @@ from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView,
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel, half_width, shown
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import HARD_TO_SEE, DetectablePerson, Detector
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import (PERIOD_S, STANDING, OdometryModel, bearing_of, driving,
-                                                            from_frame, jittered, standing, to_frame, turned,
-                                                            with_odometry)
+                                                            from_frame, odometry_of, pose_at, to_frame, turned)
 
 HORIZONS_S = np.array([0.5, 1.0, 1.5, 2.0])  # prediction horizons that are evaluated
 CAMERA_HEIGHT_M = 0.5
@@ -22,15 +21,12 @@ START_S = 100.0  # stamp of the first image
 SECONDS = 60.0
 AROUND_M = (0.05, 9.0)  # people in this range of the robot are in the ground truth and occlude others
 STAYS_S = 1.5  # after the end of the recording, a track of the person is not an error for this time
-TRIES, LOOKED_AT_S = 25, 3.0  # random starts, and the interval for counting people in view
+TRIES, COUNTED_EVERY_S = 25, 3.0  # random starts, and the interval for counting people in view
 OPTICAL_FROM_BODY = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], float)
 
 
 class Timing(NamedTuple):
-    """Timing of images and detections, in seconds and shares of the images.
-
-    Stalls occur at the rate `stalls_hz`; a stall loses all images for `stall_s`.
-    """
+    """Timing of images and detections, in seconds and shares of the images. A stall loses all images for `stall_s`."""
 
     rate_hz: float = 30.0
     stamp_sigma_s: float = 0.0007
@@ -44,7 +40,7 @@ class Timing(NamedTuple):
 
 
 class Models(NamedTuple):
-    """Models of camera, odometry and timing of a run."""
+    """Models of a run."""
 
     camera: CameraModel = CameraModel()
     odometry: OdometryModel = OdometryModel()
@@ -54,9 +50,9 @@ class Models(NamedTuple):
 class RunTruth(NamedTuple):
     """The n people around the robot at the time of an image, in the fixed frame according to the odometry at that time.
 
-    `status` is VISIBLE (expected to be detected, because enough of the body is in view), OCCLUDED (in view, but mostly
-    hidden) or OUT_OF_VIEW (or the recording has just ended); `future_m` (n, horizons, 2) is NaN after the end of the
-    recording; `pose` (3,) is that of the robot in the fixed frame.
+    `status` is VISIBLE (enough of the body is in view for a detection), OCCLUDED (in view, but mostly hidden) or
+    OUT_OF_VIEW (or the recording has just ended); `future_m` (n, horizons, 2) is NaN after the end of the recording;
+    `pose` (3,) is that of the robot.
     """
 
     ids: np.ndarray
@@ -70,8 +66,7 @@ class RunTruth(NamedTuple):
 class Image(NamedTuple):
     """Received image: inputs of a tracker, and ground truth.
 
-    `sources` are the person IDs of the `detections`, or FALSE or DOUBLE. `arrival_ns` is the time at which the
-    detections arrive, and `arrival_view` is the camera pose from tf at that time.
+    `sources` are the person IDs of the `detections`, or FALSE or DOUBLE. `arrival_view` is from tf at `arrival_ns`.
     """
 
     stamp_ns: int
@@ -92,10 +87,7 @@ class Run(NamedTuple):
 
 
 class _Walks(NamedTuple):
-    """People of a run at the time of each image: (images, people, 2), NaN if not present.
-
-    `ended` (images, people) is whether the recording has ended; `future_m` is (images, people, horizons, 2).
-    """
+    """People of a run (images, people, ...), NaN if not present; `ended` is whether the recording has ended."""
 
     position_m: np.ndarray
     velocity_mps: np.ndarray
@@ -104,31 +96,19 @@ class _Walks(NamedTuple):
 
 
 def simulate(sequence, motion, seed, models=Models(), seconds=SECONDS):
-    """Simulate a run of a robot among the people of a sequence.
+    """Simulate a run of a robot among the people of a sequence. Returns a Run.
 
-    Parameters
-    ----------
-    sequence : trajectories.Sequence
-    motion : str
-        robot_motion.STANDING or robot_motion.DRIVING.
-    seed : int or sequence of int
-    models : Models
-    seconds : float
-        Duration; limited to that of the recording.
-
-    Returns
-    -------
-    Run
+    `motion` is STANDING or DRIVING, `seed` an int or a sequence of int, and `seconds` the maximum duration.
     """
     names = [zlib.crc32(name.encode('utf-8')) & 0xffffffff for name in (sequence.name, motion)]
     random = np.random.RandomState(np.append(np.atleast_1d(seed), names).astype(np.uint32))
     first_s, last_s = sequence.span_s
     seconds = min(seconds, last_s - first_s)
     start_s, true = _busiest(sequence, motion, seconds, models.camera, random)
-    path = with_odometry(true, models.odometry, random)
+    odometry = odometry_of(true, models.odometry, random)
     times_s = np.arange(0, seconds, 1 / models.timing.rate_hz)
     walks = _walks(sequence.pedestrians, start_s + times_s)
-    images = _images(path, times_s, walks, models, random)
+    images = _images(true, odometry, times_s, walks, models, random)
     return Run('%s_%s' % (sequence.name, motion), models.camera, tuple(images))
 
 
@@ -142,12 +122,13 @@ def _busiest(sequence, motion, seconds, camera, random):
         if motion == STANDING:
             place_m = random.uniform(low_m, high_m)
             towards_m = sequence.points_m[random.randint(len(sequence.points_m))]
-            poses = standing(place_m, bearing_of(towards_m - place_m), seconds + 1)
+            pose = np.append(place_m, bearing_of(towards_m - place_m))
+            poses = np.tile(pose, (int(round((seconds + 1) / PERIOD_S)) + 1, 1))
         else:
             place_m = (low_m + high_m) / 2 + random.normal(0, 0.8, 2)
             poses = driving(place_m, random.uniform(0, 2 * np.pi), random.uniform(), seconds + 1)
         count = sum(_in_view(sequence.pedestrians, start_s + time_s, poses[int(time_s / PERIOD_S)], camera)
-                    for time_s in np.arange(0, seconds, LOOKED_AT_S))
+                    for time_s in np.arange(0, seconds, COUNTED_EVERY_S))
         if best is None or count > best[0]:
             best = count, start_s, poses
     return best[1:]
@@ -183,12 +164,13 @@ def _walks(pedestrians, times_s):
     return walks
 
 
-def _images(path, times_s, walks, models, random):
-    """Yield the received images in order."""
+def _images(true, odometry, times_s, walks, models, random):
+    """Yield the received images in order. `true` and `odometry` are poses of the robot."""
     timing, detector = models.timing, Detector(models.camera, walks.ended.shape[1], 1 / models.timing.rate_hz, random)
+    pose_noise = models.odometry.position_m, models.odometry.position_m, models.odometry.heading
     arrived_s, stalled_until_s = -np.inf, -np.inf
     for row, time_s in enumerate(times_s):
-        pose = path.true_at(time_s)
+        pose = pose_at(true, time_s)
         detector.advance(pose)
         if random.uniform() < timing.stalls_hz / timing.rate_hz:
             stalled_until_s = time_s + timing.stall_s
@@ -196,17 +178,17 @@ def _images(path, times_s, walks, models, random):
             continue
         latency_s = max(timing.least_latency_s, random.normal(timing.latency_s, timing.latency_sigma_s))
         arrived_s = max(time_s + latency_s, arrived_s + timing.least_gap_s)
-        truth, seen = _looked_at(walks, row, pose, path.odometry_at(time_s), models.camera)
+        truth, seen = _observe(walks, row, pose, pose_at(odometry, time_s), models.camera)
         found = detector.find(seen, pose, time_s)
-        measured, later = (jittered(path.odometry_at(when_s), models.odometry, random)
-                           for when_s in (time_s, arrived_s))
+        measured, later = (pose_at(odometry, when_s) + random.normal(0, pose_noise) for when_s in (time_s, arrived_s))
         view = view_of(measured, models.camera)
         stamp_s = START_S + time_s + random.normal(0, timing.stamp_sigma_s)
-        yield Image(_nanoseconds(stamp_s), [detection_of(box, view, models.camera) for box in found], view, truth,
-                    [box.source for box in found], _nanoseconds(START_S + arrived_s), view_of(later, models.camera))
+        stamp_ns, arrival_ns = (int(round(when_s * NS)) for when_s in (stamp_s, START_S + arrived_s))
+        yield Image(stamp_ns, [detection_of(box, view, models.camera) for box in found], view, truth,
+                    [box.source for box in found], arrival_ns, view_of(later, models.camera))
 
 
-def _looked_at(walks, row, pose, odometry, camera):
+def _observe(walks, row, pose, odometry, camera):
     """RunTruth of an image, and its list of DetectablePerson."""
     local_m = to_frame(pose, walks.position_m[row])
     range_m = np.linalg.norm(np.where(np.isfinite(local_m), local_m, np.inf), axis=1)
@@ -247,7 +229,3 @@ def detection_of(box, view, camera):
     return Detection(rotation.dot(point_m) + view.fixed_from_camera[:3, 3],
                      np.array([box.width_m, box.width_m, box.height_m]), covariance_m2,
                      (left, False, bool(box.cut) and not left, False))
-
-
-def _nanoseconds(seconds):
-    return int(round(seconds * NS))

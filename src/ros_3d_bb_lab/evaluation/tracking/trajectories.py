@@ -17,10 +17,7 @@ PERIOD_S = 0.4  # of generated trajectories, as in common recordings
 
 
 class Pedestrian(NamedTuple):
-    """Person that is present from `start_s` to `end_s`.
-
-    `position_m` and `velocity_mps` are functions of times (n,) in seconds that return (n, 2).
-    """
+    """Person with a position and a velocity (n, 2) as functions of times (n,) from `start_s` to `end_s`."""
 
     start_s: float
     end_s: float
@@ -42,15 +39,7 @@ class Sequence(NamedTuple):
 
 
 def read_sequences(folder):
-    """Read the recordings in a folder: all `.csv` files, sorted by name.
-
-    Raises
-    ------
-    ValueError
-        If there are no files, or one of them is invalid. The message names the file.
-    OSError
-        If the folder does not exist.
-    """
+    """Read the recordings in a folder: all `.csv` files, sorted by name. Raises ValueError if there are none."""
     names = sorted(name for name in os.listdir(folder) if name.endswith('.csv'))
     if not names:
         raise ValueError('%s has no .csv file; files with the columns %s expected' % (folder, ','.join(COLUMNS)))
@@ -60,15 +49,9 @@ def read_sequences(folder):
 def read_sequence(path):
     """Read a recording: CSV with the columns t_s, id, x_m, y_m.
 
-    Points with a NaN or infinite position are treated as missing. If a person has several points at the same time, the
-    first one is used. Segments with fewer than `FEWEST_POINTS` points are left out; gaps separate segments.
-
-    Raises
-    ------
-    ValueError
-        If a column is missing, a line cannot be parsed, or no person has enough points.
-    OSError
-        If the file does not exist.
+    Points with a NaN or infinite position are treated as missing. Of several points of a person at the same time, the
+    first one is used. Segments between gaps with fewer than `FEWEST_POINTS` points are left out. Raises ValueError if a
+    column is missing, a line cannot be parsed, or no person has enough points; the message names the file.
     """
     with open(path, newline='', encoding='utf-8-sig') as stream:
         reader = csv.DictReader(stream)
@@ -88,12 +71,13 @@ def _row(path, number, line):
         if not np.isfinite(time_s):
             raise ValueError
     except (TypeError, ValueError):
-        raise ValueError('%s, line %d: %s is no point' % (path, number, ','.join(str(line[name]) for name in COLUMNS)))
+        values = ','.join(str(line[name]) for name in COLUMNS)
+        raise ValueError('%s, line %d: %s is not a point' % (path, number, values))
     return line['id'], time_s, x_m, y_m
 
 
 def _sequence(source, name, rows):
-    """Sequence of rows (id, time_s, x_m, y_m). Raises ValueError if no person has enough points."""
+    """Sequence of rows (id, time_s, x_m, y_m)."""
     points = {}
     for identity, time_s, x_m, y_m in rows:
         if np.isfinite(x_m) and np.isfinite(y_m):
@@ -108,7 +92,7 @@ def _sequence(source, name, rows):
                 people.append(pedestrian_of(part_s, part_m))
                 all_points.append(part_m)
     if not people:
-        raise ValueError('%s: nobody has %d points without a gap of more than %g s'
+        raise ValueError('%s: no person has %d points without a gap of more than %g s'
                          % (source, FEWEST_POINTS, LONGEST_GAP_S))
     return Sequence(name, tuple(people), np.concatenate(all_points))
 
@@ -138,10 +122,7 @@ def _smoothed(times_s, points_m):
 
 
 def made_sequences(seed, seconds=90):
-    """Generate sequences: one with few and one with many people, some of them in pairs, some standing.
-
-    People do not avoid each other.
-    """
+    """Generate sequences with few and many people, some in pairs, some standing. They do not avoid each other."""
     return [_made('made_%s' % name, np.random.RandomState([seed, people]), people, seconds)
             for name, people in (('sparse', 30), ('dense', 90))]
 

@@ -4,7 +4,6 @@ from std_msgs.msg import Header
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import TF_TOPIC, CameraFrame, frame_id_of, messages_of, topic_of
 from ros_3d_bb.conversions.perception_msgs import time_from, tracks_to_msg
-from ros_3d_bb_lab.simulation.ground_truth import truth_at
 
 TRUTH_TOPIC = 'ground_truth'
 MAP_FRAME, ODOM_FRAME, BASE_FRAME = 'map', 'odom', 'base_link'
@@ -22,5 +21,5 @@ def simulated_messages(simulator, frame, stamp_ns):
                         DepthImage(frame.depth_mm, 0.001), chain)
     messages = [(topic_of(frame.camera, topic) if topic != TF_TOPIC else topic, message)
                 for topic, message in messages_of(taken)]
-    truth = tracks_to_msg(truth_at(simulator, frame, stamp_ns), Header(stamp=stamp, frame_id=MAP_FRAME))
+    truth = tracks_to_msg(simulator.true_tracks(frame, stamp_ns), Header(stamp=stamp, frame_id=MAP_FRAME))
     return messages + [(TRUTH_TOPIC, truth)]

@@ -1,6 +1,5 @@
 """ROS node that simulates a robot with a camera among people."""
 import sys
-import threading
 import time
 from typing import NamedTuple
 
@@ -12,9 +11,9 @@ from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.params import WAIT_FOR_SUBSCRIBERS, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
-from ros_3d_bb.nodes.common.diagnostics import Diagnostics, is_ending
-from ros_3d_bb.nodes.common.startup import read_params, run_node
-from ros_3d_bb.nodes.common.wait_for_subscribers import wait_for_subscribers
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.master import is_ending
+from ros_3d_bb.nodes.common.startup import read_params, run_node, wait_for_subscribers
 from ros_3d_bb_lab.simulation.ros.simulator_msgs import TRUTH_TOPIC, simulated_messages
 from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
 from ros_3d_bb_lab.simulation.simulator import Simulator
@@ -35,10 +34,10 @@ class SimulatorParams(NamedTuple):
         'scenario.', limits=(-1, 2 ** 32 - 1))
     publish_clock: bool = Param(
         False, 'Whether this node publishes the time on /clock (set /use_sim_time too). Then stamps are the same in '
-        'every run, and time waits where the machine is too slow. Else stamps are the time of the machine, and images '
-        'are left out.')
+        'every run, and time waits if the machine is too slow. Otherwise, stamps are the time of the machine, and late '
+        'images are skipped.')
     speed: float = Param(1.0, 'Speed of the published time; 1: real time.', limits=(0.001, 1000))
-    repeat: bool = Param(True, 'Whether the scene starts again 3 s after its end. Else the node ends.')
+    repeat: bool = Param(True, 'Whether the scene starts again 3 s after its end. Otherwise, the node exits.')
     wait_for_subscribers: int = WAIT_FOR_SUBSCRIBERS
 
 
@@ -80,40 +79,29 @@ class SimulatorNode(object):
         self._pubs = {topic: rospy.Publisher(topic, kind, queue_size=10) for topic, kind in kinds.items()}
         self._pubs[TF_TOPIC] = rospy.Publisher('/' + TF_TOPIC, TYPES[TF_TOPIC], queue_size=10)
         self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=10) if self._params.publish_clock else None
-        self.failed = False
-        self._worker = threading.Thread(target=self._run)
-        self._worker.daemon = True
-        self._worker.start()
 
-    def _run(self):
-        """Play the scene once or repeatedly, in a separate thread from which rospy can publish."""
+    def run(self):
+        """Play the scene once or repeatedly. If this fails, the exit status is 1."""
         try:
-            self._wait_for_subscribers()
+            for camera in self._simulator.cameras:
+                # The time is published meanwhile, because rosbag and other nodes subscribe only after it is valid.
+                wait_for_subscribers(self._pubs[topic_of(camera, COLOR_TOPIC)], self._params.wait_for_subscribers,
+                                     lambda: self._publish_clock(START_NS))
             start_ns = START_NS + CLOCK_LEAD_NS if self._clock_pub is not None else rospy.get_rostime().to_nsec()
             while not rospy.is_shutdown():
                 self._play(start_ns)
-                if not self._params.repeat and not rospy.is_shutdown():
+                if not self._params.repeat:
                     rospy.loginfo('the scene is over')
-                    rospy.signal_shutdown('the scene is over')
+                    break
                 if self._clock_pub is not None:
                     start_ns += int(self._simulator.scenario.duration * NS) + PAUSE_NS
                 else:
                     time.sleep(PAUSE_NS / NS)
                     start_ns = rospy.get_rostime().to_nsec()
-        except Exception as error:  # the node is useless without this thread, so it shuts down
+        except Exception as error:
             if not is_ending():
-                self.failed = True
                 rospy.logfatal('the simulation ends: %s: %s', type(error).__name__, error)
-                rospy.signal_shutdown('the simulation failed')
-
-    def _wait_for_subscribers(self):
-        """Wait for subscribers, and publish the time meanwhile.
-
-        Some nodes, such as rosbag, subscribe only after the time is valid.
-        """
-        for camera in self._simulator.cameras:
-            wait_for_subscribers(self._pubs[topic_of(camera, COLOR_TOPIC)], self._params.wait_for_subscribers,
-                                 lambda: self._tell_time(START_NS))
+                sys.exit(1)
 
     def _play(self, start_ns):
         """Play the scene once, with the first image at `start_ns`."""
@@ -127,7 +115,7 @@ class SimulatorNode(object):
             if self._clock_pub is None:
                 missed = int((time.monotonic() - began_s) * self._simulator.rate) - number
                 if missed > 0:
-                    self._diagnostics.count('images left out', missed)
+                    self._diagnostics.count('images skipped', missed)
                     number += missed
             else:
                 began_s = max(began_s, time.monotonic() - self._simulator.time_s(number) / self._params.speed)
@@ -136,13 +124,13 @@ class SimulatorNode(object):
         frame = self._simulator.frame(number)
         stamp_ns = start_ns + int(round(frame.time_s * NS))
         messages = simulated_messages(self._simulator, frame, stamp_ns)
-        self._tell_time(stamp_ns)
+        self._publish_clock(stamp_ns)
         for topic, message in messages:
             self._pubs[topic].publish(message)
         self._diagnostics.count('images')
         self._diagnostics.record_latency(time_from(stamp_ns))
 
-    def _tell_time(self, stamp_ns):
+    def _publish_clock(self, stamp_ns):
         if self._clock_pub is not None:
             self._clock_pub.publish(Clock(time_from(stamp_ns)))
 
@@ -152,8 +140,7 @@ def _scenario(params):
         raise ValueError('no scenario given; set ~scenario (launch argument scenario:=) to the path of a file such as '
                          'those in config/scenarios')
     if params.speed != 1 and not params.publish_clock:
-        raise ValueError('parameter ~speed is %g; only where this node tells the time (~publish_clock) can it go '
-                         'faster or slower' % params.speed)
+        raise ValueError('parameter ~speed is %g; without ~publish_clock, 1 expected' % params.speed)
     try:
         scenario = read_scenario(params.scenario)
     except OSError as error:
@@ -162,5 +149,5 @@ def _scenario(params):
 
 
 def main():
-    """Run the node. The exit status is 1 if the simulation fails."""
-    sys.exit(run_node('simulator_node', SimulatorNode).failed)
+    """Run the node."""
+    run_node('simulator_node', SimulatorNode, SimulatorNode.run)

@@ -1,7 +1,7 @@
-"""Model of a RealSense D435i: depth images with the errors of active stereo.
+"""Model of a RealSense D435i: depth images with the errors of active stereo, and colour images with blur and noise.
 
-The camera matches the images of two imagers. It measures the disparity d = f B / z in steps of 1/32 px, so that depth
-has levels C / n with integer n. The noise of disparity is constant, so the noise of depth grows with the square of the
+The depth camera matches the images of two imagers. It measures the disparity d = f B / z in steps of 1/32 px, so depth
+has levels C / n with integer n. The noise of disparity is constant, so that of depth grows with the square of the
 distance. Surfaces that the second imager does not see have no depth; they form a shadow to the left of near objects.
 All parameters were fitted to the images of the thesis (compared in `test/unit/test_stereo.py`). Their depth is aligned
 to the colour camera, and so is the output of this model.
@@ -13,19 +13,17 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-# The random fields are this much larger than the image; each frame uses a part at a random place. For two frames in a
-# thousand the places are so close to each other that the noise is correlated.
+# The random fields are this much larger than the image; each frame uses a random part. For two frames in a thousand
+# the parts overlap so much that the noise is correlated.
 SPARE_PX = 512
+COLOR_FIELDS, COLOR_SPARE_PX = 4, 64  # each image has one of these fields of colour noise
+BLUR_PX, GRAIN_PX = .65, .6  # sigma of the blur of colour images and of the correlation of their noise
 # A pixel is hidden from the second imager if another pixel to its right projects this much farther to the left.
 HIDDEN_BY_PX = 0.3
 
 
 class StereoParams(NamedTuple):
-    """Parameters of the camera. Disparities are in pixels of the imagers, other lengths in pixels of the colour image.
-
-    The minimum disparity is that of 20.3 m, the largest depth in 110 real frames. The maximum, that of 0.15 m, is the
-    search range of the camera.
-    """
+    """Parameters of the depth camera. Disparities are in pixels of the imagers, lengths in those of colour images."""
 
     focal_baseline_px_m: float = 19.066875  # f B of the imagers (381 px, 50 mm): levels of 610140 / n mm
     steps_per_px: int = 32                  # disparity steps per pixel
@@ -38,29 +36,14 @@ class StereoParams(NamedTuple):
     shadow_extra_px: int = 4                # extra width of shadows, because the imagers match patches
     hole_share: float = 5e-4                # share of the pixels in small holes, away from silhouettes
     hole_kernel_px: float = 1.0             # sigma of the Gaussian kernel that sets the size of holes
-    min_disparity_px: float = 30 / 32.      # range of disparity
-    max_disparity_px: float = 126.
+    min_disparity_px: float = 30 / 32.      # that of 20.3 m, the largest depth in 110 real frames
+    max_disparity_px: float = 126.          # that of 0.15 m, the search range of the camera
 
 
 class StereoCamera(object):
-    """Depth images of a simulated D435i, aligned to its colour camera.
-
-    Parameters
-    ----------
-    camera : ros_3d_bb.camera.camera_model.Camera
-        The colour camera.
-    seed : int
-        Seed of the noise of this camera, 0 to 2**32 - 1.
-    params : StereoParams
-
-    Raises
-    ------
-    ValueError
-        If a parameter (see `check_params`) or the seed is out of range.
-    """
+    """Depth images of a simulated D435i, aligned to the colour camera `camera` (camera_model.Camera)."""
 
     def __init__(self, camera, seed=0, params=StereoParams()):
-        check_params(params)
         self._shape = camera.height, camera.width
         self._seed, self._params = seed, params
         self._shadow_px_m = camera.fx * params.shadow_baseline_m
@@ -70,37 +53,17 @@ class StereoCamera(object):
         random = np.random.RandomState(seed)
         self._noise = _noise_field(field_shape, params, random)
         self._holes = _hole_field(field_shape, params, random)
-        if params.jitter_px > 0:
-            self._grid = np.stack(np.meshgrid(*(np.arange(size, dtype=np.int16) for size in self._shape[::-1])), -1)
-            self._jitter = _jitter_field(field_shape, params, random)
+        self._grid = np.stack(np.meshgrid(*(np.arange(size, dtype=np.int16) for size in self._shape[::-1])), -1)
+        self._jitter = _jitter_field(field_shape, params, random)
 
     def measure(self, inverse_depth, number):
-        """Depth image of one frame. It depends only on the seed, the number and the scene.
+        """Depth image (height, width), uint16, of one frame. It depends only on the seed, the number and the scene.
 
-        Parameters
-        ----------
-        inverse_depth : numpy.ndarray, (height, width), float32
-            1/m along z; 0 in pixels without a surface.
-        number : int
-            0 to 2**32 - 1; frames with different numbers have independent noise.
-
-        Returns
-        -------
-        numpy.ndarray, (height, width), uint16
-            Millimetres, 0 = no depth.
-
-        Raises
-        ------
-        ValueError
-            If the inverse depth has the wrong shape or type, or the number is out of range.
+        Inverse depth is float32 and 0 in pixels without a surface. The noise of different numbers is independent.
         """
-        if inverse_depth.shape != self._shape or inverse_depth.dtype != np.float32:
-            raise ValueError('inverse_depth is %s %s; float32 %s expected'
-                             % (inverse_depth.dtype, inverse_depth.shape, self._shape))
         random = np.random.RandomState([self._seed, number])
         noise, holes, jitter = (self._cut(random) for _ in range(3))
-        if self._params.jitter_px > 0:
-            inverse_depth = self._jittered(inverse_depth, jitter)
+        inverse_depth = self._jittered(inverse_depth, jitter)
         # Rounds to the nearest step. Values out of range and nan become levels whose depth in the table is 0.
         level = cv2.addWeighted(inverse_depth, self._params.focal_baseline_px_m * self._params.steps_per_px,
                                 self._noise[noise], 1, 0, dtype=cv2.CV_16U)
@@ -113,9 +76,9 @@ class StereoCamera(object):
         top, left = random.randint(0, SPARE_PX + 1, 2)
         return slice(top, top + self._shape[0]), slice(left, left + self._shape[1])
 
-    def _jittered(self, inverse_depth, place):
+    def _jittered(self, inverse_depth, window):
         """Scene with ragged silhouettes and flying pixels, whose depth lies between that of near and far surfaces."""
-        whole, fraction = (field[place] for field in self._jitter)
+        whole, fraction = (field[window] for field in self._jitter)
         return cv2.remap(inverse_depth, cv2.add(self._grid, whole), fraction, cv2.INTER_LINEAR,
                          borderMode=cv2.BORDER_REPLICATE)
 
@@ -128,19 +91,22 @@ class StereoCamera(object):
         return cv2.dilate(hidden, kernel, anchor=(0, 0))  # to the left
 
 
-def check_params(params):
-    """Raise ValueError with the name and value of a parameter that is out of range."""
-    for name, value in zip(params._fields, params):
-        if not 0 <= value < np.inf:
-            raise ValueError('%s is %g; a finite number of at least 0 expected' % (name, value))
-    for name in ('focal_baseline_px_m', 'steps_per_px', 'max_disparity_px'):
-        if getattr(params, name) == 0:
-            raise ValueError('%s is 0; more than 0 expected' % name)
-    if params.max_disparity_px <= params.min_disparity_px:
-        raise ValueError('max_disparity_px is %g; more than min_disparity_px, %g, expected'
-                         % (params.max_disparity_px, params.min_disparity_px))
-    if params.hole_share > 1:
-        raise ValueError('hole_share is %g; 0 to 1 expected' % params.hole_share)
+class ColorSensor(object):
+    """Blur and noise of colour images. The noise, of `sigma` grey levels, depends only on the seed and the number."""
+
+    def __init__(self, camera, seed, sigma):
+        random = np.random.RandomState(seed)
+        self._seed, self._shape = seed, (camera.height, camera.width)
+        field_shape = camera.height + COLOR_SPARE_PX, camera.width + COLOR_SPARE_PX, 3
+        self._fields = [_color_field(random, field_shape, sigma) for _ in range(COLOR_FIELDS)]
+
+    def capture(self, color, number):
+        """Apply blur and noise to a rendered image (h, w, 3), uint8. Returns a new image."""
+        random = np.random.RandomState([self._seed, number])
+        field = self._fields[random.randint(COLOR_FIELDS)]
+        y, x = random.randint(COLOR_SPARE_PX, size=2)
+        noise = field[y:y + self._shape[0], x:x + self._shape[1]]
+        return cv2.add(cv2.GaussianBlur(color, (3, 3), BLUR_PX), noise, dtype=cv2.CV_8U)
 
 
 def _depth_table(params):
@@ -180,3 +146,9 @@ def _correlated(shape, kernel_px, random):
     white = random.standard_normal(tuple(size + 2 * margin for size in shape))
     smooth = cv2.sepFilter2D(white, cv2.CV_64F, kernel, kernel) / (kernel ** 2).sum()
     return smooth[margin:margin + shape[0], margin:margin + shape[1]]
+
+
+def _color_field(random, shape, sigma):
+    noise = random.standard_normal(shape).astype(np.float32)
+    noise = cv2.GaussianBlur(noise, (0, 0), GRAIN_PX)
+    return np.rint(noise * (sigma / noise.std())).clip(-127, 127).astype(np.int8)
