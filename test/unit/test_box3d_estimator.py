@@ -6,7 +6,7 @@ from hypothesis.extra import numpy as hnp
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.estimation.box3d_estimator import (AXIS_BEHIND_SURFACE_M, EDGE_PERCENT, check_rect,
+from ros_3d_bb.estimation.box3d_estimator import (AXIS_BEHIND_SURFACE_M, EDGE_PERCENT, ImageGeometry, check_rect,
                                                   complete_truncated_extent, edges, estimate_boxes,
                                                   estimate_foreground, estimate_median, estimator_named,
                                                   nearest_dominant_layer, sample_depth, truncated_edges, within)
@@ -14,6 +14,10 @@ from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
 MILLIMETRES = hnp.arrays(int, st.integers(1, 60), elements=st.integers(300, 9000))
+
+
+def of(camera):
+    return ImageGeometry(camera, (0, 0) + camera[:2])
 
 
 def flat(depth, scale_m=0.001, dtype=np.uint16):
@@ -26,7 +30,7 @@ def test_the_median_reproduces_the_recorded_positions(session_folder):
     errors_m = []
     for frame in session.frames[::2]:
         samples = sample_depth(read_depth(frame, session), frame.boxes_px[0], 20)
-        box = estimate_median(samples, frame.boxes_px[0], session.camera)
+        box = estimate_median(samples, frame.boxes_px[0], of(session.camera))
         errors_m.append(np.abs(box.center_m - frame.estimate_m))
     assert len(errors_m) >= 40
     assert np.max(errors_m) <= 0.0015
@@ -66,23 +70,23 @@ def test_no_estimate_without_valid_depth(depth, scale_m, dtype):
 @pytest.mark.parametrize('depth', [flat(3000), flat(3.0, 1.0, np.float32)])
 def test_size_is_that_of_the_box_at_the_median_depth(depth):
     rect = (10, 10, 40, 40)
-    box = estimate_median(sample_depth(depth, rect, 5), rect, CAMERA)
+    box = estimate_median(sample_depth(depth, rect, 5), rect, of(CAMERA))
     np.testing.assert_allclose(box.size_m, [30 / 60 * 3, 30 / 60 * 3, 30 / 60 * 3])
     assert box.support == 1.0 and not box.truncated and box.rect_px == rect and box.center_m[2] == 3.0
 
 
-def test_support_is_the_share_of_samples_on_the_body():
+def test_support_is_the_share_of_samples_with_depth_that_are_on_the_body():
     depth = flat(2000)
     depth.values[:, 40:] = 4000
     depth.values[:10] = 0
     rect = (0, 0, 64, 48)
-    box = estimate_median(sample_depth(depth, rect, 1), rect, CAMERA)
+    box = estimate_median(sample_depth(depth, rect, 1), rect, of(CAMERA))
     assert box.center_m[2] == pytest.approx(2.0)
-    assert box.support == pytest.approx((40 / 64) * (38 / 48))
+    assert box.support == pytest.approx(40 / 64)
 
 
 def foreground(depth, rect, nearer=()):
-    return estimate_foreground(sample_depth(depth, rect), rect, CAMERA, nearer)
+    return estimate_foreground(sample_depth(depth, rect), rect, of(CAMERA), nearer)
 
 
 @given(st.integers(500, 5000), st.floats(0.4, 1), st.integers(400, 3000))
@@ -126,11 +130,21 @@ def test_foreground_samples_about_as_many_pixels_in_every_box():
     assert sample_depth(depth, (300, 200, 310, 220)).valid.size == 200
 
 
-def test_foreground_needs_a_minimum_support():
-    """A twentieth of the box is not enough for a person."""
-    depth = flat(0)
+@pytest.mark.parametrize('background_mm', [0, 5000])
+def test_foreground_needs_a_minimum_support(background_mm):
+    """A fiftieth of the box is not enough for a person."""
+    depth = flat(background_mm)
     depth.values[20:24, 30:33] = 2000
-    assert foreground(depth, (20, 10, 42, 40)) is None
+    box = foreground(depth, (20, 10, 42, 40))
+    assert box is None or box.center_m[2] > 4.9
+
+
+def test_sparse_depth_has_full_support():
+    """Every fifth row and column has depth, as that of a lidar in the image."""
+    depth = flat(0)
+    depth.values[::5, ::5] = 2000
+    box = foreground(depth, (4, 4, 60, 44))
+    assert box.support == 1 and box.center_m[2] == pytest.approx(2.0 + AXIS_BEHIND_SURFACE_M)
 
 
 @pytest.mark.parametrize('pixels', [1, 2, 3, 11])
@@ -146,7 +160,7 @@ def test_depths_beyond_any_camera_are_ignored():
     depth = flat(2.0, 1.0, np.float32)
     depth.values[10, 10], depth.values[20, 20] = 1e30, 1e7
     box = foreground(depth, (5, 5, 60, 45))
-    assert box.center_m[2] == pytest.approx(2.0 + AXIS_BEHIND_SURFACE_M) and box.support < 1
+    assert box.center_m[2] == pytest.approx(2.0 + AXIS_BEHIND_SURFACE_M) and box.support == 1
 
 
 @pytest.mark.parametrize('name', ['foreground', 'median'])
@@ -167,10 +181,11 @@ def test_unknown_estimators_and_strides_are_rejected(name, stride, complaint):
         estimator_named(name, stride)
 
 
-@pytest.mark.parametrize('rect,cut', [((10, 10, 40, 40), ''), ((0, 10, 40, 40), 'l'), ((10, 1, 40, 40), 't'),
-                                      ((10, 10, 63, 40), 'r'), ((10, 10, 40, 48), 'b'), ((-9, 10, 90, 40), 'lr')])
+@pytest.mark.parametrize('rect,cut', [((10, 10, 210, 410), 't'), ((9, 13, 209, 413), ''), ((8, 13, 208, 413), 'l'),
+                                      ((9, 20, 109, 400), ''), ((500, 20, 634, 400), 'r'), ((500, 20, 633, 400), ''),
+                                      ((90, 200, 190, 471), 'b'), ((90, 200, 190, 470), ''), ((-9, 20, 650, 300), 'lr')])
 def test_edges_at_the_border_are_truncated(rect, cut):
-    assert truncated_edges(rect, CAMERA) == tuple(edge in cut for edge in 'ltrb')
+    assert truncated_edges(rect, (0, 0, 640, 480)) == tuple(edge in cut for edge in 'ltrb')
 
 
 WIDE = Camera(640, 480, 420, 420, 319.5, 239.5, 'plumb_bob', (-0.25, 0.06, 0.0005, -0.0004, 0))
@@ -197,10 +212,10 @@ def test_lens_distortion_is_corrected(camera, x_m):
     center_m = np.array([x_m, 0.3, 3.0])
     depth, rect = plate_in(camera, center_m, (0.5, 1.7))
     samples, axis_m = sample_depth(depth, rect), center_m * (1 + AXIS_BEHIND_SURFACE_M / 3)
-    box = estimate_foreground(samples, rect, camera)
+    box = estimate_foreground(samples, rect, of(camera))
     np.testing.assert_allclose(box.center_m, axis_m, atol=0.03)
     assert box.size_m[1] == pytest.approx(1.7, abs=0.06) and box.size_m[0] == pytest.approx(0.5, abs=0.05)
-    flat = estimate_foreground(samples, rect, Camera(*camera[:6]))
+    flat = estimate_foreground(samples, rect, of(Camera(*camera[:6])))
     assert x_m == 0 or abs(flat.center_m[0] - axis_m[0]) > 0.08
 
 
@@ -209,7 +224,7 @@ def test_the_median_is_that_of_undistorted_points(camera):
     """The rectangle of a small plate, and depth that fills it, so that the median is in its middle."""
     center_m = np.array([1.5, 0.3, 3.0])
     _depth, rect = plate_in(camera, center_m, (0.1, 0.1))
-    box = estimate_median(sample_depth(DepthImage(np.full((480, 640), 3.0), 1.0), rect, 1), rect, camera)
+    box = estimate_median(sample_depth(DepthImage(np.full((480, 640), 3.0), 1.0), rect, 1), rect, of(camera))
     np.testing.assert_allclose(box.center_m, center_m, atol=0.01)  # a pixel
     np.testing.assert_allclose(box.size_m, 0.1, atol=0.03)
 
@@ -219,13 +234,13 @@ def test_no_estimate_at_right_angles_to_the_axis_of_a_fisheye(name):
     camera = Camera(640, 480, 150, 150, 319.5, 239.5, 'equidistant', (0, 0, 0, 0))
     estimator, rect = estimator_named(name), (10, 200, 60, 280)
     samples = estimator.sample(DepthImage(np.full((480, 640), 2.0), 1.0), rect)
-    assert estimator.estimate(samples, rect, camera, ()) is None
+    assert estimator.estimate(samples, rect, of(camera), ()) is None
 
 
 def test_a_rectangle_beyond_the_image_of_a_distorting_lens_has_an_estimate():
     rect = (-2 ** 31, 100, 300, 2 ** 31 - 1)
     estimator, depth = estimator_named('foreground'), DepthImage(np.full((480, 640), 2.0), 1.0)
-    assert np.isfinite(estimator.estimate(estimator.sample(depth, rect), rect, WIDE, ()).center_m).all()
+    assert np.isfinite(estimator.estimate(estimator.sample(depth, rect), rect, of(WIDE), ()).center_m).all()
 
 
 @given(hnp.arrays(float, st.integers(1, 50), elements=st.floats(-5, 5)))

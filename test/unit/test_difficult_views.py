@@ -91,10 +91,10 @@ def test_heights_below_a_tilted_camera():
 
 
 def test_covariances_hold_for_any_support():
-    """95 % ellipses in each third of support, about 90 people each, in crowds to which the covariance was not fitted."""
+    """95 % ellipses of about 90 people in each third of support, in crowds to which it was not fitted."""
     model = read_error_model(SIMULATED_ERROR_MODEL)
-    scenes = [simulator_of(overlapping_people(7, 1.2, 7.0, np.random.RandomState(100 + seed)), 0.6, seconds=3.0, rate=1.0,
-                           seed=seed) for seed in range(14)]
+    scenes = [simulator_of(overlapping_people(7, 1.2, 7.0, np.random.RandomState(100 + seed)), 0.6, 0, 3.0, 1.0, seed)
+              for seed in range(14)]
     found, _missed = estimates(scenes, knows_tilt=True, least_visible=0.1)
     distances, supports = [], []
     for person, box, camera_from_map in found:

@@ -149,10 +149,24 @@ def test_corrected_positions_are_in_front_of_the_camera():
 
 
 def test_boxes_are_corrected_and_get_their_covariance():
-    box = Box3D(np.array([0.5, 0.1, 2.0]), np.array([0.5, 1.7, 0.5]), (1, 2, 3, 4), 0.5, (False,) * 4)
+    box = Box3D(np.array([0.5, 0.1, 2.0]), np.array([0.5, 1.7, 0.5]), (1, 2, 3, 4), 0.9, (False,) * 4)
     other = box._replace(center_m=np.array([-0.5, 0.0, 3.0]))
     assert corrected_boxes([], MODEL) == []
     for result, given_box in zip(corrected_boxes([box, other], MODEL), (box, other)):
         assert result.size_m is box.size_m
         np.testing.assert_allclose(result.center_m, MODEL.corrected(given_box.center_m))
         np.testing.assert_allclose(result.covariance_m2, MODEL.covariance(result.center_m))
+    uncalibrated, = corrected_boxes([box])
+    assert uncalibrated.center_m.tolist() == box.center_m.tolist()
+    np.testing.assert_allclose(uncalibrated.covariance_m2, 0.01 * np.eye(3))
+
+
+@pytest.mark.parametrize('model', [MODEL, None])
+@pytest.mark.parametrize('changed,gap_s,larger_m', [
+    ({'support': 0.15}, 0, (0.2, 0, 0.125)), ({'truncated_edges': (False, True, False, False)}, 0, (0.06, 0, 0.03)),
+    ({}, 0.1, (0.08, 0, 0.08))])
+def test_covariance_grows_with_missing_support_truncation_and_the_gap_between_images(model, changed, gap_s, larger_m):
+    box = Box3D(np.array([0.5, 0.1, 2.0]), np.array([0.5, 1.7, 0.5]), (1, 2, 3, 4), 0.9, (False,) * 4)
+    before, = corrected_boxes([box], model)
+    after, = corrected_boxes([box._replace(**changed)], model, gap_s)
+    np.testing.assert_allclose(after.covariance_m2 - before.covariance_m2, np.diag(larger_m) ** 2, atol=1e-12)

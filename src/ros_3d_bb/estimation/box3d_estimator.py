@@ -24,6 +24,7 @@ WIDEST_BORDER, BORDER_STEP = 0.05, 4  # of depth images without depth: share of 
 CUT_ROWS = 1 / 30.0  # share of the image height
 SAMPLES_WANTED = 2000  # approximate number of pixels that the foreground estimator samples
 AXIS_BEHIND_SURFACE_M = 0.09  # mean over standing and walking bodies of the simulation, seen from all sides
+LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate; a lidar gives twice as many
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the person's layer for an estimate
 LEAST_WIDTH_M = 0.05
 LEVEL = np.eye(3)  # of a camera that is held level
@@ -50,6 +51,11 @@ class Samples(NamedTuple):
     depth_m: np.ndarray
     valid: np.ndarray
 
+    @property
+    def pixels(self):
+        """Pixel coordinates (u, v) of the grid, (h, w, 2)."""
+        return np.stack(np.meshgrid(self.columns, self.rows), axis=-1)
+
 
 class ImageGeometry(NamedTuple):
     """Geometry of one image: its camera, the part of it with depth (see `measured_area`), and the rotation (3, 3) from
@@ -65,9 +71,9 @@ class Box3D(NamedTuple):
     """An upright cylinder, with quality measures.
 
     `center_m` (3,) in the camera optical frame and `size_m` (width, height, width) are in metres; `rect_px` is the
-    source rectangle; `support` is the share 0..1 of the samples with depth that belong to its depth layer; `truncated_edges` states whether the left,
-    upper, right and lower edge of the rectangle touch the image border; `covariance_m2` (3, 3) is that of the centre,
-    None if unknown.
+    source rectangle; `support` is the share 0..1 of the samples with depth that belong to its depth layer;
+    `truncated_edges` states whether the left, upper, right and lower edge of the rectangle touch the image border;
+    `covariance_m2` (3, 3) is that of the centre, None if unknown.
     """
 
     center_m: np.ndarray
@@ -159,8 +165,8 @@ def estimate_foreground(samples, rect_px, geometry, nearer=()):
     Returns
     -------
     Box3D or None
-        None if no sample has a valid depth and a viewing ray, if the layer contains less than `LEAST_SUPPORT` of the
-        samples with depth, or if the rectangle cannot be undistorted.
+        None if less than `LEAST_MEASURED` of the samples have a valid depth and a viewing ray, if the layer contains
+        less than `LEAST_SUPPORT` of those with depth, or if the rectangle cannot be undistorted.
     """
     camera, level_from_camera = geometry.camera, geometry.level_from_camera
     across_m, down_m, ahead_m = _level_coordinates(samples, camera, level_from_camera)
@@ -169,7 +175,7 @@ def estimate_foreground(samples, rect_px, geometry, nearer=()):
     if nearer:
         own = own & ~_occluders(samples, ahead_m, rect_px, nearer, level_from_camera)
     flat_px = _without_distortion(rect_px, camera)
-    if flat_px is None or not own.any():
+    if flat_px is None or not own.any() or measured < LEAST_MEASURED * own.size:
         return None
 
     x1, y1, x2, y2 = rect_px
@@ -317,8 +323,8 @@ def _median(sorted_depths_m):
 
 
 class Estimator(NamedTuple):
-    """Pair of functions: `sample(depth, rect_px)` returns Samples; `estimate(samples, rect_px, geometry, nearer)` returns
-    a Box3D or None, given the boxes of possible occluders.
+    """Pair of functions: `sample(depth, rect_px)` returns Samples; `estimate(samples, rect_px, geometry, nearer)`
+    returns a Box3D or None, given the boxes of possible occluders.
     """
 
     sample: Any

@@ -18,6 +18,7 @@ from ros_3d_bb.nodes.common.master import patient_master
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
 from ros_3d_bb.visualization.image_overlay import depth_to_grey, draw_boxes, draw_samples
 
@@ -36,6 +37,8 @@ class Bbox3dNode(object):
         Depth image, aligned to the colour image.
     camera/color/camera_info : sensor_msgs/CameraInfo
         Calibration of the colour camera.
+    /tf, /tf_static : tf2_msgs/TFMessage
+        Transform from ~floor_frame to the camera, for its tilt. Not used if ~floor_frame is empty.
 
     Publishes
     ---------
@@ -46,8 +49,9 @@ class Bbox3dNode(object):
     def __init__(self):
         params, = read_params(Bbox3dParams)
         self._diagnostics = Diagnostics()
-        self._stage = EstimationStage(params, self._diagnostics, self._on_frame, rospy.resolve_name(DEPTH_TOPIC),
-                                      rospy.resolve_name(INFO_TOPICS[0]))
+        self._stage = EstimationStage(params, self._diagnostics, self._on_frame,
+                                      Transforms(wait_s=0) if params.floor_frame else None,
+                                      rospy.resolve_name(DEPTH_TOPIC), rospy.resolve_name(INFO_TOPICS[0]))
         self._lock = threading.Lock()
         self._boxes_pub = rospy.Publisher(BOXES3D_TOPIC, BoundingBox3DArray, queue_size=10)
         self._images = SampleImages(int(params.cache_length * NS), self._stage.sample, params.depth_image_range,

@@ -60,14 +60,14 @@ class EstimationStage(object):
     on_frame : callable
         Called with `perception_msgs.Boxes2D`, sensor_msgs/Image and `camera_model.Camera` of one stamp.
     transforms
-        As for `tracking_stage.TrackingStage`; they tell the tilt of the camera.
+        As for `tracking_stage.TrackingStage`, for the tilt of the camera; None if no floor frame is given.
     depth_topic, info_topic : str
         Topics of the depth images and camera_info, for error messages about missing ones.
     """
 
-    def __init__(self, params, events, on_frame, transforms, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
+    def __init__(self, params, events, on_frame, transforms=None, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
         self._events, self._depth_topic, self._info_topic = events, depth_topic, info_topic
-        self._transforms = transforms if params.floor_frame else None
+        self._transforms = transforms
         self._error_model = None
         if params.error_model:
             try:
@@ -150,7 +150,7 @@ class EstimationStage(object):
         return Header(stamp=stamp, frame_id=frame_id), depth, boxes3d
 
     def _level_from_camera(self, frame_id):
-        """Return the rotation to the level frame, see `box3d_estimator.level_rotation`; `LEVEL` if the tilt is unknown.
+        """Return the rotation to the level frame (`box3d_estimator.level_rotation`); `LEVEL` if the tilt is unknown.
 
         The latest transform is used: the camera is fixed to the robot, so no wait for the image stamp is necessary.
         """
@@ -160,8 +160,8 @@ class EstimationStage(object):
             return level_rotation(self._transforms.lookup(frame_id, self._params.floor_frame, genpy.Time(0))[:3, 2])
         except tf2_ros.TransformException as error:
             if TILT_UNKNOWN not in self._events.counts:
-                self._events.note(TILT_UNKNOWN, 'the tilt of the camera is unknown, as there is no transform from %s to '
-                                  '%s: %s; it is assumed to be level (~floor_frame)'
+                self._events.note(TILT_UNKNOWN, 'the tilt of the camera is unknown, as there is no transform from '
+                                  '%s to %s: %s; it is assumed to be level (~floor_frame)'
                                   % (self._params.floor_frame, frame_id, error))
             return LEVEL
 
@@ -199,5 +199,6 @@ class EstimationStage(object):
                     '(~cache_length): the detector is %.1f s slower than that'
                     % (stamp_ns / NS, self._depth_topic, newest_ns / NS, kept_s, too_old_s))
         gap_s = self._sync.gap_ns(stamp_ns) / NS
-        return ('no depth image with their stamp %.3f received on %s: colour and depth are %.3f s apart at best; to pair '
-                'them, set ~stamp_tolerance: %.2f' % (stamp_ns / NS, self._depth_topic, gap_s, np.ceil(100 * gap_s) / 100))
+        return ('no depth image with their stamp %.3f received on %s: colour and depth are %.3f s apart at best; to '
+                'pair them, set ~stamp_tolerance: %.2f'
+                % (stamp_ns / NS, self._depth_topic, gap_s, np.ceil(100 * gap_s) / 100))

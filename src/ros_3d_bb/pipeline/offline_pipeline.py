@@ -69,6 +69,7 @@ class Pipeline(object):
         for camera in settings.cameras:
             self._estimation_stages[camera] = EstimationStage(
                 settings.bbox3d[0], events, functools.partial(self._on_frame, camera),
+                transforms if settings.bbox3d[0].floor_frame else None,
                 settings.name(DEPTH_TOPIC, camera), settings.name(INFO_TOPIC, camera))
         self._publish_empty = settings.yolov5[0].publish_empty
         if settings.detector == 'depth':

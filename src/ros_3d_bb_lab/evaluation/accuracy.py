@@ -111,7 +111,7 @@ def _repeatability_m(error_m, truth_m):
 def compare(session, boxes, estimator, model=None):
     """Compare the estimators on a session. Returns scores and positions as a dictionary, and our `Estimates`."""
     truth_m = truth_of(session)
-    truncated = np.array([any(truncated_edges(rect_px or frame.boxes_px[0], session.camera))
+    truncated = np.array([any(truncated_edges(rect_px or frame.boxes_px[0], (0, 0) + session.camera[:2]))
                           for rect_px, frame in zip(boxes, session.frames)])
     ours = _estimates_of(session, boxes, estimator, model)
     thesis = _thesis_estimates(session, boxes)

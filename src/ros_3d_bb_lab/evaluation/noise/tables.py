@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.estimation.box3d_estimator import BORDER_PX, estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, truncated_edges
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
 AXES = ('X', 'Z')
@@ -118,8 +118,10 @@ def _estimate(frame, session, name):
 
 
 def _is_cut(frame, camera):
-    return bool(frame.boxes_px) and (frame.boxes_px[0][0] <= BORDER_PX
-                                     or frame.boxes_px[0][2] >= camera.width - BORDER_PX)
+    if not frame.boxes_px:
+        return False
+    left, _top, right, _bottom = truncated_edges(frame.boxes_px[0], (0, 0) + camera[:2])
+    return left or right
 
 
 def _axis_of(row, axis, where):
