@@ -34,8 +34,9 @@ class OutOfSequenceBuffer(object):
     ----------
     step : callable
         step(state, image, observed_s, assign_id) returns the state after an image, which has `tracks` and `now_ns`,
-        and the matches: (track ID, whether the track was confirmed before, index of the detection). `observed_s` is the time
-        in seconds that the image accounts for; assign_id(column) returns the ID of the track that a detection starts.
+        and the matches: (track ID, whether the track was confirmed before, index of the detection). `observed_s` is
+        the time in seconds that the image accounts for; assign_id(column) returns the ID of the track that a
+        detection starts.
     state
         State before the first image.
     last_id : int
