@@ -1,7 +1,7 @@
 """Convert messages to observations, for running graphs and bags alike, and observe the first seconds of a bag."""
-import functools
 import collections
 import contextlib
+import functools
 
 import tf2_ros
 from genpy.message import get_message_class
@@ -79,7 +79,8 @@ def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda 
                         color_info=_newest(observed[INFO].newest, camera_from_msg),
                         depth_info=_newest(depth_info.newest, camera_from_msg),
                         color=_newest(observed[COLOR].newest, imgmsg_to_rgb),
-                        depth=_newest(observed[DEPTH].newest, functools.partial(imgmsg_to_depth, check_unit=True)), **others)
+                        depth=_newest(observed[DEPTH].newest, functools.partial(imgmsg_to_depth, check_unit=True)),
+                        **others)
 
 
 def observe_bag(path, name_of, target_frame):
