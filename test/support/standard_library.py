@@ -5,4 +5,5 @@ STANDARD_LIBRARY = {'argparse', 'ast', 'base64', 'bisect', 'collections', 'concu
                     'pkgutil', 'platform', 're', 'resource', 'signal', 'socket', 'struct', 'subprocess', 'sys',
                     'tempfile', 'threading', 'time', 'typing', 'urllib', 'warnings', 'weakref', 'xmlrpc', 'zipfile',
                     'zlib'}
-TEST_STANDARD_LIBRARY = {'atexit', 'bz2', 'queue', 'random', 'shutil', 'stat', 'types', 'unittest', 'xml'}
+TEST_STANDARD_LIBRARY = {'atexit', 'bz2', 'filecmp', 'operator', 'queue', 'random', 'shutil', 'stat',
+                         'types', 'unittest', 'xml'}
