@@ -183,7 +183,8 @@ def test_unknown_estimators_and_strides_are_rejected(name, stride, complaint):
 
 @pytest.mark.parametrize('rect,cut', [((10, 10, 210, 410), 't'), ((9, 13, 209, 413), ''), ((8, 13, 208, 413), 'l'),
                                       ((9, 20, 109, 400), ''), ((500, 20, 634, 400), 'r'), ((500, 20, 633, 400), ''),
-                                      ((90, 200, 190, 471), 'b'), ((90, 200, 190, 470), ''), ((-9, 20, 650, 300), 'lr')])
+                                      ((90, 200, 190, 471), 'b'), ((90, 200, 190, 470), ''),
+                                      ((-9, 20, 650, 300), 'lr')])
 def test_edges_at_the_border_are_truncated(rect, cut):
     assert truncated_edges(rect, (0, 0, 640, 480)) == tuple(edge in cut for edge in 'ltrb')
 

@@ -37,8 +37,10 @@ class Bbox3dNode(object):
         Depth image, aligned to the colour image.
     camera/color/camera_info : sensor_msgs/CameraInfo
         Calibration of the colour camera.
-    /tf, /tf_static : tf2_msgs/TFMessage
+    /tf : tf2_msgs/TFMessage
         Transform from ~floor_frame to the camera, for its tilt. Not used if ~floor_frame is empty.
+    /tf_static : tf2_msgs/TFMessage
+        As /tf.
 
     Publishes
     ---------
