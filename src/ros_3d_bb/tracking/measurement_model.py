@@ -7,9 +7,10 @@ from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.tracking.types import NEARER_M, wrapped
 
 # Position (x, y), its covariance, and the unit vector from the camera to it in the ground plane; extents; height of the
-# centre and its variance; whether the image border truncates the width, and the lower and the upper end.
+# centre and its variance; whether the image border truncates the width, and the lower and the upper end; support.
 MEASUREMENT = np.dtype([('position_m', float, 2), ('noise_m2', float, (2, 2)), ('ray', float, 2), ('size_m', float, 3),
-                        ('z_m', float), ('z_m2', float), ('cut_sideways', bool), ('cut_ends', bool, 2)])
+                        ('z_m', float), ('z_m2', float), ('cut_sideways', bool), ('cut_ends', bool, 2),
+                        ('support', float)])
 FLOOR_M = 0.02  # lower bound of the standard deviation of a centre: people sway as they walk
 PERSON_WIDTH_M = 0.5
 USUAL_PERIOD_S = 1 / 30.0  # image period assumed for the first image of a camera
@@ -41,7 +42,7 @@ def measurements_of(detections, view, elapsed_s, params):
     measurements = np.zeros(len(detections), MEASUREMENT)
     if not len(detections):
         return measurements
-    positions_m, sizes_m, covariances_m2, truncated_edges = zip(*detections)
+    positions_m, sizes_m, covariances_m2, truncated_edges, measurements['support'] = zip(*detections)
     positions_m, sizes_m, truncated_edges = np.array(positions_m), np.array(sizes_m), np.array(truncated_edges, bool)
     unknown_m2 = np.eye(3) * params.noise_unknown ** 2
     covariances_m2 = np.array([unknown_m2 if known is None else known for known in covariances_m2])

@@ -12,15 +12,20 @@ from ros_3d_bb.tracking import kalman_filter
 from ros_3d_bb.tracking.types import PREDICTION_STEP, PREDICTION_TIME, VISIBLE, TrackedObject, prediction_times_s
 
 # `hits` counts the detections of a track, `end_hits` those that showed the lower and the upper end of the body.
+# `cut_ns` are the stamps of the latest detections of which the image border truncated these ends.
 # `unseen_s` is the time since the last detection, `missed_s` the part of it during which a detection was expected.
 TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
-                  ('size_m', float, 3), ('end_hits', int, 2), ('hits', int), ('first_ns', np.int64),
+                  ('size_m', float, 3), ('end_hits', int, 2), ('cut_ns', np.int64, 2), ('hits', int), ('first_ns', np.int64),
                   ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float), ('status', int),
                   ('confirmed', bool), ('moving', bool)])
 RECENTLY_MATCHED_NS = NS // 5  # no track starts near a track that was matched less than this ago
 SMOOTHING = 0.1  # weight of the newest detection in size and height
 CUT_SMOOTHING = 0.02  # the same for boxes that the image border truncates sideways: the head may be outside
+CUT_LASTS_NS = NS // 2  # hysteresis: an end is visible again this long after it was last truncated
+NEVER_NS = -10 ** 18
 LEAST_HEIGHT_M = 0.1
+STARTING_SUPPORT = 0.2  # minimum support of a detection that starts a track: most positions with less are wrong
+SAME_PERSON_M = 0.15  # two people who are both visible cannot be this close to each other
 AXES = [[0], [1], [3], [4]]  # indices of x, y and their velocities among x, y, z and their velocities
 STILL_MOVING = 0.5  # hysteresis: a moving track stops below this share of `moving_speed`
 
@@ -51,12 +56,13 @@ def update_matched(tracks, rows, measurements, stamp_ns, params):
     matched['confirmed'] |= is_old_enough & (matched['hits'] >= params.min_hits)
     speed_mps = np.linalg.norm(matched['mean'][:, 2:], axis=1)
     matched['moving'] = speed_mps >= params.moving_speed * np.where(matched['moving'], STILL_MOVING, 1)
-    _update_size(matched, measurements)
+    _update_size(matched, measurements, stamp_ns)
     tracks[rows] = matched
 
 
 def new_targets(tracks, measurements, stamp_ns, params):
-    """Start tracks from unmatched measurements, except duplicate detections of recently matched or new tracks.
+    """Start tracks from unmatched measurements, except duplicate detections of recently matched or new tracks, and
+    measurements with little support.
 
     Returns the new tracks, whose IDs are not set, and the indices of the measurements that started them.
     """
@@ -67,25 +73,40 @@ def new_targets(tracks, measurements, stamp_ns, params):
     for name in ('size_m', 'z_m', 'z_m2'):
         new[name] = measurements[name]
     new['end_hits'] = ~measurements['cut_ends']
+    new['cut_ns'] = np.where(measurements['cut_ends'], stamp_ns, NEVER_NS)
     new['hits'], new['first_ns'], new['last_ns'] = 1, stamp_ns, stamp_ns
     occupied_m = tracks['mean'][stamp_ns - tracks['last_ns'] < RECENTLY_MATCHED_NS, :2]
     kept = []
-    for row, position_m in enumerate(new['mean'][:, :2]):
+    for row in np.flatnonzero(measurements['support'] >= STARTING_SUPPORT).tolist():
         others_m = np.concatenate((occupied_m, new['mean'][kept, :2]))
-        if (np.linalg.norm(others_m - position_m, axis=1) >= params.duplicate_distance).all():
+        if (np.linalg.norm(others_m - new['mean'][row, :2], axis=1) >= params.duplicate_distance).all():
             kept.append(row)
     return new[kept], kept
 
 
-def _update_size(matched, measurements):
+def duplicates(tracks, stamp_ns):
+    """Which tracks (n,) are of the person of an older track: both are confirmed, recently matched and at one place."""
+    duplicate = np.zeros(len(tracks), bool)
+    rows = np.flatnonzero(tracks['confirmed'] & (stamp_ns - tracks['last_ns'] < RECENTLY_MATCHED_NS))
+    rows = rows[np.argsort(tracks['first_ns'][rows], kind='mergesort')]
+    for count, row in enumerate(rows[1:], 1):
+        older_m = tracks['mean'][rows[:count], :2]
+        duplicate[row] = (np.linalg.norm(older_m - tracks['mean'][row, :2], axis=1) < SAME_PERSON_M).any()
+    return duplicate
+
+
+def _update_size(matched, measurements, stamp_ns):
     """Smooth the size and the height of each track with one measurement.
 
     The lower and the upper end are smoothed separately. A truncated end moves with the other one, so that the height
-    stays constant. An end that has never been visible is placed where the estimator expects it.
+    stays constant. An end that has never been visible is placed where the estimator expects it. Detectors place the
+    edge of a truncated person on either side of the limit of truncation, so an end stays truncated for `CUT_LASTS_NS`.
     """
     cut, cut_sideways = measurements['cut_ends'], measurements['cut_sideways']
-    matched['end_hits'] += ~cut
-    held = cut & (matched['end_hits'] > 0)
+    matched['cut_ns'] = np.where(cut, stamp_ns, matched['cut_ns'])
+    was_cut = ~cut & (stamp_ns - matched['cut_ns'] < CUT_LASTS_NS)
+    matched['end_hits'] += ~cut & ~was_cut
+    held = was_cut | cut & (matched['end_hits'] > 0)
     end_share = np.where(held, 0, np.maximum(SMOOTHING, 1 / np.maximum(matched['end_hits'], 1)))
     share = np.maximum(SMOOTHING, 1 / matched['hits'])
     share[cut_sideways] = CUT_SMOOTHING

@@ -18,7 +18,8 @@ from ros_3d_bb.tracking.association import associate, unmatched
 from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
 from ros_3d_bb.tracking.occlusion import SEEN, CameraVisibility, mark_missed
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
-from ros_3d_bb.tracking.track import TRACK, PredictionParams, new_targets, objects_of, position_std_of, update_matched
+from ros_3d_bb.tracking.track import (TRACK, PredictionParams, duplicates, new_targets, objects_of, position_std_of,
+                                      update_matched)
 from ros_3d_bb.tracking.types import MOVING_SPEED, OUT_OF_VIEW, VISIBLE, check_steps
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new
@@ -168,6 +169,7 @@ class Tracker(object):
         # Tentative tracks are kept for a short time only.
         max_unseen_s = np.where(tracks['confirmed'], params.max_age, TENTATIVE_TIMEOUT_S)
         kept = (tracks['unseen_s'] < max_unseen_s) & (position_std_of(tracks) < MAX_POSITION_STD_M)
+        kept &= ~duplicates(tracks, stamp_ns)
         tracks, unmatched_columns = tracks[kept], unmatched(len(detections), columns)
         new = tracks[:0]
         if len(unmatched_columns):

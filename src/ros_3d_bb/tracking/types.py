@@ -25,13 +25,15 @@ class Detection(NamedTuple):
     """One object in one image: centre (3,) and extent (3,), x = y = width, z = height.
 
     `covariance_m2` (3, 3) is the covariance of the centre, None if unknown. `truncated_edges` states whether the image
-    border truncates the object at the left, top, right and bottom, as seen by a camera held upright.
+    border truncates the object at the left, top, right and bottom, as seen by a camera held upright. `support` is the
+    share 0..1 of the depth in its 2D box that belongs to the object.
     """
 
     position_m: np.ndarray
     size_m: np.ndarray
     covariance_m2: Optional[np.ndarray] = None
     truncated_edges: Tuple[bool, bool, bool, bool] = (False, False, False, False)
+    support: float = 1.0
 
 
 def detection_from_box(box, fixed_from_camera):
@@ -47,7 +49,7 @@ def detection_from_box(box, fixed_from_camera):
     covariance_m2 = None if box.covariance_m2 is None else rotation.dot(box.covariance_m2).dot(rotation.T)
     edges = box.truncated_edges[-turns:] + box.truncated_edges[:-turns]
     return Detection(transform_points(fixed_from_camera, center_m), np.array([width_m, width_m, height_m]),
-                     covariance_m2, edges)
+                     covariance_m2, edges, box.support or 1.0)  # 0: unknown
 
 
 def _completed_in_portrait(box):
