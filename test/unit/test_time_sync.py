@@ -65,6 +65,30 @@ def test_all_boxes_are_paired_at_the_delays_of_real_detectors(delay_ms, stamped)
     assert play(delay_ms * MS, stamped) == [(n, n, n) for n in range(60)]
 
 
+@pytest.mark.parametrize('offset_ms', [-14, -5, 0, 8, 14])
+@pytest.mark.parametrize('delay_ms', [1, 50, 200])
+def test_a_free_running_depth_camera_is_paired_by_the_nearest_image(offset_ms, delay_ms):
+    """Every seventh depth image is lost, and its boxes with it."""
+    recorder = Recorder(tolerance_ns=0)
+    events = [(n * PERIOD, 'boxes', n) for n in range(60)] + [(n * PERIOD, 'camera', n) for n in range(60)]
+    events += [(n * PERIOD + offset_ms * MS, 'depth', n) for n in range(60) if n % 7 != 3]
+    arrivals = sorted((stamp_ns + (delay_ms * MS if kind == 'boxes' else 0), stamp_ns, kind, number)
+                      for stamp_ns, kind, number in events)
+    for now_ns, stamp_ns, kind, number in arrivals:
+        recorder.add(kind, stamp_ns, now_ns, number)
+    paired = [(boxes, depth) for boxes, depth, _camera in recorder.frames if depth is not None]
+    assert paired == [(n, n) for n in range(60) if n % 7 != 3][-len(paired):] and len(paired) >= 49
+
+
+def test_the_gap_to_the_nearest_depth_image():
+    recorder = Recorder(tolerance_ns=0)
+    assert recorder.sync.gap_ns(NS) is None
+    recorder.add('depth', NS, 0, 'depth')
+    recorder.add('boxes', NS + 112 * MS, 0, 'boxes')
+    recorder.sync.end()
+    assert recorder.frames == [('boxes', None, None)] and recorder.sync.gap_ns(NS + 112 * MS) == 112 * MS
+
+
 @pytest.fixture
 def recorder():
     """With the camera of image 0 and nothing else."""

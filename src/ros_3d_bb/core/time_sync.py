@@ -16,6 +16,15 @@ def arrival_clock_ns():
     return int(time.monotonic() * NS)
 
 
+def half_period_of(stamps_ns):
+    """Tolerance for the stamps of a stream that is not synchronized with one that has `stamps_ns`, in order.
+
+    It is half of the median period and a margin for its variation; at least `SAME_NS`, for stamps that should be equal.
+    """
+    periods_ns = sorted(later - earlier for earlier, later in zip(stamps_ns, stamps_ns[1:]))
+    return max(SAME_NS, int(periods_ns[len(periods_ns) // 2] * (0.5 + JITTER))) if periods_ns else SAME_NS
+
+
 class Stamped(NamedTuple):
     """A value with its stamp and its arrival time on the caller's clock; both integer nanoseconds."""
 
@@ -62,12 +71,8 @@ class MessageCache(object):
 
     @property
     def half_period_ns(self):
-        """Tolerance for the stamps of a stream that is not synchronized with this one: half of the median period of the
-        cached values, and a margin for its variation. At least `SAME_NS`, for stamps that should be equal.
-        """
-        stamps_ns = [entry.stamp_ns for entry in list(self._entries)]
-        periods_ns = sorted(later - earlier for earlier, later in zip(stamps_ns, stamps_ns[1:]))
-        return max(SAME_NS, int(periods_ns[len(periods_ns) // 2] * (0.5 + JITTER))) if periods_ns else SAME_NS
+        """`half_period_of` the cached values."""
+        return half_period_of([entry.stamp_ns for entry in list(self._entries)])
 
     def nearest(self, stamp_ns, tolerance_ns=0):
         """The entry with the nearest stamp within the tolerance, or None."""

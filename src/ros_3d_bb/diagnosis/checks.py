@@ -116,7 +116,7 @@ def _pairs_of_images(seen):
     share = paired_share(seen.streams[COLOR].stamps_ns, seen.streams[DEPTH].stamps_ns, seen.stamp_tolerance_s)
     if share is not None:
         fact = '%.0f %% of the colour images have a depth image with their stamp' % (100 * share)
-        fault = 'only %s, within %g s' % (fact, seen.stamp_tolerance_s) if share < MIN_PAIRED else ''
+        fault = 'only %s, within stamp_tolerance' % fact if share < MIN_PAIRED else ''
         yield Finding('pairs', fact, fault,
                       'use depth that is aligned to colour (realsense.launch), one rate for both, or a larger '
                       'stamp_tolerance (config/bbox3d.yaml)')

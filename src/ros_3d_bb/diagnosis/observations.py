@@ -67,7 +67,7 @@ class Observations(NamedTuple):
     use_sim_time: bool = False
     clock_count: int = 0  # number of /clock messages
     nodes: dict = {}  # {name: (level, sentence)} from the diagnostics of nodes
-    stamp_tolerance_s: float = 0.005
+    stamp_tolerance_s: float = 0.0
     cache_length_s: float = 1.0
 
 

@@ -2,7 +2,7 @@
 import numpy as np
 
 from ros_3d_bb.core.params import nearest_name
-from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.core.time_sync import NS, half_period_of
 
 LATE_S, EARLY_S = 5.0, 2.0  # tolerated time of a stamp before and after ROS time
 MIN_RATE_HZ = 4.0  # of images; tracks of walking people are lost at lower rates
@@ -74,13 +74,14 @@ def span(seconds):
 
 
 def paired_share(stamps_ns, among_ns, tolerance_s):
-    """Return the fraction of stamps that match one of `among_ns` within a tolerance.
+    """Return the fraction of stamps that match one of `among_ns` within a tolerance; 0: `time_sync.half_period_of`.
 
     Only stamps in the time range of `among_ns` are counted. Returns None if there are none.
     """
     if not among_ns:
         return None
-    stamps, others, tolerance_ns = np.array(stamps_ns, np.int64), np.sort(among_ns), int(tolerance_s * NS)
+    stamps, others = np.array(stamps_ns, np.int64), np.sort(among_ns)
+    tolerance_ns = int(tolerance_s * NS) or half_period_of(others.tolist())
     covered = stamps[(others[0] <= stamps) & (stamps <= others[-1])]
     if not covered.size:
         return None

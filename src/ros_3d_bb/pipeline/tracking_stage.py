@@ -156,7 +156,8 @@ class TrackingStage(object):
     def _view(self, stamp_ns, fixed_from_camera, camera, camera_name):
         """Return the CameraView at a stamp, with intrinsics and depth if they are known."""
         intrinsics, depth_at = self._intrinsics.get(camera), None
-        entry = self._depths[camera].nearest(stamp_ns, int(self._params.stamp_tolerance * NS))
+        depths = self._depths[camera]
+        entry = depths.nearest(stamp_ns, int(self._params.stamp_tolerance * NS) or depths.half_period_ns)
         if intrinsics is not None and entry is not None:
             # bbox3d_node reports a depth image of another size.
             if entry.value.values.shape == (intrinsics.height, intrinsics.width):

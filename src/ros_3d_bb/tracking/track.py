@@ -15,9 +15,9 @@ from ros_3d_bb.tracking.types import PREDICTION_STEP, PREDICTION_TIME, VISIBLE, 
 # `cut_ns` are the stamps of the latest detections of which the image border truncated these ends.
 # `unseen_s` is the time since the last detection, `missed_s` the part of it during which a detection was expected.
 TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
-                  ('size_m', float, 3), ('end_hits', int, 2), ('cut_ns', np.int64, 2), ('hits', int), ('first_ns', np.int64),
-                  ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float), ('status', int),
-                  ('confirmed', bool), ('moving', bool)])
+                  ('size_m', float, 3), ('end_hits', int, 2), ('cut_ns', np.int64, 2), ('hits', int),
+                  ('first_ns', np.int64), ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float),
+                  ('status', int), ('confirmed', bool), ('moving', bool)])
 RECENTLY_MATCHED_NS = NS // 5  # no track starts near a track that was matched less than this ago
 SMOOTHING = 0.1  # weight of the newest detection in size and height
 CUT_SMOOTHING = 0.02  # the same for boxes that the image border truncates sideways: the head may be outside
