@@ -69,6 +69,10 @@ def moved(stamps_ns, by_s):
     return tuple(stamp_ns + int(by_s * NS) for stamp_ns in stamps_ns)
 
 
+def exact(seen):
+    return seen._replace(stamp_tolerance_s=0.005)
+
+
 CASES = [
     (silent(DEPTH, published_kind='', publishers=()), 'depth images', 'no publishers on /camera/depth', 'the source'),
     (silent(INFO, published_kind='sensor_msgs/Image'), 'camera_info', 'has the type sensor_msgs/Image', 'start'),
@@ -83,7 +87,7 @@ CASES = [
     (with_stream(DEPTH, stamps_ns=(), lag_s=None), 'stamps', 'no stamp (zero)', 'set it to the time'),
     (with_stream(DEPTH, lag_s=9e6), 'stamps', '104.2 days before ROS time', 'use_sim_time true'),
     (with_stream(DEPTH, lag_s=-9.0), 'stamps', '9.0 s after ROS time', 'chrony'),
-    (with_stream(COLOR, stamps_ns=moved(STAMPS, 0.05))._replace(stamp_tolerance_s=0.005), 'pairs', 'only 0 %', 'stamp_tolerance'),
+    (exact(with_stream(COLOR, stamps_ns=moved(STAMPS, 0.05))), 'pairs', 'only 0 %', 'stamp_tolerance'),
     (without_tf(*LINKS), 'transforms', 'tf has no frames', 'robot_state_publisher'),
     (without_tf('odom'), 'transforms', 'tf has no frame map', 'frame_world:=odom'),
     (without_tf('camera_link'), 'transforms', 'tf has two trees',
@@ -94,8 +98,7 @@ CASES = [
     (without_tf(odom=Link('map', 1003, 1010)), 'transforms', 'the transform from odom to map begins 3.000 s after',
      'clocks'),
     (silent(BOXES2D), '2D boxes', 'no messages on /camera/boxes2d', 'wake it up'),
-    (with_stream(BOXES2D, stamps_ns=moved(STAMPS, 0.05))._replace(stamp_tolerance_s=0.005), 'boxes and depth', 'only 0 %',
-     'label'),
+    (exact(with_stream(BOXES2D, stamps_ns=moved(STAMPS, 0.05))), 'boxes and depth', 'only 0 %', 'label'),
     (with_stream(BOXES2D, lag_s=1.6), 'boxes and depth', '1.6 s after their depth image', 'cache_length'),
     (silent(BOXES3D), '3D boxes', 'no messages on /camera/boxes3d', 'wake it up'),
     (silent(TRACKS), 'tracks', 'no messages on /camera/tracks', 'wake it up'),
