@@ -13,7 +13,7 @@ import pytest
 
 from soak.faults import FAULTS
 from soak.graph import Graph
-from support.running import processes_naming
+from support.processes import processes_naming
 
 TEST = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 SCENE = {'duration': 2.0, 'rate': 5.0, 'people': [{'start': [3.0, 0.6], 'facing': 3.1, 'repeat': True, 'moves': [
