@@ -91,13 +91,6 @@ def test_without_a_transform_the_floor_is_fitted_to_the_depth_image(rig, output)
     assert diagnostics_of('depth_detector_node')[2]['images without transform'] >= 2
 
 
-def test_an_image_without_depth_is_dropped_and_the_next_one_is_processed(rig, output):
-    rig.send(leave_out=[DEPTH])
-    sent = rig.send()
-    assert_people(output.wait_for(1)[0], *sent)
-    assert output.stays_at(1)
-
-
 def test_the_service_pauses_and_resumes(rig, output):
     enable = rospy.ServiceProxy('depth_detector_node/enable', SetBool)
     enable(False)

@@ -10,12 +10,8 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import tracks_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
-from ros_3d_bb_lab.simulation.scenario import read_scenario
-from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.ros import Recorder, wait_until
 
 SCENE = """
@@ -66,17 +62,6 @@ def test_all_messages_have_the_stamps_of_the_scene(round_of_scene):
     assert times == sorted(times)
 
 
-def test_the_images_are_those_of_the_scenario(round_of_scene, path):
-    expected = Simulator(read_scenario(path))
-    for number in (0, 9):
-        frame = expected.frame(number)
-        np.testing.assert_array_equal(imgmsg_to_rgb(round_of_scene['camera/color/image_raw'][number]), frame.color)
-        depth = imgmsg_to_depth(round_of_scene['camera/aligned_depth_to_color/image_raw'][number])
-        np.testing.assert_array_equal(depth.values, frame.depth_mm)
-        person, = tracks_from_msg(round_of_scene['ground_truth'][number])
-        np.testing.assert_allclose(person.position_m, frame.people[0].position_m)
-
-
 def test_without_publish_clock_stamps_are_the_time_of_the_machine(path):
     began = time.time()
     with Recorder('ground_truth', TrackedObjectArray, publisher_expected=False) as truth:
@@ -95,7 +80,7 @@ def test_without_publish_clock_stamps_are_the_time_of_the_machine(path):
 @pytest.mark.parametrize('params,reason', [
     ((), 'no scenario given'), (('scenario:=/nowhere.yaml',), '/nowhere.yaml'),
     (('scenario:=' + os.devnull, 'speed:=0'), '~speed is 0'), (('scenario:=x', 'speed:=2.0'), 'publish_clock'),
-    (('scenario:=x', 'sped:=2'), 'did you mean ~speed'), (('scenario:=' + os.devnull, 'rate:=-5.0'), 'rate is -5')])
+    (('scenario:=' + os.devnull, 'rate:=-5.0'), 'rate is -5')])
 def test_invalid_parameters_are_rejected_at_the_start(path, params, reason):
     process = simulator(*params)
     output, _none = process.communicate(timeout=30)
