@@ -21,12 +21,13 @@ _stamps = itertools.count(1000 * NS, 10 * NS)
 
 
 class Rig(object):
-    """A camera and a detector."""
+    """A camera, a detector, and the output of the node."""
 
     def __init__(self):
         self.depth = publisher('camera/aligned_depth_to_color/image_raw', Image)
         self.info = publisher('camera/color/camera_info', CameraInfo)
         self.boxes = publisher('yolo_bounding_box', Int32MultiArray)
+        self.output = Recorder('ros_3d_bb/bb_3d', BoundingBox3DArray)
 
     def send_camera(self, stamp_ns, depth_mm=2000):
         self.info.publish(camera_info(stamp_ns))
@@ -42,15 +43,9 @@ def rig():
     return Rig()
 
 
-@pytest.fixture(scope='module')
-def recorder(rig):
-    with Recorder('ros_3d_bb/bb_3d', BoundingBox3DArray) as recorder:
-        yield recorder
-
-
 @pytest.fixture
-def output(recorder):
-    return recorder.emptied()
+def output(rig):
+    return rig.output.emptied()
 
 
 @pytest.fixture

@@ -22,12 +22,13 @@ COLOR, DEPTH, INFO = 'camera/color/image_raw', 'camera/aligned_depth_to_color/im
 
 
 class Rig(object):
-    """Publishers of a simulated robot."""
+    """Publishers of a simulated robot, and the output of the node."""
 
     def __init__(self):
         self._pubs = {COLOR: publisher(COLOR, Image), DEPTH: publisher(DEPTH, Image),
                       INFO: publisher(INFO, CameraInfo), 'tf': publisher('/tf', TFMessage)}
         self._sent = 0
+        self.output = Recorder('yolo_bounding_box', Int32MultiArray)
 
     def send(self, leave_out=(), frame_id=None, **scenario):
         """Send the next image, by default in the frame of the camera. Returns its stamp and the true boxes."""
@@ -49,15 +50,9 @@ def rig():
     return Rig()
 
 
-@pytest.fixture(scope='module')
-def recorder(rig):
-    with Recorder('yolo_bounding_box', Int32MultiArray) as recorder:
-        yield recorder
-
-
 @pytest.fixture
-def output(recorder):
-    return recorder.emptied()
+def output(rig):
+    return rig.output.emptied()
 
 
 def assert_people(message, stamp_ns, true_boxes):

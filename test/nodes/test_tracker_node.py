@@ -21,11 +21,12 @@ _stamps = itertools.count(1000 * NS, 100 * NS)
 
 
 class Rig(object):
-    """A camera that points along x of the map, on a robot."""
+    """A camera that points along x of the map, on a robot, and the output of the node."""
 
     def __init__(self):
         self.boxes = publisher('ros_3d_bb/bb_3d', BoundingBox3DArray)
         self.tf = publisher('/tf', TFMessage)
+        self.tracks = Recorder('ros_3d_bb/tracks', TrackedObjectArray)
 
     def send_tf(self, stamp_ns, x=0.0):
         transform = TransformStamped(header=header_at(stamp_ns, 'map'), child_frame_id=CAMERA)
@@ -49,15 +50,9 @@ def rig():
     return Rig()
 
 
-@pytest.fixture(scope='module')
-def tracks_recorder(rig):
-    with Recorder('ros_3d_bb/tracks', TrackedObjectArray) as tracks:
-        yield tracks
-
-
 @pytest.fixture
-def tracks(tracks_recorder):
-    return tracks_recorder.emptied()
+def tracks(rig):
+    return rig.tracks.emptied()
 
 
 @pytest.fixture
