@@ -193,7 +193,7 @@ def test_a_full_disk_is_reported(rig, folder):
 def test_without_a_session_nothing_is_stored():
     process = subprocess.Popen(['rosrun', 'ros_3d_bb', 'viewer_node', '__name:=other', '_window:=false'])
     answer = capture('other')
-    process.terminate()
+    process.kill()
     process.wait()
     assert not answer.success and 'session:=FOLDER' in answer.message
 
