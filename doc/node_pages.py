@@ -154,7 +154,7 @@ def config_file(node):
     given = [parameter for parameter in parameters_of(node) if parameter.section != SET_BY_LAUNCH]
     live = LIVE if any('Live' in parameter.facts for parameter in given) else ''
     lines = ['# Parameters of %s. %s' % (node.name, MADE_CONFIG),
-             '# Numbers are 0 or more where the comment allows no others.' + live, '']
+             '# Unless a comment says otherwise, numbers must be 0 or more.' + live, '']
     section = ''
     for parameter in given:
         if parameter.section != section:

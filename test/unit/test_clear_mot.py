@@ -32,15 +32,6 @@ def test_a_person_with_one_track():
     assert result.false_share == 0
 
 
-def test_a_match_within_the_gate_is_kept_although_another_track_is_nearer():
-    near = moments(([at(1, 0, 0)], [at(5, 0.1, 0)]), ([at(1, 0, 0)], [at(5, GATE_M - 0.1, 0), at(6, 0.1, 0)]))
-    person, = score(near).people
-    assert person.ids == [5]
-    assert score(near).false_share == 0.5
-    gone = near + [Moment(NS, [at(1, 0, 0)], [at(5, GATE_M + 0.1, 0), at(6, 0.1, 0)])]
-    assert score(gone).people[0].ids == [5, 6]
-
-
 @pytest.mark.needs('trackeval')
 @given(st.integers(0, 2 ** 32 - 1))
 def test_id_switches_are_those_of_trackeval(seed):

@@ -106,12 +106,6 @@ def test_each_2d_box_is_joined_with_its_3d_box(folder):
         ([-5, 3, 12, 60], 1000.0), ([20, 3, 30, 40], None), ([40, 3, 60, 40], 3000.0), ([1, 1, 9, 9], 4000.0)]
 
 
-def test_without_boxes_the_images_are_stored(folder):
-    append(folder, measurement(rects_px=(), boxes=()))
-    frame, = read_session(folder).frames
-    assert frame.boxes_px == () and read_json(folder)['frames'][0]['detections'] == []
-
-
 def test_ids_are_ascending_for_equal_images_and_after_measurements_were_removed(folder):
     ids = [append(folder, measurement(0))[0] for _time in range(2)]
     with atomic_file.locked_update(folder) as content:
@@ -177,7 +171,7 @@ def test_invalid_measurements_and_those_of_another_camera_are_rejected(folder, c
     assert re.search(named, append_error(folder, measurement(1, **changes)))
 
 
-@pytest.mark.parametrize('text', ['[]', '{"frames": []', '{"frames": [{"id": 1}], "camera": {}}'])
+@pytest.mark.parametrize('text', ['[]', '{"frames": []', '{"frames": 3}', '{"frames": [{"id": 1}], "camera": {}}'])
 def test_invalid_sessions_are_rejected_and_kept(tmp_path, text):
     (tmp_path / 'frames.json').write_text(text)
     append_error(str(tmp_path), measurement())

@@ -11,7 +11,6 @@ from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel, half_width
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import DOUBLE, FALSE, DetectablePerson, Detector
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING, OdometryModel
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, Models, Timing, simulate, view_of
-from ros_3d_bb_lab.evaluation.tracking.benchmark import crowd
 from ros_3d_bb_lab.evaluation.tracking.trajectories import made_sequences
 
 SECONDS = 4
@@ -70,8 +69,8 @@ def shown_in(image):
     return shown(bearing, half_width(range_m), range_m, HALF_VIEW)
 
 
-def test_without_errors_detections_of_whole_people_are_the_truth(exact):
-    whole = 0
+def test_without_errors_whole_boxes_are_the_truth_and_truncated_ones_are_nearer_to_the_centre(exact):
+    whole = truncated = 0
     for image in exact.images:
         share = shown_in(image).share
         for detection, source in zip(image.detections, image.sources):
@@ -80,22 +79,13 @@ def test_without_errors_detections_of_whole_people_are_the_truth(exact):
                 whole += 1
                 assert np.allclose(detection.position_m[:2], image.truth.position_m[row])
                 assert not any(detection.truncated_edges)
-    assert whole > 100
-
-
-def test_boxes_truncated_by_the_border_are_nearer_to_the_centre_than_the_body(exact):
-    truncated = 0
-    for image in exact.images:
-        what = shown_in(image)
-        for detection, source in zip(image.detections, image.sources):
-            row, = np.flatnonzero(image.truth.ids == source)
             if any(detection.truncated_edges):
                 truncated += 1
                 of_body, of_box = (np.abs(np.arctan2(*seen_from(image.view, place_m)[0])) for place_m in (
                     image.truth.position_m[row:row + 1], detection.position_m[None, :2]))
                 range_m = np.linalg.norm(image.truth.position_m[row] - image.view.fixed_from_camera[:2, 3])
-                assert of_body + half_width(range_m) > HALF_VIEW > of_box and what.share[row] < 1
-    assert truncated > 5
+                assert of_body + half_width(range_m) > HALF_VIEW > of_box and share[row] < 1
+    assert whole > 100 and truncated > 5
 
 
 def test_occluded_people_have_somebody_nearer_in_front_and_are_not_detected(exact):
@@ -171,13 +161,6 @@ def test_shares_are_shares_the_nearest_is_whole_and_the_farther_hides_nobody(peo
     assert np.array_equal(without.share, what.share[others]) and np.array_equal(without.middle, what.middle[others])
 
 
-@given(st.floats(-3, 3), st.floats(-5, 5), st.floats(-5, 5), st.floats(-5, 5), st.floats(-5, 5))
-def test_to_frame_undoes_from_frame(heading, x_m, y_m, forward_m, left_m):
-    pose = np.array([x_m, y_m, heading])
-    assert np.allclose(robot_motion.to_frame(pose, robot_motion.from_frame(pose, [forward_m, left_m])),
-                       (forward_m, left_m))
-
-
 def test_odometry_drifts_from_the_truth_only_while_the_robot_drives():
     random = np.random.RandomState(0)
     standing = np.tile((1, 2, 0.5), (1001, 1))
@@ -240,11 +223,3 @@ def test_covariances_are_along_the_ray_and_across(bearing, depth_m):
     assert ray.dot(covariance_m2).dot(ray) == pytest.approx(camera.depth_sigma_m(depth_m) ** 2 + 0.035 ** 2)
     across = np.array([ray[1], -ray[0]])
     assert across.dot(covariance_m2).dot(across) == pytest.approx(0.009 ** 2 + 0.015 ** 2)
-
-
-def test_a_crowd_is_in_view_in_every_image():
-    for people in (5, 100):
-        for _stamp_ns, detections, view in crowd(people, 3):
-            assert len(detections) == people
-            local_m = seen_from(view, np.array([detection.position_m[:2] for detection in detections]))
-            assert (local_m[:, 1] > 0).all()

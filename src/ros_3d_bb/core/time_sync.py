@@ -129,7 +129,7 @@ class StampSynchronizer(object):
                 self._cameras.clear()
             self._end_before_ns = newest_ns
             self._lose_waiting(True)
-        self._settle(now_ns)
+        self._match_waiting(now_ns)
 
     def add_camera(self, stamp_ns, now_ns, camera):
         """Add a camera_info; if `stamp_ns` is None, it has no stamp and replaces all others."""
@@ -139,7 +139,7 @@ class StampSynchronizer(object):
         else:
             self._cameras.add(stamp_ns, now_ns, camera)
             self._plain_camera = None
-        self._settle(now_ns)
+        self._match_waiting(now_ns)
 
     def add_boxes(self, stamp_ns, now_ns, boxes):
         """Add the boxes of one image; `stamp_ns` is None if they have no stamp."""
@@ -148,14 +148,14 @@ class StampSynchronizer(object):
             stamp_ns = None if depth is None else depth.stamp_ns
         newest_ns = self._depths.newest_ns
         if stamp_ns is None:
-            self._settle(now_ns)
+            self._match_waiting(now_ns)
             self._on_lost(boxes, False)
         elif newest_ns is not None and newest_ns + self._length_ns < stamp_ns <= self._end_before_ns:
             self._on_lost(boxes, True)  # boxes from before the time jump
-            self._settle(now_ns)
+            self._match_waiting(now_ns)
         else:
             self._waiting.append(Stamped(stamp_ns, now_ns, boxes))
-            self._settle(now_ns)
+            self._match_waiting(now_ns)
 
     def end(self):
         """Signal the end of the input: all waiting boxes are lost."""
@@ -166,7 +166,7 @@ class StampSynchronizer(object):
         for entry in lost:
             self._on_lost(entry.value, before_jump)
 
-    def _settle(self, now_ns):
+    def _match_waiting(self, now_ns):
         """Call the callbacks for boxes whose frame is complete, is lost, or did not arrive in time."""
         settled, waiting = [], []
         newest_ns = self._depths.newest_ns

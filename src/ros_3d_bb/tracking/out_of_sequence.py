@@ -33,9 +33,10 @@ class OutOfSequenceBuffer(object):
     Parameters
     ----------
     step : callable
-        step(state, image, observed_s, id_of) returns the state after an image, which has `tracks` and `now_ns`, and the
-        matches: (track ID, whether the track was confirmed before, index of the detection). `observed_s` is the time
-        in seconds that the image accounts for; id_of(column) returns the ID of the track that a detection starts.
+        step(state, image, observed_s, assign_id) returns the state after an image, which has `tracks` and `now_ns`,
+        and the matches: (track ID, whether the track was confirmed before, index of the detection). `observed_s` is
+        the time in seconds that the image accounts for; assign_id(column) returns the ID of the track that a
+        detection starts.
     state
         State before the first image.
     last_id : int
@@ -86,7 +87,7 @@ class OutOfSequenceBuffer(object):
         for image in images:
             self._history.append((self.state, image))
             self.state, matches = self._step(self.state, image, self._observed_s(*image.order),
-                                             functools.partial(self._id_of, image.order))
+                                             functools.partial(self._assign_id, image.order))
             if known_id is not None:
                 self._restore_ids(image.order, matches, known_id)
         self._forget()
@@ -97,7 +98,7 @@ class OutOfSequenceBuffer(object):
         skipped_ns = [skipped_ns for skipped_ns, other in self._skipped if other == camera and skipped_ns < stamp_ns]
         return (stamp_ns - max(skipped_ns + [before_ns])) / NS
 
-    def _id_of(self, order, column):
+    def _assign_id(self, order, column):
         key = order + (column,)
         if key not in self._ids:
             self.last_id += 1

@@ -144,7 +144,7 @@ class Tracker(object):
         published &= (tracks['status'] != OUT_OF_VIEW) | (tracks['unseen_s'] <= params.out_of_view_limit)
         return objects_of(tracks[tracks['confirmed'] & published], self._prediction)
 
-    def _step(self, state, image, observed_s, id_of):
+    def _step(self, state, image, observed_s, assign_id):
         """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
         stamp_ns, detections, view = image
         params, camera = self._params, view.camera
@@ -172,7 +172,7 @@ class Tracker(object):
         new = tracks[:0]
         if len(unmatched_columns):
             new, started = new_targets(tracks, measurements[unmatched_columns], stamp_ns, params)
-            new['id'] = [id_of(column) for column in unmatched_columns[started].tolist()]
+            new['id'] = [assign_id(column) for column in unmatched_columns[started].tolist()]
             tracks = np.concatenate((tracks, new))
         for name, latest in cameras.items():
             added = np.full(len(new), SEEN if name == camera else OUT_OF_VIEW)
