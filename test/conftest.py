@@ -108,6 +108,14 @@ def camera_bag(session_folder, tmp_path_factory):
 
 
 @pytest.fixture
+def camera_package(tmp_path):
+    """A folder with a stand-in for the package realsense2_camera."""
+    from support.launching import RS_CAMERA_ARGUMENTS, stand_in_launch_file
+    stand_in_launch_file(tmp_path, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS)
+    return tmp_path
+
+
+@pytest.fixture
 def window_on():
     """Opens the annotator's window on the session in a folder."""
     from support.window import Driver  # imports Qt
