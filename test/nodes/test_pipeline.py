@@ -11,7 +11,7 @@ import rospy
 from std_msgs.msg import Int32MultiArray
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_3d_bb.bags.bag_writer import MOUNT_M, START_NS, SessionBagOptions, session_images, write_bag
+from ros_3d_bb.bags.bag_writer import MOUNT_M, START_NS, session_images, write_bag
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
@@ -34,7 +34,7 @@ def session(session_folder):
 def make_bag(session, folder, rate_hz):
     """Write the session with its boxes to a bag. Returns its path and {stamp: frame}."""
     path = str(folder / ('%g_hz.bag' % rate_hz))
-    write_bag(session_images(session, SessionBagOptions(rate_hz=rate_hz, with_boxes=True)), path)
+    write_bag(session_images(session, rate_hz, with_boxes=True), path)
     return path, {START_NS + int(number * NS / rate_hz): frame for number, frame in enumerate(session.frames)}
 
 

@@ -77,14 +77,11 @@ def _settings_from(given):
     for option, node in FILES:
         path = getattr(given, option[2:].replace('-', '_'))
         settings = settings._replace(**{node: read_params(path, getattr(settings, node))})
-    if given.weights:
-        settings = with_params(settings, 'yolov5', weights=given.weights)
-    if given.error_model:
-        settings = with_params(settings, 'bbox3d', error_model=given.error_model)
-    if given.target_frame:
-        settings = with_params(settings, 'tracker', target_frame=given.target_frame)
-    if given.cameras:
-        settings = with_params(settings, 'tracker', cameras=[camera.strip() for camera in given.cameras.split(',')])
+    cameras = given.cameras and [camera.strip() for camera in given.cameras.split(',')]
+    for node, name, value in (('yolov5', 'weights', given.weights), ('bbox3d', 'error_model', given.error_model),
+                              ('tracker', 'target_frame', given.target_frame), ('tracker', 'cameras', cameras)):
+        if value:
+            settings = with_params(settings, node, **{name: value})
     if settings.detector == 'yolov5' and not settings.yolov5[0].weights:
         raise ValueError('--detector yolov5 needs --weights FILE, a checkpoint such as yolov5n.pt; --detector depth '
                          'needs none')

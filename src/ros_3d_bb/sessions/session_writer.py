@@ -43,18 +43,9 @@ class MeasurementRecord(NamedTuple):
 def append(folder, measurement):
     """Append a MeasurementRecord to the session in a folder, which is created if it does not exist.
 
-    Returns
-    -------
-    str, int
-        ID of the measurement (the next free number and the stamp), and number of measurements in the session.
-
-    Raises
-    ------
-    ValueError
-        If the folder is not a session, the session is of another camera, or the measurement cannot be stored. The
-        session is unchanged.
-    OSError
-        If the session cannot be written. It is unchanged.
+    Returns the ID of the measurement (the next free number and the stamp), and the number of measurements in the
+    session. Raises ValueError if the folder is not a session, the session is of another camera, or the measurement
+    cannot be stored, and OSError if the session cannot be written. The session is unchanged then.
     """
     depth = stored_depth(measurement.depth)
     for name, pixels in (('colour', measurement.color), ('depth', measurement.depth.values)):
