@@ -77,7 +77,8 @@ class BagRun(object):
 
     def _begun(self, raw, pool):
         """Start the work that can be done ahead of a message's processing: add transforms, submit detections."""
-        (topic, _camera), message, search = self._topics.get(raw.topic, UNUSED), None, None
+        topic, _camera = self._topics.get(raw.topic, UNUSED)
+        message = search = None
         if topic == TF_TOPIC:
             with self._events.rejecting('transforms'):
                 message = message_in(raw, TFMessage)

@@ -123,16 +123,17 @@ def _run_jobs(jobs, at_once, with_bar):
                 job = todo.pop(0)
                 news, process = _started(context, job)
                 running[news] = job, process
-            wait(list(running), POLL_S)
-            for news, (job, process) in list(running.items()):
-                done, text = _news_of(news, job, process, shares)
-                if done is None:
+            for news in wait(list(running)):
+                job, process = running[news]
+                kind, content = _next_news(news, job, process)
+                shares[job.target] = content if kind == 'share' else 1.0
+                if kind == 'share':
                     continue
                 del running[news]
                 process.join()
-                shares[job.target] = 1.0
-                failed += not done
-                print(('\r' + 79 * ' ' + '\r' if with_bar else '') + text, file=sys.stdout if done else sys.stderr)
+                failed += kind == 'failed'
+                print(('\r' + 79 * ' ' + '\r' if with_bar else '') + content,
+                      file=sys.stderr if kind == 'failed' else sys.stdout)
             if with_bar:
                 share = sum(shares.values()) / len(jobs)
                 print('\r[%-*s] %3d %%  %d of %d bags' % (BAR, '#' * int(BAR * share), 100 * share,
@@ -154,19 +155,14 @@ def _started(context, job):
     return news, process
 
 
-def _news_of(news, job, process, shares):
-    """Return whether a job has succeeded (None while it runs) and the text to print."""
+def _next_news(news, job, process):
+    """Return ('share', processed fraction), ('done', summary) or ('failed', reason) from the process of a job."""
     try:
-        while news.poll():
-            kind, content = news.recv()
-            if kind != 'share':
-                return kind == 'done', content
-            shares[job.target] = content
+        return news.recv()
     except EOFError:  # killed, for example by the kernel when out of memory
         process.join()
         remove_partial(job.target)
-        return False, '%s: its process ended with status %s; no bag was written' % (job.source, process.exitcode)
-    return None, ''
+        return 'failed', '%s: its process ended with status %s; no bag was written' % (job.source, process.exitcode)
 
 
 def _work(job, sender):
