@@ -4,7 +4,7 @@ import pytest
 import rospy
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_3d_bb.bags.bag_writer import MOUNT_M, START_NS, SessionBagOptions, session_images, write_bag
+from ros_3d_bb.bags.bag_writer import MOUNT_M, START_NS, session_images, write_bag
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.sessions.session_reader import read_session
@@ -24,7 +24,7 @@ def test_playback_tracks_the_person_in_the_map(session_folder, weights, tmp_path
     The person jumps every five images; then a new track is started, which is published from the fourth image on.
     """
     session, path, rate_hz = read_session(session_folder), str(tmp_path / 'session.bag'), 10.0
-    write_bag(session_images(session, SessionBagOptions(rate_hz, with_boxes=True)), path)
+    write_bag(session_images(session, rate_hz, with_boxes=True), path)
     frames = {START_NS + int(number * NS / rate_hz): frame for number, frame in enumerate(session.frames)}
     with Recorder('ros_3d_bb/bb_3d', BoundingBox3DArray, False) as boxes, \
             Recorder('ros_3d_bb/tracks', TrackedObjectArray, False) as tracks, \
