@@ -5,12 +5,10 @@ import numpy as np
 import pytest
 
 from conftest import DATA
-from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scores_of, table
-from ros_3d_bb_lab.evaluation.scenes import LEAST_SHOWN
+from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scenario_scores, scores_of, table
+from ros_3d_bb_lab.evaluation.scenes import position_errors_m
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
@@ -73,22 +71,6 @@ def test_positions_are_accurate(result):
         assert ours['rmse_x_truncated_m'] <= 0.045 and ours['missed'] <= 3
 
 
-def position_errors_m(simulator, estimator, every):
-    """Errors in the plane (n,), metres, for exact boxes of people at 1 to 6 m; NaN if there is no estimate."""
-    errors_m = []
-    for number in range(0, simulator.frame_count, every):
-        frame = simulator.frame(number)
-        people = [person for person in frame.people if person.visible >= LEAST_SHOWN]
-        boxes = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [person.box_px for person in people],
-                               simulator.camera, estimator)
-        camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
-        for person, box in zip(people, boxes):
-            x_m, _y, z_m = transform_points(camera_from_map, person.position_m)
-            if 1 <= z_m <= 6:
-                errors_m.append(np.nan if box is None else np.hypot(box.center_m[0] - x_m, box.center_m[2] - z_m))
-    return np.array(errors_m)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize('scene', ['behind_a_pillar', 'thesis_f_in_front'])
 def test_positions_are_accurate_despite_occlusion_and_background(scene):
@@ -98,6 +80,16 @@ def test_positions_are_accurate_despite_occlusion_and_background(scene):
     assert len(ours) > 20 and not np.isnan(ours).any() and ours.max() < 0.4
     assert np.sqrt(np.mean(ours ** 2)) < 0.08
     assert np.count_nonzero(median > 0.4) > 3
+
+
+@pytest.mark.slow
+def test_scores_of_scenes():
+    path = os.path.join(SCENARIOS, 'thesis_a_start.yaml')
+    scores = scenario_scores(path, estimator_named('foreground'), every=40)
+    assert scores['scenario'] == 'thesis_a_start.yaml' and scores['ours']['boxes'] == scores['thesis']['boxes'] > 5
+    assert scores['ours']['rmse_plane_m'] < 0.08 < scores['thesis']['worst_m']
+    empty = scenario_scores(os.path.join(SCENARIOS, 'empty_room.yaml'), estimator_named('foreground'), every=90)
+    assert empty['ours'] == {'boxes': 0, 'missed': 0}
 
 
 @pytest.mark.slow

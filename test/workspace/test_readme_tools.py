@@ -31,8 +31,8 @@ SESSION_TO_BAG = claimed('rosrun ros_3d_bb session_to_bag')
 SCENARIO_TO_BAG = claimed('rosrun ros_3d_bb scenario_to_bag')
 STAMPED = claimed('message = Int32MultiArray', 'python')
 # Options that shorten a benchmark.
-BENCHMARKS = [(claimed('./run bench accuracy --boxes'), ''), (claimed('./run bench scenes'), ''),
-              (claimed('./run bench speed\n'), ' --images 1'),
+BENCHMARKS = [(claimed('./run bench accuracy --boxes'), ''), (claimed('./run bench accuracy --scenarios'), ''),
+              (claimed('./run bench scenes'), ''), (claimed('./run bench speed\n'), ' --images 1'),
               (claimed('./run bench tracking'), ' --seconds 3 --repetitions 1'),
               (claimed('./run bench latency'), ' --cases free --seconds 2')]
 DETECTOR_SPEED = claimed('./run bench speed --weights')

@@ -16,8 +16,11 @@ from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, truncated_edges
 from ros_3d_bb.estimation.error_model import read_error_model, write_error_model
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb_lab.evaluation.defaults import default_weights
+from ros_3d_bb_lab.evaluation.defaults import default_weights, scenario_path
 from ros_3d_bb_lab.evaluation.error_model_fit import coverage, data_of, fit_error_model, held_out
+from ros_3d_bb_lab.evaluation.scenes import position_errors_m
+from ros_3d_bb_lab.simulation.scenario import read_scenario
+from ros_3d_bb_lab.simulation.simulator import Simulator
 
 LENGTHS = ('rmse_x_m', 'rmse_z_m', 'rmse_plane_m', 'p95_plane_m', 'bias_x_m', 'bias_z_m', 'repeatability_x_m',
            'repeatability_z_m', 'rmse_x_truncated_m')
@@ -150,10 +153,26 @@ def table(result):
     return lines
 
 
+def scenario_scores(path, estimator, every=5):
+    """Errors of both estimators, uncorrected, on a simulated scene with exact boxes and truth, as a dictionary."""
+    simulator, scores = Simulator(read_scenario(path)), {'scenario': os.path.basename(path)}
+    for name, one in (('ours', estimator), ('thesis', estimator_named('median'))):
+        errors_m = position_errors_m(simulator, one, every)
+        found_m = errors_m[~np.isnan(errors_m)]
+        scores[name] = {'boxes': len(errors_m), 'missed': len(errors_m) - len(found_m)}
+        if len(found_m):
+            scores[name].update(rmse_plane_m=float(np.sqrt(np.mean(found_m ** 2))), worst_m=float(found_m.max()),
+                                p95_plane_m=float(np.percentile(found_m, 95)))
+    return scores
+
+
 def main():
     """Run the command `./run bench accuracy`."""
     arguments = _arguments()
     try:
+        if arguments.scenarios:
+            _bench_scenarios(arguments)
+            return
         session = read_session(arguments.data)
         session = session._replace(frames=tuple(frame for frame in session.frames if frame.truth_m is not None))
         if not session.frames:
@@ -179,11 +198,26 @@ def main():
     print('\n'.join(table(result)))
 
 
+def _bench_scenarios(arguments):
+    """Print the errors on simulated scenes, and optionally write them as JSON."""
+    results = []
+    for path in arguments.scenarios:
+        results.append(scenario_scores(path, estimator_named(arguments.estimator)))
+        print(results[-1]['scenario'])
+        for name in ('ours', 'thesis'):
+            print('  %-7s %s' % (name, '  '.join('%s %.4g' % pair for pair in sorted(results[-1][name].items()))))
+    if arguments.json:
+        with open(arguments.json, 'w') as stream:
+            json.dump({'estimator': arguments.estimator, 'scenarios': results}, stream, indent=1)
+
+
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench accuracy', description=__doc__)
     data = os.environ.get('ROS_3D_BB_DATA')
     parser.add_argument('--data', default=data and os.path.join(data, 'data', 'thesis'), metavar='DIR',
                         help='a measurement session (default: $ROS_3D_BB_DATA/data/thesis)')
+    parser.add_argument('--scenarios', nargs='+', type=scenario_path, metavar='SCENARIO',
+                        help='simulated scenes instead of a session')
     parser.add_argument('--error-model', metavar='FILE', help='error model for the correction (default: models fitted '
                         'to the other positions)')
     parser.add_argument('--fit', metavar='FILE', help='also write an error model fitted to all frames')
@@ -194,7 +228,7 @@ def _arguments():
     for name in ('source', 'camera', 'date'):
         parser.add_argument('--' + name, default='', help='stored in the file of --fit')
     arguments = parser.parse_args()
-    if not arguments.data:
+    if not arguments.data and not arguments.scenarios:
         parser.error('no --data given, and ROS_3D_BB_DATA is not set')
     if arguments.boxes == 'yolov5' and not arguments.weights:
         parser.error('--boxes yolov5 needs --weights')

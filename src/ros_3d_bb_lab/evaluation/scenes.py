@@ -100,6 +100,26 @@ def _detections(depth, boxes, camera, map_from_camera, error_model):
     return [detection_from_box(box, map_from_camera) for box in found]
 
 
+def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6.0):
+    """Position errors in the plane, in metres, of an estimator with exact boxes, for people in a range of depth.
+
+    Only people with at least `LEAST_SHOWN` of the body visible are evaluated. Returns an array (n,), NaN for people
+    without an estimate.
+    """
+    errors_m = []
+    for number in range(0, simulator.frame_count, every):
+        frame = simulator.frame(number)
+        people = [person for person in frame.people if person.visible >= LEAST_SHOWN]
+        boxes = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [person.box_px for person in people],
+                               simulator.camera, estimator)
+        camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
+        for person, box in zip(people, boxes):
+            x_m, _y, z_m = transform_points(camera_from_map, person.position_m)
+            if nearest_m <= z_m <= farthest_m:
+                errors_m.append(np.nan if box is None else np.hypot(box.center_m[0] - x_m, box.center_m[2] - z_m))
+    return np.array(errors_m)
+
+
 def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):
     """Count true and false detections of sufficiently visible people in a range of depth.
 
