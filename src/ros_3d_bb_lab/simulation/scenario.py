@@ -133,12 +133,8 @@ RANGES = (  # the same for numbers
 def read_scenario(path):
     """Read a scenario file. Its `room` may be the path of another file, relative to the scenario file.
 
-    Raises
-    ------
-    ValueError
-        If the file is not YAML, or has an unknown key or an invalid value. The message names the key and the value.
-    OSError
-        If the file cannot be opened.
+    Raises ValueError if the file is not YAML, or has an unknown key or an invalid value; the message names the key and
+    the value. Raises OSError if the file cannot be opened.
     """
     content = _load(path)
     if isinstance(content, dict) and isinstance(content.get('room'), str):
