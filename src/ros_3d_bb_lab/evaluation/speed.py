@@ -269,7 +269,3 @@ def _arguments():
     if arguments.images < 1:
         parser.error('--images is %d; at least 1 expected' % arguments.images)
     return arguments
-
-
-if __name__ == '__main__':
-    main()

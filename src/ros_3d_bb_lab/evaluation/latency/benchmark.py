@@ -81,17 +81,11 @@ def launch(arguments, timeout_s, log):
         with contextlib.suppress(subprocess.TimeoutExpired):  # the missing record is reported
             process.wait(timeout_s)
     finally:
-        end(process)
-
-
-def end(roslaunch):
-    """Terminate roslaunch with its nodes, if it is still running."""
-    roslaunch.send_signal(signal.SIGINT)
-    try:
-        roslaunch.wait(ENDING_S)
-    except subprocess.TimeoutExpired:
-        roslaunch.kill()
-        roslaunch.wait()
+        process.send_signal(signal.SIGINT)  # has no effect if it has exited
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(ENDING_S)
+        process.kill()
+        process.wait()
 
 
 def free_port():
@@ -178,7 +172,3 @@ def _arguments():
         if name not in measurable:
             parser.error('case %s needs --weights' % name)
     return arguments, [known[name] for name in names]
-
-
-if __name__ == '__main__':
-    main()
