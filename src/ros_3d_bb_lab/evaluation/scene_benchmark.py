@@ -129,11 +129,11 @@ def result_of(steps, detector, camera=D435I_COLOR):
 
     Lengths are in metres and shares are 0..1. Errors are aggregated over all people in the scene.
     """
-    found, tracked = score_detections(steps, *RANGE_M[detector]), score([step.moment for step in steps])
+    people, found, false = score_detections(steps, *RANGE_M[detector])
+    tracked = score([step.moment for step in steps])
     followed = [person for person in tracked.people if person.ids]
     result = {'detector': detector, 'images': len(steps), 'people': len(tracked.people),
-              'recall': found.found / found.people if found.people else 1.0,
-              'false_boxes': found.false / max(1, len(steps)),
+              'recall': found / people if people else 1.0, 'false_boxes': false / max(1, len(steps)),
               'id_switches': sum(person.switches for person in tracked.people),
               'rmse_m': _rms([person.rmse_m for person in followed]),
               'worst_m': max([person.worst_m for person in followed], default=None)}

@@ -29,14 +29,6 @@ class Step(NamedTuple):
     moment: Moment
 
 
-class DetectionScore(NamedTuple):
-    """Number of `people` to be detected, of those `found`, and of `false` boxes."""
-
-    people: int
-    found: int
-    false: int
-
-
 def detect_in_scene(simulator, detect, every=1, error_model=None):
     """Render a scene and detect the people in it, image by image.
 
@@ -99,7 +91,8 @@ def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6
 def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):
     """Count true and false detections of sufficiently visible people in a range of depth.
 
-    In each image, boxes and people are matched one to one in order of decreasing IoU. Returns a DetectionScore.
+    In each image, boxes and people are matched one to one in order of decreasing IoU. Returns the numbers of people to
+    be detected, of people found, and of false boxes.
     """
     people = found = false = 0
     for step in steps:
@@ -115,4 +108,4 @@ def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):
             if person.visible >= least_visible and nearest_m <= depth_m <= farthest_m:
                 people += 1
                 found += column in found_people
-    return DetectionScore(people, found, false)
+    return people, found, false

@@ -10,9 +10,8 @@ import sys
 import tempfile
 from typing import NamedTuple
 
-from ros_3d_bb_lab.evaluation.defaults import default_weights, scenario_path
+from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine, scenario_path
 from ros_3d_bb_lab.evaluation.latency.latency_result import result_of
-from ros_3d_bb_lab.evaluation.machine import describe_machine
 
 IMAGES = 60  # first images of the scene, played forwards and backwards: 2 s, 90 MB
 ENDING_S = 40.0  # roslaunch waits up to 17 s for its nodes

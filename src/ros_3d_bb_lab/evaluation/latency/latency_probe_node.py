@@ -115,7 +115,7 @@ def pids_of_nodes():
 
 
 def usage_of(pid):
-    """CPU time of all threads of a process in seconds, and its resident memory in megabytes, or None if it has ended."""
+    """CPU time of all threads of a process, seconds, and its resident memory, megabytes. None if it does not exist."""
     try:
         with open('/proc/%d/stat' % pid) as stream:
             fields = stream.read().rpartition(')')[2].split()  # the name may contain any character
