@@ -16,6 +16,7 @@ from ros_3d_bb.core.time_sync import NS
 
 POLL_MS = 100
 LOST_S = 5.0  # a camera that sends no images for this time is considered lost
+BODY_FROM_OPTICAL = transform_from((0, 0, 0), OPTICAL_ROTATION)
 EXPOSURE_UNIT_S = 1e-4  # unit of the colour sensor's exposure
 # librealsense uses the same projection for the modified and the inverse Brown-Conrady model.
 DISTORTIONS = {'none': ('', 0), 'brown_conrady': (PLUMB_BOB, 5), 'modified_brown_conrady': (INVERSE_BROWN_CONRADY, 5),
@@ -194,16 +195,15 @@ def link_from_color(extrinsics):
     depth_from_color = np.eye(4)
     depth_from_color[:3, :3] = np.reshape(extrinsics.rotation, (3, 3)).T  # librealsense's matrices are by columns
     depth_from_color[:3, 3] = extrinsics.translation
-    body_from_optical = transform_from((0, 0, 0), OPTICAL_ROTATION)
-    return body_from_optical.dot(depth_from_color).dot(np.linalg.inv(body_from_optical))
+    return BODY_FROM_OPTICAL.dot(depth_from_color).dot(np.linalg.inv(BODY_FROM_OPTICAL))
 
 
 def frame_links(prefix, link_from_color_body):
     """Frames of a camera with the names of realsense2_camera: [(parent, child, parent_from_child (4, 4)), ...]."""
-    links, body_from_optical = [], transform_from((0, 0, 0), OPTICAL_ROTATION)
+    links = []
     for stream, link_from_body in (('depth', np.eye(4)), ('color', link_from_color_body)):
         body = '%s_%s_frame' % (prefix, stream)
-        links += [('%s_link' % prefix, body, link_from_body), (body, optical_frame(prefix, stream), body_from_optical)]
+        links += [('%s_link' % prefix, body, link_from_body), (body, optical_frame(prefix, stream), BODY_FROM_OPTICAL)]
     return links
 
 
