@@ -73,7 +73,7 @@ def shown_in(image):
 def test_without_errors_detections_of_whole_people_are_the_truth(exact):
     whole = 0
     for image in exact.images:
-        share = shown_in(image).share
+        share, _middle, _cut = shown_in(image)
         for detection, source in zip(image.detections, image.sources):
             row, = np.flatnonzero(image.truth.ids == source)
             if share[row] > 1 - 1e-9:
@@ -86,7 +86,7 @@ def test_without_errors_detections_of_whole_people_are_the_truth(exact):
 def test_boxes_truncated_by_the_border_are_nearer_to_the_centre_than_the_body(exact):
     truncated = 0
     for image in exact.images:
-        what = shown_in(image)
+        share, _middle, _cut = shown_in(image)
         for detection, source in zip(image.detections, image.sources):
             row, = np.flatnonzero(image.truth.ids == source)
             if any(detection.truncated_edges):
@@ -94,7 +94,7 @@ def test_boxes_truncated_by_the_border_are_nearer_to_the_centre_than_the_body(ex
                 of_body, of_box = (np.abs(np.arctan2(*seen_from(image.view, place_m)[0])) for place_m in (
                     image.truth.position_m[row:row + 1], detection.position_m[None, :2]))
                 range_m = np.linalg.norm(image.truth.position_m[row] - image.view.fixed_from_camera[:2, 3])
-                assert of_body + half_width(range_m) > HALF_VIEW > of_box and what.share[row] < 1
+                assert of_body + half_width(range_m) > HALF_VIEW > of_box and share[row] < 1
     assert truncated > 5
 
 
@@ -148,9 +148,9 @@ def test_velocities_and_futures_of_the_truth_are_those_of_the_walks(exact):
 def test_a_person_behind_another_is_hidden_and_one_half_behind_is_visible_at_the_side():
     local_m = np.array([(2, 0), (4, 0), (4, 1.2), (4, -0.5)])
     range_m = np.linalg.norm(local_m, axis=1)
-    what = shown(robot_motion.bearing_of(local_m), half_width(range_m), range_m, HALF_VIEW)
-    assert what.share[:3].tolist() == [1, 0, 1] and 0.3 < what.share[3] < 0.95
-    assert what.middle[3] < robot_motion.bearing_of(local_m[3]) and not what.cut.any()
+    share, middle, cut = shown(robot_motion.bearing_of(local_m), half_width(range_m), range_m, HALF_VIEW)
+    assert share[:3].tolist() == [1, 0, 1] and 0.3 < share[3] < 0.95
+    assert middle[3] < robot_motion.bearing_of(local_m[3]) and not cut.any()
 
 
 bearings = st.lists(st.tuples(st.floats(-1.2, 1.2), st.floats(0.5, 8)), min_size=1, max_size=8)
@@ -161,14 +161,14 @@ def test_shares_are_shares_the_nearest_is_whole_and_the_farther_hides_nobody(peo
     bearing, range_m = np.array(people).T
     range_m = range_m + 0.001 * np.arange(len(range_m))  # no ties
     half = half_width(range_m)
-    what = shown(bearing, half, range_m, HALF_VIEW)
-    assert (what.share >= 0).all() and (what.share <= 1 + 1e-9).all()
+    share, middle, _cut = shown(bearing, half, range_m, HALF_VIEW)
+    assert (share >= 0).all() and (share <= 1 + 1e-9).all()
     nearest, farthest = np.argmin(range_m), np.argmax(range_m)
     inside = min(bearing[nearest] + half[nearest], HALF_VIEW) - max(bearing[nearest] - half[nearest], -HALF_VIEW)
-    assert what.share[nearest] == pytest.approx(max(0, inside) / (2 * half[nearest]), abs=1e-9)
+    assert share[nearest] == pytest.approx(max(0, inside) / (2 * half[nearest]), abs=1e-9)
     others = np.arange(len(people)) != farthest
-    without = shown(bearing[others], half[others], range_m[others], HALF_VIEW)
-    assert np.array_equal(without.share, what.share[others]) and np.array_equal(without.middle, what.middle[others])
+    share_without, middle_without, _cut = shown(bearing[others], half[others], range_m[others], HALF_VIEW)
+    assert np.array_equal(share_without, share[others]) and np.array_equal(middle_without, middle[others])
 
 
 @given(st.floats(-3, 3), st.floats(-5, 5), st.floats(-5, 5), st.floats(-5, 5), st.floats(-5, 5))
