@@ -112,10 +112,14 @@ class UnreliableCamera(object):
 def test_the_node_waits_for_an_unplugged_camera_and_drops_incomplete_images(recording, monkeypatch):
     monkeypatch.setattr(realsense_node, 'RealSense', UnreliableCamera)
     monkeypatch.setattr(realsense_node, 'RETRY_S', 0.1)
-    with Recorder(DEPTH, Image, publisher_expected=False) as depth, Recorder(COLOR, Image, False) as color:
+    rospy.set_param('~frame_prefix', '')
+    with Recorder(DEPTH, Image, publisher_expected=False) as depth, Recorder(COLOR, Image, False) as color, \
+            Recorder('/tf_static', TFMessage, False) as frames:
         realsense_node.RealSenseNode()
         wait_until(lambda: any(message.data[0] == 4 for message in color.messages), 'images of the second connection')
         depth.wait_for(3)
+    links = {link.child_frame_id for message in frames.messages for link in message.transforms}
+    assert color.messages[-1].header.frame_id in links and '_color_optical_frame' in links
     assert UnreliableCamera.opened == 4 and UnreliableCamera.closed == 1
     assert depth.messages[0].encoding == '32FC1'
     assert imgmsg_to_depth(depth.messages[0]).values[0, 0] == pytest.approx(0.25)

@@ -72,7 +72,7 @@ def shown_in(image):
 def test_without_errors_whole_boxes_are_the_truth_and_truncated_ones_are_nearer_to_the_centre(exact):
     whole = truncated = 0
     for image in exact.images:
-        share = shown_in(image).share
+        share, _middle, _cut = shown_in(image)
         for detection, source in zip(image.detections, image.sources):
             row, = np.flatnonzero(image.truth.ids == source)
             if share[row] > 1 - 1e-9:
@@ -138,9 +138,9 @@ def test_velocities_and_futures_of_the_truth_are_those_of_the_walks(exact):
 def test_a_person_behind_another_is_hidden_and_one_half_behind_is_visible_at_the_side():
     local_m = np.array([(2, 0), (4, 0), (4, 1.2), (4, -0.5)])
     range_m = np.linalg.norm(local_m, axis=1)
-    what = shown(robot_motion.bearing_of(local_m), half_width(range_m), range_m, HALF_VIEW)
-    assert what.share[:3].tolist() == [1, 0, 1] and 0.3 < what.share[3] < 0.95
-    assert what.middle[3] < robot_motion.bearing_of(local_m[3]) and not what.cut.any()
+    share, middle, cut = shown(robot_motion.bearing_of(local_m), half_width(range_m), range_m, HALF_VIEW)
+    assert share[:3].tolist() == [1, 0, 1] and 0.3 < share[3] < 0.95
+    assert middle[3] < robot_motion.bearing_of(local_m[3]) and not cut.any()
 
 
 bearings = st.lists(st.tuples(st.floats(-1.2, 1.2), st.floats(0.5, 8)), min_size=1, max_size=8)
@@ -151,14 +151,14 @@ def test_shares_are_shares_the_nearest_is_whole_and_the_farther_hides_nobody(peo
     bearing, range_m = np.array(people).T
     range_m = range_m + 0.001 * np.arange(len(range_m))  # no ties
     half = half_width(range_m)
-    what = shown(bearing, half, range_m, HALF_VIEW)
-    assert (what.share >= 0).all() and (what.share <= 1 + 1e-9).all()
+    share, middle, _cut = shown(bearing, half, range_m, HALF_VIEW)
+    assert (share >= 0).all() and (share <= 1 + 1e-9).all()
     nearest, farthest = np.argmin(range_m), np.argmax(range_m)
     inside = min(bearing[nearest] + half[nearest], HALF_VIEW) - max(bearing[nearest] - half[nearest], -HALF_VIEW)
-    assert what.share[nearest] == pytest.approx(max(0, inside) / (2 * half[nearest]), abs=1e-9)
+    assert share[nearest] == pytest.approx(max(0, inside) / (2 * half[nearest]), abs=1e-9)
     others = np.arange(len(people)) != farthest
-    without = shown(bearing[others], half[others], range_m[others], HALF_VIEW)
-    assert np.array_equal(without.share, what.share[others]) and np.array_equal(without.middle, what.middle[others])
+    share_without, middle_without, _cut = shown(bearing[others], half[others], range_m[others], HALF_VIEW)
+    assert np.array_equal(share_without, share[others]) and np.array_equal(middle_without, middle[others])
 
 
 def test_odometry_drifts_from_the_truth_only_while_the_robot_drives():
