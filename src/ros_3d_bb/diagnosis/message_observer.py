@@ -1,6 +1,7 @@
 """Convert messages to observations, for running graphs and bags alike, and observe the first seconds of a bag."""
 import collections
 import contextlib
+import functools
 
 import tf2_ros
 from genpy.message import get_message_class
@@ -10,7 +11,7 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.bags.bag_reader import BagReader, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.conversions.camera_msgs import INFO_TOPICS, STATIC_TOPIC, TF_TOPIC
-from ros_3d_bb.conversions.image_msgs import checked_depth_from, imgmsg_to_rgb
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, INFO, ROLES
@@ -77,7 +78,8 @@ def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda 
                         color_info=_newest(observed[INFO].newest, camera_from_msg),
                         depth_info=_newest(depth_info.newest, camera_from_msg),
                         color=_newest(observed[COLOR].newest, imgmsg_to_rgb),
-                        depth=_newest(observed[DEPTH].newest, checked_depth_from), **others)
+                        depth=_newest(observed[DEPTH].newest, functools.partial(imgmsg_to_depth, check_unit=True)),
+                        **others)
 
 
 def observe_bag(path, name_of, target_frame):
