@@ -11,7 +11,7 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb_lab.simulation.ros.simulator_msgs import simulated_messages
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.ros import TIMEOUT_S, Recorder, diagnostics_of, publisher

@@ -21,7 +21,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb_lab.simulation.ros.simulator_msgs import simulated_messages
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.processes import pid_of

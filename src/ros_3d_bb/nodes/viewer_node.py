@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import rospy
+from rosgraph.masterapi import MasterError
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
@@ -19,7 +20,7 @@ from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameter
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.measurement_label import Label
+from ros_3d_bb.nodes.common.master import NO_ANSWER, on_new_master, patient_master
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshots
@@ -262,6 +263,34 @@ class ViewerNode(object):
 def _complain(future):
     if future.exception() is not None:
         rospy.logerr('the action of the key failed: %r', future.exception())
+
+
+class Label(object):
+    """The parameter ~label, `default` if unset; kept without a master, and set again on a restarted one."""
+
+    def __init__(self, default):
+        self._default, self._newest = default, default
+        on_new_master(self._restore)
+
+    def from_master(self):
+        """Request the label from the master, because rospy's cache is updated with a delay."""
+        with contextlib.suppress(*NO_ANSWER):
+            try:
+                self._newest = str(patient_master().getParam(rospy.resolve_name('~label')))
+            except MasterError:  # the parameter is not set
+                self._newest = self._default
+        return self._newest
+
+    def from_cache(self):
+        """Return the label from rospy's cache, without a request to the master."""
+        with contextlib.suppress(*NO_ANSWER):
+            self._newest = str(rospy.get_param_cached('~label', self._default))
+        return self._newest
+
+    def _restore(self):
+        # rospy assumes that its subscription to the parameter persists, but a new master has lost it.
+        patient_master().subscribeParam(rospy.get_node_uri(), rospy.resolve_name('~label'))
+        rospy.set_param('~label', self._newest)
 
 
 def main():
