@@ -98,13 +98,21 @@ def reader(tmp_path_factory, weights):
 @pytest.fixture(scope='session')
 def camera_bag(session_folder, tmp_path_factory):
     """A bag at 2 Hz of a camera with a person in front of it, with 2D boxes; longer than a detector takes to start."""
-    from ros_3d_bb.bags.bag_writer import SessionBagOptions, session_images, write_bag
+    from ros_3d_bb.bags.bag_writer import session_images, write_bag
     from ros_3d_bb.sessions.session_reader import read_session
     session = read_session(session_folder)
     nearest = sorted(session.frames, key=lambda frame: abs(frame.truth_m[1] - 2.4) + abs(frame.truth_m[0]))
     path = str(tmp_path_factory.mktemp('camera') / 'camera.bag')
-    write_bag(session_images(session._replace(frames=nearest[:5] * 8), SessionBagOptions(2.0, with_boxes=True)), path)
+    write_bag(session_images(session._replace(frames=nearest[:5] * 8), 2.0, with_boxes=True), path)
     return path
+
+
+@pytest.fixture
+def camera_package(tmp_path):
+    """A folder with a stand-in for the package realsense2_camera."""
+    from support.launching import RS_CAMERA_ARGUMENTS, stand_in_launch_file
+    stand_in_launch_file(tmp_path, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS)
+    return tmp_path
 
 
 @pytest.fixture

@@ -46,9 +46,7 @@ PARAMS = (Bbox3dParams, TrackerNodeParams, MarkerParams, DepthDetectorParams, De
 VALUES = (0, 1, -1, 2 ** 70, 0.5, float('nan'), float('inf'), True, None, '', 'map', '1, 2', [], [1, 'a'], {}, {'a': 1},
           'x' * 300, b'x', [[]] * 3)
 FROM_CAMERA = transform_from((1, 2, 0.5), (-0.5, 0.5, -0.5, 0.5))
-
-
-GOOD = hostile.good_frame(NOW_NS)
+GOOD = hostile.good_messages(NOW_NS)
 
 
 def _made(read, topic):

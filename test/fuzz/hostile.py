@@ -14,7 +14,8 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import MODELS
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, CameraFrame, messages_of
 from ros_3d_bb.conversions.image_msgs import LAYOUTS
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, time_from
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg,
+                                                   time_from)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 
@@ -58,20 +59,19 @@ class Source(random.Random):
         return Header(stamp=self.stamp(now_ns), frame_id='camera' if self.random() < 0.8 else self.choice(TEXTS))
 
 
-def good_frame(stamp_ns, frame_id='camera'):
-    """Messages {topic: message} of a valid image of a person at 2 m."""
+def good_messages(stamp_ns):
+    """Messages {topic: message} of a valid image of a person at 2 m, its boxes and tracks, in the order of sending."""
     depth_mm = np.full((HEIGHT, WIDTH), 4000, np.uint16)
     depth_mm[8:44, 26:38] = 2000
-    header = Header(stamp=time_from(stamp_ns), frame_id=frame_id)
-    return dict(messages_of(CameraFrame(header, CAMERA, np.full((HEIGHT, WIDTH, 3), 90, np.uint8),
-                                        DepthImage(depth_mm, 0.001), [])))
-
-
-def good_boxes(stamp_ns):
-    """Valid 2D boxes of `good_frame`."""
-    message = Int32MultiArray(data=[26, 8, 38, 44])
-    message.layout.dim = [MultiArrayDimension(label='boxes;stamp=%d.%09d;frame=camera' % divmod(stamp_ns, NS), size=1)]
-    return message
+    header = Header(stamp=time_from(stamp_ns), frame_id='camera')
+    image_header = copy.copy(header)
+    messages = dict(messages_of(CameraFrame(image_header, CAMERA, np.full((HEIGHT, WIDTH, 3), 90, np.uint8),
+                                            DepthImage(depth_mm, 0.001), [])))
+    messages[BOXES_TOPIC] = boxes2d_to_msg(np.array([[26, 8, 38, 44]]), header)
+    box = BoundingBox3D(center=Pose(Point(0, 0, 3), Quaternion(w=1)), size=Vector3(0.5, 1.7, 0.5))
+    messages[BOXES3D_TOPIC] = BoundingBox3DArray(header=header, boxes=[box])
+    messages[TRACKS_TOPIC] = TrackedObjectArray(header=header)
+    return messages
 
 
 def transforms(stamp_ns):

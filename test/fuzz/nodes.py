@@ -6,13 +6,10 @@ from typing import Callable, NamedTuple
 from unittest import mock
 
 import numpy as np
-from std_msgs.msg import Header
 
 from fuzz import hostile
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, time_from
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, TRACKS_TOPIC, time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeNode
@@ -23,7 +20,6 @@ from soak.invariants import BALANCES, WAITING, balance_of
 from soak.records import Status
 from support.masterless import masterless, on_the_wire
 
-INFO_TOPIC = INFO_TOPICS[0]
 START_NS, PERIOD_NS = 1000 * NS, NS // 30
 EVERY = 200  # images between checks with valid messages
 
@@ -112,16 +108,25 @@ def _quiet():
 
 def _messages_of(source, now_ns, connections):
     """Messages of one image, valid or not, in random order."""
-    good = dict(hostile.good_frame(now_ns), **{BOXES_TOPIC: hostile.good_boxes(now_ns)})
+    good = hostile.good_messages(now_ns)
     makers = hostile.makers(source, now_ns, good)
     topics = [topic for topic in sorted(connections.subscribers) if topic in makers]
     source.shuffle(topics)
-    return [(topic, good[topic] if topic in good and source.random() < 0.4 else makers[topic]()) for topic in topics]
+    return [(topic, good[topic] if source.random() < 0.4 else makers[topic]()) for topic in topics]
 
 
 def _send_transforms(connections, stamp_ns):
     if '/tf' in connections.subscribers:
         connections.send('/tf', on_the_wire(hostile.transforms(stamp_ns)))
+
+
+def send_image(connections, stamp_ns, messages=None):
+    """At the time of a stamp, send transforms and the messages of an image (by default valid ones) to subscribers."""
+    connections.now = time_from(stamp_ns)
+    _send_transforms(connections, stamp_ns)
+    for topic, message in (messages or hostile.good_messages(stamp_ns)).items():
+        if topic in connections.subscribers:
+            connections.send(topic, on_the_wire(message))
 
 
 def _check_valid(name, node, connections, now_ns):
@@ -132,16 +137,7 @@ def _check_valid(name, node, connections, now_ns):
         buffer.clear()
     for step in range(6):
         now_ns += PERIOD_NS if step else 2 * NS
-        connections.now = time_from(now_ns)
-        _send_transforms(connections, now_ns)
-        header = Header(stamp=time_from(now_ns), frame_id='camera')
-        frame = hostile.good_frame(now_ns)
-        for topic, message in ((INFO_TOPIC, frame[INFO_TOPIC]), (DEPTH_TOPIC, frame[DEPTH_TOPIC]),
-                               (COLOR_TOPIC, frame[COLOR_TOPIC]), (BOXES_TOPIC, hostile.good_boxes(now_ns)),
-                               (BOXES3D_TOPIC, BoundingBox3DArray(header=header)),
-                               (TRACKS_TOPIC, TrackedObjectArray(header=header))):
-            if topic in connections.subscribers:
-                connections.send(topic, on_the_wire(message))
+        send_image(connections, now_ns)
     if output:
         publisher = connections.publishers[output]
         assert publisher.count > before, '%s: no output for valid messages after invalid ones' % name

@@ -13,8 +13,7 @@ from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.visualization.image_overlay import VALID_COLOR
-from support.ros import (TIMEOUT_S, Recorder, camera_info, depth_message, diagnostics_of, header_at, publisher,
-                         wait_until)
+from support.ros import TIMEOUT_S, Recorder, camera_info, depth_message, header_at, publisher, wait_until
 
 PERIOD = NS // 30
 BOX = np.array([[20, 10, 44, 38]])
@@ -22,15 +21,16 @@ _stamps = itertools.count(1000 * NS, 10 * NS)
 
 
 class Rig(object):
-    """A camera and a detector."""
+    """A camera, a detector, and the output of the node."""
 
     def __init__(self):
         self.depth = publisher('camera/aligned_depth_to_color/image_raw', Image)
         self.info = publisher('camera/color/camera_info', CameraInfo)
         self.boxes = publisher('yolo_bounding_box', Int32MultiArray)
+        self.output = Recorder('ros_3d_bb/bb_3d', BoundingBox3DArray)
 
-    def send_camera(self, stamp_ns, depth_mm=2000, **info):
-        self.info.publish(camera_info(stamp_ns, **info))
+    def send_camera(self, stamp_ns, depth_mm=2000):
+        self.info.publish(camera_info(stamp_ns))
         self.depth.publish(depth_message(stamp_ns, depth_mm))
 
     def send_boxes(self, stamp_ns, boxes=BOX):
@@ -43,15 +43,9 @@ def rig():
     return Rig()
 
 
-@pytest.fixture(scope='module')
-def recorder(rig):
-    with Recorder('ros_3d_bb/bb_3d', BoundingBox3DArray) as recorder:
-        yield recorder
-
-
 @pytest.fixture
-def output(recorder):
-    return recorder.emptied()
+def output(rig):
+    return rig.output.emptied()
 
 
 @pytest.fixture
@@ -98,42 +92,6 @@ def test_boxes_without_a_stamp_get_the_image_that_arrived_before_them(rig, outpu
     message, = output.wait_for(1)
     assert message.header.stamp == time_from(now + PERIOD)
     assert message.boxes[0].center.position.z == pytest.approx(2.0)
-
-
-def test_an_invalid_array_and_boxes_without_depth_are_reported(rig, output, now):
-    """The warning names the topic. An empty array means that no people were detected, and is published."""
-    rig.send_camera(now)
-    rig.boxes.publish(Int32MultiArray(data=[1, 2, 3]))
-    rig.send_boxes(7 * NS)  # far older than the cache
-    rig.send_boxes(now, [])
-    message, = output.wait_for(1)
-    assert message.boxes == [] and message.header.stamp == time_from(now)
-    level, text, counts = diagnostics_of('bbox3d_node')
-    assert level == 1 and '/camera/aligned_depth_to_color/image_raw' in text
-    assert counts['arrays without a depth image'] == 1
-
-
-def test_the_camera_of_the_same_stamp_is_used_if_it_arrives_last(rig, output, now):
-    """The intrinsics change, and their message arrives after the depth image and the boxes."""
-    rig.send_camera(now)
-    rig.depth.publish(depth_message(now + PERIOD, 2000))
-    rig.send_boxes(now + PERIOD)
-    assert output.stays_at(0, 0.2)
-    rig.info.publish(camera_info(now + PERIOD, focal=120.0))
-    assert output.wait_for(1)[0].boxes[0].size.x == pytest.approx(24 / 120 * 2.0)
-
-
-def test_a_jump_back_in_time(rig, output, now):
-    """A bag loops: the same stamps arrive again, with other depths."""
-    known = diagnostics_of('bbox3d_node')[2].get('depth images received', 0)
-    for depth_mm, sent in ((1000, 2), (3000, 4)):
-        rig.send_camera(now, depth_mm)
-        rig.send_camera(now + PERIOD, depth_mm)
-        wait_until(lambda: diagnostics_of('bbox3d_node')[2]['depth images received'] >= known + sent, 'depth images')
-        rig.send_boxes(now + PERIOD)  # may overtake the images and meet those of the first time
-        wait_until(lambda: output.messages and output.messages[-1].boxes[0].center.position.z
-                   == pytest.approx(depth_mm / 1000), 'boxes at %d mm' % depth_mm)
-    assert len(output.messages) == 2
 
 
 def test_a_changed_estimator_is_used_from_the_next_image(rig, output, now):

@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger
 from ros_3d_bb.conversions.camera_msgs import INFO_TOPICS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.master import Registration, on_new_master
-from ros_3d_bb.nodes.common.measurement_label import Label
+from ros_3d_bb.nodes.viewer_node import Label
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.latency.benchmark import free_port
 from support.processes import killed_and_back, pid_of

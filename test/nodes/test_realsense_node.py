@@ -1,6 +1,4 @@
 """What realsense_node publishes of a recording, and of a camera that is disconnected."""
-import subprocess
-
 import numpy as np
 import pytest
 import rospy
@@ -17,7 +15,7 @@ from ros_3d_bb.drivers.realsense import CameraLost, RgbdFrame
 from ros_3d_bb.nodes import realsense_node
 from support.realsense_recordings import (COLOR_CAMERA, START_MS, STEP_MS, SUFFIX, colored, sloping_depth,
                                           write_recording)
-from support.ros import Recorder, diagnostics_of, wait_until
+from support.ros import Recorder, diagnostics_of, started, wait_until
 
 FRAMES = 6
 TOPICS = dict({'/tf_static': TFMessage, '/clock': Clock, COLOR: Image, DEPTH: Image},
@@ -31,18 +29,12 @@ def recording(tmp_path_factory):
     return write_recording(path, [colored(number) for number in range(FRAMES)], [sloping_depth()] * FRAMES)
 
 
-def node(*params):
-    if rospy.has_param('/realsense_node'):  # of the previous run
-        rospy.delete_param('/realsense_node')
-    return subprocess.Popen(['rosrun', 'ros_3d_bb', 'realsense_node'] + ['_' + param for param in params],
-                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
-
-
 @pytest.fixture(scope='module')
 def played(recording):
     """{topic: messages} of a recording that was played once."""
     recorders = {topic: Recorder(topic, kind, publisher_expected=False) for topic, kind in TOPICS.items()}
-    process = node('file:=' + recording, 'publish_clock:=true', 'real_time:=false', 'wait_for_subscribers:=1')
+    process = started('realsense_node', 'file:=' + recording, 'publish_clock:=true', 'real_time:=false',
+                      'wait_for_subscribers:=1')
     assert process.wait(timeout=60) == 0
     wait_until(lambda: len(recorders[COLOR].messages) == FRAMES, 'all images')
     for recorder in recorders.values():
@@ -84,10 +76,9 @@ def test_the_frames_of_the_camera_are_published_once_and_form_a_tree(played):
     np.testing.assert_allclose(ahead, (1, 0, 0), atol=1e-12)
 
 
-@pytest.mark.parametrize('params, reason', [
-    (('file:=/nowhere.bag',), '/nowhere.bag'), (('filters:=median',), "has 'median'"), (('hight:=3',), '~height')])
-def test_a_node_that_cannot_start_exits_with_the_reason(recording, params, reason):
-    process = node(*params)
+@pytest.mark.parametrize('param, reason', [('file:=/nowhere.bag', '/nowhere.bag'), ('filters:=median', "has 'median'")])
+def test_a_node_that_cannot_start_exits_with_the_reason(recording, param, reason):
+    process = started('realsense_node', param)
     output, _none = process.communicate(timeout=30)
     assert process.returncode == 1 and reason in output and 'Traceback' not in output
 
@@ -121,10 +112,14 @@ class UnreliableCamera(object):
 def test_the_node_waits_for_an_unplugged_camera_and_drops_incomplete_images(recording, monkeypatch):
     monkeypatch.setattr(realsense_node, 'RealSense', UnreliableCamera)
     monkeypatch.setattr(realsense_node, 'RETRY_S', 0.1)
-    with Recorder(DEPTH, Image, publisher_expected=False) as depth, Recorder(COLOR, Image, False) as color:
+    rospy.set_param('~frame_prefix', '')
+    with Recorder(DEPTH, Image, publisher_expected=False) as depth, Recorder(COLOR, Image, False) as color, \
+            Recorder('/tf_static', TFMessage, False) as frames:
         realsense_node.RealSenseNode()
         wait_until(lambda: any(message.data[0] == 4 for message in color.messages), 'images of the second connection')
         depth.wait_for(3)
+    links = {link.child_frame_id for message in frames.messages for link in message.transforms}
+    assert color.messages[-1].header.frame_id in links and '_color_optical_frame' in links
     assert UnreliableCamera.opened == 4 and UnreliableCamera.closed == 1
     assert depth.messages[0].encoding == '32FC1'
     assert imgmsg_to_depth(depth.messages[0]).values[0, 0] == pytest.approx(0.25)

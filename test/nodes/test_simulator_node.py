@@ -1,6 +1,5 @@
 """Messages, stamps and clock of simulator_node. Needs a master."""
 import os
-import subprocess
 import time
 
 import numpy as np
@@ -10,13 +9,9 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import tracks_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
-from ros_3d_bb_lab.simulation.scenario import read_scenario
-from ros_3d_bb_lab.simulation.simulator import Simulator
-from support.ros import Recorder, wait_until
+from support.ros import Recorder, started, wait_until
 
 SCENE = """
 duration: 1.0
@@ -37,19 +32,13 @@ def path(tmp_path_factory):
     return str(path)
 
 
-def simulator(*params):
-    if rospy.has_param('/simulator_node'):  # of the previous test
-        rospy.delete_param('/simulator_node')
-    return subprocess.Popen(['rosrun', 'ros_3d_bb', 'simulator_node'] + ['_' + param for param in params],
-                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
-
-
 @pytest.fixture(scope='module')
 def round_of_scene(path):
     """{topic: messages} of one round with the clock of the node."""
     recorders = {topic: Recorder(topic, kind, publisher_expected=False) for topic, kind in TOPICS.items()}
     recorders['/clock'] = Recorder('/clock', Clock, publisher_expected=False)
-    process = simulator('scenario:=' + path, 'publish_clock:=true', 'repeat:=false', 'wait_for_subscribers:=1')
+    process = started('simulator_node', 'scenario:=' + path, 'publish_clock:=true', 'repeat:=false',
+                      'wait_for_subscribers:=1')
     assert process.wait(timeout=60) == 0
     wait_until(lambda: len(recorders['ground_truth'].messages) == 10, 'ten images')
     return {topic: recorder.messages for topic, recorder in recorders.items()}
@@ -66,21 +55,10 @@ def test_all_messages_have_the_stamps_of_the_scene(round_of_scene):
     assert times == sorted(times)
 
 
-def test_the_images_are_those_of_the_scenario(round_of_scene, path):
-    expected = Simulator(read_scenario(path))
-    for number in (0, 9):
-        frame = expected.frame(number)
-        np.testing.assert_array_equal(imgmsg_to_rgb(round_of_scene['camera/color/image_raw'][number]), frame.color)
-        depth = imgmsg_to_depth(round_of_scene['camera/aligned_depth_to_color/image_raw'][number])
-        np.testing.assert_array_equal(depth.values, frame.depth_mm)
-        person, = tracks_from_msg(round_of_scene['ground_truth'][number])
-        np.testing.assert_allclose(person.position_m, frame.people[0].position_m)
-
-
 def test_without_publish_clock_stamps_are_the_time_of_the_machine(path):
     began = time.time()
     with Recorder('ground_truth', TrackedObjectArray, publisher_expected=False) as truth:
-        process = simulator('scenario:=' + path)
+        process = started('simulator_node', 'scenario:=' + path)
         wait_until(lambda: len(truth.messages) >= 12 and (
             truth.messages[-1].header.stamp - truth.messages[0].header.stamp).to_sec() > 3, 'a second round')
         process.terminate()
@@ -95,8 +73,8 @@ def test_without_publish_clock_stamps_are_the_time_of_the_machine(path):
 @pytest.mark.parametrize('params,reason', [
     ((), 'no scenario given'), (('scenario:=/nowhere.yaml',), '/nowhere.yaml'),
     (('scenario:=' + os.devnull, 'speed:=0'), '~speed is 0'), (('scenario:=x', 'speed:=2.0'), 'publish_clock'),
-    (('scenario:=x', 'sped:=2'), 'did you mean ~speed'), (('scenario:=' + os.devnull, 'rate:=-5.0'), 'rate is -5')])
+    (('scenario:=' + os.devnull, 'rate:=-5.0'), 'rate is -5')])
 def test_invalid_parameters_are_rejected_at_the_start(path, params, reason):
-    process = simulator(*params)
+    process = started('simulator_node', *params)
     output, _none = process.communicate(timeout=30)
     assert process.returncode == 1 and reason in output and 'Traceback' not in output

@@ -5,7 +5,7 @@ import numpy as np
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
-from ros_3d_bb_lab.evaluation.machine import describe_machine
+from ros_3d_bb_lab.evaluation.defaults import describe_machine
 from soak.invariants import (BALANCES, balance_of, cpu_ms_of, findings_of, growth_of, lags_of, last_of_each,
                              processes_of)
 

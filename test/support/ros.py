@@ -36,6 +36,14 @@ def launched(*arguments):
         process.wait()
 
 
+def started(node, *params):
+    """Run a node with these private parameters ('name:=value') only. Returns the process, with its output as text."""
+    if rospy.has_param('/' + node):  # of the previous run
+        rospy.delete_param('/' + node)
+    return subprocess.Popen(['rosrun', 'ros_3d_bb', node] + ['_' + param for param in params], stdout=subprocess.PIPE,
+                            stderr=subprocess.STDOUT, universal_newlines=True)
+
+
 class Recorder(object):
     """Keeps all messages of a topic; use as a context manager."""
 

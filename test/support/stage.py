@@ -14,7 +14,7 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOP
 from ros_3d_bb.conversions.perception_msgs import time_from, with_stamp
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObject, TrackedObjectArray
-from ros_3d_bb_lab.simulation.ros.simulator_msgs import simulated_messages
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.ros import TIMEOUT_S, Recorder, publisher

@@ -26,12 +26,6 @@ def folder(tmp_path):
     return str(tmp_path)
 
 
-def test_export(folder, capsys):
-    path = os.path.join(folder, 'table.csv')
-    assert main(['--export', path, folder]) == 0 and os.path.exists(path)
-    assert capsys.readouterr().out == '%s: 4 measurements\n' % path
-
-
 @pytest.mark.slow
 def test_the_output_folder_and_the_estimator_of_the_analysis_can_be_chosen(tmp_path, capsys):
     session, out = write_synthetic_session(str(tmp_path / 'session')), str(tmp_path / 'out')

@@ -1,6 +1,5 @@
 """Invalid sessions: faults of single measurements are shown with them, other faults raise an error."""
 import os
-from unittest import mock
 
 import cv2
 import numpy as np
@@ -97,16 +96,3 @@ def test_faults_of_the_whole_session_are_rejected(folder, edit):
     change_json(folder, edit)
     with pytest.raises(SessionError, match='frames.json'):
         Document.open(folder)
-
-
-@pytest.mark.slow
-def test_5000_measurements_are_opened_without_reading_images(folder, monkeypatch):
-    change_json(folder, lambda content: content.update(
-        frames=[dict(content['frames'][0], id='m%d' % number) for number in range(5000)]))
-    listdir, imread = mock.Mock(side_effect=os.listdir), mock.Mock()
-    monkeypatch.setattr(cv2, 'imread', imread)
-    monkeypatch.setattr(os, 'listdir', listdir)
-    document = Document.open(folder)
-    document.set_truth(4999, 0.1, 2.0)
-    assert document.progress == (1, 5000) and len(read_session(folder).frames) == 5000
-    assert not imread.called and listdir.call_count <= 4  # both folders, at opening and after the edit

@@ -1,5 +1,6 @@
 """Window of the annotator: all kinds of sessions, other programs, keys, export and analysis."""
 import os
+from unittest import mock
 
 import cv2
 import numpy as np
@@ -86,16 +87,12 @@ def test_each_action_has_a_key_that_fields_do_not_handle(drive):
         assert not all(is_handled_by(drive.window.pane.truth.fields['x'], key) for key in keys), name
 
 
-@pytest.mark.parametrize('content, reason', [
-    ('{', 'not the description of a measurement session'), ('[]', 'an object with frames expected'),
-    ('{"frames": []}', 'the field'), (None, 'not a measurement session')])
-def test_an_invalid_session_gives_a_message(window_on, tmp_path, content, reason):
-    if content is not None:
-        (tmp_path / 'frames.json').write_text(content)
+def test_an_invalid_session_gives_a_message(window_on, tmp_path):
+    (tmp_path / 'frames.json').write_text('[]')
     was_opened = []
     driver = window_on(write_small_session(str(tmp_path / 'good')))
     message = driver.answer(message_of, lambda: was_opened.append(driver.window.open_session(str(tmp_path))))
-    assert reason in message and str(tmp_path) in message
+    assert 'an object with frames expected' in message and str(tmp_path) in message
     assert was_opened == [False] and len(driver.document.measurements) == 4  # the old one stays open
 
 
@@ -152,7 +149,10 @@ def test_only_images_of_shown_measurements_are_read(window_on, tmp_path, monkeyp
         original = getattr(document_module, name)
         monkeypatch.setattr(document_module, name, lambda frame, what, original=original: (
             reads.append(frame.id), original(frame, what))[1])
+    listdir = mock.Mock(side_effect=os.listdir)
+    monkeypatch.setattr(os, 'listdir', listdir)
     driver = window_on(folder)
+    assert listdir.call_count <= 2  # both folders, not each file
     driver.wait_for(lambda: len(reads) == 4)  # colour and depth of the first, and of the next one in advance
     del reads[:]
     driver.press(*[Qt.Key_PageDown] * 20)

@@ -27,7 +27,6 @@ def test_recovers_a_bias_that_goes_with_the_angle():
     assert model.x_bias.slope == 0 and model.x_bias.per_angle_m == pytest.approx(-0.25, abs=0.02)
 
 
-@pytest.mark.slow
 def test_recovers_the_spread(fitted):
     ranges_m = np.array([1.0, 2.5, 4.0])
     assert fitted.z_sigma.at(ranges_m) == pytest.approx(MODEL.z_sigma.at(ranges_m), rel=0.4)
@@ -45,7 +44,6 @@ def test_without_noise_the_bias_is_exact():
     assert model.cross_validated.rmse_plane_m < 1e-3 and model.cross_validated.coverage_95 == 1
 
 
-@pytest.mark.slow
 def test_ellipses_contain_their_share(fitted):
     measured_m, truth_m = measure(SIMPLE, 30, seed=2)
     corrected_m = fitted.corrected(measured_m)
@@ -79,7 +77,6 @@ def test_positions_have_equal_weight():
     assert many.z_sigma.at(2.0) == pytest.approx(once.z_sigma.at(2.0), rel=0.1)
 
 
-@pytest.mark.slow
 def test_provenance_and_measured_range_are_stored(fitted):
     assert fitted.provenance == ('made', 'median', 'none', '2026-01-01', 4 * len(PLACES_M), len(PLACES_M))
     assert fitted.measured_range == (0.5, 4.0, 1.5, 1.0)

@@ -55,13 +55,6 @@ def test_a_measurement_behind_the_person_is_an_outlier_and_one_beside_is_not():
     assert beside[0, 1] == pytest.approx(0.4, abs=1e-4)
 
 
-@given(st.floats(-2, 2), st.floats(-2, 2))
-def test_a_mixture_stays_a_covariance(x, y):
-    _mean, covariance = update(*state(), measurements=measured_at([(x, y)]), params=OUTLIERS)
-    np.testing.assert_allclose(covariance, covariance.transpose(0, 2, 1))
-    assert np.linalg.eigvalsh(covariance[0]).min() > 0
-
-
 def test_likelihood_is_a_density():
     """-2 log p, summed over a fine grid of places, is a probability of 1."""
     mean, covariance = state(spread=0.2)

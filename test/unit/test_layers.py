@@ -55,7 +55,7 @@ ALLOWED = {
         'cv2 matplotlib'),
     'ros_3d_bb_lab.evaluation.noise': ('estimation sessions lab.evaluation', 'matplotlib scipy'),
     'ros_3d_bb_lab.evaluation.tracking': (
-        'camera core tracking lab.evaluation lab.evaluation.baselines lab.simulation',
+        'camera core tracking lab.evaluation.baselines',
         'scipy trackeval'),
     'ros_3d_bb_lab.evaluation.demo': (
         'conversions core tracking visualization lab.evaluation lab.simulation.ros',

@@ -34,10 +34,9 @@ def out(tmp_path_factory):
                   for name in ('measurements_combined', 'new_measurements', 'measurements_without_edges')]
     else:
         tables = [write_table(tmp_path_factory.mktemp('tables') / 'table.csv', rows_of())] * 3
-    patch = pytest.MonkeyPatch()
-    run(patch, '--z', tables[0], '--x', tables[1], '--x-variance', tables[2], '--out', folder, '--estimator', 'median',
-        '--camera', 'D435i <&>')
-    patch.undo()
+    with pytest.MonkeyPatch.context() as patch:
+        run(patch, '--z', tables[0], '--x', tables[1], '--x-variance', tables[2], '--out', folder,
+            '--estimator', 'median', '--camera', 'D435i <&>')
     return folder
 
 
@@ -53,7 +52,6 @@ def test_the_numbers_are_those_of_the_thesis(out):
                                                 'log_likelihoods'}
 
 
-@pytest.mark.slow
 def test_the_report_contains_all_figures(out):
     page = (out / 'report.html').read_text(encoding='utf-8')
     assert re.findall('<img src="([^"]*)"', page) == FIGURES
@@ -64,7 +62,6 @@ def test_the_report_contains_all_figures(out):
     assert '>None' not in page and 'nan' not in page
 
 
-@pytest.mark.slow
 def test_the_error_models_can_be_read_and_correct_the_bias(out):
     for name in ('error_model.yaml', 'error_model_thesis_form.yaml'):
         model = read_error_model(out / name)

@@ -15,8 +15,8 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
-from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, exact_detector, is_in_image, main,
-                                                      result_of, score_tracks, yolov5_detector)
+from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, exact_detector, main, result_of,
+                                                      score_tracks, yolov5_detector)
 from ros_3d_bb_lab.evaluation.scenes import Step, detect_in_scene, run_scene, score_detections
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, PersonTruth, Poses, SimulatedFrame, Simulator
@@ -61,7 +61,7 @@ def test_everybody_in_the_thesis_scenes_keeps_one_id(runs, name, detector):
     result = score([step.moment for step in runs[detector, name]])
     assert len(result.people) == 4
     for person in result.people:
-        assert person.longest_s >= 1 and len(person.ids) == 1, person
+        assert person.visible_s >= 1 and len(person.ids) == 1, person
         assert person.followed > 0.8 and person.rmse_m < 0.25, person
     assert len(set(person.ids[0] for person in result.people)) == 4
 
@@ -71,7 +71,8 @@ def test_everybody_in_the_thesis_scenes_keeps_one_id(runs, name, detector):
 def test_recall_and_false_positives_of_detectors(runs, detector, recall, false_rate):
     """At least 80 % of each person is visible, at 2 to 8 m (YOLOv5) or 2 to 6 m (weight-free)."""
     scores = [score_detections(runs[detector, name], *RANGE_M[detector]) for name in SCENES]
-    people, found, false, images = (sum(column) for column in zip(*scores))
+    people, found, false = (sum(column) for column in zip(*scores))
+    images = sum(len(runs[detector, name]) for name in SCENES)
     assert people > 500
     assert found >= recall * people
     assert false <= false_rate * images
@@ -89,21 +90,6 @@ def approach():
     return Simulator(read_scenario(os.path.join(FOLDER, 'approach_jackal.yaml')))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize('name', sorted(APPROACHES))
-def test_approach_scenes_come_within_half_a_metre_for_two_seconds(name):
-    camera_m, person_m = APPROACHES[name]
-    simulator = Simulator(read_scenario(os.path.join(FOLDER, name)))
-    times_s = [simulator.time_s(number) for number in range(simulator.frame_count)]
-    cameras_m = np.array([simulator.poses_at(time_s).map_from_camera[:3, 3] for time_s in times_s])
-    people_m = np.array([simulator.positions_at(time_s)[0] for time_s in times_s])
-    distances_m = np.linalg.norm(people_m - cameras_m[:, :2], axis=1)
-    assert cameras_m[:, 2] == pytest.approx(camera_m)
-    assert simulator.scenario.people[0].height == person_m
-    assert distances_m.min() == pytest.approx(0.5, abs=1e-6) and distances_m[[0, -1]].min() > 3.5
-    assert 1.5 <= np.count_nonzero(distances_m < 0.51) / simulator.rate <= 2.5
-
-
 def test_exact_boxes_have_a_reproducible_jitter(approach):
     jitters_px = []
     for number in range(0, 285, 19):
@@ -119,11 +105,10 @@ def test_exact_boxes_have_a_reproducible_jitter(approach):
 def test_exact_boxes_have_the_covariance_of_the_error_model(approach):
     """In the map, whose x axis is the optical axis of the camera; the person is at 3.7 m."""
     model = read_error_model(ERROR_MODEL)
-    plain = next(detect_in_scene(approach, exact_detector(approach)))
-    image = next(detect_in_scene(approach, exact_detector(approach), error_model=model))
-    (before,), (detection,) = plain.detections, image.detections
+    _step, (before,), _view = next(detect_in_scene(approach, exact_detector(approach)))
+    step, (detection,), _view = next(detect_in_scene(approach, exact_detector(approach), error_model=model))
     assert before.covariance_m2 is None
-    camera_m = image.step.frame.poses.map_from_camera[:3, 3]
+    camera_m = step.frame.poses.map_from_camera[:3, 3]
     x_m, y_m, z_m = detection.position_m - camera_m
     expected, = model.covariance(np.array([(-y_m, -z_m, x_m)]))
     assert detection.covariance_m2[0, 0] == pytest.approx(expected[2, 2])
@@ -133,9 +118,18 @@ def test_exact_boxes_have_the_covariance_of_the_error_model(approach):
 @pytest.mark.slow
 @pytest.mark.parametrize('name', sorted(APPROACHES))
 def test_a_person_approaching_to_half_a_metre_is_one_visible_track(name):
-    """At 10 images per second; all images: ./run bench scenes."""
+    """At 10 images per second; all images: ./run bench scenes. The scene comes to half a metre for two seconds."""
+    camera_m, person_m = APPROACHES[name]
     simulator = Simulator(read_scenario(os.path.join(FOLDER, name)))
     steps = run_scene(simulator, exact_detector(simulator), 3, error_model=read_error_model(ERROR_MODEL))
+    cameras_m = np.array([step.frame.poses.map_from_camera[:3, 3] for step in steps])
+    people_m = np.array([step.frame.people[0].position_m[:2] for step in steps])
+    distances_m = np.linalg.norm(people_m - cameras_m[:, :2], axis=1)
+    assert cameras_m[:, 2] == pytest.approx(camera_m)
+    assert simulator.scenario.people[0].height == person_m
+    assert distances_m.min() == pytest.approx(0.5, abs=1e-6) and distances_m[[0, -1]].min() > 3.5
+    assert 15 <= np.count_nonzero(distances_m < 0.51) <= 25
+
     result = result_of(steps, 'exact', simulator.camera)
     assert set(result) == {'detector', 'images', 'people', 'recall', 'false_boxes', 'id_switches', 'rmse_m', 'worst_m',
                            'track_ids', 'not_visible', 'velocity_rmse_mps', 'prediction_1s_m'}
@@ -222,10 +216,3 @@ def test_errors_without_matches_or_predictions_are_none():
         'track_ids': 0, 'not_visible': 0, 'velocity_rmse_mps': None, 'prediction_1s_m': None}
     short = scored([([someone], [track_of(someone, horizon_s=0.5)])])
     assert short['velocity_rmse_mps'] == 0 and short['prediction_1s_m'] is None
-
-
-def test_a_person_is_in_the_image_while_the_axis_is():
-    map_from_camera = transform_from(CAMERA_M, OPTICAL_ROTATION)
-    edge_m = 3.0 * 319.2 / 614.686  # of the left border, 3 m ahead
-    assert is_in_image(person(1, 3.0, edge_m - 0.01), map_from_camera, D435I_COLOR)
-    assert not is_in_image(person(1, 3.0, edge_m + 0.01), map_from_camera, D435I_COLOR)

@@ -17,8 +17,9 @@ from ros_3d_bb.core import atomic_file
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.sessions import session_writer
+from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshot
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb.sessions.session_writer import MeasurementRecord, append, stored_depth
+from ros_3d_bb.sessions.session_writer import append, stored_depth
 from support.small_session import read_json
 
 CAMERA = Camera(64, 48, 60.0, 61.0, 31.5, 23.25, 'plumb_bob', (0.1, -0.2, 0.001, 0.002, 0.03))
@@ -29,11 +30,11 @@ BOX = Box3D(np.array([0.1234, -0.25, 2.5]), np.array([0.5, 1.75, 0.5]), (10, 0, 
 
 def measurement(number=0, **changes):
     random = np.random.RandomState(number)
-    values = dict(color=random.randint(0, 256, (48, 64, 3)).astype(np.uint8),
+    values = dict(color=ColorImage(random.randint(0, 256, (48, 64, 3)).astype(np.uint8), 'optical'),
                   depth=DepthImage(random.randint(0, 65536, (48, 64)).astype(np.uint16), 0.001), camera=CAMERA,
-                  frame_id='optical', stamp_ns=STAMP_NS + number * NS, rects_px=((10, 0, 30, 48),), boxes=(BOX,))
+                  stamp_ns=STAMP_NS + number * NS, boxes2d=((10, 0, 30, 48),), boxes3d=(BOX,))
     values.update(changes)
-    return MeasurementRecord(**values)
+    return Snapshot(**values)
 
 
 def content_of(folder):
@@ -58,17 +59,17 @@ def folder(tmp_path):
 
 
 def test_measurements_are_read_back(folder):
-    sent = [measurement(0), measurement(1, label='A1, arms up')]
-    stored = [append(folder, one) for one in sent]
+    sent, labels = [measurement(0), measurement(1)], ['', 'A1, arms up']
+    stored = [append(folder, one, label) for one, label in zip(sent, labels)]
     session = read_session(folder)
     assert (session.camera, session.depth_scale_m, session.frame_id) == (CAMERA, 0.001, 'optical')
     assert [(frame.id, count) for count, frame in enumerate(session.frames, 1)] == stored
-    for frame, one in zip(session.frames, sent):
-        np.testing.assert_array_equal(read_color(frame, session.camera), one.color)
+    for frame, one, label in zip(session.frames, sent, labels):
+        np.testing.assert_array_equal(read_color(frame, session.camera), one.color.pixels)
         depth = read_depth(frame, session)
         np.testing.assert_array_equal(depth.values, one.depth.values)
         assert depth.scale_m == one.depth.scale_m
-        assert (frame.stamp_ns, frame.label, frame.boxes_px) == (one.stamp_ns, one.label, ((10, 0, 30, 48),))
+        assert (frame.stamp_ns, frame.label, frame.boxes_px) == (one.stamp_ns, label, ((10, 0, 30, 48),))
         detection, = frame.detections
         np.testing.assert_allclose(detection.estimate_m, BOX.center_m, atol=1e-6)
         np.testing.assert_allclose(detection.size_m, BOX.size_m[:2], atol=1e-6)
@@ -86,7 +87,7 @@ def test_the_lens_model_is_read_back(folder, model, distortion):
 
 
 def test_the_description_contains_all_fields(folder):
-    append(folder, measurement(label='A1'))
+    append(folder, measurement(), 'A1')
     entry, = read_json(folder)['frames']
     assert entry == {
         'id': '00001_1616161616_123456789', 'color': 'color/00001_1616161616_123456789.png',
@@ -100,16 +101,10 @@ def test_each_2d_box_is_joined_with_its_3d_box(folder):
     rects_px = ((-5, 3, 12, 60), (20, 3, 30, 40), (40, 3, 60, 40))
     boxes = tuple(BOX._replace(rect_px=rect_px, center_m=np.array([0.0, 0.0, z]))
                   for rect_px, z in (((40, 3, 60, 40), 3.0), ((0, 3, 12, 48), 1.0), ((1, 1, 9, 9), 4.0)))
-    append(folder, measurement(rects_px=rects_px, boxes=boxes))
+    append(folder, measurement(boxes2d=rects_px, boxes3d=boxes))
     entry, = read_json(folder)['frames']
     assert [(detection['box'], detection.get('estimate_mm', [None] * 3)[2]) for detection in entry['detections']] == [
         ([-5, 3, 12, 60], 1000.0), ([20, 3, 30, 40], None), ([40, 3, 60, 40], 3000.0), ([1, 1, 9, 9], 4000.0)]
-
-
-def test_without_boxes_the_images_are_stored(folder):
-    append(folder, measurement(rects_px=(), boxes=()))
-    frame, = read_session(folder).frames
-    assert frame.boxes_px == () and read_json(folder)['frames'][0]['detections'] == []
 
 
 def test_ids_are_ascending_for_equal_images_and_after_measurements_were_removed(folder):
@@ -162,22 +157,23 @@ def test_a_killed_process_leaves_complete_measurements(folder):
         assert reported + 1 <= len(session.frames) <= reported + 2
         count = len(session.frames)
     for number, frame in enumerate(session.frames):
-        np.testing.assert_array_equal(read_color(frame, session.camera), measurement(number).color)
+        np.testing.assert_array_equal(read_color(frame, session.camera), measurement(number).color.pixels)
         np.testing.assert_array_equal(read_depth(frame, session).values, measurement(number).depth.values)
 
 
 @pytest.mark.parametrize('changes, named', [
-    ({'camera': CAMERA._replace(fx=60.5)}, 'intrinsics .*60.5'), ({'frame_id': 'another'}, 'frame .*optical.*another'),
+    ({'camera': CAMERA._replace(fx=60.5)}, 'intrinsics .*60.5'),
+    ({'color': measurement().color._replace(frame_id='another')}, 'frame .*optical.*another'),
     ({'depth': DepthImage(np.zeros((48, 64), np.uint16), 0.0001)}, 'depth scale .*0.001.*0.0001'),
-    ({'color': np.zeros((50, 64, 3), np.uint8)}, 'colour .*64 x 50'),
+    ({'color': ColorImage(np.zeros((50, 64, 3), np.uint8), 'optical')}, 'colour .*64 x 50'),
     ({'depth': DepthImage(np.zeros((24, 32), np.uint16), 0.001)}, 'depth .*32 x 24'),
-    ({'boxes': (BOX._replace(center_m=np.full(3, np.nan)),)}, 'nan')])
+    ({'boxes3d': (BOX._replace(center_m=np.full(3, np.nan)),)}, 'nan')])
 def test_invalid_measurements_and_those_of_another_camera_are_rejected(folder, changes, named):
     append(folder, measurement(0))
     assert re.search(named, append_error(folder, measurement(1, **changes)))
 
 
-@pytest.mark.parametrize('text', ['[]', '{"frames": []', '{"frames": [{"id": 1}], "camera": {}}'])
+@pytest.mark.parametrize('text', ['[]', '{"frames": []', '{"frames": 3}', '{"frames": [{"id": 1}], "camera": {}}'])
 def test_invalid_sessions_are_rejected_and_kept(tmp_path, text):
     (tmp_path / 'frames.json').write_text(text)
     append_error(str(tmp_path), measurement())

@@ -5,7 +5,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb_lab.simulation.mesh import CELL_M, box, loft, vertex_normals, volume
-from support.meshes import assert_closed
 
 metres = st.floats(.05, 3)
 positions = st.tuples(*[st.floats(-5, 5)] * 3)
@@ -29,15 +28,6 @@ def test_an_elliptic_tube_has_the_volume_of_its_inscribed_polygon(length, depth,
     area = depth * width * 64 / 2 * np.sin(2 * np.pi / 64)
     assert volume(vertices, faces) == pytest.approx(area * length, rel=1e-9)
     assert area == pytest.approx(np.pi * depth * width, rel=.002)
-
-
-@given(st.integers(2, 12).map(lambda half: 2 * half), st.integers(2, 6), st.floats(1.5, 6))
-@settings(max_examples=30)
-def test_a_tube_is_closed_and_wound_outwards(sides, rings, exponent):
-    vertices, faces = tube(1.0, .3, .5, exponent, sides, rings)
-    assert len(vertices) == sides * rings
-    assert_closed(faces)
-    assert volume(vertices, faces) > 0
 
 
 def test_the_cross_section_approaches_a_rectangle_with_growing_exponent():

@@ -63,17 +63,6 @@ def test_people_stay_at_the_end_of_their_last_move(start, person_moves):
         assert speed_of(state) < 1e-9 and state.posture.swing < 1e-9
 
 
-@given(st.floats(.3, 2), st.floats(-3, 3))
-@settings(max_examples=30)
-def test_a_straight_walk_has_its_speed_and_heading(speed, direction):
-    motion = walker(Move(to=(6 * np.cos(direction), 6 * np.sin(direction)), speed=speed))
-    state = motion.at(3 / speed)
-    expected = speed * np.array([np.cos(direction), np.sin(direction)])
-    np.testing.assert_allclose(state.velocity_mps, expected, atol=1e-9)
-    np.testing.assert_allclose(state.position_m, expected * 3 / speed, atol=1e-9)
-    assert angle_between(state.heading_rad, direction) < 1e-9
-
-
 @given(st.floats(.3, 2))
 @settings(max_examples=20)
 def test_each_gait_cycle_covers_one_stride(speed):

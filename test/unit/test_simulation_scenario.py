@@ -39,13 +39,9 @@ def content_with(where, name, value):
 
 
 @pytest.mark.parametrize('where,name', KEYS)
-def test_the_error_of_a_misspelled_key_names_its_path_and_the_nearest_key(where, name):
+def test_errors_name_the_path_of_a_misspelled_key_and_of_a_value_of_the_wrong_type(where, name):
     text = error_of(content_with(where, name + 'x', 1))
     assert text.startswith(where + ' ') and "'%sx'" % name in text and ' mean %s?' % name in text
-
-
-@pytest.mark.parametrize('where,name', KEYS)
-def test_the_error_of_a_value_of_the_wrong_type_names_its_path(where, name):
     for value in (None, 'much', '1.0', object(), float('nan'), float('inf'), [[1]], [1, 'a', 2], {'a': 1}, {1: 2}):
         if name == 'name' and value == 'much':
             continue

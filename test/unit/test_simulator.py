@@ -61,35 +61,21 @@ def test_frames_fill_the_duration_at_the_rate(duration, rate, count):
 
 def test_several_cameras_take_turns_at_their_mounts():
     """One faces forward, the other left and down from 2 m above the floor; a person is in front of each."""
-    robot = Robot(pose=(1.0, 0.0, 0.0), cameras=(Mount('front'), Mount('side', (0.0, 0.3, 1.9), np.pi / 2, -0.4)))
+    sideways = Mount('side', (0.0, 0.3, 1.9), np.pi / 2, -0.4)
+    robot = Robot(pose=(1.0, 0.0, 0.0), base_height=0.1, cameras=(Mount('front'), sideways))
     simulator = Simulator(scene(Person((4.0, 0.0)), Person((1.0, 3.0)), robot=robot), CAMERA)
     assert (simulator.cameras, simulator.rate, simulator.frame_count) == (['front', 'side'], 20.0, 60)
     frames = [simulator.frame(number) for number in (0, 1, 2)]
     assert [(frame.camera, frame.time_s) for frame in frames] == [('front', 0.0), ('side', 0.05), ('front', 0.1)]
     assert [visible_ids(frame) for frame in frames] == [[1], [2], [1]]
     side = frames[1].poses.map_from_camera
-    np.testing.assert_allclose(side[:3, 3], (1.0, 0.3, 1.965), atol=1e-9)
+    np.testing.assert_allclose(side[:3, 3], (1.0, 0.3, 2.0), atol=1e-9)
     np.testing.assert_allclose(side[:3, 2], (0, np.cos(0.4), -np.sin(0.4)), atol=1e-9)
 
 
 @pytest.fixture(scope='module')
 def empty_simulator():
     return Simulator(scene(), CAMERA)
-
-
-def test_without_noise_depth_is_exact():
-    """The wall is at x = 9 m; the camera is 0.17 m in front of the robot's centre, 0.265 m above the floor."""
-    depth_mm = frame_of().depth_mm
-    assert depth_mm[60, 80] == 8830
-    for v in (80, 110):
-        assert depth_mm[v, 80] == pytest.approx(.265 / (v - CAMERA.cy) * CAMERA.fy * 1000, abs=1)
-
-
-def test_with_noise_depth_has_the_errors_of_a_d435():
-    noisy, exact = (frame_of(Person((2.5, 0)), depth_noise=noise).depth_mm.astype(float) for noise in (True, False))
-    assert (noisy == 0).any() and not (exact == 0).any()
-    errors = (noisy / exact - 1)[noisy > 0]
-    assert .001 < np.median(np.abs(errors)) < .03
 
 
 @pytest.mark.slow
@@ -134,18 +120,6 @@ def test_images_agree_with_the_poses(x, y, yaw, pitch, ahead, beside):
     x1, y1, x2, y2 = truth.box_px
     assert x1 <= u < x2 and y1 <= v < y2
     assert frame.depth_mm[int(round(v)), int(round(u))] / 1000. == pytest.approx(point[2], abs=.25)
-
-
-def test_poses_are_rigid_and_agree_with_the_mount():
-    robot = Robot((1.0, 2.0, np.pi / 2), mount=(.2, .1, .5), base_height=.1, pitch=.3)
-    poses = Simulator(scene(robot=robot), CAMERA).poses_at(0)
-    for matrix in poses + (poses.map_from_camera,):
-        np.testing.assert_allclose(matrix[:3, :3].dot(matrix[:3, :3].T), np.eye(3), atol=1e-12)
-        np.testing.assert_array_equal(matrix[3], (0, 0, 0, 1))
-    camera = poses.map_from_camera
-    np.testing.assert_allclose(camera[:3, 3], (.9, 2.2, .6), atol=1e-12)
-    np.testing.assert_allclose(camera[:3, 2], (0, np.cos(.3), np.sin(.3)), atol=1e-12)  # faces y, tilted up
-    np.testing.assert_allclose(camera[:3, 0], (1, 0, 0), atol=1e-12)
 
 
 def test_drift_changes_the_pose_in_odom_and_not_in_the_map():

@@ -12,10 +12,9 @@ from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.types import Detection
-from ros_3d_bb_lab.evaluation import detector_speed
 from ros_3d_bb_lab.evaluation import speed as benchmark
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
-from ros_3d_bb_lab.evaluation.machine import describe_machine
+from ros_3d_bb_lab.evaluation.defaults import describe_machine
 from ros_3d_bb_lab.evaluation.speed import JITTER_PX, crowd_of, people_of
 
 SIZE = np.array([0.5, 0.5, 1.7])
@@ -141,10 +140,10 @@ def test_detectors_take_turns_and_the_median_counts(checkpoint, monkeypatch):
     def timed(detector, image):
         turns.append((detector.size, int(image[0, 0, 0])))
         return detector.size + image[0, 0, 0] ** 2.0, 2.0 * detector.size
-    monkeypatch.setattr(detector_speed, '_time_ms', timed)
-    monkeypatch.setattr(detector_speed, '_detector', lambda weights, runtime, size: mock.Mock(size=size))
+    monkeypatch.setattr(benchmark, '_detector_time_ms', timed)
+    monkeypatch.setattr(benchmark, '_detector', lambda weights, runtime, size: mock.Mock(size=size))
     images = [np.full((2, 2, 3), value, np.uint8) for value in (1, 2, 9)]
-    rows = detector_speed.detector_speed(images, checkpoint, ('torch',), (100, 200))
+    rows = benchmark.detector_speed(images, checkpoint, ('torch',), (100, 200))
     assert turns == [(size, value) for value in (1, 2, 9) for size in (100, 200)]
     assert rows == [{'runtime': 'torch', 'threads': 1, 'size': size, 'cpu_ms': size + 4, 'wall_ms': 2 * size}
                     for size in (100, 200)]
@@ -153,6 +152,6 @@ def test_detectors_take_turns_and_the_median_counts(checkpoint, monkeypatch):
 @pytest.mark.needs('torch')
 def test_no_images_and_unknown_runtimes_are_rejected(checkpoint):
     with pytest.raises(ValueError, match='no images'):
-        detector_speed.detector_speed([], checkpoint)
+        benchmark.detector_speed([], checkpoint)
     with pytest.raises(ValueError, match="'tensorflow'"):
-        detector_speed.detector_speed([np.zeros((64, 64, 3), np.uint8)], checkpoint, runtimes=('tensorflow',))
+        benchmark.detector_speed([np.zeros((64, 64, 3), np.uint8)], checkpoint, runtimes=('tensorflow',))

@@ -39,16 +39,6 @@ def test_ids_start_at_1_and_are_not_reused():
     assert [track.id for track in tracker.update(0, [at(0, 0)])] == [4]
 
 
-def test_people_who_pass_each_other_keep_their_ids():
-    """Thesis Fig. 4.1: two people pass each other at walking speed, seen at 30 Hz."""
-    tracker = ThesisTracker()
-    for frame in range(120):
-        time_s = frame / 30
-        tracks = tracker.update(seconds(time_s), [at(-2 + 1.2 * time_s, 0), at(2 - 1.2 * time_s, 0.8)][::(-1) ** frame])
-    assert [track.id for track in tracks] == [1, 2]
-    assert tracks[0].position_m[0] > 0 or tracks[1].position_m[0] < 0
-
-
 @pytest.mark.parametrize('rate_hz', [5, 60])
 def test_velocity_is_metres_per_second_at_any_rate(rate_hz):
     tracker = ThesisTracker()

@@ -140,7 +140,7 @@ def test_runs_are_weighted_by_their_images():
     nothing = outputs_of(one, lambda _number, _truth: [])
     result = scores_of([score_run(one, nothing), score_run(three, outputs_of(three, right))])
     assert result['recall'] == pytest.approx(75) == result['mota']
-    assert score_run(one, nothing).errors.shape == (0, 6, 3)
+    assert score_run(one, nothing)[1].shape == (0, 6, 3)
 
 
 def test_without_visible_people_and_tracks_scores_are_none():

@@ -5,20 +5,18 @@ import pytest
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
+from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshot
 from ros_3d_bb.visualization.image_overlay import BOX_COLOR, colorize_depth
-from ros_3d_bb.visualization.viewer_layout import (RATE_WINDOW_NS, WARNING_INK, FrameRate, ViewerContent, box_lines,
-                                                   compose, text_image)
+from ros_3d_bb.visualization.viewer_layout import RATE_WINDOW_NS, WARNING_INK, FrameRate, box_lines, compose, text_image
 
 BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75,
             (True,) * 4)
 
 
 def view(**changes):
-    values = dict(color=np.full((240, 320, 3), (10, 20, 30), np.uint8),
-                  depth=DepthImage(np.full((240, 320), 1500, np.uint16), 0.001), rects_px=((100, 40, 200, 160),),
-                  boxes=(BOX,))
-    values.update(changes)
-    return ViewerContent(**values)
+    snapshot = Snapshot(0, ColorImage(np.full((240, 320, 3), (10, 20, 30), np.uint8), 'optical'),
+                        DepthImage(np.full((240, 320), 1500, np.uint16), 0.001), None, ((100, 40, 200, 160),), (BOX,))
+    return snapshot._replace(**changes)
 
 
 @pytest.mark.parametrize('width_px', [160, 320, 640])
@@ -41,8 +39,8 @@ def test_boxes_are_drawn_in_the_third_panel_only():
 
 def test_2d_boxes_without_a_3d_box_are_drawn_and_others_only_once():
     lifted = compose(view(), 320, 6.0)
-    np.testing.assert_array_equal(lifted, compose(view(rects_px=None), 320, 6.0))
-    with_other = compose(view(rects_px=((100, 40, 200, 160), (-20, 30, 60, 400))), 320, 6.0)
+    np.testing.assert_array_equal(lifted, compose(view(boxes2d=None), 320, 6.0))
+    with_other = compose(view(boxes2d=((100, 40, 200, 160), (-20, 30, 60, 400))), 320, 6.0)
     assert with_other[100, 640 + 60].tolist() == list(BOX_COLOR) != lifted[100, 640 + 60].tolist()
 
 
@@ -70,9 +68,10 @@ def test_warnings_are_in_another_colour():
     assert has_ink == [False, True]
 
 
-@pytest.mark.parametrize('changes', [{'boxes': None}, {'boxes': None, 'rects_px': None}, {'boxes': (), 'rects_px': ()}])
+@pytest.mark.parametrize('changes', [{'boxes3d': None}, {'boxes3d': None, 'boxes2d': None},
+                                     {'boxes3d': (), 'boxes2d': ()}])
 def test_boxes_may_be_missing_and_many_grow_the_window(changes):
-    few, many = (compose(view(boxes=(BOX,) * count), 320, 6.0).shape for count in (1, 30))
+    few, many = (compose(view(boxes3d=(BOX,) * count), 320, 6.0).shape for count in (1, 30))
     assert compose(view(**changes), 320, 6.0).shape == few and many[0] > few[0]
 
 

@@ -10,10 +10,8 @@ import torch
 from ros_3d_bb.detection.yolov5 import backends, torch_backend
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime, physical_cores
 from ros_3d_bb.detection.yolov5.checkpoint import WeightsError
-from ros_3d_bb.detection.yolov5.detector import DetectionParams, Yolov5
 from ros_3d_bb.detection.yolov5.onnx_backend import session_of
 from ros_3d_bb.detection.yolov5.torch_backend import TorchRuntime
-from ros_3d_bb.sessions.session_reader import read_color, read_session
 from support.checkpoints import random_network, write_checkpoint
 from support.layouts import layout
 from support.official_reference import made
@@ -66,21 +64,6 @@ def test_raw_output_agrees_with_the_official_code(tmp_path, official_output, ran
     for image, rows, values in cases:
         difference = np.abs(run(image, -1)[rows] - values)
         assert difference[:, :4].max() <= 0.01 and difference[:, 4:].max() <= 1e-4
-
-
-@pytest.mark.slow
-@needs_onnx
-def test_detections_in_a_measurement_session_do_not_depend_on_the_runtime(session_folder, official_output):
-    """Boxes within 1 px and scores within 0.01, at the two sizes that are measured."""
-    session = read_session(session_folder)
-    for size in (640, 512):
-        detectors = [Yolov5(open_runtime(official_output[0], params), DetectionParams(image_size=size, confidence=0.2))
-                     for params in (ON_TORCH, ON_ONNX)]
-        for frame in session.frames[::12]:
-            one, other = (detector.detect(read_color(frame, session.camera)) for detector in detectors)
-            assert one.classes.tolist() == other.classes.tolist()
-            np.testing.assert_allclose(one.boxes, other.boxes, atol=1, rtol=0)
-            np.testing.assert_allclose(one.scores, other.scores, atol=0.01, rtol=0)
 
 
 @pytest.mark.parametrize('params', BOTH)

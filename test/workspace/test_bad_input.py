@@ -11,13 +11,11 @@ import pytest
 from std_msgs.msg import Header
 
 from fuzz import hostile
-from fuzz.nodes import TARGETS, _quiet, _send_transforms
+from fuzz.nodes import TARGETS, _quiet, _send_transforms, send_image
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg,
-                                                   time_from)
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, boxes2d_from_msg, time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
-from support.masterless import masterless, on_the_wire
+from support.masterless import masterless
 
 INFO_TOPIC = INFO_TOPICS[0]
 START_NS, PERIOD_NS = 1000 * NS, NS // 30
@@ -109,14 +107,10 @@ class Rig(object):
     def send(self, topic=None, change=None):
         """Send the messages of one image, of which one was changed."""
         self._now_ns += PERIOD_NS
-        self._connections.now = time_from(self._now_ns)
-        _send_transforms(self._connections, self._now_ns)
-        messages = good_messages(self._now_ns)
+        messages = hostile.good_messages(self._now_ns)
         if topic is not None:
             change(messages[topic])
-        for name, message in messages.items():
-            if name in self._connections.subscribers:
-                self._connections.send(name, on_the_wire(message))
+        send_image(self._connections, self._now_ns, messages)
 
     def has_answered(self):
         """Whether there is a result for the newest image."""
@@ -125,19 +119,6 @@ class Rig(object):
         newest = self._connections.publishers[self._target.output].newest
         stamp_ns = newest.header.stamp.to_nsec() if hasattr(newest, 'header') else boxes2d_from_msg(newest).stamp_ns
         return stamp_ns == self._now_ns
-
-
-def good_messages(stamp_ns):
-    """{topic: message} in the order in which they are sent."""
-    good = hostile.good_frame(stamp_ns)
-    box = BoundingBox3D()
-    box.center.position.z, box.center.orientation.w = 3.0, 1.0
-    box.size.x, box.size.y, box.size.z = 0.5, 1.7, 0.5
-    boxes = BoundingBox3DArray(boxes=[box])
-    boxes.header.frame_id, boxes.header.stamp = 'camera', time_from(stamp_ns)
-    return {INFO_TOPIC: good[INFO_TOPIC], DEPTH_TOPIC: good[DEPTH_TOPIC], COLOR_TOPIC: good[COLOR_TOPIC],
-            BOXES_TOPIC: hostile.good_boxes(stamp_ns), BOXES3D_TOPIC: boxes,
-            TRACKS_TOPIC: TrackedObjectArray(header=boxes.header)}
 
 
 @pytest.fixture

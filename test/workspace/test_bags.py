@@ -8,8 +8,7 @@ import pytest
 import rosbag
 import tf2_ros
 
-from ros_3d_bb.bags.bag_writer import (START_NS, SessionBagOptions, images_in, session_images, session_to_bag,
-                                       write_bag)
+from ros_3d_bb.bags.bag_writer import START_NS, images_in, session_images, session_to_bag, write_bag
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from_msg, time_from,
                                                    tracks_from_msg, transform_from_msg)
@@ -31,7 +30,7 @@ def session(session_folder):
 def messages(session, tmp_path_factory):
     """{topic: messages} of a bag at 10 Hz."""
     path = str(tmp_path_factory.mktemp('bag') / 'session.bag')
-    assert write_bag(session_images(session, SessionBagOptions(10.0, with_boxes=True)), path) == 7
+    assert write_bag(session_images(session, 10.0, with_boxes=True), path) == 7
     return messages_in(path)
 
 
@@ -195,7 +194,7 @@ def test_an_invalid_scenario_leaves_no_bag_and_the_fault_is_named(tmp_path, run_
 
 def test_a_bag_is_read_by_image(session, tmp_path):
     path = str(tmp_path / 'session.bag')
-    write_bag(session_images(session, SessionBagOptions(with_boxes=True)), path)
+    write_bag(session_images(session, with_boxes=True), path)
     topics = {'tf', 'camera/color/image_raw', 'yolo_bounding_box'}
     images = images_in(path, topics)
     assert len(images) == len(session.frames)

@@ -12,14 +12,12 @@ from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.bags.process_bag import with_params
 from ros_3d_bb.conversions.perception_msgs import stamp_of
-from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.demo.scene_report import panels_of, read_recording
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.launching import loaded
-from support.masterless import masterless, on_the_wire
 from support.two_cameras import PERIOD_NS, START_NS, Rig
 
 # A person walks from the view of the front camera into that of the left one; another one stands in both views.
@@ -115,19 +113,6 @@ def shift(message, seconds):
         label = message.layout.dim[0].label
         stamp = re.search(r'stamp=(\d+)', label).group(1)
         message.layout.dim[0].label = label.replace(stamp, str(int(stamp) + seconds), 1)
-
-
-def test_the_node_publishes_what_process_bag_writes(bags):
-    found = []
-    with masterless({'tf_timeout': 0.0, 'cameras': 'front, left'}) as connections, rosbag.Bag(bags[1]) as bag:
-        TrackerNode()
-        for topic, message, _time in bag.read_messages():
-            name = topic if topic == '/tf' else topic[1:]
-            if name in connections.subscribers:
-                connections.send(name, on_the_wire(message))
-                if name.endswith('bb_3d'):
-                    found.append(connections.publishers['ros_3d_bb/tracks'].newest)
-    assert [str(message) for message in found] == [str(message) for message in messages_on(bags[1], 'ros_3d_bb/tracks')]
 
 
 @pytest.fixture

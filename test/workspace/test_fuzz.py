@@ -6,9 +6,10 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from fuzz.functions import FUNCTIONS, fuzz_functions
-from fuzz.hostile import good_boxes, good_frame, transforms
-from fuzz.nodes import TARGETS, fuzz_node
-from ros_3d_bb.conversions.perception_msgs import stamp_of
+from fuzz.hostile import good_messages, transforms
+from fuzz.nodes import TARGETS, fuzz_node, send_image
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC as COLOR, DEPTH_TOPIC as DEPTH, INFO_TOPICS
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC as BOXES, stamp_of
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
@@ -18,8 +19,7 @@ from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
 from ros_3d_bb.visualization import image_overlay
 from support.masterless import masterless
 
-TOPICS = ('camera/color/camera_info', 'camera/aligned_depth_to_color/image_raw', 'camera/color/image_raw',
-          'yolo_bounding_box')
+INFO = INFO_TOPICS[0]
 
 
 def test_functions_reject_invalid_values_by_documented_exceptions():
@@ -70,21 +70,15 @@ def test_edges_far_outside_the_image_are_clipped(monkeypatch):
     assert corners == [-4, 5, 68, 20, 3, 4, 9, 52]
 
 
-def messages_at(stamp_ns):
-    """Valid messages in the order of `TOPICS`."""
-    frame = dict(good_frame(stamp_ns), yolo_bounding_box=good_boxes(stamp_ns))
-    return [frame[topic] for topic in TOPICS]
-
-
 def test_boxes_are_processed_even_if_the_colour_image_is_invalid():
     """Two arrays of boxes wait for one depth image."""
     with masterless() as connections:
         Bbox3dNode()
-        for stamp_ns, order in ((10 ** 12, (0, 1, 3)), (2 * 10 ** 12, (0, 2, 3, 3, 1))):
-            messages = messages_at(stamp_ns)
-            messages[2].step = 1
-            for number in order:
-                connections.send(TOPICS[number], messages[number])
+        for stamp_ns, order in ((10 ** 12, (INFO, DEPTH, BOXES)), (2 * 10 ** 12, (INFO, COLOR, BOXES, BOXES, DEPTH))):
+            messages = good_messages(stamp_ns)
+            messages[COLOR].step = 1
+            for topic in order:
+                connections.send(topic, messages[topic])
         assert connections.publishers['ros_3d_bb/bb_3d'].count == 3
 
 
@@ -93,8 +87,6 @@ def test_debug_images_are_published_after_a_colour_image_without_a_stamp():
     with masterless() as connections:
         Bbox3dNode()
         for stamp_ns in (10 ** 12, 2 * 10 ** 12):
-            for topic, message in zip(TOPICS, messages_at(stamp_ns)):
-                if topic in connections.subscribers:
-                    connections.send(topic, message)
-            connections.send('camera/color/image_raw', Image())
+            send_image(connections, stamp_ns)
+            connections.send(COLOR, Image())
         assert connections.publishers['ros_3d_bb/color'].count == 1

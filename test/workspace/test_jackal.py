@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import xacro
 
-from support.launching import (ROOT, RS_CAMERA_ARGUMENTS, dumped, given_to_stand_ins, loaded, stand_in_launch_file,
-                               write)
+from support.launching import ROOT, dumped, given_to_stand_ins, loaded, write
 from support.urdf import base_from
 
 CAMERA = os.path.join(ROOT, 'urdf', 'jackal_d435i.urdf.xacro')
@@ -78,14 +77,8 @@ def test_a_variable_selects_the_mesh_for_the_visual_geometry_only(jackal):
     assert link.find('collision/geometry/box') is not None
 
 
-@pytest.fixture
-def packages(tmp_path):
-    stand_in_launch_file(tmp_path, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS)
-    return tmp_path
-
-
-def test_one_command_starts_camera_and_pipeline(packages):
-    parameters = dumped('jackal.launch', packages, 'weights:=/some/yolov5n.pt', 'fps:=15', 'planner:=costmap',
+def test_one_command_starts_camera_and_pipeline(camera_package):
+    parameters = dumped('jackal.launch', camera_package, 'weights:=/some/yolov5n.pt', 'fps:=15', 'planner:=costmap',
                         'frame_world:=odom', 'error_model:=/some/model.yaml')
     assert given_to_stand_ins(parameters)['align_depth'] == 'true'
     assert given_to_stand_ins(parameters)['color_fps'] == '15'
@@ -114,7 +107,7 @@ def test_drivers_and_mounts_of_several_cameras_are_not_started():
     assert parameters['/tracker_node/cameras'] == 'front,rear' and '/rear/bbox3d_node/estimator' in parameters
 
 
-def test_nodes_are_respawned_on_the_robot_only(packages):
+def test_nodes_are_respawned_on_the_robot_only(camera_package):
     """Elsewhere only with respawn:=true, because configuration errors would be logged repeatedly."""
     arguments = ['driver:=pyrealsense2', 'planner:=costmap']
     _parameters, nodes = loaded('jackal.launch', *arguments)
@@ -123,7 +116,7 @@ def test_nodes_are_respawned_on_the_robot_only(packages):
     assert not any(node.respawn for node in nodes.values())
     _parameters, nodes = loaded('pipeline.launch', 'planner:=costmap', 'weights:=yolov5n.pt')
     assert len(nodes) == 4 and not any(node.respawn for node in nodes.values())
-    assert given_to_stand_ins(dumped('jackal.launch', packages))['respawn'] == 'true'
+    assert given_to_stand_ins(dumped('jackal.launch', camera_package))['respawn'] == 'true'
 
 
 def test_computer_moves_the_pipeline_but_not_the_camera():

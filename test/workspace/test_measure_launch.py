@@ -2,7 +2,7 @@
 import pytest
 
 from support import launching
-from support.launching import RS_CAMERA_ARGUMENTS, dumped, given_to_stand_ins, stand_in_launch_file
+from support.launching import dumped, given_to_stand_ins
 
 LAUNCH, REQUIRED = 'measure.launch', ['session:=/a session', 'weights:=/some.pt']
 
@@ -19,9 +19,8 @@ def test_without_camera_realsense2_camera_is_not_needed():
     assert nodes['viewer_node'].required
 
 
-def test_the_camera_aligns_depth_and_its_frame_is_the_target(tmp_path):
-    stand_in_launch_file(tmp_path, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS)
-    parameters = dumped(LAUNCH, tmp_path, 'camera:=true', 'detector:=depth', *REQUIRED)
+def test_the_camera_aligns_depth_and_its_frame_is_the_target(camera_package):
+    parameters = dumped(LAUNCH, camera_package, 'camera:=true', 'detector:=depth', *REQUIRED)
     assert given_to_stand_ins(parameters)['align_depth'] == 'true'
     assert parameters['/tracker_node/target_frame'] == 'camera_link'
     assert parameters['/depth_detector_node/floor_frame'] == ''

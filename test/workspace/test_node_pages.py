@@ -7,8 +7,7 @@ from unittest import mock
 
 import pytest
 
-from fuzz import hostile
-from fuzz.nodes import TARGETS
+from fuzz.nodes import TARGETS, send_image
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.realsense_node import RealSenseNode
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import LatencyProbeNode
@@ -42,9 +41,7 @@ def connected(name):
             mock.patch.dict(sys.modules, stand_ins), mock.patch('threading.Thread.start'), \
             mock.patch('ros_3d_bb_lab.evaluation.latency.replay_node.images_in', lambda _path, _topics: []):
         node = make()
-        messages = dict(hostile.good_frame(NS), yolo_bounding_box=hostile.good_boxes(NS))
-        for topic in sorted(set(messages) & set(connections.subscribers)):
-            connections.send(topic, messages[topic])
+        send_image(connections, NS)
         yield node, connections
 
 

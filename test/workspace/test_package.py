@@ -13,7 +13,7 @@ from ros_3d_bb.core.params import check, params_from, table_of
 from ros_3d_bb.visualization.markers import NAMESPACES
 from support.launching import loaded
 from support.pages import ROOT, node_pages
-from support.standard_library import STANDARD_LIBRARY, TEST_STANDARD_LIBRARY
+from support.standard_library import STANDARD_LIBRARY
 
 # rosdep keys of modules that are no ROS packages; None: optional, imported where it is used.
 KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-torch', 'onnxruntime': None,
@@ -69,7 +69,7 @@ def test_every_import_is_declared_and_every_dependency_is_used():
 
 def test_imports_of_the_tests_are_declared_or_in_their_requirements():
     names = imported(glob.glob(inside('test', '**', '*.py'), recursive=True))
-    names -= {'support', 'fuzz', 'soak', 'conftest'} | TEST_STANDARD_LIBRARY
+    names -= {'support', 'fuzz', 'soak', 'conftest'}
     with open(inside('test', 'requirements.txt')) as stream:
         required = set(re.findall(r'^([\w-]+)', stream.read(), re.MULTILINE))
     known = declared('depend', 'exec_depend', 'test_depend')

@@ -17,7 +17,7 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError, BagReader
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
-from ros_3d_bb.bags.bag_writer import SessionBagOptions, session_images, write_bag
+from ros_3d_bb.bags.bag_writer import session_images, write_bag
 from ros_3d_bb.bags.process_bag import main, with_params
 from ros_3d_bb.conversions.camera_msgs import START_NS
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, tracks_from_msg
@@ -45,8 +45,7 @@ def session_bag(session_folder, tmp_path):
     """Writes `in.bag`, a bag of five images of a session, with or without boxes."""
     session = read_session(session_folder)
     session = session._replace(frames=session.frames[:5])
-    return lambda with_boxes: write_bag(session_images(session, SessionBagOptions(with_boxes=with_boxes)),
-                                        str(tmp_path / 'in.bag'))
+    return lambda with_boxes: write_bag(session_images(session, with_boxes=with_boxes), str(tmp_path / 'in.bag'))
 
 
 def messages_in(path):

@@ -1,22 +1,14 @@
 """What realsense.launch starts, with a stand-in for realsense2_camera that has only the arguments of its release."""
-import pytest
-
-from support.launching import RS_CAMERA_ARGUMENTS, dumped, given_to_stand_ins, loaded, stand_in_launch_file
+from support.launching import dumped, given_to_stand_ins, loaded
 
 
-@pytest.fixture
-def packages(tmp_path):
-    stand_in_launch_file(tmp_path, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS)
-    return tmp_path
-
-
-def test_the_driver_aligns_depth_to_colour_of_the_same_size_and_rate(packages):
+def test_the_driver_aligns_depth_to_colour_of_the_same_size_and_rate(camera_package):
     """The stand-in rejects arguments that are not those of the release."""
-    given = given_to_stand_ins(dumped('realsense.launch', packages))
+    given = given_to_stand_ins(dumped('realsense.launch', camera_package))
     assert given == {'align_depth': 'true', 'camera': 'camera', 'initial_reset': 'false', 'color_width': '640',
                      'color_height': '480', 'color_fps': '30', 'depth_width': '640', 'depth_height': '480',
                      'depth_fps': '30', 'respawn': 'false'}
-    given = given_to_stand_ins(dumped('realsense.launch', packages, 'camera:=front', 'serial_no:=0123', 'fps:=15',
+    given = given_to_stand_ins(dumped('realsense.launch', camera_package, 'camera:=front', 'serial_no:=0123', 'fps:=15',
                                       'width:=848', 'filters:=disparity,spatial', 'initial_reset:=true'))
     assert given['camera'] == 'front' and given['filters'] == 'disparity,spatial' and given['initial_reset'] == 'true'
     assert (given['color_width'], given['depth_width'], given['color_fps'], given['depth_fps']) == (
@@ -24,12 +16,12 @@ def test_the_driver_aligns_depth_to_colour_of_the_same_size_and_rate(packages):
     assert given['serial_no'].lstrip('0') == '123'
 
 
-def test_exposure_is_automatic_or_in_the_units_of_the_sensor(packages):
-    automatic = dumped('realsense.launch', packages)
+def test_exposure_is_automatic_or_in_the_units_of_the_sensor(camera_package):
+    automatic = dumped('realsense.launch', camera_package)
     assert automatic['/camera/rgb_camera/enable_auto_exposure'] is True
     assert automatic['/camera/rgb_camera/auto_exposure_priority'] is False
     assert '/camera/rgb_camera/exposure' not in automatic
-    fixed = dumped('realsense.launch', packages, 'exposure:=0.008', 'camera:=front')
+    fixed = dumped('realsense.launch', camera_package, 'exposure:=0.008', 'camera:=front')
     assert fixed['/front/rgb_camera/enable_auto_exposure'] is False and fixed['/front/rgb_camera/exposure'] == 80
 
 

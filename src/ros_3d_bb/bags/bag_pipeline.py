@@ -17,17 +17,13 @@ from ros_3d_bb.pipeline.detection_stage import detect_in_color, opened_yolov5
 from ros_3d_bb.pipeline.offline_pipeline import INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, Pipeline, Settings
 
 MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
+UNUSED = None, ''  # topic and camera of messages that the nodes do not use
 
 
 class Waiting(NamedTuple):
-    """A message that was read ahead of its processing, and what was begun: deserialization, and a detection in it.
-
-    `topic` is the topic of the nodes (None: not used by them), and `camera` the namespace.
-    """
+    """A message that was read ahead of its processing, and what was begun: deserialization, and a detection in it."""
 
     raw: Raw
-    topic: Optional[str]
-    camera: str
     message: Any
     search: Optional[Future]
 
@@ -81,7 +77,8 @@ class BagRun(object):
 
     def _begun(self, raw, pool):
         """Start the work that can be done ahead of a message's processing: add transforms, submit detections."""
-        (topic, camera), message, search = self._topics.get(raw.topic, (None, '')), None, None
+        topic, _camera = self._topics.get(raw.topic, UNUSED)
+        message = search = None
         if topic == TF_TOPIC:
             with self._events.rejecting('transforms'):
                 message = message_in(raw, TFMessage)
@@ -90,12 +87,13 @@ class BagRun(object):
             with self._events.rejecting('images'):
                 message = message_in(raw, Image)
                 search = pool.submit(detect_in_color, self._detector, message)
-        return Waiting(raw, topic, camera, message, search)
+        return Waiting(raw, message, search)
 
     def _handled(self, waiting):
         """Process a message and return the messages that the nodes would publish, [(topic, message), ...]."""
-        raw, topic, camera, message, search = waiting
-        if topic is None or topic == STATIC_TOPIC:
+        raw, message, search = waiting
+        topic, camera = self._topics.get(raw.topic, UNUSED)
+        if topic in (None, STATIC_TOPIC):
             return []
         now_ns = raw.time.to_nsec()
         self._events.count('messages on %s' % raw.topic)

@@ -4,7 +4,6 @@ import collections
 import contextlib
 import os
 import sys
-from typing import NamedTuple, Tuple
 
 import numpy as np
 import rosbag
@@ -18,15 +17,6 @@ from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_sessi
 
 PARTIAL = '.active'  # suffix of incomplete bags, as in rosbag record
 MOUNT_M = (0.17, 0.0, 0.20)  # position of the camera of a Jackal in base_link: forward, left, up (thesis 3.5.1)
-
-
-class SessionBagOptions(NamedTuple):
-    """Options for bags of sessions: frames per second, position of the forward-facing camera in base_link (x forward,
-    y left, z up) in metres, and whether the 2D boxes of the session are written to yolo_bounding_box."""
-
-    rate_hz: float = 30.0
-    mount_m: Tuple[float, float, float] = MOUNT_M
-    with_boxes: bool = False
 
 
 def write_bag(images, path, compression='lz4'):
@@ -82,16 +72,20 @@ def images_in(path, topics):
     return list(images.values())
 
 
-def session_images(session, options=SessionBagOptions()):
-    """Yield the images of a measurement session for `write_bag`. Raises SessionError if one cannot be read."""
+def session_images(session, rate_hz=30.0, mount_m=MOUNT_M, with_boxes=False):
+    """Yield the images of a measurement session for `write_bag`, optionally with their 2D boxes.
+
+    `mount_m` is the position of the forward-facing camera in base_link (x forward, y left, z up), metres. Raises
+    SessionError if an image cannot be read.
+    """
     chain = [('map', 'odom', np.eye(4)), ('odom', 'base_link', np.eye(4)),
-             ('base_link', session.frame_id, transform_from(options.mount_m, OPTICAL_ROTATION))]
+             ('base_link', session.frame_id, transform_from(mount_m, OPTICAL_ROTATION))]
     for number, frame in enumerate(session.frames):
-        stamp_ns = START_NS + int(number * NS / options.rate_hz)
+        stamp_ns = START_NS + int(number * NS / rate_hz)
         header = Header(stamp=time_from(stamp_ns), frame_id=session.frame_id)
         messages = list(messages_of(CameraFrame(header, session.camera, read_color(frame, session.camera),
                                                 read_depth(frame, session), chain)))
-        if options.with_boxes:
+        if with_boxes:
             messages.append((BOXES_TOPIC, boxes2d_to_msg(np.array(frame.boxes_px, int).reshape(-1, 4), header)))
         yield stamp_ns, messages
 
@@ -109,8 +103,8 @@ def session_to_bag():
     arguments = parser.parse_args()
     if not arguments.rate > 0:
         parser.error('--rate %g: more than 0 expected' % arguments.rate)
-    options = SessionBagOptions(arguments.rate, tuple(arguments.mount), arguments.boxes)
-    write_bag_of_command(parser, arguments, lambda: session_images(read_session(arguments.session), options))
+    write_bag_of_command(parser, arguments, lambda: session_images(read_session(arguments.session), arguments.rate,
+                                                                   arguments.mount, arguments.boxes))
 
 
 def bag_command_parser(name, doc):

@@ -77,14 +77,11 @@ def _settings_from(given):
     for option, node in FILES:
         path = getattr(given, option[2:].replace('-', '_'))
         settings = settings._replace(**{node: read_params(path, getattr(settings, node))})
-    if given.weights:
-        settings = with_params(settings, 'yolov5', weights=given.weights)
-    if given.error_model:
-        settings = with_params(settings, 'bbox3d', error_model=given.error_model)
-    if given.target_frame:
-        settings = with_params(settings, 'tracker', target_frame=given.target_frame)
-    if given.cameras:
-        settings = with_params(settings, 'tracker', cameras=[camera.strip() for camera in given.cameras.split(',')])
+    cameras = given.cameras and [camera.strip() for camera in given.cameras.split(',')]
+    for node, name, value in (('yolov5', 'weights', given.weights), ('bbox3d', 'error_model', given.error_model),
+                              ('tracker', 'target_frame', given.target_frame), ('tracker', 'cameras', cameras)):
+        if value:
+            settings = with_params(settings, node, **{name: value})
     if settings.detector == 'yolov5' and not settings.yolov5[0].weights:
         raise ValueError('--detector yolov5 needs --weights FILE, a checkpoint such as yolov5n.pt; --detector depth '
                          'needs none')
@@ -126,16 +123,17 @@ def _run_jobs(jobs, at_once, with_bar):
                 job = todo.pop(0)
                 news, process = _started(context, job)
                 running[news] = job, process
-            wait(list(running), POLL_S)
-            for news, (job, process) in list(running.items()):
-                done, text = _news_of(news, job, process, shares)
-                if done is None:
+            for news in wait(list(running)):
+                job, process = running[news]
+                kind, content = _next_news(news, job, process)
+                shares[job.target] = content if kind == 'share' else 1.0
+                if kind == 'share':
                     continue
                 del running[news]
                 process.join()
-                shares[job.target] = 1.0
-                failed += not done
-                print(('\r' + 79 * ' ' + '\r' if with_bar else '') + text, file=sys.stdout if done else sys.stderr)
+                failed += kind == 'failed'
+                print(('\r' + 79 * ' ' + '\r' if with_bar else '') + content,
+                      file=sys.stderr if kind == 'failed' else sys.stdout)
             if with_bar:
                 share = sum(shares.values()) / len(jobs)
                 print('\r[%-*s] %3d %%  %d of %d bags' % (BAR, '#' * int(BAR * share), 100 * share,
@@ -157,19 +155,14 @@ def _started(context, job):
     return news, process
 
 
-def _news_of(news, job, process, shares):
-    """Return whether a job has succeeded (None while it runs) and the text to print."""
+def _next_news(news, job, process):
+    """Return ('share', processed fraction), ('done', summary) or ('failed', reason) from the process of a job."""
     try:
-        while news.poll():
-            kind, content = news.recv()
-            if kind != 'share':
-                return kind == 'done', content
-            shares[job.target] = content
+        return news.recv()
     except EOFError:  # killed, for example by the kernel when out of memory
         process.join()
         remove_partial(job.target)
-        return False, '%s: its process ended with status %s; no bag was written' % (job.source, process.exitcode)
-    return None, ''
+        return 'failed', '%s: its process ended with status %s; no bag was written' % (job.source, process.exitcode)
 
 
 def _work(job, sender):

@@ -14,10 +14,9 @@ from ros_3d_bb.conversions.camera_msgs import INFO_TOPICS, STATIC_TOPIC, TF_TOPI
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, INFO
+from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, INFO, ROLES
 from ros_3d_bb.diagnosis.observations import Newest, Observations, Stream, TfSeen
 from ros_3d_bb.diagnosis.tf_tree import links_in
-from ros_3d_bb.diagnosis.topic_roles import ROLES
 
 KEPT = 1000  # stamps per topic
 BAG_SECONDS = 10.0  # cache length of tf2
@@ -26,7 +25,7 @@ BAG_SECONDS = 10.0  # cache length of tf2
 class Observation(object):
     """Statistics of the messages of one topic: their count, stamps and arrival times, and the newest message.
 
-    `role` is that of the topic (see `topic_roles.ROLES`), or None.
+    `role` is that of the topic (see `checks.ROLES`), or None.
     """
 
     def __init__(self, role, topic):

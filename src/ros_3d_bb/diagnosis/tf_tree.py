@@ -36,21 +36,10 @@ def _path_to_root(links, frame):
 
 
 def why_missing(links, target, source, stamp_s):
-    """Explain why there is no transform from the camera's frame to the fixed frame of the tracks at a stamp.
+    """Explain why there is no transform from the camera's frame `source` to the fixed frame `target` of the tracks.
 
-    Parameters
-    ----------
-    links : dict
-        {frame: Link}
-    target, source : str
-        The fixed frame and the frame of the camera.
-    stamp_s : float
-        Stamp of the image, seconds; 0 for the latest transform.
-
-    Returns
-    -------
-    str, str
-        The fault and its fix; both empty if the links show no fault.
+    `links` is {frame: Link}, and `stamp_s` the stamp of the image in seconds, or 0 for the latest transform. Returns
+    the fault and its fix; both are empty if the links show no fault.
     """
     frames = sorted(set(links) | set(link.parent for link in links.values()))
     if not frames:

@@ -16,6 +16,7 @@ from ros_3d_bb.core.time_sync import NS
 
 POLL_MS = 100
 LOST_S = 5.0  # a camera that sends no images for this time is considered lost
+BODY_FROM_OPTICAL = transform_from((0, 0, 0), OPTICAL_ROTATION)
 EXPOSURE_UNIT_S = 1e-4  # unit of the colour sensor's exposure
 # librealsense uses the same projection for the modified and the inverse Brown-Conrady model.
 DISTORTIONS = {'none': ('', 0), 'brown_conrady': (PLUMB_BOB, 5), 'modified_brown_conrady': (INVERSE_BROWN_CONRADY, 5),
@@ -78,16 +79,11 @@ class Stamps(object):
 class RealSense(object):
     """Open camera, or recording (`file`) of a camera, with depth aligned to colour. Call `close` after use.
 
-    Raises CameraLost if no such camera is connected, and ValueError if the recording cannot be played.
+    `camera` is the Camera of the colour stream and of the aligned depth; `link_from_color` (4, 4) transforms between
+    the body frames, x forward and z up, of the colour and the depth camera (the `_link`); `is_over` is whether a
+    recording that is not repeated has ended.
 
-    Attributes
-    ----------
-    camera : Camera
-        Intrinsics of the colour stream and of the aligned depth.
-    link_from_color : numpy.ndarray, (4, 4)
-        Transform between the body frames, x forward and z up, of the colour and the depth camera (the `_link`).
-    is_over : bool
-        Whether a recording that is not repeated has ended.
+    Raises CameraLost if no such camera is connected, and ValueError if the recording cannot be played.
     """
 
     def __init__(self, params):
@@ -199,17 +195,21 @@ def link_from_color(extrinsics):
     depth_from_color = np.eye(4)
     depth_from_color[:3, :3] = np.reshape(extrinsics.rotation, (3, 3)).T  # librealsense's matrices are by columns
     depth_from_color[:3, 3] = extrinsics.translation
-    body_from_optical = transform_from((0, 0, 0), OPTICAL_ROTATION)
-    return body_from_optical.dot(depth_from_color).dot(np.linalg.inv(body_from_optical))
+    return BODY_FROM_OPTICAL.dot(depth_from_color).dot(np.linalg.inv(BODY_FROM_OPTICAL))
 
 
 def frame_links(prefix, link_from_color_body):
     """Frames of a camera with the names of realsense2_camera: [(parent, child, parent_from_child (4, 4)), ...]."""
-    links, body_from_optical = [], transform_from((0, 0, 0), OPTICAL_ROTATION)
+    links = []
     for stream, link_from_body in (('depth', np.eye(4)), ('color', link_from_color_body)):
-        body, optical = '%s_%s_frame' % (prefix, stream), '%s_%s_optical_frame' % (prefix, stream)
-        links += [('%s_link' % prefix, body, link_from_body), (body, optical, body_from_optical)]
+        body = '%s_%s_frame' % (prefix, stream)
+        links += [('%s_link' % prefix, body, link_from_body), (body, optical_frame(prefix, stream), BODY_FROM_OPTICAL)]
     return links
+
+
+def optical_frame(prefix, stream):
+    """Name of the optical frame of a stream, color or depth. The prefix may be empty."""
+    return '%s_%s_optical_frame' % (prefix, stream)
 
 
 def rgb_of(pixels, format_name):

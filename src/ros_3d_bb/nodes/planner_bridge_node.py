@@ -60,26 +60,23 @@ class ReceivedTracks(NamedTuple):
 
 
 class PlannerTopic(object):
-    """An output topic. `arrival_ns` is the arrival time of the published tracks, None if the planner holds none."""
+    """An output topic. `held` are the ReceivedTracks that the planner holds, None if it holds none."""
 
     def __init__(self, output):
-        self.output, self.arrival_ns = output, None
+        self.output, self.held = output, None
         self._publisher = rospy.Publisher(output.topic, output.kind, queue_size=2)
 
     def send(self, tracks, stamp_ns, received):
         """Publish tracks in the output frame; `received` are the ReceivedTracks from which they were predicted."""
-        self._frame_id = self.output.frame or received.frame_id
-        self._frame_from_tracks, self.arrival_ns = received.transforms[self._frame_id], received.arrival_ns
-        self._publish(tracks, stamp_ns)
+        frame_id = self.output.frame or received.frame_id
+        header = Header(stamp=time_from(stamp_ns), frame_id=frame_id)
+        self._publisher.publish(self.output.write(tracks, received.transforms[frame_id], header))
+        self.held = received
 
     def empty(self, stamp_ns):
         """Publish an empty array in the frame of the last one."""
-        self.arrival_ns = None
-        self._publish([], stamp_ns)
-
-    def _publish(self, tracks, stamp_ns):
-        header = Header(stamp=time_from(stamp_ns), frame_id=self._frame_id)
-        self._publisher.publish(self.output.write(tracks, self._frame_from_tracks, header))
+        self.send([], stamp_ns, self.held)
+        self.held = None
 
 
 class PlannerBridgeNode(object):
@@ -186,9 +183,9 @@ class PlannerBridgeNode(object):
         with self._diagnostics.rejecting('outputs'), self._lock:
             now_ns = _now_ns()
             for topic in self._topics:
-                if topic.arrival_ns is None:
+                if topic.held is None:
                     continue
-                if not 0 <= now_ns - topic.arrival_ns <= self._params.timeout * NS:
+                if not 0 <= now_ns - topic.held.arrival_ns <= self._params.timeout * NS:
                     self._diagnostics.warn('outputs emptied', 'no valid tracks for %g s: %s is emptied until the next '
                                            'ones arrive' % (self._params.timeout, topic.output.topic))
                     topic.empty(now_ns)
@@ -199,7 +196,7 @@ class PlannerBridgeNode(object):
         """Publish empty arrays at shutdown, so that planners do not keep the last tracks."""
         with self._lock:
             for topic in self._topics:
-                if topic.arrival_ns is not None:
+                if topic.held is not None:
                     topic.empty(_now_ns())
 
 

@@ -10,12 +10,13 @@ import tf2_ros
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
-from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, TYPES, CameraFrame, frame_id_of,
+from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, TYPES, CameraFrame,
                                                image_messages_of, transform_messages)
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.params import SET_BY_LAUNCH, WAIT_FOR_SUBSCRIBERS, Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.drivers.realsense import CameraLost, RealSense, RealSenseParams, frame_links, librealsense
+from ros_3d_bb.drivers.realsense import (CameraLost, RealSense, RealSenseParams, frame_links, librealsense,
+                                         optical_frame)
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import is_ending
 from ros_3d_bb.nodes.common.startup import read_params, run_node, wait_for_subscribers
@@ -113,7 +114,7 @@ class RealSenseNode(object):
         self._publish_time(frame.stamp_ns)
         if links:
             self._static_transforms.sendTransform(transform_messages(stamp, links))
-        header = Header(stamp=stamp, frame_id=frame_id_of(self._params.frame_prefix))
+        header = Header(stamp=stamp, frame_id=optical_frame(self._params.frame_prefix, 'color'))
         for topic, message in image_messages_of(CameraFrame(header, camera.camera, frame.color, frame.depth, ())):
             self._pubs[topic].publish(message)
         self._diagnostics.count('images')

@@ -1,5 +1,4 @@
 """ROS node that displays images and boxes, and stores measurements in a session."""
-import collections
 import contextlib
 import os
 import threading
@@ -8,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import rospy
+from rosgraph.masterapi import MasterError
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
@@ -20,13 +20,13 @@ from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameter
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.measurement_label import Label
+from ros_3d_bb.nodes.common.master import NO_ANSWER, on_new_master, patient_master
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
-from ros_3d_bb.sessions.frame_synchronizer import Snapshots
-from ros_3d_bb.sessions.session_writer import MeasurementRecord, append
+from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshots
+from ros_3d_bb.sessions.session_writer import append
 from ros_3d_bb.visualization.cv_window import Window
-from ros_3d_bb.visualization.viewer_layout import FrameRate, ViewerContent, compose, text_image
+from ros_3d_bb.visualization.viewer_layout import FrameRate, compose, text_image
 
 CAMERA_INFO_TOPIC = INFO_TOPICS[0]
 ENABLE_SERVICE = 'detector/enable'
@@ -50,9 +50,6 @@ class ViewerParams(NamedTuple):
         15.0, 'Maximum rate of drawing the window, which is drawn for new images only.', 'Hz', limits=(0.1, 10000))
     panel_width: int = Param(480, 'Width of each of the three images in the window.', 'pixels', limits=(80, 10000))
     depth_image_range: float = Param(6.0, 'Depth at the far end of the colours.', 'm', limits=(0.1, 10000))
-
-
-Color = collections.namedtuple('Color', 'pixels frame_id')  # RGB image and the frame of its camera
 
 
 class ViewerNode(object):
@@ -105,7 +102,8 @@ class ViewerNode(object):
 
     def _on_color(self, message):
         with self._receiving('colour images', COLOR_TOPIC):
-            color, now_ns = Color(imgmsg_to_rgb(message), message.header.frame_id), arrival_clock_ns()
+            color = ColorImage(imgmsg_to_rgb(message), self._params.frame_id or message.header.frame_id)
+            now_ns = arrival_clock_ns()
             self._rate.add(now_ns)
             self._snapshots.add_color(stamp_of(message), now_ns, color)
 
@@ -165,9 +163,7 @@ class ViewerNode(object):
             raise ValueError('no session is given; start the viewer with session:=FOLDER')
         snapshot = self._snapshot_to_store()
         label = self._label.from_master()
-        name, count = append(self._params.session, MeasurementRecord(
-            snapshot.color.pixels, snapshot.depth, snapshot.camera, self._params.frame_id or snapshot.color.frame_id,
-            snapshot.stamp_ns, snapshot.boxes2d or (), snapshot.boxes3d or (), label))
+        name, count = append(self._params.session, snapshot, label)
         self._captured_ns = snapshot.stamp_ns
         found = ('without 3D boxes' if snapshot.boxes3d is None else
                  'with %d 3D box%s' % (len(snapshot.boxes3d), '' if len(snapshot.boxes3d) == 1 else 'es'))
@@ -250,9 +246,8 @@ class ViewerNode(object):
         lines = ('%.1f images/s    stamp %d.%09d    %s' % ((rate_hz,) + divmod(snapshot.stamp_ns, NS) + (
                      'no 3D boxes' if snapshot.boxes3d is None else '3D boxes: %d' % len(snapshot.boxes3d),)),
                  'session: %s    label: %s' % (self._params.session or 'none', label or 'none'), KEYS, self._answer)
-        view = ViewerContent(snapshot.color.pixels, snapshot.depth, snapshot.boxes2d, snapshot.boxes3d, lines,
-                             tuple(self._warnings(snapshot, is_early, rate_hz)))
-        self._window.show(compose(view, self._params.panel_width, self._params.depth_image_range))
+        warnings = list(self._warnings(snapshot, is_early, rate_hz))
+        self._window.show(compose(snapshot, self._params.panel_width, self._params.depth_image_range, lines, warnings))
         self._diagnostics.record_latency(time_from(snapshot.stamp_ns))
         return content
 
@@ -268,6 +263,34 @@ class ViewerNode(object):
 def _complain(future):
     if future.exception() is not None:
         rospy.logerr('the action of the key failed: %r', future.exception())
+
+
+class Label(object):
+    """The parameter ~label, `default` if unset; kept without a master, and set again on a restarted one."""
+
+    def __init__(self, default):
+        self._default, self._newest = default, default
+        on_new_master(self._restore)
+
+    def from_master(self):
+        """Request the label from the master, because rospy's cache is updated with a delay."""
+        with contextlib.suppress(*NO_ANSWER):
+            try:
+                self._newest = str(patient_master().getParam(rospy.resolve_name('~label')))
+            except MasterError:  # the parameter is not set
+                self._newest = self._default
+        return self._newest
+
+    def from_cache(self):
+        """Return the label from rospy's cache, without a request to the master."""
+        with contextlib.suppress(*NO_ANSWER):
+            self._newest = str(rospy.get_param_cached('~label', self._default))
+        return self._newest
+
+    def _restore(self):
+        # rospy assumes that its subscription to the parameter persists, but a new master has lost it.
+        patient_master().subscribeParam(rospy.get_node_uri(), rospy.resolve_name('~label'))
+        rospy.set_param('~label', self._newest)
 
 
 def main():

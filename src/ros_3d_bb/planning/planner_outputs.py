@@ -46,10 +46,7 @@ NAMES = ['costmap'] + sorted(OPTIONAL)
 def outputs_from(params):
     """Create the list of Output that the parameters (`PlannerBridgeParams`) select.
 
-    Raises
-    ------
-    ValueError
-        If an output is unknown, or the package that it needs is not installed; the message names it.
+    Raises ValueError if an output is unknown, or the package that it needs is not installed; the message names it.
     """
     if not params.outputs:
         raise ValueError('parameter ~outputs is empty; some of %s expected' % ', '.join(NAMES))

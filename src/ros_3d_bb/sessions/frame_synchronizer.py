@@ -1,18 +1,34 @@
 """Synchronizer of the messages of one image: colour, depth, camera, 2D boxes and 3D boxes."""
-from typing import Any, NamedTuple
+from typing import NamedTuple, Optional, Tuple
 
+import numpy as np
+
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import MessageCache, StampSynchronizer
+from ros_3d_bb.estimation.box3d_estimator import Box3D
+
+
+class ColorImage(NamedTuple):
+    """Colour image (height, width, 3), uint8, RGB, and the frame of its camera."""
+
+    pixels: np.ndarray
+    frame_id: str
 
 
 class Snapshot(NamedTuple):
-    """Colour, depth, camera, 2D boxes and 3D boxes of one stamp, as they were added. Missing boxes are None."""
+    """Images, camera and boxes of one stamp, as they were added.
+
+    `depth` is aligned to `color`. `boxes2d` are the 2D boxes (x1, y1, x2, y2), and `boxes3d` those estimated from them,
+    of which some may be missing. Boxes that have not arrived are None.
+    """
 
     stamp_ns: int
-    color: Any
-    depth: Any
-    camera: Any
-    boxes2d: Any
-    boxes3d: Any
+    color: ColorImage
+    depth: DepthImage
+    camera: Camera
+    boxes2d: Optional[Tuple[Tuple[int, int, int, int], ...]]
+    boxes3d: Optional[Tuple[Box3D, ...]]
 
 
 class Snapshots(object):

@@ -5,16 +5,13 @@ in the file and in metres here.
 """
 import os
 import re
-from typing import NamedTuple, Tuple
 
 import cv2
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.atomic_file import FILE_NAME, atomic_write, locked_update
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.sessions.session_reader import read_session
 
 MILLIMETRE = 0.001
@@ -22,58 +19,31 @@ MAX_DEPTH_MM = 65535  # largest value in 16 bits
 ID_FORMAT = re.compile(r'(\d+)_\d+_\d{9}$')
 
 
-class MeasurementRecord(NamedTuple):
-    """One measurement to be stored.
+def append(folder, snapshot, label=''):
+    """Append a `frame_synchronizer.Snapshot` to the session in a folder, which is created if it does not exist.
 
-    `color` is (height, width, 3), uint8, RGB; `depth` is aligned to it. `frame_id` is the frame of the camera.
-    `rects_px` are the 2D boxes (x1, y1, x2, y2), and `boxes` the 3D boxes that were estimated from them; some may be
-    missing. `label` is given by the user.
+    Returns the ID of the measurement (the next free number and the stamp), and the number of measurements in the
+    session. Raises ValueError if the folder is not a session, the session is of another camera, or the measurement
+    cannot be stored, and OSError if the session cannot be written. The session is unchanged then.
     """
-
-    color: np.ndarray
-    depth: DepthImage
-    camera: Camera
-    frame_id: str
-    stamp_ns: int
-    rects_px: Tuple[Tuple[int, int, int, int], ...]
-    boxes: Tuple[Box3D, ...]
-    label: str = ''
-
-
-def append(folder, measurement):
-    """Append a MeasurementRecord to the session in a folder, which is created if it does not exist.
-
-    Returns
-    -------
-    str, int
-        ID of the measurement (the next free number and the stamp), and number of measurements in the session.
-
-    Raises
-    ------
-    ValueError
-        If the folder is not a session, the session is of another camera, or the measurement cannot be stored. The
-        session is unchanged.
-    OSError
-        If the session cannot be written. It is unchanged.
-    """
-    depth = stored_depth(measurement.depth)
-    for name, pixels in (('colour', measurement.color), ('depth', measurement.depth.values)):
-        if pixels.shape[:2] != (measurement.camera.height, measurement.camera.width):
+    depth = stored_depth(snapshot.depth)
+    for name, pixels in (('colour', snapshot.color.pixels), ('depth', snapshot.depth.values)):
+        if pixels.shape[:2] != (snapshot.camera.height, snapshot.camera.width):
             raise ValueError('the %s image has %d x %d pixels and the camera has %d x %d; depth aligned to colour '
-                             'expected' % ((name,) + pixels.shape[1::-1] + measurement.camera[:2]))
+                             'expected' % ((name,) + pixels.shape[1::-1] + snapshot.camera[:2]))
     for name in ('color', 'depth'):
         os.makedirs(os.path.join(folder, name), exist_ok=True)
     written = []
     try:
         with locked_update(folder) as content:
-            _check_camera(folder, measurement, depth.scale_m)
-            content.setdefault('camera', _camera_entry(measurement, depth.scale_m))
-            name = _next_id(content['frames'], measurement.stamp_ns)
+            _check_camera(folder, snapshot, depth.scale_m)
+            content.setdefault('camera', _camera_entry(snapshot, depth.scale_m))
+            name = _next_id(content['frames'], snapshot.stamp_ns)
             entry = {'id': name, 'color': 'color/%s.png' % name, 'depth': 'depth/%s.png' % name,
-                     'stamp': '%d.%09d' % divmod(measurement.stamp_ns, NS), 'detections': _detections(measurement)}
-            if measurement.label:
-                entry['label'] = measurement.label
-            for kind, pixels in (('color', measurement.color[..., ::-1]), ('depth', depth.values)):
+                     'stamp': '%d.%09d' % divmod(snapshot.stamp_ns, NS), 'detections': _detections(snapshot)}
+            if label:
+                entry['label'] = label
+            for kind, pixels in (('color', snapshot.color.pixels[..., ::-1]), ('depth', depth.values)):
                 path = os.path.join(folder, entry[kind])
                 atomic_write(path, _png(pixels))
                 written.append(path)
@@ -99,14 +69,14 @@ def stored_depth(depth):
     return DepthImage(np.where(valid, depth_mm, 0).astype(np.uint16), MILLIMETRE)
 
 
-def _check_camera(folder, measurement, scale_m):
+def _check_camera(folder, snapshot, scale_m):
     """Raise ValueError if the folder contains a session of another camera."""
     if not os.path.exists(os.path.join(folder, FILE_NAME)):
         return
     session = read_session(folder)
-    for name, stored, actual in (('intrinsics', tuple(session.camera), tuple(measurement.camera)),
+    for name, stored, actual in (('intrinsics', tuple(session.camera), tuple(snapshot.camera)),
                                  ('depth scale', session.depth_scale_m, scale_m),
-                                 ('frame', session.frame_id, measurement.frame_id)):
+                                 ('frame', session.frame_id, snapshot.color.frame_id)):
         if stored != actual:
             raise ValueError('the session in %s was recorded by another camera: its %s is %s, but this camera\'s is '
                              '%s; choose another folder' % (folder, name, stored, actual))
@@ -118,20 +88,20 @@ def _next_id(entries, stamp_ns):
     return '%05d_%d_%09d' % ((max([len(entries)] + numbers) + 1,) + divmod(stamp_ns, NS))
 
 
-def _camera_entry(measurement, scale_m):
-    camera = dict(measurement.camera._asdict())
+def _camera_entry(snapshot, scale_m):
+    camera = dict(snapshot.camera._asdict())
     model, distortion = camera.pop('distortion_model'), list(camera.pop('distortion'))
-    camera.update(distortion=distortion or [0.0] * 5, depth_scale=scale_m, frame=measurement.frame_id)
+    camera.update(distortion=distortion or [0.0] * 5, depth_scale=scale_m, frame=snapshot.color.frame_id)
     if model:
         camera['distortion_model'] = model
     return camera
 
 
-def _detections(measurement):
+def _detections(snapshot):
     """Entries of the 2D boxes with their 3D boxes, and of 3D boxes whose 2D box is missing."""
-    boxes, entries = list(measurement.boxes), []
-    width, height = measurement.camera[:2]
-    for rect_px in measurement.rects_px:
+    boxes, entries = list(snapshot.boxes3d or ()), []
+    width, height = snapshot.camera[:2]
+    for rect_px in snapshot.boxes2d or ():
         inside_px = tuple(np.clip(rect_px, 0, [width, height] * 2).tolist())  # 3D boxes in messages are clipped
         match = next((box for box in boxes if tuple(box.rect_px) in (inside_px, tuple(rect_px))), None)
         entry = {'box': [int(edge) for edge in rect_px]}

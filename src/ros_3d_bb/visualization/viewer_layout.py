@@ -3,14 +3,11 @@
 Images are (height, width, 3), uint8, RGB.
 """
 import collections
-from typing import NamedTuple, Optional, Tuple
 
 import cv2
 import numpy as np
 
-from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.visualization.image_overlay import colorize_depth, draw_boxes, depth_to_grey
 
 PAPER, INK, WARNING_INK = (32, 32, 32), (235, 235, 235), (255, 190, 60)
@@ -19,17 +16,6 @@ BAR_WIDTH_PX, BAR_TOP_PX = 14, 16
 MIN_TEXT_LINES = 8  # keeps the size of the window constant for a few people
 RATE_WINDOW_NS = 2 * NS  # interval for the frame rate
 TITLES = ('colour', 'depth', 'boxes')
-
-
-class ViewerContent(NamedTuple):
-    """Content of the window: an image, its 2D and 3D boxes or None, lines of text, and highlighted warnings."""
-
-    color: np.ndarray
-    depth: DepthImage
-    rects_px: Optional[Tuple[Tuple[int, int, int, int], ...]]
-    boxes: Optional[Tuple[Box3D, ...]]
-    lines: Tuple[str, ...] = ()
-    warnings: Tuple[str, ...] = ()
 
 
 class FrameRate(object):
@@ -51,19 +37,22 @@ class FrameRate(object):
         return (len(self._arrivals_ns) - 1) * NS / max(1, self._arrivals_ns[-1] - self._arrivals_ns[0])
 
 
-def compose(view, panel_width_px, farthest_m):
-    """Draw a view: three panels of the width `panel_width_px`, with depth colour-coded up to `farthest_m`."""
-    height, width = view.color.shape[:2]
+def compose(snapshot, panel_width_px, farthest_m, lines=(), warnings=()):
+    """Draw a `frame_synchronizer.Snapshot`, with lines of text and highlighted warnings below.
+
+    The three panels have the width `panel_width_px`; depth is colour-coded up to `farthest_m`.
+    """
+    height, width = snapshot.color.pixels.shape[:2]
     size_px = (panel_width_px, max(1, int(round(height * panel_width_px / width))))
-    color = cv2.resize(np.ascontiguousarray(view.color), size_px, interpolation=cv2.INTER_LINEAR)
+    color = cv2.resize(np.ascontiguousarray(snapshot.color.pixels), size_px, interpolation=cv2.INTER_LINEAR)
     # depth must not be interpolated
-    grey = cv2.resize(depth_to_grey(view.depth, farthest_m), size_px, interpolation=cv2.INTER_NEAREST)
-    panels = [color, _with_range_bar(colorize_depth(grey), farthest_m), _annotated(color.copy(), view)]
+    grey = cv2.resize(depth_to_grey(snapshot.depth, farthest_m), size_px, interpolation=cv2.INTER_NEAREST)
+    panels = [color, _with_range_bar(colorize_depth(grey), farthest_m), _annotated(color.copy(), snapshot)]
     for panel, title in zip(panels, TITLES):
         _write(panel, title, (MARGIN_PX, panel.shape[0] - MARGIN_PX))  # labels of boxes are at the top
     row = np.concatenate(panels, axis=1)
-    lines = view.lines + box_lines(view.boxes or ())
-    return np.concatenate((row, text_image(lines, view.warnings, row.shape[1])))
+    lines = tuple(lines) + box_lines(snapshot.boxes3d or ())
+    return np.concatenate((row, text_image(lines, warnings, row.shape[1])))
 
 
 def _with_range_bar(image, farthest_m):
@@ -88,12 +77,12 @@ def box_lines(boxes):
                  for number, box in enumerate(boxes, 1))
 
 
-def _annotated(panel, view):
+def _annotated(panel, snapshot):
     """Draw 3D boxes with number and distance, and 2D boxes without a 3D box."""
-    boxes = view.boxes or ()
+    boxes = snapshot.boxes3d or ()
     located = set(tuple(box.rect_px) for box in boxes)
-    height, width = view.color.shape[:2]
-    inside_px = np.clip(np.reshape(view.rects_px or (), (-1, 4)).astype(int), 0, [width, height] * 2).tolist()
+    height, width = snapshot.color.pixels.shape[:2]
+    inside_px = np.clip(np.reshape(snapshot.boxes2d or (), (-1, 4)).astype(int), 0, [width, height] * 2).tolist()
     without_position = [rect_px for rect_px in inside_px if tuple(rect_px) not in located]
     rects_px = np.array([box.rect_px for box in boxes] + without_position, float).reshape(-1, 4)
     labels = ['%d: %.2f m' % (number, box.center_m[2]) for number, box in enumerate(boxes, 1)]

@@ -2,7 +2,7 @@
 import importlib
 import sys
 
-MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.__main__', 'scenes': 'scene_benchmark', 'speed': 'speed',
+MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.benchmark', 'scenes': 'scene_benchmark', 'speed': 'speed',
            'latency': 'latency.benchmark'}
 
 

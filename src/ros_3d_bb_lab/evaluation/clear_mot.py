@@ -29,14 +29,13 @@ class Moment(NamedTuple):
 class PersonScore(NamedTuple):
     """Tracking scores of one person.
 
-    `visible_s` is the total time in view and `longest_s` the longest uninterrupted interval; `followed` is the share
-    0..1 of the images with the person visible that have a matched track; `ids` has an entry for each change of the
-    track ID; `rmse_m` and `worst_m` are position errors of the matched tracks, NaN if there are none.
+    `visible_s` is the total time in view; `followed` is the share 0..1 of the images with the person visible that have
+    a matched track; `ids` has an entry for each change of the track ID; `rmse_m` and `worst_m` are position errors of
+    the matched tracks, NaN if there are none.
     """
 
     person: int
     visible_s: float
-    longest_s: float
     followed: float
     ids: List[int]
     rmse_m: float
@@ -99,18 +98,16 @@ def _person_score(person_id, moments, matches):
                 errors_m.append(np.linalg.norm((track.position_m - person.position_m)[:2]))
                 if ids[-1:] != [track.id]:
                     ids.append(track.id)
-    lengths_s = _visible_intervals_s(visible_ns, [moment.stamp_ns for moment in moments])
-    return PersonScore(person_id, sum(lengths_s), max(lengths_s, default=0.0),
-                       len(errors_m) / float(max(1, len(visible_ns))), ids,
+    visible_s = _visible_s(visible_ns, [moment.stamp_ns for moment in moments])
+    return PersonScore(person_id, visible_s, len(errors_m) / float(max(1, len(visible_ns))), ids,
                        float(np.sqrt(np.mean(np.square(errors_m)))) if errors_m else float('nan'),
                        max(errors_m, default=float('nan')))
 
 
-def _visible_intervals_s(visible_ns, all_ns):
+def _visible_s(visible_ns, all_ns):
     period_ns = np.median(np.diff(all_ns)) if len(all_ns) > 1 else 0
-    gaps = np.flatnonzero(np.diff(visible_ns) > LONGEST_GAP * period_ns) + 1
-    intervals = np.split(np.array(visible_ns, np.int64), gaps)
-    return [(interval[-1] - interval[0]) / NS for interval in intervals if len(interval)]
+    gaps_ns = np.diff(visible_ns)
+    return float(np.sum(gaps_ns[gaps_ns <= LONGEST_GAP * period_ns])) / NS
 
 
 def table(scene_score):

@@ -1,7 +1,10 @@
-"""Default inputs of the benchmarks: the cached weights, and the files in config/."""
+"""What the benchmarks find on a machine: the cached weights, the files in config/, and its cores and software."""
 import argparse
 import glob
 import os
+import platform
+
+import numpy as np
 
 from ros_3d_bb.detection.yolov5.onnx_backend import export_folder
 
@@ -29,3 +32,15 @@ def scenario_path(name):
 def scenario_paths(*patterns):
     """Paths of the scenarios in config/scenarios whose names match a pattern, in the order of the patterns."""
     return [path for pattern in patterns for path in sorted(glob.glob(os.path.join(SCENARIOS, pattern + '.yaml')))]
+
+
+def describe_machine():
+    """Cores, CPU model and software versions as one line of text."""
+    fields = {}
+    if os.path.exists('/proc/cpuinfo'):
+        with open('/proc/cpuinfo') as stream:
+            fields = dict(line.partition(':')[::2] for line in stream if ':' in line)
+    fields = {name.strip(): value.strip() for name, value in fields.items()}
+    where = ' of a virtual machine' if 'hypervisor' in fields.get('flags', '').split() else ''
+    return '%d cores%s, %s; Python %s, numpy %s' % (
+        os.cpu_count(), where, fields.get('model name', platform.machine()), platform.python_version(), np.__version__)

@@ -31,9 +31,6 @@ class Data(NamedTuple):
     truth_m: np.ndarray
     position: np.ndarray
 
-    def part(self, mask):
-        return Data(*(values[mask] for values in self))
-
     def weights(self):
         """Weights of the measurements, (n,). The weights of each position sum to 1."""
         return 1.0 / np.bincount(self.position)[self.position]
@@ -49,7 +46,7 @@ def fit_error_model(measured_m, truth_m, source='', estimator='', camera='', dat
     data = data_of(measured_m, truth_m)
     model = _fit(data)
     corrected_m, covariances = held_out(data)
-    provenance = Provenance(source, estimator, camera, date, len(data.truth_m), int(data.position.max()) + 1)
+    provenance = Provenance(source, estimator, camera, date, len(data.truth_m), len(np.unique(data.position)))
     return checked(model._replace(provenance=provenance, cross_validated=scores_of(corrected_m, covariances, truth_m)))
 
 
@@ -101,10 +98,9 @@ def coverage(error_m, covariances):
 
 def _folds(data):
     """Yield the mask (n,) of the measurements of each position, and the data of all other positions."""
-    for number in range(data.position.max() + 1):
-        held = data.position == number
-        others = data.part(~held)
-        yield held, others._replace(position=np.unique(others.position, return_inverse=True)[1].reshape(-1))
+    for position in np.unique(data.position):
+        held = data.position == position
+        yield held, Data(*(values[~held] for values in data))
 
 
 def _fit(data):
@@ -114,7 +110,7 @@ def _fit(data):
     residuals_m = _residuals(data, degree, terms)
     x_sigma, z_sigma = (_fit_spread(residuals_m[:, axis], data) for axis in (0, 1))
     sigmas_m = np.stack([spread.at(data.truth_m[:, 1]) for spread in (x_sigma, z_sigma)], axis=1)
-    widening = _widening(sigmas_m, residuals_m, int(data.position.max()) + 1)
+    widening = _widening(sigmas_m, residuals_m, len(np.unique(data.position)))
     x_sigma, z_sigma = (Spread(*(widening * part for part in spread)) for spread in (x_sigma, z_sigma))
     return _fit_bias(data, degree, terms)._replace(x_sigma=x_sigma, z_sigma=z_sigma)
 

@@ -129,10 +129,12 @@ def result_of(steps, detector, camera=D435I_COLOR):
 
     Lengths are in metres and shares are 0..1. Errors are aggregated over all people in the scene.
     """
-    found, tracked = score_detections(steps, *RANGE_M[detector]), score([step.moment for step in steps])
+    people, found, false = score_detections(steps, *RANGE_M[detector])
+    tracked = score([step.moment for step in steps])
     followed = [person for person in tracked.people if person.ids]
-    result = {'detector': detector, 'images': found.images, 'people': len(tracked.people), 'recall': found.recall,
-              'false_boxes': found.false_rate, 'id_switches': sum(person.switches for person in tracked.people),
+    result = {'detector': detector, 'images': len(steps), 'people': len(tracked.people),
+              'recall': found / people if people else 1.0, 'false_boxes': false / max(1, len(steps)),
+              'id_switches': sum(person.switches for person in tracked.people),
               'rmse_m': _rms([person.rmse_m for person in followed]),
               'worst_m': max([person.worst_m for person in followed], default=None)}
     result.update(score_tracks(steps, camera))
@@ -190,7 +192,3 @@ def _print_row(result):
                      '%.3f' % result['false_boxes'], result['id_switches'], texts['rmse_m'], texts['worst_m'],
                      result['track_ids'], result['not_visible'], texts['velocity_rmse_mps'],
                      texts['prediction_1s_m']), flush=True)
-
-
-if __name__ == '__main__':
-    main()

@@ -1,6 +1,6 @@
 """Pipeline without ROS on a simulated scene: 2D detection, 3D boxes and tracking, image by image."""
 import functools
-from typing import List, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ros_3d_bb.estimation.error_model import corrected_boxes
 from ros_3d_bb.tracking.association import match_greedily
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import CameraView, Detection, detection_from_box
+from ros_3d_bb.tracking.types import CameraView, detection_from_box
 from ros_3d_bb_lab.evaluation.clear_mot import Moment
 from ros_3d_bb_lab.simulation.simulator import SimulatedFrame
 
@@ -29,64 +29,32 @@ class Step(NamedTuple):
     moment: Moment
 
 
-class SceneImage(NamedTuple):
-    """One image as a Step without tracks, and the inputs of a tracker."""
-
-    step: Step
-    detections: List[Detection]
-    view: CameraView
-
-
-class DetectionScore(NamedTuple):
-    """Number of `people` to be detected, of those `found`, of `false` boxes, and of `images`."""
-
-    people: int
-    found: int
-    false: int
-    images: int
-
-    @property
-    def recall(self):
-        """0..1; 1 if there were no people to be detected."""
-        return self.found / float(self.people) if self.people else 1.0
-
-    @property
-    def false_rate(self):
-        """Number of false boxes per image."""
-        return self.false / float(max(1, self.images))
-
-
 def detect_in_scene(simulator, detect, every=1, error_model=None):
     """Render a scene and detect the people in it, image by image.
 
     `detect` is called with a SimulatedFrame and returns 2D boxes (n, 4). Every `every`-th image is used. An error model
-    corrects the 3D boxes and provides their covariance, as in bbox3d_node. Yields SceneImage.
+    corrects the 3D boxes and provides their covariance, as in bbox3d_node. Yields a
+    Step without tracks, and the inputs of a tracker: its detections and the CameraView.
     """
     for number in range(0, simulator.frame_count, every):
         frame = simulator.frame(number)
         boxes = np.asarray(detect(frame), float).reshape(-1, 4)
         depth = DepthImage(frame.depth_mm, 0.001)
         stamp_ns = int(round(frame.time_s * NS))
-        yield SceneImage(Step(frame._replace(color=None, depth_mm=None), boxes,
-                              Moment(stamp_ns, simulator.true_tracks(frame, stamp_ns), [])),
-                         _detections(depth, boxes, simulator.camera, frame.poses.map_from_camera, error_model),
-                         CameraView(frame.poses.map_from_camera, simulator.camera, frame.camera,
-                                    functools.partial(depths_towards, simulator.camera, depth)))
-
-
-def track_scene(images, trackers):
-    """Run trackers on the images (SceneImage) of a scene. Returns a list of Step for each tracker."""
-    steps = [[] for _tracker in trackers]
-    for step, detections, view in images:
-        for tracker, own_steps in zip(trackers, steps):
-            tracks = tracker.update(step.moment.stamp_ns, detections, view)
-            own_steps.append(step._replace(moment=step.moment._replace(tracks=tracks)))
-    return steps
+        step = Step(frame._replace(color=None, depth_mm=None), boxes,
+                    Moment(stamp_ns, simulator.true_tracks(frame, stamp_ns), []))
+        detections = _detections(depth, boxes, simulator.camera, frame.poses.map_from_camera, error_model)
+        view = CameraView(frame.poses.map_from_camera, simulator.camera, frame.camera,
+                          functools.partial(depths_towards, simulator.camera, depth))
+        yield step, detections, view
 
 
 def run_scene(simulator, detect, every=1, error_model=None):
-    """Run the pipeline on a scene: `detect_in_scene`, then `track_scene` with our tracker. Returns a list of Step."""
-    steps, = track_scene(detect_in_scene(simulator, detect, every, error_model), [Tracker()])
+    """Run the pipeline on a scene: `detect_in_scene`, then our tracker. Returns a list of Step."""
+    tracker, steps = Tracker(), []
+    for step, detections, view in detect_in_scene(simulator, detect, every, error_model):
+        tracks = tracker.update(step.moment.stamp_ns, detections, view)
+        steps.append(step._replace(moment=step.moment._replace(tracks=tracks)))
     return steps
 
 
@@ -123,7 +91,8 @@ def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6
 def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):
     """Count true and false detections of sufficiently visible people in a range of depth.
 
-    In each image, boxes and people are matched one to one in order of decreasing IoU. Returns a DetectionScore.
+    In each image, boxes and people are matched one to one in order of decreasing IoU. Returns the numbers of people to
+    be detected, of people found, and of false boxes.
     """
     people = found = false = 0
     for step in steps:
@@ -139,4 +108,4 @@ def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):
             if person.visible >= least_visible and nearest_m <= depth_m <= farthest_m:
                 people += 1
                 found += column in found_people
-    return DetectionScore(people, found, false, len(steps))
+    return people, found, false

@@ -27,9 +27,7 @@ from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, Detection, detection_from_box
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
-from ros_3d_bb_lab.evaluation.defaults import default_weights
-from ros_3d_bb_lab.evaluation.detector_speed import detector_speed
-from ros_3d_bb_lab.evaluation.machine import describe_machine
+from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 
 OBJECTS = (1, 2, 5, 10, 20, 50, 100)
@@ -40,7 +38,7 @@ AHEAD_S = 2.0  # horizon of the thesis' prediction
 ALGORITHMS, STAGES = ('ours', 'thesis'), ('estimation', 'tracking', 'both')
 CURVES = (('both', 'both', 'tab:green'), ('estimation', '3D boxes', 'tab:blue'),
           ('tracking', 'tracking and prediction', 'tab:orange'))
-DETECTOR_IMAGES = 40
+DETECTOR_IMAGES, DETECTOR_WARM_UPS = 40, 2
 COVERED = 0.2  # share of a box that its neighbour covers
 JITTER_PX = 2  # maximum change of the edges of a box between images
 SIMULATED = (2.0, 4.0), (-0.2, 0.2), 2  # simulated session, used if no session is given
@@ -188,6 +186,40 @@ def _statistics(times_ms):
     return result
 
 
+def detector_speed(images, weights, runtimes=('torch', 'onnxruntime'), sizes=(640, 512)):
+    """Measure the time of detection on the CPU, from the image to the boxes.
+
+    All runtimes and sizes process each of the `images`, (height, width, 3) RGB, in turn, so that other load on the
+    machine affects all of them equally and their ratios remain valid. `weights` is a checkpoint (.pt), the only format
+    that every runtime supports; `sizes` are the longer side of the input in pixels.
+
+    Returns a list of {runtime, size, threads, cpu_ms (of all threads of this process), wall_ms}, medians over the
+    images. Raises ValueError if there are no images, or a runtime does not support these weights.
+    """
+    if not len(images):
+        raise ValueError('no images; at least one image is required to measure the speed of the detector')
+    cases = [(runtime, size, _detector(weights, runtime, size)) for runtime in runtimes for size in sizes]
+    for _image in range(DETECTOR_WARM_UPS):
+        for _runtime, _size, detector in cases:
+            detector.detect(images[0])
+    times_ms = [[_detector_time_ms(detector, image) for _runtime, _size, detector in cases] for image in images]
+    return [{'runtime': runtime, 'size': size, 'threads': 1, 'cpu_ms': cpu_ms, 'wall_ms': wall_ms}
+            for (runtime, size, _detector), (cpu_ms, wall_ms) in zip(cases, np.median(times_ms, axis=0).tolist())]
+
+
+def _detector(weights, runtime, size):
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
+    from ros_3d_bb.detection.yolov5.detector import DetectionParams, Yolov5
+    running = RuntimeParams(runtime=runtime, device='cpu', threads=1)
+    return Yolov5(open_runtime(weights, running), DetectionParams(image_size=size))
+
+
+def _detector_time_ms(detector, image):
+    cpu_s, wall_s = time.process_time(), time.perf_counter()
+    detector.detect(image)
+    return (time.process_time() - cpu_s) * 1e3, (time.perf_counter() - wall_s) * 1e3
+
+
 def table(result):
     """Format the times as lines of text."""
     lines = ['CPU time of an image, ms: median (mean ± standard deviation)',
@@ -271,7 +303,3 @@ def _arguments():
     if arguments.images < 1:
         parser.error('--images is %d; at least 1 expected' % arguments.images)
     return arguments
-
-
-if __name__ == '__main__':
-    main()

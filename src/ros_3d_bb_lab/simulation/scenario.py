@@ -133,12 +133,8 @@ RANGES = (  # the same for numbers
 def read_scenario(path):
     """Read a scenario file. Its `room` may be the path of another file, relative to the scenario file.
 
-    Raises
-    ------
-    ValueError
-        If the file is not YAML, or has an unknown key or an invalid value. The message names the key and the value.
-    OSError
-        If the file cannot be opened.
+    Raises ValueError if the file is not YAML, or has an unknown key or an invalid value; the message names the key and
+    the value. Raises OSError if the file cannot be opened.
     """
     content = _load(path)
     if isinstance(content, dict) and isinstance(content.get('room'), str):
@@ -237,10 +233,10 @@ def _value(name, value, where):
     if name in VECTORS:
         if not (isinstance(value, list) and len(value) == VECTORS[name]):
             raise ValueError('%s is %r; %d numbers expected' % (where, value, VECTORS[name]))
-        return tuple(_checked(name, _number(entry, where), where) for entry in value)
+        return tuple(_number(name, entry, where) for entry in value)
     if name in FLAGS or name == 'name':
         return value
-    return _checked(name, _number(value, where), where)
+    return _number(name, value, where)
 
 
 def _check(checks, name, value, where):
@@ -249,12 +245,8 @@ def _check(checks, name, value, where):
             raise ValueError('%s is %r; %s expected' % (where, value, expected))
 
 
-def _checked(name, number, where):
-    _check(RANGES, name, number, where)
-    return int(number) if name in WHOLE else float(number)
-
-
-def _number(value, where):
+def _number(name, value, where):
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e10:
         raise ValueError('%s is %r; a number expected' % (where, value))
-    return value
+    _check(RANGES, name, value, where)
+    return int(value) if name in WHOLE else float(value)

@@ -1,4 +1,4 @@
-"""Replaces paramiko: runs commands of roslaunch for the other computer as local processes with ENTER_OTHER."""
+"""Replaces paramiko: runs commands of roslaunch for the other computer as local processes."""
 import os
 import socket
 import subprocess
@@ -36,8 +36,8 @@ class SSHClient(object):
             raise SSHException('no such computer: %s' % address)
 
     def exec_command(self, command):
-        process = subprocess.Popen(os.environ['ENTER_OTHER'].split() + ['sh', '-c', command], stdin=subprocess.PIPE,
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        process = subprocess.Popen(['sh', '-c', command], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE)
         return process.stdin, _Pipe(process.stdout), _Pipe(process.stderr)
 
     def close(self):

@@ -45,26 +45,11 @@ class DepthPeople(object):
         self._params = params
 
     def detect(self, image, depth, camera, floor=None):
-        """Detect people.
+        """Detect people in an RGB image (height, width, 3), uint8, and the DepthImage aligned to it.
 
-        Parameters
-        ----------
-        image : numpy.ndarray, (height, width, 3), uint8, RGB
-        depth : ros_3d_bb.camera.depth_image.DepthImage
-            Aligned to the colour image.
-        camera : ros_3d_bb.camera.camera_model.Camera
-        floor : ros_3d_bb.detection.depth.ground_plane.Floor, optional
-            By default, the floor is fitted to this image. If that fails, the last fitted floor is used.
-
-        Returns
-        -------
-        ros_3d_bb.detection.boxes.Detections or None
-            All of class 0. None if no floor is known yet.
-
-        Raises
-        ------
-        ValueError
-            If the images or the camera differ in size, or the camera is not upright above the floor.
+        By default, the floor (ground_plane.Floor) is fitted to this image; if that fails, the last fitted floor is
+        used. Returns Detections of class 0, or None if no floor is known yet. Raises ValueError if the images or the
+        camera differ in size, or the camera is not upright above the floor.
         """
         if depth.values.shape != (camera.height, camera.width):
             raise ValueError('the depth image has %d x %d pixels and the colour camera %d x %d; depth aligned to '

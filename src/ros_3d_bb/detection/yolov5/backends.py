@@ -37,23 +37,11 @@ class RuntimeParams(NamedTuple):
 
 
 def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
-    """Load weights into the backend for their file format.
+    """Load an official checkpoint (.pt), or a model that YOLOv5 exported to TorchScript (.torchscript) or ONNX (.onnx).
 
-    Parameters
-    ----------
-    path : str
-        An official checkpoint (.pt), or a model exported by YOLOv5 to TorchScript (.torchscript) or ONNX (.onnx).
-        A TorchScript file is a program: load only trusted files.
-    params : RuntimeParams
-    warn : callable
-        Called with one line of text for problems that are worked around.
-
-    Raises
-    ------
-    WeightsError
-        If the file cannot be used, or needs torch and torch is not installed.
-    ValueError
-        If a parameter is out of range, the device does not exist, or the requested runtime cannot run this file.
+    A TorchScript file is a program: load only trusted files. `warn` is called with one line of text for problems that
+    are worked around. Raises WeightsError if the file cannot be used, or needs torch and torch is not installed, and
+    ValueError if a parameter is out of range, the device does not exist, or the runtime cannot run this file.
     """
     check(params)
     if params.runtime == 'onnxruntime' and params.device not in ('auto', 'cpu'):

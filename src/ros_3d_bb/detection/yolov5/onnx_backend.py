@@ -109,12 +109,8 @@ def open_exported(path, folder, threads, warn):
     The folder is created if missing. If it cannot be written, the export is used from memory. `warn` is called with one
     line of text for problems that are worked around.
 
-    Raises
-    ------
-    WeightsError
-        If the checkpoint cannot be used.
-    OnnxUnusable
-        If ONNX Runtime is not installed, or its output differs from torch's.
+    Raises WeightsError if the checkpoint cannot be used, and OnnxUnusable if ONNX Runtime is not installed, or its
+    output differs from torch's.
     """
     try:
         import onnxruntime  # noqa: F401

@@ -69,11 +69,6 @@ class Diagnostics(EventCounter):
         """Whether an exception results from shutdown, when rospy closes publishers during running callbacks."""
         return isinstance(error, rospy.ROSException) and is_ending()
 
-    def counters(self):
-        """Return the published counters: a list of (event, count) and ('<inputs> received', count)."""
-        return list(self.counts.items()) + [('%s received' % inputs, amount)
-                                            for inputs, amount in list(self.received.items())]
-
     def _report(self, status):
         is_recent = time.monotonic() - self._warned_at < WARNING_LASTS_S
         faults = self._current_faults()
@@ -86,8 +81,10 @@ class Diagnostics(EventCounter):
             status.summary(DiagnosticStatus.STALE, 'no input yet')
         else:
             status.summary(DiagnosticStatus.OK, 'working')
-        for event, amount in self.counters():
+        for event, amount in list(self.counts.items()):  # a copy, because other threads add events
             status.add(event, str(amount))
+        for inputs, amount in list(self.received.items()):
+            status.add('%s received' % inputs, str(amount))
         for values in [self._rate_and_latency] + self._shown:
             for name, text in values():
                 status.add(name, text)

@@ -11,9 +11,8 @@ from sensor_msgs.msg import CameraInfo
 
 from ros_3d_bb.conversions.camera_msgs import topic_of
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
-from ros_3d_bb.diagnosis.checks import BOXES3D, DEPTH
+from ros_3d_bb.diagnosis.checks import BOXES3D, DEPTH, ROLES
 from ros_3d_bb.diagnosis.message_observer import Observation, observations_of
-from ros_3d_bb.diagnosis.topic_roles import ROLES
 from ros_3d_bb.nodes.common.master import published_topics, publishers_of
 from ros_3d_bb.nodes.common.subscribers import IMAGE_BUFFER
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams

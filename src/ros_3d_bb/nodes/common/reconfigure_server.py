@@ -20,13 +20,8 @@ class ReconfigureServer(object):
     value is rejected as a whole, where the server of dynamic_reconfigure would clamp the value. The response contains
     the current values, because an error would end the thread of rqt_reconfigure.
 
-    Parameters
-    ----------
-    params : list of NamedTuple
-        All parameters of the node, as returned by `startup.read_params`.
-    apply : callable
-        Called with the changed parameters, in the same order. Raises ValueError without changing anything if they are
-        invalid.
+    `params` are all parameters of the node, as returned by `startup.read_params`. `apply` is called with the changed
+    parameters, in the same order. It raises ValueError without changing anything if they are invalid.
 
     Publishes
     ---------

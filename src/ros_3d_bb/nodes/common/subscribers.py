@@ -6,9 +6,9 @@ import rospy
 from rospy.topics import get_topic_manager
 from sensor_msgs.msg import Image
 
+from ros_3d_bb.diagnosis.checks import role_named
 from ros_3d_bb.diagnosis.observations import Stream
 from ros_3d_bb.diagnosis.topic_faults import NO_CLOCK, clock_fault, silence_fault
-from ros_3d_bb.diagnosis.topic_roles import role_named
 from ros_3d_bb.nodes.common.master import NO_ANSWER, published_topics, publishers_of
 
 # Queue size for messages that are cached until others arrive and must not be lost: this many may arrive at once after

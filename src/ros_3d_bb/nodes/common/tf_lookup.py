@@ -64,16 +64,10 @@ class Transforms(object):
         self._requested, self._explanations = {}, {}  # by (target, source): time; (sentence, time)
 
     def lookup(self, target_frame, source_frame, stamp):
-        """Look up `target_from_source` at a stamp.
+        """Look up `target_from_source` (4, 4) at a stamp.
 
-        Returns
-        -------
-        numpy.ndarray, (4, 4)
-
-        Raises
-        ------
-        tf2_ros.TransformException
-            If the transform is not available within the timeout. The message names the frames and the state of tf.
+        Raises tf2_ros.TransformException if the transform is not available within the timeout. The message names the
+        frames and the state of tf.
         """
         frames = target_frame.lstrip('/'), source_frame.lstrip('/')
         self._requested[frames] = time.monotonic()

@@ -16,7 +16,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_caption
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score, table
-from ros_3d_bb_lab.simulation.ros.simulator_msgs import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
 
 matplotlib.use('Agg')
 from matplotlib import gridspec, pyplot  # noqa: E402 (the backend must be selected first)

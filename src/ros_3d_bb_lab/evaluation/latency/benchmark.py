@@ -10,9 +10,8 @@ import sys
 import tempfile
 from typing import NamedTuple
 
-from ros_3d_bb_lab.evaluation.defaults import default_weights, scenario_path
+from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine, scenario_path
 from ros_3d_bb_lab.evaluation.latency.latency_result import result_of
-from ros_3d_bb_lab.evaluation.machine import describe_machine
 
 IMAGES = 60  # first images of the scene, played forwards and backwards: 2 s, 90 MB
 ENDING_S = 40.0  # roslaunch waits up to 17 s for its nodes
@@ -81,17 +80,11 @@ def launch(arguments, timeout_s, log):
         with contextlib.suppress(subprocess.TimeoutExpired):  # the missing record is reported
             process.wait(timeout_s)
     finally:
-        end(process)
-
-
-def end(roslaunch):
-    """Terminate roslaunch with its nodes, if it is still running."""
-    roslaunch.send_signal(signal.SIGINT)
-    try:
-        roslaunch.wait(ENDING_S)
-    except subprocess.TimeoutExpired:
-        roslaunch.kill()
-        roslaunch.wait()
+        process.send_signal(signal.SIGINT)  # has no effect if it has exited
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(ENDING_S)
+        process.kill()
+        process.wait()
 
 
 def free_port():
@@ -178,7 +171,3 @@ def _arguments():
         if name not in measurable:
             parser.error('case %s needs --weights' % name)
     return arguments, [known[name] for name in names]
-
-
-if __name__ == '__main__':
-    main()

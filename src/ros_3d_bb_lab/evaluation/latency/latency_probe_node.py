@@ -26,13 +26,6 @@ OUTPUTS = ((BOXES_TOPIC, Int32MultiArray), (BOXES3D_TOPIC, BoundingBox3DArray), 
            ('visualization_marker_array', MarkerArray))  # of `STAGES`
 
 
-class Usage(NamedTuple):
-    """CPU time of all threads since the start of a process in seconds, and its current resident memory in megabytes."""
-
-    cpu_s: float
-    rss_mb: float
-
-
 @parameters()
 class LatencyProbeParams(NamedTuple):
     """Parameters of latency_probe_node."""
@@ -122,14 +115,14 @@ def pids_of_nodes():
 
 
 def usage_of(pid):
-    """Usage of a process by /proc. None if it does not exist."""
+    """CPU time of all threads of a process, seconds, and its resident memory, megabytes. None if it does not exist."""
     try:
         with open('/proc/%d/stat' % pid) as stream:
             fields = stream.read().rpartition(')')[2].split()  # the name may contain any character
     except (FileNotFoundError, ProcessLookupError):
         return None
     utime, stime, rss_pages = (int(fields[number - 3]) for number in (14, 15, 24))  # numbered as in proc(5)
-    return Usage((utime + stime) / float(os.sysconf('SC_CLK_TCK')), rss_pages * os.sysconf('SC_PAGE_SIZE') / 1e6)
+    return (utime + stime) / os.sysconf('SC_CLK_TCK'), rss_pages * os.sysconf('SC_PAGE_SIZE') / 1e6
 
 
 def main():

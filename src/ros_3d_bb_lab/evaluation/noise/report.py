@@ -92,12 +92,7 @@ def _focal_lengths(_analysis):
     thesis_px = theory.focal_px(theory.THESIS_FOV_DEG, theory.THESIS_WIDTH_PX)
     color_deg = theory.fov_deg(theory.COLOR_FOCAL_PX, theory.THESIS_WIDTH_PX)
     stereo_px = theory.STEREO_PX_M / theory.THESIS_BASELINE_M
-    rows = [(name, '%.0f' % focal, '%.1f' % theory.fov_deg(focal, theory.THESIS_WIDTH_PX),
-             '%.4f' % theory.stereo_rms_m(3.0, focal * theory.THESIS_BASELINE_M))
-            for name, focal in (("thesis: from the colour camera's 69°", thesis_px),
-                                ('colour intrinsics', theory.COLOR_FOCAL_PX), ('stereo pair (used here)', stereo_px))]
     return [
-        _table(('focal length f', 'f [px]', 'field of view at 640 px [°]', 'theory at 3 m [m]'), rows),
         _paragraph('The thesis derives f = %.0f px from the 69° of the data sheet. These are the field of view of the '
                    'whole 16:9 colour sensor, but the images of 640×480 pixels (4:3) are cropped: the intrinsics of '
                    'the camera are f = %.1f px, %.1f°. With 69° the theoretical error is %.0f %% too large.'

@@ -1,5 +1,4 @@
 """Tracking benchmark: trackers on simulated detections from a robot among recorded pedestrians.
 
-May import: camera, core, tracking, ros_3d_bb_lab.evaluation, ros_3d_bb_lab.evaluation.baselines,
-ros_3d_bb_lab.simulation.
+May import: camera, core, tracking, ros_3d_bb_lab.evaluation.baselines.
 """

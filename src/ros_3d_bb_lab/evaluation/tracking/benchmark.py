@@ -1,4 +1,11 @@
-"""Comparison of our tracker, the thesis' and Norfair on the same detections from robots among pedestrians."""
+"""Compare trackers on simulated detections from a camera on a standing or driving robot among recorded pedestrians.
+
+Detection errors are as measured in the thesis. Without recordings, pedestrian trajectories are generated.
+"""
+import argparse
+import json
+import os
+import sys
 import time
 from typing import Any, NamedTuple
 
@@ -15,6 +22,7 @@ from ros_3d_bb_lab.evaluation.tracking.detection_generator import SimulatedDetec
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
 from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, detection_of, simulate, view_of
+from ros_3d_bb_lab.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
 
 # CPU time: people walk in circles around fixed places, on an area that grows with their number
 PEOPLE = (5, 20, 100)
@@ -114,3 +122,52 @@ def _text(key, value):
     if value is None or isinstance(value, int):
         return '-' if value is None else str(value)
     return '%.3f' % value if '_' in key else '%.1f' % value
+
+
+def bench(arguments):
+    """Run the comparison and print it. Returns the settings and the scores of each tracker, as written by --json."""
+    sequences = read_sequences(arguments.data) if arguments.data else made_sequences(arguments.seed)
+    names = [sequence.name for sequence in sequences]
+    print('sequences: %s (%s), seed %d' % (', '.join(names), arguments.data or 'generated; no recordings found',
+                                           arguments.seed), flush=True)
+    contestants = CONTESTANTS + ((BOUND,) if arguments.bound else ())
+    runs = runs_of(sequences, arguments.seed, arguments.repetitions, arguments.seconds)
+    trackers = compare(runs, contestants)
+    for contestant in contestants:
+        trackers[contestant.name]['cpu_ms'] = {str(people): cpu_ms(contestant.make, people) for people in PEOPLE}
+    print('\n'.join(table(trackers)))
+    return {'sequences': names, 'recorded': bool(arguments.data), 'seed': arguments.seed,
+            'repetitions': arguments.repetitions, 'seconds': arguments.seconds, 'trackers': trackers}
+
+
+def main():
+    """Run the command `./run bench tracking`."""
+    arguments = _arguments()
+    try:
+        result = bench(arguments)
+        if arguments.json:
+            with open(arguments.json, 'w') as stream:
+                json.dump(result, stream, indent=1)
+    except (ValueError, OSError) as error:
+        sys.exit('./run bench tracking: %s' % error)
+
+
+def _arguments():
+    parser = argparse.ArgumentParser(prog='./run bench tracking', description=__doc__)
+    data = os.path.join(os.environ.get('ROS_3D_BB_DATA', ''), 'data', 'trajectories')
+    parser.add_argument('--data', default=data if os.path.isdir(data) else None, metavar='DIR',
+                        help='folder of CSV files with the columns %s (default: $ROS_3D_BB_DATA/data/trajectories if '
+                        'it exists, otherwise generated trajectories)' % ','.join(COLUMNS))
+    parser.add_argument('--seed', type=int, default=0, metavar='N', help='random seed (default: 0)')
+    parser.add_argument('--repetitions', type=int, default=2, metavar='N',
+                        help='runs of each sequence with a standing and with a driving robot (default: 2)')
+    parser.add_argument('--seconds', type=float, default=SECONDS, help='duration of a run (default: %g)' % SECONDS)
+    parser.add_argument('--bound', action='store_true', help='also score our tracker with perfect data association')
+    parser.add_argument('--json', metavar='FILE', help='also write the scores to FILE')
+    arguments = parser.parse_args()
+    for name in ('repetitions', 'seconds'):
+        if not getattr(arguments, name) > 0:
+            parser.error('--%s is %g; more than 0 expected' % (name, getattr(arguments, name)))
+    if not 0 <= arguments.seed < 2 ** 32:
+        parser.error('--seed is %d; 0 to %d expected' % (arguments.seed, 2 ** 32 - 1))
+    return arguments

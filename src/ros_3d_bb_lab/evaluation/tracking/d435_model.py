@@ -69,17 +69,6 @@ class CameraModel(NamedTuple):
                          [mixed_m2, 0, forward ** 2 * along_m2 + right ** 2 * across_m2]])
 
 
-class Shown(NamedTuple):
-    """Visibility of people (n,) in an image: the largest visible part of each.
-
-    `share` is its share of the width of the person, `middle` its bearing, `cut` whether the image border truncates it.
-    """
-
-    share: np.ndarray
-    middle: np.ndarray
-    cut: np.ndarray
-
-
 def thesis_bias_m(depth_m):
     """Bias of depth in the thesis, metres."""
     depth_m = np.asarray(depth_m, float)
@@ -96,22 +85,22 @@ def half_width(range_m):
 def shown(bearing, half, range_m, half_view):
     """Visible parts of cylinders (n,) with angular half-widths around their bearings, occluded by nearer ones.
 
-    The field of view extends from -`half_view` to `half_view`. Returns Shown; `middle` is equal to `bearing` for people
-    that are not visible.
+    The field of view extends from -`half_view` to `half_view`. Returns arrays (n,) of the largest visible part of each:
+    its share of the width, its bearing (that of the cylinder if none is visible), and whether the image border cuts it.
     """
-    result = Shown(np.zeros(len(bearing)), np.array(bearing, float), np.zeros(len(bearing), bool))
+    share, middle, cut = np.zeros(len(bearing)), np.array(bearing, float), np.zeros(len(bearing), bool)
     nearer = []
     for person in np.argsort(range_m):
         left, right = bearing[person] + half[person], bearing[person] - half[person]
         pieces = _without(nearer, max(right, -half_view), min(left, half_view))
         if pieces:
             low, high = max(pieces, key=lambda piece: piece[1] - piece[0])
-            result.share[person] = (high - low) / (left - right)
-            result.middle[person] = (low + high) / 2
-            result.cut[person] = low <= -half_view or high >= half_view
+            share[person] = (high - low) / (left - right)
+            middle[person] = (low + high) / 2
+            cut[person] = low <= -half_view or high >= half_view
         if range_m[person] > BLIND_M:
             nearer.append((right, left))
-    return result
+    return share, middle, cut
 
 
 def _without(covers, low, high):

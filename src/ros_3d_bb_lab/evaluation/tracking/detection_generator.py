@@ -28,7 +28,7 @@ class SimulatedDetection(NamedTuple):
 
 
 class DetectablePerson(NamedTuple):
-    """Person visible in an image, with the fields of `d435_model.Shown`; `heading` is relative to the camera."""
+    """Person in an image; `share`, `middle`, `cut` as in `d435_model.shown`; `heading` is relative to the camera."""
 
     person: int
     depth_m: float

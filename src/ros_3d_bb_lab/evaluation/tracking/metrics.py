@@ -9,7 +9,6 @@ covariances are computed from the matched pairs.
 """
 import contextlib
 import io
-from typing import List, NamedTuple
 
 import numpy as np
 
@@ -24,19 +23,13 @@ BORDER, BORDER_M, NEAREST_M = 0.04, 0.15, 0.5  # margins of the field of view: r
 WITHIN_95 = 5.991  # 95 % quantile of chi squared with 2 degrees of freedom
 
 
-class RunScore(NamedTuple):
-    """Scores of a run: results of TrackEval's HOTA, CLEAR and Identity metrics, and errors of the n matched tracks.
-
-    `errors` (n, 2 + horizons, 3) are those of position, velocity and the predictions for `HORIZONS_S`: x and y, NaN if
-    the truth is unknown, and the squared Mahalanobis distance, NaN for tracks without covariance.
-    """
-
-    results: List[dict]
-    errors: np.ndarray
-
-
 def score_run(run, outputs):
-    """Score a tracker on a run_generator.Run, with a list of TrackedObject after each image. Returns a RunScore."""
+    """Score a tracker on a run_generator.Run, with a list of TrackedObject after each image.
+
+    Returns the results of TrackEval's HOTA, CLEAR and Identity metrics, and the errors (n, 2 + horizons, 3) of the n
+    matched tracks in position, velocity and the predictions for `HORIZONS_S`: x and y, NaN if the truth is unknown, and
+    the squared Mahalanobis distance, NaN for tracks without covariance.
+    """
     people, tracks, similarities, errors = [], [], [], []
     for image, objects in zip(run.images, outputs):
         person_ids, track_ids, similarity, image_errors = _score_image(image.truth, objects, run.camera)
@@ -47,16 +40,17 @@ def score_run(run, outputs):
     data = trackeval_data(people, tracks, similarities)
     with contextlib.redirect_stdout(io.StringIO()):
         results = [metric.eval_sequence(data) for metric in trackeval_metrics()]
-    return RunScore(results, np.reshape(errors, (-1, 2 + len(HORIZONS_S), 3)))
+    return results, np.reshape(errors, (-1, 2 + len(HORIZONS_S), 3))
 
 
 def scores_of(run_scores):
-    """Combine the scores of all runs to a dictionary, without `cpu_ms`.
+    """Combine the scores of all runs, from `score_run`, to a dictionary, without `cpu_ms`.
 
     Scores are in percent, lengths in metres, and coverage is a share 0..1. Values without data are None.
     """
+    results_of_runs, errors_of_runs = zip(*run_scores)
     combined = []
-    for metric, results in zip(trackeval_metrics(), zip(*(score.results for score in run_scores))):
+    for metric, results in zip(trackeval_metrics(), zip(*results_of_runs)):
         combined.append(metric.combine_sequences({str(number): result for number, result in enumerate(results)}))
     hota, clear, identity = combined
     scores = {'hota': 100 * float(np.mean(hota['HOTA'])), 'assa': 100 * float(np.mean(hota['AssA'])),
@@ -64,7 +58,7 @@ def scores_of(run_scores):
               'idf1': 100 * float(identity['IDF1']), 'id_switches': int(clear['IDSW']),
               'fragmentations': int(clear['Frag']), 'recall': 100 * float(clear['CLR_Re']),
               'precision': 100 * float(clear['CLR_Pr'])}
-    errors = np.concatenate([score.errors for score in run_scores])
+    errors = np.concatenate(errors_of_runs)
     lengths, distances = np.linalg.norm(errors[..., :2], axis=2), errors[..., 2]
     scores.update(position_rmse_m=_rms(errors[:, 0, :2]), velocity_rmse_mps=_rms(errors[:, 1, :2]),
                   coverage_95_position=_coverage(distances[:, 0]), coverage_95_velocity=_coverage(distances[:, 1]))

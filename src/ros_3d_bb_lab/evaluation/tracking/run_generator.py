@@ -196,8 +196,8 @@ def _observe(walks, row, pose, odometry, camera):
     local_m, range_m, bearing = local_m[ids], range_m[ids], bearing_of(local_m[ids])
     there = ~walks.ended[row, ids] & (np.abs(bearing) < np.pi / 2)
     half_view = camera.field_of_view / 2
-    what = shown(bearing, np.where(there, half_width(range_m), 1e-3), range_m, half_view)
-    share = np.where(there, what.share, 0)
+    share, middle, cut = shown(bearing, np.where(there, half_width(range_m), 1e-3), range_m, half_view)
+    share = np.where(there, share, 0)
     inside = (there & (np.abs(bearing) < half_view) & (local_m[:, 0] > camera.nearest_m)
               & (range_m < camera.farthest_m))
     velocity_mps, turn = walks.velocity_mps[row, ids], odometry[2] - pose[2]
@@ -205,7 +205,7 @@ def _observe(walks, row, pose, odometry, camera):
                      from_frame(odometry, to_frame(pose, walks.future_m[row, ids])),
                      np.where(inside, np.where(share >= HARD_TO_SEE, VISIBLE, OCCLUDED), OUT_OF_VIEW), odometry)
     heading = bearing_of(velocity_mps) - pose[2]
-    seen = [DetectablePerson(ids[i], local_m[i, 0], range_m[i], what.middle[i], share[i], what.cut[i],
+    seen = [DetectablePerson(ids[i], local_m[i, 0], range_m[i], middle[i], share[i], cut[i],
                              np.linalg.norm(velocity_mps[i]), heading[i]) for i in np.flatnonzero(share > 0)]
     return truth, seen
 

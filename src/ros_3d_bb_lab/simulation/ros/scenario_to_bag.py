@@ -1,16 +1,35 @@
-"""Conversion of scenarios to bags: the command `scenario_to_bag`."""
+"""ROS messages of simulated scenes, and the command `scenario_to_bag`."""
 import itertools
 
 import numpy as np
 from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_writer import bag_command_parser, write_bag_of_command
-from ros_3d_bb.conversions.camera_msgs import START_NS, frame_id_of, topic_of
-from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_msg, time_from
+from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.conversions.camera_msgs import START_NS, TF_TOPIC, CameraFrame, frame_id_of, messages_of, topic_of
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_msg, time_from, tracks_to_msg
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb_lab.simulation.ros.simulator_msgs import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
 from ros_3d_bb_lab.simulation.simulator import Simulator
+
+TRUTH_TOPIC = 'ground_truth'
+MAP_FRAME, ODOM_FRAME, BASE_FRAME = 'map', 'odom', 'base_link'
+
+
+def simulated_messages(simulator, frame, stamp_ns):
+    """Convert a frame to (topic, message) pairs: tf, camera_info, depth, colour, and ground truth in the map.
+
+    The occlusion status in the ground truth refers to the camera of the frame.
+    """
+    stamp, frame_id = time_from(stamp_ns), frame_id_of(frame.camera)
+    chain = [(MAP_FRAME, ODOM_FRAME, frame.poses.map_from_odom), (ODOM_FRAME, BASE_FRAME, frame.poses.odom_from_base),
+             (BASE_FRAME, frame_id, frame.poses.base_from_camera)]
+    taken = CameraFrame(Header(stamp=stamp, frame_id=frame_id), simulator.camera, frame.color,
+                        DepthImage(frame.depth_mm, 0.001), chain)
+    messages = [(topic_of(frame.camera, topic) if topic != TF_TOPIC else topic, message)
+                for topic, message in messages_of(taken)]
+    truth = tracks_to_msg(simulator.true_tracks(frame, stamp_ns), Header(stamp=stamp, frame_id=MAP_FRAME))
+    return messages + [(TRUTH_TOPIC, truth)]
 
 
 def scenario_images(scenario, with_boxes=False):

@@ -14,7 +14,7 @@ from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import is_ending
 from ros_3d_bb.nodes.common.startup import read_params, run_node, wait_for_subscribers
-from ros_3d_bb_lab.simulation.ros.simulator_msgs import TRUTH_TOPIC, simulated_messages
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import TRUTH_TOPIC, simulated_messages
 from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
