@@ -6,8 +6,8 @@ import threading
 import time
 
 import rospy
-from support.processes import end
 
+from support.processes import end
 
 LAUNCH = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'soak.launch')
 STARTED = re.compile(r'process\[([\w/]+)-\d+\]: started with pid \[(\d+)\]')
