@@ -7,7 +7,7 @@ import time
 
 import rospy
 
-from ros_3d_bb_lab.evaluation.latency.benchmark import end
+from support.processes import end
 
 LAUNCH = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'soak.launch')
 STARTED = re.compile(r'process\[([\w/]+)-\d+\]: started with pid \[(\d+)\]')

@@ -81,3 +81,13 @@ def never_reading(node, topic, kind):
         wait_until(lambda: any(entry[1] == '/subscriber' and entry[4] == topic for entry in ServerProxy(uri).getBusInfo(
             '/subscriber')[2]), 'the connection of a subscriber of ' + topic)
         yield
+
+
+def end(roslaunch):
+    """Terminate roslaunch with its nodes."""
+    roslaunch.send_signal(signal.SIGINT)
+    try:
+        roslaunch.wait(30)
+    except subprocess.TimeoutExpired:
+        roslaunch.kill()
+        roslaunch.wait()
