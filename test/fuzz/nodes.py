@@ -113,7 +113,7 @@ def _quiet():
 def _messages_of(source, now_ns, connections):
     """Messages of one image, valid or not, in random order."""
     good = dict(hostile.good_frame(now_ns), **{BOXES_TOPIC: hostile.good_boxes(now_ns)})
-    makers = hostile.makers(source, now_ns, good)
+    makers = hostile.makers(source, now_ns, good, 0.5)
     topics = [topic for topic in sorted(connections.subscribers) if topic in makers]
     source.shuffle(topics)
     return [(topic, good[topic] if topic in good and source.random() < 0.4 else makers[topic]()) for topic in topics]

@@ -65,7 +65,7 @@ def _alignment(seen):
     if seen.depth is None or seen.color_info is None or seen.color_info.fault:
         return
     depth, camera = seen.depth.message, seen.color_info.converted
-    fault = size_fault(camera, depth.width, depth.height)
+    fault = size_fault(camera, depth.width, depth.height) if depth.width else ''  # _encodings reports an empty image
     if not fault and seen.depth_info is not None and not seen.depth_info.fault:
         fault = intrinsics_fault(camera, seen.depth_info.converted)
     fault = fault or frames_fault(seen.color_info.message.header.frame_id, depth.header.frame_id)

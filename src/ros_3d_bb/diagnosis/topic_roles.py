@@ -2,9 +2,9 @@
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
 from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS
-from ros_3d_bb.diagnosis.observations import Role
+from ros_3d_bb.diagnosis.observations import IMAGE, Role
 
-IMAGE, CAMERA = 'sensor_msgs/Image', 'the camera (roslaunch ros_3d_bb realsense.launch)'
+CAMERA = 'the camera (roslaunch ros_3d_bb realsense.launch)'
 CAMERA_SILENT = 'is the camera plugged in, the bag still playing (not paused), the network fast enough for images?'
 DETECTOR_SILENT = ('is the detector paused (call its service ~enable with true), still loading its weights, or '
                    'configured to publish no empty arrays (publish_empty: false)?')
