@@ -8,6 +8,7 @@ import rosbag
 from ros_3d_bb.conversions.image_msgs import pixels_from
 
 QUANTIZATION, MAX_M = 100.0, 10.0  # defaults of the compressed_depth_image_transport
+JPEG_QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 80]  # default of the compressed_image_transport
 
 
 def compressed_fields(message, codec='jpeg'):
@@ -18,7 +19,7 @@ def compressed_fields(message, codec='jpeg'):
     else:
         is_color = pixels.ndim == 3
         text = '%s; %s compressed %s' % (encoding, codec, 'bgr8' if is_color else '')
-        _done, data = cv2.imencode('.' + codec, pixels[..., ::-1] if encoding == 'rgb8' else pixels)
+        _done, data = cv2.imencode('.' + codec, pixels[..., ::-1] if encoding == 'rgb8' else pixels, JPEG_QUALITY)
         data = data.tobytes()
     return {'header': message.header, 'format': text, 'data': data}
 
