@@ -26,7 +26,8 @@ TEXTS = ('', 'camera', 'map', '/camera', 'no_such_frame', 'a b', '\u00e4\u0661',
 WIDTH, HEIGHT = 64, 48
 CODECS = {COLOR_TOPIC: ('jpeg', 'png'), DEPTH_TOPIC: ('png', 'compressedDepth', 'compressedDepth rvl')}
 FORMATS = ('jpeg', 'png', 'rgb8; jpeg compressed bgr8', 'bayer_rggb8; png compressed ', '16UC1; png compressed ',
-           '16UC1; compressedDepth', '16UC1; compressedDepth rvl', '32FC1; compressedDepth', '32FC1; compressedDepth rvl')
+           '16UC1; compressedDepth', '16UC1; compressedDepth rvl', '32FC1; compressedDepth',
+           '32FC1; compressedDepth rvl')
 CAMERA = Camera(WIDTH, HEIGHT, 60.0, 60.0, 31.5, 23.5)
 
 

@@ -12,7 +12,7 @@ JPEG_QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 80]  # default of the compressed_image
 
 
 def compressed_fields(message, codec='jpeg'):
-    """Fields of the CompressedImage of an image: 'jpeg', 'png', or of depth 'compressedDepth', 'compressedDepth rvl'."""
+    """Fields of the CompressedImage of an image: jpeg, png, or of depth compressedDepth, compressedDepth rvl."""
     pixels, encoding = pixels_from(message)
     if codec.startswith('compressedDepth'):
         text, data = '%s; %s' % (encoding, codec), compressed_depth(pixels, 'rvl' in codec)

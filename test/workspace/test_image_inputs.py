@@ -1,4 +1,4 @@
-"""Compressed, YUV and Bayer images give the positions of plain images, in process_bag, in the nodes and in the doctor."""
+"""Compressed, YUV and Bayer images give the positions of plain images in process_bag, and pass the doctor."""
 import argparse
 import subprocess
 import sys
@@ -12,7 +12,7 @@ from sensor_msgs.msg import CompressedImage, Image
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.bags.bag_writer import write_bag
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, info_topic_beside
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.nodes.doctor import bag_findings
 from ros_3d_bb.pipeline.offline_pipeline import Settings
@@ -98,6 +98,12 @@ def test_other_images_give_the_same_positions(scene, plain, tmp_path, name):
     for stamp, positions in expected.items():
         assert found[stamp].shape == positions.shape
         np.testing.assert_allclose(found[stamp], positions, atol=largest_m)
+
+
+@pytest.mark.parametrize('image_topic', ['/camera/depth/image', '/camera/depth/image/compressedDepth',
+                                         '/camera/depth/image/compressed'])
+def test_camera_info_is_in_the_namespace_of_the_image(image_topic):
+    assert info_topic_beside(image_topic) == '/camera/depth/camera_info'
 
 
 def test_cv2_is_not_imported_for_plain_images():

@@ -1,5 +1,4 @@
 """Observe the topics of a running ROS graph for some seconds, as input of the checks."""
-import os
 import time
 
 import rospy
