@@ -51,7 +51,11 @@ GOOD = hostile.good_messages(NOW_NS)
 
 def _made(read, topic):
     """Function that reads an invalid message of a topic."""
-    return lambda source, _folder: read(hostile.makers(source, NOW_NS, GOOD)[topic]())
+    return lambda source, _folder: read(hostile.makers(source, NOW_NS, GOOD, 0.5)[topic]())
+
+
+def _array(source, _folder):
+    array_from(hostile.image(source, NOW_NS, GOOD[COLOR_TOPIC]))
 
 
 def _boxes2d(source, _folder):
@@ -184,7 +188,7 @@ def _tracker_params(path):
 
 
 FUNCTIONS = {  # name: (function of a Source and a folder, relative frequency)
-    'array_from': (_made(array_from, COLOR_TOPIC), 10), 'imgmsg_to_rgb': (_made(imgmsg_to_rgb, COLOR_TOPIC), 8),
+    'array_from': (_array, 10), 'imgmsg_to_rgb': (_made(imgmsg_to_rgb, COLOR_TOPIC), 8),
     'imgmsg_to_depth': (_made(imgmsg_to_depth, DEPTH_TOPIC), 8),
     'camera_from_msg': (_made(camera_from_msg, INFO_TOPICS[0]), 8),
     'boxes2d_from_msg, boxes2d_to_msg': (_boxes2d, 6), 'boxes3d_from_msg, boxes3d_to_msg': (_boxes3d, 3),

@@ -5,7 +5,7 @@ import random
 import genpy
 import numpy as np
 from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion, Transform, TransformStamped, Vector3
-from sensor_msgs.msg import RegionOfInterest
+from sensor_msgs.msg import CompressedImage, RegionOfInterest
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from tf2_msgs.msg import TFMessage
 
@@ -18,12 +18,17 @@ from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, T
                                                    time_from)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
+from support.compressed import compressed_fields
 
 FLOATS = (0.0, -0.0, 1.0, -1.0, 0.5, 3.0, float('nan'), float('inf'), -float('inf'), 1e308, -1e308, 5e-324, 1e-30, 1e6)
 INT32 = (0, 1, -1, 3, 10, 47, 48, 63, 64, 65, 1000, 2 ** 31 - 1, -2 ** 31)
 UINT32 = (0, 1, 2, 47, 48, 64, 65535, 2 ** 31, 2 ** 32 - 1)
 TEXTS = ('', 'camera', 'map', '/camera', 'no_such_frame', 'a b', '\u00e4\u0661', 'x' * 1000, '%s%n', "'; --", 'a=b;c')
 WIDTH, HEIGHT = 64, 48
+CODECS = {COLOR_TOPIC: ('jpeg', 'png'), DEPTH_TOPIC: ('png', 'compressedDepth', 'compressedDepth rvl')}
+FORMATS = ('jpeg', 'png', 'rgb8; jpeg compressed bgr8', 'bayer_rggb8; png compressed ', '16UC1; png compressed ',
+           '16UC1; compressedDepth', '16UC1; compressedDepth rvl', '32FC1; compressedDepth',
+           '32FC1; compressedDepth rvl')
 CAMERA = Camera(WIDTH, HEIGHT, 60.0, 60.0, 31.5, 23.5)
 
 
@@ -84,11 +89,14 @@ def transforms(stamp_ns):
     return message
 
 
-def makers(source, now_ns, good):
+def makers(source, now_ns, good, compressed_share=0.0):
     """{topic: function that makes an invalid message}; `good` are the messages of a valid image."""
+    def image_on(topic):
+        is_compressed = source.random() < compressed_share
+        return (compressed_image(source, now_ns, good[topic], source.choice(CODECS[topic])) if is_compressed
+                else image(source, now_ns, good[topic]))
     return {INFO_TOPICS[0]: lambda: camera_info(source, now_ns, good[INFO_TOPICS[0]]),
-            DEPTH_TOPIC: lambda: image(source, now_ns, good[DEPTH_TOPIC]),
-            COLOR_TOPIC: lambda: image(source, now_ns, good[COLOR_TOPIC]),
+            DEPTH_TOPIC: lambda: image_on(DEPTH_TOPIC), COLOR_TOPIC: lambda: image_on(COLOR_TOPIC),
             BOXES_TOPIC: lambda: boxes2d(source, now_ns), BOXES3D_TOPIC: lambda: boxes3d(source, now_ns),
             TRACKS_TOPIC: lambda: tracks(source, now_ns)}
 
@@ -106,6 +114,22 @@ def image(source, now_ns, good):
         lambda: {'is_bigendian': source.choice((1, 255))},
         lambda: {'data': source.bytes_of(len(message.data))},
         lambda: _extreme_pixels(source, message.height % 64, message.width % 64)))
+    return message
+
+
+def compressed_image(source, now_ns, good, codec):
+    """A mostly damaged compressed copy of a valid image."""
+    message = CompressedImage(**dict(compressed_fields(good, codec), header=source.header(now_ns)))
+
+    def other_bytes():
+        at, count = source.randrange(len(message.data) + 1), source.choice((1, 2, 4, 40))
+        return {'data': message.data[:at] + source.bytes_of(count) + message.data[at + count:]}
+
+    _damage(source, message, (
+        other_bytes,
+        lambda: {'format': source.choice(FORMATS + tuple(LAYOUTS) + TEXTS)},
+        lambda: {'data': message.data[:source.randrange(len(message.data) + 1)]},
+        lambda: {'data': source.bytes_of(len(message.data))}))
     return message
 
 

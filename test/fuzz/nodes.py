@@ -109,7 +109,7 @@ def _quiet():
 def _messages_of(source, now_ns, connections):
     """Messages of one image, valid or not, in random order."""
     good = hostile.good_messages(now_ns)
-    makers = hostile.makers(source, now_ns, good)
+    makers = hostile.makers(source, now_ns, good, 0.5)
     topics = [topic for topic in sorted(connections.subscribers) if topic in makers]
     source.shuffle(topics)
     return [(topic, good[topic] if source.random() < 0.4 else makers[topic]()) for topic in topics]

@@ -5,14 +5,16 @@ import numpy as np
 import pytest
 import rospy
 from dynamic_reconfigure.client import Client
-from sensor_msgs.msg import CameraInfo, Image
-from std_msgs.msg import Int32MultiArray
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import Int32MultiArray, String
 
-from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
+from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray
+from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.visualization.image_overlay import VALID_COLOR
+from support.compressed import compressed_fields
 from support.ros import TIMEOUT_S, Recorder, camera_info, depth_message, header_at, publisher, wait_until
 
 PERIOD = NS // 30
@@ -110,6 +112,23 @@ def test_a_changed_estimator_is_used_from_the_next_image(rig, output, now):
     client.update_configuration({'stride': 20})
     client.close()
     assert depths_m == pytest.approx([5.0, 2.09, 5.0])
+
+
+def test_the_publisher_decides_the_type_of_images(rig):
+    """A message of another type is left out; the diagnostics report such a topic as silent."""
+    image, received = depth_message(NS, 2000), {}
+    for name, message in (('plain', image), ('other', String('no image')), ('compressed', CompressedImage(
+            **compressed_fields(image, 'compressedDepth rvl')))):
+        received[name] = []
+        subscriber = subscribe('images/' + name, Image, received[name].append)
+        sender = publisher('images/' + name, type(message))
+        for _message in range(2):
+            sender.publish(message)
+        if name != 'other':
+            wait_until(lambda: len(received[name]) == 2, name)
+        subscriber.unregister()
+        assert [type(each) for each in received[name]] == [type(message)] * (0 if name == 'other' else 2)
+    np.testing.assert_array_equal(imgmsg_to_depth(received['compressed'][0]).values, np.full((48, 64), 2000))
 
 
 def test_debug_images_are_published_while_they_have_subscribers(rig, output, now):

@@ -42,6 +42,29 @@ def test_colours_are_converted_to_rgb(encoding, channels):
     np.testing.assert_array_equal(rgb, pixels[..., channels])
 
 
+# Colour of the pixels of each Bayer pattern: rows of the upper left 2 x 2 pixels, R 0, G 1, B 2.
+BAYER = {'rggb': [[0, 1], [1, 2]], 'bggr': [[2, 1], [1, 0]], 'gbrg': [[1, 2], [0, 1]], 'grbg': [[1, 0], [2, 1]]}
+
+
+@pytest.mark.parametrize('pattern', sorted(BAYER))
+@pytest.mark.parametrize('bits, big_endian', [(8, False), (16, False), (16, True)])
+def test_bayer_patterns_are_converted_to_rgb(pattern, bits, big_endian):
+    color = np.array([200, 120, 40])
+    mosaic = color[np.tile(BAYER[pattern], (4, 5))].astype(np.uint8 if bits == 8 else np.uint16) << (bits - 8)
+    rgb = imgmsg_to_rgb(message_of(mosaic, 'bayer_%s%d' % (pattern, bits), 3, big_endian))
+    np.testing.assert_array_equal(rgb, np.broadcast_to(color, (8, 10, 3)))
+
+
+@pytest.mark.parametrize('encoding, of_luma', [('yuv422', 1), ('yuv422_yuy2', 0)])
+def test_yuv_is_converted_to_rgb(encoding, of_luma):
+    """Red: U 90, V 240, luma 81; the right half is darker."""
+    pixels = np.empty((4, 8, 2), np.uint8)
+    pixels[:, ::2, 1 - of_luma], pixels[:, 1::2, 1 - of_luma] = 90, 240
+    pixels[:, :4, of_luma], pixels[:, 4:, of_luma] = 81, 41
+    rgb = imgmsg_to_rgb(message_of(pixels, encoding, padding=4)).astype(int)
+    assert np.abs(rgb[:, :4] - [254, 0, 0]).max() <= 2 and np.abs(rgb[:, 4:, 0] - 208).max() <= 3
+
+
 def test_pixels_are_views_of_the_data():
     message = message_of(np.zeros((4, 5), np.uint16), '16UC1')
     message.data = bytearray(message.data)
@@ -51,7 +74,7 @@ def test_pixels_are_views_of_the_data():
 
 
 @pytest.mark.parametrize('change,named', [
-    ({'encoding': 'yuv422'}, 'yuv422'), ({'encoding': ''}, 'unknown'), ({'width': 0}, 'empty'),
+    ({'encoding': '9UC7'}, '9UC7'), ({'encoding': ''}, 'unknown'), ({'width': 0}, 'empty'),
     ({'height': 0}, 'empty'), ({'step': 1}, 'too short'), ({'data': b'\0'}, 'too short'), ({'height': 99}, 'too short'),
     ({'width': 99}, 'too short')])
 def test_invalid_images_are_rejected(change, named):

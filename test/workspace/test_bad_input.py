@@ -8,6 +8,7 @@ from unittest import mock
 import genpy
 import numpy as np
 import pytest
+from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
 from fuzz import hostile
@@ -52,12 +53,18 @@ def nan_and_inf(message):
     message.encoding, message.step, message.data = '32FC1', 4 * message.width, depth_m.tobytes()
 
 
+def damaged_compressed(message):
+    """A compressed image in place of the message."""
+    return CompressedImage(message.header, '16UC1; compressedDepth', bytes(100))
+
+
 EXTREMES = [-2 ** 31, -2 ** 31, 2 ** 31 - 1, 2 ** 31 - 1]
 OTHER_STAMPS = [(stamped(START_NS + HOUR_NS), None), (stamped(START_NS - 900 * NS), None)]
 IMAGES = OTHER_STAMPS + [
     (fields(step=1), 'image data is too short'), (fields(data=bytes(100)), 'image data is too short: 100 bytes'),
     (fields(width=0, height=0, step=0, data=b''), 'image is empty: 0 x 0 pixels'),
     (fields(encoding='9UC7'), "has encoding '9UC7'; expected one of"),
+    (damaged_compressed, "sensor_msgs/CompressedImage of format '16UC1; compressedDepth' cannot be decoded"),
     (fields(header__stamp=genpy.Time()), 'has no stamp (zero)'),
     (fields(header__stamp=time_from(START_NS + HOUR_NS)), None),
     (fields(header__stamp=time_from(START_NS - 900 * NS)), None)]
@@ -109,7 +116,7 @@ class Rig(object):
         self._now_ns += PERIOD_NS
         messages = hostile.good_messages(self._now_ns)
         if topic is not None:
-            change(messages[topic])
+            messages[topic] = change(messages[topic]) or messages[topic]
         send_image(self._connections, self._now_ns, messages)
 
     def has_answered(self):

@@ -1,26 +1,35 @@
-"""Nodes and process_bag publish the same messages for the same bag."""
+"""Nodes and process_bag publish the same messages for the same bag, whose images may be compressed."""
 import pytest
 import rosbag
+from sensor_msgs.msg import CompressedImage
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_writer import write_bag
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
+from support.compressed import compressed_fields, rewritten
 from support.masterless import masterless, on_the_wire
 
 SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}
 
 
-@pytest.fixture(scope='module')
-def bags(tmp_path_factory):
+CODECS = {'plain': {}, 'compressed': {COLOR_TOPIC: 'jpeg', DEPTH_TOPIC: 'compressedDepth rvl'}}
+
+
+@pytest.fixture(scope='module', params=sorted(CODECS))
+def bags(request, tmp_path_factory):
     """A bag of a scene, and the output of process_bag."""
     folder = tmp_path_factory.mktemp('bags')
-    write_bag(scenario_images(scenario_from(SCENE)), str(folder / 'in.bag'))
-    process_bag(str(folder / 'in.bag'), str(folder / 'out.bag'), Settings(detector='depth'))
+    write_bag(scenario_images(scenario_from(SCENE)), str(folder / 'plain.bag'))
+    names = rewritten(folder / 'plain.bag', folder / 'in.bag', {
+        topic: lambda message, codec=codec: CompressedImage(**compressed_fields(message, codec))
+        for topic, codec in CODECS[request.param].items()})
+    process_bag(str(folder / 'in.bag'), str(folder / 'out.bag'), Settings(detector='depth', names=names))
     return str(folder / 'in.bag'), str(folder / 'out.bag')
 
 
@@ -31,6 +40,7 @@ def published(node_class, bag_path, params, topics):
         node_class()
         for topic, message, _time in bag.read_messages():
             before = {name: connections.publishers[name].count for name in topics}
+            topic = topic.replace('/compressedDepth', '').replace('/compressed', '')
             for name in {topic, topic[1:]} & set(connections.subscribers):
                 connections.send(name, on_the_wire(message))
             for name in topics:

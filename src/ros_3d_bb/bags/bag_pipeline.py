@@ -3,13 +3,12 @@ import collections
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, NamedTuple, Optional
 
-from sensor_msgs.msg import Image
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.bags.bag_reader import BagError, BagReader, Raw, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import new_bag
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, STATIC_TOPIC, TF_TOPIC
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, IMAGE_KINDS, STATIC_TOPIC, TF_TOPIC
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
@@ -46,7 +45,7 @@ class BagRun(object):
             self._detector = opened_yolov5(params.weights, detection, running,
                                            lambda line: events.note('remarks of the detector', line))
         for camera in settings.cameras:
-            reader.check_topic(settings.name(needed, camera), INPUTS[needed])
+            reader.check_topic(settings.name(needed, camera), *INPUTS[needed])
 
     def outputs(self):
         """Yield (Raw, [(topic, message), ...]): each message of the bag with the messages published by the nodes."""
@@ -85,7 +84,7 @@ class BagRun(object):
                 self._transforms.ahead(message)
         elif topic == COLOR_TOPIC and self._detector is not None:
             with self._events.rejecting('images'):
-                message = message_in(raw, Image)
+                message = message_in(raw, *IMAGE_KINDS)
                 search = pool.submit(detect_in_color, self._detector, message)
         return Waiting(raw, message, search)
 
@@ -107,7 +106,7 @@ class BagRun(object):
                 return self._pipeline.found(message.header, detections, now_ns, camera)
         elif topic != COLOR_TOPIC or self._detector is None:
             with self._events.rejecting('messages on %s' % raw.topic):
-                return self._pipeline.take(topic, message_in(raw, INPUTS[topic]), now_ns, camera)
+                return self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), now_ns, camera)
         return []
 
 

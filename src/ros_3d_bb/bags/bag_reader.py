@@ -66,13 +66,14 @@ class BagReader(object):
             return 0, 0
         return tuple(int(1e9 * time_s) for time_s in (self._bag.get_start_time(), self._bag.get_end_time()))
 
-    def check_topic(self, topic, kind):
-        """Raise BagError if a bag has no such topic of a message class. The error names topics of this type."""
-        if self.topics.get(topic) == kind._type:
+    def check_topic(self, topic, *kinds):
+        """Raise BagError if a bag has no such topic of these message classes. The error names topics of these types."""
+        types = [kind._type for kind in kinds]
+        if self.topics.get(topic) in types:
             return
-        others = sorted(name for name, datatype in self.topics.items() if datatype == kind._type)
+        others = sorted(name for name, datatype in self.topics.items() if datatype in types)
         raise BagError('%s has no %s on %s; %s' % (
-            self._path, kind._type, topic, 'did you mean %s? Remap it with --remap. Topics of this type: %s'
+            self._path, ' or '.join(types), topic, 'did you mean %s? Remap it with --remap. Topics of this type: %s'
             % (nearest_name(topic, others), ', '.join(others)) if others else 'it has no topic of this type'))
 
     def messages(self, topics=None):
@@ -91,11 +92,13 @@ class BagReader(object):
             yield Raw(entry.topic, datatype, md5sum, data, entry.timestamp, entry.connection_header)
 
 
-def message_in(raw, kind):
-    """Deserialize a Raw as a message class. Raises ValueError if its type differs, or it is damaged."""
-    if (raw.datatype, raw.md5sum) != (kind._type, kind._md5sum):
-        raise ValueError('%s has messages of type %s (%s); %s (%s) expected'
-                         % (raw.topic, raw.datatype, raw.md5sum, kind._type, kind._md5sum))
+def message_in(raw, *kinds):
+    """Deserialize a Raw as one of some message classes. Raises ValueError if its type differs, or it is damaged."""
+    kind = next((kind for kind in kinds if (raw.datatype, raw.md5sum) == (kind._type, kind._md5sum)), None)
+    if kind is None:
+        raise ValueError('%s has messages of type %s (%s); %s expected'
+                         % (raw.topic, raw.datatype, raw.md5sum,
+                            ' or '.join('%s (%s)' % (kind._type, kind._md5sum) for kind in kinds)))
     try:
         return kind().deserialize(raw.data)
     except Exception as error:  # errors of genpy, struct, and UTF-8 decoding

@@ -3,14 +3,14 @@ from typing import Any, NamedTuple, Sequence
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import Camera, quaternion_from
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import PLUMB_BOB
-from ros_3d_bb.conversions.image_msgs import fill_image
+from ros_3d_bb.conversions.image_msgs import fill_image, is_compressed, pixels_from
 from ros_3d_bb.core.time_sync import NS
 
 TF_TOPIC, STATIC_TOPIC = 'tf', 'tf_static'
@@ -19,6 +19,8 @@ INFO_TOPICS = ('camera/color/camera_info', 'camera/aligned_depth_to_color/camera
 CAMERA = 'camera'  # namespace of the topics of a single camera
 TYPES = {TF_TOPIC: TFMessage, COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPICS[0]: CameraInfo,
          INFO_TOPICS[1]: CameraInfo}
+IMAGE_KINDS = Image, CompressedImage  # that the nodes accept as an image
+TRANSPORTS = 'compressed', 'compressedDepth'  # of image_transport; last part of the name of a topic
 START_NS = 1600000000 * NS  # start of scenes and bags: arbitrary but fixed
 
 
@@ -45,6 +47,19 @@ def topic_of(camera, topic):
     if not camera:
         return topic
     return '%s/%s' % (camera, topic[len(CAMERA) + 1:] if topic.startswith(CAMERA + '/') else topic)
+
+
+def info_topic_beside(image_topic):
+    """Return the topic of the camera_info of an image topic, which may be that of a compressed transport."""
+    parts = image_topic.split('/')
+    return '/'.join(parts[:-2 if parts[-1] in TRANSPORTS else -1] + ['camera_info'])
+
+
+def uncompressed(message):
+    """Return an image message as sensor_msgs/Image. Raises ValueError as `image_msgs.pixels_from`."""
+    if not is_compressed(message):
+        return message
+    return fill_image(Image(header=message.header), *pixels_from(message))
 
 
 def messages_of(frame):

@@ -1,16 +1,27 @@
-"""Conversion between sensor_msgs/Image and numpy, without copies if the layout allows it.
+"""Conversion between image messages and numpy, without copies if the layout allows it.
 
 cv_bridge is not used, because it has no Python 3 build on Melodic and does not check the size of the data. The
-functions accept any object with the fields of sensor_msgs/Image and do not import ROS.
+functions accept any object with the fields of sensor_msgs/Image or sensor_msgs/CompressedImage and do not import ROS.
+OpenCV is imported only where it is used, see `camera.distortion`.
 """
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.conversions.compressed_images import decode
 
 # encoding: (dtype without byte order, channels)
 LAYOUTS = {'rgb8': ('u1', 3), 'bgr8': ('u1', 3), 'rgba8': ('u1', 4), 'bgra8': ('u1', 4), 'mono8': ('u1', 1),
-           '8UC1': ('u1', 1), '8UC3': ('u1', 3), '16UC1': ('u2', 1), 'mono16': ('u2', 1), '32FC1': ('f4', 1)}
-COLOR_ENCODINGS = ('rgb8', 'bgr8', 'rgba8', 'bgra8', 'mono8', '8UC1', '8UC3')
+           '8UC1': ('u1', 1), '8UC3': ('u1', 3), '16UC1': ('u2', 1), 'mono16': ('u2', 1), '32FC1': ('f4', 1),
+           'yuv422': ('u1', 2), 'yuv422_yuy2': ('u1', 2)}
+# Encodings that cv2.cvtColor converts, and how. OpenCV names a Bayer pattern by pixels of its second row.
+CONVERSIONS = {'yuv422': 'COLOR_YUV2RGB_UYVY', 'yuv422_yuy2': 'COLOR_YUV2RGB_YUY2',
+               'bayer_rggb8': 'COLOR_BayerBG2RGB', 'bayer_rggb16': 'COLOR_BayerBG2RGB',
+               'bayer_bggr8': 'COLOR_BayerRG2RGB', 'bayer_bggr16': 'COLOR_BayerRG2RGB',
+               'bayer_gbrg8': 'COLOR_BayerGR2RGB', 'bayer_gbrg16': 'COLOR_BayerGR2RGB',
+               'bayer_grbg8': 'COLOR_BayerGB2RGB', 'bayer_grbg16': 'COLOR_BayerGB2RGB'}
+LAYOUTS.update((encoding, ('u2' if encoding.endswith('16') else 'u1', 1))
+               for encoding in CONVERSIONS if encoding.startswith('bayer_'))
+COLOR_ENCODINGS = ('rgb8', 'bgr8', 'rgba8', 'bgra8', 'mono8', '8UC1', '8UC3') + tuple(CONVERSIONS)
 # REP 118: depth is in millimetres in 16UC1 (mono16 in Gazebo and some drivers) and in metres in 32FC1.
 DEPTH_SCALES = {'16UC1': 0.001, 'mono16': 0.001, '32FC1': 1.0}
 GRID = 16  # rows and columns of the grid of pixels whose median shows the unit of depth
@@ -39,30 +50,72 @@ def array_from(message):
     return pixels[..., 0] if channels == 1 else pixels
 
 
+def pixels_from(message):
+    """Return the pixels, (height, width[, channels]), of an image message, which may be compressed, and their encoding.
+
+    Raises ValueError as `array_from`, or if a compressed image cannot be decoded.
+    """
+    if not is_compressed(message):
+        return array_from(message), message.encoding
+    try:
+        return decode(message.format, message.data)
+    except ValueError as error:
+        raise ValueError('%s cannot be decoded: %s' % (_name_of(message), error))
+
+
+def is_compressed(message):
+    """Whether an image message is a sensor_msgs/CompressedImage."""
+    return hasattr(message, 'format')
+
+
+def _name_of(message):
+    return 'sensor_msgs/CompressedImage of format %.60r' % message.format
+
+
 def imgmsg_to_rgb(message):
     """Return the pixels of a colour image message as RGB, (height, width, 3), uint8; a view if the encoding allows it.
 
-    Raises ValueError as `array_from`, and if the encoding is not colour or grey.
+    Raises ValueError as `pixels_from`, and if the encoding is not colour or grey.
     """
-    if message.encoding not in COLOR_ENCODINGS:
-        raise ValueError('colour image has encoding %r; expected one of %s'
-                         % (message.encoding, ', '.join(COLOR_ENCODINGS)))
-    pixels = array_from(message)
+    pixels, encoding = _pixels_of('colour', message, COLOR_ENCODINGS)
+    if encoding in CONVERSIONS:
+        return _converted(pixels, encoding)
     if pixels.ndim == 2:
         return np.repeat(pixels[..., None], 3, axis=2)
-    return pixels[..., 2::-1] if message.encoding in ('bgr8', 'bgra8', '8UC3') else pixels[..., :3]
+    return pixels[..., 2::-1] if encoding in ('bgr8', 'bgra8', '8UC3') else pixels[..., :3]
+
+
+def _pixels_of(content, message, encodings):
+    """As `pixels_from`; raises ValueError if the encoding is not one of `encodings`."""
+    if not is_compressed(message) and message.encoding not in encodings:
+        raise ValueError('%s image has encoding %r; expected one of %s'
+                         % (content, message.encoding, ', '.join(encodings)))
+    pixels, encoding = pixels_from(message)
+    if encoding not in encodings:
+        raise ValueError('%s has encoding %.20r; a %s image expected' % (_name_of(message), encoding, content))
+    return pixels, encoding
+
+
+def _converted(pixels, encoding):
+    """Return YUV or Bayer pixels as RGB. Of 16 bits the higher 8 are used."""
+    import cv2
+    if pixels.dtype.itemsize == 2:
+        pixels = (pixels >> 8).astype(np.uint8)
+    try:
+        return cv2.cvtColor(np.ascontiguousarray(pixels), getattr(cv2, CONVERSIONS[encoding]))
+    except cv2.error as error:
+        raise ValueError('image of %d x %d pixels cannot be converted from %s (%s)'
+                         % (pixels.shape[1], pixels.shape[0], encoding, error.err))
 
 
 def imgmsg_to_depth(message, scale_m=None, check_unit=False):
     """Convert an image message to a DepthImage.
 
-    Raises ValueError as `array_from`, if the encoding is not a depth encoding, and with `check_unit` as `units_fault`.
+    Raises ValueError as `pixels_from`, if the encoding is not a depth encoding, and with `check_unit` as `units_fault`.
     `scale_m` is given in metres per unit, for a camera that does not follow REP 118.
     """
-    if message.encoding not in DEPTH_SCALES:
-        raise ValueError('depth image has encoding %r; expected one of %s'
-                         % (message.encoding, ', '.join(DEPTH_SCALES)))
-    depth = DepthImage(array_from(message), scale_m or DEPTH_SCALES[message.encoding])
+    pixels, encoding = _pixels_of('depth', message, tuple(DEPTH_SCALES))
+    depth = DepthImage(pixels, scale_m or DEPTH_SCALES[encoding])
     fault = units_fault(depth) if check_unit else ''
     if fault:
         raise ValueError(fault)

@@ -6,14 +6,14 @@ their unit is not checked.
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault, size_fault
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
-from ros_3d_bb.diagnosis.observations import Finding, Role
+from ros_3d_bb.diagnosis.observations import IMAGE, Finding, Role
 from ros_3d_bb.diagnosis.tf_tree import why_missing
 from ros_3d_bb.diagnosis.topic_faults import (LATE_S, MIN_PAIRED, MIN_RATE_HZ, NO_CLOCK, clock_fault, paired_share,
                                               silence_fault, span)
 
 COLOR, DEPTH, INFO, BOXES2D, BOXES3D, TRACKS = 'color', 'depth', 'info', 'boxes2d', 'boxes3d', 'tracks'
 IMAGES = COLOR, DEPTH, INFO
-IMAGE, CAMERA = 'sensor_msgs/Image', 'the camera (roslaunch ros_3d_bb realsense.launch)'
+CAMERA = 'the camera (roslaunch ros_3d_bb realsense.launch)'
 CAMERA_SILENT = 'is the camera plugged in, the bag still playing (not paused), the network fast enough for images?'
 DETECTOR_SILENT = ('is the detector paused (call its service ~enable with true), still loading its weights, or '
                    'configured to publish no empty arrays (publish_empty: false)?')
@@ -87,7 +87,7 @@ def _alignment(seen):
     if seen.depth is None or seen.color_info is None or seen.color_info.fault:
         return
     depth, camera = seen.depth.message, seen.color_info.converted
-    fault = size_fault(camera, depth.width, depth.height)
+    fault = size_fault(camera, depth.width, depth.height) if depth.width else ''  # _encodings reports an empty image
     if not fault and seen.depth_info is not None and not seen.depth_info.fault:
         fault = intrinsics_fault(camera, seen.depth_info.converted)
     fault = fault or frames_fault(seen.color_info.message.header.frame_id, depth.header.frame_id)

@@ -5,12 +5,12 @@ import functools
 
 import tf2_ros
 from genpy.message import get_message_class
-from sensor_msgs.msg import CameraInfo
+from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.bags.bag_reader import BagReader, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
-from ros_3d_bb.conversions.camera_msgs import INFO_TOPICS, STATIC_TOPIC, TF_TOPIC
+from ros_3d_bb.conversions.camera_msgs import INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, uncompressed
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from
 from ros_3d_bb.core.time_sync import NS
@@ -77,9 +77,9 @@ def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda 
     return Observations(streams, topics, seconds,
                         color_info=_newest(observed[INFO].newest, camera_from_msg),
                         depth_info=_newest(depth_info.newest, camera_from_msg),
-                        color=_newest(observed[COLOR].newest, imgmsg_to_rgb),
-                        depth=_newest(observed[DEPTH].newest, functools.partial(imgmsg_to_depth, check_unit=True)),
-                        **others)
+                        color=_newest_image(observed[COLOR].newest, imgmsg_to_rgb),
+                        depth=_newest_image(observed[DEPTH].newest,
+                                            functools.partial(imgmsg_to_depth, check_unit=True)), **others)
 
 
 def observe_bag(path, name_of, target_frame):
@@ -101,18 +101,18 @@ def _read(reader, observed, depth_info, transforms):
     for raw in reader.messages(['/' + STATIC_TOPIC]):
         with contextlib.suppress(ValueError):
             transforms.set_static(message_in(raw, TFMessage))
-    takers = {one.topic: (one.take, get_message_class(one.role.kind)) for one in observed.values()}
-    takers[depth_info.topic] = depth_info.take, CameraInfo
-    takers['/' + TF_TOPIC] = lambda message, _time_ns: transforms.ahead(message), TFMessage
+    takers = {one.topic: (one.take, [get_message_class(kind) for kind in one.role.kinds]) for one in observed.values()}
+    takers[depth_info.topic] = depth_info.take, [CameraInfo]
+    takers['/' + TF_TOPIC] = lambda message, _time_ns: transforms.ahead(message), [TFMessage]
     begin_ns = None
     for raw in reader.messages(sorted(takers)):
         time_ns = raw.time.to_nsec()
         begin_ns = time_ns if begin_ns is None else begin_ns
         if time_ns - begin_ns > BAG_SECONDS * NS:
             break
-        take, kind = takers[raw.topic]
+        take, kinds = takers[raw.topic]
         with contextlib.suppress(ValueError):
-            take(message_in(raw, kind), time_ns)
+            take(message_in(raw, *kinds), time_ns)
 
 
 def _stamp_in(message):
@@ -132,3 +132,11 @@ def _newest(message, convert):
         return Newest(message, convert(message))
     except ValueError as error:
         return Newest(message, None, str(error))
+
+
+def _newest_image(message, convert):
+    """As `_newest`, of a sensor_msgs/Image; an empty one replaces a compressed image that cannot be decoded."""
+    try:
+        return _newest(None if message is None else uncompressed(message), convert)
+    except ValueError as error:
+        return Newest(Image(header=message.header), None, str(error))

@@ -2,6 +2,9 @@
 from typing import Any, Dict, NamedTuple, Optional, Tuple
 
 
+IMAGE, COMPRESSED_IMAGE = 'sensor_msgs/Image', 'sensor_msgs/CompressedImage'
+
+
 class Role(NamedTuple):
     """A topic of the pipeline."""
 
@@ -11,6 +14,11 @@ class Role(NamedTuple):
     argument: str  # launch argument that renames the topic, or empty
     source: str  # its publisher
     when_silent: str  # what to do if the publisher is silent
+
+    @property
+    def kinds(self):
+        """The types that the nodes accept: images may be compressed."""
+        return (IMAGE, COMPRESSED_IMAGE) if self.kind == IMAGE else (self.kind,)
 
 
 class Publisher(NamedTuple):

@@ -3,6 +3,7 @@ import numpy as np
 
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.time_sync import NS, half_period_of
+from ros_3d_bb.diagnosis.observations import COMPRESSED_IMAGE
 
 LATE_S, EARLY_S = 5.0, 2.0  # tolerated time of a stamp before and after ROS time
 MIN_RATE_HZ = 4.0  # of images; tracks of walking people are lost at lower rates
@@ -18,9 +19,9 @@ def silence_fault(stream, topics, used=(), seconds=5.0, is_bag=False):
     not suggested as replacement. `seconds` is the duration of the observation.
     """
     role, topic = stream.role, stream.topic
-    if stream.published_kind != role.kind:
+    if stream.published_kind not in role.kinds:
         missing = 'there is no %s in the bag' if is_bag else 'no publishers on %s'
-        wrong_type = '%s has the type %s; %s expected' % (topic, stream.published_kind, role.kind)
+        wrong_type = '%s has the type %s; %s expected' % (topic, stream.published_kind, ' or '.join(role.kinds))
         return (wrong_type if stream.published_kind else missing % topic,
                 _rename(stream, topics, used, 'record it' if is_bag else 'start ' + role.source))
     if is_bag:
@@ -35,10 +36,12 @@ def silence_fault(stream, topics, used=(), seconds=5.0, is_bag=False):
 
 
 def _rename(stream, topics, used, start):
-    role = stream.role
+    role, is_depth = stream.role, 'depth' in stream.role.name
     others = sorted(name for name, kind in topics.items()
-                    if kind == role.kind and name != stream.topic and name not in used
-                    and not ('/ros_3d_bb/' in name and kind.endswith('/Image')))  # debug images of this package
+                    if kind in role.kinds and name != stream.topic and name not in used
+                    and not ('/ros_3d_bb/' in name and kind.endswith('/Image'))  # debug images of this package
+                    # image_transport publishes both transports of any image, but only one of them is usable
+                    and (kind != COMPRESSED_IMAGE or name.endswith('/compressedDepth') == is_depth))
     if not others:
         return '%s; there is no other topic of the type %s' % (start, role.kind)
     other = nearest_name(stream.topic, others)

@@ -6,7 +6,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, info_topic_beside, uncompressed
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg, camera_from_msg,
                                                    stamp_of)
@@ -20,7 +20,6 @@ from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
-from ros_3d_bb.visualization.image_overlay import depth_to_grey, draw_boxes, draw_samples
 
 
 class Bbox3dNode(object):
@@ -111,7 +110,7 @@ class DepthCameraCheck(object):
     def __init__(self, with_frames):
         self._with_frames = with_frames
         self.color, self.depth_frame, self._depth = None, '', None
-        topic = rospy.resolve_name(DEPTH_TOPIC).rpartition('/')[0] + '/camera_info'
+        topic = info_topic_beside(rospy.resolve_name(DEPTH_TOPIC))
         rospy.Subscriber(topic, CameraInfo, self._on_depth_camera, queue_size=1)
 
     def faults(self):
@@ -168,16 +167,19 @@ class SampleImages(object):
         if (needs_raw or needs_color) != (self._subscriber is not None):
             self._subscription.offer(needs_raw or needs_color)
         if self._depth_pub.get_num_connections():
+            from ros_3d_bb.visualization.image_overlay import depth_to_grey  # imports OpenCV, which needs 100 MB
             grey = depth_to_grey(depth, self._depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))
         color = self._colors.nearest(header.stamp.to_nsec())
         if color is None:
             return
-        if needs_raw:
-            self._raw_pub.publish(color.value)
-        if needs_color:
-            with self._diagnostics.rejecting('colour images'):  # an unusable one does not affect the 3D boxes
-                image = imgmsg_to_rgb(color.value).copy()
+        with self._diagnostics.rejecting('colour images'):  # an unusable one does not affect the 3D boxes
+            color_msg = uncompressed(color.value)
+            if needs_raw:
+                self._raw_pub.publish(color_msg)
+            if needs_color:
+                from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_samples  # as above
+                image = imgmsg_to_rgb(color_msg).copy()
                 for box in boxes:
                     draw_boxes(image, [box.rect_px], ['%.2f m' % box.center_m[2]])
                 for box in boxes:

@@ -3,11 +3,12 @@ import contextlib
 import functools
 from typing import NamedTuple, Optional, Tuple
 
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, topic_of
+from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KINDS, INFO_TOPICS, STATIC_TOPIC,
+                                               TF_TOPIC, topic_of, uncompressed)
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg,
                                                    boxes3d_to_msg, tracks_to_msg)
 from ros_3d_bb.core.error_text import cause
@@ -20,8 +21,8 @@ from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 
 INFO_TOPIC = INFO_TOPICS[0]
-INPUTS = {COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPIC: CameraInfo, BOXES_TOPIC: Int32MultiArray,
-          TF_TOPIC: TFMessage, STATIC_TOPIC: TFMessage}
+INPUTS = {COLOR_TOPIC: IMAGE_KINDS, DEPTH_TOPIC: IMAGE_KINDS, INFO_TOPIC: (CameraInfo,),
+          BOXES_TOPIC: (Int32MultiArray,), TF_TOPIC: (TFMessage,), STATIC_TOPIC: (TFMessage,)}
 OUTPUTS_OF_CAMERA, OUTPUTS = (BOXES_TOPIC, BOXES3D_TOPIC), (TRACKS_TOPIC, MARKERS_TOPIC)
 DETECTORS = 'yolov5', 'depth', 'none'
 
@@ -91,6 +92,7 @@ class Pipeline(object):
             for stage in stages:
                 stage.add_camera_info(message, now_ns)
         elif topic == DEPTH_TOPIC:
+            message = uncompressed(message)  # once for all stages
             if self._tracking_stage.uses_depth:
                 self._tracking_stage.add_depth(message, now_ns, camera)
             for stage in stages:

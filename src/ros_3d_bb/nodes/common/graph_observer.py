@@ -1,5 +1,4 @@
 """Observe the topics of a running ROS graph for some seconds, as input of the checks."""
-import os
 import time
 
 import rospy
@@ -9,7 +8,7 @@ from genpy.message import get_message_class
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo
 
-from ros_3d_bb.conversions.camera_msgs import topic_of
+from ros_3d_bb.conversions.camera_msgs import info_topic_beside, topic_of
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
 from ros_3d_bb.diagnosis.checks import BOXES3D, DEPTH, ROLES
 from ros_3d_bb.diagnosis.message_observer import Observation, observations_of
@@ -39,11 +38,11 @@ class GraphObserver(object):
         time.sleep(NAMES_S)
         self._topics = published_topics()
         self._observed = {key: Observation(role, self._topic_of(role.name)) for key, role in ROLES.items()}
-        self._depth_info = Observation(None, os.path.dirname(self._observed[DEPTH].topic) + '/camera_info')
+        self._depth_info = Observation(None, info_topic_beside(self._observed[DEPTH].topic))
         self._began_s = time.monotonic()
         for one in self._observed.values():
-            if self._topics.get(one.topic) == one.role.kind:
-                self._subscribe(one, get_message_class(one.role.kind))
+            if self._topics.get(one.topic) in one.role.kinds:
+                self._subscribe(one, get_message_class(self._topics[one.topic]))
         self._subscribe(self._depth_info, CameraInfo)
 
     def close(self):

@@ -6,6 +6,7 @@ import rospy
 from rospy.topics import get_topic_manager
 from sensor_msgs.msg import Image
 
+from ros_3d_bb.conversions.camera_msgs import IMAGE_KINDS
 from ros_3d_bb.diagnosis.checks import role_named
 from ros_3d_bb.diagnosis.observations import Stream
 from ros_3d_bb.diagnosis.topic_faults import NO_CLOCK, clock_fault, silence_fault
@@ -34,6 +35,10 @@ class Input(object):
 
     def take(self, message):
         """Record a message and pass it to the callback."""
+        if isinstance(message, rospy.AnyMsg):
+            message = _image_in(message)
+            if message is None:  # the diagnostics report the type of a topic without messages
+                return
         self.count += 1
         self.received_s = time.monotonic()
         header = getattr(message, 'header', None)
@@ -53,14 +58,22 @@ class Input(object):
 def subscribe(topic, kind, callback, at_once=AT_ONCE):
     """Create a rospy.Subscriber with TCP_NODELAY, whose messages are recorded, see `inputs`.
 
-    Without TCP_NODELAY, the kernel delays small messages by up to 40 ms, until previous ones are acknowledged.
+    Without TCP_NODELAY, the kernel delays small messages by up to 40 ms, until previous ones are acknowledged. With
+    the kind Image, each publisher may send any of `camera_msgs.IMAGE_KINDS`, and the callback receives that type.
     """
-    created = Input(topic, kind, callback)
-    created.subscriber = rospy.Subscriber(topic, kind, created.take, queue_size=at_once, tcp_nodelay=True,
-                                          buff_size=IMAGE_BUFFER if kind is Image else SMALL_BUFFER)
+    created, is_image = Input(topic, kind, callback), kind is Image
+    created.subscriber = rospy.Subscriber(topic, rospy.AnyMsg if is_image else kind, created.take, queue_size=at_once,
+                                          tcp_nodelay=True, buff_size=IMAGE_BUFFER if is_image else SMALL_BUFFER)
     with _lock:
         _inputs.append(created)
     return created.subscriber
+
+
+def _image_in(message):
+    """Deserialize an AnyMsg as the image type of its publisher, or return None if that is another type."""
+    given = message._connection_header['type'], message._connection_header['md5sum']
+    kind = next((kind for kind in IMAGE_KINDS if (kind._type, kind._md5sum) == given), None)
+    return None if kind is None else kind().deserialize(message._buff)
 
 
 def inputs():

@@ -1,0 +1,159 @@
+"""Decoding of sensor_msgs/CompressedImage: JPEG, PNG, and depth of the compressed_depth_image_transport (PNG or RVL).
+
+The declared size is checked before anything is decoded. OpenCV is imported only where it is used, see
+`camera.distortion`.
+"""
+import struct
+
+import numpy as np
+
+JPEG, PNG = b'\xff\xd8', b'\x89PNG\r\n\x1a\n'  # first bytes
+JPEG_END, PNG_END = b'\xff\xd9', b'IEND'
+PNG_GREY = 0  # colour type
+MAX_PIXELS = 2 ** 25  # an image of 8K video has 33 million pixels
+DEPTH_TRANSPORT, RVL = 'compressedDepth', 'rvl'
+DEPTH_HEADER = struct.Struct('<iff')  # ConfigHeader of the transport: format (unused), depthQuantA, depthQuantB
+MAX_NIBBLES = 10  # of a number in RVL, each with three bits
+
+
+def decode(format_text, data):
+    """Return the pixels, (height, width[, channels]), of a compressed image and their encoding as in sensor_msgs/Image.
+
+    Raises ValueError if the data are not JPEG, PNG or compressed depth, are damaged, or have too many pixels.
+    """
+    encoding, _separator, codec = format_text.partition(';')
+    encoding, data = encoding.strip(), bytes(data)
+    if DEPTH_TRANSPORT in format_text:
+        return _decode_depth(encoding, RVL in codec, data)
+    width, height, is_grey16 = _declared(data)
+    _check_size(width, height)
+    if is_grey16:
+        return _decode_with_opencv(data, True), encoding if encoding.startswith('bayer_') else '16UC1'
+    if encoding.startswith('bayer_'):
+        return _decode_with_opencv(data, True), encoding
+    return _decode_with_opencv(data, False), 'bgr8'
+
+
+def _declared(data):
+    """Return the width and height in the header of a complete JPEG or PNG, and whether it is 16-bit grey."""
+    if data.startswith(JPEG):
+        width, height = _jpeg_size(data)
+        is_grey16, is_complete = False, data.rfind(JPEG_END) > 0
+    elif data.startswith(PNG) and len(data) >= 26:
+        width, height, bits, color_type = struct.unpack_from('>IIBB', data, 16)
+        is_grey16, is_complete = (bits, color_type) == (16, PNG_GREY), data.rfind(PNG_END) > 0
+    else:
+        raise ValueError('its %d bytes are neither JPEG nor PNG' % len(data))
+    if not is_complete:
+        raise ValueError('its %d bytes are truncated' % len(data))
+    return width, height, is_grey16
+
+
+def _jpeg_size(data):
+    """Return the width and height in the first frame header of a JPEG. Stops at markers that cannot precede it."""
+    at = len(JPEG)
+    while at + 9 <= len(data) and data[at] == 0xff:
+        marker, (length,) = data[at + 1], struct.unpack_from('>H', data, at + 2)
+        if marker == 0xff:  # padding
+            at += 1
+        elif marker < 0xc0 or 0xd0 <= marker <= 0xda:
+            break
+        elif marker <= 0xcf and marker not in (0xc4, 0xc8, 0xcc):
+            return struct.unpack_from('>HH', data, at + 5)[::-1]
+        else:
+            at += 2 + length
+    raise ValueError('the header of its JPEG is damaged')
+
+
+def _check_size(width, height):
+    if not 0 < width * height <= MAX_PIXELS:
+        raise ValueError('it has %d x %d pixels; 1 to %d pixels expected' % (width, height, MAX_PIXELS))
+
+
+def _decode_with_opencv(data, unchanged):
+    """Decode a JPEG or PNG to BGR, or unchanged, which must give one channel."""
+    import cv2
+    flags = cv2.IMREAD_UNCHANGED if unchanged else cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except cv2.error as error:
+        raise ValueError('OpenCV cannot decode its %d bytes (%s)' % (len(data), error.err))
+    if pixels is None:
+        raise ValueError('its %d bytes are damaged' % len(data))
+    if unchanged and pixels.ndim != 2:
+        raise ValueError('it has %d channels; 1 expected' % pixels.shape[2])
+    return pixels
+
+
+def _decode_depth(encoding, is_rvl, data):
+    """Decode a message of the compressed_depth_image_transport: its header, then 16-bit values as PNG or RVL.
+
+    Depth in metres, 32FC1, is stored as inverse depth: depth = A / (value - B), and 0 if it is not measured.
+    """
+    if encoding not in ('16UC1', 'mono16', '32FC1'):
+        raise ValueError('its encoding is %.20r; 16UC1 or 32FC1 expected' % encoding)
+    if len(data) < DEPTH_HEADER.size:
+        raise ValueError('its %d bytes are truncated' % len(data))
+    _format, quant_a, quant_b = DEPTH_HEADER.unpack_from(data)
+    content = data[DEPTH_HEADER.size:]
+    if is_rvl:
+        values = _decode_rvl(content)
+    else:
+        width, height, is_grey16 = _declared(content)
+        _check_size(width, height)
+        if not is_grey16:
+            raise ValueError('it does not contain a 16-bit grey PNG')
+        values = _decode_with_opencv(content, True)
+    if encoding != '32FC1':
+        return values, '16UC1'
+    if not (np.isfinite(quant_b) and np.isfinite(quant_a) and quant_a > 0):
+        raise ValueError('its quantization is %g, %g; finite numbers expected, the first one positive'
+                         % (quant_a, quant_b))
+    with np.errstate(divide='ignore', over='ignore'):
+        depth_m = np.float32(quant_a) / (values - np.float32(quant_b))
+    depth_m[values == 0] = np.nan
+    return depth_m, '32FC1'
+
+
+def _decode_rvl(data):
+    """Decode RVL (Wilson, Fast Lossless Depth Image Compression, 2017): width, height, and runs of zeros and others.
+
+    A number has three bits in each nibble, lowest first; the highest bit of a nibble announces another one. Each run
+    is the count of zeros, the count of other pixels, and the zigzag difference of each of these to the one before.
+    """
+    if len(data) < 8:
+        raise ValueError('its %d bytes of RVL are truncated' % len(data))
+    width, height = struct.unpack_from('<II', data)
+    _check_size(width, height)
+    numbers = _rvl_numbers(data[8:len(data) - len(data) % 4])
+    at, done, zeros, others = 0, 0, [], []
+    while done < width * height and at + 1 < numbers.size:
+        zeros.append(numbers.item(at))
+        others.append(numbers.item(at + 1))
+        done += zeros[-1] + others[-1]
+        at += 2 + others[-1]
+    if done != width * height or at > numbers.size:
+        raise ValueError('its RVL has %d of %d x %d pixels' % (done, width, height))
+    others = np.array(others)
+    starts = 2 * np.arange(1, others.size + 1) + np.cumsum(others) - others  # of the differences of each run in numbers
+    within = np.arange(others.sum())
+    zigzag = numbers[within + np.repeat(starts - (np.cumsum(others) - others), others)]
+    pixels = np.zeros(width * height, np.uint16)
+    pixels[within + np.repeat(np.cumsum(zeros), others)] = np.cumsum((zigzag >> 1) ^ -(zigzag & 1)).astype(np.uint16)
+    return pixels.reshape(height, width)
+
+
+def _rvl_numbers(data):
+    """Return the numbers of RVL, which are in nibbles of little-endian 32-bit words, the highest nibble first."""
+    octets = np.frombuffer(data, '<u4').astype('>u4').view(np.uint8)
+    nibbles = np.column_stack([octets >> 4, octets & 15]).ravel()
+    ends = np.flatnonzero(nibbles < 8)
+    starts = np.concatenate([[0], ends[:-1] + 1])[:ends.size]
+    lengths = ends - starts + 1
+    if lengths.max(initial=0) > MAX_NIBBLES:
+        raise ValueError('its RVL is damaged')
+    numbers = (nibbles[starts] & 7).astype(np.int64)
+    for digit in range(1, lengths.max(initial=0)):
+        longer = np.flatnonzero(lengths > digit)
+        numbers[longer] |= (nibbles[starts[longer] + digit] & 7).astype(np.int64) << (3 * digit)
+    return numbers
