@@ -64,7 +64,7 @@ def assert_people(message, stamp_ns, true_boxes):
 
 def test_nothing_is_published_while_no_floor_is_known(rig, output):
     """Neither from tf nor from a depth image: an empty array would mean that there are no people."""
-    rig.send(leave_out=['tf'], frame_id='another_camera', people=[], robot={'pitch': 0.9})
+    rig.send(leave_out=['tf'], frame_id='another_camera', people=[], robot={'pitch': -0.9})
     assert output.stays_at(0)
     assert diagnostics_of('depth_detector_node')[2]['images without floor'] == 1
 

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 
 
 def simulator_of(people, height_m, tilt_deg=0, seconds=0.2, rate=5.0, seed=0):
-    robot = {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': -np.radians(tilt_deg)}
+    robot = {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': np.radians(tilt_deg)}
     return Simulator(scenario_from({'duration': seconds, 'rate': rate, 'seed': seed, 'robot': robot, 'people': people,
                                     'room': {'bounds': [-4.0, 14.0, -7.0, 7.0], 'height': 4.0}}))
 

@@ -50,6 +50,15 @@ def test_a_backward_jump_in_time_is_handled_once(rig):
     assert rig.send(stamp_ns - 19 * NS + PERIOD_NS).header.stamp < time_from(stamp_ns)
 
 
+def test_an_optical_target_frame_is_rejected():
+    """By its name when the tracker starts, by that of the boxes when they arrive."""
+    with pytest.raises(ValueError, match='camera_rgb_optical_frame is an optical frame.*camera_height'):
+        Rig(target_frame='camera_rgb_optical_frame')
+    rig = Rig(target_frame='kinect2_rgb')
+    with pytest.raises(ValueError, match='kinect2_rgb is an optical frame.*~target_frame'):
+        rig.send(START_NS, frame_id='/kinect2_rgb')
+
+
 def add_images(rig, stamp_ns, encoding='16UC1'):
     """camera_info, and a depth image of a wall 1.5 m ahead."""
     header, depth_mm = Header(stamp=time_from(stamp_ns), frame_id='camera'), np.full((48, 64), 1500, '<u2')

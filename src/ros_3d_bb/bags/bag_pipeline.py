@@ -8,11 +8,12 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.bags.bag_reader import BagError, BagReader, Raw, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import new_bag
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, IMAGE_KINDS, STATIC_TOPIC, TF_TOPIC
+from ros_3d_bb.camera.image_rotation import mounted_camera, turns_for
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KINDS, STATIC_TOPIC, TF_TOPIC
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.pipeline.detection_stage import detect_in_color, opened_yolov5
+from ros_3d_bb.pipeline.detection_stage import CameraRotation, detect_in_color, opened_yolov5
 from ros_3d_bb.pipeline.offline_pipeline import INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, Pipeline, Settings
 
 MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
@@ -44,6 +45,7 @@ class BagRun(object):
             params, detection, running = settings.yolov5
             self._detector = opened_yolov5(params.weights, detection, running,
                                            lambda line: events.note('remarks of the detector', line))
+            self._rotations = {camera: CameraRotation(params, self._transforms) for camera in settings.cameras}
         for camera in settings.cameras:
             reader.check_topic(settings.name(needed, camera), *INPUTS[needed])
 
@@ -53,10 +55,24 @@ class BagRun(object):
         for raw in self._reader.messages([static]):
             with self._events.rejecting('transforms'):
                 self._transforms.set_static(message_in(raw, TFMessage))
+        if self._settings.camera_pose is not None:
+            self._set_camera_pose(*self._settings.camera_pose)
         with ThreadPoolExecutor(self._settings.searches) as pool:
             for waiting in self._ahead(pool):
                 yield waiting.raw, self._handled(waiting)
         self._pipeline.end()
+
+    def _set_camera_pose(self, height_m, tilt_rad):
+        """Set the pose of the camera, whose frame is that of the first depth image unless a parameter replaces it."""
+        params = self._settings.bbox3d[0]
+        pose = mounted_camera(height_m, tilt_rad, turns_for(params.image_rotation, None))
+        for raw in self._reader.messages([self._settings.name(DEPTH_TOPIC)]):
+            try:
+                frame_id = params.frame_id or message_in(raw, *IMAGE_KINDS).header.frame_id
+            except ValueError:  # reported when the message is processed
+                continue
+            self._transforms.set_pose(self._settings.tracker[0].target_frame, frame_id, pose)
+            return
 
     def _ahead(self, pool):
         """Yield the messages with a delay, to read transforms within ~tf_timeout and images for the detector ahead."""
@@ -76,7 +92,7 @@ class BagRun(object):
 
     def _begun(self, raw, pool):
         """Start the work that can be done ahead of a message's processing: add transforms, submit detections."""
-        topic, _camera = self._topics.get(raw.topic, UNUSED)
+        topic, camera = self._topics.get(raw.topic, UNUSED)
         message = search = None
         if topic == TF_TOPIC:
             with self._events.rejecting('transforms'):
@@ -85,7 +101,8 @@ class BagRun(object):
         elif topic == COLOR_TOPIC and self._detector is not None:
             with self._events.rejecting('images'):
                 message = message_in(raw, *IMAGE_KINDS)
-                search = pool.submit(detect_in_color, self._detector, message)
+                turns = self._rotations[camera].turns(message.header.frame_id)
+                search = pool.submit(detect_in_color, self._detector, message, turns)
         return Waiting(raw, message, search)
 
     def _handled(self, waiting):

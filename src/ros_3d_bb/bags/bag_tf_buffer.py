@@ -1,8 +1,11 @@
 """tf2 buffer that is filled from the messages of a bag while they are processed."""
 import collections
 
+import genpy
 import tf2_ros
+from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import check_transforms, transform_from_msg
 from ros_3d_bb.core.time_sync import JUMP_NS
 
@@ -18,12 +21,29 @@ class BagTransforms(object):
         self._buffer = tf2_ros.BufferCore()
         self._newest_ns = 0
         self._held = collections.deque()
+        self._static_parents = {}
 
     def set_static(self, message):
         """Add a message of tf_static, which is valid for the whole bag. Raises ValueError as `ahead`."""
         check_transforms(message)
         for transform in message.transforms:
             self._buffer.set_transform_static(transform, 'bag')
+            self._static_parents[transform.child_frame_id.lstrip('/')] = transform.header.frame_id.lstrip('/')
+
+    def set_pose(self, target_frame, frame, target_from_frame):
+        """Set the pose (4, 4) of a frame in a frame that tf does not contain, by a transform to the root of its tree.
+
+        Raises ValueError if the static transforms already contain the frame in `target_frame`.
+        """
+        root, seen = frame.lstrip('/'), set()
+        while root in self._static_parents and root not in seen:
+            seen.add(root)
+            root = self._static_parents[root]
+        if root == target_frame.lstrip('/'):
+            raise ValueError('the bag contains the pose of %s in %s; a bag without it expected (--camera-height)'
+                             % (frame, target_frame))
+        target_from_root = target_from_frame.dot(self.lookup(frame, root, genpy.Time(0)))
+        self.set_static(TFMessage(transform_messages(genpy.Time(0), [(target_frame, root, target_from_root)])))
 
     def ahead(self, message):
         """Add a tf message before it is processed. Raises ValueError if a stamp exceeds the range of tf2."""

@@ -1,5 +1,6 @@
 """Command `process_bag`: run the pipeline on one or more bags without a ROS master, in parallel processes."""
 import argparse
+import math
 import multiprocessing
 import os
 import resource
@@ -15,12 +16,14 @@ from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.bags.bag_writer import remove_partial
 from ros_3d_bb.core.error_text import cause
-from ros_3d_bb.core.params import params_from
+from ros_3d_bb.core.params import IMAGE_ROTATION, params_from
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.pipeline.offline_pipeline import DETECTORS, Settings
 
 POLL_S, BAR = 0.2, 40
 GIB = 2 ** 30
+HIGHEST_M = 100.0
+IMAGE_NODES = 'yolov5', 'depth', 'bbox3d'
 FILES = (('--yolov5-params', 'yolov5'), ('--depth-params', 'depth'), ('--bbox3d-params', 'bbox3d'),
          ('--tracker-params', 'tracker'))
 
@@ -82,10 +85,30 @@ def _settings_from(given):
                               ('tracker', 'target_frame', given.target_frame), ('tracker', 'cameras', cameras)):
         if value:
             settings = with_params(settings, node, **{name: value})
+    settings = _with_camera(settings, given)
     if settings.detector == 'yolov5' and not settings.yolov5[0].weights:
         raise ValueError('--detector yolov5 needs --weights FILE, a checkpoint such as yolov5n.pt; --detector depth '
                          'needs none')
     return settings._replace(searches=given.searches or max(1, len(os.sched_getaffinity(0)) // given.jobs))
+
+
+def _with_camera(settings, given):
+    """Return settings with the orientation of the camera that the command line gives. Raises ValueError."""
+    if given.image_rotation:
+        for node in IMAGE_NODES:
+            settings = with_params(settings, node, image_rotation=given.image_rotation)
+    if given.camera_height is None:
+        return settings
+    tracker = settings.tracker[0]
+    if tracker.cameras:
+        raise ValueError('--camera-height is given with several cameras; expected with a single camera only')
+    if not (0 < given.camera_height < HIGHEST_M and abs(given.camera_tilt) < math.pi / 2):
+        raise ValueError('--camera-height is %g and --camera-tilt %g; more than 0 and less than %g m, and less than '
+                         'pi / 2 rad expected' % (given.camera_height, given.camera_tilt, HIGHEST_M))
+    for node in IMAGE_NODES:
+        settings = with_params(settings, node, floor_frame=tracker.target_frame)
+    settings = with_params(settings, 'depth', floor_height=0.0)
+    return settings._replace(camera_pose=(given.camera_height, given.camera_tilt))
 
 
 def with_params(settings, node, **changed):
@@ -223,6 +246,12 @@ def _parser():
         parser.add_argument(option, metavar='FILE', help='parameter file in the format of config/%s.yaml' % config)
     parser.add_argument('--error-model', metavar='FILE', help='error model for the 3D boxes')
     parser.add_argument('--target-frame', metavar='FRAME', help='frame of the tracks (default: map)')
+    parser.add_argument('--camera-height', type=float, metavar='M', help='for a bag without tf: height of the camera '
+                        'above the floor, which is z = 0 of the target frame, metres')
+    parser.add_argument('--camera-tilt', type=float, default=0.0, metavar='RAD', help='with --camera-height, pitch of '
+                        'the camera, radians; positive: it looks down (default: 0)')
+    parser.add_argument('--image-rotation', choices=IMAGE_ROTATION.choices, help='clockwise rotation that makes the '
+                        'images upright, degrees (default: auto, from tf)')
     parser.add_argument('--cameras', metavar='NAMES', help='namespaces of several cameras, separated by commas (front, '
                         'rear: topics front/color/image_raw, ...)')
     parser.add_argument('--remap', action='append', default=[], metavar='TOPIC:=TOPIC',

@@ -112,13 +112,18 @@ def quaternion_from(matrix):
 
 
 def upright_turns(fixed_from_camera):
-    """Number of clockwise quarter turns after which the image is upright; `fixed_from_camera` (4, 4): fixed has z up.
+    """`quarter_turns` of a camera by its pose `fixed_from_camera` (4, 4) in a frame whose z axis points up."""
+    return quarter_turns(fixed_from_camera[2, :3])
+
+
+def quarter_turns(up):
+    """Number of clockwise quarter turns after which the image is upright; `up` (3,) is in the optical frame.
 
     0 for an upright camera, 1 if the left edge of the image is up, 2 if the camera is upside down, 3 if the right edge
     is up. Also 0 for a camera that points up or down within `STEEP`, where people have no upright direction in the
     image.
     """
-    x_up, y_up = fixed_from_camera[2, :2]
+    x_up, y_up = up[:2]
     if np.hypot(x_up, y_up) < STEEP:
         return 0
     if abs(x_up) > abs(y_up):

@@ -3,11 +3,11 @@
 A check yields its findings, both faults and facts, and none if its input is missing: without depth images, for example,
 their unit is not checked.
 """
-from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault, size_fault
+from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault, size_fault, target_frame_fault
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
 from ros_3d_bb.diagnosis.observations import IMAGE, Finding, Role
-from ros_3d_bb.diagnosis.tf_tree import why_missing
+from ros_3d_bb.diagnosis.tf_tree import pose_fix, why_missing
 from ros_3d_bb.diagnosis.topic_faults import (LATE_S, MIN_PAIRED, MIN_RATE_HZ, NO_CLOCK, clock_fault, paired_share,
                                               silence_fault, span)
 
@@ -148,7 +148,10 @@ def _transforms(seen):
     if seen.tf is None:
         return
     target, source, stamp_s, links, fault = seen.tf
-    if fault:
+    optical_fault = target_frame_fault(target, source)
+    if optical_fault:
+        yield Finding('transforms', '', optical_fault, 'frame_world:=map, and %s' % pose_fix(source))
+    elif fault:
         cause, fix = why_missing(links, target, source, stamp_s)
         fault = 'no transform from %s to %s at the stamp of the image: %s' % (source, target, cause or fault)
         yield Finding('transforms', '', fault, fix or 'inspect the tree with rosrun tf view_frames')

@@ -3,6 +3,7 @@ from typing import NamedTuple
 
 from yaml import YAMLError
 
+from ros_3d_bb.camera.alignment import is_optical
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
 
@@ -44,15 +45,16 @@ def why_missing(links, target, source, stamp_s):
     frames = sorted(set(links) | set(link.parent for link in links.values()))
     if not frames:
         return ('tf has no frames: no transforms on /tf or /tf_static',
-                'start robot_state_publisher and the localisation of the robot; for a camera alone: frame_world:=%s'
-                % source)
+                'start robot_state_publisher and the localisation of the robot; for a camera alone, %s'
+                % pose_fix(source))
     if source not in frames:
         more = ' and %d more' % (len(frames) - NAMED) if len(frames) > NAMED else ''
         return ('tf has no frame %s; its frames: %s%s' % (source, ', '.join(frames[:NAMED]), more),
-                'publish the pose of the camera: rosrun tf2_ros static_transform_publisher X Y Z YAW PITCH ROLL '
-                'base_link %s; or, if it has another name in tf, such as %s: frame_id:=%s'
-                % ((source,) + 2 * (nearest_name(source, frames),)))
+                'publish the pose of the camera: %s; or, if it has another name in tf, such as %s: frame_id:=%s'
+                % ((_publisher_command('base_link', source),) + 2 * (nearest_name(source, frames),)))
     up, down = _path_to_root(links, source), _path_to_root(links, target)
+    if target not in frames and is_optical(up[-1]):
+        return 'tf has no frame %s; the tree of the camera is %s' % (target, ' < '.join(up)), pose_fix(up[-1])
     if target not in frames:
         return ('tf has no frame %s; the tree of the camera is %s' % (target, ' < '.join(up)),
                 'start the localisation of the robot in %s, or track in another frame: frame_world:=%s'
@@ -67,7 +69,21 @@ def _missing_link(frames, root, target):
     parent = 'base_link' if root != 'base_link' and 'base_link' in frames else target
     if root in ('odom', 'base_link'):
         return 'start the localisation of the robot (publishes %s to %s), or frame_world:=%s' % (target, root, root)
-    return 'rosrun tf2_ros static_transform_publisher X Y Z YAW PITCH ROLL %s %s' % (parent, root)
+    return _publisher_command(parent, root)
+
+
+def pose_fix(frame):
+    """How to publish the pose of a camera that is not on a robot; `frame` is its optical frame."""
+    return ('publish its pose, here 1.2 m above the floor and tilted down by 0.1 rad: rosrun tf2_ros '
+            'static_transform_publisher 0 0 1.2 -1.5708 0 -1.6708 map %s; the launch arguments camera_height:=1.2 '
+            'camera_tilt:=0.1 frame_id:=%s do the same; process_bag: --camera-height 1.2 --camera-tilt 0.1'
+            % (frame, frame))
+
+
+def _publisher_command(parent, frame):
+    """The command that publishes the pose of a frame; that of an optical frame is given for a level camera."""
+    angles = '-1.5708 0 -1.5708' if is_optical(frame) else 'YAW PITCH ROLL'
+    return 'rosrun tf2_ros static_transform_publisher X Y Z %s %s %s' % (angles, parent, frame)
 
 
 def _outdated_link(links, up, down, stamp_s):

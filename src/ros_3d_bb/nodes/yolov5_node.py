@@ -10,7 +10,8 @@ from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import subscribe
-from ros_3d_bb.pipeline.detection_stage import Yolov5NodeParams, detect_in_color, opened_yolov5
+from ros_3d_bb.nodes.common.tf_lookup import Transforms
+from ros_3d_bb.pipeline.detection_stage import CameraRotation, Yolov5NodeParams, detect_in_color, opened_yolov5
 
 
 class Yolov5Node(object):
@@ -23,12 +24,19 @@ class Yolov5Node(object):
     ----------
     camera/color/image_raw : sensor_msgs/Image
         Colour image.
+    /tf : tf2_msgs/TFMessage
+        Transform from ~floor_frame to the camera, which tells the edge of the image that is up. Subscribed until it is
+        available; not used if ~image_rotation is given or ~floor_frame is empty.
+    /tf_static : tf2_msgs/TFMessage
+        As /tf.
     """
 
     def __init__(self):
         params, detection, running = given = read_params(Yolov5NodeParams, DetectionParams, RuntimeParams)
         self._detector = opened_yolov5(params.weights, detection, running, rospy.logwarn)
         self._diagnostics = Diagnostics()
+        transforms = Transforms(wait_s=0)
+        self._rotation = CameraRotation(params, transforms, transforms.close)
         self._worker = DetectorWorker(params, self._diagnostics, self._detect, self._detector.names)
         subscribe(COLOR_TOPIC, Image, self._on_image, 1)
         rospy.loginfo('detecting %s with %s on %s', ', '.join(map(str, detection.classes)), params.weights,
@@ -43,7 +51,7 @@ class Yolov5Node(object):
             self._worker.offer(message)
 
     def _detect(self, message):
-        result = detect_in_color(self._detector, message)
+        result = detect_in_color(self._detector, message, self._rotation.turns(message.header.frame_id))
         self._diagnostics.count('images processed')
         return result
 

@@ -7,9 +7,11 @@ import numpy as np
 import tf2_ros
 
 from ros_3d_bb.camera.camera_model import transform_from
+from ros_3d_bb.camera.image_rotation import (AUTO, turned_camera, turned_image, turned_rotation, turns_for,
+                                             unturned_boxes)
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_if_any, stamp_of
-from ros_3d_bb.core.params import ENABLED, PUBLISH_EMPTY, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.params import ENABLED, IMAGE_ROTATION, PUBLISH_EMPTY, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
@@ -25,6 +27,9 @@ class Yolov5NodeParams(NamedTuple):
     """Parameters of yolov5_node, except those of the network and its runtime."""
 
     weights: str = Param('')
+    floor_frame: str = Param('base_link')
+    frame_id: str = Param('')
+    image_rotation: str = IMAGE_ROTATION
     enabled: bool = ENABLED
     publish_empty: bool = PUBLISH_EMPTY
 
@@ -38,6 +43,7 @@ class DepthDetectorParams(NamedTuple):
         -0.065, 'Height of the floor in floor_frame. The default fits base_link of a Jackal.', 'm',
         limits=(-10000, 10000), live=(-1, 1))
     frame_id: str = Param('')
+    image_rotation: str = IMAGE_ROTATION
     stamp_tolerance: float = STAMP_TOLERANCE
     enabled: bool = ENABLED
     publish_empty: bool = PUBLISH_EMPTY
@@ -68,14 +74,54 @@ def opened_yolov5(weights, detection, running, warn):
     return detector
 
 
-def detect_in_color(detector, message):
+def detect_in_color(detector, message, turns=0):
     """Return a colour image as RGB, (height, width, 3), and the Detections of a `detector.Yolov5` in it.
 
-    Raises ValueError if the image or its stamp cannot be used.
+    The detector receives the image upright, after `turns` clockwise quarter turns. Raises ValueError if the image or
+    its stamp cannot be used.
     """
     stamp_of(message)
     image = imgmsg_to_rgb(message)
-    return image, detector.detect(image)
+    return image, _as_received(detector.detect(turned_image(image, turns)), turns, image)
+
+
+def _as_received(detections, turns, image):
+    height, width = image.shape[:2]
+    return detections._replace(boxes=unturned_boxes(detections.boxes, turns, width, height))
+
+
+class CameraRotation(object):
+    """Quarter turns that make the images of one camera upright, from ~image_rotation or tf.
+
+    The transform is looked up until it is available, and not again: the camera is fixed to the robot.
+
+    Parameters
+    ----------
+    params : Yolov5NodeParams
+    transforms
+        As for `tracking_stage.TrackingStage`. It is not used if ~image_rotation is given, or no floor frame.
+    on_known : callable
+        Called once no further lookups are necessary.
+    """
+
+    def __init__(self, params, transforms, on_known=lambda: None):
+        self._params, self._transforms, self._on_known = params, transforms, on_known
+        self._turns = None
+        if params.image_rotation != AUTO or not params.floor_frame:
+            self._turns = turns_for(params.image_rotation, None)
+            on_known()
+
+    def turns(self, frame_id):
+        """Clockwise quarter turns of the images, whose header has this frame; 0 while they are unknown."""
+        if self._turns is None:
+            try:
+                camera_from_floor = self._transforms.lookup(self._params.frame_id or frame_id,
+                                                            self._params.floor_frame, NEWEST)
+            except tf2_ros.TransformException:  # reported by the estimation stage, which needs the same transform
+                return 0
+            self._turns = turns_for(AUTO, camera_from_floor[:3, 2])
+            self._on_known()
+        return self._turns
 
 
 class RgbdDetectionStage(object):
@@ -139,13 +185,19 @@ class RgbdDetectionStage(object):
         image = imgmsg_to_rgb(color_msg)
         camera_frame = self._params.frame_id or color_msg.header.frame_id
         depth = imgmsg_to_depth(depth_msg, check_unit=True)
-        detections = self._detector.detect(image, depth, camera, self._floor(camera_frame))
+        floor = self._floor(camera_frame)
+        turns = turns_for(self._params.image_rotation, None if floor is None else floor.normal)
+        if floor is not None:
+            floor = floor._replace(normal=turned_rotation(turns).dot(floor.normal))
+        upright_depth = depth._replace(values=turned_image(depth.values, turns))
+        detections = self._detector.detect(turned_image(image, turns), upright_depth, turned_camera(camera, turns),
+                                           floor)
         if detections is None:
             self._events.warn('images without floor', 'tf gives no floor, and none is visible in the depth image; no '
                               'detection; waiting for the next image')
             return None
         self._events.count('images processed')
-        return image, detections
+        return image, _as_received(detections, turns, image)
 
     def _floor(self, camera_frame):
         """Return the floor plane from tf, or None if it is unknown, so that the detector fits it.

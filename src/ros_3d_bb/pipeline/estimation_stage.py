@@ -7,12 +7,14 @@ import tf2_ros
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
+from ros_3d_bb.camera.image_rotation import (turned_boxes, turned_camera, turned_image, turned_rotation, turns_for,
+                                             unturned_boxes)
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from_msg, stamp_if_any, stamp_of,
                                                    time_from)
 from ros_3d_bb.core.limits import LARGEST_M
-from ros_3d_bb.core.params import DEPTH_SCALE, LARGEST, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.params import DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 from ros_3d_bb.estimation.box3d_estimator import LEVEL, check_rect, estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
@@ -40,6 +42,7 @@ class Bbox3dParams(NamedTuple):
         'ever takes.', 's')
     stamp_tolerance: float = STAMP_TOLERANCE
     floor_frame: str = Param('base_link')
+    image_rotation: str = IMAGE_ROTATION
     assumed_delay: float = Param(
         0.05, 'Processing time of the detector, used where its boxes have no stamp.', 's', live=(0, 1))
     depth_image_range: float = Param(
@@ -131,10 +134,13 @@ class EstimationStage(object):
         gap_s = abs((stamp - depth_msg.header.stamp).to_sec())
         implausible, rects_px = [], self._usable_rects(boxes2d)
         frame_id = self._params.frame_id or depth_msg.header.frame_id
-        estimates = estimate_boxes(depth, rects_px, camera, self._estimator, implausible,
-                                   self._level_from_camera(frame_id))
+        turns, level_from_camera = self._orientation(frame_id)
+        upright_depth = depth._replace(values=turned_image(depth.values, turns))
+        upright_rects_px = turned_boxes(rects_px, turns, width, height).tolist()
+        estimates = estimate_boxes(upright_depth, list(map(tuple, upright_rects_px)), turned_camera(camera, turns),
+                                   self._estimator, implausible, level_from_camera)
         boxes3d = list(filter(None, estimates))
-        for box in implausible:
+        for box in _as_received(implausible, turns, camera):
             self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
                               '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
                               % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
@@ -147,26 +153,34 @@ class EstimationStage(object):
         counts['images estimated'] = 1
         self._events.count_all(counts)
 
-        return Header(stamp=stamp, frame_id=frame_id), depth, boxes3d
+        return Header(stamp=stamp, frame_id=frame_id), depth, _as_received(boxes3d, turns, camera)
 
-    def _level_from_camera(self, frame_id):
-        """Return the rotation to the level frame (`box3d_estimator.level_rotation`); `LEVEL` if the tilt is unknown.
+    def _orientation(self, frame_id):
+        """Return the quarter turns that make the image upright, and the rotation from the frame of the upright image
+        to the level frame (`box3d_estimator.level_rotation`); `LEVEL` if the tilt is unknown.
+        """
+        up = self._up(frame_id)
+        turns = turns_for(self._params.image_rotation, up)
+        return turns, LEVEL if up is None else level_rotation(turned_rotation(turns).dot(up))
+
+    def _up(self, frame_id):
+        """Return the unit vector (3,) that points up in the optical frame; None if tf does not contain it.
 
         The latest transform is used: the camera is fixed to the robot, so no wait for the image stamp is necessary.
         """
         if self._transforms is None:
-            return LEVEL
+            return None
         try:
-            return level_rotation(self._transforms.lookup(frame_id, self._params.floor_frame, genpy.Time(0))[:3, 2])
+            return self._transforms.lookup(frame_id, self._params.floor_frame, genpy.Time(0))[:3, 2]
         except tf2_ros.TransformException as error:
             if TILT_UNKNOWN not in self._events.counts:
                 self._events.note(TILT_UNKNOWN, 'the tilt of the camera is unknown, as there is no transform from '
                                   '%s to %s: %s; it is assumed to be level (~floor_frame)'
                                   % (self._params.floor_frame, frame_id, error))
-            return LEVEL
+            return None
 
     def _usable_rects(self, boxes2d):
-        """Return the rectangles (x1, y1, x2, y2), in pixels, that are neither empty nor reversed."""
+        """Return the rectangles (n, 4), in pixels, that are neither empty nor reversed."""
         usable_px = []
         for rect_px in map(tuple, boxes2d.boxes.tolist()):
             try:
@@ -174,7 +188,7 @@ class EstimationStage(object):
                 usable_px.append(rect_px)
             except ValueError as error:
                 self._events.warn('boxes rejected', '2D %s; the others in this image are used' % error)
-        return usable_px
+        return np.array(usable_px, np.int64).reshape(-1, 4)
 
     def _on_lost(self, boxes2d, before_jump):
         if before_jump:
@@ -202,3 +216,21 @@ class EstimationStage(object):
         return ('no depth image with their stamp %.3f received on %s: colour and depth are %.3f s apart at best; to '
                 'pair them, set ~stamp_tolerance: %.2f'
                 % (stamp_ns / NS, self._depth_topic, gap_s, np.ceil(100 * gap_s) / 100))
+
+
+def _as_received(boxes3d, turns, camera):
+    """Convert Box3Ds in the frame of the upright image to that of the image as received, `turns` before."""
+    if not turns:
+        return boxes3d
+    camera_from_turned, converted = turned_rotation(turns).T, []
+    for box in boxes3d:
+        (rect_px,) = unturned_boxes(np.array([box.rect_px]), turns, camera.width, camera.height).tolist()
+        width_m, height_m, _width_m = box.size_m
+        size_m = box.size_m if turns == 2 else np.array([height_m, width_m, width_m])
+        covariance_m2 = None
+        if box.covariance_m2 is not None:
+            covariance_m2 = camera_from_turned.dot(box.covariance_m2).dot(camera_from_turned.T)
+        edges = box.truncated_edges[turns:] + box.truncated_edges[:turns]
+        converted.append(box._replace(center_m=camera_from_turned.dot(box.center_m), size_m=size_m,
+                                      rect_px=tuple(rect_px), truncated_edges=edges, covariance_m2=covariance_m2))
+    return converted

@@ -30,7 +30,8 @@ DETECTORS = 'yolov5', 'depth', 'none'
 class Settings(NamedTuple):
     """Settings for processing bags: detector, parameters of each node, topics, concurrent searches, and compression.
 
-    `names` maps topics of the nodes to topics of the bag; `keep` lists the topics to copy (None: all).
+    `names` maps topics of the nodes to topics of the bag; `keep` lists the topics to copy (None: all). `camera_pose` is
+    the height, metres, and the tilt, radians, of a camera without tf (see `image_rotation.mounted_camera`).
     """
 
     detector: str = 'yolov5'
@@ -42,6 +43,7 @@ class Settings(NamedTuple):
     keep: Optional[Tuple[str, ...]] = None
     searches: int = 1
     compression: str = 'lz4'
+    camera_pose: Optional[Tuple[float, float]] = None
 
     @property
     def cameras(self):

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import tf2_ros
 from std_msgs.msg import Header
 
+from ros_3d_bb.camera.alignment import POSE, target_frame_fault
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import (camera_from_msg, detections_from_msg, stamp_of, time_from,
                                                    usable_boxes3d)
@@ -115,10 +116,14 @@ class TrackingStage(object):
 
     def add_boxes(self, message, now_ns, camera=''):
         """Process a BoundingBox3DArray: `on_tracks` is called unless the transform is missing, or the stamp is
-        inconsistent with those of the other cameras. Raises ValueError if the message or each of its boxes is invalid.
+        inconsistent with those of the other cameras. Raises ValueError if the message or each of its boxes is invalid,
+        or the boxes are in the fixed frame.
         """
         stamp_ns, camera_name = stamp_of(message), camera or message.header.frame_id
         frame_id, target_frame = self._params.camera_frame or message.header.frame_id, self._params.target_frame
+        fault = target_frame_fault(target_frame, frame_id)
+        if fault:
+            raise ValueError('%s (~target_frame); %s' % (fault, POSE))
         with self.lock:
             if not self._accept(stamp_ns, now_ns, camera):
                 return
@@ -198,6 +203,9 @@ class TrackingStage(object):
 def _check(params):
     if not params.target_frame:
         raise ValueError('parameter ~target_frame is empty; map or odom expected')
+    fault = target_frame_fault(params.target_frame, params.camera_frame)
+    if fault:
+        raise ValueError('parameter ~target_frame: %s; %s' % (fault, POSE))
     for camera in params.cameras:
         if not (isinstance(camera, str) and NAMESPACE.match(camera)) or list(params.cameras).count(camera) > 1:
             raise ValueError('parameter ~cameras is %s; different namespaces expected, such as front, rear'

@@ -114,7 +114,7 @@ class Simulator(object):
         map_from_odom = _upright(x, y, 0, yaw)
         map_from_base = _upright(state.position_m[0], state.position_m[1], robot.base_height, state.heading_rad)
         base_from_mount, tilted = _upright(*mount.mount + (mount.yaw,)), np.eye(4)
-        tilted[:3, :3] = rotation(1, -mount.pitch)
+        tilted[:3, :3] = rotation(1, mount.pitch)
         return Poses(map_from_odom, np.linalg.inv(map_from_odom).dot(map_from_base),
                      base_from_mount.dot(tilted).dot(FRONT_FROM_OPTICAL))
 

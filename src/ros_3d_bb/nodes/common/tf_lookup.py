@@ -90,6 +90,10 @@ class Transforms(object):
             self._from_before = False
         raise explained
 
+    def close(self):
+        """Unsubscribe from tf."""
+        self._listener.unregister()
+
     def go_back(self):
         """Handle a backward jump in time: the buffer is cleared if the next lookup fails.
 

@@ -1,0 +1,90 @@
+"""Rotation of images by quarter turns, for cameras that are mounted in portrait orientation or upside down.
+
+Convention: `turns` is the number of clockwise quarter turns after which an image is upright, 0..3. Edges of boxes are
+(x1, y1, x2, y2) in pixels, x2 and y2 exclusive.
+"""
+import functools
+
+import numpy as np
+
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, quarter_turns, transform_from
+from ros_3d_bb.camera.distortion import EQUIDISTANT
+
+AUTO = 'auto'
+TURNED_FROM_CAMERA = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # optical frames, one turn
+
+
+def turns_for(image_rotation, up):
+    """Quarter turns that make the images of a camera upright.
+
+    Parameters
+    ----------
+    image_rotation : str
+        Clockwise rotation in degrees; `AUTO`: from `up`.
+    up : array_like, (3,) or None
+        Unit vector in the optical frame; None if unknown.
+
+    Returns
+    -------
+    int
+        0 for `AUTO` if `up` is unknown.
+    """
+    if image_rotation != AUTO:
+        return int(image_rotation) // 90
+    return 0 if up is None else quarter_turns(up)
+
+
+def turned_image(values, turns):
+    """A view of an image (height, width, ...) that is turned clockwise."""
+    return np.rot90(values, -turns) if turns else values
+
+
+def turned_rotation(turns):
+    """Rotation (3, 3) from the optical frame of an image to that of the turned image."""
+    return np.linalg.matrix_power(TURNED_FROM_CAMERA, turns)
+
+
+def mounted_camera(height_m, tilt_rad, turns):
+    """Pose (4, 4) of the optical frame of a camera that looks along x, above the origin of a frame whose z points up.
+
+    Parameters
+    ----------
+    height_m : float
+    tilt_rad : float
+        Pitch; positive: the camera looks down (REP 103).
+    turns : int
+        The camera is rolled so that this number of quarter turns makes its images upright.
+    """
+    pitched = transform_from((0, 0, height_m), (0, np.sin(tilt_rad / 2), 0, np.cos(tilt_rad / 2)))
+    pose = pitched.dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
+    pose[:3, :3] = pose[:3, :3].dot(turned_rotation(turns))
+    return pose
+
+
+@functools.lru_cache(maxsize=16)
+def turned_camera(camera, turns):
+    """The `camera_model.Camera` of the turned image, including its lens distortion."""
+    for _turn in range(turns):
+        distortion = camera.distortion
+        if distortion and camera.distortion_model != EQUIDISTANT:
+            k1, k2, p1, p2 = distortion[:4]
+            distortion = (k1, k2, p2, -p1) + distortion[4:]  # (p2, p1) is a vector in the image plane
+        camera = camera._replace(width=camera.height, height=camera.width, fx=camera.fy, fy=camera.fx,
+                                 cx=camera.height - 1 - camera.cy, cy=camera.cx, distortion=distortion)
+    return camera
+
+
+def turned_boxes(boxes, turns, width, height):
+    """Boxes (n, 4) of an image of `width` x `height` pixels, in the turned image. Inverse of `unturned_boxes`."""
+    for _turn in range(turns):
+        x1, y1, x2, y2 = boxes.T
+        boxes = np.stack((height - y2, x1, height - y1, x2), axis=1)
+        width, height = height, width
+    return boxes
+
+
+def unturned_boxes(boxes, turns, width, height):
+    """Boxes (n, 4) of a turned image, in the image of `width` x `height` pixels before it was turned."""
+    if turns % 2:
+        width, height = height, width
+    return turned_boxes(boxes, -turns % 4, width, height)
