@@ -34,7 +34,7 @@ class ScaleCheck(object):
         self._heights_m.extend(float(box.size_m[1]) for box in boxes if _shows_standing_person(box))
         if len(self._heights_m) < LATEST:
             return None
-        lower_m, median_m, upper_m = np.percentile(self._heights_m, (25, 50, 75))
+        lower_m, median_m, upper_m = sorted(self._heights_m)[LATEST // 4::LATEST // 4]
         if upper_m >= HEIGHTS_M[0] and lower_m <= HEIGHTS_M[1]:
             return None
         self._heights_m.clear()

@@ -17,6 +17,7 @@ FAR_M = 8.0
 MAX_ROLL_RAD = MAX_UPWARDS_RAD = np.radians(27)  # of a camera whose floor is fitted
 MAX_KNOWN_TILT_RAD = np.radians(65)  # of a floor that is known from tf
 MIN_POINTS, MIN_SHARE = 60, 0.04  # inliers of a credible plane: number, and share of the points with depth
+MAX_ABOVE = 0.5  # maximum number of points just above a credible plane per inlier; 1 for one that cuts other surfaces
 MAX_BELOW = 0.05  # maximum share of the points below a credible plane
 MAX_LEVERAGE = 14  # maximum distance of the visible floor from the camera, in standard deviations of its points
 PARALLEL, HIGHER_M = np.cos(np.radians(3)), 0.1  # a table: parallel to the floor, and higher by at least this
@@ -174,7 +175,10 @@ def _refine(floor, points, params):
         normal = np.linalg.eigh(offsets.T.dot(offsets))[1][:, 0]
         normal *= -np.sign(normal[1])
         floor = Floor(normal, -float(normal.dot(center)))
-    below = np.count_nonzero(floor.height(points) < -3 * tolerance_m)
+    heights = floor.height(points) / tolerance_m
+    below, inliers, above = (np.count_nonzero((heights >= low) & (heights < high))
+                             for low, high in ((-np.inf, -3), (-1, 1), (1, 3)))
     ahead = near.dot(np.array([0, 0, 1]) - floor.normal[2] * floor.normal)
-    is_credible = below < MAX_BELOW * len(points) and ahead.mean() < MAX_LEVERAGE * ahead.std()
+    is_credible = (below < MAX_BELOW * len(points) and above < MAX_ABOVE * inliers
+                   and ahead.mean() < MAX_LEVERAGE * ahead.std())
     return floor if is_credible and _is_upright(floor.normal, floor.offset_m, params) else None
