@@ -32,6 +32,12 @@ def test_seated_doubtful_and_truncated_people_are_not_counted(box):
     assert not any(check.factor([box]) for _ in range(2 * LATEST))
 
 
+def test_giants_count_with_any_support():
+    """Depth that is too large spreads a person over more than a layer."""
+    check = ScaleCheck()
+    assert [check.factor([box_of(8.5, support=0.15)]) for _ in range(LATEST)][-1] == 0.2
+
+
 def test_heights_that_disagree_are_no_fault():
     check = ScaleCheck()
     assert not any(check.factor([box_of(0.6), box_of(0.6), box_of(1.7)]) for _ in range(LATEST))

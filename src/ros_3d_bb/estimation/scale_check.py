@@ -45,4 +45,5 @@ class ScaleCheck(object):
 
 def _shows_standing_person(box):
     x1, y1, x2, y2 = box.rect_px
-    return not box.truncated and box.support >= LEAST_SUPPORT and y2 - y1 >= LEAST_ASPECT * (x2 - x1)
+    is_supported = box.support >= LEAST_SUPPORT or box.size_m[1] > HEIGHTS_M[1]  # a giant is deeper than a body's layer
+    return not box.truncated and is_supported and y2 - y1 >= LEAST_ASPECT * (x2 - x1)
