@@ -177,6 +177,15 @@ def test_the_last_floor_is_used_if_none_is_visible():
     assert DepthPeople().detect(color, hidden, CAMERA) is None
 
 
+def test_a_fitted_floor_is_dropped_once_the_floor_is_known():
+    room = Room()
+    color, depth = room.images()
+    hidden = DepthImage(np.zeros_like(depth.values), 0.001)
+    detector = DepthPeople()
+    assert [detector.detect(color, image, CAMERA, floor) is not None for image, floor in (
+        (depth, None), (hidden, None), (hidden, room.floor), (hidden, None))] == [True, True, True, False]
+
+
 @pytest.mark.parametrize('image,depth,named', [
     ((240, 320), (240, 320), 'depth .*320 x 240.*camera 640 x 480'),
     ((240, 320), (480, 640), 'colour .*320 x 240.*depth image 640 x 480')])
@@ -193,7 +202,8 @@ def test_a_floor_that_is_not_below_the_camera_is_rejected(normal):
 
 
 @pytest.mark.parametrize('params, message', [({'min_depth': 7.0}, 'min_depth is 7 and max_depth is 6.5'),
-                                             ({'max_top': 1.0}, 'min_top is 1.25 and max_top is 1')])
+                                             ({'max_top': 1.0}, 'min_top is 1.25 and max_top is 1'),
+                                             ({'min_camera_height': 4.0}, 'max_camera_height is 3.2')])
 def test_parameters_that_contradict_each_other_are_rejected(params, message):
     with pytest.raises(ValueError, match=message):
         DepthPeople(DepthPeopleParams(**params))

@@ -8,11 +8,15 @@ import pytest
 import rosbag
 import tf2_ros
 
+from conftest import DATA
 from ros_3d_bb.bags.bag_writer import START_NS, images_in, session_images, session_to_bag, write_bag
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from_msg, time_from,
                                                    tracks_from_msg, transform_from_msg)
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.detection.depth.ground_plane import fit_floor
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images, scenario_to_bag
 from ros_3d_bb_lab.simulation.scenario import scenario_from
@@ -207,3 +211,22 @@ def test_a_bag_is_read_by_image(session, tmp_path):
                                             (str(tmp_path / 'missing.bag'), topics, 'missing.bag')):
         with pytest.raises(ValueError, match=named):
             images_in(wrong_path, wrong_topics)
+
+
+def images_of_a_polished_floor():
+    """Depth images in which the floor has no depth, with their cameras: recorded, or drawn without the data."""
+    folder = os.path.join(DATA, 'data', 'tue_bags')
+    if not os.path.isdir(folder):
+        values = np.full((480, 640), np.nan, np.float32)
+        values[60:460, 270:350], values[240:400, :90], values[140:300, 420:600] = 1.9, 2.2, 4.8
+        yield DepthImage(values, 1.0), Camera(640, 480, 537.0, 537.5, 320.7, 227.7)
+        return
+    for name in sorted(os.listdir(folder)):
+        with rosbag.Bag(os.path.join(folder, name)) as bag:
+            by_kind = {getattr(message, 'encoding', 'camera_info'): message for _, message, _ in bag.read_messages()}
+        yield imgmsg_to_depth(by_kind['32FC1']), camera_from_msg(by_kind['camera_info'])
+
+
+def test_no_other_plane_is_taken_for_a_floor_without_depth():
+    floors = [fit_floor(depth, camera) for depth, camera in images_of_a_polished_floor()]
+    assert floors and floors == len(floors) * [None]

@@ -11,7 +11,8 @@ from ros_3d_bb.camera.image_rotation import (AUTO, turned_camera, turned_image, 
                                              unturned_boxes)
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_if_any, stamp_of
-from ros_3d_bb.core.params import ENABLED, IMAGE_ROTATION, PUBLISH_EMPTY, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.params import (DEPTH_SCALE, ENABLED, IMAGE_ROTATION, PUBLISH_EMPTY, STAMP_TOLERANCE, Param,
+                                   parameters)
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
@@ -42,6 +43,7 @@ class DepthDetectorParams(NamedTuple):
     floor_height: float = Param(
         -0.065, 'Height of the floor in floor_frame. The default fits base_link of a Jackal.', 'm',
         limits=(-10000, 10000), live=(-1, 1))
+    depth_scale: float = DEPTH_SCALE
     frame_id: str = Param('')
     image_rotation: str = IMAGE_ROTATION
     stamp_tolerance: float = STAMP_TOLERANCE
@@ -184,7 +186,7 @@ class RgbdDetectionStage(object):
         """
         image = imgmsg_to_rgb(color_msg)
         camera_frame = self._params.frame_id or color_msg.header.frame_id
-        depth = imgmsg_to_depth(depth_msg, check_unit=True)
+        depth = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
         floor = self._floor(camera_frame)
         turns = turns_for(self._params.image_rotation, None if floor is None else floor.normal)
         if floor is not None:

@@ -18,6 +18,7 @@ from ros_3d_bb.core.params import DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TO
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 from ros_3d_bb.estimation.box3d_estimator import LEVEL, check_rect, estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
+from ros_3d_bb.estimation.scale_check import ScaleCheck
 
 UNSTAMPED = '2D boxes without a stamp'  # event, reported once
 TILT_UNKNOWN = 'tilt of the camera unknown'
@@ -70,7 +71,7 @@ class EstimationStage(object):
 
     def __init__(self, params, events, on_frame, transforms=None, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
         self._events, self._depth_topic, self._info_topic = events, depth_topic, info_topic
-        self._transforms = transforms
+        self._transforms, self._scale_check = transforms, ScaleCheck()
         self._error_model = None
         if params.error_model:
             try:
@@ -144,6 +145,7 @@ class EstimationStage(object):
             self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
                               '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
                               % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
+        self._check_scale(boxes3d + implausible, depth.scale_m)
         counts = {'boxes estimated': len(boxes3d),
                   'boxes without depth': len(estimates) - len(boxes3d) - len(implausible)}
         boxes3d = corrected_boxes(boxes3d, self._error_model, gap_s)
@@ -154,6 +156,14 @@ class EstimationStage(object):
         self._events.count_all(counts)
 
         return Header(stamp=stamp, frame_id=frame_id), depth, _as_received(boxes3d, turns, camera)
+
+    def _check_scale(self, boxes3d, scale_m):
+        """Warn if people have impossible heights, with the scale that makes them possible."""
+        factor = self._scale_check.factor(boxes3d)
+        if factor is not None:
+            self._events.warn('depth of a wrong scale', 'people of impossible height: depth must be multiplied by %g; '
+                              'set ~depth_scale: %g (now %g); positions and sizes are wrong until then'
+                              % (factor, factor * scale_m, scale_m))
 
     def _orientation(self, frame_id):
         """Return the quarter turns that make the image upright, and the rotation from the frame of the upright image

@@ -8,7 +8,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 
 from ros_3d_bb.detection.boxes import Detections
-from ros_3d_bb.detection.depth.ground_plane import check_upright, fit_floor
+from ros_3d_bb.detection.depth.ground_plane import FittedFloor, check_upright
 from ros_3d_bb.detection.depth.person_classifier import (BEST_HOG, PersonHog, PersonWindow, person_score, pyramid_of,
                                                          shape_features_of)
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_person_clusters, grid_of
@@ -33,11 +33,11 @@ class DepthPeople(object):
 
     def __init__(self, params=DepthPeopleParams()):
         self.reconfigure(params)
-        self._hog, self._floor = PersonHog(), None
+        self._hog, self._fitted_floor = PersonHog(), FittedFloor()
 
     def reconfigure(self, params):
         """Change the DepthPeopleParams. If two contradict each other, raise ValueError and keep the old ones."""
-        for name in ('depth', 'width', 'top'):
+        for name in ('depth', 'width', 'top', 'camera_height'):
             low, high = getattr(params, 'min_%s' % name), getattr(params, 'max_%s' % name)
             if not low < high:
                 raise ValueError('min_%s is %g and max_%s is %g; min_%s must be smaller'
@@ -48,8 +48,8 @@ class DepthPeople(object):
         """Detect people in an RGB image (height, width, 3), uint8, and the DepthImage aligned to it.
 
         By default, the floor (ground_plane.Floor) is fitted to this image; if that fails, the last fitted floor is
-        used. Returns Detections of class 0, or None if no floor is known yet. Raises ValueError if the images or the
-        camera differ in size, or the camera is not upright above the floor.
+        used, unless a floor was given since. Returns Detections of class 0, or None if no floor is known yet. Raises
+        ValueError if the images or the camera differ in size, or the camera is not upright above the floor.
         """
         if depth.values.shape != (camera.height, camera.width):
             raise ValueError('the depth image has %d x %d pixels and the colour camera %d x %d; depth aligned to '
@@ -57,8 +57,10 @@ class DepthPeople(object):
         if image.shape[:2] != depth.values.shape:
             raise ValueError('the colour image has %d x %d pixels and the depth image %d x %d; depth aligned to colour '
                              'expected' % (image.shape[1::-1] + depth.values.shape[::-1]))
-        if floor is None:
-            floor = self._floor = fit_floor(depth, camera) or self._floor
+        if floor is not None:
+            self._fitted_floor = FittedFloor()
+        else:
+            floor = self._fitted_floor.update(depth, camera, self._params)
         if floor is None:
             return None
         check_upright(floor)

@@ -7,15 +7,27 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+
 STEP_PX = 10  # sampling distance: about 3000 points of a 640x480 image
-HYPOTHESES = 300  # enough for a floor that fills a quarter of the image, which then contains 300 / 4**3 triples
-SCORING_POINTS = 600
-FAR_M = 6.0
-MAX_FITTED_TILT_RAD = np.radians(27)
-MAX_KNOWN_TILT_RAD = np.radians(50)  # of a floor that is known from tf
-CAMERA_HEIGHT_M = (0.12, 2.2)
+HYPOTHESES, REACH = 300, 16  # number of triples of points; their extent in sampling distances, less for half of them
+SCORING_POINTS = 400
+BELOW_WEIGHT = 10  # points below a plane count this much against it: a table may fill more of the image than the floor
+FAR_M = 8.0
+MAX_ROLL_RAD = MAX_UPWARDS_RAD = np.radians(27)  # of a camera whose floor is fitted
+MAX_KNOWN_TILT_RAD = np.radians(65)  # of a floor that is known from tf
 MIN_POINTS, MIN_SHARE = 60, 0.04  # inliers of a credible plane: number, and share of the points with depth
+MAX_ABOVE = 0.5  # maximum number of points just above a credible plane per inlier; 1 for one that cuts other surfaces
 MAX_BELOW = 0.05  # maximum share of the points below a credible plane
+MAX_LEVERAGE = 14  # maximum distance of the visible floor from the camera, in standard deviations of its points
+PARALLEL, HIGHER_M = np.cos(np.radians(3)), 0.1  # a table: parallel to the floor, and higher by at least this
+MAX_HIGHER = 100  # images in a row with a higher plane only, after which the camera must have been lowered
+
+# The same random numbers serve for all images: the points of the sample, as shares of their number, and triples.
+_RANDOM = np.random.RandomState(0)
+SAMPLE, FIRST = _RANDOM.rand(SCORING_POINTS), _RANDOM.rand(HYPOTHESES)
+SHIFTS = _RANDOM.randint(-REACH, REACH + 1, (2, 2, HYPOTHESES))  # of the rows and columns of the two other points
+SHIFTS[..., ::2] //= 3
 
 
 class Floor(NamedTuple):
@@ -42,7 +54,7 @@ def floor_from_transform(camera_from_floor):
 
 
 def check_upright(floor):
-    """Raise ValueError if the floor is not below the camera or the camera is tilted by more than 50 degrees."""
+    """Raise ValueError if the floor is not below the camera or the camera is tilted by more than 65 degrees."""
     if not (-floor.normal[1] > np.cos(MAX_KNOWN_TILT_RAD) and floor.offset_m > 0):
         raise ValueError('the normal of the floor is (%.2f, %.2f, %.2f) in the camera frame, and the camera is %.2f m '
                          'above the floor; about (0, -1, 0) and more than 0 expected. Check that the camera frame is '
@@ -50,70 +62,123 @@ def check_upright(floor):
                          % (tuple(floor.normal) + (floor.offset_m,)))
 
 
-def fit_floor(depth, camera):
+class FittedFloor(object):
+    """The floor in successive images of a camera at a fixed height, `floor`; None before it was visible.
+
+    If the floor is hidden, the plane of a table or a bed may be fitted instead. A fitted plane that is parallel to the
+    last floor and higher is therefore ignored for `MAX_HIGHER` images in a row.
+    """
+
+    def __init__(self):
+        self.floor, self._higher = None, 0
+
+    def update(self, depth, camera, params):
+        """Fit the floor to the next image, see `fit_floor`. Returns the floor."""
+        fitted = fit_floor(depth, camera, params)
+        if fitted is None:
+            return self.floor
+        self._higher = self._higher + 1 if self._is_higher(fitted) else 0
+        if not 0 < self._higher <= MAX_HIGHER:
+            self.floor, self._higher = fitted, 0
+        return self.floor
+
+    def _is_higher(self, plane):
+        return (self.floor is not None and plane.normal.dot(self.floor.normal) > PARALLEL
+                and plane.offset_m < self.floor.offset_m - HIGHER_M)
+
+
+def fit_floor(depth, camera, params=DepthPeopleParams()):
     """Fit the floor to a depth image by RANSAC and least squares on the inliers.
 
-    The camera must be 0.15 m to 2 m above the floor and tilted by less than 25 degrees. Points below a plane count
-    against it, so that tables and shelves are not detected as the floor. The same image always gives the same floor.
-    Returns None if no credible floor is visible.
+    Points below a plane count against it, so that tables and shelves are not detected as the floor. The same image
+    always gives the same floor.
+
+    Parameters
+    ----------
+    depth : ros_3d_bb.camera.depth_image.DepthImage
+    camera : ros_3d_bb.camera.camera_model.Camera
+    params : DepthPeopleParams
+        Limits of the height and tilt of the camera.
+
+    Returns
+    -------
+    Floor or None
+        None if no credible floor is visible.
     """
-    points = _points(depth, camera)
+    points, cells = _points(depth, camera)
     if len(points) < MIN_POINTS:
         return None
-    random = np.random.RandomState(0)
-    normals, offsets = _hypotheses(points, random)
+    normals, offsets = _hypotheses(points, cells, params)
     if not len(normals):
         return None
 
-    sample = points[random.randint(0, len(points), SCORING_POINTS)]
-    heights_m = sample.dot(normals.T) + offsets
-    tolerance_m = _tolerance_m(sample)[:, None]
-    scores = (np.abs(heights_m) < tolerance_m).sum(axis=0) - (heights_m < -2 * tolerance_m).sum(axis=0)
-    best = scores.argmax()
-    return _refine(Floor(normals[best], offsets[best]), points)
+    sample = points[(SAMPLE * len(points)).astype(int)]
+    heights_m = normals.dot(sample.T) + offsets[:, None]
+    heights = heights_m / _tolerance_m(sample, offsets[:, None])
+    inliers = np.count_nonzero(np.abs(heights) < 1, axis=1)
+    best = (inliers - BELOW_WEIGHT * np.count_nonzero(heights < -2, axis=1)).argmax()
+    return _refine(Floor(normals[best], offsets[best]), points, params)
 
 
 def _points(depth, camera):
-    """Points (n, 3) on a coarse grid of the image, up to FAR_M."""
+    """Points (n, 3) on a coarse grid of the image, up to FAR_M, and their numbers in the grid (h, w), or -1."""
     height, width = depth.values.shape
     u, v = np.meshgrid(np.arange(STEP_PX // 2, width, STEP_PX), np.arange(STEP_PX // 2, height, STEP_PX))
     depth_m, valid = depth.at(u, v)
     valid[valid] = depth_m[valid] < FAR_M
-    return camera.deproject(np.stack((u, v), axis=-1)[valid], depth_m[valid])
+    cells = np.full(valid.shape, -1)
+    cells[valid] = np.arange(np.count_nonzero(valid))
+    return camera.deproject(np.stack((u, v), axis=-1)[valid], depth_m[valid]), cells
 
 
-def _hypotheses(points, random):
-    """Candidate floor planes through three random points each: normals (n, 3), offsets (n,)."""
-    a, b, c = points[random.randint(0, len(points), (3, HYPOTHESES))]
+def _hypotheses(points, cells, params):
+    """Candidate floor planes through three points near each other in the image: normals (n, 3), offsets (n,).
+
+    Neighbours are often on the same surface, so that a small part of a floor yields candidates, too.
+    """
+    first = (FIRST * len(points)).astype(int)
+    row_shifts, column_shifts = SHIFTS
+    others = np.flatnonzero(cells >= 0)[first] + row_shifts * cells.shape[1] + column_shifts
+    others = cells.take(others, mode='clip')
+    have_depth = others.min(axis=0) >= 0
+    a, (b, c) = points[first[have_depth]], points[others[:, have_depth]]
     normals = np.cross(b - a, c - a)
     lengths = np.linalg.norm(normals, axis=1)
     spread = lengths > 1e-3
     normals = normals[spread] / lengths[spread, None]
     normals *= -np.sign(normals[:, 1:2])  # up is -y in the optical frame
     offsets = -(normals * a[spread]).sum(axis=1)
-    usable = _is_upright(normals, offsets)
+    usable = _is_upright(normals, offsets, params)
     return normals[usable], offsets[usable]
 
 
-def _is_upright(normals, offsets):
-    return ((-normals[..., 1] > np.cos(MAX_FITTED_TILT_RAD))
-            & (offsets > CAMERA_HEIGHT_M[0]) & (offsets < CAMERA_HEIGHT_M[1]))
+def _is_upright(normals, offsets, params):
+    x, y, z = normals.T
+    return ((-y > np.cos(params.max_camera_tilt)) & (np.abs(x) < np.sin(MAX_ROLL_RAD)) & (z < np.sin(MAX_UPWARDS_RAD))
+            & (offsets > params.min_camera_height) & (offsets < params.max_camera_height))
 
 
-def _tolerance_m(points):
-    """Maximum distance of inliers from the plane. It grows with depth, as heights at flat viewing angles do."""
-    return 0.015 + 0.01 * points[:, 2]
+def _tolerance_m(points, offset_m):
+    """Maximum distance of inliers from a plane. Errors of heights grow with depth and with the height of the camera."""
+    return np.sqrt(np.maximum(1, offset_m)) * (0.015 + 0.01 * points[:, 2])
 
 
-def _refine(floor, points):
+def _refine(floor, points, params):
     """Fit the plane to its inliers by least squares. Returns None if the result is not credible."""
+    tolerance_m = _tolerance_m(points, floor.offset_m)
     for share in (1.0, 0.6, 0.4, 0.4):  # shrink the tolerance: the foot of a wall pulls the plane up
-        near = points[np.abs(floor.height(points)) < share * _tolerance_m(points)]
+        near = points[np.abs(floor.height(points)) < share * tolerance_m]
         if len(near) < max(MIN_POINTS, MIN_SHARE * len(points)):
             return None
         center = near.mean(axis=0)
-        normal = np.linalg.svd((near - center) / near[:, 2:], full_matrices=False)[2][2]
+        offsets = (near - center) / near[:, 2:]
+        normal = np.linalg.eigh(offsets.T.dot(offsets))[1][:, 0]
         normal *= -np.sign(normal[1])
         floor = Floor(normal, -float(normal.dot(center)))
-    below = np.mean(floor.height(points) < -3 * _tolerance_m(points))
-    return floor if _is_upright(floor.normal, floor.offset_m) and below < MAX_BELOW else None
+    heights = floor.height(points) / tolerance_m
+    below, inliers, above = (np.count_nonzero((heights >= low) & (heights < high))
+                             for low, high in ((-np.inf, -3), (-1, 1), (1, 3)))
+    ahead = near.dot(np.array([0, 0, 1]) - floor.normal[2] * floor.normal)
+    is_credible = (below < MAX_BELOW * len(points) and above < MAX_ABOVE * inliers
+                   and ahead.mean() < MAX_LEVERAGE * ahead.std())
+    return floor if is_credible and _is_upright(floor.normal, floor.offset_m, params) else None

@@ -18,7 +18,7 @@ TWO_LAYERS = 0.7  # between-class share of the variance of two depth layers; 0.6
 
 @parameters()
 class DepthPeopleParams(NamedTuple):
-    """What counts as a person. A person cut by the image border may be smaller."""
+    """What counts as a person, who may be smaller if cut by the image border, and limits of a fitted floor."""
 
     min_depth: float = Param(0.4, 'Nearest person, along the optical axis.', 'm', live=(0, 3))
     max_depth: float = Param(
@@ -44,6 +44,13 @@ class DepthPeopleParams(NamedTuple):
         0.8, 'Largest height of the lowest visible part above the floor: legs may be hidden.', 'm', live=(0, 1.5))
     min_visible: float = Param(0.9, 'Smallest height of the visible part.', 'm', live=(0, 1.7))
     min_visible_cut: float = Param(0.5, 'The same where the image ends below the head.', 'm', live=(0, 1.7))
+    min_camera_height: float = Param(
+        0.08, 'Smallest height of the camera above a floor that is fitted to the depth image, where tf gives none.',
+        'm', live=(0, 2))
+    max_camera_height: float = Param(3.2, 'Largest height of the camera above a fitted floor.', 'm', live=(0.2, 5))
+    max_camera_tilt: float = Param(
+        1.1, 'Largest angle by which the camera looks down on a fitted floor; 63 degrees.', 'rad',
+        limits=(0.1, 1.4), live=(0.1, 1.4))
     min_score: float = Param(
         0.7, 'Smallest score, 0 to 1, of shape and HOG together. Lower values detect more people and more that is '
         'none.', live=(0, 1))
