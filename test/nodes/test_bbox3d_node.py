@@ -66,7 +66,7 @@ def test_boxes_become_3d_in_the_frame_and_at_the_stamp_of_the_image(rig, output,
     center, size = box.center.position, box.size
     assert center.z == pytest.approx(2.0) and abs(center.x) < 0.04 and abs(center.y) < 0.04
     assert (size.x, size.y, size.z) == pytest.approx((24 / 60 * 2.0, 28 / 60 * 2.0, 24 / 60 * 2.0))
-    assert box.center.orientation.w == 1.0 and box.position_covariance == tuple([0.0] * 9)
+    assert box.center.orientation.w == 1.0 and min(box.position_covariance[::4]) >= 0.01  # without an error model
     assert (box.roi.x_offset, box.roi.y_offset, box.roi.width, box.roi.height) == (20, 10, 24, 28)
     assert box.support == 1.0 and not box.truncated
 

@@ -101,7 +101,7 @@ FAULTS = {
     'empty camera_info': (lambda stamp_ns: {INFO: CameraInfo(header=header_at(stamp_ns))}, 'bbox3d_node',
                           'camera_info rejected: it is empty', 'it is empty', 'camera_calibration'),
     'boxes older than the cache': (lambda stamp_ns: {BOXES: messages_at(stamp_ns - 3 * NS)[BOXES]}, 'bbox3d_node',
-                                   's too old; the detector is slower', 'the 2D boxes arrive 3.', 'cache_length'),
+                                   's slower than that', 'the 2D boxes arrive 3.', 'cache_length'),
     'depth of another camera': (lambda stamp_ns: {DEPTH_INFO: camera_info(stamp_ns, focal=45.0)}, 'bbox3d_node',
                                 'depth is not aligned to colour: the intrinsics',
                                 'intrinsics fx fy cx cy of depth are 45.0', 'align_depth:=true'),
