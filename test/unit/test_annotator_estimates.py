@@ -18,7 +18,7 @@ def test_a_box_drawn_by_hand_is_estimated_and_chosen(document, folder):
     assert document.measurements[0].person == 1 and drawn.by_hand and drawn.box_px == NEAR_BOX
     assert box.center_m[2] == pytest.approx(NEAR_MM / 1000.0 + 0.09)  # the axis is behind the surface
     assert np.abs(drawn.estimate_m - box.center_m).max() < 1e-5
-    assert drawn.support == pytest.approx(box.support, abs=1e-3) and drawn.truncated is False
+    assert drawn.support == pytest.approx(box.support, abs=1e-3) and drawn.truncated == box.truncated
     assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
 
 

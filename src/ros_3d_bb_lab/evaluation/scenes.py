@@ -8,7 +8,7 @@ from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes
 from ros_3d_bb.tracking.association import match_greedily
 from ros_3d_bb.tracking.occlusion import depths_towards
@@ -61,10 +61,9 @@ def run_scene(simulator, detect, every=1, error_model=None):
 def _detections(depth, boxes, camera, map_from_camera, error_model):
     """Convert 2D boxes to detections in the map, as bbox3d_node and tracker_node do."""
     rects_px = [tuple(rect) for rect in np.rint(boxes).astype(int).tolist() if rect[0] < rect[2] and rect[1] < rect[3]]
-    estimated = estimate_boxes(depth, rects_px, camera, estimator_named('foreground'))
-    found = [box for box in estimated if box is not None]
-    if error_model is not None:
-        found = corrected_boxes(found, error_model)
+    estimated = estimate_boxes(depth, rects_px, camera, estimator_named('foreground'),
+                               level_from_camera=level_rotation(map_from_camera[2, :3]))
+    found = corrected_boxes([box for box in estimated if box is not None], error_model)
     return [detection_from_box(box, map_from_camera) for box in found]
 
 
