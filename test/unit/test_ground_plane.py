@@ -98,7 +98,7 @@ def test_limits_of_a_known_floor(tilt_deg, is_valid):
 def test_simulated_tables_and_beds(height_m, tilt_deg, ahead_m, size_m, is_visible):
     """The last two hide nearly the whole floor. Planes that cut them and the walls are not floors either."""
     simulator = Simulator(scenario_from({
-        'duration': 1.0, 'rate': 1.0, 'robot': {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': -np.radians(tilt_deg)},
+        'duration': 1.0, 'rate': 1.0, 'robot': {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': np.radians(tilt_deg)},
         'room': {'bounds': [-2.0, 5.0, -4.0, 4.0], 'height': 4.0,
                  'furniture': [{'at': [ahead_m, 0.1], 'size': list(size_m)}]}}))
     frame = simulator.frame(0)

@@ -66,7 +66,7 @@ def test_simulated_people(height_m, tilt_deg, people_m, crouch):
               for side, tall_m in zip((-1, 1), people_m)]
     simulator = Simulator(scenario_from({
         'duration': 0.2, 'rate': 5.0, 'people': people, 'room': {'height': 4.0},
-        'robot': {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': -np.radians(tilt_deg)}}))
+        'robot': {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': np.radians(tilt_deg)}}))
     frame = simulator.frame(0)
     rects_px = [person.box_px for person in frame.people if person.box_px is not None]
     level = level_rotation(np.linalg.inv(frame.poses.map_from_camera)[:3, 2])
