@@ -20,6 +20,7 @@ from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
+from ros_3d_bb.visualization.image_overlay import depth_to_grey, draw_boxes, draw_samples
 
 
 class Bbox3dNode(object):
@@ -167,7 +168,6 @@ class SampleImages(object):
         if (needs_raw or needs_color) != (self._subscriber is not None):
             self._subscription.offer(needs_raw or needs_color)
         if self._depth_pub.get_num_connections():
-            from ros_3d_bb.visualization.image_overlay import depth_to_grey  # imports OpenCV, which needs 100 MB
             grey = depth_to_grey(depth, self._depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))
         color = self._colors.nearest(header.stamp.to_nsec())
@@ -178,7 +178,6 @@ class SampleImages(object):
             if needs_raw:
                 self._raw_pub.publish(color_msg)
             if needs_color:
-                from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_samples  # as above
                 image = imgmsg_to_rgb(color_msg).copy()
                 for box in boxes:
                     draw_boxes(image, [box.rect_px], ['%.2f m' % box.center_m[2]])
