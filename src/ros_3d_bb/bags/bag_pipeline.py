@@ -14,7 +14,7 @@ from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.pipeline.detection_stage import detect_in_color, opened_yolov5
-from ros_3d_bb.pipeline.offline_pipeline import INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, Pipeline, Settings
+from ros_3d_bb.pipeline.offline_pipeline import DEPTH_INFO_TOPIC, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, Pipeline, Settings
 
 MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
 
@@ -37,10 +37,10 @@ class BagRun(object):
 
     def __init__(self, reader, settings, events):
         self._reader, self._settings, self._events = reader, settings, events
-        unused, needed = (COLOR_TOPIC, BOXES_TOPIC) if settings.detector == 'none' else (BOXES_TOPIC, COLOR_TOPIC)
+        needed = BOXES_TOPIC if settings.detector == 'none' else COLOR_TOPIC
         self._topics = {settings.name(topic): (topic, '') for topic in (TF_TOPIC, STATIC_TOPIC)}
         for camera in settings.cameras:
-            for topic in set(INPUTS) - {TF_TOPIC, STATIC_TOPIC, unused}:
+            for topic in settings.inputs - {TF_TOPIC, STATIC_TOPIC}:
                 self._topics[settings.name(topic, camera)] = topic, camera
         self._transforms = BagTransforms()
         self._pipeline = Pipeline(settings, events, self._transforms)
@@ -58,10 +58,19 @@ class BagRun(object):
         for raw in self._reader.messages([static]):
             with self._events.rejecting('transforms'):
                 self._transforms.set_static(message_in(raw, TFMessage))
+        self._read_depth_cameras()
         with ThreadPoolExecutor(self._settings.searches) as pool:
             for waiting in self._ahead(pool):
                 yield waiting.raw, self._handled(waiting)
         self._pipeline.end()
+
+    def _read_depth_cameras(self):
+        """Pass the first camera_info of raw depth to the pipeline, which needs it for the first image."""
+        for name, (topic, camera) in self._topics.items():
+            raw = next(self._reader.messages([name]), None) if topic == DEPTH_INFO_TOPIC else None
+            if raw is not None:
+                with self._events.rejecting('messages on %s' % name):
+                    self._pipeline.take(topic, message_in(raw, INPUTS[topic]), raw.time.to_nsec(), camera)
 
     def _ahead(self, pool):
         """Yield the messages with a delay, to read transforms within ~tf_timeout and images for the detector ahead."""

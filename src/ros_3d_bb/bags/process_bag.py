@@ -14,6 +14,7 @@ import ros_3d_bb
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.bags.bag_writer import remove_partial
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.yaml_loader import load_yaml
@@ -81,6 +82,9 @@ def _settings_from(given):
         settings = with_params(settings, 'yolov5', weights=given.weights)
     if given.error_model:
         settings = with_params(settings, 'bbox3d', error_model=given.error_model)
+    if given.depth:
+        for node in ('depth', 'bbox3d', 'tracker'):
+            settings = with_params(settings, node, depth=given.depth)
     if given.target_frame:
         settings = with_params(settings, 'tracker', target_frame=given.target_frame)
     if given.cameras:
@@ -229,6 +233,9 @@ def _parser():
         config = {'depth': 'depth_detector'}.get(node, node)
         parser.add_argument(option, metavar='FILE', help='parameter file in the format of config/%s.yaml' % config)
     parser.add_argument('--error-model', metavar='FILE', help='error model for the 3D boxes')
+    parser.add_argument('--depth', choices=DEPTH_TOPICS, help='raw: the depth images are not aligned to colour; they '
+                        'are on camera/depth/image_rect_raw, their camera_info on camera/depth/camera_info, and the '
+                        'transform between the cameras in tf (default: aligned)')
     parser.add_argument('--target-frame', metavar='FRAME', help='frame of the tracks (default: map)')
     parser.add_argument('--cameras', metavar='NAMES', help='namespaces of several cameras, separated by commas (front, '
                         'rear: topics front/color/image_raw, ...)')

@@ -4,7 +4,7 @@ Each returns a description of the difference, empty without one. `color` and `de
 """
 SAME_PX = 1.0  # intrinsics that differ by less count as equal: half a pixel is 1 cm at 6 m
 ALIGN = ('start the camera with realsense.launch, or realsense2_camera with align_depth:=true, and use '
-         'camera/aligned_depth_to_color/image_raw')
+         'camera/aligned_depth_to_color/image_raw, or pass depth:=raw, which registers raw depth')
 
 
 def size_fault(color, width, height):

@@ -64,6 +64,9 @@ def _alignment(seen):
     """Check that depth has the image size, intrinsics and frame of colour."""
     if seen.depth is None or seen.color_info is None or seen.color_info.fault:
         return
+    if seen.depth_is_raw:
+        yield Finding('alignment', 'raw depth, which the nodes register to colour')
+        return
     depth, camera = seen.depth.message, seen.color_info.converted
     fault = size_fault(camera, depth.width, depth.height)
     if not fault and seen.depth_info is not None and not seen.depth_info.fault:

@@ -7,15 +7,16 @@ import tf2_ros
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from_msg, stamp_if_any, stamp_of,
                                                    time_from)
 from ros_3d_bb.core.limits import LARGEST_M
-from ros_3d_bb.core.params import DEPTH_SCALE, LARGEST, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.params import DEPTH, DEPTH_SCALE, LARGEST, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 from ros_3d_bb.estimation.box3d_estimator import LEVEL, check_rect, estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
+from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
 
 UNSTAMPED = '2D boxes without a stamp'  # event, reported once
 TILT_UNKNOWN = 'tilt of the camera unknown'
@@ -33,6 +34,7 @@ class Bbox3dParams(NamedTuple):
         20, 'Distance between the depth samples of the estimator median; 20 in the thesis.', 'pixels',
         limits=(1, LARGEST), live=(1, 100))
     error_model: str = Param('')
+    depth: str = DEPTH
     depth_scale: float = DEPTH_SCALE
     frame_id: str = Param('')
     cache_length: float = Param(
@@ -60,14 +62,17 @@ class EstimationStage(object):
     on_frame : callable
         Called with `perception_msgs.Boxes2D`, sensor_msgs/Image and `camera_model.Camera` of one stamp.
     transforms
-        As for `tracking_stage.TrackingStage`, for the tilt of the camera; None if no floor frame is given.
-    depth_topic, info_topic : str
-        Topics of the depth images and camera_info, for error messages about missing ones.
+        As for `tracking_stage.TrackingStage`, for the tilt of the camera and raw depth; None if neither is used.
+    topics : sequence of str, optional
+        Topics of the depth images, their camera_info and that of colour, for error messages about missing ones.
     """
 
-    def __init__(self, params, events, on_frame, transforms=None, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
-        self._events, self._depth_topic, self._info_topic = events, depth_topic, info_topic
-        self._transforms = transforms
+    def __init__(self, params, events, on_frame, transforms=None, topics=DEPTH_TOPICS['aligned'] + INFO_TOPICS[:1]):
+        self._events = events
+        self._depth_topic, depth_info_topic, self._info_topic = topics
+        self._transforms = transforms if params.floor_frame else None
+        self._registration = DepthRegistration(transforms, depth_info_topic) if params.depth == RAW else None
+        self._color_frame = ''
         self._error_model = None
         if params.error_model:
             try:
@@ -95,8 +100,14 @@ class EstimationStage(object):
         return self._estimator.sample
 
     def add_camera_info(self, message, now_ns):
-        """Add a sensor_msgs/CameraInfo."""
-        self._sync.add_camera(stamp_if_any(message), now_ns, camera_from_msg(message))
+        """Add a sensor_msgs/CameraInfo of the colour camera."""
+        camera = camera_from_msg(message)
+        self._color_frame = message.header.frame_id
+        self._sync.add_camera(stamp_if_any(message), now_ns, camera)
+
+    def add_depth_camera_info(self, message):
+        """Add a sensor_msgs/CameraInfo of the depth camera, for raw depth."""
+        self._registration.add_camera_info(message)
 
     def add_depth(self, message, now_ns):
         """Add a depth image."""
@@ -119,18 +130,13 @@ class EstimationStage(object):
         """Estimate the 3D boxes of one image, whose parts are those that `on_frame` was called with.
 
         A 2D box yields no 3D box if it is empty or reversed, has no depth of its own, or gives an implausible size.
-        Returns the header, the DepthImage and a list of Box3D. Raises ValueError if the depth image cannot be read, or
-        its size differs from that of the camera.
+        Returns the header, the DepthImage (RegisteredDepth of raw depth) and a list of Box3D. Raises ValueError if the
+        depth image cannot be read, its size differs from that of the camera, or it cannot be registered.
         """
-        depth = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
-        height, width = depth.values.shape
-        if (width, height) != (camera.width, camera.height):
-            raise ValueError('%s; depth must be aligned to colour: %s' % (size_fault(camera, width, height), ALIGN))
-
+        depth, frame_id = self._aligned(depth_msg, camera)
         stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
         gap_s = abs((stamp - depth_msg.header.stamp).to_sec())
         implausible, rects_px = [], self._usable_rects(boxes2d)
-        frame_id = self._params.frame_id or depth_msg.header.frame_id
         estimates = estimate_boxes(depth, rects_px, camera, self._estimator, implausible,
                                    self._level_from_camera(frame_id))
         boxes3d = list(filter(None, estimates))
@@ -148,6 +154,17 @@ class EstimationStage(object):
         self._events.count_all(counts)
 
         return Header(stamp=stamp, frame_id=frame_id), depth, boxes3d
+
+    def _aligned(self, depth_msg, camera):
+        """Return the depth image with the pixels of colour, and the frame of the colour camera."""
+        depth = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
+        if self._registration is not None:
+            frame_id = self._params.frame_id or self._color_frame
+            return self._registration.register(depth, depth_msg.header.frame_id, camera, frame_id), frame_id
+        height, width = depth.shape
+        if (width, height) != (camera.width, camera.height):
+            raise ValueError('%s; depth must be aligned to colour: %s' % (size_fault(camera, width, height), ALIGN))
+        return depth, self._params.frame_id or depth_msg.header.frame_id
 
     def _level_from_camera(self, frame_id):
         """Return the rotation to the level frame (`box3d_estimator.level_rotation`); `LEVEL` if the tilt is unknown.

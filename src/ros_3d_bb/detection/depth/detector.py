@@ -66,12 +66,12 @@ class DepthPeople(object):
         ValueError
             If the images or the camera differ in size, or the camera is not upright above the floor.
         """
-        if depth.values.shape != (camera.height, camera.width):
+        if depth.shape != (camera.height, camera.width):
             raise ValueError('the depth image has %d x %d pixels and the colour camera %d x %d; depth aligned to '
-                             'colour expected' % (depth.values.shape[::-1] + camera[:2]))
-        if image.shape[:2] != depth.values.shape:
+                             'colour expected' % (depth.shape[::-1] + camera[:2]))
+        if image.shape[:2] != depth.shape:
             raise ValueError('the colour image has %d x %d pixels and the depth image %d x %d; depth aligned to colour '
-                             'expected' % (image.shape[1::-1] + depth.values.shape[::-1]))
+                             'expected' % (image.shape[1::-1] + depth.shape[::-1]))
         if floor is None:
             floor = self._floor = fit_floor(depth, camera) or self._floor
         if floor is None:

@@ -63,6 +63,11 @@ def subscribe(topic, kind, callback, at_once=AT_ONCE):
     return created.subscriber
 
 
+def camera_info_beside(image_topic):
+    """Return the topic of the camera_info of an image: in the namespace of its topic, which may be remapped."""
+    return rospy.resolve_name(image_topic).rpartition('/')[0] + '/camera_info'
+
+
 def inputs():
     """Return the Input of each topic that is currently subscribed."""
     with _lock:
