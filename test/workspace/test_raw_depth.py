@@ -10,14 +10,18 @@ from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.bags.process_bag import main, with_params
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPICS, START_NS, STATIC_TOPIC, CameraFrame,
-                                               image_messages_of, transform_messages)
-from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_msg, time_from
+from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, START_NS, STATIC_TOPIC, CameraFrame, image_messages_of,
+                                               transform_messages)
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg, time_from
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
+from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
+from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.simulator_msgs import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
+from support.masterless import published
 
 IMAGES, COLOR_FRAME, DEPTH_FRAME = 5, 'camera_color_optical_frame', 'camera_depth_optical_frame'
 DEPTH_CAMERA = Camera(848, 480, 421.0, 421.0, 424.2, 238.9)
@@ -43,10 +47,11 @@ def images(baseline_m, color, depth):
         frame, beside = color.frame(number), depth.frame(number)
         stamp_ns = START_NS + number * NS // IMAGES
         header = Header(stamp=time_from(stamp_ns), frame_id=DEPTH_FRAME)
-        messages = [entry for entry in simulated_messages(color, frame, stamp_ns) if entry[0] != COLOR_TOPIC]
+        messages = simulated_messages(color, frame, stamp_ns)
         raw = dict(image_messages_of(CameraFrame(header, DEPTH_CAMERA, beside.color,
                                                  DepthImage(beside.depth_mm, 0.001), ())))
-        messages += [(theirs, raw[ours]) for ours, theirs in zip(*(DEPTH_TOPICS[key] for key in ('aligned', 'raw')))]
+        for ours, theirs in zip(*map(DEPTH_TOPICS.get, ('aligned', 'raw'))):
+            messages.insert(0, (theirs, raw[ours]))  # camera_info first
         boxes_px = [person.box_px for person in frame.people]
         messages.append((BOXES_TOPIC, boxes2d_to_msg(np.array(boxes_px), header)))
         if number == 0:
@@ -88,6 +93,21 @@ def test_boxes_from_raw_depth_have_the_position_of_those_from_aligned_depth(bag,
     assert len(messages) == IMAGES and {message.header.frame_id for message in messages} == {COLOR_FRAME}
     assert found_m.shape == expected_m.shape == (IMAGES * len(PEOPLE), 3)
     assert np.linalg.norm(found_m - expected_m, axis=1).max() < 0.01
+
+
+def test_the_nodes_publish_the_same(bag, tmp_path):
+    """And the detector finds the people in both kinds of depth."""
+    counts = {}
+    for depth in ('aligned', 'raw'):
+        process_bag(bag, str(tmp_path / depth), settings(depth, 'depth'))
+        counts[depth] = [len(message.boxes) for message in boxes_in(tmp_path / depth)[0]]
+    assert counts['raw'] == counts['aligned'] and sum(counts['raw']) > IMAGES
+    for node_class, params, topic in ((DepthDetectorNode, {}, BOXES_TOPIC), (Bbox3dNode, {}, BOXES3D_TOPIC),
+                                      (TrackerNode, {'tf_timeout': 0.0}, TRACKS_TOPIC)):
+        found = published(node_class, str(tmp_path / 'raw'), dict(params, depth='raw'), [topic])
+        with rosbag.Bag(str(tmp_path / 'raw')) as written:
+            expected = [message for _topic, message, _time in written.read_messages('/' + topic)]
+        assert len(expected) == IMAGES and [str(message) for message in found[topic]] == list(map(str, expected))
 
 
 def without(path, target, unwanted):
