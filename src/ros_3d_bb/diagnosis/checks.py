@@ -71,7 +71,7 @@ def _alignment(seen):
     fault = size_fault(camera, depth.width, depth.height)
     if not fault and seen.depth_info is not None and not seen.depth_info.fault:
         fault = intrinsics_fault(camera, seen.depth_info.converted)
-    fault = fault or frames_fault(seen.color_info.message.header.frame_id, depth.header.frame_id)
+    fault = fault or frames_fault(seen.color_info.message.header.frame_id, depth.header.frame_id) or seen.edges_fault
     yield Finding('alignment', 'depth has the pixels and the frame of colour', fault, ALIGN)
 
 

@@ -63,6 +63,7 @@ class Observations(NamedTuple):
     depth_info: Optional[Newest] = None
     color: Optional[Newest] = None
     depth: Optional[Newest] = None
+    edges_fault: str = ''  # of `alignment.EdgeComparison`
     tf: Optional[TfSeen] = None
     use_sim_time: bool = False
     clock_count: int = 0  # number of /clock messages

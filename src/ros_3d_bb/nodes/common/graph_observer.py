@@ -11,8 +11,8 @@ from sensor_msgs.msg import CameraInfo
 
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, topic_of
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
-from ros_3d_bb.diagnosis.checks import BOXES3D, DEPTH
-from ros_3d_bb.diagnosis.message_observer import Observation, observations_of
+from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH
+from ros_3d_bb.diagnosis.message_observer import EdgeObserver, Observation, observations_of
 from ros_3d_bb.diagnosis.topic_roles import ROLES
 from ros_3d_bb.nodes.common.master import published_topics, publishers_of
 from ros_3d_bb.nodes.common.subscribers import IMAGE_BUFFER
@@ -44,6 +44,7 @@ class GraphObserver(object):
         names[DEPTH] = DEPTH_TOPICS[self._bbox3d_param('depth')][0]
         self._observed = {key: Observation(role, self._topic_of(names[key])) for key, role in ROLES.items()}
         self._depth_info = Observation(None, os.path.dirname(self._observed[DEPTH].topic) + '/camera_info')
+        self._edges = EdgeObserver(self._observed[COLOR], self._observed[DEPTH])
         self._began_s = time.monotonic()
         for one in self._observed.values():
             if self._topics.get(one.topic) == one.role.kind:
@@ -69,7 +70,7 @@ class GraphObserver(object):
                                              target_frame, camera_frame),
             use_sim_time=bool(rospy.get_param('/use_sim_time', False)), clock_count=len(self._clocks),
             nodes={name: status[:2] for name, status in list(self._statuses.items())},
-            depth_is_raw=self._bbox3d_param('depth') == RAW,
+            edges_fault=self._edges.fault(), depth_is_raw=self._bbox3d_param('depth') == RAW,
             stamp_tolerance_s=self._bbox3d_param('stamp_tolerance'),
             cache_length_s=self._bbox3d_param('cache_length'))
 
