@@ -21,6 +21,7 @@ from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.simulator_msgs import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
+from support.launching import loaded
 from support.masterless import published
 
 IMAGES, COLOR_FRAME, DEPTH_FRAME = 5, 'camera_color_optical_frame', 'camera_depth_optical_frame'
@@ -126,3 +127,13 @@ def test_what_registration_needs_is_named_if_it_is_missing(bag, tmp_path, unwant
     events = process_bag(source, str(tmp_path / 'out.bag'), settings())
     assert events.counts['2D boxes rejected'] == IMAGES
     assert all(name in events.sentences['2D boxes rejected'] for name in named)
+
+
+@pytest.mark.parametrize('cameras,count,topics', [
+    ('', 3, {'camera/depth/image_rect_raw'}),
+    ('front,rear', 5, {'depth/image_rect_raw', 'camera/depth/image_rect_raw'})])
+def test_one_argument_of_the_pipeline_sets_the_parameters_and_topics(cameras, count, topics):
+    """Detectors and bbox3d_node run in the namespace of their camera; the tracker adds the namespaces itself."""
+    parameters, nodes = loaded('pipeline.launch', 'detector:=depth', 'depth:=raw', 'cameras:=' + cameras)
+    assert [value for name, value in parameters.items() if name.endswith('/depth')] == ['raw'] * count
+    assert {dict(node.remap_args)[RAW_TOPIC] for node in nodes.values()} == topics

@@ -80,8 +80,8 @@ class EdgeComparison(object):
         best_zoom, best_shift = np.unravel_index(shares.argmax(), shares.shape)
         if shares.max() - aligned < max(MIN_BETTER, MIN_BETTER_STDS * shares.std()):
             return ''
-        return ('the edges of depth and colour disagree: they fit if depth is enlarged %.2f times and shifted by %.0f %% '
-                'of the image width at 2 m' % (ZOOMS[best_zoom], 100 * SHIFTS[best_shift] / 2))
+        return ('the edges of depth and colour disagree: they fit if depth is enlarged %.2f times and shifted by '
+                '%.0f %% of the image width at 2 m' % (ZOOMS[best_zoom], 100 * SHIFTS[best_shift] / 2))
 
 
 def _depth_edges(depth):

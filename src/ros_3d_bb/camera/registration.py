@@ -49,7 +49,7 @@ class Registration(object):
             return np.zeros((len(rows), len(columns)))
         across, down = _Cells(columns, self._pitch_px[0]), _Cells(rows, self._pitch_px[1])
         part = self._part_towards(rows, columns, across.stride, down.stride)
-        with np.errstate(invalid='ignore', divide='ignore'):  # nan is no depth
+        with np.errstate(all='ignore'):  # of what is no depth
             depth_m = depth.values[part].astype(np.float32) * np.float32(depth.scale_m)
             points = self._rays[part] * depth_m[..., np.newaxis] + self._offset_m
             pixels = self.color_camera.project(points)
