@@ -82,9 +82,8 @@ def _settings_from(given):
         settings = with_params(settings, 'yolov5', weights=given.weights)
     if given.error_model:
         settings = with_params(settings, 'bbox3d', error_model=given.error_model)
-    if given.depth:
-        for node in ('depth', 'bbox3d', 'tracker'):
-            settings = with_params(settings, node, depth=given.depth)
+    for node in ('depth', 'bbox3d', 'tracker'):  # one kind of depth images for all
+        settings = with_params(settings, node, depth=given.depth or settings.bbox3d[0].depth)
     if given.target_frame:
         settings = with_params(settings, 'tracker', target_frame=given.target_frame)
     if given.cameras:

@@ -86,7 +86,10 @@ class Registration(object):
         width, height = self.color_camera[:2]
         edges_px = []
         for edge, axis in ((points[:, 0], 0), (points[0], 1), (points[:, -1], 0), (points[-1], 1)):
-            edges_px.append(np.nanmedian(self.color_camera.project(edge)[:, axis]))
+            with np.errstate(all='ignore'):  # points beside the view of the colour camera
+                pixels = self.color_camera.project(edge)[:, axis]
+            pixels = pixels[np.isfinite(pixels) & (edge[:, 2] > 0)]
+            edges_px.append(np.median(pixels) if pixels.size else np.nan)
         edges_px = np.where(np.isfinite(edges_px), edges_px, (0, 0, width, height))
         left, top, right, bottom = np.clip(edges_px, 0, (width, height, width, height)).astype(int).tolist()
         return (left, top, right, bottom) if left < right and top < bottom else (0, 0, width, height)
