@@ -8,6 +8,7 @@ import io
 from unittest import mock
 
 import genpy
+import rosbag
 import tf2_ros
 
 
@@ -98,3 +99,19 @@ def masterless(params=()):
         for name, ours in replaced.items():
             stack.enter_context(mock.patch(name, ours))
         yield connections
+
+
+def published(node_class, bag_path, params, topics):
+    """{topic: messages} that a node publishes for the messages of a bag."""
+    kept = {topic: [] for topic in topics}
+    with masterless(params) as connections, rosbag.Bag(bag_path) as bag:
+        node_class()
+        for topic, message, _time in bag.read_messages():
+            before = {name: connections.publishers[name].count for name in topics}
+            topic = topic.replace('/compressedDepth', '').replace('/compressed', '')
+            for name in {topic, topic[1:]} & set(connections.subscribers):
+                connections.send(name, on_the_wire(message))
+            for name in topics:
+                if connections.publishers[name].count > before[name]:
+                    kept[name].append(connections.publishers[name].newest)
+    return kept

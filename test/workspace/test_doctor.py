@@ -13,7 +13,7 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_writer import write_bag
-from ros_3d_bb.conversions.image_msgs import fill_image
+from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
 from ros_3d_bb.nodes.bbox3d_node import DepthCameraCheck
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver
 from ros_3d_bb.nodes.doctor import bag_findings, machine_findings, tracked_cameras
@@ -90,6 +90,12 @@ def without_odom(topic, message):
     return topic, message
 
 
+def beside(topic, message):
+    if topic == DEPTH:
+        fill_image(message, np.roll(imgmsg_to_depth(message).values, 14, axis=1), '16UC1')
+    return topic, message
+
+
 def later(topic, message):
     if topic == DEPTH:
         message.header.stamp.secs += 3600
@@ -100,6 +106,7 @@ def later(topic, message):
     (metres, 'metres in a 16UC1', 'depth_scale'),
     (renamed, 'there is no %s in the bag' % DEPTH, 'camera_depth:=/front/depth/image_raw'),
     (other_intrinsics, 'the intrinsics fx fy cx cy of depth are 385.0', 'align_depth:=true'),
+    (beside, 'the edges of depth and colour disagree', 'depth:=raw'),
     (empty_info, 'it is empty', 'camera_calibration'),
     (without_odom, 'tf has no frame map; the tree of the camera is camera_color_optical_frame < base_link < odom',
      'frame_world:=odom'),

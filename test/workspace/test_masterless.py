@@ -13,7 +13,7 @@ from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.compressed import compressed_fields, rewritten
-from support.masterless import masterless, on_the_wire
+from support.masterless import published
 
 SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}
 
@@ -31,22 +31,6 @@ def bags(request, tmp_path_factory):
         for topic, codec in CODECS[request.param].items()})
     process_bag(str(folder / 'in.bag'), str(folder / 'out.bag'), Settings(detector='depth', names=names))
     return str(folder / 'in.bag'), str(folder / 'out.bag')
-
-
-def published(node_class, bag_path, params, topics):
-    """{topic: messages} that a node publishes for the messages of a bag."""
-    kept = {topic: [] for topic in topics}
-    with masterless(params) as connections, rosbag.Bag(bag_path) as bag:
-        node_class()
-        for topic, message, _time in bag.read_messages():
-            before = {name: connections.publishers[name].count for name in topics}
-            topic = topic.replace('/compressedDepth', '').replace('/compressed', '')
-            for name in {topic, topic[1:]} & set(connections.subscribers):
-                connections.send(name, on_the_wire(message))
-            for name in topics:
-                if connections.publishers[name].count > before[name]:
-                    kept[name].append(connections.publishers[name].newest)
-    return kept
 
 
 @pytest.mark.parametrize('node_class, input_bag, params, topics', [

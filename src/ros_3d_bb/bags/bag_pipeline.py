@@ -13,8 +13,10 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KI
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, detect_in_color, opened_yolov5
-from ros_3d_bb.pipeline.offline_pipeline import INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, Pipeline, Settings
+from ros_3d_bb.pipeline.offline_pipeline import (DEPTH_INFO_TOPIC, INFO_TOPIC, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA,
+                                                 Pipeline, Settings)
 
 MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
 UNUSED = None, ''  # topic and camera of messages that the nodes do not use
@@ -33,10 +35,10 @@ class BagRun(object):
 
     def __init__(self, reader, settings, events):
         self._reader, self._settings, self._events = reader, settings, events
-        unused, needed = (COLOR_TOPIC, BOXES_TOPIC) if settings.detector == 'none' else (BOXES_TOPIC, COLOR_TOPIC)
+        needed = BOXES_TOPIC if settings.detector == 'none' else COLOR_TOPIC
         self._topics = {settings.name(topic): (topic, '') for topic in (TF_TOPIC, STATIC_TOPIC)}
         for camera in settings.cameras:
-            for topic in set(INPUTS) - {TF_TOPIC, STATIC_TOPIC, unused}:
+            for topic in settings.inputs - {TF_TOPIC, STATIC_TOPIC}:
                 self._topics[settings.name(topic, camera)] = topic, camera
         self._transforms = BagTransforms()
         self._pipeline = Pipeline(settings, events, self._transforms)
@@ -57,22 +59,32 @@ class BagRun(object):
                 self._transforms.set_static(message_in(raw, TFMessage))
         if self._settings.camera_pose is not None:
             self._set_camera_pose(*self._settings.camera_pose)
+        self._read_depth_cameras()
         with ThreadPoolExecutor(self._settings.searches) as pool:
             for waiting in self._ahead(pool):
                 yield waiting.raw, self._handled(waiting)
         self._pipeline.end()
 
     def _set_camera_pose(self, height_m, tilt_rad):
-        """Set the pose of the camera, whose frame is that of the first depth image unless a parameter replaces it."""
+        """Set the pose of the camera, whose frame is that of its first message unless a parameter replaces it."""
         params = self._settings.bbox3d[0]
         pose = mounted_camera(height_m, tilt_rad, turns_for(params.image_rotation, None))
-        for raw in self._reader.messages([self._settings.name(DEPTH_TOPIC)]):
+        topic = INFO_TOPIC if params.depth == RAW else DEPTH_TOPIC  # whose frame is that of the 3D boxes
+        for raw in self._reader.messages([self._settings.name(topic)]):
             try:
-                frame_id = params.frame_id or message_in(raw, *IMAGE_KINDS).header.frame_id
+                frame_id = params.frame_id or message_in(raw, *INPUTS[topic]).header.frame_id
             except ValueError:  # reported when the message is processed
                 continue
             self._transforms.set_pose(self._settings.tracker[0].target_frame, frame_id, pose)
             return
+
+    def _read_depth_cameras(self):
+        """Pass the first camera_info of raw depth to the pipeline, which needs it for the first image."""
+        for name, (topic, camera) in self._topics.items():
+            raw = next(self._reader.messages([name]), None) if topic == DEPTH_INFO_TOPIC else None
+            if raw is not None:
+                with self._events.rejecting('messages on %s' % name):
+                    self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), raw.time.to_nsec(), camera)
 
     def _ahead(self, pool):
         """Yield the messages with a delay, to read transforms within ~tf_timeout and images for the detector ahead."""

@@ -15,6 +15,7 @@ import ros_3d_bb
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.bags.bag_writer import remove_partial
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.params import IMAGE_ROTATION, params_from
 from ros_3d_bb.core.yaml_loader import load_yaml
@@ -85,6 +86,8 @@ def _settings_from(given):
                               ('tracker', 'target_frame', given.target_frame), ('tracker', 'cameras', cameras)):
         if value:
             settings = with_params(settings, node, **{name: value})
+    for node in ('depth', 'bbox3d', 'tracker'):  # one kind of depth images for all
+        settings = with_params(settings, node, depth=given.depth or settings.bbox3d[0].depth)
     settings = _with_camera(settings, given)
     if settings.detector == 'yolov5' and not settings.yolov5[0].weights:
         raise ValueError('--detector yolov5 needs --weights FILE, a checkpoint such as yolov5n.pt; --detector depth '
@@ -245,6 +248,9 @@ def _parser():
         config = {'depth': 'depth_detector'}.get(node, node)
         parser.add_argument(option, metavar='FILE', help='parameter file in the format of config/%s.yaml' % config)
     parser.add_argument('--error-model', metavar='FILE', help='error model for the 3D boxes')
+    parser.add_argument('--depth', choices=DEPTH_TOPICS, help='raw: the depth images are not aligned to colour; they '
+                        'are on camera/depth/image_rect_raw, their camera_info on camera/depth/camera_info, and the '
+                        'transform between the cameras in tf (default: aligned)')
     parser.add_argument('--target-frame', metavar='FRAME', help='frame of the tracks (default: map)')
     parser.add_argument('--camera-height', type=float, metavar='M', help='for a bag without tf: height of the camera '
                         'above the floor, which is z = 0 of the target frame, metres')

@@ -4,6 +4,7 @@ from typing import NamedTuple
 import numpy as np
 
 FARTHEST_M = 100.0  # beyond the range of any depth camera
+WIDEST_BORDER, BORDER_STEP = 0.05, 4  # of images without depth: share of the image; pixels between samples
 
 
 class DepthImage(NamedTuple):
@@ -15,7 +16,33 @@ class DepthImage(NamedTuple):
     values: np.ndarray
     scale_m: float
 
+    @property
+    def shape(self):
+        """Height and width."""
+        return self.values.shape
+
+    def part(self, rows, columns):
+        """The values in rows and columns (slices)."""
+        return self.values[rows, columns]
+
     def at(self, u, v):
         """Return the depth, metres, at the pixels in columns u and rows v (arrays of int), and whether it is valid."""
         depth_m = self.values[v, u].astype(float) * self.scale_m
         return depth_m, (depth_m > 0) & (depth_m <= FARTHEST_M)
+
+    def measured_area(self):
+        """Rectangle (x1, y1, x2, y2) of the image without its black border, where registration leaves no depth.
+
+        A border of more than `WIDEST_BORDER` of the width or height is not due to registration: its background is far
+        away.
+        """
+        height, width = self.values.shape
+        left, right = _black_ends((self.values[::BORDER_STEP] > 0).any(axis=0))
+        top, bottom = _black_ends((self.values[:, ::BORDER_STEP] > 0).any(axis=1))
+        return left, top, width - right, height - bottom
+
+
+def _black_ends(measured):
+    """Number of lines without depth at both ends, given which of the lines (n,) have depth."""
+    ends = int(measured.argmax()), int(measured[::-1].argmax())
+    return [count if count <= WIDEST_BORDER * len(measured) else 0 for count in ends]

@@ -8,6 +8,7 @@ import functools
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, quarter_turns, transform_from
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import EQUIDISTANT
 
 AUTO = 'auto'
@@ -37,6 +38,11 @@ def turns_for(image_rotation, up):
 def turned_image(values, turns):
     """A view of an image (height, width, ...) that is turned clockwise."""
     return np.rot90(values, -turns) if turns else values
+
+
+def turned_depth(depth, turns):
+    """A DepthImage or RegisteredDepth that is turned clockwise; of the latter, the whole image is registered."""
+    return DepthImage(turned_image(depth.values, turns), depth.scale_m) if turns else depth
 
 
 def turned_rotation(turns):

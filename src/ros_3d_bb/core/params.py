@@ -39,6 +39,7 @@ SET_BY_LAUNCH = 'Set by launch files'
 DEPTH_SCALE = Param(
     0.0, 'Metres per unit of the depth image. 0: taken from its encoding (REP 118: 16UC1 in millimetres, 32FC1 in '
     'metres).')
+DEPTH = Param('aligned', choices=('aligned', 'raw'))
 STAMP_TOLERANCE = Param(0.0, 'Largest difference between the stamps of a colour and a depth image that belong '
                         'together. 0: half of the period of the depth images.', 's')
 IMAGE_ROTATION = Param('auto', choices=('auto', '0', '90', '180', '270'))

@@ -86,11 +86,14 @@ def _alignment(seen):
     """Check that depth has the image size, intrinsics and frame of colour."""
     if seen.depth is None or seen.color_info is None or seen.color_info.fault:
         return
+    if seen.depth_is_raw:
+        yield Finding('alignment', 'raw depth, which the nodes register to colour')
+        return
     depth, camera = seen.depth.message, seen.color_info.converted
     fault = size_fault(camera, depth.width, depth.height) if depth.width else ''  # _encodings reports an empty image
     if not fault and seen.depth_info is not None and not seen.depth_info.fault:
         fault = intrinsics_fault(camera, seen.depth_info.converted)
-    fault = fault or frames_fault(seen.color_info.message.header.frame_id, depth.header.frame_id)
+    fault = fault or frames_fault(seen.color_info.message.header.frame_id, depth.header.frame_id) or seen.edges_fault
     yield Finding('alignment', 'depth has the pixels and the frame of colour', fault, ALIGN)
 
 

@@ -10,26 +10,51 @@ from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.bags.bag_reader import BagReader, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
+from ros_3d_bb.camera.alignment import EdgeComparison
 from ros_3d_bb.conversions.camera_msgs import INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, uncompressed
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from
-from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.core.time_sync import NS, SAME_NS
 from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, INFO, ROLES
 from ros_3d_bb.diagnosis.observations import Newest, Observations, Stream, TfSeen
 from ros_3d_bb.diagnosis.tf_tree import links_in
 
 KEPT = 1000  # stamps per topic
+COMPARED_NS = NS // 4  # between two comparisons of edges
 BAG_SECONDS = 10.0  # cache length of tf2
+
+
+class EdgeObserver(object):
+    """Compare the edges of colour and depth images with the same stamp, at most every `COMPARED_NS`."""
+
+    def __init__(self, color, depth):
+        self._edges, self._color, self._depth, self._compared_ns = EdgeComparison(), color, depth, 0
+        color.on_message = depth.on_message = self._compare
+
+    def fault(self):
+        """Return a sentence if the edges disagree, '' otherwise."""
+        return self._edges.fault()
+
+    def _compare(self):
+        color, depth = self._color.newest, self._depth.newest
+        if color is None or depth is None:
+            return
+        stamp_ns = color.header.stamp.to_nsec()
+        if (abs(stamp_ns - depth.header.stamp.to_nsec()) <= SAME_NS
+                and abs(stamp_ns - self._compared_ns) >= COMPARED_NS):
+            self._compared_ns = stamp_ns
+            with contextlib.suppress(ValueError):  # reported as an invalid encoding
+                self._edges.add(imgmsg_to_rgb(color), imgmsg_to_depth(depth))
 
 
 class Observation(object):
     """Statistics of the messages of one topic: their count, stamps and arrival times, and the newest message.
 
-    `role` is that of the topic (see `checks.ROLES`), or None.
+    `role` is that of the topic (see `checks.ROLES`), or None; `on_message` is called after each message.
     """
 
     def __init__(self, role, topic):
-        self.role, self.topic, self.newest = role, topic, None
+        self.role, self.topic, self.newest, self.on_message = role, topic, None, lambda: None
         self._count, self._first_ns, self._last_ns = 0, None, None
         self._stamps_ns, self._lags_s = collections.deque(maxlen=KEPT), (None, None)
 
@@ -43,6 +68,7 @@ class Observation(object):
             self._stamps_ns.append(stamp_ns)
         if stamp_ns and ros_ns:
             self._lags_s = (ros_ns - stamp_ns) / NS, None if machine_s is None else machine_s - stamp_ns / NS
+        self.on_message()
 
     def stream(self, published_kind, publishers=()):
         """Return the observations as a Stream."""
@@ -89,10 +115,11 @@ def observe_bag(path, name_of, target_frame):
     """
     observed = {key: Observation(role, name_of(role.name)) for key, role in ROLES.items()}
     depth_info, transforms = Observation(None, name_of(INFO_TOPICS[1])), BagTransforms()
+    edges = EdgeObserver(observed[COLOR], observed[DEPTH])
     with BagReader(path) as reader:
         topics = reader.topics
         _read(reader, observed, depth_info, transforms)
-    return observations_of(observed, depth_info, topics, BAG_SECONDS, is_bag=True,
+    return observations_of(observed, depth_info, topics, BAG_SECONDS, is_bag=True, edges_fault=edges.fault(),
                            tf=observed[DEPTH].tf_seen(transforms.lookup, transforms.frames_as_yaml, target_frame))
 
 

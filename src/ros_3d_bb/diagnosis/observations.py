@@ -71,10 +71,12 @@ class Observations(NamedTuple):
     depth_info: Optional[Newest] = None
     color: Optional[Newest] = None
     depth: Optional[Newest] = None
+    edges_fault: str = ''  # of `alignment.EdgeComparison`
     tf: Optional[TfSeen] = None
     use_sim_time: bool = False
     clock_count: int = 0  # number of /clock messages
     nodes: dict = {}  # {name: (level, sentence)} from the diagnostics of nodes
+    depth_is_raw: bool = False  # not aligned to colour; the nodes register it
     stamp_tolerance_s: float = 0.0
     cache_length_s: float = 1.0
 

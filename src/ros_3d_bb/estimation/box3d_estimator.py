@@ -19,7 +19,6 @@ from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M, USUAL_HEIGHT_M, USUAL_W
 # detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person
 # who is not truncated there loses little, because only boxes of less than the usual size are completed.
 BORDER_PX, BORDER_SHARE = 4, 0.02
-WIDEST_BORDER, BORDER_STEP = 0.05, 4  # of depth images without depth: share of the image; pixels between samples
 # Nearer people stand lower in the image. The lower edges of truncated boxes are compared at this height.
 CUT_ROWS = 1 / 30.0  # share of the image height
 SAMPLES_WANTED = 2000  # approximate number of pixels that the foreground estimator samples
@@ -58,8 +57,8 @@ class Samples(NamedTuple):
 
 
 class ImageGeometry(NamedTuple):
-    """Geometry of one image: its camera, the part of it with depth (see `measured_area`), and the rotation (3, 3) from
-    the optical frame to the level frame (see `level_rotation`).
+    """Geometry of one image: its camera, the part of it with depth (see `DepthImage.measured_area`), and the rotation
+    (3, 3) from the optical frame to the level frame (see `level_rotation`).
     """
 
     camera: Camera
@@ -112,7 +111,7 @@ def sample_depth(depth, rect_px, stride_px=None):
     -------
     Samples
     """
-    height, width = depth.values.shape
+    height, width = depth.shape
     x1, y1, x2, y2 = map(int, rect_px)
     if stride_px is None:
         visible_columns = min(max(x2, 0), width) - min(max(x1, 0), width)
@@ -120,7 +119,7 @@ def sample_depth(depth, rect_px, stride_px=None):
         visible_px = max(0, visible_columns) * max(0, visible_rows)
         stride_px = max(1, int(np.sqrt(visible_px / SAMPLES_WANTED)))
     columns, rows = _ticks(x1, x2, width, stride_px), _ticks(y1, y2, height, stride_px)
-    depth_m = depth.values[rows, columns].astype(float) * depth.scale_m
+    depth_m = depth.part(rows, columns).astype(float) * depth.scale_m
     valid = (depth_m > 0) & (depth_m <= FARTHEST_DEPTH_M)
     return Samples(np.arange(width)[columns], np.arange(height)[rows], depth_m, valid)
 
@@ -365,7 +364,7 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_f
         In the order of the rectangles; None without a plausible estimate.
     """
     boxes, nearer = [None] * len(rects_px), []
-    geometry = ImageGeometry(camera, measured_area(depth), level_from_camera)
+    geometry = ImageGeometry(camera, depth.measured_area(), level_from_camera)
     for number in front_to_back(rects_px, camera):
         rect_px = rects_px[number]
         box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, geometry, nearer)
@@ -393,25 +392,8 @@ def check_rect(rect_px):
         raise ValueError('box (%d, %d, %d, %d) is empty or reversed: x1 < x2 and y1 < y2 expected' % (x1, y1, x2, y2))
 
 
-def measured_area(depth):
-    """Rectangle (x1, y1, x2, y2) of the image without its black border, where registration leaves no depth.
-
-    A border of more than `WIDEST_BORDER` of the width or height is not due to registration: its background is far away.
-    """
-    height, width = depth.values.shape
-    left, right = _black_ends((depth.values[::BORDER_STEP] > 0).any(axis=0))
-    top, bottom = _black_ends((depth.values[:, ::BORDER_STEP] > 0).any(axis=1))
-    return left, top, width - right, height - bottom
-
-
-def _black_ends(measured):
-    """Number of lines without depth at both ends, given which of the lines (n,) have depth."""
-    ends = int(measured.argmax()), int(measured[::-1].argmax())
-    return [count if count <= WIDEST_BORDER * len(measured) else 0 for count in ends]
-
-
 def truncated_edges(rect_px, area_px):
-    """Whether the left, upper, right and lower edge of a rectangle touch the border of an area, see `measured_area`.
+    """Whether the left, upper, right and lower edge of a rectangle touch the border of the area with depth.
 
     Returns
     -------

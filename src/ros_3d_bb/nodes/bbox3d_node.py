@@ -6,7 +6,8 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, info_topic_beside, uncompressed
+from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS, info_topic_beside,
+                                               uncompressed)
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg, camera_from_msg,
                                                    stamp_of)
@@ -19,6 +20,7 @@ from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
+from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
 from ros_3d_bb.visualization.image_overlay import depth_to_grey, draw_boxes, draw_samples
 
@@ -27,7 +29,9 @@ class Bbox3dNode(object):
     """Estimate 3D boxes from 2D boxes and depth images.
 
     Each array of 2D boxes is paired with the depth image of the same stamp, regardless of the detector's latency.
-    Parameters: config/bbox3d.yaml; some can be changed at run time.
+    Parameters: config/bbox3d.yaml; some can be changed at run time. With ~depth raw, the depth images are on
+    camera/depth/image_rect_raw and their camera_info on camera/depth/camera_info; the node registers them to the colour
+    image, using the transform between both cameras in tf.
 
     Subscribes
     ----------
@@ -38,7 +42,8 @@ class Bbox3dNode(object):
     camera/color/camera_info : sensor_msgs/CameraInfo
         Calibration of the colour camera.
     /tf : tf2_msgs/TFMessage
-        Transform from ~floor_frame to the camera, for its tilt. Not used if ~floor_frame is empty.
+        Transform from ~floor_frame to the camera, for its tilt, and between the cameras for raw depth. Not used if
+        ~floor_frame is empty and depth is aligned.
     /tf_static : tf2_msgs/TFMessage
         As /tf.
 
@@ -51,17 +56,24 @@ class Bbox3dNode(object):
     def __init__(self):
         params, = read_params(Bbox3dParams)
         self._diagnostics = Diagnostics()
+        depth_topic, is_raw = DEPTH_TOPICS[params.depth][0], params.depth == RAW
+        depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
         self._stage = EstimationStage(params, self._diagnostics, self._on_frame,
-                                      Transforms(wait_s=0) if params.floor_frame else None,
-                                      rospy.resolve_name(DEPTH_TOPIC), rospy.resolve_name(INFO_TOPICS[0]))
+                                      Transforms(wait_s=0) if params.floor_frame or is_raw else None,
+                                      (rospy.resolve_name(depth_topic), depth_info_topic,
+                                       rospy.resolve_name(INFO_TOPICS[0])))
         self._lock = threading.Lock()
         self._boxes_pub = rospy.Publisher(BOXES3D_TOPIC, BoundingBox3DArray, queue_size=10)
         self._images = SampleImages(int(params.cache_length * NS), self._stage.sample, params.depth_image_range,
                                     self._diagnostics)
-        self._alignment = DepthCameraCheck(with_frames=not params.frame_id)
-        self._diagnostics.check(self._alignment.faults)
+        self._alignment = None
+        if is_raw:
+            subscribe(depth_info_topic, CameraInfo, self._on_depth_camera_info, 1)
+        else:
+            self._alignment = DepthCameraCheck(with_frames=not params.frame_id)
+            self._diagnostics.check(self._alignment.faults)
         # Depth images are cached until their boxes arrive, so the subscriber queues must not drop any.
-        subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
+        subscribe(depth_topic, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
         subscribe(BOXES_TOPIC, Int32MultiArray, self._on_boxes)
         self._reconfigure_server = ReconfigureServer([params], self._reconfigure)
@@ -71,13 +83,19 @@ class Bbox3dNode(object):
             self._stage.reconfigure(params)
             self._images.reconfigure(self._stage.sample, params.depth_image_range)
 
+    def _on_depth_camera_info(self, message):
+        with self._diagnostics.receiving('camera_info of depth'), self._lock:
+            self._stage.add_depth_camera_info(message)
+
     def _on_camera_info(self, message):
-        self._alignment.color = message
+        if self._alignment is not None:
+            self._alignment.color = message
         with self._diagnostics.receiving('camera_info'), self._lock:
             self._stage.add_camera_info(message, arrival_clock_ns())
 
     def _on_depth(self, message):
-        self._alignment.depth_frame = message.header.frame_id
+        if self._alignment is not None:
+            self._alignment.depth_frame = message.header.frame_id
         with self._diagnostics.receiving('depth images'), self._lock:
             self._stage.add_depth(message, arrival_clock_ns())
 

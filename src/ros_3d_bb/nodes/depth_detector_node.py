@@ -1,9 +1,10 @@
 """ROS node that detects people in depth and colour images without a trained network."""
 import threading
 
+import rospy
 from sensor_msgs.msg import CameraInfo, Image
 
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPICS, INFO_TOPICS, info_topic_beside
 from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
@@ -12,13 +13,16 @@ from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
+from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, RgbdDetectionStage
 
 
 class DepthDetectorNode(object):
     """Detect people in depth and colour images.
 
-    No network weights are required. Parameters: config/depth_detector.yaml; most can be changed at run time.
+    No network weights are required. Parameters: config/depth_detector.yaml; most can be changed at run time. With
+    ~depth raw, the depth images are on camera/depth/image_rect_raw and their camera_info on camera/depth/camera_info;
+    the node registers them to the colour image, using the transform between both cameras in tf.
 
     Subscribes
     ----------
@@ -29,7 +33,8 @@ class DepthDetectorNode(object):
     camera/color/camera_info : sensor_msgs/CameraInfo
         Calibration of the colour camera.
     /tf : tf2_msgs/TFMessage
-        Transform from ~floor_frame to the camera, which locates the floor. Not used if ~floor_frame is empty.
+        Transform from ~floor_frame to the camera, which locates the floor, and between the cameras for raw depth. Not
+        used if ~floor_frame is empty and depth is aligned.
     /tf_static : tf2_msgs/TFMessage
         As /tf.
     """
@@ -37,14 +42,19 @@ class DepthDetectorNode(object):
     def __init__(self):
         params, people = read_params(DepthDetectorParams, DepthPeopleParams)
         self._diagnostics = Diagnostics()
-        transforms = Transforms(wait_s=0) if params.floor_frame else None
+        depth_topic, is_raw = DEPTH_TOPICS[params.depth][0], params.depth == RAW
+        depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
+        transforms = Transforms(wait_s=0) if params.floor_frame or is_raw else None
         if transforms is not None:
             self._diagnostics.show('tf age', transforms.age)
         self._lock, self._detecting = threading.Lock(), threading.Lock()
         self._worker = DetectorWorker(params, self._diagnostics, self._detect, RgbdDetectionStage.names)
-        self._stage = RgbdDetectionStage(params, people, self._diagnostics, self._worker.offer, transforms)
+        self._stage = RgbdDetectionStage(params, people, self._diagnostics, self._worker.offer, transforms,
+                                         depth_info_topic)
         subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
-        subscribe(DEPTH_TOPIC, Image, self._on_depth, KEPT_AT_ONCE)
+        if is_raw:
+            subscribe(depth_info_topic, CameraInfo, self._on_depth_camera_info, 1)
+        subscribe(depth_topic, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(COLOR_TOPIC, Image, self._on_color)
         ReconfigureServer([params, people], self._reconfigure)
 
@@ -55,6 +65,10 @@ class DepthDetectorNode(object):
     def _on_camera_info(self, message):
         with self._diagnostics.receiving('camera_info'), self._lock:
             self._stage.add_camera_info(message, arrival_clock_ns())
+
+    def _on_depth_camera_info(self, message):
+        with self._diagnostics.receiving('camera_info of depth'), self._lock:
+            self._stage.add_depth_camera_info(message)
 
     def _on_depth(self, message):
         with self._diagnostics.receiving('depth images'), self._lock:

@@ -5,7 +5,7 @@ import rospy
 from sensor_msgs.msg import CameraInfo, Image
 from visualization_msgs.msg import MarkerArray
 
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS, topic_of
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, info_topic_beside, topic_of
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_msg
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.time_sync import arrival_clock_ns
@@ -16,6 +16,7 @@ from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
+from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
 from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 
@@ -29,7 +30,8 @@ class TrackerNode(object):
     If there is no transform at the stamp of the boxes, nothing is published and tracks do not age. Parameters:
     config/tracker.yaml; many can be changed at run time. With ~cameras, the node subscribes to the boxes, camera_info
     and depth images of each camera: for the camera front these are front/ros_3d_bb/bb_3d, front/color/camera_info and
-    front/aligned_depth_to_color/image_raw.
+    front/aligned_depth_to_color/image_raw. With ~depth raw, the depth images are on camera/depth/image_rect_raw
+    (front/depth/image_rect_raw) and their camera_info on camera/depth/camera_info.
 
     Subscribes
     ----------
@@ -64,17 +66,20 @@ class TrackerNode(object):
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
         for camera in self._stage.cameras:
-            self._subscribe(camera)
+            self._subscribe(camera, topic_of(camera, DEPTH_TOPICS[params.depth][0]), params.depth == RAW)
         self._reconfigure_server = ReconfigureServer(given, self._reconfigure)
 
-    def _subscribe(self, camera):
+    def _subscribe(self, camera, depth_topic, is_raw):
         def of_camera(callback):
             return functools.partial(callback, camera=camera)
         subscribe(topic_of(camera, BOXES3D_TOPIC), BoundingBox3DArray, of_camera(self._on_boxes))
         if self._stage.uses_camera_info:
             subscribe(topic_of(camera, INFO_TOPICS[0]), CameraInfo, of_camera(self._on_camera_info), 1)
         if self._stage.uses_depth:
-            subscribe(topic_of(camera, DEPTH_TOPIC), Image, of_camera(self._on_depth), KEPT_AT_ONCE)
+            subscribe(depth_topic, Image, of_camera(self._on_depth), KEPT_AT_ONCE)
+        if self._stage.uses_depth and is_raw:
+            depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
+            subscribe(depth_info_topic, CameraInfo, of_camera(self._on_depth_camera_info), 1)
 
     def _reconfigure(self, _params, marker_params, *tracking):
         with self._stage.lock:
@@ -84,6 +89,10 @@ class TrackerNode(object):
     def _on_camera_info(self, message, camera):
         with self._diagnostics.receiving('camera_info'):
             self._stage.add_camera_info(message, camera)
+
+    def _on_depth_camera_info(self, message, camera):
+        with self._diagnostics.receiving('camera_info of depth'):
+            self._stage.add_depth_camera_info(message, camera)
 
     def _on_depth(self, message, camera):
         with self._diagnostics.receiving('depth images'):

@@ -7,17 +7,19 @@ import numpy as np
 import tf2_ros
 
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.camera.image_rotation import (AUTO, turned_camera, turned_image, turned_rotation, turns_for,
-                                             unturned_boxes)
+from ros_3d_bb.camera.image_rotation import (AUTO, turned_camera, turned_depth, turned_image, turned_rotation,
+                                             turns_for, unturned_boxes)
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_if_any, stamp_of
-from ros_3d_bb.core.params import (DEPTH_SCALE, ENABLED, IMAGE_ROTATION, PUBLISH_EMPTY, STAMP_TOLERANCE, Param,
+from ros_3d_bb.core.params import (DEPTH, DEPTH_SCALE, ENABLED, IMAGE_ROTATION, PUBLISH_EMPTY, STAMP_TOLERANCE, Param,
                                    parameters)
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
 from ros_3d_bb.detection.yolov5.backends import open_runtime
 from ros_3d_bb.detection.yolov5.detector import Yolov5
+from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
 
 CACHE_NS = NS  # how long images wait for each other
 NEWEST = genpy.Time(0)  # tf returns the latest transform for stamp 0
@@ -45,6 +47,7 @@ class DepthDetectorParams(NamedTuple):
         limits=(-10000, 10000), live=(-1, 1))
     depth_scale: float = DEPTH_SCALE
     frame_id: str = Param('')
+    depth: str = DEPTH
     image_rotation: str = IMAGE_ROTATION
     stamp_tolerance: float = STAMP_TOLERANCE
     enabled: bool = ENABLED
@@ -140,13 +143,17 @@ class RgbdDetectionStage(object):
     on_frame : callable
         Called with two sensor_msgs/Image, colour and depth, and a `camera_model.Camera` of one stamp, for `detect`.
     transforms
-        As for `tracking_stage.TrackingStage`; None if no floor frame is given.
+        As for `tracking_stage.TrackingStage`; None if no floor frame is given and depth is aligned.
+    depth_info_topic : str, optional
+        Topic of the camera_info of raw depth, for the error message if it is missing.
     """
 
     names = ('person',)
 
-    def __init__(self, params, people, events, on_frame, transforms):
-        self._params, self._events, self._transforms = params, events, transforms
+    def __init__(self, params, people, events, on_frame, transforms, depth_info_topic=DEPTH_TOPICS[RAW][1]):
+        self._params, self._events = params, events
+        self._transforms = transforms if params.floor_frame else None
+        self._registration = DepthRegistration(transforms, depth_info_topic) if params.depth == RAW else None
         self._detector = DepthPeople(people)
         self._sync = StampSynchronizer(CACHE_NS, int(params.stamp_tolerance * NS), 0, on_frame, self._on_lost)
 
@@ -159,6 +166,10 @@ class RgbdDetectionStage(object):
         """Add a sensor_msgs/CameraInfo."""
         camera = camera_from_msg(message)
         self._sync.add_camera(stamp_if_any(message), now_ns, camera)
+
+    def add_depth_camera_info(self, message):
+        """Add a sensor_msgs/CameraInfo of the depth camera, for raw depth."""
+        self._registration.add_camera_info(message)
 
     def add_depth(self, message, now_ns):
         """Add a depth image."""
@@ -187,13 +198,14 @@ class RgbdDetectionStage(object):
         image = imgmsg_to_rgb(color_msg)
         camera_frame = self._params.frame_id or color_msg.header.frame_id
         depth = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
+        if self._registration is not None:
+            depth = self._registration.register(depth, depth_msg.header.frame_id, camera, camera_frame)
         floor = self._floor(camera_frame)
         turns = turns_for(self._params.image_rotation, None if floor is None else floor.normal)
         if floor is not None:
             floor = floor._replace(normal=turned_rotation(turns).dot(floor.normal))
-        upright_depth = depth._replace(values=turned_image(depth.values, turns))
-        detections = self._detector.detect(turned_image(image, turns), upright_depth, turned_camera(camera, turns),
-                                           floor)
+        detections = self._detector.detect(turned_image(image, turns), turned_depth(depth, turns),
+                                           turned_camera(camera, turns), floor)
         if detections is None:
             self._events.warn('images without floor', 'tf gives no floor, and none is visible in the depth image; no '
                               'detection; waiting for the next image')

@@ -7,18 +7,19 @@ import tf2_ros
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
-from ros_3d_bb.camera.image_rotation import (turned_boxes, turned_camera, turned_image, turned_rotation, turns_for,
+from ros_3d_bb.camera.image_rotation import (turned_boxes, turned_camera, turned_depth, turned_rotation, turns_for,
                                              unturned_boxes)
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from_msg, stamp_if_any, stamp_of,
                                                    time_from)
 from ros_3d_bb.core.limits import LARGEST_M
-from ros_3d_bb.core.params import DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.params import DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 from ros_3d_bb.estimation.box3d_estimator import LEVEL, check_rect, estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.estimation.scale_check import ScaleCheck
+from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
 
 UNSTAMPED = '2D boxes without a stamp'  # event, reported once
 TILT_UNKNOWN = 'tilt of the camera unknown'
@@ -36,6 +37,7 @@ class Bbox3dParams(NamedTuple):
         20, 'Distance between the depth samples of the estimator median; 20 in the thesis.', 'pixels',
         limits=(1, LARGEST), live=(1, 100))
     error_model: str = Param('')
+    depth: str = DEPTH
     depth_scale: float = DEPTH_SCALE
     frame_id: str = Param('')
     cache_length: float = Param(
@@ -64,14 +66,17 @@ class EstimationStage(object):
     on_frame : callable
         Called with `perception_msgs.Boxes2D`, sensor_msgs/Image and `camera_model.Camera` of one stamp.
     transforms
-        As for `tracking_stage.TrackingStage`, for the tilt of the camera; None if no floor frame is given.
-    depth_topic, info_topic : str
-        Topics of the depth images and camera_info, for error messages about missing ones.
+        As for `tracking_stage.TrackingStage`, for the tilt of the camera and raw depth; None if neither is used.
+    topics : sequence of str, optional
+        Topics of the depth images, their camera_info and that of colour, for error messages about missing ones.
     """
 
-    def __init__(self, params, events, on_frame, transforms=None, depth_topic=DEPTH_TOPIC, info_topic=INFO_TOPICS[0]):
-        self._events, self._depth_topic, self._info_topic = events, depth_topic, info_topic
-        self._transforms, self._scale_check = transforms, ScaleCheck()
+    def __init__(self, params, events, on_frame, transforms=None, topics=DEPTH_TOPICS['aligned'] + INFO_TOPICS[:1]):
+        self._events = events
+        self._depth_topic, depth_info_topic, self._info_topic = topics
+        self._transforms = transforms if params.floor_frame else None
+        self._registration = DepthRegistration(transforms, depth_info_topic) if params.depth == RAW else None
+        self._color_frame, self._scale_check = '', ScaleCheck()
         self._error_model = None
         if params.error_model:
             try:
@@ -99,8 +104,14 @@ class EstimationStage(object):
         return self._estimator.sample
 
     def add_camera_info(self, message, now_ns):
-        """Add a sensor_msgs/CameraInfo."""
-        self._sync.add_camera(stamp_if_any(message), now_ns, camera_from_msg(message))
+        """Add a sensor_msgs/CameraInfo of the colour camera."""
+        camera = camera_from_msg(message)
+        self._color_frame = message.header.frame_id
+        self._sync.add_camera(stamp_if_any(message), now_ns, camera)
+
+    def add_depth_camera_info(self, message):
+        """Add a sensor_msgs/CameraInfo of the depth camera, for raw depth."""
+        self._registration.add_camera_info(message)
 
     def add_depth(self, message, now_ns):
         """Add a depth image."""
@@ -123,29 +134,24 @@ class EstimationStage(object):
         """Estimate the 3D boxes of one image, whose parts are those that `on_frame` was called with.
 
         A 2D box yields no 3D box if it is empty or reversed, has no depth of its own, or gives an implausible size.
-        Returns the header, the DepthImage and a list of Box3D. Raises ValueError if the depth image cannot be read, or
-        its size differs from that of the camera.
+        Returns the header, the DepthImage (RegisteredDepth of raw depth) and a list of Box3D. Raises ValueError if the
+        depth image cannot be read, its size differs from that of the camera, or it cannot be registered.
         """
-        depth = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
-        height, width = depth.values.shape
-        if (width, height) != (camera.width, camera.height):
-            raise ValueError('%s; depth must be aligned to colour: %s' % (size_fault(camera, width, height), ALIGN))
-
+        raw = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
+        depth, frame_id = self._aligned(raw, depth_msg.header.frame_id, camera)
         stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
         gap_s = abs((stamp - depth_msg.header.stamp).to_sec())
         implausible, rects_px = [], self._usable_rects(boxes2d)
-        frame_id = self._params.frame_id or depth_msg.header.frame_id
         turns, level_from_camera = self._orientation(frame_id)
-        upright_depth = depth._replace(values=turned_image(depth.values, turns))
-        upright_rects_px = turned_boxes(rects_px, turns, width, height).tolist()
-        estimates = estimate_boxes(upright_depth, list(map(tuple, upright_rects_px)), turned_camera(camera, turns),
-                                   self._estimator, implausible, level_from_camera)
+        upright_rects_px = turned_boxes(rects_px, turns, camera.width, camera.height).tolist()
+        estimates = estimate_boxes(turned_depth(depth, turns), list(map(tuple, upright_rects_px)),
+                                   turned_camera(camera, turns), self._estimator, implausible, level_from_camera)
         boxes3d = list(filter(None, estimates))
         for box in _as_received(implausible, turns, camera):
             self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
                               '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
                               % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
-        self._check_scale(boxes3d + implausible, depth.scale_m)
+        self._check_scale(boxes3d + implausible, raw.scale_m)
         counts = {'boxes estimated': len(boxes3d),
                   'boxes without depth': len(estimates) - len(boxes3d) - len(implausible)}
         boxes3d = corrected_boxes(boxes3d, self._error_model, gap_s)
@@ -156,6 +162,16 @@ class EstimationStage(object):
         self._events.count_all(counts)
 
         return Header(stamp=stamp, frame_id=frame_id), depth, _as_received(boxes3d, turns, camera)
+
+    def _aligned(self, depth, depth_frame, camera):
+        """Return a depth image with the pixels of colour, and the frame of the colour camera."""
+        if self._registration is not None:
+            frame_id = self._params.frame_id or self._color_frame
+            return self._registration.register(depth, depth_frame, camera, frame_id), frame_id
+        height, width = depth.shape
+        if (width, height) != (camera.width, camera.height):
+            raise ValueError('%s; depth must be aligned to colour: %s' % (size_fault(camera, width, height), ALIGN))
+        return depth, self._params.frame_id or depth_frame
 
     def _check_scale(self, boxes3d, scale_m):
         """Warn if people have impossible heights, with the scale that makes them possible."""

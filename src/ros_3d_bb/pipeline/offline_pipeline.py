@@ -7,22 +7,24 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KINDS, INFO_TOPICS, STATIC_TOPIC,
-                                               TF_TOPIC, topic_of, uncompressed)
+from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, IMAGE_KINDS, INFO_TOPICS,
+                                               STATIC_TOPIC, TF_TOPIC, topic_of, uncompressed)
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg,
                                                    boxes3d_to_msg, tracks_to_msg)
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
 from ros_3d_bb.detection.yolov5.detector import DetectionParams
+from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, RgbdDetectionStage, Yolov5NodeParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
 from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 
-INFO_TOPIC = INFO_TOPICS[0]
+INFO_TOPIC, DEPTH_INFO_TOPIC = INFO_TOPICS
 INPUTS = {COLOR_TOPIC: IMAGE_KINDS, DEPTH_TOPIC: IMAGE_KINDS, INFO_TOPIC: (CameraInfo,),
-          BOXES_TOPIC: (Int32MultiArray,), TF_TOPIC: (TFMessage,), STATIC_TOPIC: (TFMessage,)}
+          DEPTH_INFO_TOPIC: (CameraInfo,), BOXES_TOPIC: (Int32MultiArray,), TF_TOPIC: (TFMessage,),
+          STATIC_TOPIC: (TFMessage,)}
 OUTPUTS_OF_CAMERA, OUTPUTS = (BOXES_TOPIC, BOXES3D_TOPIC), (TRACKS_TOPIC, MARKERS_TOPIC)
 DETECTORS = 'yolov5', 'depth', 'none'
 
@@ -46,12 +48,22 @@ class Settings(NamedTuple):
     camera_pose: Optional[Tuple[float, float]] = None
 
     @property
+    def inputs(self):
+        """The topics of `INPUTS` that are used."""
+        unused = {COLOR_TOPIC if self.detector == 'none' else BOXES_TOPIC}
+        if self.bbox3d[0].depth != RAW:
+            unused.add(DEPTH_INFO_TOPIC)
+        return set(INPUTS) - unused
+
+    @property
     def cameras(self):
         """Namespaces of the cameras; '' for a single camera."""
         return tuple(self.tracker[0].cameras) or ('',)
 
     def name(self, topic, camera=''):
         """Return the name in the bag of a topic of a camera's nodes."""
+        if topic in (DEPTH_TOPIC, DEPTH_INFO_TOPIC):
+            topic = DEPTH_TOPICS[self.bbox3d[0].depth][topic == DEPTH_INFO_TOPIC]
         topic = topic_of(camera, topic)
         return '/' + self.names.get(topic, topic).lstrip('/')
 
@@ -72,16 +84,15 @@ class Pipeline(object):
         for camera in settings.cameras:
             self._estimation_stages[camera] = EstimationStage(
                 settings.bbox3d[0], events, functools.partial(self._on_frame, camera),
-                transforms if settings.bbox3d[0].floor_frame else None,
-                settings.name(DEPTH_TOPIC, camera), settings.name(INFO_TOPIC, camera))
+                transforms, [settings.name(topic, camera) for topic in (DEPTH_TOPIC, DEPTH_INFO_TOPIC, INFO_TOPIC)])
         self._publish_empty = settings.yolov5[0].publish_empty
         if settings.detector == 'depth':
             params, people = settings.depth
             self._publish_empty = params.publish_empty
             for camera in settings.cameras:
                 self._detection_stages[camera] = RgbdDetectionStage(
-                    params, people, events, functools.partial(self._on_images, camera),
-                    transforms if params.floor_frame else None)
+                    params, people, events, functools.partial(self._on_images, camera), transforms,
+                    settings.name(DEPTH_INFO_TOPIC, camera))
         self._now_ns, self._outputs = 0, []  # time and outputs of the message that is being processed
 
     def take(self, topic, message, now_ns, camera=''):
@@ -93,6 +104,11 @@ class Pipeline(object):
                 self._tracking_stage.add_camera_info(message, camera)
             for stage in stages:
                 stage.add_camera_info(message, now_ns)
+        elif topic == DEPTH_INFO_TOPIC:
+            if self._tracking_stage.uses_depth:
+                self._tracking_stage.add_depth_camera_info(message, camera)
+            for stage in stages:
+                stage.add_depth_camera_info(message)
         elif topic == DEPTH_TOPIC:
             message = uncompressed(message)  # once for all stages
             if self._tracking_stage.uses_depth:

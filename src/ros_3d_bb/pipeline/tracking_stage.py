@@ -4,16 +4,20 @@ import re
 import threading
 from typing import NamedTuple
 
+import numpy as np
 import tf2_ros
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import POSE, target_frame_fault
+from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import (camera_from_msg, detections_from_msg, stamp_of, time_from,
                                                    usable_boxes3d)
 from ros_3d_bb.core.camera_clocks import CameraClocks
-from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.params import DEPTH, DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, MessageCache
+from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
@@ -40,6 +44,7 @@ class TrackerNodeParams(NamedTuple):
     cameras: list = Param(())
     camera_frame: str = Param('')
     use_depth: bool = Param(True, 'Whether depth images are used to find out that a person is occluded.')
+    depth: str = DEPTH
     depth_scale: float = DEPTH_SCALE
     depth_cache_length: float = Param(1.0, 'How long depth images are kept for the boxes of the same stamp.', 's')
     stamp_tolerance: float = STAMP_TOLERANCE
@@ -95,6 +100,8 @@ class TrackingStage(object):
         self._jumps = 0  # number of backward jumps in time
         self._frames, self._intrinsics = {}, {}  # by camera
         self._depths = {camera: MessageCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
+        self._registrations = {camera: DepthRegistration(transforms, topic_of(camera, DEPTH_TOPICS[RAW][1]))
+                               for camera in self.cameras if params.depth == RAW}
 
     def reconfigure(self, tracking):
         """Use other tracking parameters for the next boxes; tracks are kept. Raises ValueError as the constructor."""
@@ -108,11 +115,16 @@ class TrackingStage(object):
         """Add a sensor_msgs/CameraInfo. Raises ValueError if it is invalid."""
         self._intrinsics[camera] = camera_from_msg(message)
 
+    def add_depth_camera_info(self, message, camera=''):
+        """Add a sensor_msgs/CameraInfo of the depth camera, for raw depth. Raises ValueError if it is invalid."""
+        self._registrations[camera].add_camera_info(message)
+
     def add_depth(self, message, now_ns, camera=''):
         """Add a depth image. Raises ValueError if it has no stamp; if it is invalid otherwise, it is counted."""
         stamp_ns = stamp_of(message)
         with self._events.rejecting('depth images'):
-            self._depths[camera].add(stamp_ns, now_ns, imgmsg_to_depth(message, self._params.depth_scale))
+            depth = imgmsg_to_depth(message, self._params.depth_scale)
+            self._depths[camera].add(stamp_ns, now_ns, (depth, message.header.frame_id))
 
     def add_boxes(self, message, now_ns, camera=''):
         """Process a BoundingBox3DArray: `on_tracks` is called unless the transform is missing, or the stamp is
@@ -153,21 +165,31 @@ class TrackingStage(object):
         if camera:
             self._check_frame(message.header.frame_id, camera)
         tracks = self._tracker.update(stamp_ns, detections_from_msg(usable, fixed_from_camera),
-                                      self._view(stamp_ns, fixed_from_camera, camera, camera_name))
+                                      self._view(message.header, fixed_from_camera, camera, camera_name))
         self._events.count('images tracked')
         newest_ns = self._clocks.track(stamp_ns, camera)
         self._on_tracks(tracks, Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame))
 
-    def _view(self, stamp_ns, fixed_from_camera, camera, camera_name):
-        """Return the CameraView at a stamp, with intrinsics and depth if they are known."""
+    def _view(self, header, fixed_from_camera, camera, camera_name):
+        """Return the CameraView of boxes with this header, with intrinsics and depth if they are known."""
         intrinsics, depth_at = self._intrinsics.get(camera), None
         depths = self._depths[camera]
-        entry = depths.nearest(stamp_ns, int(self._params.stamp_tolerance * NS) or depths.half_period_ns)
+        entry = depths.nearest(header.stamp.to_nsec(), int(self._params.stamp_tolerance * NS) or depths.half_period_ns)
         if intrinsics is not None and entry is not None:
-            # bbox3d_node reports a depth image of another size.
-            if entry.value.values.shape == (intrinsics.height, intrinsics.width):
-                depth_at = functools.partial(depths_towards, intrinsics, entry.value)
+            depth_at = self._depth_at(*entry.value, intrinsics, camera, header.frame_id)
         return CameraView(fixed_from_camera, intrinsics, camera_name, depth_at)
+
+    def _depth_at(self, depth, depth_frame, intrinsics, camera, boxes_frame):
+        """Return `CameraView.depth_at` for a depth image; None if it cannot be used, which bbox3d_node reports."""
+        if camera not in self._registrations:
+            is_aligned = depth.shape == (intrinsics.height, intrinsics.width)
+            return functools.partial(depths_towards, intrinsics, depth) if is_aligned else None
+        try:
+            geometry = self._registrations[camera].geometry(depth, depth_frame, intrinsics,
+                                                            self._params.camera_frame or boxes_frame)
+        except ValueError:
+            return None
+        return functools.partial(_depths_from_beside, geometry, depth)
 
     def _accept(self, stamp_ns, now_ns, camera):
         """Whether the stamp of boxes is consistent with those of the other cameras. Handles backward jumps in time, as
@@ -198,6 +220,14 @@ class TrackingStage(object):
             self._events.note('cameras sharing a frame', 'the boxes of %s are all in the frame %s and are tracked as '
                               'if the cameras had the same pose; each camera needs its own frame'
                               % (' and '.join(cameras), frame_id))
+
+
+def _depths_from_beside(geometry, depth, points):
+    """As `depths_towards`, for raw depth: measured towards the points from the depth camera beside the view."""
+    points_there = transform_points(np.linalg.inv(geometry.color_from_depth), points)
+    share = depths_towards(geometry.depth_camera, depth, points_there) / points_there[:, 2]
+    beside_m = geometry.color_from_depth[2, 3]
+    return beside_m + share * (points[:, 2] - beside_m)
 
 
 def _check(params):

@@ -51,12 +51,12 @@ class DepthPeople(object):
         used, unless a floor was given since. Returns Detections of class 0, or None if no floor is known yet. Raises
         ValueError if the images or the camera differ in size, or the camera is not upright above the floor.
         """
-        if depth.values.shape != (camera.height, camera.width):
+        if depth.shape != (camera.height, camera.width):
             raise ValueError('the depth image has %d x %d pixels and the colour camera %d x %d; depth aligned to '
-                             'colour expected' % (depth.values.shape[::-1] + camera[:2]))
-        if image.shape[:2] != depth.values.shape:
+                             'colour expected' % (depth.shape[::-1] + camera[:2]))
+        if image.shape[:2] != depth.shape:
             raise ValueError('the colour image has %d x %d pixels and the depth image %d x %d; depth aligned to colour '
-                             'expected' % (image.shape[1::-1] + depth.values.shape[::-1]))
+                             'expected' % (image.shape[1::-1] + depth.shape[::-1]))
         if floor is not None:
             self._fitted_floor = FittedFloor()
         else:

@@ -122,7 +122,7 @@ def fit_floor(depth, camera, params=DepthPeopleParams()):
 
 def _points(depth, camera):
     """Points (n, 3) on a coarse grid of the image, up to FAR_M, and their numbers in the grid (h, w), or -1."""
-    height, width = depth.values.shape
+    height, width = depth.shape
     u, v = np.meshgrid(np.arange(STEP_PX // 2, width, STEP_PX), np.arange(STEP_PX // 2, height, STEP_PX))
     depth_m, valid = depth.at(u, v)
     valid[valid] = depth_m[valid] < FAR_M

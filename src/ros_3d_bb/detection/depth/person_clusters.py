@@ -98,7 +98,7 @@ class Shape(NamedTuple):
 def grid_of(depth, camera, floor, params):
     """Sample a depth image on the grid. Returns Grid."""
     step = max(1, int(round(params.cell_angle * camera.fx)))
-    values = depth.values[step // 2::step, step // 2::step]
+    values = depth.part(slice(step // 2, None, step), slice(step // 2, None, step))
     depth_m = values.astype(np.float32) * np.float32(depth.scale_m)
     depth_m[~((depth_m > params.min_depth) & (depth_m < 100))] = 0
     rows, columns = np.arange(depth_m.shape[0])[:, None], np.arange(depth_m.shape[1])

@@ -8,12 +8,13 @@ from genpy.message import get_message_class
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo
 
-from ros_3d_bb.conversions.camera_msgs import info_topic_beside, topic_of
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, info_topic_beside, topic_of
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
-from ros_3d_bb.diagnosis.checks import BOXES3D, DEPTH, ROLES
-from ros_3d_bb.diagnosis.message_observer import Observation, observations_of
+from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, ROLES
+from ros_3d_bb.diagnosis.message_observer import EdgeObserver, Observation, observations_of
 from ros_3d_bb.nodes.common.master import published_topics, publishers_of
 from ros_3d_bb.nodes.common.subscribers import IMAGE_BUFFER
+from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams
 
@@ -37,8 +38,11 @@ class GraphObserver(object):
                              rospy.Subscriber('/clock', Clock, self._clocks.append, queue_size=10)]
         time.sleep(NAMES_S)
         self._topics = published_topics()
-        self._observed = {key: Observation(role, self._topic_of(role.name)) for key, role in ROLES.items()}
+        names = {key: role.name for key, role in ROLES.items()}
+        names[DEPTH] = DEPTH_TOPICS[self._bbox3d_param('depth')][0]
+        self._observed = {key: Observation(role, self._topic_of(names[key])) for key, role in ROLES.items()}
         self._depth_info = Observation(None, info_topic_beside(self._observed[DEPTH].topic))
+        self._edges = EdgeObserver(self._observed[COLOR], self._observed[DEPTH])
         self._began_s = time.monotonic()
         for one in self._observed.values():
             if self._topics.get(one.topic) in one.role.kinds:
@@ -64,6 +68,7 @@ class GraphObserver(object):
                                              target_frame, camera_frame),
             use_sim_time=bool(rospy.get_param('/use_sim_time', False)), clock_count=len(self._clocks),
             nodes={name: status[:2] for name, status in list(self._statuses.items())},
+            edges_fault=self._edges.fault(), depth_is_raw=self._bbox3d_param('depth') == RAW,
             stamp_tolerance_s=self._bbox3d_param('stamp_tolerance'),
             cache_length_s=self._bbox3d_param('cache_length'))
 

@@ -1,0 +1,60 @@
+"""Register raw depth messages, with the camera_info of the depth camera and the transform between both cameras."""
+import genpy
+import numpy as np
+import tf2_ros
+
+from ros_3d_bb.camera.registration import RegisteredDepth, Registration
+from ros_3d_bb.conversions.perception_msgs import camera_from_msg
+
+RAW = 'raw'  # value of ~depth
+
+
+class DepthRegistration(object):
+    """Register raw depth images to the colour camera.
+
+    Parameters
+    ----------
+    transforms
+        As for `tracking_stage.TrackingStage`. The latest transform is used: the cameras are fixed to each other.
+    info_topic : str
+        Topic of the camera_info of the depth camera, for the error message if it is missing.
+    """
+
+    def __init__(self, transforms, info_topic):
+        self._transforms, self._info_topic, self._depth_camera = transforms, info_topic, None
+        self._geometry = None
+
+    def add_camera_info(self, message):
+        """Add a sensor_msgs/CameraInfo of the depth camera; it is used for all images until the next."""
+        self._depth_camera = camera_from_msg(message)
+
+    def register(self, depth, depth_frame, color_camera, color_frame):
+        """Return the RegisteredDepth of a raw DepthImage. Raises ValueError as `geometry`."""
+        return RegisteredDepth(depth, self.geometry(depth, depth_frame, color_camera, color_frame))
+
+    def geometry(self, depth, depth_frame, color_camera, color_frame):
+        """Return the Registration for a DepthImage, given the optical frames of both cameras.
+
+        Raises
+        ------
+        ValueError
+            If there is no camera_info of depth, it has another size, or the transform is missing.
+        """
+        camera = self._depth_camera
+        if camera is None:
+            raise ValueError('raw depth cannot be registered: no camera_info of the depth camera received on %s'
+                             % self._info_topic)
+        if depth.shape != (camera.height, camera.width):
+            raise ValueError('the depth image has %d x %d pixels, its camera_info on %s %d x %d'
+                             % (depth.shape[::-1] + (self._info_topic,) + camera[:2]))
+        try:
+            color_from_depth = self._transforms.lookup(color_frame, depth_frame, genpy.Time(0))
+        except tf2_ros.TransformException as error:
+            raise ValueError('raw depth cannot be registered: there is no transform from %s to %s: %s; the driver of '
+                             'the camera publishes it (realsense2_camera with publish_tf:=true)'
+                             % (depth_frame, color_frame, error))
+        known = self._geometry
+        if known is None or (known.color_camera, known.depth_camera) != (color_camera, camera) or not np.array_equal(
+                known.color_from_depth, color_from_depth):
+            self._geometry = Registration(color_camera, camera, color_from_depth)
+        return self._geometry

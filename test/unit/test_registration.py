@@ -1,0 +1,99 @@
+"""Registration of raw depth, against geometry and ray casting."""
+import numpy as np
+import pytest
+
+from ros_3d_bb.camera.camera_model import Camera, transform_from
+from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.registration import RegisteredDepth, Registration
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
+from support.cylinders import Cylinder, mounted, rect_of, render
+
+COLOR, DEPTH_CAMERA = Camera(640, 480, 614.686, 614.842, 319.199, 242.08), Camera(848, 480, 421.0, 421.0, 424.2, 238.9)
+WIDE = Camera(160, 120, 80.0, 80.0, 79.5, 59.5)
+NEAR_M, WALL_M = 2.0, 4.0
+STRIPE = slice(60, 80)  # columns of a wide image that show something near
+
+
+def stripe():
+    """Depth of a wide camera, metres: something near in front of a wall."""
+    depth_m = np.full((WIDE.height, WIDE.width), WALL_M, np.float32)
+    depth_m[:, STRIPE] = NEAR_M
+    return depth_m
+
+
+def registered(depth_m, color, shift_m, depth_camera=WIDE, rotation=(0, 0, 0, 1)):
+    return RegisteredDepth(DepthImage(depth_m, 1.0), Registration(color, depth_camera,
+                                                                  transform_from((shift_m, 0, 0), rotation)))
+
+
+@pytest.mark.parametrize('zoom', [0.5, 1.0, 1.7, 3.0])
+def test_the_size_of_a_point_leaves_no_gaps_and_what_is_near_hides_what_is_behind(zoom):
+    """The stripe moves by its disparity; beside it, the depth camera sees no wall."""
+    color = Camera(int(160 * zoom), int(120 * zoom), 80 * zoom, 80 * zoom, 79.5 * zoom, 59.5 * zoom)
+    depth_m = registered(stripe(), color, 0.2).values
+    left, right = ((edge - 0.5 - 79.5) * zoom + 80 * zoom * 0.2 / NEAR_M + 79.5 * zoom for edge in (60, 80))
+    row = depth_m[depth_m.shape[0] // 2]
+    near = np.flatnonzero(row == NEAR_M)
+    assert near[0] == pytest.approx(left, abs=1 + zoom) and near[-1] == pytest.approx(right, abs=1 + zoom)
+    assert len(near) == near[-1] - near[0] + 1
+    unseen = np.flatnonzero(row == 0)
+    unseen = unseen[unseen > 0.2 * len(row)]  # but for the border
+    assert len(unseen) == pytest.approx(80 * zoom * 0.2 * (1 / NEAR_M - 1 / WALL_M), abs=1 + zoom)
+    assert (np.abs(unseen - near[0]) < 10 * zoom).all()
+
+
+def test_a_part_has_the_values_of_the_whole_image():
+    depth = registered(stripe(), COLOR, 0.05)
+    whole, part = depth.values, depth.part(slice(100, 300), slice(200, 400))
+    assert part.shape == (200, 200) and depth.shape == whole.shape == (480, 640)
+    agree = np.abs(part - whole[100:300, 200:400]) < 0.01  # the cells begin elsewhere
+    assert agree.mean() > 0.95
+    assert depth.part(slice(5, 5), slice(0, 9)).shape == (0, 9)
+    depth_m, measured = depth.at(np.array([320]), np.array([240]))
+    assert measured.all() and depth_m == whole[240, 320]
+
+
+@pytest.mark.parametrize('value', [0, np.nan, np.inf, -1, 1e4])
+def test_invalid_depth_is_not_registered(value):
+    assert not registered(np.full((120, 160), value, np.float32), COLOR, 0.05).values.any()
+
+
+def test_a_rotated_distorted_depth_camera_sees_the_same_points():
+    """A wall at an angle: each registered depth lies on it."""
+    fisheye = Camera(160, 120, 80.0, 80.0, 79.5, 59.5, 'plumb_bob', (-0.1, 0.01, 0.001, 0.0, 0.0))
+    pinhole = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, 'plumb_bob', (0.05, 0.0, 0.0, 0.001, 0.0))
+    color_from_depth = transform_from((0.03, 0.01, -0.02), (0.05, 0.0, 0.02, 1))
+    normal, offset_m = np.array([0.3, 0.2, 1.0]), 3.0  # of the wall, in the colour frame
+    rays = fisheye.deproject(np.stack(np.meshgrid(np.arange(160), np.arange(120)), axis=-1), 1.0)
+    there = normal.dot(color_from_depth[:3, :3])
+    depth_m = (offset_m - normal.dot(color_from_depth[:3, 3])) / rays.dot(there)
+    part = RegisteredDepth(DepthImage(depth_m, 1.0), Registration(pinhole, fisheye, color_from_depth)).part(
+        slice(20, 220, 8), slice(20, 300, 8))
+    pixels = np.stack(np.meshgrid(np.arange(20, 300, 8), np.arange(20, 220, 8)), axis=-1)
+    expected_m = offset_m / pinhole.deproject(pixels, 1.0).dot(normal)
+    assert (part > 0).mean() > 0.95
+    assert np.abs(part - expected_m)[part > 0].max() < 0.02  # the slope of the wall within a pixel
+
+
+def test_the_area_with_depth_is_that_of_the_depth_camera():
+    narrow = Camera(160, 120, 160.0, 160.0, 79.5, 59.5)
+    assert registered(stripe(), COLOR, 0.0).measured_area() == (0, 0, 640, 480)
+    left, top, right, bottom = registered(stripe(), COLOR, 0.0, narrow).measured_area()
+    assert (left, right) == pytest.approx((319.2 - 614.7 * 79.5 / 160, 319.2 + 614.7 * 79.5 / 160), abs=2)
+    assert (top, bottom) == pytest.approx((242.1 - 614.8 * 59.5 / 160, 242.1 + 614.8 * 59.5 / 160), abs=2)
+
+
+@pytest.mark.parametrize('baseline_m', [0.015, 0.05])
+def test_boxes_have_the_position_of_aligned_depth(baseline_m):
+    view = mounted(1.0)
+    people = [Cylinder(2.0, 0.6), Cylinder(3.0, -0.5), Cylinder(5.0, 0.2)]
+    aligned, shown = render(COLOR, view, people)
+    raw, _shown = render(DEPTH_CAMERA, view.dot(transform_from((-baseline_m, 0, 0), (0, 0, 0, 1))), people)
+    rects = [rect_of(shown, number) for number in range(3)]
+    registration = Registration(COLOR, DEPTH_CAMERA, transform_from((-baseline_m, 0, 0), (0, 0, 0, 1)))
+    plain, lifted = (estimate_boxes(depth, rects, COLOR, estimator_named('foreground'))
+                     for depth in (aligned, RegisteredDepth(raw, registration)))
+    for expected, box in zip(plain, lifted):
+        np.testing.assert_allclose(box.center_m, expected.center_m, atol=0.01)
+        assert box.support == pytest.approx(expected.support, abs=0.05)
+        assert box.truncated_edges == expected.truncated_edges
