@@ -61,6 +61,7 @@ def test_a_short_soak_violates_no_invariant(soaking, tmp_path):
     """Each kind of fault occurs. The limit of the recovery time depends on the load of the machine."""
     process = soaking('--minutes', '1.5', '--seed', '8', '--recover-within', '600', '--json', 'soak.json')
     printed, progress = process.communicate(timeout=TIMEOUT_S)
+    assert (tmp_path / 'soak.json').exists(), printed + progress
     found = json.loads((tmp_path / 'soak.json').read_text())
     broken = set(invariant['name'] for invariant in found['invariants'] if not invariant['holds'])
     assert broken <= SPEED_DEPENDENT and process.returncode == bool(broken), printed + progress
