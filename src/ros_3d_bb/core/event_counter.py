@@ -31,6 +31,12 @@ class EventCounter(object):
             for event, amount in amounts.items():
                 self.counts[event] = self.counts.get(event, 0) + amount
 
+    def totals(self):
+        """Return the current counters as a dict: of the events, then '<inputs> received' of each kind of inputs."""
+        with self._lock:
+            received = {'%s received' % inputs: amount for inputs, amount in self.received.items()}
+            return dict(self.counts, **received)
+
     def note(self, event, sentence):
         """Count an event that is worth reporting, and keep its first message."""
         self.count(event)

@@ -81,10 +81,8 @@ class Diagnostics(EventCounter):
             status.summary(DiagnosticStatus.STALE, 'no input yet')
         else:
             status.summary(DiagnosticStatus.OK, 'working')
-        for event, amount in list(self.counts.items()):  # a copy, because other threads add events
-            status.add(event, str(amount))
-        for inputs, amount in list(self.received.items()):
-            status.add('%s received' % inputs, str(amount))
+        for name, amount in self.totals().items():
+            status.add(name, str(amount))
         for values in [self._rate_and_latency] + self._shown:
             for name, text in values():
                 status.add(name, text)
