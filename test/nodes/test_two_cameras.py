@@ -30,7 +30,7 @@ def bag(tmp_path_factory):
 
 
 def test_each_person_is_one_track_in_the_views_of_both_cameras(bag):
-    """From the second second on, there are as many tracks as people in nearly all images, and nobody is out of view."""
+    """After one second, there are as many tracks as people in nearly all images, and no person is out of view."""
     with rosbag.Bag(bag) as opened:
         moments = read_recording(opened).moments
     result = score(moments)

@@ -74,9 +74,9 @@ def test_rectangles_with_extreme_or_reversed_edges(events):
     assert events.counts['boxes without depth'] == 1
 
 
-@pytest.mark.parametrize('units_per_m,depth_scale,told', [(5000, 0.0, '0.0002'), (1000, 0.0, None),
-                                                          (5000, 0.0002, None)])
-def test_depth_of_a_wrong_scale_is_reported_with_the_correct_one(units_per_m, depth_scale, told, events):
+@pytest.mark.parametrize('units_per_m,depth_scale,reported', [(5000, 0.0, '0.0002'), (1000, 0.0, None),
+                                                              (5000, 0.0002, None)])
+def test_depth_of_a_wrong_scale_is_reported_with_the_correct_one(units_per_m, depth_scale, reported, events):
     results = []
 
     def on_frame(boxes2d, depth_msg, camera):
@@ -88,9 +88,9 @@ def test_depth_of_a_wrong_scale_is_reported_with_the_correct_one(units_per_m, de
         values = (scene(wall_m=5.0) * units_per_m).astype(np.uint16)
         stage.add_depth(fill_image(Image(header=header), values, '16UC1'), 0)
         stage.add_boxes(boxes2d_to_msg(np.array([PERSON_PX]), header), 0)
-    assert len(results) > 25 and events.counts.get('depth of a wrong scale', 0) == (told is not None)
-    if told:
-        assert 'depth_scale: %s ' % told in events.sentences['depth of a wrong scale']
+    assert len(results) > 25 and events.counts.get('depth of a wrong scale', 0) == (reported is not None)
+    if reported:
+        assert 'depth_scale: %s ' % reported in events.sentences['depth of a wrong scale']
     else:
         assert results[0].center_m[2] == pytest.approx(PERSON_M, abs=0.1)
 

@@ -14,7 +14,7 @@ NEAR = 1.4  # ratio of a factor and a common one that it stands for
 
 
 class ScaleCheck(object):
-    """Heights of the latest people. Those of whom a part is hidden, truncated or not standing are not counted.
+    """Heights of the latest people. People who are partly hidden, truncated or not standing are not counted.
 
     Three quarters of the heights must be too large, or too small.
     """
