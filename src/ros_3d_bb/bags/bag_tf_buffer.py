@@ -6,7 +6,7 @@ import tf2_ros
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import transform_messages
-from ros_3d_bb.conversions.perception_msgs import check_transforms, transform_from_msg
+from ros_3d_bb.conversions.perception_msgs import NEWEST, check_transforms, transform_from_msg
 from ros_3d_bb.core.time_sync import JUMP_NS
 
 
@@ -42,7 +42,7 @@ class BagTransforms(object):
         if root == target_frame.lstrip('/'):
             raise ValueError('the bag contains the pose of %s in %s; a bag without it expected (--camera-height)'
                              % (frame, target_frame))
-        target_from_root = target_from_frame.dot(self.lookup(frame, root, genpy.Time(0)))
+        target_from_root = target_from_frame.dot(self.lookup(frame, root, NEWEST))
         self.set_static(TFMessage(transform_messages(genpy.Time(0), [(target_frame, root, target_from_root)])))
 
     def ahead(self, message):

@@ -15,6 +15,7 @@ from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.tracking.types import TrackedObject, detection_from_box
 
 BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC = 'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'
+NEWEST = genpy.Time(0)  # tf returns the latest transform for stamp 0
 LATEST_NS = 2 ** 31 * NS  # limit of stamps, as their differences must fit into a ROS duration
 EDGE_FLAGS = BoundingBox3D.LEFT, BoundingBox3D.TOP, BoundingBox3D.RIGHT, BoundingBox3D.BOTTOM
 ROUNDING = 1e-9  # tolerance of eigenvalues of a covariance, relative to its largest element if that exceeds 1

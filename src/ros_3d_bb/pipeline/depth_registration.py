@@ -1,10 +1,9 @@
 """Register raw depth messages, with the camera_info of the depth camera and the transform between both cameras."""
-import genpy
 import numpy as np
 import tf2_ros
 
 from ros_3d_bb.camera.registration import RegisteredDepth, Registration
-from ros_3d_bb.conversions.perception_msgs import camera_from_msg
+from ros_3d_bb.conversions.perception_msgs import NEWEST, camera_from_msg
 
 RAW = 'raw'  # value of ~depth
 
@@ -48,7 +47,7 @@ class DepthRegistration(object):
             raise ValueError('the depth image has %d x %d pixels, its camera_info on %s %d x %d'
                              % (depth.shape[::-1] + (self._info_topic,) + camera[:2]))
         try:
-            color_from_depth = self._transforms.lookup(color_frame, depth_frame, genpy.Time(0))
+            color_from_depth = self._transforms.lookup(color_frame, depth_frame, NEWEST)
         except tf2_ros.TransformException as error:
             raise ValueError('raw depth cannot be registered: there is no transform from %s to %s: %s; the driver of '
                              'the camera publishes it (realsense2_camera with publish_tf:=true)'

@@ -2,7 +2,6 @@
 import os
 from typing import NamedTuple
 
-import genpy
 import numpy as np
 import tf2_ros
 
@@ -11,7 +10,7 @@ from ros_3d_bb.camera.image_rotation import (AUTO, turned_camera, turned_depth, 
                                              turns_for, unturned_boxes)
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_if_any, stamp_of
+from ros_3d_bb.conversions.perception_msgs import NEWEST, camera_from_msg, stamp_if_any, stamp_of
 from ros_3d_bb.core.params import (DEPTH, DEPTH_SCALE, ENABLED, IMAGE_ROTATION, PUBLISH_EMPTY, STAMP_TOLERANCE, Param,
                                    parameters)
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
@@ -22,7 +21,6 @@ from ros_3d_bb.detection.yolov5.detector import Yolov5
 from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
 
 CACHE_NS = NS  # how long images wait for each other
-NEWEST = genpy.Time(0)  # tf returns the latest transform for stamp 0
 
 
 @parameters()

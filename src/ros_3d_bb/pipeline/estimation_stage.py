@@ -1,7 +1,6 @@
 """Estimation stage: 3D boxes from 2D boxes, depth images and camera_info, shared by bbox3d_node and process_bag."""
 from typing import NamedTuple
 
-import genpy
 import numpy as np
 import tf2_ros
 from std_msgs.msg import Header
@@ -11,8 +10,8 @@ from ros_3d_bb.camera.image_rotation import (turned_boxes, turned_camera, turned
                                              unturned_boxes)
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
-from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from_msg, stamp_if_any, stamp_of,
-                                                   time_from)
+from ros_3d_bb.conversions.perception_msgs import (NEWEST, boxes2d_from_msg, camera_from_msg, stamp_if_any,
+                                                   stamp_of, time_from)
 from ros_3d_bb.core.limits import LARGEST_M
 from ros_3d_bb.core.params import DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
@@ -197,7 +196,7 @@ class EstimationStage(object):
         if self._transforms is None:
             return None
         try:
-            return self._transforms.lookup(frame_id, self._params.floor_frame, genpy.Time(0))[:3, 2]
+            return self._transforms.lookup(frame_id, self._params.floor_frame, NEWEST)[:3, 2]
         except tf2_ros.TransformException as error:
             if TILT_UNKNOWN not in self._events.counts:
                 self._events.note(TILT_UNKNOWN, 'the tilt of the camera is unknown, as there is no transform from '
