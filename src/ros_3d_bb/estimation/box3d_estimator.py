@@ -363,6 +363,8 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_f
     list of Box3D or None
         In the order of the rectangles; None without a plausible estimate.
     """
+    if len(rects_px) == 0:  # most images show no people
+        return []
     boxes, nearer = [None] * len(rects_px), []
     geometry = ImageGeometry(camera, depth.measured_area(), level_from_camera)
     for number in front_to_back(rects_px, camera):
