@@ -33,9 +33,11 @@ class Graph(object):
         self._process, self._is_ending, self._lines_left = None, False, 0
 
     def __enter__(self):
-        # in a separate session, so that a Ctrl-C in the terminal does not reach it directly
+        # In a separate session, so that a Ctrl-C in the terminal does not reach it directly. Without a buffer: the
+        # process IDs of the nodes are in its output.
         self._process = subprocess.Popen(self._command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                                         universal_newlines=True, errors='replace', start_new_session=True)
+                                         universal_newlines=True, errors='replace', start_new_session=True,
+                                         env=dict(os.environ, PYTHONUNBUFFERED='1'))
         thread = threading.Thread(target=self._read)
         thread.daemon = True
         thread.start()
