@@ -80,6 +80,26 @@ def test_a_free_running_depth_camera_is_paired_by_the_nearest_image(offset_ms, d
     assert paired == [(n, n) for n in range(60) if n % 7 != 3][-len(paired):] and len(paired) >= 49
 
 
+def test_boxes_of_the_first_image_wait_until_the_period_is_known():
+    recorder = Recorder(tolerance_ns=0)
+    recorder.add('camera', 0, 0, 'camera')
+    recorder.add('boxes', 0, 0, 'boxes')
+    assert recorder.add('depth', PERIOD * 2 // 5, PERIOD * 2 // 5, 'first') == []
+    assert recorder.add('depth', PERIOD * 7 // 5, PERIOD * 7 // 5, 'second') == [('boxes', 'first', 'camera')]
+
+
+@pytest.mark.parametrize('of_depth', [False, True])
+def test_boxes_do_not_wait_for_a_camera_info_with_the_other_stamp(of_depth):
+    """The camera_info of a free-running camera may have the stamps of colour or of depth."""
+    recorder, late = Recorder(tolerance_ns=0), PERIOD * 2 // 5
+    for number in range(4):
+        stamp_ns = number * PERIOD
+        recorder.add('camera', stamp_ns + late if of_depth else stamp_ns, stamp_ns, number)
+        recorder.add('depth', stamp_ns + late, stamp_ns + late, number)
+        settled = recorder.add('boxes', stamp_ns, stamp_ns + 2 * late, number)
+    assert settled == [(3, 3, 3)]
+
+
 def test_the_gap_to_the_nearest_depth_image():
     recorder = Recorder(tolerance_ns=0)
     assert recorder.sync.gap_ns(NS) is None

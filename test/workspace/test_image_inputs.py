@@ -7,13 +7,14 @@ import cv2
 import numpy as np
 import pytest
 import rosbag
-from sensor_msgs.msg import CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.bags.bag_writer import write_bag
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, info_topic_beside
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, info_of_images, info_topic_beside
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
+from ros_3d_bb.conversions.perception_msgs import camera_from_msg
 from ros_3d_bb.nodes.doctor import bag_findings
 from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
@@ -104,6 +105,19 @@ def test_other_images_give_the_same_positions(scene, plain, tmp_path, name):
                                          '/camera/depth/image/compressed'])
 def test_camera_info_is_in_the_namespace_of_the_image(image_topic):
     assert info_topic_beside(image_topic) == '/camera/depth/camera_info'
+
+
+@pytest.mark.parametrize('topic,is_rectified', [
+    ('/kinect2/qhd/image_depth_rect', True), ('/camera/depth/image_rect_raw/compressedDepth', True),
+    ('/camera/rgb/image_rect_color', True), ('/camera/rgb/image_raw', False), ('/rect/image_direct', False)])
+def test_rectified_images_have_no_distortion(topic, is_rectified):
+    info = CameraInfo(width=640, height=480, distortion_model='plumb_bob', D=[0.1, 0, 0, 0, 0],
+                      K=[600, 0, 320, 0, 600, 240, 0, 0, 1], P=[580, 0, 318, 0, 0, 581, 239, 0, 0, 0, 1, 0])
+    camera = camera_from_msg(info_of_images(info, topic))
+    assert camera[2:6] == ((580, 581, 318, 239) if is_rectified else (600, 600, 320, 240))
+    assert bool(camera.distortion) is not is_rectified and info.K[0] == 600
+    info.P = [0] * 12  # unknown
+    assert camera_from_msg(info_of_images(info, topic)).fx == 600
 
 
 def test_the_tracker_does_not_import_cv2_for_plain_images():

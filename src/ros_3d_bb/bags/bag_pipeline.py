@@ -1,5 +1,6 @@
 """Run the pipeline on a bag without a ROS master. Equal input bags and parameters give identical output bags."""
 import collections
+import itertools
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, NamedTuple, Optional
 
@@ -19,6 +20,7 @@ from ros_3d_bb.pipeline.offline_pipeline import (DEPTH_INFO_TOPIC, INFO_TOPIC, I
                                                  Pipeline, Settings)
 
 MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
+DRIVER_TF_NS = NS  # within this time from its start, a bag contains each frame of a camera driver
 UNUSED = None, ''  # topic and camera of messages that the nodes do not use
 
 
@@ -66,7 +68,14 @@ class BagRun(object):
         self._pipeline.end()
 
     def _set_camera_pose(self, height_m, tilt_rad):
-        """Set the pose of the camera, whose frame is that of its first message unless a parameter replaces it."""
+        """Set the pose of the camera, whose frame is that of its first message unless a parameter replaces it.
+
+        The other frames of the bag are those of the driver, which do not move, even if it publishes them on tf.
+        """
+        tf_topic, ends_ns = self._settings.name(TF_TOPIC), self._reader.span_ns[0] + DRIVER_TF_NS
+        for raw in itertools.takewhile(lambda raw: raw.time.to_nsec() < ends_ns, self._reader.messages([tf_topic])):
+            with self._events.rejecting('transforms'):
+                self._transforms.set_static(message_in(raw, TFMessage))
         params = self._settings.bbox3d[0]
         pose = mounted_camera(height_m, tilt_rad, turns_for(params.image_rotation, None))
         topic = INFO_TOPIC if params.depth == RAW else DEPTH_TOPIC  # whose frame is that of the 3D boxes

@@ -1,4 +1,6 @@
 """Messages of an RGB-D camera on a robot: images, camera_info and transforms, on the topics of realsense2_camera."""
+import copy
+import re
 from typing import Any, NamedTuple, Sequence
 
 import numpy as np
@@ -24,6 +26,7 @@ TYPES = {TF_TOPIC: TFMessage, COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPIC
          INFO_TOPICS[1]: CameraInfo}
 IMAGE_KINDS = Image, CompressedImage  # that the nodes accept as an image
 TRANSPORTS = 'compressed', 'compressedDepth'  # of image_transport; last part of the name of a topic
+RECTIFIED = re.compile('(^|_)rect(_|$)')  # part of the name of a rectified image, as in image_rect_color
 START_NS = 1600000000 * NS  # start of scenes and bags: arbitrary but fixed
 
 
@@ -54,8 +57,26 @@ def topic_of(camera, topic):
 
 def info_topic_beside(image_topic):
     """Return the topic of the camera_info of an image topic, which may be that of a compressed transport."""
+    return '/'.join(_names_of(image_topic)[:-1] + ['camera_info'])
+
+
+def info_of_images(message, image_topic):
+    """Return the sensor_msgs/CameraInfo of the images on a topic.
+
+    Rectified images, which the name of their topic tells (image_rect, image_color_rect), have the intrinsics P and no
+    distortion, although they share the camera_info of the raw images (sensor_msgs/CameraInfo).
+    """
+    if not (RECTIFIED.search(_names_of(image_topic)[-1]) and message.P[0] > 0):
+        return message
+    rectified = copy.copy(message)
+    rectified.D, rectified.K = (), message.P[:3] + message.P[4:7] + message.P[8:11]
+    return rectified
+
+
+def _names_of(image_topic):
+    """Return the parts of the name of an image topic, without that of its transport."""
     parts = image_topic.split('/')
-    return '/'.join(parts[:-2 if parts[-1] in TRANSPORTS else -1] + ['camera_info'])
+    return parts[:-1] if parts[-1] in TRANSPORTS else parts
 
 
 def uncompressed(message):

@@ -194,10 +194,11 @@ class StampSynchronizer(object):
         settled, waiting = [], []
         newest_ns = self._depths.newest_ns
         tolerance_ns = self._tolerance_ns or self._depths.half_period_ns
+        is_tolerance_known = self._tolerance_ns > 0 or len(self._depths) > 1
         for number, entry in enumerate(self._waiting):
             depth = self._depths.nearest(entry.stamp_ns, tolerance_ns)
-            camera = None if depth is None else self._camera_at(depth.stamp_ns)
-            is_lost = depth is None and newest_ns is not None and entry.stamp_ns < newest_ns
+            camera = None if depth is None else self._camera_at(entry.stamp_ns, tolerance_ns)
+            is_lost = depth is None and newest_ns is not None and entry.stamp_ns < newest_ns and is_tolerance_known
             is_late = now_ns - entry.arrival_ns > self._length_ns
             is_crowded = len(self._waiting) - number > MAX_WAITING
             if camera is not None or is_lost or is_late or is_crowded:
@@ -211,11 +212,11 @@ class StampSynchronizer(object):
             else:
                 self._on_frame(boxes, depth.value, camera)
 
-    def _camera_at(self, stamp_ns):
-        """The camera of a depth image, or the nearest one as soon as a newer message shows that its own is lost."""
+    def _camera_at(self, stamp_ns, tolerance_ns):
+        """The camera of the boxes, or the nearest one as soon as a newer message shows that its own is lost."""
         if self._plain_camera is not None:
             return self._plain_camera
-        camera = self._cameras.nearest(stamp_ns, self._tolerance_ns or SAME_NS)
+        camera = self._cameras.nearest(stamp_ns, tolerance_ns)
         if camera is None and max(self._depths.newest_ns, self._cameras.newest_ns or 0) > stamp_ns:
             camera = self._cameras.nearest(stamp_ns, float('inf'))
         return None if camera is None else camera.value

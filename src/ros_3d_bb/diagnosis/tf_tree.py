@@ -8,6 +8,7 @@ from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
 
 NAMED = 8  # frames listed in a sentence
+ROBOT_FRAMES = 'odom', 'base_link'  # roots of the tree of a robot without localisation (REP 105)
 
 
 class Link(NamedTuple):
@@ -56,9 +57,11 @@ def why_missing(links, target, source, stamp_s):
     if target not in frames and is_optical(up[-1]):
         return 'tf has no frame %s; the tree of the camera is %s' % (target, ' < '.join(up)), pose_fix(up[-1])
     if target not in frames:
-        return ('tf has no frame %s; the tree of the camera is %s' % (target, ' < '.join(up)),
-                'start the localisation of the robot in %s, or track in another frame: frame_world:=%s'
-                % (target, up[-1]))
+        fix = 'start the localisation of the robot in %s, or track in another frame: frame_world:=%s' % (target, up[-1])
+        if up[-1] not in ROBOT_FRAMES:
+            fix += ('; for a camera that is not on a robot: camera_height:=1.2 camera_tilt:=0.1 camera_root:=%s '
+                    '(process_bag: --camera-height 1.2 --camera-tilt 0.1)' % up[-1])
+        return 'tf has no frame %s; the tree of the camera is %s' % (target, ' < '.join(up)), fix
     if up[-1] != down[-1]:
         return ('tf has two trees, %s and %s, without a transform between them' % (' < '.join(up), ' < '.join(down)),
                 _missing_link(frames, up[-1], target))
@@ -67,7 +70,7 @@ def why_missing(links, target, source, stamp_s):
 
 def _missing_link(frames, root, target):
     parent = 'base_link' if root != 'base_link' and 'base_link' in frames else target
-    if root in ('odom', 'base_link'):
+    if root in ROBOT_FRAMES:
         return 'start the localisation of the robot (publishes %s to %s), or frame_world:=%s' % (target, root, root)
     return _publisher_command(parent, root)
 

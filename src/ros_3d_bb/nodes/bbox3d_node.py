@@ -6,8 +6,8 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault
-from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS, info_topic_beside,
-                                               uncompressed)
+from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS, info_of_images,
+                                               info_topic_beside, uncompressed)
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg, camera_from_msg,
                                                    stamp_of)
@@ -18,7 +18,7 @@ from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import patient_master
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
-from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
@@ -68,13 +68,13 @@ class Bbox3dNode(object):
                                     self._diagnostics)
         self._alignment = None
         if is_raw:
-            subscribe(depth_info_topic, CameraInfo, self._on_depth_camera_info, 1)
+            subscribe_camera_info(depth_info_topic, depth_topic, self._on_depth_camera_info, 1)
         else:
             self._alignment = DepthCameraCheck(with_frames=not params.frame_id)
             self._diagnostics.check(self._alignment.faults)
         # Depth images are cached until their boxes arrive, so the subscriber queues must not drop any.
         subscribe(depth_topic, Image, self._on_depth, KEPT_AT_ONCE)
-        subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
+        subscribe_camera_info(INFO_TOPICS[0], COLOR_TOPIC if is_raw else depth_topic, self._on_camera_info)
         subscribe(BOXES_TOPIC, Int32MultiArray, self._on_boxes)
         self._reconfigure_server = ReconfigureServer([params], self._reconfigure)
 
@@ -129,8 +129,8 @@ class DepthCameraCheck(object):
     def __init__(self, with_frames):
         self._with_frames = with_frames
         self.color, self.depth_frame, self._depth = None, '', None
-        topic = info_topic_beside(rospy.resolve_name(DEPTH_TOPIC))
-        rospy.Subscriber(topic, CameraInfo, self._on_depth_camera, queue_size=1)
+        self._depth_topic = rospy.resolve_name(DEPTH_TOPIC)
+        rospy.Subscriber(info_topic_beside(self._depth_topic), CameraInfo, self._on_depth_camera, queue_size=1)
 
     def faults(self):
         """Yield (event, sentence) for each current fault. Called once per second."""
@@ -146,7 +146,7 @@ class DepthCameraCheck(object):
             yield 'alignment', 'depth is not aligned to colour: %s; positions are wrong; %s' % (fault, ALIGN)
 
     def _on_depth_camera(self, message):
-        self._depth = message
+        self._depth = info_of_images(message, self._depth_topic)
 
 
 class SampleImages(object):

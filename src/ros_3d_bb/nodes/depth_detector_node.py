@@ -2,7 +2,7 @@
 import threading
 
 import rospy
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import Image
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPICS, INFO_TOPICS, info_topic_beside
 from ros_3d_bb.core.time_sync import arrival_clock_ns
@@ -11,7 +11,7 @@ from ros_3d_bb.nodes.common.detector_output import DetectorWorker
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
-from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, RgbdDetectionStage
@@ -51,9 +51,9 @@ class DepthDetectorNode(object):
         self._worker = DetectorWorker(params, self._diagnostics, self._detect, RgbdDetectionStage.names)
         self._stage = RgbdDetectionStage(params, people, self._diagnostics, self._worker.offer, transforms,
                                          depth_info_topic)
-        subscribe(INFO_TOPICS[0], CameraInfo, self._on_camera_info, KEPT_AT_ONCE)
+        subscribe_camera_info(INFO_TOPICS[0], COLOR_TOPIC if is_raw else depth_topic, self._on_camera_info)
         if is_raw:
-            subscribe(depth_info_topic, CameraInfo, self._on_depth_camera_info, 1)
+            subscribe_camera_info(depth_info_topic, depth_topic, self._on_depth_camera_info, 1)
         subscribe(depth_topic, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(COLOR_TOPIC, Image, self._on_color)
         ReconfigureServer([params, people], self._reconfigure)

@@ -2,10 +2,10 @@
 import functools
 
 import rospy
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import Image
 from visualization_msgs.msg import MarkerArray
 
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, info_topic_beside, topic_of
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPICS, INFO_TOPICS, info_topic_beside, topic_of
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_msg
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.time_sync import arrival_clock_ns
@@ -14,7 +14,7 @@ from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import on_new_master
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
-from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
@@ -74,12 +74,14 @@ class TrackerNode(object):
             return functools.partial(callback, camera=camera)
         subscribe(topic_of(camera, BOXES3D_TOPIC), BoundingBox3DArray, of_camera(self._on_boxes))
         if self._stage.uses_camera_info:
-            subscribe(topic_of(camera, INFO_TOPICS[0]), CameraInfo, of_camera(self._on_camera_info), 1)
+            subscribe_camera_info(topic_of(camera, INFO_TOPICS[0]),
+                                  topic_of(camera, COLOR_TOPIC) if is_raw else depth_topic,
+                                  of_camera(self._on_camera_info), 1)
         if self._stage.uses_depth:
             subscribe(depth_topic, Image, of_camera(self._on_depth), KEPT_AT_ONCE)
         if self._stage.uses_depth and is_raw:
             depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
-            subscribe(depth_info_topic, CameraInfo, of_camera(self._on_depth_camera_info), 1)
+            subscribe_camera_info(depth_info_topic, depth_topic, of_camera(self._on_depth_camera_info), 1)
 
     def _reconfigure(self, _params, marker_params, *tracking):
         with self._stage.lock:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import rospy
 from rosgraph.masterapi import MasterError
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
@@ -22,7 +22,7 @@ from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import NO_ANSWER, on_new_master, patient_master
 from ros_3d_bb.nodes.common.startup import read_params, run_node
-from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
+from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshots
 from ros_3d_bb.sessions.session_writer import append
 from ros_3d_bb.visualization.cv_window import Window
@@ -96,9 +96,9 @@ class ViewerNode(object):
         rospy.Service('~capture', Trigger, lambda _request: TriggerResponse(*self.capture()))
         for topic, kind, callback in ((BOXES3D_TOPIC, BoundingBox3DArray, self._on_boxes3d),
                                       (BOXES_TOPIC, Int32MultiArray, self._on_boxes2d),
-                                      (CAMERA_INFO_TOPIC, CameraInfo, self._on_camera_info),
                                       (DEPTH_TOPIC, Image, self._on_depth), (COLOR_TOPIC, Image, self._on_color)):
             subscribe(topic, kind, callback, KEPT_AT_ONCE)
+        subscribe_camera_info(CAMERA_INFO_TOPIC, DEPTH_TOPIC, self._on_camera_info)
 
     def _on_color(self, message):
         with self._receiving('colour images', COLOR_TOPIC):

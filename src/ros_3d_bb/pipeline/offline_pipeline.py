@@ -8,7 +8,7 @@ from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, IMAGE_KINDS, INFO_TOPICS,
-                                               STATIC_TOPIC, TF_TOPIC, topic_of, uncompressed)
+                                               STATIC_TOPIC, TF_TOPIC, info_of_images, topic_of, uncompressed)
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg,
                                                    boxes3d_to_msg, tracks_to_msg)
 from ros_3d_bb.core.error_text import cause
@@ -76,7 +76,7 @@ class Pipeline(object):
     """
 
     def __init__(self, settings, events, transforms):
-        self._events = events
+        self._settings, self._events = settings, events
         tracker_params, marker_params, *tracking = settings.tracker
         self._tracking_stage = TrackingStage(tracker_params, tracking, events, transforms, self._on_tracks)
         self._markers = MarkerWriter(marker_params)
@@ -99,6 +99,9 @@ class Pipeline(object):
         """Process a message recorded at `now_ns` on an input topic of the nodes. Returns [(topic, message), ...]."""
         self._now_ns, self._outputs = now_ns, []
         stages = [stages[camera] for stages in (self._detection_stages, self._estimation_stages) if camera in stages]
+        if topic in INFO_TOPICS:
+            is_color_raw = topic == INFO_TOPIC and self._settings.bbox3d[0].depth == RAW
+            message = info_of_images(message, self._settings.name(COLOR_TOPIC if is_color_raw else DEPTH_TOPIC, camera))
         if topic == INFO_TOPIC:
             if self._tracking_stage.uses_camera_info:
                 self._tracking_stage.add_camera_info(message, camera)

@@ -4,9 +4,9 @@ import time
 
 import rospy
 from rospy.topics import get_topic_manager
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CameraInfo, Image
 
-from ros_3d_bb.conversions.camera_msgs import IMAGE_KINDS
+from ros_3d_bb.conversions.camera_msgs import IMAGE_KINDS, info_of_images
 from ros_3d_bb.diagnosis.checks import role_named
 from ros_3d_bb.diagnosis.observations import Stream
 from ros_3d_bb.diagnosis.topic_faults import NO_CLOCK, clock_fault, silence_fault
@@ -67,6 +67,12 @@ def subscribe(topic, kind, callback, at_once=AT_ONCE):
     with _lock:
         _inputs.append(created)
     return created.subscriber
+
+
+def subscribe_camera_info(topic, image_topic, callback, at_once=KEPT_AT_ONCE):
+    """Subscribe to the camera_info of the images on a topic, see `camera_msgs.info_of_images`."""
+    image_topic = rospy.resolve_name(image_topic)
+    return subscribe(topic, CameraInfo, lambda message: callback(info_of_images(message, image_topic)), at_once)
 
 
 def _image_in(message):
