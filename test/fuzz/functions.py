@@ -23,8 +23,9 @@ from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import non_maximum_suppression
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from ros_3d_bb.detection.network_detector import ranked
+from ros_3d_bb.detection.onnx.decoders import decode_rows
 from ros_3d_bb.detection.yolov5.checkpoint import read_checkpoint
-from ros_3d_bb.detection.yolov5.detector import filter_predictions
 from ros_3d_bb.detection.yolov5.predictions import decode_heads
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import read_error_model
@@ -98,7 +99,7 @@ def _estimates(source, _folder):
 
 def _predictions(source, _folder):
     rows = np.reshape(source.numbers(7 * source.choice((0, 1, 5))), (-1, 7))
-    candidates = filter_predictions(rows.astype(np.float32), 0.25, [0, 1])
+    candidates = ranked(decode_rows([rows.astype(np.float32)[None]], (64, 64), 2, 0.25), [0, 1])
     detections = non_maximum_suppression(candidates, 0.45, 100)
     assert np.isfinite(detections.boxes).all()
 
@@ -193,7 +194,7 @@ FUNCTIONS = {  # name: (function of a Source and a folder, relative frequency)
     'camera_from_msg': (_made(camera_from_msg, INFO_TOPICS[0]), 8),
     'boxes2d_from_msg, boxes2d_to_msg': (_boxes2d, 6), 'boxes3d_from_msg, boxes3d_to_msg': (_boxes3d, 3),
     'usable_boxes3d, detections_from_msg': (_detections, 4), 'tracks, planners': (_tracks, 3),
-    'estimate_boxes': (_estimates, 2), 'filter_predictions, non_maximum_suppression': (_predictions, 3),
+    'estimate_boxes': (_estimates, 2), 'decode_rows, ranked, non_maximum_suppression': (_predictions, 3),
     'decode_heads': (_heads, 2), 'params_from': (_params, 15), 'parse_length': (_length, 10),
     'scenario_from': (_scenario, 2), 'read_scenario': (_file(read_scenario, 'scenario.yaml', *SCENARIOS), 0.1),
     'read_error_model': (_file(read_error_model, 'model.yaml', *MODELS), 0.1),
