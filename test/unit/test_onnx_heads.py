@@ -43,6 +43,14 @@ def test_grids_of_sizes_that_are_no_multiples_of_the_largest_stride(head, input_
     np.testing.assert_allclose(detections_in(outputs, layout, input_hw).boxes, BOXES, atol=1e-3)
 
 
+@pytest.mark.parametrize('bins', [8, 11, 17])
+def test_distributions_of_other_lengths(bins):
+    outputs = outputs_of('nanodet', BOXES, np.pad(SCORES, ((0, 0), (0, 77))), HW, bins=bins)
+    layout = layout_of(outputs, HW, {})
+    assert (layout.head, layout.classes) == ('nanodet', 80)
+    np.testing.assert_allclose(detections_in(outputs, layout).boxes, BOXES, atol=1e-3)
+
+
 def test_distributions_by_stride_in_other_orders_and_as_maps():
     """Scores and distances of a stride in turn, and (1, channels, height, width); scores before the sigmoid."""
     outputs = outputs_of('picodet', BOXES, SCORES, HW, STRIDES['picodet'])

@@ -11,7 +11,7 @@ P3, P6 = (8, 16, 32), (8, 16, 32, 64)
 GRIDS = (P3, P6, (4, 8, 16, 32))
 TASKS = ('detect', 'segment', 'pose')  # of ultralytics, whose outputs contain boxes
 YOLOV5_ANCHORS = 3  # predictions of each cell
-BINS = 8  # of the usual distributions of distances
+BINS, OTHER_BINS = 8, (11, 17)  # of usual distributions of distances; the first is that of most networks
 IMAGENET_MEAN, IMAGENET_STD = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)  # red, green, blue
 BLUE_FIRST = {'color': 'bgr', 'mean': IMAGENET_MEAN[::-1], 'std': IMAGENET_STD[::-1]}
 
@@ -141,7 +141,8 @@ def _class_count(head, shapes, metadata, names):
     if HEADS[head].suppressed:
         return len(names) or len(COCO)
     if head.startswith(('nanodet', 'picodet')):
-        count = len(names) or (len(COCO) if columns == len(COCO) + 4 * BINS else columns - 4 * BINS)
+        of_coco = columns - len(COCO) in [4 * bins for bins in OTHER_BINS]
+        count = len(names) or (len(COCO) if of_coco else columns - 4 * BINS)
         if (columns - count) % 4 or columns - count < 8:
             raise ValueError('its %d columns are not the scores of %d classes and 4 distances' % (columns, count))
         return _checked(count, names)
