@@ -23,8 +23,12 @@ from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import non_maximum_suppression
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector, ranked
+from ros_3d_bb.detection.onnx.decoders import decode_rows
+from ros_3d_bb.detection.onnx.heads import HEADS, P3, P6
+from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
 from ros_3d_bb.detection.yolov5.checkpoint import read_checkpoint
-from ros_3d_bb.detection.yolov5.detector import filter_predictions
+from ros_3d_bb.detection.yolov5.onnx_writer import Graph, metadata_entry
 from ros_3d_bb.detection.yolov5.predictions import decode_heads
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import read_error_model
@@ -38,6 +42,7 @@ from ros_3d_bb_annotator import legacy
 from ros_3d_bb_annotator.lengths import parse_length
 from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
 from support.masterless import on_the_wire
+from support.onnx_files import (FLOAT, UINT8, outputs_of, write_constant_network, write_layers, write_mean_network)
 
 CONFIG = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'config')
 NOW_NS = 1000 * NS
@@ -98,7 +103,7 @@ def _estimates(source, _folder):
 
 def _predictions(source, _folder):
     rows = np.reshape(source.numbers(7 * source.choice((0, 1, 5))), (-1, 7))
-    candidates = filter_predictions(rows.astype(np.float32), 0.25, [0, 1])
+    candidates = ranked(decode_rows([rows.astype(np.float32)[None]], (64, 64), 2, 0.25), [0, 1])
     detections = non_maximum_suppression(candidates, 0.45, 100)
     assert np.isfinite(detections.boxes).all()
 
@@ -179,6 +184,81 @@ def _checkpoint(source, folder):
     read_checkpoint(path)
 
 
+def _onnx_seeds():
+    """Contents of small ONNX files of all families."""
+    boxes, scores, strides = [(1.5, 2, 20, 30)], [(0.9, 0.1, 0.2)], {'nanodet-plus': P6, 'picodet': P6}
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder, 'seed.onnx')
+        write_layers(path)
+        yield path.read_bytes()
+        for element in (FLOAT, UINT8):
+            write_mean_network(path, element=element)
+            yield path.read_bytes()
+        for head in HEADS:
+            outputs = outputs_of(head, boxes, scores, (64, 64), strides.get(head, P3))
+            write_constant_network(path, outputs, (1, 3, 64, 64), metadata=METADATA)
+            yield path.read_bytes()
+
+
+METADATA = {'names': "{0: 'person', 1: 'dog', 2: 'chair'}", 'stride': '32', 'task': 'detect', 'end2end': 'False',
+            'args': "{'nms': False}"}
+SETTINGS = [text.encode() for text in (
+    'head: yolox\nstrides: [8, 16, 32]\nnames: [person, dog, chair]\n', 'mean: [1, 2, 3]\nstd: [4, 5, 6]\ncolor: bgr\n',
+    'resize: stretch\npadding: 0\n', '')]
+
+
+def _flipped(source, content):
+    """Bytes of which some have another value; the lengths in the file remain valid."""
+    content = bytearray(content)
+    for _byte in range(source.choice((1, 1, 2, 5))):
+        content[source.randrange(len(content))] = source.choice((0, 1, 127, 255, source.randrange(256)))
+    return bytes(content)
+
+
+def _absurd_onnx(source):
+    """An ONNX file of operators whose results may have any size."""
+    def sizes(count):
+        return [source.choice((0, 1, 1, 2, -1, 3, 64, 1000, 10 ** 5, 2 ** 31, 2 ** 40, 2 ** 62)) for _n in range(count)]
+
+    graph, value = Graph(), 'images'
+    for _operator in range(source.choice((1, 2, 3))):
+        shape = graph.constant(np.array(sizes(4), np.int64))
+        value = source.choice((
+            lambda: graph.node('ConstantOfShape', [shape]), lambda: graph.node('Expand', [value, shape]),
+            lambda: graph.node('Tile', [value, shape]), lambda: graph.node('Reshape', [value, shape]),
+            lambda: graph.node('Pad', [value, graph.constant(np.array(sizes(8), np.int64))]),
+            lambda: graph.node('Resize', [value, '', graph.constant(np.float32(sizes(4)))], mode='nearest'),
+            lambda: graph.node('MaxPool', [value], kernel_shape=[2, 2], pads=[abs(n) for n in sizes(4)]),
+            lambda: graph.node('Concat', [value] * 100, axis=sizes(1)[0])))()
+    shape = tuple(source.choice(((1, 3, 64, 64), (1, 3, 'h', 'w'), (1, 64, 64, 3), (1, 3) + tuple(sizes(2)))))
+    return graph.model([('images', FLOAT, shape)], [(value, FLOAT, ('a', 'b', 'c'))], {})
+
+
+def _onnx(source, folder):
+    """A damaged ONNX file, or a valid one with damaged metadata, or with a damaged YAML file; and an image for it."""
+    onnx, settings = pathlib.Path(folder, 'network.onnx'), pathlib.Path(folder, 'network.yaml')
+    content, settings_text, kind = source.choice(ONNX), b'', source.randrange(5)
+    if kind == 0:
+        content = _mutated(source, content)
+    elif kind == 1:
+        content = _flipped(source, content)
+    elif kind == 4:
+        content = _absurd_onnx(source)
+    elif kind == 2:
+        key = source.choice(sorted(METADATA))
+        content += metadata_entry(key, _mutated(source, METADATA[key].encode()).decode('utf-8', 'replace'))
+    else:
+        settings_text = _mutated(source, source.choice(SETTINGS))
+    onnx.write_bytes(content)
+    settings.write_bytes(settings_text)
+    network = OnnxModel(str(onnx), 1)
+    detector = NetworkDetector(network, DetectionParams(classes=[0], image_size=64))
+    assert np.isfinite(detector.detect(IMAGE).boxes).all()
+
+
+ONNX, IMAGE = list(_onnx_seeds()), np.full((48, 64, 3), 90, np.uint8)
+
+
 def _length(source, _folder):
     parse_length(_mutated(source, b'1,230.5 mm').decode('utf-8', 'replace'), source.choice(('mm', 'm')))
 
@@ -193,14 +273,14 @@ FUNCTIONS = {  # name: (function of a Source and a folder, relative frequency)
     'camera_from_msg': (_made(camera_from_msg, INFO_TOPICS[0]), 8),
     'boxes2d_from_msg, boxes2d_to_msg': (_boxes2d, 6), 'boxes3d_from_msg, boxes3d_to_msg': (_boxes3d, 3),
     'usable_boxes3d, detections_from_msg': (_detections, 4), 'tracks, planners': (_tracks, 3),
-    'estimate_boxes': (_estimates, 2), 'filter_predictions, non_maximum_suppression': (_predictions, 3),
+    'estimate_boxes': (_estimates, 2), 'decode_rows, ranked, non_maximum_suppression': (_predictions, 3),
     'decode_heads': (_heads, 2), 'params_from': (_params, 15), 'parse_length': (_length, 10),
     'scenario_from': (_scenario, 2), 'read_scenario': (_file(read_scenario, 'scenario.yaml', *SCENARIOS), 0.1),
     'read_error_model': (_file(read_error_model, 'model.yaml', *MODELS), 0.1),
     'read_params': (_file(_tracker_params, 'tracker.yaml', TRACKER), 0.05),
     'read_session': (_file(lambda path: read_session(os.path.dirname(path)), 'frames.json', SESSION), 0.5),
     'legacy.read': (_file(lambda path: legacy.read(os.path.dirname(path)), legacy.TEXT_NAME, OLD), 0.5),
-    'read_checkpoint': (_checkpoint, 0.3)}
+    'read_checkpoint': (_checkpoint, 0.3), 'OnnxModel': (_onnx, 0.3)}
 
 
 def fuzz_functions(seed, count, deadline_s=float('inf')):

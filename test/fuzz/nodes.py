@@ -10,6 +10,7 @@ import numpy as np
 from fuzz import hostile
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, TRACKS_TOPIC, time_from
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.detection.yolov5.predictions import Backend
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeNode
@@ -32,10 +33,10 @@ class Target(NamedTuple):
     output: str     # topic on which it responds to valid messages, if there is one
 
 
-class Network(object):
+class Network(Backend):
     """Replaces a network by invalid predictions."""
 
-    names, stride, input_hw, description = ('person', 'chair'), 32, None, 'noise'
+    names, stride, description = ('person', 'chair'), 32, 'noise'
 
     def __init__(self, source):
         self._source = source

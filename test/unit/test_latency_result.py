@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb_lab.evaluation.latency.benchmark import row
+from ros_3d_bb_lab.evaluation.latency.benchmark import cases_of, row
 from ros_3d_bb_lab.evaluation.latency.latency_result import STAGES, latencies, result_of
 
 NS = 10 ** 9
@@ -66,3 +66,11 @@ def test_without_any_answer_there_are_no_latencies():
     result = result_of(record_of([None] * 10))
     assert (result['p50_ms'], result['p99_ms'], result['output_hz'], result['dropped']) == (None, None, 0, 10)
     assert '-' in row(dict(result, name='free', load_average=0.0))
+
+
+def test_each_model_file_is_a_case_with_and_without_load():
+    assert [case.name for case in cases_of([]) if not case.loaded] == ['free', 'depth']
+    cases = {case.name: case for case in cases_of(['/a/yolov5n.pt', '/b/yolox_nano.onnx'])}
+    assert set(cases) == {name + load for load in ('', '+load')
+                          for name in ('free', 'depth', 'yolov5-512', 'yolov5-640', 'yolox_nano')}
+    assert cases['yolov5-512'].weights == '/a/yolov5n.pt' and cases['yolox_nano+load'].weights == '/b/yolox_nano.onnx'

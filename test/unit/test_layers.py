@@ -17,8 +17,9 @@ ALLOWED = {
     'ros_3d_bb.camera': ('core', 'cv2'),
     'ros_3d_bb.estimation': ('camera core', 'yaml'),
     'ros_3d_bb.tracking': ('camera core', 'scipy'),
-    'ros_3d_bb.detection': ('core', ''),
-    'ros_3d_bb.detection.yolov5': ('core detection', 'cv2 onnxruntime torch'),
+    'ros_3d_bb.detection': ('core', 'cv2'),
+    'ros_3d_bb.detection.onnx': ('core detection', 'onnxruntime yaml'),
+    'ros_3d_bb.detection.yolov5': ('core detection detection.onnx', 'onnxruntime torch'),
     'ros_3d_bb.detection.depth': ('core detection', 'cv2'),
     'ros_3d_bb.conversions': (
         'camera core estimation msg tracking',
@@ -41,8 +42,8 @@ ALLOWED = {
         'diagnostic_msgs diagnostic_updater dynamic_reconfigure genpy rosgraph rosgraph_msgs rospkg rospy '
         'sensor_msgs std_msgs std_srvs tf2_ros'),
     'ros_3d_bb.nodes': (
-        'bags camera conversions core detection.depth detection.yolov5 diagnosis drivers msg nodes.common pipeline '
-        'planning sessions tracking visualization',
+        'bags camera conversions core detection detection.depth detection.yolov5 diagnosis drivers msg nodes.common '
+        'pipeline planning sessions tracking visualization',
         'rosgraph rosgraph_msgs rospy sensor_msgs std_msgs std_srvs tf2_ros visualization_msgs'),
     'ros_3d_bb_lab.simulation': ('camera core tracking', 'cv2 yaml'),
     'ros_3d_bb_lab.simulation.ros': (

@@ -10,9 +10,9 @@ import onnx
 import pytest
 import torch
 
+from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5 import onnx_backend, onnx_export
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
-from ros_3d_bb.detection.yolov5.checkpoint import WeightsError
 from ros_3d_bb.detection.yolov5.onnx_backend import OnnxUnusable, export_folder, open_exported, with_checksum
 from ros_3d_bb.detection.yolov5.onnx_export import Exporter, export
 from support.checkpoints import random_network, write_checkpoint

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 import torch
 
+from ros_3d_bb.detection.weights import COCO, WeightsError, class_names
 from ros_3d_bb.detection.yolov5 import checkpoint
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
-from ros_3d_bb.detection.yolov5.checkpoint import EXPECTED, WeightsError, class_names, read_checkpoint
+from ros_3d_bb.detection.yolov5.checkpoint import EXPECTED, read_checkpoint
 from support.checkpoints import official_classes, write_checkpoint
 from support.layouts import layout
 from support.red_detector import write_red_detector
@@ -105,6 +106,14 @@ def test_names_outside_the_allow_list_are_rejected(path, module, name):
         read_checkpoint(path)
 
 
+@pytest.mark.parametrize('name', ['ultralytics.nn.tasks DetectionModel', 'ultralytics.nn.modules.block C2f'])
+def test_the_error_for_ultralytics_models_is_how_to_export_them(path, name):
+    """YOLOv8 and later contain pickled code, of which nothing is imported."""
+    write_pickle(path, b'c%s\n%s\n)R.' % tuple(name.encode().split()))
+    with pytest.raises(WeightsError, match=r'"yolo export model=weights\.pt format=onnx"'):
+        read_checkpoint(path)
+
+
 @pytest.mark.parametrize('name', ['models.common', 'numpy.core.multiarray', 'torch.nn.modules.conv', 'pathlib',
                                   'utils.loss'])
 def test_allowed_modules_are_replaced_by_stand_ins(path, name):
@@ -189,7 +198,7 @@ def test_errors_name_the_file_the_cause_and_the_expected_format(path, content, p
                                                   (None, 2, ['0', '1']), ({0: 'a'}, 2, ['a', '1']),
                                                   ({'0': 'a', '1': 'b'}, 2, ['a', 'b']),
                                                   (['a' * 300, ['b']], 2, ['0', '1']),
-                                                  (None, 80, ['person'] + [str(n) for n in range(1, 80)])])
+                                                  (None, 80, list(COCO))])
 def test_names_in_every_form(names, count, expected):
     """80 classes without names are those of COCO."""
     assert class_names(names, count) == expected

@@ -64,7 +64,7 @@ def test_no_process_remains_after_ctrl_c(bag, benchmark, tmp_path):
 
 
 @pytest.mark.parametrize('arguments, status, reason', [
-    (('--cases', 'fre'), 2, "'fre' is unknown"), (('--cases', 'yolov5-512'), 2, 'needs --weights'),
+    (('--cases', 'fre'), 2, "'fre' is unknown"), (('--cases', 'yolov5-512'), 2, 'need --weights'),
     (('--seconds', '0'), 2, 'more than 0'), (('--cases', 'free', '--bag', __file__), 1, 'cannot be read')])
 def test_invalid_arguments_and_bags_are_rejected(benchmark, arguments, status, reason):
     process = benchmark('--bag', 'some.bag', *arguments)

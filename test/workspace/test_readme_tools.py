@@ -12,7 +12,10 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from
+from ros_3d_bb.core.yaml_loader import load_yaml
+from ros_3d_bb.detection.onnx.model_settings import ModelSettings, settings_from
 from support.code_blocks import claimed
+from support.onnx_files import outputs_of, write_constant_network
 
 DEMO_AND_TESTS = claimed('./run demo\n./run test')
 BUILD = claimed('./run build')
@@ -36,8 +39,11 @@ BENCHMARKS = [(claimed('./run bench accuracy --boxes'), ''), (claimed('./run ben
               (claimed('./run bench tracking'), ' --seconds 3 --repetitions 1'),
               (claimed('./run bench latency'), ' --cases free --seconds 2')]
 DETECTOR_SPEED = claimed('./run bench speed --weights')
+DETECTORS = claimed('./run bench detector')
 YAML = [claimed(beginning, 'yaml') for beginning in ('local_costmap:', 'global_costmap:', 'TebLocalPlannerROS:',
                                                      'max_obstacles:')]
+MODEL_SETTINGS = [claimed('# %s.yaml' % name, 'yaml') for name in (
+    'yolo11n', 'people_yolov7', 'yolox_legacy', 'nanodet', 'picodet_s_416', 'with_nms')]
 
 
 @pytest.fixture(scope='module')
@@ -169,6 +175,13 @@ def test_detector_speed_by_runtime(reader, clone, data, official_output):
     assert 'torch' in printed and 'onnxruntime' in printed
 
 
+def test_detectors_are_compared(reader, clone, data):
+    outputs = outputs_of('yolox', [(0, 0, 30, 30)], [[1] * 80], (96, 128))
+    write_constant_network(reader.home / 'yolox_nano.onnx', outputs)
+    printed = reader.types(DETECTORS, clone, appended=' --every 50', ROS_3D_BB_DATA=data)
+    assert re.search(r'^yolox_nano.onnx  *0 .*^depth ', printed, re.DOTALL | re.MULTILINE)
+
+
 def test_stamp_and_frame_in_the_layout_of_2d_boxes():
     image = Image()
     image.header.stamp, image.header.frame_id = time_from(1600000000000000005), 'some_camera'
@@ -178,6 +191,12 @@ def test_stamp_and_frame_in_the_layout_of_2d_boxes():
     boxes = boxes2d_from_msg(names['message'])
     assert (boxes.stamp_ns, boxes.frame_id) == (1600000000000000005, 'some_camera')
     assert boxes.boxes.tolist() == [[10, 20, 30, 40]]
+
+
+@pytest.mark.parametrize('block', MODEL_SETTINGS, ids=lambda block: block.text.split()[1])
+def test_settings_of_models_are_valid(block):
+    settings = settings_from(load_yaml(block.text))
+    assert settings != ModelSettings() and settings.head in block.text
 
 
 @pytest.mark.parametrize('block', YAML, ids=lambda block: block.text.split(':')[0])

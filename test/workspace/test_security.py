@@ -10,8 +10,9 @@ import pytest
 import yaml
 
 from ros_3d_bb.core.yaml_loader import load_yaml
+from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5.backends import open_runtime
-from ros_3d_bb.detection.yolov5.checkpoint import WeightsError, read_checkpoint
+from ros_3d_bb.detection.yolov5.checkpoint import read_checkpoint
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_lab.evaluation.noise.tables import read_table

@@ -1,10 +1,10 @@
-"""ROS node that detects people in colour images with YOLOv5."""
+"""ROS node that detects people in colour images with a network."""
 import rospy
 from sensor_msgs.msg import Image
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC
+from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
-from ros_3d_bb.detection.yolov5.detector import DetectionParams
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer

@@ -16,8 +16,8 @@ from ros_3d_bb.core.params import (DEPTH, DEPTH_SCALE, ENABLED, IMAGE_ROTATION, 
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
+from ros_3d_bb.detection.network_detector import NetworkDetector
 from ros_3d_bb.detection.yolov5.backends import open_runtime
-from ros_3d_bb.detection.yolov5.detector import Yolov5
 from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
 
 CACHE_NS = NS  # how long images wait for each other
@@ -53,13 +53,13 @@ class DepthDetectorParams(NamedTuple):
 
 
 def opened_yolov5(weights, detection, running, warn):
-    """Return a `Yolov5` detector.
+    """Return a `network_detector.NetworkDetector`.
 
     Parameters
     ----------
     weights : str
         Path of the checkpoint or exported network.
-    detection : detector.DetectionParams
+    detection : network_detector.DetectionParams
     running : backends.RuntimeParams
     warn : callable
         Called with the text of each warning.
@@ -71,14 +71,14 @@ def opened_yolov5(weights, detection, running, warn):
     """
     if not weights:
         raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
-                         'checkpoint such as yolov5n.pt')
-    detector = Yolov5(open_runtime(os.path.abspath(os.path.expanduser(weights)), running, warn), detection)
+                         'checkpoint such as yolov5n.pt, or of an ONNX file of another detector')
+    detector = NetworkDetector(open_runtime(os.path.abspath(os.path.expanduser(weights)), running, warn), detection)
     detector.detect(np.zeros((480, 640, 3), np.uint8))  # the first detection takes several times as long as others
     return detector
 
 
 def detect_in_color(detector, message, turns=0):
-    """Return a colour image as RGB, (height, width, 3), and the Detections of a `detector.Yolov5` in it.
+    """Return a colour image as RGB, (height, width, 3), and the Detections of a `NetworkDetector` in it.
 
     The detector receives the image upright, after `turns` clockwise quarter turns. Raises ValueError if the image or
     its stamp cannot be used.

@@ -13,8 +13,8 @@ from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, T
                                                    boxes3d_to_msg, tracks_to_msg)
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
-from ros_3d_bb.detection.yolov5.detector import DetectionParams
 from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, RgbdDetectionStage, Yolov5NodeParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage

@@ -40,9 +40,9 @@ def depth_detector(simulator):
 
 def yolov5_detector(weights):
     """YOLOv5 detector for `run_scene` from a checkpoint. Raises ValueError if the checkpoint cannot be used."""
+    from ros_3d_bb.detection.network_detector import NetworkDetector
     from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch (slow)
-    from ros_3d_bb.detection.yolov5.detector import Yolov5
-    detector = Yolov5(open_runtime(weights, RuntimeParams(device='cpu')))
+    detector = NetworkDetector(open_runtime(weights, RuntimeParams(device='cpu')))
     return lambda frame: detector.detect(frame.color).boxes
 
 

@@ -208,10 +208,10 @@ def detector_speed(images, weights, runtimes=('torch', 'onnxruntime'), sizes=(64
 
 
 def _detector(weights, runtime, size):
+    from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
     from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
-    from ros_3d_bb.detection.yolov5.detector import DetectionParams, Yolov5
     running = RuntimeParams(runtime=runtime, device='cpu', threads=1)
-    return Yolov5(open_runtime(weights, running), DetectionParams(image_size=size))
+    return NetworkDetector(open_runtime(weights, running), DetectionParams(image_size=size))
 
 
 def _detector_time_ms(detector, image):

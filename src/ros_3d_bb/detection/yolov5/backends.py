@@ -1,10 +1,7 @@
-"""Inference backends: the common interface of torch and ONNX Runtime.
+"""Networks of all kinds of model files, chosen by the suffix: torch and ONNX Runtime.
 
-`open_runtime` chooses the backend by the suffix of the model file; `detector.Yolov5` turns its predictions into boxes.
-A backend is called with an RGB image (height, width, 3), uint8, and a minimum objectness. It returns the predictions
-above it (rows, 5 + classes), float32: x, y, width, height in pixels of the image, objectness, class scores.
-Attributes: `names`, the class names; `stride`, of which height and width must be multiples; `input_hw`, the only
-(height, width) that it accepts, or None if it accepts any; and `description`, a text for logs.
+`open_runtime` returns a network for `network_detector.NetworkDetector`: one of the YOLOv5 backends, see
+`predictions.Backend`, or an `onnx.onnx_model.OnnxModel`.
 """
 import ctypes
 import os
@@ -12,8 +9,9 @@ import warnings
 from typing import NamedTuple
 
 from ros_3d_bb.core.params import Param, check, parameters
-from ros_3d_bb.detection.yolov5.checkpoint import WeightsError
-from ros_3d_bb.detection.yolov5.onnx_backend import OnnxRuntime, OnnxUnusable, export_folder, open_exported
+from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
+from ros_3d_bb.detection.weights import WeightsError
+from ros_3d_bb.detection.yolov5.onnx_backend import OnnxUnusable, export_folder, open_exported
 
 MAX_THREADS = 4  # default maximum; small networks gain little from more threads
 
@@ -37,7 +35,8 @@ class RuntimeParams(NamedTuple):
 
 
 def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
-    """Load an official checkpoint (.pt), or a model that YOLOv5 exported to TorchScript (.torchscript) or ONNX (.onnx).
+    """Load an official YOLOv5 checkpoint (.pt), its export to TorchScript (.torchscript), or any known detector in
+    an ONNX file (.onnx).
 
     A TorchScript file is a program: load only trusted files. `warn` is called with one line of text for problems that
     are worked around. Raises WeightsError if the file cannot be used, or needs torch and torch is not installed, and
@@ -66,7 +65,7 @@ def _open_file(path, params, threads, warn):
             raise ValueError('runtime torch cannot run %s; use auto or onnxruntime, or the .pt checkpoint' % path)
         if params.device not in ('auto', 'cpu'):
             raise ValueError('device is %r, but %s runs on the CPU; use the .pt checkpoint' % (params.device, path))
-        return OnnxRuntime(path, threads)
+        return OnnxModel(path, threads)
 
     if path.endswith(('.torchscript', '.torchscript.pt')):
         if params.runtime == 'onnxruntime':

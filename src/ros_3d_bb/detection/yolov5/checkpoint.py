@@ -6,26 +6,23 @@ inert stand-ins. No class is imported and torch is not used, so a file controls 
 the network. Known limitation: a malicious file can keep Python's unpickler busy for very long by hashing nested tuples.
 """
 import collections
+import os
 import pickle
 import zipfile
 
 import numpy as np
 
 from ros_3d_bb.core.error_text import cause
+from ros_3d_bb.detection.weights import MAX_CLASSES, MAX_NAME, WeightsError, class_names
 
 EXPECTED = 'expected the checkpoint (.pt) of an official YOLOv5 detection model, release 5.0 to 7.0'
 # Modules whose classes become inert stand-ins: the model itself, and leftovers of training in the file.
 INERT_MODULES = ('models', 'utils', 'torch.nn', 'numpy', '_codecs', 'pathlib', 'datetime')
-MAX_CLASSES, MAX_NAME = 10000, 200
 # A tensor may repeat its numbers by strides of 0, as YOLOv5's cached grids do, up to this size.
 MAX_REPEATED = 10 ** 6
 STORAGE_DTYPES = {'DoubleStorage': '<f8', 'FloatStorage': '<f4', 'HalfStorage': '<f2', 'LongStorage': '<i8',
                   'IntStorage': '<i4', 'ShortStorage': '<i2', 'CharStorage': '<i1', 'ByteStorage': '<u1',
                   'BoolStorage': '|b1'}
-
-
-class WeightsError(ValueError):
-    """Weights that cannot be used. The message names the file, the reason, and what was expected."""
 
 
 def read_checkpoint(path):
@@ -93,6 +90,10 @@ class _Unpickler(pickle.Unpickler):
             return STORAGE_DTYPES[name]
         if any(module == inert or module.startswith(inert + '.') for inert in INERT_MODULES):
             return self._classes.setdefault((module, name), type(name, (Inert,), {'origin': '%s.%s' % (module, name)}))
+        if module.split('.')[0] == 'ultralytics':
+            raise pickle.UnpicklingError(
+                'it is a model of ultralytics (YOLOv8 or later), which contains code; export it with "yolo export '
+                'model=%s format=onnx" and use the .onnx file' % os.path.basename(self._archive.filename))
         raise pickle.UnpicklingError('%s.%s is not in the allow-list' % (module, name))
 
     def persistent_load(self, reference):
@@ -136,20 +137,6 @@ def _content_of(root):
     if activations - {declared.partition('(')[0].rpartition('.')[2]}:
         raise ValueError('its layers use %s, but its yaml declares %s' % (', '.join(sorted(activations)), declared))
     return layout, class_names(model.state.get('names'), layout['nc']), tensors
-
-
-def class_names(names, count):
-    """Class names as a list, from the list or the {number: name} dict in a file.
-
-    Without names, 80 classes are those of COCO, whose first is person. Other classes are named by their number.
-    """
-    if isinstance(names, (list, tuple)):
-        names = dict(enumerate(names))
-    if not isinstance(names, dict):
-        names = {0: 'person'} if count == 80 else {}
-    entries = [names.get(number, names.get(str(number))) for number in range(count)]  # keys are strings in JSON
-    return [name if isinstance(name, str) and len(name) <= MAX_NAME else str(number)
-            for number, name in enumerate(entries)]
 
 
 def _walk(model):

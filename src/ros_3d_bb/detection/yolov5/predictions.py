@@ -5,12 +5,21 @@ network, one per scale, contain the same predictions before decoding.
 """
 import numpy as np
 
+from ros_3d_bb.detection.network_detector import Resize
+from ros_3d_bb.detection.onnx.decoders import decode_rows
 
-def batch_of(image):
-    """Convert an RGB image (height, width, 3), uint8, to a batch (1, 3, height, width), float32, 0..1."""
-    batch = np.ascontiguousarray(image.transpose(2, 0, 1)[None], np.float32)
-    batch /= 255
-    return batch
+
+class Backend(object):
+    """Base of the backends. They are called with an RGB image (height, width, 3), uint8, and a minimum objectness, and
+    return the predictions above it, float32.
+    """
+
+    input_hw, resize, suppressed = None, Resize(), False
+
+    def candidates(self, image, confidence):
+        """Detections in an image with a score above the confidence, see `network_detector.NetworkDetector`."""
+        rows = self(image, confidence)
+        return decode_rows([rows[None]], image.shape[:2], rows.shape[1] - 5, confidence)
 
 
 def check_stride(stride):

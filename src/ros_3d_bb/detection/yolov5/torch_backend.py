@@ -5,9 +5,11 @@ import numpy as np
 import torch
 
 from ros_3d_bb.core.error_text import cause
-from ros_3d_bb.detection.yolov5.checkpoint import EXPECTED, WeightsError, class_names, read_checkpoint
+from ros_3d_bb.detection.batches import batch_of
+from ros_3d_bb.detection.weights import WeightsError, class_names
+from ros_3d_bb.detection.yolov5.checkpoint import EXPECTED, read_checkpoint
 from ros_3d_bb.detection.yolov5.network import Network
-from ros_3d_bb.detection.yolov5.predictions import batch_of, check_stride, predictions
+from ros_3d_bb.detection.yolov5.predictions import Backend, check_stride, predictions
 
 
 def torch_device(name):
@@ -48,10 +50,8 @@ def run(network, image):
         return network(torch.from_numpy(batch_of(image)).to(weight.device, weight.dtype))[0]
 
 
-class TorchRuntime(object):
+class TorchRuntime(Backend):
     """Official checkpoint in the network of this package."""
-
-    input_hw = None
 
     def __init__(self, path, device, threads):
         network, self.names = network_of(path)
@@ -65,7 +65,7 @@ class TorchRuntime(object):
         return rows[rows[:, 4] > min_objectness].cpu().numpy()
 
 
-class TorchScriptRuntime(object):
+class TorchScriptRuntime(Backend):
     """Model exported to TorchScript by YOLOv5's export.py. It accepts only the image size of the export."""
 
     def __init__(self, path, device, threads):

@@ -26,13 +26,18 @@ class Case(NamedTuple):
 
     name: str
     detector: str    # of pipeline.launch
-    image_size: int  # of YOLOv5
+    image_size: int  # of the network
+    weights: str     # path of the model file
     loaded: bool     # whether another process loads a core
 
 
-DETECTORS = (('free', 'none', 0), ('depth', 'depth', 0), ('yolov5-512', 'yolov5', 512), ('yolov5-640', 'yolov5', 640))
-CASES = [Case(name + ('+load' if loaded else ''), detector, size, loaded)
-         for loaded in (False, True) for name, detector, size in DETECTORS]
+def cases_of(weights):
+    """All cases for a list of model files: the first is that of the YOLOv5 cases, each other is a case of its own."""
+    detectors = [('free', 'none', 0, ''), ('depth', 'depth', 0, '')]
+    detectors += [('yolov5-%d' % size, 'yolov5', size, path) for path in weights[:1] for size in (512, 640)]
+    detectors += [(os.path.splitext(os.path.basename(path))[0], 'yolov5', 640, path) for path in weights[1:]]
+    return [Case(name + ('+load' if loaded else ''), detector, size, path, loaded)
+            for loaded in (False, True) for name, detector, size, path in detectors]
 
 
 def measured(case, arguments, bag, folder):
@@ -41,7 +46,7 @@ def measured(case, arguments, bag, folder):
     Raises RuntimeError if nothing was measured.
     """
     record, log = (os.path.join(folder, case.name + suffix) for suffix in ('.json', '.log'))
-    options = {'bag': bag, 'record': record, 'detector': case.detector, 'weights': arguments.weights or '',
+    options = {'bag': bag, 'record': record, 'detector': case.detector, 'weights': case.weights,
                'image_size': case.image_size, 'seconds': arguments.seconds, 'rate': arguments.rate}
     with cpu_load(int(case.loaded)), open(log, 'w') as stream:
         launch(['%s:=%s' % option for option in options.items()], arguments.seconds + 200, stream)
@@ -148,11 +153,13 @@ def main():
 
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench latency', description=__doc__)
-    parser.add_argument('--cases', help='some of %s, separated by commas (default: all; yolov5 needs weights)'
-                        % ', '.join(case.name for case in CASES))
+    parser.add_argument('--cases', help='some of free, depth, yolov5-512, yolov5-640 and the names of further model '
+                        'files, each with or without +load, separated by commas (default: all)')
     parser.add_argument('--seconds', type=float, default=20.0, help='duration of a measurement (default: 20)')
     parser.add_argument('--rate', type=float, default=30.0, metavar='HZ', help='images per second (default: 30)')
-    parser.add_argument('--weights', default=default_weights(), help='checkpoint or export of YOLOv5')
+    parser.add_argument('--weights', nargs='+', default=list(filter(None, [default_weights()])), metavar='FILE',
+                        help='checkpoint or export of YOLOv5, and further model files, which are cases named by the '
+                        'file without suffix (default: yolov5n.pt in the cache, if any)')
     images = parser.add_mutually_exclusive_group()
     images.add_argument('--scenario', type=scenario_path, default='demo', metavar='SCENARIO',
                         help='scenario; its first %d images are played (default: demo)' % IMAGES)
@@ -161,13 +168,10 @@ def _arguments():
     arguments = parser.parse_args()
     if not (arguments.seconds > 0 and arguments.rate > 0):
         parser.error('--seconds %g, --rate %g: more than 0 expected' % (arguments.seconds, arguments.rate))
-    arguments.weights = arguments.weights and os.path.abspath(arguments.weights)
-    known = {case.name: case for case in CASES}
-    measurable = [case.name for case in CASES if arguments.weights or case.detector != 'yolov5']
-    names = arguments.cases.split(',') if arguments.cases else measurable
+    known = {case.name: case for case in cases_of([os.path.abspath(path) for path in arguments.weights])}
+    names = arguments.cases.split(',') if arguments.cases else list(known)
     for name in names:
         if name not in known:
-            parser.error('case %r is unknown; known: %s' % (name, ', '.join(known)))
-        if name not in measurable:
-            parser.error('case %s needs --weights' % name)
+            parser.error('case %r is unknown; known: %s%s' % (name, ', '.join(known), '' if arguments.weights else
+                                                              '; cases of networks need --weights'))
     return arguments, [known[name] for name in names]

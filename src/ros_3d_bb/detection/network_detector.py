@@ -1,0 +1,142 @@
+"""Detector that runs a network: resizing, network, class filter, non-maximum suppression.
+
+Convention: boxes are (x1, y1, x2, y2) in pixels of the image, x to the right, y down, x2 and y2 exclusive.
+"""
+from typing import NamedTuple, Tuple
+
+import cv2
+import numpy as np
+
+from ros_3d_bb.core.params import LARGEST, Param, parameters
+from ros_3d_bb.detection.boxes import Detections, non_maximum_suppression
+
+RESIZE_MODES = ('center', 'corner', 'stretch')
+MAX_INPUT_PX = 4096  # larger inputs exhaust the memory
+MAX_CANDIDATES = 30000  # maximum number of boxes before suppression, as in ultralytics
+
+
+@parameters()
+class DetectionParams(NamedTuple):
+    """What counts as a detection."""
+
+    classes: list = Param(('person',), 'Classes to detect: names or numbers of the model.', live=True)
+    confidence: float = Param(
+        0.25, 'Smallest score of a detection (of YOLOv5 and YOLOX, objectness times class score).', limits=(0, 1),
+        live=(0, 1))
+    iou: float = Param(
+        0.45, 'Two boxes of a class that overlap by more than this (intersection over union) are one object.',
+        limits=(0, 1), live=(0, 1))
+    max_det: int = Param(
+        100, 'Largest number of detections in an image; the best ones are kept.', limits=(1, LARGEST), live=(1, 300))
+    image_size: int = Param(
+        640, "Longer side of the network's input, rounded up to its stride (32, P6 models 64). Smaller is faster and "
+        'misses people farther away. Exports with a fixed size ignore it.', 'pixels', limits=(1, MAX_INPUT_PX),
+        live=(160, 1280))
+
+
+class Resize(NamedTuple):
+    """How an image becomes the input of a network.
+
+    mode is `center` (scaled with its aspect ratio and padded on two sides), `corner` (padded at the right and at the
+    bottom) or `stretch` (not padded); padding is a grey level.
+    """
+
+    mode: str = 'center'
+    padding: int = 114
+
+
+class Placement(NamedTuple):
+    """Scale and shift, x and y, from an image to the network's input."""
+
+    scale: Tuple[float, float]
+    shift: Tuple[int, int]
+
+    def undo(self, boxes, image_hw):
+        """Convert boxes from input pixels to image pixels, clipped to the image."""
+        boxes = (boxes - np.tile(self.shift, 2)) / np.tile(self.scale, 2)
+        height, width = image_hw
+        return np.clip(boxes, 0, [width, height, width, height])
+
+
+class NetworkDetector(object):
+    """Detector that runs a network.
+
+    Parameters
+    ----------
+    network
+        A backend of `detection.yolov5.backends` or an `onnx.onnx_model.OnnxModel`. Its method `candidates` takes an
+        RGB image (height, width, 3), uint8, and a confidence, and returns the Detections above it in pixels of this
+        image, in any order. Its attributes are `names`, the class names; `stride`, of which height and width must be
+        multiples; `input_hw`, the only (height, width) that it accepts, or None if it accepts any; `resize`, a
+        `Resize`; `suppressed`, whether it suppresses overlapping boxes itself; and `description`, a text for logs.
+    params : DetectionParams
+
+    Raises
+    ------
+    ValueError
+        If there is no class to detect, or the model does not have one of the classes.
+    """
+
+    def __init__(self, network, params=DetectionParams()):
+        if not params.classes:
+            raise ValueError('classes is empty; at least one class expected, such as person')
+        self._network, self._params = network, params
+        self.names, self.description = network.names, network.description  # class names by number; text for logs
+        self._classes = [class_number(entry, network.names) for entry in params.classes]
+        size = int(np.ceil(params.image_size / float(network.stride))) * network.stride
+        self._input_hw = network.input_hw or (size, size)
+        self._stride = network.stride if network.input_hw is None else None
+
+    def with_params(self, params):
+        """Return a detector with the same network and other parameters. Raises ValueError like the constructor."""
+        return NetworkDetector(self._network, params)
+
+    def detect(self, image):
+        """Return the Detections in an RGB image (height, width, 3), uint8."""
+        scaled, placement = fit_image(image, self._input_hw, self._stride, self._network.resize)
+        candidates = ranked(self._network.candidates(scaled, self._params.confidence), self._classes)
+        iou_limit = 1 if self._network.suppressed else self._params.iou
+        detections = non_maximum_suppression(candidates, iou_limit, self._params.max_det)
+        return detections._replace(boxes=placement.undo(detections.boxes, image.shape[:2]))
+
+
+def class_number(entry, names):
+    """Number of a class that is given by name or number. Raises ValueError if the model does not have it."""
+    if entry in names:
+        return names.index(entry)
+    if str(entry).isdigit() and int(entry) < len(names):
+        return int(entry)
+    raise ValueError('class %r is not among the %d classes of the model: %s' % (entry, len(names), ', '.join(names)))
+
+
+def fit_image(image, input_hw, stride=None, resize=Resize()):
+    """Scale an image to the network's input and pad it.
+
+    It is padded to `input_hw`, or to the next multiple of a stride. Returns the image, which is the given one if it
+    already has this size, and its Placement.
+    """
+    height, width = image.shape[:2]
+    if resize.mode == 'stretch':
+        scaled_hw = input_hw
+    else:
+        scale = min(input_hw[0] / float(height), input_hw[1] / float(width))
+        scaled_hw = max(int(round(height * scale)), 1), max(int(round(width * scale)), 1)
+    if scaled_hw != (height, width):
+        image = cv2.resize(image, scaled_hw[::-1], interpolation=cv2.INTER_LINEAR)
+    pad_y, pad_x = (outer - inner for outer, inner in zip(input_hw, scaled_hw))
+    if stride is not None:
+        pad_y, pad_x = pad_y % stride, pad_x % stride
+    top, left = (pad_y // 2, pad_x // 2) if resize.mode == 'center' else (0, 0)
+    if pad_x or pad_y:
+        image = cv2.copyMakeBorder(image, top, pad_y - top, left, pad_x - left, cv2.BORDER_CONSTANT,
+                                   value=(resize.padding,) * 3)
+    scale_xy = (scaled_hw[1] / float(width), scaled_hw[0] / float(height)) if resize.mode == 'stretch' else (scale,) * 2
+    return image, Placement(scale_xy, (left, top))
+
+
+def ranked(detections, classes):
+    """Detections of some classes with finite boxes, in order of decreasing score; at most MAX_CANDIDATES."""
+    boxes, scores, numbers = detections
+    kept = np.flatnonzero(np.isin(numbers, classes) & np.isfinite(boxes).all(axis=1))
+    kept = kept[np.argsort(-scores[kept], kind='mergesort')[:MAX_CANDIDATES]]
+    return Detections(boxes[kept], scores[kept], numbers[kept])

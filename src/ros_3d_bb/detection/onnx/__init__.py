@@ -1,0 +1,4 @@
+"""Detectors in ONNX files of any family: heads, preprocessing, and ONNX Runtime.
+
+May import: core, detection.
+"""

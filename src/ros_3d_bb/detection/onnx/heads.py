@@ -1,0 +1,161 @@
+"""Families of detection heads, and their recognition by the outputs of a network."""
+import functools
+from collections import OrderedDict
+from typing import Callable, NamedTuple, Tuple
+
+from ros_3d_bb.detection.onnx.decoders import (cell_count, decode_columns, decode_distances, decode_final, decode_rows,
+                                               decode_yolox, is_probability)
+from ros_3d_bb.detection.weights import COCO, MAX_CLASSES
+
+P3, P6 = (8, 16, 32), (8, 16, 32, 64)
+GRIDS = (P3, P6, (4, 8, 16, 32))
+TASKS = ('detect', 'segment', 'pose')  # of ultralytics, whose outputs contain boxes
+YOLOV5_ANCHORS = 3  # predictions of each cell
+BINS, OTHER_BINS = 8, (11, 17)  # of usual distributions of distances; the first is that of most networks
+IMAGENET_MEAN, IMAGENET_STD = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)  # red, green, blue
+BLUE_FIRST = {'color': 'bgr', 'mean': IMAGENET_MEAN[::-1], 'std': IMAGENET_STD[::-1]}
+
+
+class Head(NamedTuple):
+    """A family of heads, with the input on which its networks are trained."""
+
+    decode: Callable  # a function of `decoders`
+    shape: str  # of its outputs, for messages
+    strides: Tuple[int, ...] = ()  # of the grid, if the decoder needs it
+    suppressed: bool = False  # whether the network suppresses overlapping boxes
+    color: str = 'rgb'  # order of the channels
+    mean: Tuple[float, ...] = (0.0, 0.0, 0.0)  # subtracted from the channels, 0..255, in this order
+    std: Tuple[float, ...] = (255.0, 255.0, 255.0)  # by which they are then divided
+    resize: str = 'center'  # a mode of `network_detector.fit_image`
+    padding: int = 114
+
+
+HEADS = OrderedDict((
+    ('yolov5', Head(decode_rows, '(1, n, 5 + classes)')),
+    ('yolov8', Head(decode_columns, '(1, 4 + classes, n)')),
+    ('end-to-end', Head(decode_final, '(1, n, 6)', suppressed=True)),
+    ('yolox', Head(decode_yolox, '(1, n, 5 + classes)', P3, color='bgr', std=(1.0, 1.0, 1.0), resize='corner')),
+    ('yolox-decoded', Head(decode_rows, '(1, n, 5 + classes)', color='bgr', std=(1.0, 1.0, 1.0), resize='corner')),
+    ('nanodet', Head(decode_distances, '(1, n, classes + 4 * bins), or (1, n, classes) and (1, n, 4 * bins) by stride',
+                     P3, padding=0, **BLUE_FIRST)),
+    ('nanodet-plus', Head(functools.partial(decode_distances, offset=0.0), '(1, n, classes + 4 * bins)', P6,
+                          resize='stretch', **BLUE_FIRST)),
+    ('picodet', Head(decode_distances, '(1, n, classes) and (1, n, 4 * bins) by stride', P6, mean=IMAGENET_MEAN,
+                     std=IMAGENET_STD, resize='stretch'))))
+
+
+class Layout(NamedTuple):
+    """How the outputs of one network are decoded."""
+
+    head: str  # a key of HEADS
+    classes: int  # number of classes
+    strides: Tuple[int, ...] = ()  # of the grid
+    order: Tuple[int, ...] = (0,)  # indices of the outputs for the decoder
+
+
+def layout_of(outputs, input_hw, metadata, head='', strides=(), names=()):
+    """Recognise a network by its outputs. Returns its Layout.
+
+    Parameters
+    ----------
+    outputs : list of ndarray
+        Outputs for any image.
+    input_hw : tuple of int
+        Height and width of that image.
+    metadata : dict
+        Metadata of the file, {key: text}.
+    head, strides, names : optional
+        Name of the head, strides of its grid and names of its classes, where they are given.
+
+    Raises
+    ------
+    ValueError
+        If the outputs are not those of a known head, or not of what is given.
+    """
+    if metadata.get('task', 'detect') not in TASKS:
+        raise ValueError('its task is %.40r; %s expected' % (metadata['task'], ', '.join(TASKS)))
+    shapes = [output.shape for output in outputs]
+    grids = [tuple(strides)] if strides else GRIDS
+    for grid in grids:
+        order = _order_by_stride(shapes, input_hw, grid)
+        if order and head in ('', 'nanodet', 'picodet'):
+            classes = _rows_and_channels(shapes[order[0]])[1]
+            return Layout(head or ('picodet' if len(grid) > 3 else 'nanodet'), _checked(classes, names), grid, order)
+    if not shapes or len(shapes[0]) != 3 or shapes[0][0] != 1:
+        raise ValueError('its first output is not (1, n, m)')
+    grid = next((grid for grid in grids if _matches(shapes[0], cell_count(input_hw, grid))), ())
+    head = head or _head_of(outputs[0], input_hw, grid, metadata)
+    if HEADS[head].strides and not (grid and shapes[0][1] == cell_count(input_hw, grid)):
+        raise ValueError('its first output has %d rows, which are not the cells of strides %s; the key strides in the '
+                         'YAML file gives others' % (shapes[0][1], list(strides or HEADS[head].strides)))
+    return Layout(head, _class_count(head, shapes, metadata, names), grid)
+
+
+def _order_by_stride(shapes, input_hw, grid):
+    """Indices of the scores of each stride, followed by those of the distances; None if the outputs are not these."""
+    if len(shapes) != 2 * len(grid) or any(len(shape) not in (3, 4) or shape[0] != 1 for shape in shapes):
+        return None
+    scores, distances = [], []
+    for stride in grid:
+        pair = [index for index, shape in enumerate(shapes)
+                if _rows_and_channels(shape)[0] == cell_count(input_hw, (stride,))]
+        if len(pair) != 2:
+            return None
+        pair.sort(key=lambda index: _rows_and_channels(shapes[index])[1] == 4 * BINS)  # stable: else scores are first
+        scores.append(pair[0])
+        distances.append(pair[1])
+    return tuple(scores + distances)
+
+
+def _rows_and_channels(shape):
+    """Numbers of cells and channels of an output (1, n, channels) or (1, channels, height, width)."""
+    return (shape[1], shape[2]) if len(shape) == 3 else (shape[2] * shape[3], shape[1])
+
+
+def _matches(shape, cells):
+    return cells in (shape[1], shape[2]) or shape[1] == YOLOV5_ANCHORS * cells
+
+
+def _head_of(output, input_hw, grid, metadata):
+    """Name of the head with one output (1, n, m). Raises ValueError if it is unknown."""
+    rows, columns = output.shape[1:]
+    if columns >= 6 and (metadata.get('end2end') == 'True' or "'nms': True" in metadata.get('args', '')):
+        return 'end-to-end'
+    cells = cell_count(input_hw, grid)
+    if grid and columns == cells:
+        return 'yolov8'
+    if grid and rows == YOLOV5_ANCHORS * cells:
+        return 'yolov5'
+    if grid and rows == cells:
+        if not is_probability(output[0, :, 4:]):  # the distributions of distances are before the softmax
+            return 'nanodet' if len(grid) == 3 else 'nanodet-plus'
+        return 'yolox-decoded' if output[0, :, 0].max() > input_hw[1] / 2 else 'yolox'
+    if columns == 6:
+        return 'end-to-end'
+    raise ValueError('its outputs are those of no known head')
+
+
+def _class_count(head, shapes, metadata, names):
+    """Number of classes of a head with one output. Raises ValueError if it does not fit the names."""
+    _one, rows, columns = shapes[0]
+    if HEADS[head].suppressed:
+        return len(names) or len(COCO)
+    if head.startswith(('nanodet', 'picodet')):
+        of_coco = columns - len(COCO) in [4 * bins for bins in OTHER_BINS]
+        count = len(names) or (len(COCO) if of_coco else columns - 4 * BINS)
+        if (columns - count) % 4 or columns - count < 8:
+            raise ValueError('its %d columns are not the scores of %d classes and 4 distances' % (columns, count))
+        return _checked(count, names)
+    channels = rows - 4 if head == 'yolov8' else columns - 5
+    if metadata.get('task') == 'pose' and 0 < len(names) < channels:  # key points follow the scores
+        return len(names)
+    masks = shapes[1][1] if len(shapes) > 1 and len(shapes[1]) == 4 else 0
+    return _checked(channels - masks, names)
+
+
+def _checked(classes, names):
+    if not 0 < classes <= MAX_CLASSES:
+        raise ValueError('it has %d classes; 1 to %d expected' % (classes, MAX_CLASSES))
+    if names and len(names) != classes:
+        raise ValueError('there are %d names for its %d classes' % (len(names), classes))
+    return classes

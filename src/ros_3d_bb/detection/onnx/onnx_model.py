@@ -1,0 +1,154 @@
+"""Detection networks in ONNX files, run by ONNX Runtime on the CPU.
+
+The head is recognised by the outputs for a grey image (`heads`); a YAML file beside the ONNX file can give it, and the
+preprocessing (`model_settings`).
+"""
+import ast
+import functools
+
+import numpy as np
+
+from ros_3d_bb.core.error_text import cause
+from ros_3d_bb.detection.batches import BGR, RGB, batch_of
+from ros_3d_bb.detection.network_detector import MAX_INPUT_PX, Resize
+from ros_3d_bb.detection.onnx.heads import HEADS, layout_of
+from ros_3d_bb.detection.onnx.model_settings import MAX_STRIDE, ModelSettings, read_settings
+from ros_3d_bb.detection.onnx.session import EXTRA_BYTES, check_content, limited_memory, session_of
+from ros_3d_bb.detection.weights import MAX_CLASSES, WeightsError, class_names
+
+INSTALL = 'ONNX Runtime is not installed; install it with "pip3 install onnxruntime"'
+DTYPES = {'tensor(float)': np.float32, 'tensor(float16)': np.float16, 'tensor(uint8)': np.uint8}
+MAX_OUTPUT_BYTES = 2 ** 28
+MAX_METADATA = 10 ** 6  # characters
+MAX_LISTED = 20  # inputs or outputs in a message
+GREY = 114  # of the image by which the head is recognised
+
+
+class OnnxModel(object):
+    """Network of an ONNX file, for `network_detector.NetworkDetector`.
+
+    Raises WeightsError if the file cannot be used: it is damaged, its outputs are those of no known head, or the YAML
+    file beside it is invalid.
+    """
+
+    def __init__(self, path, threads):
+        self.description = 'ONNX Runtime on the CPU, threads: %d' % threads
+        settings, self._session = read_settings(path), None
+        try:
+            with open(path, 'rb') as stream:
+                content = stream.read()
+            check_content(content)
+            with limited_memory(EXTRA_BYTES + 4 * len(content)):
+                self._session = session_of(content, threads)
+                self._configure(settings, self._session.get_modelmeta().custom_metadata_map)
+        except ImportError:
+            raise WeightsError('weights %s: %s, or use the .pt checkpoint' % (path, INSTALL))
+        except OSError as error:
+            raise WeightsError('weights %s: cannot be read (%s)' % (path, error.strerror))
+        except Exception as error:  # a damaged file can raise any exception
+            raise WeightsError('weights %s: %s%s' % (path, cause(error), _signature(self._session)))
+
+    def _configure(self, settings, metadata):
+        """Read the input, recognise the head by the outputs for a grey image, and set the attributes."""
+        entry, = self._session.get_inputs()
+        self._input, self._dtype = entry.name, DTYPES[entry.type]
+        self._channels_last, self.input_hw = _input_layout(entry.shape)
+        self.stride = _stride(metadata, settings)
+        probe_hw = self.input_hw or (3 * max(64, self.stride), 4 * max(64, self.stride))
+        probe = np.full(probe_hw + (3,), GREY, np.uint8)
+        names = settings.names or _names(metadata)
+        self._prepare = _preprocessing(self._dtype, HEADS['yolov5'], ModelSettings())
+        outputs = self._run(probe)
+        self._layout = layout_of(outputs, probe_hw, metadata, settings.head, settings.strides, names)
+
+        self._head = HEADS[self._layout.head]
+        self.names = class_names(names or None, self._layout.classes)
+        self.suppressed = self._head.suppressed
+        self.resize = Resize(settings.resize or self._head.resize,
+                             self._head.padding if settings.padding < 0 else settings.padding)
+        self._prepare = _preprocessing(self._dtype, self._head, settings)
+        self.candidates(probe, 0.0)
+
+    def candidates(self, image, confidence):
+        """Detections in an image with a score above the confidence, see `network_detector.NetworkDetector`."""
+        outputs = self._run(image)
+        outputs = [outputs[index].astype(np.float32, copy=False) for index in self._layout.order]
+        return self._head.decode(outputs, image.shape[:2], self._layout.classes, confidence, self._layout.strides)
+
+    def _run(self, image):
+        """Outputs of the network for an RGB image (height, width, 3), uint8; ValueError if they are too large."""
+        batch = self._prepare(image)
+        if self._channels_last:
+            batch = np.ascontiguousarray(batch.transpose(0, 2, 3, 1))
+        outputs = self._session.run(None, {self._input: batch})
+        if sum(output.nbytes for output in outputs) > MAX_OUTPUT_BYTES:
+            raise ValueError('its outputs are larger than %d MB' % (MAX_OUTPUT_BYTES // 2 ** 20))
+        return outputs
+
+
+def _preprocessing(dtype, head, settings):
+    """Function that converts an RGB image to a batch (1, 3, height, width) for networks with this head."""
+    color = settings.color or head.color
+    order = BGR if color == 'bgr' else RGB
+    if dtype == np.uint8:
+        if settings.mean or settings.std:
+            raise ValueError('its input is uint8, to which mean and std of the YAML file do not apply')
+        return functools.partial(_uint8_batch_of, order=order)
+    step = 1 if color == head.color else -1
+    return functools.partial(batch_of, order=order, mean=tuple(settings.mean or head.mean[::step]),
+                             std=tuple(settings.std or head.std[::step]), dtype=dtype)
+
+
+def _uint8_batch_of(image, order=RGB):
+    """Batch (1, 3, height, width) of an RGB image, uint8, with the channels in the given order."""
+    return np.ascontiguousarray(image.transpose(2, 0, 1)[list(order)][None])
+
+
+def _input_layout(shape):
+    """Whether the channels of an input are last, and its (height, width), None if dynamic. Raises ValueError."""
+    if len(shape) != 4 or (isinstance(shape[0], int) and shape[0] != 1):
+        raise ValueError('its input is not one image')
+    channels_last = shape[3] == 3 and shape[1] != 3
+    if not channels_last and isinstance(shape[1], int) and shape[1] != 3:
+        raise ValueError('its input has %d channels; 3 expected' % shape[1])
+    size = tuple(shape[1:3] if channels_last else shape[2:])
+    fixed = [isinstance(length, int) for length in size]
+    if not any(fixed):
+        return channels_last, None
+    if not all(fixed) or not all(0 < length <= MAX_INPUT_PX for length in size):
+        raise ValueError('its input has the size %s; both 1 to %d, or both dynamic expected' % (size, MAX_INPUT_PX))
+    return channels_last, size
+
+
+def _stride(metadata, settings):
+    """Number of pixels of which height and width are multiples."""
+    stride = int(metadata.get('stride', max(settings.strides or (32,))))
+    if not 1 <= stride <= MAX_STRIDE:
+        raise ValueError('its stride is %d; 1 to %d expected' % (stride, MAX_STRIDE))
+    return stride
+
+
+def _names(metadata):
+    """Class names in the metadata of ultralytics and YOLOv5, as a list; empty without. Raises ValueError."""
+    text = metadata.get('names', '')
+    if not text:
+        return []
+    if len(text) > MAX_METADATA:
+        raise ValueError('its names are longer than %d characters' % MAX_METADATA)
+    names = ast.literal_eval(text)  # executes no code
+    count = len(names) if isinstance(names, (dict, list, tuple)) else 0
+    if not 0 < count <= MAX_CLASSES:
+        raise ValueError('its names are not those of 1 to %d classes' % MAX_CLASSES)
+    return class_names(names, count)
+
+
+def _signature(session):
+    """Inputs and outputs of a network, and the heads that are known, as text; empty if it could not be loaded."""
+    if session is None:
+        return '; expected an ONNX file of a detector'
+    lists = [', '.join('%s %s %s' % (entry.name, entry.shape, entry.type)
+                       for entry in entries[:MAX_LISTED]) or 'none'
+             for entries in (session.get_inputs(), session.get_outputs())]
+    known = '; '.join('%s %s' % (name, head.shape) for name, head in HEADS.items())
+    return '. Inputs: %s. Outputs: %s. Known heads: %s. See doc/detectors.md' % (
+        ascii(lists[0])[1:-1], ascii(lists[1])[1:-1], known)

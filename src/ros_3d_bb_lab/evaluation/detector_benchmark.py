@@ -1,0 +1,145 @@
+"""Detectors on the images of a measurement session: people found, overlap with the recorded boxes, and CPU time.
+
+Any number of models, of any format, and the detector without weights (`depth`) process each image in turn, so that
+other load on the machine affects all of them equally and the ratios of their times remain valid. Times are CPU times
+from the image to the boxes, with one thread.
+"""
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+
+import cv2
+import numpy as np
+
+from ros_3d_bb.detection.boxes import iou
+from ros_3d_bb.detection.depth.detector import DepthPeople
+from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
+from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
+from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine
+from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
+
+FOUND_IOU, CONFIDENCE = 0.5, 0.25
+WARM_UPS = 3  # images that are not timed
+DEPTH = 'depth'  # the row of the detector without weights
+SIMULATED = (2.0, 3.0, 4.0), (-0.25, 0.0, 0.25), 1  # arguments of write_simulated_session
+COLUMNS = '%-28s %6s %11s %12s %8s %7s'
+HEADINGS = ('detector', 'found', 'median IoU', 'false boxes', 'CPU ms', 'ratio')
+
+
+def network_detector(path):
+    """Function that returns the boxes (n, 4) of the people in a color image, for a model file.
+
+    Raises ValueError if the file cannot be used, or has no class `person`.
+    """
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch (slow)
+    network = open_runtime(path, RuntimeParams(device='cpu', threads=1))
+    detector = NetworkDetector(network, DetectionParams(confidence=CONFIDENCE))
+    return lambda color, _depth: detector.detect(color).boxes
+
+
+def depth_detector(camera):
+    """As `network_detector`, for the detector without weights. It fits the floor to the depth images."""
+    people = DepthPeople()
+
+    def detect(color, depth):
+        detections = people.detect(color, depth, camera)
+        return np.zeros((0, 4)) if detections is None else detections.boxes
+
+    return detect
+
+
+def compare(session, detectors):
+    """Run detectors on the images of a session that have recorded boxes.
+
+    Parameters
+    ----------
+    session : session_reader.Session
+    detectors : dict
+        Functions of a color image (height, width, 3), RGB, and a DepthImage, by name. They return boxes (n, 4).
+
+    Returns
+    -------
+    dict
+        `frames`, their number; `boxes`, the number of their boxes; and `detectors`, by name: `found` boxes with an IoU
+        of at least 0.5, `median_iou` of all recorded boxes with the best detection (0 without), `false_boxes` without a
+        recorded box, and `cpu_ms`, the median of the CPU times.
+
+    Raises
+    ------
+    ValueError
+        If there is no image with a box.
+    """
+    frames = [frame for frame in session.frames if frame.boxes_px]
+    if not frames:
+        raise ValueError('the session has no images with 2D boxes')
+    overlaps, false_boxes, times_ms = ({name: [] for name in detectors} for _result in range(3))
+    warm_up = frames[:WARM_UPS]
+    for number, frame in enumerate(warm_up + frames):
+        images = read_color(frame, session.camera), read_depth(frame, session)
+        recorded = np.array(frame.boxes_px, float)
+        for name, detect in detectors.items():
+            start_s = time.process_time()
+            found = detect(*images)
+            spent_ms = 1e3 * (time.process_time() - start_s)
+            if number >= len(warm_up):
+                table = np.array([iou(box, found) for box in recorded]).reshape(len(recorded), len(found))
+                overlaps[name].extend(table.max(axis=1, initial=0).tolist())
+                false_boxes[name].append(int((table.max(axis=0, initial=0) < FOUND_IOU).sum()))
+                times_ms[name].append(spent_ms)
+    return {'frames': len(frames), 'boxes': sum(len(frame.boxes_px) for frame in frames), 'detectors': {
+        name: {'found': int(np.sum(np.array(overlaps[name]) >= FOUND_IOU)),
+               'median_iou': float(np.median(overlaps[name])), 'false_boxes': sum(false_boxes[name]),
+               'cpu_ms': float(np.median(times_ms[name]))} for name in detectors}}
+
+
+def named(paths):
+    """File names by which models are distinguished, or their paths if two have the same name: {name: path}."""
+    names = [os.path.basename(path) for path in paths]
+    return {name if names.count(name) == 1 else path: path for name, path in zip(names, paths)}
+
+
+def table(result):
+    """Format the results as lines of text. The ratio of CPU times is that to the first detector."""
+    rows = result['detectors']
+    first_ms = next(iter(rows.values()))['cpu_ms']
+    return [COLUMNS % HEADINGS] + [
+        COLUMNS % (name, row['found'], '%.3f' % row['median_iou'], row['false_boxes'], '%.1f' % row['cpu_ms'],
+                   '%.2f' % (row['cpu_ms'] / first_ms)) for name, row in rows.items()]
+
+
+def main():
+    """Run the command `./run bench detector`."""
+    arguments = _arguments()
+    cv2.setNumThreads(1)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
+            session = session._replace(frames=session.frames[::arguments.every])
+            detectors = {name: network_detector(path) for name, path in named(arguments.weights).items()}
+            detectors[DEPTH] = depth_detector(session.camera)
+            result = dict(compare(session, detectors), machine=describe_machine())
+        if arguments.json:
+            with open(arguments.json, 'w') as stream:
+                json.dump(result, stream, indent=1)
+    except (ValueError, OSError) as error:
+        sys.exit('./run bench detector: %s' % error)
+    print('%s\n%d images, %d people' % (result['machine'], result['frames'], result['boxes']))
+    print('\n'.join(table(result)))
+
+
+def _arguments():
+    parser = argparse.ArgumentParser(prog='./run bench detector', description=__doc__)
+    data = os.environ.get('ROS_3D_BB_DATA')
+    parser.add_argument('--weights', nargs='+', default=list(filter(None, [default_weights()])), metavar='FILE',
+                        help='model files: YOLOv5 checkpoints, ONNX files (default: yolov5n.pt in the cache, if any)')
+    parser.add_argument('--data', default=data and os.path.join(data, 'data', 'thesis'), metavar='DIR',
+                        help='measurement session (default: $ROS_3D_BB_DATA/data/thesis, or simulated)')
+    parser.add_argument('--every', type=int, default=1, metavar='N', help='use every Nth image (default: 1)')
+    parser.add_argument('--json', metavar='FILE', help='also write the results to FILE')
+    arguments = parser.parse_args()
+    if arguments.every < 1:
+        parser.error('--every is %d; at least 1 expected' % arguments.every)
+    return arguments

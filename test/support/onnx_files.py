@@ -1,0 +1,95 @@
+"""ONNX files of detectors with given outputs, and outputs that contain given boxes."""
+import numpy as np
+
+from ros_3d_bb.detection.onnx.decoders import grid
+from ros_3d_bb.detection.yolov5.onnx_writer import FLOAT, Graph
+
+FLOAT16, UINT8 = 10, 2
+
+
+def write_constant_network(path, outputs, input_shape=(1, 3, 96, 128), element=FLOAT, metadata=()):
+    """Write a network that gives the same outputs, float32 arrays, for each image. Returns the path."""
+    graph = Graph()
+    values = [graph.node('Identity', [graph.constant(np.asarray(output, np.float32))]) for output in outputs]
+    entries = [(name, FLOAT, tuple(output.shape)) for name, output in zip(values, outputs)]
+    with open(str(path), 'wb') as stream:
+        stream.write(graph.model([('images', element, tuple(input_shape))], entries, dict(metadata)))
+    return str(path)
+
+
+def outputs_of(head, boxes, scores, input_hw, strides=(8, 16, 32), bins=8):
+    """Outputs of a head that contain boxes (n, 4), x1, y1, x2, y2, with scores (n, classes) in 0..1.
+
+    A box is predicted by the cell of the first stride in which its center is. Other predictions have scores of 0.
+    """
+    boxes, scores = np.asarray(boxes, float), np.asarray(scores, float)
+    center, size = (boxes[:, :2] + boxes[:, 2:]) / 2, boxes[:, 2:] - boxes[:, :2]
+    if head == 'end-to-end':
+        return [np.hstack((boxes, scores.max(axis=1)[:, None], scores.argmax(axis=1)[:, None]))[None]]
+
+    cells = grid(input_hw, tuple(strides)).astype(float)
+    columns, rows = (center // strides[0]).astype(int).T
+    used = rows * -(-input_hw[1] // strides[0]) + columns
+    cell, stride = cells[used, :2], cells[used, 2:]
+    if head in ('yolov5', 'yolov8', 'yolox-decoded'):
+        values = np.hstack((center, size, np.ones((len(boxes), 1)), scores))
+        all_rows = np.zeros((len(cells) * (3 if head == 'yolov5' else 1), values.shape[1]))
+        if head == 'yolox-decoded':
+            all_rows[:, :4] = np.hstack((cells[:, :2] * cells[:, 2:], cells[:, [2, 2]]))
+        all_rows[used] = values
+        return [np.delete(all_rows, 4, axis=1).T[None] if head == 'yolov8' else all_rows[None]]
+    if head == 'yolox':
+        all_rows = np.zeros((len(cells), 5 + scores.shape[1]))
+        all_rows[used] = np.hstack((center / stride - cell, np.log(size / stride), np.ones((len(boxes), 1)), scores))
+        return [all_rows[None]]
+
+    points = (cell + (0.0 if head == 'nanodet-plus' else 0.5)) * stride
+    all_rows = np.hstack((np.zeros((len(cells), scores.shape[1])), np.full((len(cells), 4 * bins), -1.0)))
+    distances = np.hstack((points - boxes[:, :2], boxes[:, 2:] - points)) / stride
+    all_rows[used] = np.hstack((scores, distributions(distances, bins)))
+    if head != 'picodet':
+        return [all_rows[None]]
+    ends = np.cumsum([(cells[:, 2] == stride).sum() for stride in strides])[:-1]
+    return [part[None] for part in np.split(all_rows[:, :scores.shape[1]], ends)
+            + np.split(all_rows[:, scores.shape[1]:], ends)]
+
+
+def distributions(distances, bins):
+    """Values before the softmax, (n, 4 * bins), of distributions whose expected values are distances (n, 4)."""
+    low = np.clip(np.floor(distances), 0, bins - 2).astype(int)
+    weights = np.full(distances.shape + (bins,), 1e-9)
+    np.put_along_axis(weights, low[..., None], np.clip(low + 1 - distances, 1e-9, 1)[..., None], axis=-1)
+    np.put_along_axis(weights, low[..., None] + 1, np.clip(distances - low, 1e-9, 1)[..., None], axis=-1)
+    return np.log(weights).reshape(len(distances), -1)
+
+
+def write_layers(path):
+    """Write a network of the operators of detectors: convolution, pooling, resizing, and a head. Returns the path."""
+    random, graph = np.random.RandomState(0), Graph()
+    x = graph.node('Conv', ['images', graph.constant(random.randn(8, 3, 3, 3).astype(np.float32))], strides=[8, 8],
+                   pads=[1] * 4)
+    y = graph.node('MaxPool', [graph.node('Relu', [x])], kernel_shape=[2, 2], strides=[2, 2])
+    y = graph.node('Resize', [y, '', graph.constant(np.float32([1, 1, 2, 2]))], mode='nearest')
+    x = graph.node('Sigmoid', [graph.node('Concat', [x, y], axis=1)])
+    rows = graph.node('Reshape', [graph.node('Transpose', [x], perm=[0, 2, 3, 1]),
+                                  graph.constant(np.array([1, -1, 16], np.int64))])
+    rows = graph.node('Slice', [rows] + [graph.constant(np.array([value], np.int64)) for value in (0, 6, 2)])
+    with open(str(path), 'wb') as stream:
+        stream.write(graph.model([('images', FLOAT, (1, 3, 64, 96))], [(rows, FLOAT, (1, 'n', 6))],
+                                 {'names': "{0: 'person', 1: 'dog'}", 'stride': '32', 'task': 'detect'}))
+    return str(path)
+
+
+def write_mean_network(path, input_shape=(1, 3, 96, 128), element=FLOAT, channels_last=False, metadata=()):
+    """Write a network whose only detection (1, 1, 6) is the mean of the channels of its input, twice. Returns the path.
+
+    The mean of the second channel is the score, and that of the third one the class.
+    """
+    graph = Graph()
+    mean = graph.node('ReduceMean', [graph.node('Cast', ['images'], to=FLOAT)], keepdims=0,
+                      axes=[1, 2] if channels_last else [2, 3])
+    row = graph.node('Reshape', [graph.node('Concat', [mean, mean], axis=1),
+                                 graph.constant(np.array([1, 1, 6], np.int64))])
+    with open(str(path), 'wb') as stream:
+        stream.write(graph.model([('images', element, tuple(input_shape))], [(row, FLOAT, (1, 1, 6))], dict(metadata)))
+    return str(path)

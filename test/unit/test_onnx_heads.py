@@ -1,0 +1,106 @@
+"""Heads of detection networks: recognition by the outputs, and decoding of known boxes."""
+import numpy as np
+import pytest
+
+from ros_3d_bb.detection.network_detector import ranked
+from ros_3d_bb.detection.onnx.heads import HEADS, layout_of
+from support.onnx_files import outputs_of
+
+HW = 96, 128
+BOXES = np.array([(1.5, 2, 20, 30), (10, 3, 40, 20.25), (15, 2.5, 24, 33)])
+SCORES = np.array([(0.9, 0.1, 0.2), (0.3, 0.8, 0.1), (0.2, 0.1, 0.7)])
+STRIDES = {'nanodet-plus': (8, 16, 32, 64), 'picodet': (8, 16, 32, 64)}
+NAMES = ['person', 'dog', 'chair']
+
+
+def detections_in(outputs, layout, input_hw=HW, confidence=0.25):
+    given = [np.float32(outputs[index]) for index in layout.order]
+    found = HEADS[layout.head].decode(given, input_hw, layout.classes, confidence, layout.strides)
+    return ranked(found, range(layout.classes))
+
+
+@pytest.mark.parametrize('names', [NAMES, ()])
+@pytest.mark.parametrize('head', HEADS)
+def test_heads_are_recognised_and_decoded(head, names):
+    outputs = outputs_of(head, BOXES, SCORES, HW, STRIDES.get(head, (8, 16, 32)))
+    layout = layout_of(outputs, HW, {}, names=names)
+    assert layout.head == head
+    assert layout.classes == (80 if head == 'end-to-end' and not names else 3)
+    found = detections_in(outputs, layout)
+    np.testing.assert_allclose(found.boxes, BOXES, atol=1e-3)
+    np.testing.assert_allclose(found.scores, SCORES.max(axis=1), atol=1e-6)
+    assert found.classes.tolist() == [0, 1, 2]
+    assert len(detections_in(outputs, layout, confidence=0.85).boxes) == 1
+
+
+@pytest.mark.parametrize('head', ['nanodet', 'nanodet-plus', 'picodet'])
+@pytest.mark.parametrize('input_hw', [(320, 320), (416, 416), (256, 480)])
+def test_grids_of_sizes_that_are_no_multiples_of_the_largest_stride(head, input_hw):
+    strides = STRIDES.get(head, (8, 16, 32))
+    outputs = outputs_of(head, BOXES, np.pad(SCORES, ((0, 0), (0, 77))), input_hw, strides)
+    layout = layout_of(outputs, input_hw, {})
+    assert (layout.head, layout.classes, layout.strides) == (head, 80, strides)
+    np.testing.assert_allclose(detections_in(outputs, layout, input_hw).boxes, BOXES, atol=1e-3)
+
+
+@pytest.mark.parametrize('bins', [8, 11, 17])
+def test_distributions_of_other_lengths(bins):
+    outputs = outputs_of('nanodet', BOXES, np.pad(SCORES, ((0, 0), (0, 77))), HW, bins=bins)
+    layout = layout_of(outputs, HW, {})
+    assert (layout.head, layout.classes) == ('nanodet', 80)
+    np.testing.assert_allclose(detections_in(outputs, layout).boxes, BOXES, atol=1e-3)
+
+
+def test_distributions_by_stride_in_other_orders_and_as_maps():
+    """Scores and distances of a stride in turn, and (1, channels, height, width); scores before the sigmoid."""
+    outputs = outputs_of('picodet', BOXES, SCORES, HW, STRIDES['picodet'])
+    with np.errstate(divide='ignore'):
+        logits = [np.log(np.clip(output, 1e-6, 1) / (1 - output)) for output in outputs[:4]]
+    sizes = [(12, 16), (6, 8), (3, 4), (2, 2)]
+    maps = []
+    for (height, width), scores, distances in zip(sizes, logits, outputs[4:]):
+        maps += [values[0].T.reshape(1, -1, height, width) for values in (distances, scores)]
+    layout = layout_of(maps, HW, {})
+    assert layout.order == (1, 3, 5, 7, 0, 2, 4, 6)
+    found = detections_in(maps, layout)
+    np.testing.assert_allclose(found.boxes, BOXES, atol=1e-3)
+    np.testing.assert_allclose(found.scores, SCORES.max(axis=1), atol=1e-6)
+
+
+@pytest.mark.parametrize('metadata, coefficients, names', [
+    ({'task': 'segment'}, 32, ()), ({'task': 'segment'}, 32, NAMES), ({'task': 'pose'}, 51, NAMES)])
+def test_columns_of_other_tasks_are_no_classes(metadata, coefficients, names):
+    output, = outputs_of('yolov8', BOXES, SCORES, HW)
+    outputs = [np.concatenate((output, np.full((1, coefficients, output.shape[2]), 5)), axis=1)]
+    if metadata['task'] == 'segment':
+        outputs.append(np.zeros((1, 32, 24, 32)))
+    layout = layout_of(outputs, HW, metadata, names=names)
+    assert layout == ('yolov8', 3, (8, 16, 32), (0,))
+    assert detections_in(outputs, layout).classes.tolist() == [0, 1, 2]
+
+
+def test_networks_that_suppress_are_known_by_their_metadata():
+    rows = np.zeros((1, 252, 38))  # as many rows as the grid has cells
+    assert layout_of([rows], HW, {'end2end': 'True'}).head == 'end-to-end'
+    assert layout_of([rows], HW, {'args': "{'nms': True}"}).head == 'end-to-end'
+
+
+@pytest.mark.parametrize('given, reason', [
+    (dict(outputs=[np.zeros((1, 1000))]), 'first output'), (dict(outputs=[]), 'first output'),
+    (dict(outputs=[np.zeros((2, 300, 6))]), 'first output'), (dict(outputs=[np.zeros((1, 77, 79))]), 'no known head'),
+    (dict(metadata={'task': 'classify'}), "'classify'"), (dict(names=['a', 'b']), '2 names for its 3 classes'),
+    (dict(head='yolox'), 'cells of strides'), (dict(outputs=[np.zeros((1, 3, 252))]), '-1 classes'),
+    (dict(head='nanodet', outputs=[np.ones((1, 252, 35)) * 7], names=NAMES * 2), '35 columns'),
+    (dict(head='nanodet', outputs=[np.ones((1, 300, 35))], strides=[8]), 'cells of strides')])
+def test_outputs_that_do_not_fit_are_rejected(given, reason):
+    outputs = outputs_of('yolov8', BOXES, SCORES, HW)
+    with pytest.raises(ValueError, match=reason):
+        layout_of(**dict(dict(outputs=outputs, input_hw=HW, metadata={}), **given))
+
+
+def test_other_strides_are_used_if_they_are_given():
+    outputs = outputs_of('yolox', BOXES, SCORES, HW, (16, 32))
+    with pytest.raises(ValueError):
+        layout_of(outputs, HW, {}, 'yolox')
+    layout = layout_of(outputs, HW, {}, strides=[16, 32])
+    np.testing.assert_allclose(detections_in(outputs, layout).boxes, BOXES, atol=1e-3)

@@ -1,0 +1,260 @@
+"""Detectors in ONNX files: agreement with ultralytics, input formats, YAML files beside them, and rejected files."""
+import os
+import resource
+
+import numpy as np
+import pytest
+
+from ros_3d_bb.detection.boxes import iou
+from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
+from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
+from ros_3d_bb.detection.weights import COCO, WeightsError
+from ros_3d_bb.sessions.session_reader import read_color, read_session
+from ros_3d_bb.detection.yolov5.onnx_writer import Graph, metadata_entry
+from support.onnx_files import FLOAT, FLOAT16, UINT8, outputs_of, write_constant_network, write_mean_network
+
+DATA = os.environ.get('ROS_3D_BB_DATA', '')
+HW = 96, 128
+BOXES = np.array([(1.5, 2, 20, 30), (10, 3, 40, 20.25), (50, 2.5, 64, 33)])
+SCORES = np.array([(0.9, 0.1, 0.2), (0.3, 0.8, 0.1), (0.2, 0.1, 0.7)])
+ALL = DetectionParams(classes=list(range(3)))
+TIE = 2e-5  # scores that differ by less are in another order after other rounding
+pytestmark = pytest.mark.needs('onnxruntime')
+
+
+class Reference(object):
+    """A network, images, and the detections (n, 6) that ultralytics found in them."""
+
+    def __init__(self, path, images, detections):
+        self.path, self.images, self.detections = path, images, detections
+
+
+@pytest.fixture(scope='module', params=['yolov8n', 'yolo11n', 'yolo26n', 'yolov8n-seg'])
+def family(request):
+    return request.param
+
+
+@pytest.fixture(params=['480x640', 'dynamic'])
+def reference(request, family, session_folder, tmp_path):
+    """Exports and detections of ultralytics; without data, random boxes and the rule of its suppression."""
+    if not DATA:
+        return made_reference(tmp_path / 'made.onnx', request.param)
+    folder = os.path.join(DATA, 'weights', 'exports')
+    session = read_session(session_folder)
+    with np.load(os.path.join(folder, family + '_reference.npz')) as recorded:
+        numbers = [int(name[6:]) for name in recorded.files if name[6:].isdigit()]
+        detections = [recorded['frame_%d' % number] for number in numbers]
+    images = [read_color(session.frames[number], session.camera) for number in numbers]
+    return Reference(os.path.join(folder, '%s-%s.onnx' % (family, request.param)), images, detections)
+
+
+def made_reference(path, _kind):
+    random = np.random.RandomState(0)
+    corners = np.hstack((random.uniform(0, 500, (6300, 2)), np.zeros((6300, 2))))
+    corners[:, 2:] = corners[:, :2] + random.uniform(20, 140, (6300, 2))
+    scores = random.uniform(0, 1, (6300, 80)) ** 40
+    center, size = (corners[:, :2] + corners[:, 2:]) / 2, corners[:, 2:] - corners[:, :2]
+    write_constant_network(path, [np.hstack((center, size, scores)).T[None]], (1, 3, 480, 640))
+    best = scores.argmax(axis=1)
+    kept = []
+    for number in np.argsort(-scores.max(axis=1)):
+        rivals = [other for other in kept if best[other] == best[number]]
+        if scores[number].max() > 0.25 and len(kept) < 100 and not (
+                rivals and iou(corners[number], corners[rivals]).max() > 0.45):
+            kept.append(number)
+    expected = np.hstack((corners[kept], scores[kept].max(axis=1)[:, None], best[kept][:, None]))
+    return Reference(str(path), [np.zeros((480, 640, 3), np.uint8)],
+                     [np.hstack((np.clip(expected[:, :4], 0, [640, 480, 640, 480]), expected[:, 4:]))])
+
+
+class TiesAs(OnnxModel):
+    """A YOLOv8 network whose ties are decided as in the `expected` detections (n, 6).
+
+    The random networks of the reference give many scores of 1 within the rounding of float32, of several predictions
+    that overlap, and of several classes of one prediction. ONNX Runtime and torch decide these differently.
+    """
+
+    expected = None
+
+    def _run(self, image):
+        outputs = super(TiesAs, self)._run(image)
+        return outputs if self.expected is None else [decide_ties(outputs[0], self.expected)] + outputs[1:]
+
+
+def decide_ties(output, expected):
+    columns = output[0].copy()
+    center, half, scores = columns[:2].T, columns[2:4].T / 2, columns[4:84].T
+    corners = np.hstack((center - half, center + half))
+    clipped = np.clip(corners, 0, [640, 480, 640, 480])
+    tied = scores > scores.max(axis=1, keepdims=True) - TIE
+    added = np.zeros_like(scores)
+    for x1, y1, x2, y2, _score, number in expected:
+        number = int(number)
+        found = np.abs(clipped - (x1, y1, x2, y2)).max(axis=1) + ~tied[:, number]
+        assert found.min() <= 0.5  # a prediction, and one of its best classes
+        overlapping = iou(corners[found.argmin()], corners) > 0.45
+        added[overlapping & tied[:, number], number] = np.maximum(added[overlapping & tied[:, number], number], TIE)
+        added[found.argmin(), number] = 2 * TIE
+    columns[4:84] += added.T
+    return columns[None]
+
+
+def assert_same_detections(detections, expected):
+    """Whatever their order: the same classes, boxes within 0.5 px and scores within 1e-3."""
+    assert len(detections.boxes) == len(expected)
+    remaining = list(range(len(expected)))
+    for box, score, number in zip(*detections):
+        difference = np.abs(expected[remaining, :4] - box).max(axis=1) + 1e3 * (expected[remaining, 5] != number)
+        nearest = remaining.pop(int(difference.argmin()))
+        assert difference.min() <= 0.5 and abs(expected[nearest, 4] - score) <= 1e-3
+
+
+def test_detections_are_those_of_ultralytics(reference):
+    network = TiesAs(reference.path, 1)
+    detector = NetworkDetector(network, DetectionParams(classes=list(range(80))))
+    for image, network.expected in zip(reference.images, reference.detections):
+        assert_same_detections(detector.detect(image), network.expected)
+    assert network.names == list(COCO) and not network.suppressed
+
+
+@pytest.mark.slow
+def test_yolox_detects_the_person_in_a_measurement_session(session_folder, tmp_path):
+    """In at least 109 of 110 frames, with a median IoU of at least 0.95 with the recorded boxes."""
+    session = read_session(session_folder)
+    weights = os.path.join(DATA, 'weights', 'yolox_nano.onnx')
+    if not DATA:  # a network that gives the box of the first frame
+        session = session._replace(frames=session.frames[:1])
+        box = np.array(session.frames[0].boxes_px[0]) * 416 / 640.0
+        weights = write_constant_network(
+            tmp_path / 'yolox.onnx', outputs_of('yolox', [box], [[0.9] + [0] * 79], (416, 416)), (1, 3, 416, 416))
+    detector = NetworkDetector(OnnxModel(weights, 1))
+    overlaps = [max(iou(np.array(frame.boxes_px[0], float), detector.detect(read_color(frame, session.camera)).boxes),
+                    default=0) for frame in session.frames]
+    assert np.mean(np.array(overlaps) >= 0.5) >= 109 / 110
+    assert np.median(overlaps) >= 0.95
+
+
+COLOR = (3, 200, 5)
+
+
+@pytest.mark.parametrize('shape, channels_last', [
+    ((1, 3, 96, 128), False), ((1, 96, 128, 3), True), (('n', 3, 'h', 'w'), False), ((1, 'h', 'w', 3), True),
+    ((1, 'channels', 'h', 'w'), False)])
+@pytest.mark.parametrize('element, scale, atol', [(FLOAT, 1 / 255.0, 1e-4), (FLOAT16, 1 / 255.0, 1e-3), (UINT8, 1, 0)])
+def test_every_input_format(tmp_path, shape, channels_last, element, scale, atol):
+    network = OnnxModel(write_mean_network(tmp_path / 'a.onnx', shape, element, channels_last), 1)
+    assert network.input_hw == (None if 'h' in shape else HW) and network.suppressed
+    found = network.candidates(np.full(HW + (3,), COLOR, np.uint8), 0.25)
+    np.testing.assert_allclose(found.boxes, [np.array(COLOR + COLOR[:1]) * scale], atol=atol)
+    assert found.classes.tolist() == [int(COLOR[2] * scale)]
+
+
+@pytest.mark.parametrize('text, expected', [
+    ('color: bgr', (5, 200, 3)), ('std: [1, 1, 1]', (3 * 255, 200 * 255, 5 * 255)),
+    ('{color: bgr, mean: [4, 0, 1], std: [255, 255, 127.5]}', (1, 200, 4)), ('', COLOR)])
+def test_the_yaml_file_gives_color_mean_and_scale(tmp_path, text, expected):
+    (tmp_path / 'a.yaml').write_text(text)
+    network = OnnxModel(write_mean_network(tmp_path / 'a.onnx'), 1)
+    found = network.candidates(np.full(HW + (3,), COLOR, np.uint8), 0.25)
+    np.testing.assert_allclose(found.boxes[0, :3] * 255, expected, atol=1e-2)
+
+
+def test_the_yaml_file_gives_head_names_and_resizing(tmp_path):
+    path = write_constant_network(tmp_path / 'a.onnx', outputs_of('yolox', BOXES, SCORES, HW, (16, 32)))
+    with pytest.raises(WeightsError, match='no known head'):
+        OnnxModel(path, 1)
+    (tmp_path / 'a.yaml').write_text('{head: yolox, strides: [16, 32], names: [person, dog, chair], resize: stretch, '
+                                     'padding: 9}')
+    network = OnnxModel(path, 1)
+    assert network.names == ['person', 'dog', 'chair'] and network.resize == ('stretch', 9)
+    found = NetworkDetector(network, ALL).detect(np.zeros((192, 128, 3), np.uint8))
+    np.testing.assert_allclose(found.boxes, BOXES * (1, 2, 1, 2), atol=1e-3)
+
+
+@pytest.mark.parametrize('text, reason', [
+    ('colour: bgr', 'unknown.*colour.*did you mean.*color.*std'), ('color: grey', "'grey'.*rgb, bgr"),
+    ('mean: [1, 2]', 'mean is .*three'), ('std: [1, 0, 1]', 'greater than 0'), ('std: [.nan, 1, 1]', 'three numbers'),
+    ('strides: [8, 1.5]', 'strides'), ('names: [a, no]', 'quotes'), ('head: yolo', "'yolo'"), ('padding: 300', '300'),
+    ('- a', 'keys and values'), ('a: [', 'parsing'), ('a: &x [1]\nb: *x', 'alias'), ('1: 2', 'keys and values'),
+    ('names: [a, b]', '2 names for its 3 classes'), ('#' * 1000001, 'larger'), ('head: nanodet', 'cells|columns')])
+def test_yaml_files_that_cannot_be_used_are_rejected(tmp_path, text, reason):
+    path = write_constant_network(tmp_path / 'model.onnx', outputs_of('yolov8', BOXES, SCORES, HW))
+    (tmp_path / 'model.yaml').write_text(text)
+    with pytest.raises(WeightsError, match='(?s)model.*(%s)' % reason):
+        OnnxModel(path, 1)
+
+
+def test_mean_and_std_do_not_apply_to_integers(tmp_path):
+    (tmp_path / 'a.yaml').write_text('mean: [1, 1, 1]')
+    with pytest.raises(WeightsError, match='uint8'):
+        OnnxModel(write_mean_network(tmp_path / 'a.onnx', element=UINT8), 1)
+
+
+def test_a_network_with_unknown_outputs_is_described(tmp_path):
+    path = write_constant_network(tmp_path / 'a.onnx', [np.zeros((1, 77, 79)), np.zeros((1, 4))])
+    with pytest.raises(WeightsError) as error:
+        OnnxModel(path, 1)
+    for part in (path, 'images [1, 3, 96, 128] tensor(float)', '[1, 77, 79]', '[1, 4]', 'yolov8 (1, 4 + classes, n)',
+                 'doc/detectors.md'):
+        assert part in str(error.value)
+
+
+@pytest.mark.parametrize('shape, element, reason', [
+    ((1, 1, 96, 128), FLOAT, '1 channels'), ((4, 3, 96, 128), FLOAT, 'not one image'), ((1, 3, 96), FLOAT, 'not one'),
+    ((1, 3, 96, 5000), FLOAT, '5000'), ((1, 3, 96, 'w'), FLOAT, 'size'), ((1, 3, 96, 128), 9, 'tensor')])
+def test_inputs_that_are_not_a_color_image_are_rejected(tmp_path, shape, element, reason):
+    path = write_constant_network(tmp_path / 'a.onnx', outputs_of('yolov8', BOXES, SCORES, HW), shape, element)
+    with pytest.raises(WeightsError, match=reason):
+        OnnxModel(path, 1)
+
+
+@pytest.mark.parametrize('metadata, reason', [
+    ({'names': '["a"'}, 'names|closed'), ({'names': '3'}, 'names'), ({'stride': '0'}, 'stride'),
+    ({'names': '[' * 100000}, 'a.onnx'), ({'task': 'classify'}, 'classify')])
+def test_metadata_that_cannot_be_used_is_rejected(tmp_path, metadata, reason):
+    path = write_constant_network(tmp_path / 'a.onnx', outputs_of('yolov8', BOXES, SCORES, HW), metadata=metadata)
+    with pytest.raises(WeightsError, match=reason):
+        OnnxModel(path, 1)
+
+
+def write_graph(path, kind, inputs=(), **attributes):
+    """Write a network whose output is that of one operator beside the image."""
+    graph = Graph()
+    value = graph.node(kind, [graph.constant(entry) for entry in inputs] or ['images'], **attributes)
+    path.write_bytes(graph.model([('images', FLOAT, (1, 3, 96, 128))], [(value, FLOAT, ('a', 'b', 'c'))], {}))
+    return str(path)
+
+
+def test_a_network_that_would_fill_the_memory_is_rejected(tmp_path):
+    path = write_graph(tmp_path / 'a.onnx', 'ConstantOfShape', [np.array([1, 100000, 100000], np.int64)])
+    limits = resource.getrlimit(resource.RLIMIT_DATA)
+    with pytest.raises(WeightsError, match='a.onnx'):
+        OnnxModel(path, 1)
+    assert resource.getrlimit(resource.RLIMIT_DATA) == limits
+    assert np.ones(300 * 2 ** 20, np.uint8).sum() == 300 * 2 ** 20  # more memory than the limit left
+
+
+def test_networks_that_may_never_end_are_rejected(tmp_path):
+    with pytest.raises(WeightsError, match='operator Loop'):
+        OnnxModel(write_graph(tmp_path / 'a.onnx', 'Loop'), 1)
+
+
+def test_weights_in_other_files_are_not_read(tmp_path):
+    """As in models of more than 2 GB, or in files that name /etc/passwd as weights."""
+    tensor = metadata_entry('location', '/etc/passwd')[2:]  # StringStringEntryProto
+    external = bytes([13 << 3 | 2, len(tensor)]) + tensor
+    graph = bytes([5 << 3 | 2, len(external)]) + external
+    path = tmp_path / 'a.onnx'
+    path.write_bytes(bytes([7 << 3 | 2, len(graph)]) + graph)
+    with pytest.raises(WeightsError, match='another file'):
+        OnnxModel(str(path), 1)
+
+
+@pytest.mark.parametrize('content, reason', [
+    (b'\x3a\xff\x01abc', 'truncated'), (b'\xff' * 20, 'damaged'), (b'\x3b', 'not an ONNX'), (b'\x3a', 'truncated'),
+    (b'', 'a.onnx'), (b'nonsense', 'not an ONNX')])
+def test_damaged_files_are_rejected(tmp_path, content, reason):
+    path = tmp_path / 'a.onnx'
+    path.write_bytes(content)
+    with pytest.raises(WeightsError, match=reason):
+        OnnxModel(str(path), 1)
