@@ -13,6 +13,7 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import FARTHEST_M as FARTHEST_DEPTH_M
+from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M, USUAL_HEIGHT_M, USUAL_WIDTH_M
 
 # A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated:
@@ -72,7 +73,8 @@ class Box3D(NamedTuple):
     `center_m` (3,) in the camera optical frame and `size_m` (width, height, width) are in metres; `rect_px` is the
     source rectangle; `support` is the share 0..1 of the samples with depth that belong to its depth layer;
     `truncated_edges` states whether the left, upper, right and lower edge of the rectangle touch the image border;
-    `covariance_m2` (3, 3) is that of the centre, None if unknown.
+    `covariance_m2` (3, 3) is that of the centre, None if unknown; `label` is the class name, and `score` is that of the
+    rectangle, 0..1, 0 if unknown.
     """
 
     center_m: np.ndarray
@@ -81,6 +83,8 @@ class Box3D(NamedTuple):
     support: float
     truncated_edges: Tuple[bool, bool, bool, bool]
     covariance_m2: Optional[Any] = None
+    label: str = PERSON
+    score: float = 0.0
 
     @property
     def truncated(self):

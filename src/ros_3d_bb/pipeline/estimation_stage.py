@@ -140,12 +140,13 @@ class EstimationStage(object):
         depth, frame_id = self._aligned(raw, depth_msg.header.frame_id, camera)
         stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
         gap_s = abs((stamp - depth_msg.header.stamp).to_sec())
-        implausible, rects_px = [], self._usable_rects(boxes2d)
+        implausible, usable = [], self._usable_boxes(boxes2d)
         turns, level_from_camera = self._orientation(frame_id)
-        upright_rects_px = turned_boxes(rects_px, turns, camera.width, camera.height).tolist()
+        upright_rects_px = turned_boxes(usable.boxes, turns, camera.width, camera.height).tolist()
         estimates = estimate_boxes(turned_depth(depth, turns), list(map(tuple, upright_rects_px)),
                                    turned_camera(camera, turns), self._estimator, implausible, level_from_camera)
-        boxes3d = list(filter(None, estimates))
+        boxes3d = [box._replace(label=label, score=score)
+                   for box, label, score in zip(estimates, usable.labels, usable.scores.tolist()) if box is not None]
         for box in _as_received(implausible, turns, camera):
             self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
                               '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
@@ -204,16 +205,17 @@ class EstimationStage(object):
                                   % (self._params.floor_frame, frame_id, error))
             return None
 
-    def _usable_rects(self, boxes2d):
-        """Return the rectangles (n, 4), in pixels, that are neither empty nor reversed."""
-        usable_px = []
-        for rect_px in map(tuple, boxes2d.boxes.tolist()):
+    def _usable_boxes(self, boxes2d):
+        """Return the Boxes2D whose rectangles are neither empty nor reversed."""
+        usable = []
+        for number, rect_px in enumerate(boxes2d.boxes.tolist()):
             try:
                 check_rect(rect_px)
-                usable_px.append(rect_px)
+                usable.append(number)
             except ValueError as error:
                 self._events.warn('boxes rejected', '2D %s; the others in this image are used' % error)
-        return np.array(usable_px, np.int64).reshape(-1, 4)
+        return boxes2d._replace(boxes=boxes2d.boxes[usable], labels=[boxes2d.labels[number] for number in usable],
+                                scores=boxes2d.scores[usable])
 
     def _on_lost(self, boxes2d, before_jump):
         if before_jump:
