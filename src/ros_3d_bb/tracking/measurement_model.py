@@ -7,8 +7,8 @@ from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.tracking.types import NEARER_M, wrapped
 
 # Position (x, y), its covariance, and the unit vector from the camera to it in the ground plane; extents; height of the
-# centre and its variance; whether the image border truncates the width, and the lower and the upper end; support; number
-# of the class (`class_numbers.ClassNumbers`), score, and `Detection.index`.
+# centre and its variance; whether the image border truncates the width, and the lower and the upper end; support;
+# number of the class (`class_numbers.ClassNumbers`), score, and `Detection.index`.
 MEASUREMENT = np.dtype([('position_m', float, 2), ('noise_m2', float, (2, 2)), ('ray', float, 2), ('size_m', float, 3),
                         ('z_m', float), ('z_m2', float), ('cut_sideways', bool), ('cut_ends', bool, 2),
                         ('support', float), ('class_number', int), ('score', float), ('detection', int)])

@@ -69,8 +69,9 @@ class ThesisTracker(object):
         if tracks and detections:
             distances_m = plane_distances([track.position_m for track, _unseen_ns in tracks],
                                           [detection.position_m for detection in detections])
-            groups = np.array([self._classes.group_of(track.label) for track, _unseen_ns in tracks])
-            distances_m[groups[:, None] != [self._classes.group_of(detection.label) for detection in detections]] = np.inf
+            groups, others = (np.array([self._classes.group_of(known.label) for known in objects])
+                              for objects in ([track for track, _unseen_ns in tracks], detections))
+            distances_m[groups[:, None] != others] = np.inf
             pairs = [pair for pair in match_greedily(distances_m) if np.isfinite(distances_m[pair])]
         for row, column in pairs:
             tracks[row] = self._matched(tracks[row][0], stamp_ns, detections[column]), 0

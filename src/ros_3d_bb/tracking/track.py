@@ -2,6 +2,7 @@
 
 Fixed frame, metres, nanoseconds.
 """
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -15,13 +16,14 @@ from ros_3d_bb.tracking.types import PREDICTION_STEP, PREDICTION_TIME, VISIBLE, 
 # `hits` counts the detections of a track, `end_hits` those that showed the lower and the upper end of the body.
 # `cut_ns` are the stamps of the latest detections of which the image border truncated these ends.
 # `unseen_s` is the time since the last detection, `missed_s` the part of it during which a detection was expected.
-# `votes` are filtered scores of the classes of the group, of which `class_number` (`class_numbers.ClassNumbers`) has the
-# highest; `score` is the filtered score; `detection` is `Detection.index` in the latest image.
+# `votes` are filtered scores of the classes of the group, of which `class_number` (see `ClassNumbers`) has the highest.
+# `score` is the filtered score of the detections; `detection` is `Detection.index` in the latest image.
 TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
                   ('size_m', float, 3), ('end_hits', int, 2), ('cut_ns', np.int64, 2), ('hits', int),
                   ('first_ns', np.int64), ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float),
                   ('status', int), ('confirmed', bool), ('moving', bool), ('class_number', int),
                   ('votes', float, MAX_IN_GROUP), ('score', float), ('detection', int)])
+PUBLISHED = 'id', 'status', 'moving', 'first_ns', 'last_ns', 'class_number', 'score', 'detection'
 RECENTLY_MATCHED_NS = NS // 5  # no track starts near a track that was matched less than this ago
 SMOOTHING = 0.1  # weight of the newest detection in size, height and score
 CUT_SMOOTHING = 0.02  # the same for boxes that the image border truncates sideways: the head may be outside
@@ -188,15 +190,12 @@ def objects_of(tracks, params, classes):
     covariances[:, [0, 1], [0, 1]] += params.position_bias ** 2
     covariances[:, 2, 2] = tracks['z_m2']
 
-    known = [tracks[name].tolist() for name in ('id', 'status', 'moving', 'first_ns', 'last_ns', 'class_number', 'score',
-                                                'detection')]
-    return [TrackedObject(track_id, position_m, size_m, velocity_mps, velocity_mps, status, moving, first_ns, last_ns,
-                          prediction_m, params.prediction_step, covariance, prediction_m2, classes.labels[number],
-                          score, detection)
-            for track_id, status, moving, first_ns, last_ns, number, score, detection, position_m, size_m, velocity_mps,
-            prediction_m, covariance, prediction_m2 in zip(*known, positions_m, tracks['size_m'].copy(),
-                                                           velocities_mps, predictions_m, covariances,
-                                                           predictions_m2)]
+    columns = {name: tracks[name].tolist() for name in PUBLISHED}
+    labels = [classes.labels[number] for number in columns['class_number']]
+    return list(map(TrackedObject, columns['id'], positions_m, tracks['size_m'].copy(), velocities_mps, velocities_mps,
+                    columns['status'], columns['moving'], columns['first_ns'], columns['last_ns'], predictions_m,
+                    itertools.repeat(params.prediction_step), covariances, predictions_m2, labels, columns['score'],
+                    columns['detection']))
 
 
 def _covariances_ahead(covariance, times_s, params):

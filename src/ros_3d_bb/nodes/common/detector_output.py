@@ -23,8 +23,8 @@ class DetectorWorker(object):
     Publishes
     ---------
     yolo_bounding_box : std_msgs/Int32MultiArray
-        x1, y1, x2, y2 of each object, in pixels; stamp and frame of the image, and class and score of each object are in
-        `layout.dim[0].label`.
+        x1, y1, x2, y2 of each object, in pixels; stamp and frame of the image, and class and score of each object, are
+        in `layout.dim[0].label`.
     yolo_result_out : sensor_msgs/Image
         Colour image with the 2D boxes; published only if there are subscribers.
 
