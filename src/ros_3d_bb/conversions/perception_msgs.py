@@ -11,6 +11,7 @@ from ros_3d_bb import msg
 from ros_3d_bb.camera.camera_model import Camera, transform_from
 from ros_3d_bb.core.labels import PERSON, label_fault, score_fault, usable_label
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
+from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
@@ -265,15 +266,18 @@ def _box3d_fault(message):
     return label_fault(box.label) or score_fault(box.score)
 
 
-def detections_from_msg(message, fixed_from_camera, indices=None):
+def detections_from_msg(message, fixed_from_camera, indices=None, classes=ObjectClasses()):
     """Convert the boxes of a BoundingBox3DArray with these indices to Detections in the fixed frame.
 
     They must be usable (see `box3d_faults`); by default all boxes are converted. `fixed_from_camera` (4, 4) is the pose
-    of the camera's optical frame in the fixed frame.
+    of the camera's optical frame in the fixed frame, `classes` the table of the classes of objects.
     """
-    indices = range(len(message.boxes)) if indices is None else indices
-    return [detection_from_box(_box3d_from_msg(message.boxes[index]), fixed_from_camera)._replace(index=index)
-            for index in indices]
+    detections = []
+    for index in range(len(message.boxes)) if indices is None else indices:
+        box = _box3d_from_msg(message.boxes[index])
+        detection = detection_from_box(box, fixed_from_camera, classes.of(box.label))
+        detections.append(detection._replace(index=index))
+    return detections
 
 
 def tracks_to_msg(tracks, header):

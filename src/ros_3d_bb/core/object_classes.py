@@ -48,9 +48,11 @@ class ObjectClass(NamedTuple):
 
 _SEAT, _LUGGAGE, _FURNITURE = 'seat', 'luggage', dict(acceleration=0.1, initial_speed=0.25)
 DEFAULT_CLASS = ObjectClass()  # of classes that are not listed
-# The person is that of the thesis. The others are usual sizes of objects in rooms, to a tenth of a metre.
+# The distance to the axis of people is the mean over standing and walking bodies of the simulation, from all sides.
+PERSON_CLASS = ObjectClass(PERSON, 0.46, 1.7, axis=0.09)
+# The sizes of the other classes are estimates for usual objects, not measurements.
 CLASSES = OrderedDict([
-    (PERSON, ObjectClass(PERSON, 0.46, 1.7, axis=0.09)),
+    (PERSON, PERSON_CLASS),
     ('bicycle', ObjectClass('two-wheeler', 0.6, 1.1, 1.75, acceleration=2.0, initial_speed=2.0)),
     ('motorcycle', ObjectClass('two-wheeler', 0.8, 1.1, 2.1, acceleration=2.0, initial_speed=2.0)),
     ('dog', ObjectClass('pet', 0.25, 0.55, 0.7, acceleration=2.0)),

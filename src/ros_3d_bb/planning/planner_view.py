@@ -36,6 +36,16 @@ def _fault_of(track):
     return ''
 
 
+def with_class_widths(tracks, classes):
+    """Give elongated objects at least the length of their class (ObjectClasses) as their width.
+
+    A dog that is seen from the front appears narrow. Planners must keep clear of its whole length, whose direction is
+    unknown.
+    """
+    return [track._replace(size_m=np.maximum(track.size_m, [length_m, length_m, 0])) for track, length_m in
+            ((track, classes.of(track.label).length) for track in tracks)]
+
+
 def _walking_velocity(track):
     """Velocity (3,), m/s; zero for a track that does not move: it is noise that planners would extrapolate."""
     return track.velocity_mps if track.moving else np.zeros(3)

@@ -5,7 +5,7 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera, transform_points, upright_turns
 from ros_3d_bb.core.labels import PERSON
-from ros_3d_bb.core.limits import USUAL_HEIGHT_M, USUAL_WIDTH_M
+from ros_3d_bb.core.object_classes import PERSON_CLASS
 from ros_3d_bb.core.params import Param
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
@@ -42,8 +42,8 @@ class Detection(NamedTuple):
     index: int = NOT_DETECTED
 
 
-def detection_from_box(box, fixed_from_camera):
-    """Convert a `box3d_estimator.Box3D` of an image to a Detection in the fixed frame.
+def detection_from_box(box, fixed_from_camera, kind=PERSON_CLASS):
+    """Convert a `box3d_estimator.Box3D` of an image, whose ObjectClass is `kind`, to a Detection in the fixed frame.
 
     The cylinder is upright in the fixed frame, independent of which edge of the image is up: for a camera mounted in
     portrait, width and height are swapped.
@@ -51,22 +51,22 @@ def detection_from_box(box, fixed_from_camera):
     rotation, turns = fixed_from_camera[:3, :3], upright_turns(fixed_from_camera)
     center_m, (width_m, height_m) = box.center_m, box.size_m[:2]
     if turns % 2:
-        center_m, (height_m, width_m) = _completed_in_portrait(box)
+        center_m, (height_m, width_m) = _completed_in_portrait(box, kind)
     covariance_m2 = None if box.covariance_m2 is None else rotation.dot(box.covariance_m2).dot(rotation.T)
     edges = box.truncated_edges[-turns:] + box.truncated_edges[:-turns]
     return Detection(transform_points(fixed_from_camera, center_m), np.array([width_m, width_m, height_m]),
                      covariance_m2, edges, box.support or 1.0, box.label, box.score)  # support 0: unknown
 
 
-def _completed_in_portrait(box):
+def _completed_in_portrait(box, kind):
     """Centre (3,) of a box and its extents along the rows and the columns of an image of a camera in portrait.
 
-    The estimator completes a truncated body as if it stood upright in the image: to the usual width along the rows and
-    to the usual height along the columns. In portrait, the two are swapped. The visible end stays in place.
+    The estimator completes a truncated object as if it stood upright in the image: to the usual width along the rows
+    and to the usual height along the columns. In portrait, the two are swapped. The visible end stays in place.
     """
     center_m, extents_m, cut = np.array(box.center_m, float), np.array(box.size_m[:2], float), box.truncated_edges
-    was_completed = np.isclose(extents_m[1], USUAL_HEIGHT_M)
-    completed_m = max(extents_m[0], USUAL_HEIGHT_M), USUAL_WIDTH_M if was_completed else extents_m[1]
+    was_completed = np.isclose(extents_m[1], kind.height)
+    completed_m = max(extents_m[0], kind.height), kind.width if was_completed else extents_m[1]
     for axis, (cut_low, cut_high) in enumerate(zip(cut[:2], cut[2:])):
         if cut_low != cut_high:
             missing_m = completed_m[axis] - extents_m[axis]
