@@ -8,7 +8,8 @@ import pytest
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
 from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
-from ros_3d_bb.detection.weights import COCO, WeightsError
+from ros_3d_bb.core.labels import COCO
+from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.sessions.session_reader import read_color, read_session
 from ros_3d_bb.detection.yolov5.onnx_writer import Graph, metadata_entry
 from support.onnx_files import FLOAT, FLOAT16, UINT8, outputs_of, write_constant_network, write_mean_network

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import torch
 
-from ros_3d_bb.detection.weights import COCO, WeightsError, class_names
+from ros_3d_bb.core.labels import COCO
+from ros_3d_bb.detection.weights import WeightsError, class_names
 from ros_3d_bb.detection.yolov5 import checkpoint
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
 from ros_3d_bb.detection.yolov5.checkpoint import EXPECTED, read_checkpoint

@@ -3,9 +3,10 @@ import functools
 from collections import OrderedDict
 from typing import Callable, NamedTuple, Tuple
 
+from ros_3d_bb.core.labels import COCO
 from ros_3d_bb.detection.onnx.decoders import (cell_count, decode_columns, decode_distances, decode_final, decode_rows,
                                                decode_yolox, is_probability)
-from ros_3d_bb.detection.weights import COCO, MAX_CLASSES
+from ros_3d_bb.detection.weights import MAX_CLASSES
 
 P3, P6 = (8, 16, 32), (8, 16, 32, 64)
 GRIDS = (P3, P6, (4, 8, 16, 32))
