@@ -168,6 +168,7 @@ def test_the_yaml_file_gives_head_names_and_resizing(tmp_path):
                                      'padding: 9}')
     network = OnnxModel(path, 1)
     assert network.names == ['person', 'dog', 'chair'] and network.resize == ('stretch', 9)
+    assert network.description.endswith('head: yolox')
     found = NetworkDetector(network, ALL).detect(np.zeros((192, 128, 3), np.uint8))
     np.testing.assert_allclose(found.boxes, BOXES * (1, 2, 1, 2), atol=1e-3)
 

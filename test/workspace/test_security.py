@@ -125,5 +125,5 @@ def test_malicious_checkpoints_are_rejected(tmp_path, monkeypatch, little_memory
 def test_malicious_onnx_files_are_rejected(tmp_path, content):
     path = tmp_path / 'weights.onnx'
     path.write_bytes(content)
-    with pytest.raises(WeightsError, match='not a YOLOv5 ONNX export'):
+    with pytest.raises(WeightsError, match='expected an ONNX file of a detector'):
         open_runtime(str(path))

@@ -20,7 +20,7 @@ INSTALL = 'ONNX Runtime is not installed; install it with "pip3 install onnxrunt
 DTYPES = {'tensor(float)': np.float32, 'tensor(float16)': np.float16, 'tensor(uint8)': np.uint8}
 MAX_OUTPUT_BYTES = 2 ** 28
 MAX_METADATA = 10 ** 6  # characters
-MAX_LISTED = 20  # inputs or outputs in a message
+MAX_LISTED, MAX_LIST_LENGTH = 20, 2000  # inputs or outputs in a message, and characters
 GREY = 114  # of the image by which the head is recognised
 
 
@@ -62,6 +62,7 @@ class OnnxModel(object):
         self._layout = layout_of(outputs, probe_hw, metadata, settings.head, settings.strides, names)
 
         self._head = HEADS[self._layout.head]
+        self.description += ', head: %s' % self._layout.head
         self.names = class_names(names or None, self._layout.classes)
         self.suppressed = self._head.suppressed
         self.resize = Resize(settings.resize or self._head.resize,
@@ -151,4 +152,4 @@ def _signature(session):
              for entries in (session.get_inputs(), session.get_outputs())]
     known = '; '.join('%s %s' % (name, head.shape) for name, head in HEADS.items())
     return '. Inputs: %s. Outputs: %s. Known heads: %s. See doc/detectors.md' % (
-        ascii(lists[0])[1:-1], ascii(lists[1])[1:-1], known)
+        tuple(ascii(text[:MAX_LIST_LENGTH])[1:-1] for text in lists) + (known,))

@@ -9,7 +9,7 @@ EXTRA_BYTES = 2 ** 30  # memory that a network may take beside its weights
 MESSAGES = {
     'model': {7: 'graph', 20: 'training', 25: 'function'}, 'training': {1: 'graph', 2: 'graph'},
     'function': {7: 'node', 11: 'attribute'}, 'graph': {1: 'node', 5: 'tensor', 15: 'sparse tensor'},
-    'node': {1: 'input', 4: 'operator', 5: 'attribute'}, 'sparse tensor': {1: 'tensor', 2: 'tensor'},
+    'node': {4: 'operator', 5: 'attribute'}, 'sparse tensor': {1: 'tensor', 2: 'tensor'},
     'attribute': {5: 'tensor', 6: 'graph', 10: 'tensor', 11: 'graph', 22: 'sparse tensor', 23: 'sparse tensor'},
     'tensor': {13: 'external data'}}
 MAX_DEPTH = 20  # of messages in messages
