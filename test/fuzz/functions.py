@@ -65,8 +65,8 @@ def _array(source, _folder):
 
 def _boxes2d(source, _folder):
     boxes = boxes2d_from_msg(hostile.boxes2d(source, NOW_NS))
-    back = boxes2d_from_msg(boxes2d_to_msg(boxes.boxes, source.header(NOW_NS)))
-    assert back.boxes.tolist() == boxes.boxes.tolist()
+    back = boxes2d_from_msg(boxes2d_to_msg(boxes.boxes, source.header(NOW_NS), boxes.labels, boxes.scores))
+    assert back.boxes.tolist() == boxes.boxes.tolist() and back.labels == boxes.labels
 
 
 def _boxes3d(source, _folder):

@@ -60,6 +60,7 @@ def assert_people(message, stamp_ns, true_boxes):
     boxes = found.boxes.astype(float)
     assert found.stamp_ns == stamp_ns and len(boxes) == len(true_boxes)
     assert all(iou(np.array(true_box, float), boxes).max() > 0.5 for true_box in true_boxes)
+    assert set(found.labels) == {'person'} and (found.scores > 0).all()
 
 
 def test_nothing_is_published_while_no_floor_is_known(rig, output):

@@ -58,7 +58,9 @@ def test_the_person_is_detected_and_the_array_has_stamp_and_frame(camera, output
     message, = output.wait_for(1)
     boxes = boxes2d_from_msg(message)
     assert boxes.stamp_ns == START + number and boxes.frame_id == 'camera_color_optical_frame'
-    assert message.layout.dim[0].label == ('boxes;stamp=1000.%09d;frame=camera_color_optical_frame' % number)
+    assert message.layout.dim[0].label.startswith(
+        'boxes;stamp=1000.%09d;frame=camera_color_optical_frame;classes=person;scores=0.' % number)
+    assert boxes.labels == ('person',) and 0.25 < boxes.scores[0] < 1
     assert message.layout.dim[0].size == len(boxes.boxes) == 1 and message.layout.dim[1].size == 4
     assert message.layout.data_offset == 0
     assert iou(np.array(box, float), boxes.boxes)[0] > 0.8

@@ -47,6 +47,11 @@ class Rig(TrackingStage):
         super().__init__(TrackerNodeParams(cameras=list(cameras), **params), [kind() for kind in TRACKING_PARAMS],
                          self.events, self.transforms, lambda *result: self._results.append(Result(*result)))
 
+    @property
+    def newest(self):
+        """The latest Result that `send` has not returned."""
+        return self._results[-1]
+
     def send(self, stamp_ns, camera='', frame_id=None, count=1, z=3.0):
         """Equal boxes of one image. Returns the Result, or None."""
         self.add_boxes(boxes(stamp_ns, frame_id or camera or 'camera', [(0.0, 0.0, z)] * count), self.now_ns, camera)

@@ -32,7 +32,7 @@ def scene(wall_m, person_m=PERSON_M):
     return depth_m
 
 
-def estimate(depth_m, rects_px, events, estimator='foreground'):
+def estimate(depth_m, rects_px, events, estimator='foreground', labels=None, scores=None, **params):
     """The 3D boxes of an image. All of them can be tracked, and their regions are inside the image."""
     results = []
 
@@ -42,10 +42,10 @@ def estimate(depth_m, rects_px, events, estimator='foreground'):
         assert not usable_boxes3d(message)[1]
         assert all(box.roi.x_offset + box.roi.width <= 640 for box in message.boxes)
         results.extend(boxes3d)
-    stage = EstimationStage(Bbox3dParams(estimator=estimator), events, on_frame)
+    stage = EstimationStage(Bbox3dParams(estimator=estimator, **params), events, on_frame)
     stage.add_camera_info(CameraInfo(header=HEADER, width=640, height=480, K=INTRINSICS), 0)
     stage.add_depth(fill_image(Image(header=HEADER), depth_m, '32FC1'), 0)
-    stage.add_boxes(boxes2d_to_msg(np.array(rects_px), HEADER), 0)
+    stage.add_boxes(boxes2d_to_msg(np.array(rects_px), HEADER, labels, scores), 0)
     return results
 
 
@@ -115,3 +115,41 @@ def test_an_error_model_is_rejected_for_another_estimator(model, estimator, othe
 def test_a_missing_error_model_is_named():
     with pytest.raises(ValueError, match='nowhere.yaml.*absolute path expected'):
         EstimationStage(params('nowhere', 'median'), EventCounter(), None)
+
+
+def test_classes_and_scores_stay_with_their_boxes(events):
+    """Of four boxes, the second one is reversed and the third one has no depth."""
+    depth_m = scene(wall_m=5.0)
+    depth_m[200:300, 400:500] = 0
+    rects_px = [PERSON_PX, (9, 5, 5, 9), (410, 210, 490, 290), (250, 150, 350, 460)]
+    depth_m[150:460, 250:350] = 4.0
+    boxes = estimate(depth_m, rects_px, events, labels=['dog', 'cat', 'chair', 'drone'], scores=[0.5, 0.6, 0.7, 0.8])
+    assert [(box.label, box.score, box.rect_px) for box in boxes] == [('dog', 0.5, rects_px[0]),
+                                                                      ('drone', 0.8, rects_px[3])]
+
+
+def test_another_table_of_classes_is_used(tmp_path, events):
+    path = tmp_path / 'classes.yaml'
+    path.write_text('classes: {person: {axis: 0.2}}\ndefault: {axis: 0.4}')
+    for label, behind_m in (('person', 0.2), ('drone', 0.4)):
+        box, = estimate(scene(wall_m=5.0), [PERSON_PX], events, labels=[label], classes_file=str(path))
+        assert box.center_m[2] == pytest.approx(PERSON_M + behind_m, abs=1e-3)
+    with pytest.raises(ValueError, match='nowhere.yaml'):
+        EstimationStage(Bbox3dParams(classes_file='/nowhere.yaml'), events, None)
+
+
+def test_only_heights_of_people_tell_the_scale_of_depth(events):
+    """Toys of 0.3 m are possible, people of 0.3 m are not."""
+    results = []
+
+    def on_frame(boxes2d, depth_msg, camera):
+        results.extend(stage.estimate(boxes2d, depth_msg, camera)[2])
+    stage = EstimationStage(Bbox3dParams(), events, on_frame)
+    stage.add_camera_info(CameraInfo(header=HEADER, width=640, height=480, K=INTRINSICS), 0)
+    for number in range(60):
+        header = Header(stamp=time_from((1000 + number) * NS), frame_id='camera')
+        stage.add_depth(fill_image(Image(header=header), scene(wall_m=5.0, person_m=0.6), '32FC1'), 0)
+        label = 'toy' if number < 30 else 'person'
+        stage.add_boxes(boxes2d_to_msg(np.array([PERSON_PX]), header, [label]), 0)
+        assert ('depth of a wrong scale' in events.counts) <= (number >= 30)
+    assert len(results) >= 59 and events.counts['depth of a wrong scale'] == 1

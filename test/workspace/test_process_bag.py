@@ -111,7 +111,8 @@ def test_the_number_of_parallel_searches_does_not_matter(session_bag, weights, t
     assert filecmp.cmp(str(tmp_path / '1.bag'), str(tmp_path / '3.bag'), shallow=False)
     found = messages_in(tmp_path / '1.bag')
     assert len(found['/yolo_bounding_box']) == len(found['/ros_3d_bb/bb_3d']) == 5
-    assert any(message.boxes for message in found['/ros_3d_bb/bb_3d'])
+    boxes3d = [box for message in found['/ros_3d_bb/bb_3d'] for box in message.boxes]
+    assert boxes3d and {box.label for box in boxes3d} == {'person'} and all(box.score > 0.25 for box in boxes3d)
 
 
 def test_without_detector_the_boxes_in_the_bag_are_used(session_bag, tmp_path):

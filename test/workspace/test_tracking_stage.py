@@ -109,8 +109,9 @@ def test_invalid_boxes_do_not_affect_the_others(rig):
         message = boxes(START_NS + frame * PERIOD_NS, 'camera', [(0, 0, 3), (0, 0, float('nan')), (0, 0, 3)])
         message.boxes[0].size.x, message.boxes[0].size.y = 9.34, 10.93
         rig.add_boxes(message, 0)
+        assert rig.newest.tracks[0].detection == 2  # among the published boxes, not among those that are used
     result = rig.send(START_NS + 60 * PERIOD_NS)
-    assert ids(result) == before and result.tracks[0].status == VISIBLE
+    assert ids(result) == before and result.tracks[0].status == VISIBLE and result.tracks[0].detection == 0
     assert rig.events.counts['3D boxes dropped'] == 60 and rig.events.counts['images tracked'] == 61
 
 

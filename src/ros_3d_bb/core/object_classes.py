@@ -55,16 +55,16 @@ CLASSES = OrderedDict([
     (PERSON, PERSON_CLASS),
     ('bicycle', ObjectClass('two-wheeler', 0.6, 1.1, 1.75, acceleration=2.0, initial_speed=2.0)),
     ('motorcycle', ObjectClass('two-wheeler', 0.8, 1.1, 2.1, acceleration=2.0, initial_speed=2.0)),
-    ('dog', ObjectClass('pet', 0.25, 0.55, 0.7, acceleration=2.0)),
-    ('cat', ObjectClass('pet', 0.15, 0.3, 0.45, acceleration=2.0)),
-    ('chair', ObjectClass(_SEAT, 0.5, 0.9, **_FURNITURE)),
+    ('dog', ObjectClass('pet', 0.22, 0.55, 0.55, acceleration=2.0)),
+    ('cat', ObjectClass('pet', 0.15, 0.3, 0.4, acceleration=2.0)),
+    ('chair', ObjectClass(_SEAT, 0.5, 0.9, axis=0.18, **_FURNITURE)),
     ('couch', ObjectClass(_SEAT, 0.9, 0.85, 1.9, **_FURNITURE)),
     ('bench', ObjectClass(_SEAT, 0.5, 0.85, 1.5, **_FURNITURE)),
     ('suitcase', ObjectClass(_LUGGAGE, 0.3, 0.65, 0.45)),
-    ('backpack', ObjectClass(_LUGGAGE, 0.3, 0.5)),
-    ('handbag', ObjectClass(_LUGGAGE, 0.3, 0.3)),
-    ('trolley', ObjectClass('trolley', 0.5, 1.0)),
-    ('potted plant', ObjectClass('potted plant', 0.4, 0.8, **_FURNITURE))])
+    ('backpack', ObjectClass(_LUGGAGE, 0.3, 0.5, axis=0.1)),
+    ('handbag', ObjectClass(_LUGGAGE, 0.3, 0.3, axis=0.1)),
+    ('trolley', ObjectClass('trolley', 0.45, 1.0, 0.6)),
+    ('potted plant', ObjectClass('potted plant', 0.4, 0.8, axis=0.15, **_FURNITURE))])
 RANGES = {'width': LARGEST_M, 'height': LARGEST_M, 'length': LARGEST_M, 'axis': LARGEST_M,
           'acceleration': LARGEST_FACTOR, 'initial_speed': LARGEST_FACTOR}
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
@@ -41,8 +42,8 @@ def detect_in_scene(simulator, detect, every=1, error_model=None):
         boxes = np.asarray(detect(frame), float).reshape(-1, 4)
         depth = DepthImage(frame.depth_mm, 0.001)
         stamp_ns = int(round(frame.time_s * NS))
-        step = Step(frame._replace(color=None, depth_mm=None), boxes,
-                    Moment(stamp_ns, simulator.true_tracks(frame, stamp_ns), []))
+        people = [track for track in simulator.true_tracks(frame, stamp_ns) if track.label == PERSON]
+        step = Step(frame._replace(color=None, depth_mm=None), boxes, Moment(stamp_ns, people, []))
         detections = _detections(depth, boxes, simulator.camera, frame.poses.map_from_camera, error_model)
         view = CameraView(frame.poses.map_from_camera, simulator.camera, frame.camera,
                           functools.partial(depths_towards, simulator.camera, depth))

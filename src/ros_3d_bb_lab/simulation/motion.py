@@ -12,6 +12,7 @@ from ros_3d_bb_lab.simulation.gait import Posture, stride_m
 SMOOTHING_S = 0.6
 WALKING_MPS = 1.3  # speed at which legs and arms reach their full swing
 FOLLOW_STEP_S = 0.05
+OBJECT_HEIGHT_M = 1.0  # of an object, for the length of its steps, which it does not show
 AFTER_S = 3.0  # moves continue beyond the end of the scene, for the predictions in the ground truth
 MIN_ROUND_S = 0.1  # rounds of moves that take less time are not repeated
 COLUMNS = X, Y, HEADING, PHASE, SWING, CROUCH = range(6)
@@ -60,6 +61,11 @@ class Motion(object):
 def person_motion(person, height_m, duration_s):
     """Motion of a person (`scenario.Person`) of the height `height_m`."""
     return _Knots(person.start, person.facing, person.crouch, height_m).motion(person, duration_s)
+
+
+def object_motion(scene_object, duration_s):
+    """Motion of a `scenario.SceneObject` that is not pushed. It faces the direction of its moves, as people do."""
+    return _Knots(scene_object.start, scene_object.facing, 0.0, OBJECT_HEIGHT_M).motion(scene_object, duration_s)
 
 
 def robot_motion(robot, people, duration_s):

@@ -1,12 +1,17 @@
-"""Scenario files: a room, a robot and people in YAML. `config/scenarios/README.md` describes all keys and units."""
+"""Scenario files: a room, a robot, people and other objects in YAML.
+
+`config/scenarios/README.md` describes all keys and units.
+"""
 import os
 import re
 from typing import NamedTuple, Optional, Tuple
 
 import yaml
 
+from ros_3d_bb.core.labels import label_fault
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
+from ros_3d_bb_lab.simulation.scene_objects import SHAPES
 
 Color = Tuple[int, int, int]
 Point = Tuple[float, float]
@@ -97,6 +102,22 @@ class Person(NamedTuple):
     trousers: Optional[Color] = None
 
 
+class SceneObject(NamedTuple):
+    """Object other than a person: `start` and `moves`, or `pushed_by` a person (number from 1).
+
+    Its shape is that of its class (see `scene_objects.SHAPES`) unless `size` (x, y, z) makes it a box.
+    """
+
+    label: str
+    start: Optional[Point] = None
+    facing: float = 0.0
+    moves: Tuple[Move, ...] = ()
+    repeat: bool = False
+    pushed_by: Optional[int] = None
+    size: Optional[Tuple[float, float, float]] = None
+    color: Optional[Color] = None
+
+
 class Scenario(NamedTuple):
     """Scene. The same `seed` gives the same images."""
 
@@ -108,19 +129,21 @@ class Scenario(NamedTuple):
     room: Room = Room()
     robot: Robot = Robot()
     people: Tuple[Person, ...] = ()
+    objects: Tuple[SceneObject, ...] = ()
 
 
 MOVE_KEYS = {'to': ('to', 'speed', 'rate'), 'turn': ('turn', 'rate'), 'wait': ('wait', 'facing', 'crouch')}
 RECORDS = {'room': Room, 'robot': Robot, 'follow': Follow}
-LISTS = {'furniture': Furniture, 'people': Person, 'moves': Move, 'cameras': Mount}
+LISTS = {'furniture': Furniture, 'people': Person, 'objects': SceneObject, 'moves': Move, 'cameras': Mount}
 VECTORS = {'bounds': 4, 'at': 2, 'size': 3, 'to': 2, 'start': 2, 'pose': 3, 'mount': 3, 'odometry_drift': 3, 'color': 3,
            'skin': 3, 'hair': 3, 'shirt': 3, 'trousers': 3}
-FLAGS, WHOLE = {'repeat', 'long_hair', 'short_sleeves', 'depth_noise'}, {'seed', 'person'}
+FLAGS, WHOLE = {'repeat', 'long_hair', 'short_sleeves', 'depth_noise'}, {'seed', 'person', 'pushed_by'}
 NAME = re.compile(r'[A-Za-z]\w*$')  # a topic namespace
 TYPES = (  # keys, check of a value, and its description
     (LISTS, lambda value: isinstance(value, list), 'a list'),
     (FLAGS, lambda value: isinstance(value, bool), 'true or false'),
-    ({'name'}, lambda value: isinstance(value, str) and NAME.match(value), 'a name such as front'))
+    ({'name'}, lambda value: isinstance(value, str) and NAME.match(value), 'a name such as front'),
+    ({'label'}, lambda value: isinstance(value, str) and not label_fault(value), 'the name of a class such as dog'))
 RANGES = (  # the same for numbers
     (WHOLE, lambda number: number == int(number) and 0 <= number < 2 ** 32, 'an integer from 0 to 4294967295'),
     ({'duration', 'rate', 'height', 'speed', 'girth', 'distance', 'size'}, lambda number: number > 0, 'more than 0'),
@@ -165,6 +188,8 @@ def scenario_from(content):
     _check_inside(room.bounds, 'robot', robot.pose[:2], robot.moves, camera_m)
     for number, person in enumerate(scenario.people, 1):
         _check_inside(room.bounds, 'people[%d]' % number, person.start, person.moves)
+    for number, scene_object in enumerate(scenario.objects, 1):
+        _check_object(scene_object, 'objects[%d]' % number, scenario)
     _check_cameras(robot, room)
     if robot.follow is not None and not 1 <= robot.follow.person <= len(scenario.people):
         raise ValueError('robot.follow.person is %d; 1 to %d expected' % (robot.follow.person, len(scenario.people)))
@@ -187,6 +212,20 @@ def _check_cameras(robot, room):
         if not 0 < robot.base_height + camera.mount[2] < room.height:
             raise ValueError('robot.mount is %s with robot.base_height %g, outside the room of height %g'
                              % (list(camera.mount), robot.base_height, room.height))
+
+
+def _check_object(scene_object, name, scenario):
+    if (scene_object.start is None) == (scene_object.pushed_by is None):
+        raise ValueError('%s is a %s; either start or pushed_by expected' % (name, scene_object.label))
+    if scene_object.start is not None:
+        _check_inside(scenario.room.bounds, name, scene_object.start, scene_object.moves)
+    elif not 1 <= scene_object.pushed_by <= len(scenario.people):
+        raise ValueError('%s.pushed_by is %d; 1 to %d expected' % (name, scene_object.pushed_by, len(scenario.people)))
+    elif scene_object.moves:
+        raise ValueError('%s has moves and pushed_by; only one of both is allowed' % name)
+    if scene_object.size is None and scene_object.label not in SHAPES:
+        raise ValueError('%s is a %s, whose shape is not known; a size, or one of %s expected'
+                         % (name, scene_object.label, ', '.join(sorted(SHAPES))))
 
 
 def _check_inside(bounds, name, start, moves, margin_m=0.0):
@@ -234,7 +273,7 @@ def _value(name, value, where):
         if not (isinstance(value, list) and len(value) == VECTORS[name]):
             raise ValueError('%s is %r; %d numbers expected' % (where, value, VECTORS[name]))
         return tuple(_number(name, entry, where) for entry in value)
-    if name in FLAGS or name == 'name':
+    if name in FLAGS or name in ('name', 'label'):
         return value
     return _number(name, value, where)
 

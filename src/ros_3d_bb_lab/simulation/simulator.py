@@ -5,14 +5,16 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject, prediction_times_s
 from ros_3d_bb_lab.simulation.body import Body, Build
 from ros_3d_bb_lab.simulation.mesh import box, rotation
-from ros_3d_bb_lab.simulation.motion import person_motion, robot_motion
+from ros_3d_bb_lab.simulation.motion import object_motion, person_motion, robot_motion
 from ros_3d_bb_lab.simulation.renderer import render
 from ros_3d_bb_lab.simulation.room import RenderedRoom
 from ros_3d_bb_lab.simulation.sensors import ColorSensor, StereoCamera
+from ros_3d_bb_lab.simulation.scene_objects import GAP_M, PushedMotion, object_mesh
 
 D435I_COLOR = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)  # camera of the measurements in the thesis
 FRONT_FROM_OPTICAL = transform_from((0, 0, 0), OPTICAL_ROTATION)
@@ -28,9 +30,9 @@ SHOES = ((45, 40, 40), (35, 35, 35), (205, 200, 200))
 
 
 class PersonTruth(NamedTuple):
-    """Ground truth of a person in one frame, in the map frame. Shares are 0..1."""
+    """Ground truth of a person or another object in one frame, in the map frame. Shares are 0..1."""
 
-    id: int                   # from 1, in the order of the scenario
+    id: int                   # from 1, in the order of the scenario: people, then other objects
     position_m: np.ndarray    # (3,), centre of the body's vertical axis
     velocity_mps: np.ndarray  # (3,)
     size_m: np.ndarray        # width, width, height
@@ -38,6 +40,7 @@ class PersonTruth(NamedTuple):
     hidden: float             # share of the body inside the image that other objects hide
     inside: float             # share of the body that lies inside the image
     box_px: Optional[Tuple[int, int, int, int]]  # bounding box (x1, y1, x2, y2) of the visible part, if there is one
+    label: str = PERSON       # class
 
 
 class Poses(NamedTuple):
@@ -63,6 +66,12 @@ class SimulatedFrame(NamedTuple):
     poses: Poses
     people: List[PersonTruth]
     camera: str = ''      # its name, '' if there is only one
+    objects: Tuple[PersonTruth, ...] = ()  # objects other than people
+
+    @property
+    def truth(self):
+        """Ground truth of people and other objects."""
+        return self.people + list(self.objects)
 
 
 class Simulator(object):
@@ -84,6 +93,10 @@ class Simulator(object):
                         for number, person in enumerate(scenario.people)]
         self._motions = [person_motion(person, body.build.height_m, scenario.duration)
                          for person, body in zip(scenario.people, self._bodies)]
+        self._meshes = [object_mesh(scene_object, np.random.RandomState(number))
+                        for number, scene_object in enumerate(scenario.objects)]
+        self._motions_of_objects = [self._motion_of(scene_object, mesh)
+                                    for scene_object, mesh in zip(scenario.objects, self._meshes)]
         self._robot = robot_motion(scenario.robot, self._motions, scenario.duration)
         self._color_sensor = ColorSensor(camera, scenario.seed, scenario.color_noise)
         self._stereo = StereoCamera(camera, scenario.seed) if scenario.depth_noise else None
@@ -98,13 +111,17 @@ class Simulator(object):
         poses, states = self.poses_at(time_s, turn), [motion.at(time_s) for motion in self._motions]
         bodies = [body.posed(state.posture).moved(np.append(state.position_m, 0), state.heading_rad)
                   for body, state in zip(self._bodies, states)]
+        states += [motion.at(time_s) for motion in self._motions_of_objects]
+        bodies += [mesh.moved(np.append(state.position_m, 0), state.heading_rad)
+                   for mesh, state in zip(self._meshes, states[len(bodies):])]
         shadows = [(state.position_m[0], state.position_m[1], SHADOW_RADIUS_M) for state in states]
         rendering = render(self._room, bodies + self._furniture, shadows, self.camera, poses.map_from_camera)
         depth_mm = (self._stereo.measure(rendering.inverse_depth, number) if self._stereo is not None
                     else np.rint(1000 / rendering.inverse_depth).clip(0, 65535).astype(np.uint16))
-        people = [self._truth(index, state, bodies[index], rendering) for index, state in enumerate(states)]
+        truth = [self._truth(index, state, bodies[index], rendering) for index, state in enumerate(states)]
+        people, objects = truth[:len(self._bodies)], tuple(truth[len(self._bodies):])
         color = self._color_sensor.capture(rendering.color, number)
-        return SimulatedFrame(number, time_s, color, depth_mm, poses, people, self.cameras[turn])
+        return SimulatedFrame(number, time_s, color, depth_mm, poses, people, self.cameras[turn], objects)
 
     def poses_at(self, time_s, camera=0):
         """Poses of odometry, robot and camera at a time. `camera` is the index of the camera."""
@@ -119,11 +136,12 @@ class Simulator(object):
                      base_from_mount.dot(tilted).dot(FRONT_FROM_OPTICAL))
 
     def positions_at(self, time_s):
-        """Positions (n, 2) of the people in the map. The time may be after the end of the scene."""
-        return np.array([motion.at(time_s).position_m for motion in self._motions]).reshape(-1, 2)
+        """Positions (n, 2) of people and objects in the map. The time may be after the end of the scene."""
+        motions = self._motions + self._motions_of_objects
+        return np.array([motion.at(time_s).position_m for motion in motions]).reshape(-1, 2)
 
     def true_tracks(self, frame, stamp_ns):
-        """Convert the people of a frame to tracks (TrackedObject) in the map, first seen at the start of the scene.
+        """Convert the objects of a frame to tracks (TrackedObject) in the map, first seen at the start of the scene.
 
         Their predictions are their actual future positions.
         """
@@ -132,12 +150,13 @@ class Simulator(object):
         start_ns = stamp_ns - int(round(frame.time_s * NS))
         return [TrackedObject(person.id, person.position_m, person.size_m, person.velocity_mps, person.velocity_mps,
                               _status(person), bool(np.linalg.norm(person.velocity_mps) > MOVING_MPS), start_ns,
-                              stamp_ns, np.c_[path, np.full(len(path), person.position_m[2])], PREDICTION_STEP_S)
-                for person, path in zip(frame.people, paths)]
+                              stamp_ns, np.c_[path, np.full(len(path), person.position_m[2])], PREDICTION_STEP_S,
+                              label=person.label)
+                for person, path in zip(frame.truth, paths)]
 
     def _truth(self, index, state, body, rendering):
-        height_m = float(body.vertices[:, 2].max())
-        width_m = self._bodies[index].width_m
+        height_m, number = float(body.vertices[:, 2].max()), index - len(self._bodies)
+        width_m = self._bodies[index].width_m if number < 0 else _largest_extent(self._meshes[number])
         visible = cv2.inRange(rendering.objects, index + 1, index + 1)
         count = cv2.countNonZero(visible)
         x, y, width, height = cv2.boundingRect(visible)
@@ -145,7 +164,18 @@ class Simulator(object):
         inside = rendering.inside[index]
         return PersonTruth(index + 1, np.append(state.position_m, height_m / 2), np.append(state.velocity_mps, 0),
                            np.array([width_m, width_m, height_m]), (1 - hidden) * inside, hidden, inside,
-                           (x, y, x + width, y + height) if count else None)
+                           (x, y, x + width, y + height) if count else None,
+                           PERSON if number < 0 else self.scenario.objects[number].label)
+
+    def _motion_of(self, scene_object, mesh):
+        if scene_object.pushed_by is None:
+            return object_motion(scene_object, self.scenario.duration)
+        return PushedMotion(self._motions[scene_object.pushed_by - 1], GAP_M + float(np.ptp(mesh.vertices[:, 0])) / 2)
+
+
+def _largest_extent(mesh):
+    """Larger horizontal extent of a mesh, metres."""
+    return float(np.ptp(mesh.vertices[:, :2], axis=0).max())
 
 
 def _status(person):

@@ -40,10 +40,11 @@ def scenario_images(scenario, with_boxes=False):
         stamp_ns = START_NS + int(round(frame.time_s * NS))
         messages = simulated_messages(simulator, frame, stamp_ns)
         if with_boxes:
-            boxes = [person.box_px for person in frame.people if person.box_px is not None]
+            shown = [truth for truth in frame.truth if truth.box_px is not None]
             header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(frame.camera))
             messages.append((topic_of(frame.camera, BOXES_TOPIC),
-                             boxes2d_to_msg(np.array(boxes, int).reshape(-1, 4), header)))
+                             boxes2d_to_msg(np.array([truth.box_px for truth in shown], int).reshape(-1, 4), header,
+                                            [truth.label for truth in shown], [1.0] * len(shown))))
         yield stamp_ns, messages
 
 

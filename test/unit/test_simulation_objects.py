@@ -1,0 +1,101 @@
+"""Objects other than people in the simulator: shapes, motion, ground truth, and errors of estimated positions."""
+import numpy as np
+import pytest
+
+from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
+from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL
+from ros_3d_bb_lab.simulation.motion import person_motion
+from ros_3d_bb_lab.simulation.scenario import Move, Person, SceneObject, Scenario, scenario_from
+from ros_3d_bb_lab.simulation.scene_objects import GAP_M, SHAPES, PushedMotion, object_mesh
+from ros_3d_bb_lab.simulation.simulator import Simulator
+
+
+@pytest.mark.parametrize('label', sorted(SHAPES))
+def test_shapes_stand_on_the_floor_and_are_centred(label):
+    mesh = object_mesh(SceneObject(label, (3.0, 0.0)), np.random.RandomState(0))
+    low_m, high_m = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    assert low_m[2] == 0 and np.abs(low_m[:2] + high_m[:2]).max() < 1e-6
+    assert mesh.faces.max() == len(mesh.vertices) - 1 and len(mesh.colors) == len(mesh.faces)
+
+
+def test_other_objects_are_boxes_with_a_size():
+    crate = SceneObject('crate', (3.0, 0.0), size=(0.3, 0.4, 0.5), color=(9, 8, 7))
+    mesh = object_mesh(crate, np.random.RandomState(0))
+    np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), (0.3, 0.4, 0.5), atol=1e-6)
+    assert mesh.colors[0].tolist() == [9, 8, 7]
+
+
+def test_a_pushed_object_is_in_front_of_the_person():
+    moves = Move(to=(2.0, 0.0), speed=1.0), Move(to=(2.0, 2.0), speed=1.0)
+    person = person_motion(Person((0.0, 0.0), moves=moves), 1.7, 4)
+    pushed = PushedMotion(person, 0.7)
+    for time_s in (1.0, 2.0, 3.0):
+        position_m, _velocity, heading_rad, _posture = person.at(time_s)
+        ahead = np.array([np.cos(heading_rad), np.sin(heading_rad)])
+        np.testing.assert_allclose(pushed.at(time_s).position_m, position_m + 0.7 * ahead)
+        step_m = pushed.at(time_s + 0.05).position_m - pushed.at(time_s - 0.05).position_m
+        np.testing.assert_allclose(pushed.at(time_s).velocity_mps, step_m / 0.1, atol=0.1)
+    np.testing.assert_allclose(pushed.at(1.0).velocity_mps, (1, 0), atol=1e-6)
+    assert np.hypot(*pushed.at(2.0).velocity_mps) > 1.5  # it swings round
+
+
+def test_the_ground_truth_has_objects_after_people():
+    scenario = Scenario(duration=0.1, rate=10, people=(Person((4.0, 0.5)),),
+                        objects=(SceneObject('trolley', pushed_by=1), SceneObject('chair', (3.0, -1.0), facing=0.7)))
+    simulator = Simulator(scenario)
+    frame = simulator.frame(0)
+    assert [(truth.id, truth.label) for truth in frame.truth] == [(1, 'person'), (2, 'trolley'), (3, 'chair')]
+    assert [person.label for person in frame.people] == ['person']
+    person, trolley, chair = frame.truth
+    assert trolley.position_m[0] - person.position_m[0] == pytest.approx(GAP_M + 0.3)
+    np.testing.assert_allclose(chair.size_m, (0.45, 0.45, 0.9), atol=1e-6)
+    np.testing.assert_allclose(chair.position_m, (3.0, -1.0, 0.45), atol=1e-6)
+    x1, y1, x2, y2 = chair.box_px
+    assert 100 < x2 - x1 < 160 and 180 < y2 - y1 < 240
+    tracks = simulator.true_tracks(frame, 10 ** 9)
+    assert [track.label for track in tracks] == ['person', 'trolley', 'chair']
+    np.testing.assert_allclose(tracks[1].prediction_m[:, :2], [trolley.position_m[:2]] * 8)
+
+
+def test_scenes_without_objects_are_as_before():
+    person = Person((3.0, 0.3))
+    alone, beside = (Simulator(Scenario(duration=0.1, rate=10, people=(person,), objects=objects)).frame(0)
+                     for objects in ((), (SceneObject('chair', (-2.0, 0.0)),)))
+    assert alone.color.tobytes() == beside.color.tobytes() and str(alone.people) == str(beside.people)
+
+
+@pytest.mark.parametrize('entry, reason', [
+    ({'start': [3, 0]}, 'label expected, too'), ({'label': 'dog'}, 'either start or pushed_by'),
+    ({'label': 'dog', 'start': [3, 0], 'pushed_by': 1}, 'either start or pushed_by'),
+    ({'label': 'dog', 'pushed_by': 2}, 'pushed_by is 2; 1 to 1 expected'),
+    ({'label': 'dog', 'pushed_by': 1, 'moves': [{'wait': 1.0}]}, 'only one of both'),
+    ({'label': 'crate', 'start': [3, 0]}, 'a size, or one of chair, dog, trolley expected'),
+    ({'label': 'a;b', 'start': [3, 0]}, 'the name of a class'), ({'label': 7, 'start': [3, 0]}, 'the name of a class'),
+    ({'label': 'dog', 'start': [30, 0]}, 'outside the room'),
+    ({'label': 'dog', 'start': [3, 0], 'speed': 1}, 'unknown key'),
+    ({'label': 'crate', 'start': [3, 0], 'size': [1, 0, 1]}, 'more than 0 expected')])
+def test_invalid_objects_are_rejected(entry, reason):
+    with pytest.raises(ValueError, match=reason):
+        scenario_from({'people': [{'start': [2, 0]}], 'objects': [entry]})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('label', sorted(SHAPES))
+def test_positions_of_objects_are_accurate_from_all_sides(label):
+    """Whatever side is seen: RMSE of single images at 3 and 5 m."""
+    model, errors_m = read_error_model(SIMULATED_ERROR_MODEL), []
+    for place in ((3.2, 0.8), (5.0, 0.5)):
+        for heading_deg in range(0, 360, 30):
+            simulator = Simulator(Scenario(duration=0.1, rate=10, objects=(
+                SceneObject(label, place, facing=float(np.radians(heading_deg))),)))
+            frame = simulator.frame(0)
+            truth, = frame.objects
+            boxes = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [truth.box_px], simulator.camera,
+                                   estimator_named('foreground'), labels=[label])
+            (x_m, _y, z_m), = [box.center_m for box in corrected_boxes(boxes, model)]
+            true_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), truth.position_m)
+            errors_m.append(np.hypot(x_m - true_m[0], z_m - true_m[2]))
+    assert np.sqrt(np.mean(np.square(errors_m))) <= 0.08

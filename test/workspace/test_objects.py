@@ -1,0 +1,75 @@
+"""A scene with a person, a dog, a trolley that is pushed and a chair, from true 2D boxes with classes to tracks."""
+import os
+
+import numpy as np
+import pytest
+
+from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
+from ros_3d_bb.bags.process_bag import with_params
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, boxes3d_from_msg, tracks_from_msg
+from ros_3d_bb.core.event_counter import EventCounter
+from ros_3d_bb.pipeline.offline_pipeline import Pipeline, Settings
+from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import TRUTH_TOPIC, scenario_images
+from ros_3d_bb_lab.simulation.scenario import read_scenario
+
+LABELS = ['chair', 'dog', 'person', 'trolley']
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope='module')
+def run():
+    """[(truth, 3D boxes, tracks)] of the images of config/scenarios/objects.yaml, as process_bag makes them."""
+    settings = with_params(Settings(detector='none'), 'bbox3d', error_model=SIMULATED_ERROR_MODEL)
+    transforms, images = BagTransforms(), []
+    pipeline = Pipeline(settings, EventCounter(), transforms)
+    for stamp_ns, messages in scenario_images(read_scenario(scenario_path('objects')), with_boxes=True):
+        outputs, of_topic = [], dict(messages)
+        transforms.ahead(of_topic['tf'])
+        transforms.passed(of_topic['tf'])
+        for topic, message in messages:
+            if topic in settings.inputs and topic != 'tf':
+                outputs += pipeline.take(topic, message, stamp_ns)
+        images.append((of_topic[TRUTH_TOPIC], dict(outputs)[BOXES3D_TOPIC], dict(outputs)[TRACKS_TOPIC]))
+    return images
+
+
+def test_each_object_is_one_track_with_its_label(run):
+    moments = [Moment(truth.header.stamp.to_nsec(), tracks_from_msg(truth), tracks_from_msg(tracks))
+               for truth, _boxes3d, tracks in run]
+    labels = {track.id: track.label for track in moments[0].truth}
+    scores = score(moments)
+    assert sorted(labels.values()) == LABELS and scores.false_share == 0
+    published = {(track.id, track.label) for moment in moments for track in moment.tracks}
+    assert sorted(label for _id, label in published) == LABELS  # one track each, whose label never changes
+    for found in scores.people:
+        assert (found.ids[0], labels[found.person]) in published and len(found.ids) == 1
+        assert found.followed > 0.95 and found.rmse_m <= 0.08, labels[found.person]
+
+
+def test_tracks_name_the_box_that_they_were_detected_as(run):
+    detected = 0
+    for _truth, boxes3d, tracks in run:
+        assert boxes3d.header.stamp == tracks.header.stamp
+        boxes = boxes3d_from_msg(boxes3d)
+        indices = [track.detection for track in tracks.objects if track.detection >= 0]
+        assert len(set(indices)) == len(indices)
+        for track in tracks.objects:
+            assert (track.detection >= 0) == (track.last_seen == tracks.header.stamp)
+            if track.detection >= 0:
+                assert boxes[track.detection].label == track.label
+                detected += 1
+    assert detected > 0.9 * 4 * len(run)
+
+
+def test_tracks_have_the_score_of_the_detector(run):
+    assert {track.score for _truth, _boxes3d, tracks in run for track in tracks.objects} == {1.0}
+
+
+def test_objects_have_the_size_of_their_class(run):
+    heights_m = {track.label: track.size.z for track in run[-1][2].objects}
+    truth_m = {track.label: track.size.z for track in run[-1][0].objects}
+    assert all(abs(heights_m[label] - truth_m[label]) < 0.15 for label in LABELS), heights_m
+    assert np.all([track.size.x < 0.8 for track in run[-1][2].objects])
+    assert os.path.basename(scenario_path('objects')) == 'objects.yaml'
