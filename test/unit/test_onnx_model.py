@@ -177,6 +177,7 @@ def test_the_yaml_file_gives_head_names_and_resizing(tmp_path):
     ('colour: bgr', 'unknown.*colour.*did you mean.*color.*std'), ('color: grey', "'grey'.*rgb, bgr"),
     ('mean: [1, 2]', 'mean is .*three'), ('std: [1, 0, 1]', 'greater than 0'), ('std: [.nan, 1, 1]', 'three numbers'),
     ('strides: [8, 1.5]', 'strides'), ('names: [a, no]', 'quotes'), ('head: yolo', "'yolo'"), ('padding: 300', '300'),
+    ('padding: ' + '9' * 400, 'padding is 1.79'),
     ('- a', 'keys and values'), ('a: [', 'parsing'), ('a: &x [1]\nb: *x', 'alias'), ('1: 2', 'keys and values'),
     ('names: [a, b]', '2 names for its 3 classes'), ('#' * 1000001, 'larger'), ('head: nanodet', 'cells|columns')])
 def test_yaml_files_that_cannot_be_used_are_rejected(tmp_path, text, reason):

@@ -1,9 +1,11 @@
 """Parameters of a node: their schema, and conversion of the parameter server's values to validated NamedTuples."""
 import difflib
+import sys
 from collections import OrderedDict
 from typing import Any, NamedTuple, Tuple, Union
 
 LARGEST = 1e6
+MAX_FLOAT = sys.float_info.max
 
 
 class Param(NamedTuple):
@@ -105,6 +107,7 @@ def check(params):
     for name, param in params.PARAMS.items():
         value = getattr(params, name)
         if isinstance(value, (int, float)) and not param.limits[0] <= value <= param.limits[1]:
+            value = max(-MAX_FLOAT, min(value, MAX_FLOAT))  # larger integers cannot be formatted
             raise ValueError('parameter ~%s is %g; %s expected' % (name, value, param.allowed))
         for word in (value if isinstance(value, (list, tuple)) else [value]) if param.choices else ():
             if word not in param.choices:

@@ -3,7 +3,7 @@ import contextlib
 import resource
 
 MAX_BYTES = 2 ** 30  # of a file
-EXTRA_BYTES = 2 ** 30  # memory that a network may take beside its weights
+EXTRA_BYTES = 3 * 2 ** 28  # memory that a network may take beside its weights
 # Messages inside of messages, {message: {field number: message}}, of
 # https://github.com/onnx/onnx/blob/main/onnx/onnx.proto
 MESSAGES = {
