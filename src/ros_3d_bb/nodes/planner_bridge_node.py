@@ -71,13 +71,14 @@ class PlannerTopic(object):
     def send(self, tracks, stamp_ns, received):
         """Publish tracks in the output frame; `received` are the ReceivedTracks from which they were predicted."""
         frame_id = self.output.frame or received.frame_id
-        header = Header(stamp=time_from(stamp_ns), frame_id=frame_id)
+        header = Header(stamp=time_from(0 if self.output.latest_tf else stamp_ns), frame_id=frame_id)
         self._publisher.publish(self.output.write(tracks, received.transforms[frame_id], header))
         self.held = received
 
     def empty(self, stamp_ns):
-        """Publish an empty array in the frame of the last one."""
-        self.send([], stamp_ns, self.held)
+        """Publish an empty array in the frame of the last one, if planners need it."""
+        if self.output.is_emptied:
+            self.send([], stamp_ns, self.held)
         self.held = None
 
 
@@ -190,8 +191,9 @@ class PlannerBridgeNode(object):
                 if topic.held is None:
                     continue
                 if not 0 <= now_ns - topic.held.arrival_ns <= self._params.timeout * NS:
-                    self._diagnostics.warn('outputs emptied', 'no valid tracks for %g s: %s is emptied until the next '
-                                           'ones arrive' % (self._params.timeout, topic.output.topic))
+                    self._diagnostics.warn('outputs emptied', 'no valid tracks for %g s: %s %s until the next ones '
+                                           'arrive' % (self._params.timeout, topic.output.topic,
+                                                       'is emptied' if topic.output.is_emptied else 'is silent'))
                     topic.empty(now_ns)
                 elif topic.output.to_now and now_ns - self._received.arrival_ns >= self._params.resend_period * NS:
                     self._send(topic, now_ns)
