@@ -3,12 +3,13 @@ import time
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import TransformStamped, Twist
+from geometry_msgs.msg import Twist
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from, transform_points
+from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
@@ -88,12 +89,12 @@ class DrivenRobot(object):
     def _send_tf(self):
         stamp_ns = self.now_ns
         map_from_odom, odom_from_base = np.linalg.inv(self.odom_from_map(self.seconds)), level(*self._pose)
-        self._tf_pub.publish(TFMessage([_link(stamp_ns, 'map', 'odom', map_from_odom),
-                                        _link(stamp_ns, 'odom', 'base_link', odom_from_base),
-                                        _link(stamp_ns, 'base_link', CAMERA, BASE_FROM_CAMERA)]))
+        links = transform_messages(time_from(stamp_ns), [('map', 'odom', map_from_odom), (
+            'odom', 'base_link', odom_from_base), ('base_link', CAMERA, BASE_FROM_CAMERA)])
+        self._tf_pub.publish(TFMessage(links))
         odometry = Odometry(header=header_at(stamp_ns, 'odom'), child_frame_id='base_link')
         odometry.pose.pose.position.x, odometry.pose.pose.position.y = self._pose[:2]
-        odometry.pose.pose.orientation = _link(stamp_ns, '', '', odom_from_base).transform.rotation
+        odometry.pose.pose.orientation = links[1].transform.rotation
         odometry.twist.twist.linear.x, odometry.twist.twist.angular.z = self._cmd
         self._odom_pub.publish(odometry)
 
@@ -118,15 +119,3 @@ class DrivenRobot(object):
         while not condition() and time.monotonic() < deadline_s:
             time.sleep(0.002)
         return condition()
-
-
-def _link(stamp_ns, parent, child, transform):
-    link = TransformStamped(header=header_at(stamp_ns, parent), child_frame_id=child)
-    place, turn = link.transform.translation, link.transform.rotation
-    place.x, place.y, place.z = transform[:3, 3]
-    if child == CAMERA:
-        turn.x, turn.y, turn.z, turn.w = -0.5, 0.5, -0.5, 0.5
-    else:
-        yaw = np.arctan2(transform[1, 0], transform[0, 0])
-        turn.z, turn.w = np.sin(yaw / 2), np.cos(yaw / 2)
-    return link

@@ -1,6 +1,5 @@
 """Tracks as planners read them: each message is serialized, and passed to a replica of its reader."""
 import os
-import re
 import sys
 
 import numpy as np
@@ -105,7 +104,7 @@ def test_mpc_planner_jackal_receives_everyone_with_radius_and_velocity():
 
 
 def test_the_social_layer_transforms_position_and_velocity():
-    layer = SocialLayerReplica({'map': QUARTER})
+    layer = SocialLayerReplica(lambda frame_id, _stamp: {'map': QUARTER}[frame_id])
     layer.receive(sent(people_to_msg, 'people_msgs', [walker(3, [1, 2, 0.9], [1.2, 0, 0])]))
     (position, velocity), = layer.people()
     np.testing.assert_allclose(position, [8, 6, 0.9])
@@ -149,10 +148,9 @@ def test_detections_have_box_id_and_covariance():
 
 
 def people_layer():
-    """The sources of the layer that doc/planners.md recommends."""
-    with open(os.path.join(ROOT, 'doc', 'planners.md')) as stream:
-        snippets = [yaml.safe_load(snippet) for snippet in re.findall(r'```yaml\n(.*?)```', stream.read(), re.DOTALL)]
-    layer, = [snippet['local_costmap']['people_layer'] for snippet in snippets if 'local_costmap' in snippet]
+    """The sources of the shipped layer."""
+    with open(os.path.join(ROOT, 'config', 'move_base', 'local_costmap.yaml')) as stream:
+        layer = yaml.safe_load(stream)['people_layer']
     return {name: layer[name] for name in layer['observation_sources'].split()}
 
 
@@ -161,7 +159,8 @@ LEVEL_ROBOT = transform_from((1, 0, 0), (0, 0, 0.6, 0.8))  # odom_from_base_link
 
 def costmap(sources, odom_from_robot=LEVEL_ROBOT, odom_from_map=QUARTER):
     """A local costmap around the origin of odom."""
-    return ObstacleLayerReplica({'map': odom_from_map, 'odom': np.eye(4), 'base_link': odom_from_robot}, sources)
+    frames = {'map': odom_from_map, 'odom': np.eye(4), 'base_link': odom_from_robot}
+    return ObstacleLayerReplica(lambda frame_id, _stamp: frames[frame_id], sources)
 
 
 def show(layer, sources, tracks, odom_from_robot=LEVEL_ROBOT, odom_from_map=QUARTER):
@@ -171,7 +170,7 @@ def show(layer, sources, tracks, odom_from_robot=LEVEL_ROBOT, odom_from_map=QUAR
         np.linalg.inv(odom_from_map), track.prediction_m)) for track in tracks]
     robot_from_map = np.linalg.inv(odom_from_robot).dot(odom_from_map)
     for name, source in sources.items():
-        output = topics[source['topic'].replace('/planner_bridge_node/', '~')]
+        output = topics[source['topic'].replace('planner_bridge_node/', '~')]
         layer.receive(name, on_the_wire(output.write(in_map, robot_from_map, header_in(output.frame))))
     layer.update()
 
@@ -241,3 +240,9 @@ def test_the_costmap_needs_no_package_and_no_ring_where_its_range_is_zero():
     assert [(output.topic, output.kind) for output in outputs_from(PlannerBridgeParams())] == [
         ('~points', PointCloud2), ('~clearing_points', PointCloud2)]
     assert [output.topic for output in outputs_from(PlannerBridgeParams(clearing_range=0.0))] == ['~points']
+
+
+def test_the_robot_stops_when_either_source_of_people_stays_away():
+    """The limit is shorter than `timeout`, after which the points are emptied."""
+    limits_s = [source['expected_update_rate'] for source in people_layer().values()]
+    assert len(limits_s) == 2 and all(0 < limit_s < PlannerBridgeParams().timeout for limit_s in limits_s)

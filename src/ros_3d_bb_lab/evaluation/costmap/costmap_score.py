@@ -51,7 +51,7 @@ class Sighting(NamedTuple):
     tracks_m: np.ndarray
 
 
-def score_costmaps(costmaps, sightings, positions_at, walking):
+def score_costmaps(costmaps, sightings, positions_at):
     """Score the costmaps of a scene.
 
     Parameters
@@ -63,8 +63,6 @@ def score_costmaps(costmaps, sightings, positions_at, walking):
         which the person is not visible.
     positions_at : callable
         True positions (n, 2) of the people at a time.
-    walking : callable
-        Speeds (n,) of the people at a time, m/s.
 
     Returns
     -------
@@ -75,7 +73,7 @@ def score_costmaps(costmaps, sightings, positions_at, walking):
     """
     hits = _hits(costmaps, _counted(sightings, positions_at), positions_at)
     false = [_is_false(costmap, positions_at) for costmap in costmaps]
-    trails_s = _trails_s(costmaps, positions_at, walking)
+    trails_s = _trails_s(costmaps, positions_at)
     lethal = sum(len(cells) for cells in false)
     return {'costmaps': len(costmaps), 'people': len(hits), 'recall': float(np.mean(hits)) if len(hits) else None,
             'lethal_cells': lethal, 'false_cells': sum(int(cells.sum()) for cells in false) / lethal if lethal else None,
@@ -116,18 +114,17 @@ def _is_false(costmap, positions_at):
     return nearest_m > NEAR_M
 
 
-def _trails_s(costmaps, positions_at, walking):
+def _trails_s(costmaps, positions_at):
     """How long lethal places stay lethal after a walking person has left them.
 
     Places that another person comes near, or that the person returns to, are not counted.
     """
     times_s = np.array([costmap.time_s for costmap in costmaps])
     trails_s = []
-    for number in range(0, len(costmaps)):
-        start_s = times_s[number]
-        people_m, speeds_mps = positions_at(start_s), walking(start_s)
-        under = costmaps[number].is_lethal(people_m)
-        for person in np.flatnonzero((speeds_mps > WALKING_MPS) & (under == 1)):
+    for costmap, start_s in zip(costmaps, times_s):
+        people_m = positions_at(start_s)
+        speeds_mps = np.linalg.norm(positions_at(start_s + STEP_S) - people_m, axis=1) / STEP_S
+        for person in np.flatnonzero((speeds_mps > WALKING_MPS) & (costmap.is_lethal(people_m) == 1)):
             gone_s = start_s + BODY_M / speeds_mps[person]
             later = costmaps[np.searchsorted(times_s, gone_s):]
             lasted_s = _lasted_s(later, people_m[person], person, gone_s, positions_at)
