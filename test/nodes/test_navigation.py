@@ -37,7 +37,6 @@ def robot(tmp_path_factory):
     rospy.init_node('test_navigation')
     nodes = subprocess.Popen(['roslaunch', os.path.join(ROOT, 'test', 'support', 'navigation.launch')], env=environment)
     driven = DrivenRobot()
-    driven.costmap = Recorder('move_base/local_costmap/costmap', OccupancyGrid, publisher_expected=False)
     driven.social = Recorder('social_costmap/costmap/costmap', OccupancyGrid, publisher_expected=False)
     driven.goal = rospy.Publisher('move_base_simple/goal', PoseStamped, queue_size=1)
     try:

@@ -20,6 +20,7 @@ TICK_NS, PERIOD_NS, IMAGE_NS = NS // 100, NS // 10, NS // 33  # images are taken
 CAMERA, BASE_FROM_CAMERA = 'camera_color_optical_frame', transform_from((0.17, 0, 0.2), OPTICAL_ROTATION)
 DRIFT = 0.03, -0.02, 0.02  # of odom in the map: x, y (m/s) and yaw (rad/s)
 PATIENCE_S = 1.0  # real time, for an answer
+COSTMAP_NS = 4 * NS // 10  # longest time between costmaps
 
 
 def level(x, y, yaw):
@@ -45,6 +46,7 @@ class DrivenRobot(object):
         self._map_pub.publish(self._empty_map())
         rospy.Subscriber('cmd_vel', Twist, self._on_cmd_vel, queue_size=1)
         self.tracks = Recorder('ros_3d_bb/tracks', TrackedObjectArray, publisher_expected=False)
+        self.costmap = Recorder('move_base/local_costmap/costmap', OccupancyGrid, publisher_expected=False)
 
     @staticmethod
     def _empty_map():
@@ -84,7 +86,8 @@ class DrivenRobot(object):
                 time.sleep(TICK_NS / NS)
                 if tick == 2 and self.sees:
                     self._send_boxes()
-            self._wait_for(lambda: commands < self.commands or not is_driven)
+            self._wait_for(lambda: (commands < self.commands or not is_driven)
+                           and self.now_ns - _newest_ns(self.costmap) < COSTMAP_NS)
 
     def _send_tf(self):
         stamp_ns = self.now_ns
@@ -101,8 +104,8 @@ class DrivenRobot(object):
     def _send_boxes(self):
         """The boxes of the people in front of the camera, once the tracks of the last ones have arrived."""
         if self._sent_ns and self._answered:
-            self._answered = self._wait_for(lambda: self._newest_ns() >= self._sent_ns)
-        self._answered |= bool(self._sent_ns) and self._newest_ns() >= self._sent_ns
+            self._answered = self._wait_for(lambda: _newest_ns(self.tracks) >= self._sent_ns)
+        self._answered |= bool(self._sent_ns) and _newest_ns(self.tracks) >= self._sent_ns
         map_from_camera = np.linalg.inv(self.odom_from_map(self.seconds)).dot(level(*self._pose)).dot(BASE_FROM_CAMERA)
         people_m = np.asarray(self.people(self.seconds)).reshape(-1, 2)
         centers_m = transform_points(np.linalg.inv(map_from_camera), np.c_[people_m, np.full(len(people_m), 0.85)])
@@ -110,12 +113,15 @@ class DrivenRobot(object):
                                                             if center_m[2] > 0.5]))
         self._sent_ns = self.now_ns
 
-    def _newest_ns(self):
-        return self.tracks.messages[-1].header.stamp.to_nsec() if self.tracks.messages else 0
-
     @staticmethod
     def _wait_for(condition):
         deadline_s = time.monotonic() + PATIENCE_S
         while not condition() and time.monotonic() < deadline_s:
             time.sleep(0.002)
         return condition()
+
+
+def _newest_ns(recorder):
+    """Stamp of the newest message."""
+    messages = recorder.messages
+    return messages[-1].header.stamp.to_nsec() if messages else 0

@@ -40,6 +40,7 @@ LATENCY_S = 0.1  # from an image to its tracks
 TICK_S, ODOM_S, LOCALISATION_S = 0.01, 0.02, 0.1  # periods of /clock, of odom in tf, and of the map in tf
 GAP_NS = 100 * NS  # between scenes
 STARTING_S = 30.0
+COSTMAP_S, PATIENCE_S = 0.4, 1.0  # longest time between costmaps, and how long to wait for one in real time
 COLUMNS = '%-20s %8s %7s %8s %12s %6s %10s'
 HEADINGS = 'scene', 'costmaps', 'people', 'recall', 'false cells', 'trails', 'trail p95'
 LAUNCH = """<launch>
@@ -123,6 +124,12 @@ class Player(object):
             self._tf_pub.publish(TFMessage(transform_messages(stamp, links)))
         self._now_ns += int(TICK_S * NS)
         time.sleep(TICK_S / self._speed)
+        deadline_s = time.monotonic() + PATIENCE_S
+        while self._is_late() and time.monotonic() < deadline_s:  # the machine is busy
+            time.sleep(0.002)
+
+    def _is_late(self):
+        return self._grids and self._now_ns - self._grids[-1].header.stamp.to_nsec() > COSTMAP_S * NS
 
 
 def _costmap(scene, grid, start_ns):
