@@ -3,7 +3,6 @@ import genpy
 import numpy as np
 import tf2_ros
 from geometry_msgs.msg import Point, PoseWithCovariance, Vector3
-from sensor_msgs import point_cloud2
 
 from ros_3d_bb.msg import TrackedObject
 
@@ -156,7 +155,11 @@ class ObstacleLayerReplica(object):
         self.grid = np.full((self.cells, self.cells), FREE, np.uint8)  # [y, x], centre at the costmap's origin
 
     def receive(self, name, cloud):
-        points = np.array(list(point_cloud2.read_points(cloud, ('x', 'y', 'z')))).reshape(-1, 3)
+        offsets = {field.name: field.offset for field in cloud.fields}
+        kind = np.dtype({'names': 'xyz', 'formats': ['<f4'] * 3, 'offsets': [offsets[name] for name in 'xyz'],
+                         'itemsize': cloud.point_step})
+        points = np.frombuffer(cloud.data, kind)
+        points = np.column_stack([points[name] for name in 'xyz'])
         points = moved_float32(points, self._costmap_from(cloud.header.frame_id, cloud.header.stamp))
         source = self._sources[name]
         inside = (points[:, 2] >= source['min_obstacle_height']) & (points[:, 2] <= source['max_obstacle_height'])

@@ -23,7 +23,7 @@ SPEED_MPS, AMPLITUDE, SIGMA_M = 0.8, 77, 0.5
 class Window(ObstacleLayerReplica):
     """Does not follow the robot, and is therefore larger."""
 
-    cells = 400
+    cells = 360
 
 
 class Costmap(object):
@@ -34,7 +34,7 @@ class Costmap(object):
         self._lock, self._buffer = threading.Lock(), tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self._buffer)
         self._frame = self._params['global_frame']
-        self._arrived = {}
+        self._arrived, self._updates = {}, 0
         self._publisher = rospy.Publisher('~%s/costmap' % name, OccupancyGrid, queue_size=1)
         self._layer = self._people_layer() if 'people_layer' in self._params else self._social_layer()
 
@@ -70,9 +70,12 @@ class Costmap(object):
         return all(rospy.get_time() - self._arrived[name] <= limit_s for name, limit_s in self._limits_s.items())
 
     def update(self):
-        """Update the layer and publish the costmap."""
+        """Update the layer, and publish every third costmap."""
         with self._lock:
             costs = self._obstacles() if isinstance(self._layer, Window) else self._proxemic()
+        self._updates += 1
+        if self._updates % 3:
+            return
         grid = OccupancyGrid(header=Header(stamp=rospy.get_rostime(), frame_id=self._frame))
         grid.info.height, grid.info.width = costs.shape
         grid.info.resolution = Window.resolution

@@ -38,7 +38,7 @@ from ros_3d_bb_lab.simulation.simulator import Simulator
 SCENES = 'turning_robot', 'corridor', 'demo', 'behind_a_pillar', 'thesis_e_passing', 'following_robot'
 LATENCY_S = 0.1  # from an image to its tracks
 TICK_S, ODOM_S, LOCALISATION_S = 0.01, 0.02, 0.1  # periods of /clock, of odom in tf, and of the map in tf
-GAP_NS = 100 * NS  # between scenes
+GAP_NS, LEAD_S = 100 * NS, 0.5  # between scenes, and of tf before the first image
 STARTING_S = 30.0
 COSTMAP_S, PATIENCE_S = 0.4, 1.0  # longest time between costmaps, and how long to wait for one in real time
 COLUMNS = '%-20s %8s %7s %8s %12s %6s %10s'
@@ -101,6 +101,8 @@ class Player(object):
     def play(self, scene):
         """Play a scene. Returns its costmaps, a list of Costmap."""
         self._now_ns += GAP_NS
+        for _tick in range(int(LEAD_S / TICK_S)):  # tf begins before the first image
+            self._tick(scene, 0.0, True)
         start_ns = self._now_ns
         del self._grids[:]
         waiting = list(scene.steps)

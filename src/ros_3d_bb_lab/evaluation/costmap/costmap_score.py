@@ -14,6 +14,7 @@ STEP_S = 0.1
 BODY_M = 0.3  # a person has left a place at this distance
 WALKING_MPS = 0.4
 TRACKED_M = 0.5  # maximum distance between a person and a matching track
+SETTLED_S = 0.3  # from the image of a new track until its marks count: latency of the pipeline and a cycle
 
 
 class Costmap(NamedTuple):
@@ -59,7 +60,7 @@ def score_costmaps(costmaps, sightings, positions_at):
     costmaps : list of Costmap
         In the order of time.
     sightings : list of Sighting
-        In the order of time. A person counts once a track was published within `TRACKED_M`, until the next image in
+        In the order of time. A person counts `SETTLED_S` after a track was within `TRACKED_M`, until the next image in
         which the person is not visible.
     positions_at : callable
         True positions (n, 2) of the people at a time.
@@ -82,14 +83,14 @@ def score_costmaps(costmaps, sightings, positions_at):
 
 def _counted(sightings, positions_at):
     """Times, and which people (n,) are visible and tracked at each."""
-    times_s, rows, tracked = [], [], False
+    rows, since_s = [], np.inf
     for sighting in sightings:
         people_m = positions_at(sighting.time_s)
-        off_m = np.linalg.norm(people_m[:, None] - sighting.tracks_m[None].reshape(1, -1, 2), axis=2)
-        tracked = sighting.visible & (tracked | (off_m < TRACKED_M).any(axis=1))
-        times_s.append(sighting.time_s)
-        rows.append(tracked)
-    return np.array(times_s), rows
+        off_m = np.linalg.norm(people_m[:, None] - sighting.tracks_m.reshape(1, -1, 2), axis=2)
+        first_s = np.where((off_m < TRACKED_M).any(axis=1), sighting.time_s, np.inf)
+        since_s = np.where(sighting.visible, np.minimum(since_s, first_s), np.inf)
+        rows.append(sighting.time_s - since_s >= SETTLED_S)
+    return np.array([sighting.time_s for sighting in sightings]), rows
 
 
 def _hits(costmaps, counted, positions_at):
