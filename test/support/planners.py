@@ -182,7 +182,7 @@ class ObstacleLayerReplica(object):
         return x, y
 
     def _clear(self, origin, points, range_m):
-        """One cell a step along the longer axis, from the sensor's cell to those of the points, as far as it reaches."""
+        """One cell a step along the longer axis, from the sensor's cell to those of the points, up to the range."""
         start = np.array(self._cell(origin))
         ways = np.column_stack(self._cell(points)) - start
         steps = np.maximum(np.abs(ways).max(axis=1), 1)

@@ -15,15 +15,20 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
 from ros_3d_bb.conversions.perception_msgs import transform_from_msg
-from support.planners import LETHAL, ObstacleLayerReplica, SocialLayerReplica
+from support.planners import FREE, LETHAL, ObstacleLayerReplica, SocialLayerReplica
 
 SPEED_MPS, AMPLITUDE, SIGMA_M = 0.8, 77, 0.5
 
 
 class Window(ObstacleLayerReplica):
-    """Does not follow the robot, and is therefore larger."""
+    """Does not follow the robot, and is therefore larger. The rays to the ring are so dense that they clear a disc."""
 
-    cells = 360
+    cells = 320
+
+    def _clear(self, origin, points, range_m):
+        axis_m = (np.arange(self.cells) - self.cells // 2 + 0.5) * self.resolution
+        reach_m = min(range_m, np.linalg.norm(points - origin, axis=1).max())
+        self.grid[np.hypot(axis_m - origin[0], axis_m[:, None] - origin[1]) < reach_m] = FREE
 
 
 class Costmap(object):
@@ -70,11 +75,11 @@ class Costmap(object):
         return all(rospy.get_time() - self._arrived[name] <= limit_s for name, limit_s in self._limits_s.items())
 
     def update(self):
-        """Update the layer, and publish every third costmap."""
+        """Update the layer, and publish every second costmap."""
         with self._lock:
             costs = self._obstacles() if isinstance(self._layer, Window) else self._proxemic()
         self._updates += 1
-        if self._updates % 3:
+        if self._updates % 2:
             return
         grid = OccupancyGrid(header=Header(stamp=rospy.get_rostime(), frame_id=self._frame))
         grid.info.height, grid.info.width = costs.shape

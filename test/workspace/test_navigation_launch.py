@@ -31,9 +31,9 @@ def test_dwa_drives_in_a_map_with_people_in_the_local_costmap():
 
 @pytest.mark.parametrize('costmap, frame', [('local_costmap', 'my_odom'), ('global_costmap', 'my_map')])
 def test_frames_and_topics_are_arguments(costmap, frame):
-    parameters, nodes = loaded('navigation.launch', 'frame_world:=my_map', 'odom_frame:=my_odom', 'robot_frame:=my_base',
-                               'scan_topic:=my_scan', 'odom_topic:=my_odometry', 'map_topic:=my_map_topic',
-                               'cmd_vel_topic:=my_cmd_vel')
+    parameters, nodes = loaded('navigation.launch', 'frame_world:=my_map', 'odom_frame:=my_odom',
+                               'robot_frame:=my_base', 'scan_topic:=my_scan', 'odom_topic:=my_odometry',
+                               'map_topic:=my_map_topic', 'cmd_vel_topic:=my_cmd_vel')
     of_costmap = MOVE_BASE + costmap
     assert parameters[of_costmap + '/global_frame'] == frame
     assert parameters[of_costmap + '/robot_base_frame'] == 'my_base'

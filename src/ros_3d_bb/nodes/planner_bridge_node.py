@@ -40,8 +40,8 @@ class PlannerBridgeParams(NamedTuple):
         0.5, 'How far ahead costmaps are marked with predicted footprints; 0: current positions only. The costmap '
         'does not know when people will be there, so long times block free ways.', 's')
     point_spacing: float = Param(
-        0.035, 'Distance between the points of a footprint; at most 0.7 of a cell of the costmap: the grid of the points '
-        'is turned against its cells.', 'm', limits=(0.001, LARGEST))
+        0.035, 'Distance between the points of a footprint; at most 0.7 of a cell of the costmap, whose grid is turned '
+        'against that of the points.', 'm', limits=(0.001, LARGEST))
     clearing_range: float = Param(
         10.0, 'Radius of the ring of points around the robot up to which the costmap is cleared before people are '
         'marked; 0: no ring. At least the raytrace_range of the costmap.', 'm')

@@ -75,14 +75,14 @@ def score_costmaps(costmaps, sightings, positions_at):
     hits = _hits(costmaps, _counted(sightings, positions_at), positions_at)
     false = [_is_false(costmap, positions_at) for costmap in costmaps]
     trails_s = _trails_s(costmaps, positions_at)
-    lethal = sum(len(cells) for cells in false)
+    lethal, wrong = sum(len(cells) for cells in false), sum(int(cells.sum()) for cells in false)
     return {'costmaps': len(costmaps), 'people': len(hits), 'recall': float(np.mean(hits)) if len(hits) else None,
-            'lethal_cells': lethal, 'false_cells': sum(int(cells.sum()) for cells in false) / lethal if lethal else None,
+            'lethal_cells': lethal, 'false_cells': wrong / lethal if lethal else None,
             'trails': len(trails_s), 'trail_p95_s': float(np.percentile(trails_s, 95)) if len(trails_s) else None}
 
 
 def _counted(sightings, positions_at):
-    """Times, and which people (n,) are visible and tracked at each."""
+    """Times, and which people (n,) count at each."""
     rows, since_s = [], np.inf
     for sighting in sightings:
         people_m = positions_at(sighting.time_s)
