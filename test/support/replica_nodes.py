@@ -76,12 +76,13 @@ class Costmap(object):
 
     def update(self):
         """Update the layer, and publish every second costmap."""
+        stamp = rospy.get_rostime()
         with self._lock:
             costs = self._obstacles() if isinstance(self._layer, Window) else self._proxemic()
         self._updates += 1
         if self._updates % 2:
             return
-        grid = OccupancyGrid(header=Header(stamp=rospy.get_rostime(), frame_id=self._frame))
+        grid = OccupancyGrid(header=Header(stamp=stamp, frame_id=self._frame))
         grid.info.height, grid.info.width = costs.shape
         grid.info.resolution = Window.resolution
         grid.info.origin.position.x = grid.info.origin.position.y = -Window.cells // 2 * Window.resolution
