@@ -6,6 +6,7 @@ import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from, transform_points
@@ -31,7 +32,7 @@ class DrivenRobot(object):
     """The robot starts at the origin of the map and looks along x. Its localisation and odometry publish tf at 10 Hz.
 
     `people` is a function from seconds to positions (n, 2) in the map. `velocity` is that of the last cmd_vel. Time
-    waits for the answers of the tracker and of move_base, so that a busy machine does not look like a fault.
+    waits for the answers of the bridge and of move_base, so that a busy machine does not look like a fault.
     """
 
     def __init__(self):
@@ -46,6 +47,7 @@ class DrivenRobot(object):
         self._map_pub.publish(self._empty_map())
         rospy.Subscriber('cmd_vel', Twist, self._on_cmd_vel, queue_size=1)
         self.tracks = Recorder('ros_3d_bb/tracks', TrackedObjectArray, publisher_expected=False)
+        self.ring = Recorder('planner_bridge_node/clearing_points', PointCloud2, publisher_expected=False)
         self.costmap = Recorder('move_base/local_costmap/costmap', OccupancyGrid, publisher_expected=False)
 
     @staticmethod
@@ -102,10 +104,10 @@ class DrivenRobot(object):
         self._odom_pub.publish(odometry)
 
     def _send_boxes(self):
-        """The boxes of the people in front of the camera, once the tracks of the last ones have arrived."""
+        """The boxes of the people in front of the camera, once the bridge has answered the last ones."""
         if self._sent_ns and self._answered:
-            self._answered = self._wait_for(lambda: _newest_ns(self.tracks) >= self._sent_ns)
-        self._answered |= bool(self._sent_ns) and _newest_ns(self.tracks) >= self._sent_ns
+            self._answered = self._wait_for(lambda: _newest_ns(self.ring) >= self._sent_ns)
+        self._answered |= bool(self._sent_ns) and _newest_ns(self.ring) >= self._sent_ns
         map_from_camera = np.linalg.inv(self.odom_from_map(self.seconds)).dot(level(*self._pose)).dot(BASE_FROM_CAMERA)
         people_m = np.asarray(self.people(self.seconds)).reshape(-1, 2)
         centers_m = transform_points(np.linalg.inv(map_from_camera), np.c_[people_m, np.full(len(people_m), 0.85)])

@@ -19,6 +19,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.conversions.camera_msgs import START_NS, transform_messages
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, time_from, tracks_to_msg
 from ros_3d_bb.core.time_sync import NS
@@ -29,7 +30,7 @@ from ros_3d_bb_lab.evaluation.costmap.costmap_score import Costmap, Sighting, sc
 from ros_3d_bb_lab.evaluation.costmap.picture import draw_costmap
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, describe_machine, scenario_path
 from ros_3d_bb_lab.evaluation.latency.benchmark import free_port, running_roslaunch
-from ros_3d_bb_lab.evaluation.scene_benchmark import depth_detector
+from ros_3d_bb_lab.evaluation.scene_benchmark import RANGE_M, depth_detector
 from ros_3d_bb_lab.evaluation.scenes import run_scene
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -73,10 +74,16 @@ def tracked_scene(name):
 
 
 def sightings_of(scene):
-    """What each image of a scene shows, as a list of Sighting."""
-    return [Sighting(step.frame.time_s, np.array([person.status == VISIBLE for person in step.moment.truth]),
+    """What each image of a scene shows within the range of the detector, as a list of Sighting."""
+    return [Sighting(step.frame.time_s, np.array([_is_visible(person, step.frame) for person in step.moment.truth]),
                      np.reshape([track.position_m[:2] for track in step.moment.tracks], (-1, 2)))
             for step in scene.steps]
+
+
+def _is_visible(person, frame):
+    nearest_m, farthest_m = RANGE_M['depth']
+    depth_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), person.position_m)[2]
+    return person.status == VISIBLE and nearest_m <= depth_m <= farthest_m
 
 
 class Player(object):
