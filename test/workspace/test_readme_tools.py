@@ -40,8 +40,7 @@ BENCHMARKS = [(claimed('./run bench accuracy --boxes'), ''), (claimed('./run ben
               (claimed('./run bench latency'), ' --cases free --seconds 2')]
 DETECTOR_SPEED = claimed('./run bench speed --weights')
 DETECTORS = claimed('./run bench detector')
-YAML = [claimed(beginning, 'yaml') for beginning in ('local_costmap:', 'global_costmap:', 'TebLocalPlannerROS:',
-                                                     'max_obstacles:')]
+YAML = [claimed('max_obstacles:', 'yaml')]
 MODEL_SETTINGS = [claimed('# %s.yaml' % name, 'yaml') for name in (
     'yolo11n', 'people_yolov7', 'yolox_legacy', 'nanodet', 'picodet_s_416', 'with_nms')]
 

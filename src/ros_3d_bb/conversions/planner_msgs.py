@@ -13,7 +13,7 @@ from ros_3d_bb.msg import TrackedObject
 
 STATUS_NAMES = {TrackedObject.VISIBLE: 'visible', TrackedObject.OCCLUDED: 'occluded',
                 TrackedObject.OUT_OF_VIEW: 'out of view'}
-UNSEEN_RELIABILITY = 0.5  # of tracks that are not visible in the latest image; some planners scale costs by it
+UNSEEN_RELIABILITY = 0.5  # of tracks that are not visible in the latest image
 CLASSIFICATIONS = {'person': 'PEDESTRIAN', 'bicycle': 'BIKE', 'car': 'CAR', 'truck': 'TRUCK',
                    'motorcycle': 'MOTORCYCLE', 'bus': 'OTHER_VEHICLE'}  # of derived_object_msgs/Object
 

@@ -40,8 +40,8 @@ class PlannerBridgeParams(NamedTuple):
         0.5, 'How far ahead costmaps are marked with predicted footprints; 0: current positions only. The costmap '
         'does not know when people will be there, so long times block free ways.', 's')
     point_spacing: float = Param(
-        0.05, 'Distance between the points of a footprint; at most a cell of the costmap.', 'm',
-        limits=(0.001, LARGEST))
+        0.035, 'Distance between the points of a footprint; at most 0.7 of a cell of the costmap, whose grid is turned '
+        'against that of the points.', 'm', limits=(0.001, LARGEST))
     clearing_range: float = Param(
         10.0, 'Radius of the ring of points around the robot up to which the costmap is cleared before people are '
         'marked; 0: no ring. At least the raytrace_range of the costmap.', 'm')
@@ -71,20 +71,22 @@ class PlannerTopic(object):
     def send(self, tracks, stamp_ns, received):
         """Publish tracks in the output frame; `received` are the ReceivedTracks from which they were predicted."""
         frame_id = self.output.frame or received.frame_id
-        header = Header(stamp=time_from(stamp_ns), frame_id=frame_id)
+        header = Header(stamp=time_from(0 if self.output.latest_tf else stamp_ns), frame_id=frame_id)
         self._publisher.publish(self.output.write(tracks, received.transforms[frame_id], header))
         self.held = received
 
     def empty(self, stamp_ns):
-        """Publish an empty array in the frame of the last one."""
-        self.send([], stamp_ns, self.held)
+        """Publish an empty array in the frame of the last one, if planners need it."""
+        if self.output.is_emptied:
+            self.send([], stamp_ns, self.held)
         self.held = None
 
 
 class PlannerBridgeNode(object):
     """Publish tracks in the message formats of planners.
 
-    ~outputs selects the published topics. If no tracks arrive for ~timeout, an empty array is published once on each.
+    ~outputs selects the published topics. If no tracks arrive for ~timeout, an empty array is published once on each,
+    except for ~clearing_points.
     Parameters: config/planner_bridge.yaml.
 
     Subscribes
@@ -102,9 +104,9 @@ class PlannerBridgeNode(object):
         `costmap`: current and predicted footprints of people, as points for an obstacle layer.
     ~clearing_points : sensor_msgs/PointCloud2
         `costmap`: ring of points around the robot up to which the costmap is cleared before people are marked. Not
-        published if ~clearing_range is 0.
+        published if ~clearing_range is 0, and while there are no valid tracks, so that a costmap can notice it.
     /people : people_msgs/People
-        `people`: for social_navigation_layers.
+        `people`: for social_navigation_layers. The stamp is 0, for which tf2 takes the latest transform.
     ~obstacles : costmap_converter/ObstacleArrayMsg
         `teb`: for teb_local_planner.
     ~objects : derived_object_msgs/ObjectArray
@@ -190,8 +192,9 @@ class PlannerBridgeNode(object):
                 if topic.held is None:
                     continue
                 if not 0 <= now_ns - topic.held.arrival_ns <= self._params.timeout * NS:
-                    self._diagnostics.warn('outputs emptied', 'no valid tracks for %g s: %s is emptied until the next '
-                                           'ones arrive' % (self._params.timeout, topic.output.topic))
+                    self._diagnostics.warn('outputs emptied', 'no valid tracks for %g s: %s %s until the next ones '
+                                           'arrive' % (self._params.timeout, topic.output.topic,
+                                                       'is emptied' if topic.output.is_emptied else 'is silent'))
                     topic.empty(now_ns)
                 elif topic.output.to_now and now_ns - self._received.arrival_ns >= self._params.resend_period * NS:
                     self._send(topic, now_ns)

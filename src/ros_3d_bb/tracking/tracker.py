@@ -61,10 +61,10 @@ class TrackerParams(NamedTuple):
         0.35, 'How long a track stays published while a camera should detect the person and does not.', 's',
         live=(0, 5))
     out_of_view_limit: float = Param(
-        1.0, 'How long a track stays published while the person is out of view of all cameras.', 's', live=(0, 10))
+        0.5, 'How long the track of a moving person stays published while out of view of all cameras: people turn and '
+        'stop.', 's', live=(0, 10))
     max_position_std: float = Param(
-        0.5, 'A track stays published during occlusion up to this standard deviation of its position.', 'm',
-        live=(0, 2))
+        0.5, 'An undetected track stays published up to this standard deviation of its position.', 'm', live=(0, 2))
     max_age: float = Param(4.0, 'A person who reappears within this time keeps the track ID.', 's', live=(0, 30))
     max_range: float = Param(
         8.0, 'Range of the detector: people who are farther from the camera are not expected to be detected.', 'm',
@@ -146,7 +146,8 @@ class Tracker(object):
         tracks = tracks[np.argsort(tracks['id'])]
         published = (tracks['missed_s'] <= params.max_missed_time) & (position_std_of(tracks) < params.max_position_std)
         published |= tracks['status'] == VISIBLE
-        published &= (tracks['status'] != OUT_OF_VIEW) | (tracks['unseen_s'] <= params.out_of_view_limit)
+        has_left = (tracks['status'] == OUT_OF_VIEW) & tracks['moving']
+        published &= ~has_left | (tracks['unseen_s'] <= params.out_of_view_limit)
         return objects_of(tracks[tracks['confirmed'] & published], self._prediction, self._classes)
 
     def _step(self, state, image, observed_s, assign_id):

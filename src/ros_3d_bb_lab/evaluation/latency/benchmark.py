@@ -73,17 +73,23 @@ def cpu_load(cores):
 
 
 def launch(arguments, timeout_s, log):
-    """Run roslaunch latency.launch on a free port until it exits or times out. Its nodes are terminated in any case.
+    """Run roslaunch latency.launch on a free port until it exits or times out."""
+    with running_roslaunch(['ros_3d_bb', 'latency.launch'] + arguments, free_port(), log) as process, \
+            contextlib.suppress(subprocess.TimeoutExpired):  # the missing record is reported
+        process.wait(timeout_s)
+
+
+@contextlib.contextmanager
+def running_roslaunch(arguments, port, log):
+    """Context in which roslaunch runs with its own master. Its nodes are terminated in any case.
 
     roslaunch runs in a separate session, so that a Ctrl-C in the terminal reaches it only once, through this function.
     """
-    port = free_port()
-    process = subprocess.Popen(['roslaunch', '-p', str(port), 'ros_3d_bb', 'latency.launch'] + arguments, stdout=log,
-                               stderr=subprocess.STDOUT, start_new_session=True,
+    process = subprocess.Popen(['roslaunch', '-p', str(port)] + arguments, stdout=log, stderr=subprocess.STDOUT,
+                               start_new_session=True,
                                env=dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % port))
     try:
-        with contextlib.suppress(subprocess.TimeoutExpired):  # the missing record is reported
-            process.wait(timeout_s)
+        yield process
     finally:
         process.send_signal(signal.SIGINT)  # has no effect if it has exited
         with contextlib.suppress(subprocess.TimeoutExpired):
