@@ -47,7 +47,7 @@ ALLOWED = {
     'ros_3d_bb_lab.simulation': ('camera core tracking', 'cv2 yaml'),
     'ros_3d_bb_lab.simulation.ros': (
         'bags camera conversions core msg nodes.common lab.simulation',
-        'rosgraph_msgs rospy std_msgs'),
+        'geometry_msgs nav_msgs rosgraph_msgs rospy std_msgs tf2_msgs'),
     'ros_3d_bb_lab.evaluation.baselines': ('camera core tracking', 'norfair'),
     'ros_3d_bb_lab.evaluation': (
         'camera core detection detection.depth detection.yolov5 estimation sessions tracking '
