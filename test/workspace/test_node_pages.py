@@ -23,7 +23,7 @@ SCENARIO = os.path.join(ROOT, 'config', 'scenarios', 'empty_room.yaml')
 # Parameters with which nodes connect to all their topics; the other nodes are created as by the fuzzer.
 MORE_PARAMS = {'planner_bridge_node': {'outputs': 'costmap, people, teb, mpc, vision'},
                'realsense_node': {'publish_clock': True}, 'replay_node': {'boxes': True},
-               'simulator_node': {'scenario': SCENARIO, 'publish_clock': True}}
+               'simulator_node': {'scenario': SCENARIO, 'publish_clock': True, 'drive': True}}
 OTHERS = {'realsense_node': RealSenseNode, 'replay_node': ReplayNode, 'simulator_node': SimulatorNode,
           'latency_probe_node': LatencyProbeNode}
 OPTIONAL_PACKAGES = 'people_msgs', 'costmap_converter', 'derived_object_msgs', 'vision_msgs'
