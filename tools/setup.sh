@@ -18,6 +18,7 @@ set_up_system() {
     return
   fi
   local missing=()
+  [ ! -d "${ROS_3D_BB_DATA:-}/planners" ] || apt_packages+=("${planner_packages[@]}")
   for package in "${apt_packages[@]}"; do
     dpkg-query -W -f '${Status}' "$package" 2> /dev/null | grep -q 'ok installed' || missing+=("$package")
   done

@@ -18,6 +18,7 @@ run_all_tests() {
   build
   say "running all tests (data: ${ROS_3D_BB_DATA:-made by the tests})"
   rm -rf "$workspace/build/test_results"
+  build_planners &  # the tests that need them wait
   # Most tests wait for programs to start and to end: two at a time use that.
   catkin_make --directory "$workspace" run_tests -j2
   say "totals"

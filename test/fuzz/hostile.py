@@ -24,6 +24,8 @@ FLOATS = (0.0, -0.0, 1.0, -1.0, 0.5, 3.0, float('nan'), float('inf'), -float('in
 INT32 = (0, 1, -1, 3, 10, 47, 48, 63, 64, 65, 1000, 2 ** 31 - 1, -2 ** 31)
 UINT32 = (0, 1, 2, 47, 48, 64, 65535, 2 ** 31, 2 ** 32 - 1)
 TEXTS = ('', 'camera', 'map', '/camera', 'no_such_frame', 'a b', '\u00e4\u0661', 'x' * 1000, '%s%n', "'; --", 'a=b;c')
+NAMES = ('person', 'dog', '', 'a;b', 'x' * 65, '\u9f8d', 'do\x07g')
+SCORES = ('0.5', '0', '1', '1.5', '-1', 'nan', 'inf', '1e400', '', 'high', '\u0661')
 WIDTH, HEIGHT = 64, 48
 CODECS = {COLOR_TOPIC: ('jpeg', 'png'), DEPTH_TOPIC: ('png', 'compressedDepth', 'compressedDepth rvl')}
 FORMATS = ('jpeg', 'png', 'rgb8; jpeg compressed bgr8', 'bayer_rggb8; png compressed ', '16UC1; png compressed ',
@@ -46,6 +48,11 @@ class Source(random.Random):
     def numbers(self, count):
         """Several floats."""
         return [self.number() for _number in range(count)]
+
+    def score(self):
+        """A float32 that mostly is a score."""
+        with np.errstate(over='ignore'):
+            return float(np.float32(self.random() if self.random() < 0.5 else self.number()))
 
     def bytes_of(self, count):
         """At most 65536 bytes."""
@@ -176,6 +183,9 @@ def boxes2d(source, now_ns):
     if source.random() < 0.8:
         stamp = source.stamp(now_ns)
         label = 'boxes;stamp=%d.%09d;frame=%s' % (stamp.secs, stamp.nsecs, source.choice(TEXTS))
+        if source.random() < 0.5:
+            label += ';classes=' + ','.join(source.choice(NAMES) for _box in range(source.choice((1, count // 4))))
+            label += ';scores=' + ','.join(source.choice(SCORES) for _box in range(source.choice((1, count // 4))))
         if source.random() < 0.2:
             label = source.choice((label[:source.randrange(len(label))], 'boxes;stamp=%s.000000000' % ('9' * 100),
                                    'boxes;stamp=\u0661.' + 9 * '\u00b2', ';' * 50, 'stamp=1.000000000;stamp=x') + TEXTS)
@@ -196,6 +206,7 @@ def boxes3d(source, now_ns):
             lambda: {'center': Pose(position, Quaternion(*source.numbers(4)))},
             lambda: {'size': Vector3(*source.numbers(3))},
             lambda: {'position_covariance': source.numbers(9)},
+            lambda: {'label': source.choice(NAMES + TEXTS), 'score': source.score()},
             lambda: {'roi': RegionOfInterest(*[source.choice(UINT32) for _edge in range(4)], False)}))
         message.boxes.append(box)
     return message
@@ -215,6 +226,8 @@ def tracks(source, now_ns):
             part = source.choice((track.pose.pose.position, track.twist.twist.linear, track.size)
                                  + tuple(pose.pose.position for pose in track.prediction))
             part.x, part.y, part.z = source.numbers(3)
+        if source.random() < 0.3:
+            track.label, track.score = source.choice(NAMES + TEXTS), source.score()
         if source.random() < 0.3:
             track.pose.covariance, track.twist.covariance = source.numbers(36), source.numbers(36)
         message.objects.append(track)

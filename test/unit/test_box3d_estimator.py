@@ -6,7 +6,8 @@ from hypothesis.extra import numpy as hnp
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.estimation.box3d_estimator import (AXIS_BEHIND_SURFACE_M, EDGE_PERCENT, ImageGeometry, check_rect,
+from ros_3d_bb.core.object_classes import PERSON_CLASS
+from ros_3d_bb.estimation.box3d_estimator import (EDGE_PERCENT, ImageGeometry, check_rect,
                                                   complete_truncated_extent, edges, estimate_boxes,
                                                   estimate_foreground, estimate_median, estimator_named,
                                                   nearest_dominant_layer, sample_depth, truncated_edges, within)
@@ -96,7 +97,7 @@ def test_foreground_is_the_person_for_any_share_of_background(person_mm, share, 
     half = max(2, int(30 * share / 2))
     depth.values[:, 32 - half:32 + half] = person_mm
     box = foreground(depth, (17, 4, 47, 44))
-    assert box.center_m[2] == pytest.approx(person_mm * 0.001 + AXIS_BEHIND_SURFACE_M, abs=1e-9)
+    assert box.center_m[2] == pytest.approx(person_mm * 0.001 + PERSON_CLASS.axis, abs=1e-9)
     assert box.center_m[0] == pytest.approx(0, abs=0.5 / 60 * person_mm * 0.001)
     assert box.size_m[0] <= 1.1 * (2 * half) / 60 * person_mm * 0.001
     assert box.size_m[1] == pytest.approx(40 / 60 * person_mm * 0.001)
@@ -109,8 +110,8 @@ def test_foreground_masks_pixels_of_occluders():
     depth.values[5:45, 10:34] = 2000
     near, far = (10, 5, 34, 45), (28, 10, 50, 40)
     in_front = foreground(depth, near)
-    assert in_front.center_m[2] == pytest.approx(2.0 + AXIS_BEHIND_SURFACE_M)
-    assert foreground(depth, far, [in_front]).center_m[2] == pytest.approx(3.0 + AXIS_BEHIND_SURFACE_M)
+    assert in_front.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis)
+    assert foreground(depth, far, [in_front]).center_m[2] == pytest.approx(3.0 + PERSON_CLASS.axis)
     assert foreground(depth, (12, 8, 30, 44), [in_front]) is None
 
 
@@ -119,7 +120,7 @@ def test_foreground_ignores_flying_pixels():
     depth.values[:, 30:34] = 2000, 2200, 3000, 4000  # the second one is in the layer of the person
     depth.values[:, 34:] = 4000
     box = foreground(depth, (14, 4, 50, 44))
-    assert box.center_m[2] == pytest.approx(2.0 + AXIS_BEHIND_SURFACE_M)
+    assert box.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis)
 
 
 def test_foreground_samples_about_as_many_pixels_in_every_box():
@@ -144,7 +145,7 @@ def test_sparse_depth_has_full_support():
     depth = flat(0)
     depth.values[::5, ::5] = 2000
     box = foreground(depth, (4, 4, 60, 44))
-    assert box.support == 1 and box.center_m[2] == pytest.approx(2.0 + AXIS_BEHIND_SURFACE_M)
+    assert box.support == 1 and box.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis)
 
 
 @pytest.mark.parametrize('pixels', [1, 2, 3, 11])
@@ -152,7 +153,7 @@ def test_a_box_of_few_pixels_has_a_position(pixels):
     depth = flat(0)
     depth.values[10, 10:10 + pixels] = 3000 + 10 * np.arange(pixels)
     box = foreground(depth, (10, 10, 10 + pixels, 11))
-    assert box.center_m[2] == pytest.approx(3.0 + 0.005 * (pixels - 1) + AXIS_BEHIND_SURFACE_M)
+    assert box.center_m[2] == pytest.approx(3.0 + 0.005 * (pixels - 1) + PERSON_CLASS.axis)
     assert np.isfinite(box.center_m).all() and (box.size_m > 0).all()
 
 
@@ -160,7 +161,7 @@ def test_depths_beyond_any_camera_are_ignored():
     depth = flat(2.0, 1.0, np.float32)
     depth.values[10, 10], depth.values[20, 20] = 1e30, 1e7
     box = foreground(depth, (5, 5, 60, 45))
-    assert box.center_m[2] == pytest.approx(2.0 + AXIS_BEHIND_SURFACE_M) and box.support == 1
+    assert box.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis) and box.support == 1
 
 
 @pytest.mark.parametrize('name', ['foreground', 'median'])
@@ -212,7 +213,7 @@ def test_lens_distortion_is_corrected(camera, x_m):
     """Within 3 cm in position and 6 cm in height; without the correction, positions at the sides are wrong."""
     center_m = np.array([x_m, 0.3, 3.0])
     depth, rect = plate_in(camera, center_m, (0.5, 1.7))
-    samples, axis_m = sample_depth(depth, rect), center_m * (1 + AXIS_BEHIND_SURFACE_M / 3)
+    samples, axis_m = sample_depth(depth, rect), center_m * (1 + PERSON_CLASS.axis / 3)
     box = estimate_foreground(samples, rect, of(camera))
     np.testing.assert_allclose(box.center_m, axis_m, atol=0.03)
     assert box.size_m[1] == pytest.approx(1.7, abs=0.06) and box.size_m[0] == pytest.approx(0.5, abs=0.05)

@@ -62,6 +62,9 @@ def test_an_invalid_track_does_not_affect_the_others(changed):
     usable, faults = usable_tracks([good[0], broken, good[1]])
     assert [track.id for track in usable] == [1, 2] and len(faults) == 1 and 'track 7 ' in faults[0]
     assert usable_tracks(good)[1] == []
+    for wrong in ({'score': np.nan}, {'score': 1.5}, {'label': 'a;b'}, {'label': u'\u9f8d'}):
+        usable, faults = usable_tracks([good[0], good[1]._replace(**wrong)])
+        assert usable == good[:1] and len(faults) == 1
 
 
 coordinates = st.floats(-1e6, 1e6)

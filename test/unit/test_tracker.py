@@ -103,7 +103,19 @@ def test_a_person_who_leaves_the_view_is_out_of_view_and_then_unpublished():
     walk = play(Tracker(), 5, lambda time_s: [at(3, time_s)] if time_s < 1.75 else [])
     states = [objects[0].status if objects else None for objects in walk[52:]]
     assert states[8] == OUT_OF_VIEW and states[-1] is None
-    assert len([state for state in states if state is not None]) == 31  # until 1 s after the last detection
+    assert len([state for state in states if state is not None]) == 16  # until 0.5 s after the last detection
+
+
+def test_a_standing_person_out_of_view_stays_published_while_the_position_is_certain():
+    """The camera turns away: until the standard deviation of the position is 0.5 m."""
+    tracker, away = Tracker(), VIEW._replace(fixed_from_camera=transform_from((0, 0, 0), (0, 0, 1, 0)).dot(
+        VIEW.fixed_from_camera))
+    play(tracker, 2, standing((3, 0)))
+    after = play(tracker, 4, standing(), start_s=2, view=away)
+    published = [objects[0] for objects in after if objects]
+    assert 1.5 <= len(published) / 30 <= 2.5 and all(after[:len(published)])
+    assert all(track.status == OUT_OF_VIEW for track in published)
+    assert np.linalg.norm(published[-1].position_m[:2] - [3, 0]) < 0.1
 
 
 def test_a_person_who_reappears_within_max_age_keeps_the_id():

@@ -83,3 +83,9 @@ def test_the_frame_rate_is_that_of_recent_images_and_its_memory_is_limited():
     assert len(rate._arrivals_ns) <= 31 * RATE_WINDOW_NS // NS
     assert rate.at(2999 * NS // 30) == pytest.approx(30.0)
     assert rate.at(110 * NS) == 0
+
+
+def test_objects_other_than_people_are_shown_with_their_class():
+    person, dog = box_lines([BOX, BOX._replace(label='dog', score=0.5)])
+    assert person.startswith('1: ') and dog.startswith('dog 2: ') and dog.endswith('score 0.50, truncated')
+    assert (compose(view(), 640, 6.0) != compose(view(boxes3d=(BOX._replace(label='dog'),)), 640, 6.0)).any()

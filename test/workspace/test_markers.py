@@ -181,6 +181,8 @@ def test_tracks_that_are_not_visible_are_paler_and_have_a_question_mark(status, 
     seen, unseen = drawn([track(3)], params), drawn([track(3, status=status)], params)
     assert (seen['id', 3].text, unseen['id', 3].text) == ('3', '3?')
     assert rgb(seen['id', 3].color) != rgb(unseen['id', 3].color)
+    dog = drawn([track(3)._replace(label='dog')], ALL._replace(marker_color=coloring))
+    assert dog['id', 3].text == 'dog 3'
     for namespace in ('cylinder', 'velocity', 'prediction'):
         assert 0.1 < unseen[namespace, 3].color.a < seen[namespace, 3].color.a / 2
 

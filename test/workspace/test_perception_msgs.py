@@ -9,10 +9,10 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
-from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, boxes3d_from_msg,
-                                                   boxes3d_to_msg, camera_from_msg, detections_from_msg,
-                                                   stamp_of, time_from, tracks_from_msg, tracks_to_msg,
-                                                   usable_boxes3d, with_stamp)
+from ros_3d_bb.conversions.perception_msgs import (box3d_faults, boxes2d_from_msg, boxes2d_to_msg,
+                                                   boxes3d_from_msg, boxes3d_to_msg, camera_from_msg,
+                                                   detections_from_msg, stamp_of, time_from, tracks_from_msg,
+                                                   tracks_to_msg, usable_boxes3d, with_stamp)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
@@ -55,11 +55,63 @@ def test_2d_boxes_without_a_stamp(message):
     assert boxes.stamp_ns is None and boxes.boxes.tolist() == [[1, 2, 3, 4]]
 
 
+TWO_BOXES = np.array([[1, 2, 3, 4], [5, 6, 7, 8]])
+
+
+@pytest.mark.parametrize('frame_id', ['camera', 'a;b', 'a;classes', ''])
+def test_2d_boxes_keep_classes_and_scores(frame_id):
+    message = boxes2d_to_msg(TWO_BOXES, header(NS, frame_id), ['person', 'traffic light'], [0.9134, 0.42])
+    assert message.layout.dim[0].label == (
+        'boxes;stamp=1.000000000;frame=%s;classes=person,traffic light;scores=0.913,0.42' % frame_id)
+    back = boxes2d_from_msg(on_the_wire(message))
+    assert back.frame_id == frame_id and back.stamp_ns == NS
+    assert back.labels == ('person', 'traffic light') and back.scores.tolist() == [0.913, 0.42]
+
+
+@pytest.mark.parametrize('message', [
+    Int32MultiArray(data=TWO_BOXES.ravel().tolist()), boxes2d_to_msg(TWO_BOXES, header(NS, 'camera')),
+    boxes2d_to_msg(TWO_BOXES, header(NS, 'a;b=c;d'))])
+def test_2d_boxes_without_classes_are_people_with_unknown_scores(message):
+    boxes = boxes2d_from_msg(on_the_wire(message))
+    assert boxes.labels == ('person', 'person') and boxes.scores.tolist() == [0, 0]
+
+
+def test_classes_and_scores_are_independent_of_each_other():
+    assert boxes2d_from_msg(labelled('boxes;classes=dog')).labels == ('dog',)
+    scored = boxes2d_from_msg(labelled('boxes;stamp=1.000000000;frame=a;scores=0.25'))
+    assert scored.labels == ('person',) and scored.scores.tolist() == [0.25] and scored.frame_id == 'a'
+
+
+def test_no_2d_boxes_have_no_classes():
+    message = boxes2d_to_msg([], header(NS, 'camera'), [], [])
+    assert message.layout.dim[0].label == 'boxes;stamp=1.000000000;frame=camera'
+    assert boxes2d_from_msg(on_the_wire(message)).labels == ()
+
+
+@given(st.lists(st.tuples(st.text(), st.floats(0, 1)), min_size=1, max_size=5))
+def test_any_class_name_is_published_in_a_form_that_can_be_read(objects):
+    labels, scores = zip(*objects)
+    back = boxes2d_from_msg(boxes2d_to_msg([(1, 2, 3, 4)] * len(labels), header(NS), labels, scores))
+    assert len(back.labels) == len(labels) and np.abs(back.scores - scores).max() < 1e-3
+
+
+def test_class_names_keep_what_the_array_can_carry():
+    message = boxes2d_to_msg([(1, 2, 3, 4)] * 3, header(NS), [' fire hydrant', 'a;b,c', ''])
+    assert boxes2d_from_msg(message).labels == ('fire hydrant', 'a_b_c', '_')
+
+
 @pytest.mark.parametrize('convert,message,reason', [
     (boxes2d_from_msg, labelled('boxes;stamp=1.5'), 'expected'),
     (boxes2d_from_msg, labelled('boxes;stamp=;frame=a'), 'expected'),
     (boxes2d_from_msg, labelled('boxes;stamp=-1.000000000'), 'expected'),
     (boxes2d_from_msg, labelled('boxes;stamp=1e3.000000000'), 'expected'),
+    (boxes2d_from_msg, labelled('boxes;stamp=1.000000000;frame=a;classes=dog,cat'), '2 classes for 1 boxes'),
+    (boxes2d_from_msg, labelled('boxes;stamp=1.000000000;frame=a;classes=dog;scores=0.5,0.5'), '2 scores for 1 boxes'),
+    (boxes2d_from_msg, labelled('boxes;classes=dog;scores=high'), 'unusable scores'),
+    (boxes2d_from_msg, labelled('boxes;classes=dog;scores=nan'), 'the score nan; 0..1 expected'),
+    (boxes2d_from_msg, labelled('boxes;classes=dog;scores=1.01'), 'the score 1.01; 0..1 expected'),
+    (boxes2d_from_msg, labelled('boxes;classes=%s' % ('d' * 65)), '1 to 64 printable ASCII characters'),
+    (boxes2d_from_msg, labelled('boxes;classes=do\x07g'), '1 to 64 printable ASCII characters'),
     (boxes2d_from_msg, Int32MultiArray(data=[1] * 3), 'multiple of 4'),
     (boxes2d_from_msg, Int32MultiArray(data=[1] * 4004), '1001 2D boxes'),
     (camera_from_msg, CameraInfo(width=640, height=480), 'it is empty'),
@@ -120,7 +172,7 @@ def detection_of(box, roll_deg=0, pitch_deg=0, yaw_deg=0):
 @pytest.mark.parametrize('covariance_m2', [None, np.diag([0.01, 0.04, 0.09])])
 def test_3d_boxes_survive(covariance_m2):
     sent = Box3D(np.array([0.1, 0.2, 3.0]), np.array([0.5, 1.7, 0.5]), (10, 20, 64, 48), 0.75,
-                 (False, False, True, True), covariance_m2)
+                 (False, False, True, True), covariance_m2, 'dog', 0.625)
     camera = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
     back, other = boxes3d_from_msg(on_the_wire(boxes3d_to_msg([sent] * 2, header(1), camera)))
     for field, value in sent._asdict().items():
@@ -139,9 +191,19 @@ def test_an_unusable_3d_box_does_not_affect_the_others(wrong):
     usable, faults = usable_boxes3d(message)
     assert usable.boxes == [good, other] and usable.header == message.header
     assert len(faults) == 1 and faults[0].startswith('3D box 1 has ')
-    assert len(message.boxes) == 3
-    positions_m = [detection.position_m[0] for detection in detections_from_msg(usable, np.eye(4))]
-    assert positions_m == [-1.0, 2.0]
+    assert len(message.boxes) == 3 and [bool(fault) for fault in box3d_faults(message)] == [False, True, False]
+    detections = detections_from_msg(message, np.eye(4), [0, 2])
+    assert [(detection.index, detection.position_m[0]) for detection in detections] == [(0, -1.0), (2, 2.0)]
+
+
+@pytest.mark.parametrize('wrong', [{'score': np.nan}, {'score': -0.1}, {'score': 1.5}, {'label': 'a;b'},
+                                   {'label': 'x' * 65}, {'label': u'\u9f8d'}])
+def test_3d_boxes_with_unusable_classes_or_scores_are_dropped(wrong):
+    good, bad = box_of(), box_of()
+    for name, value in wrong.items():
+        setattr(bad, name, value)
+    usable, faults = usable_boxes3d(BoundingBox3DArray(boxes=[bad, good]))
+    assert usable.boxes == [good] and len(faults) == 1
 
 
 @given(st.integers(0, 2 ** 32 - 1), st.floats(-6, 7.9), st.integers(1, 3))
@@ -225,8 +287,10 @@ def test_states_have_the_numbers_of_the_message():
 
 def test_with_stamp_changes_only_the_stamp():
     stamp = time_from(7 * NS + 5)
-    boxes = boxes2d_from_msg(with_stamp(boxes2d_to_msg(np.array([[1, 2, 3, 4]]), header(1, 'camera')), stamp))
+    boxes = boxes2d_from_msg(with_stamp(boxes2d_to_msg([(1, 2, 3, 4)], header(1, 'camera'), ['dog'], [0.5]), stamp))
     assert (boxes.boxes.tolist(), boxes.stamp_ns, boxes.frame_id) == ([[1, 2, 3, 4]], 7 * NS + 5, 'camera')
+    assert boxes.labels == ('dog',) and boxes.scores.tolist() == [0.5]
+    assert 'classes' not in with_stamp(boxes2d_to_msg([(1, 2, 3, 4)], header(1)), stamp).layout.dim[0].label
     depth = DepthImage(np.ones((2, 2), np.uint16), 0.001)
     chain = [('map', 'odom', np.eye(4)), ('odom', 'camera', np.eye(4))]
     camera, color = Camera(2, 2, 1.0, 1.0, 0.5, 0.5), np.zeros((2, 2, 3), np.uint8)

@@ -33,12 +33,12 @@ def header_in(frame_id, stamp_ns=STAMP_NS):
     return Header(stamp=time_from(stamp_ns), frame_id=frame_id)
 
 
-def walker(number, position_m, velocity_mps, status=VISIBLE, width_m=0.6):
+def walker(number, position_m, velocity_mps, status=VISIBLE, width_m=0.6, label='person', score=0.0):
     position_m, velocity_mps = np.array(position_m, float), np.array(velocity_mps, float)
     prediction_m = position_m + np.outer(0.25 * np.arange(1, 9), velocity_mps)
     covariance = np.diag([0.01, 0.04, 0.09, 0.1, 0.2, 0.3])
     return TrackedObject(number, position_m, np.array([width_m, width_m, 1.7]), velocity_mps, velocity_mps, status,
-                         bool(velocity_mps.any()), 0, STAMP_NS, prediction_m, 0.25, covariance)
+                         bool(velocity_mps.any()), 0, STAMP_NS, prediction_m, 0.25, covariance, None, label, score)
 
 
 @pytest.mark.parametrize('kind', sorted(PUBLISHED_MD5))
@@ -115,9 +115,26 @@ def test_the_social_layer_transforms_position_and_velocity():
 @pytest.mark.parametrize('status, tag, reliability', [(VISIBLE, 'visible', 1.0), (OCCLUDED, 'occluded', 0.5),
                                                       (7, 'unknown', 0.5)])
 def test_people_have_an_id_tags_and_reliability(status, tag, reliability):
-    person, = sent(people_to_msg, 'people_msgs', [walker(12, [1, 2, 0.9], [0, 0, 0], status)]).people
+    person, = sent(people_to_msg, 'people_msgs', [walker(12, [1, 2, 0.9], [0, 0, 0], status, score=0.75)]).people
     assert (person.name, person.reliability) == ('12', reliability)
-    assert dict(zip(person.tagnames, person.tags)) == {'status': tag, 'width': '0.60', 'height': '1.70'}
+    assert dict(zip(person.tagnames, person.tags)) == {'label': 'person', 'score': '0.75', 'status': tag,
+                                                       'width': '0.60', 'height': '1.70'}
+
+
+@pytest.mark.parametrize('label, score, name, certainty', [
+    ('person', 0.0, 'PEDESTRIAN', 255), ('bicycle', 0.5, 'BIKE', 128), ('chair', 0.8, 'UNKNOWN', 204)])
+def test_objects_are_classified(label, score, name, certainty):
+    tracks = [walker(1, [1, 2, 0.9], [0, 0, 0], label=label, score=score)]
+    item, = sent(objects_to_msg, 'derived_object_msgs', tracks).objects
+    assert item.classification == getattr(item, 'CLASSIFICATION_' + name) and item.classification_certainty == certainty
+    assert item.object_classified == (name != 'UNKNOWN')
+
+
+@pytest.mark.parametrize('label, ids', [('person', [3, 0]), ('dog', [3, 16]), ('trolley', [3])])
+def test_detections_have_the_number_of_the_class(label, ids):
+    tracks = [walker(3, [1, 2, 0.9], [1, 0, 0], OCCLUDED, label=label, score=0.8)]
+    detection, = sent(detections3d_to_msg, 'vision_msgs', tracks).detections
+    assert [(result.id, result.score) for result in detection.results] == [(number, 0.4) for number in ids]
 
 
 def test_detections_have_box_id_and_covariance():

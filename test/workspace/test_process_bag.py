@@ -22,8 +22,8 @@ from ros_3d_bb.bags.bag_writer import session_images, write_bag
 from ros_3d_bb.bags.process_bag import main, with_params
 from ros_3d_bb.conversions.camera_msgs import START_NS
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, tracks_from_msg
+from ros_3d_bb.core.object_classes import PERSON_CLASS
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d_estimator import AXIS_BEHIND_SURFACE_M
 from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
@@ -176,7 +176,7 @@ def test_images_that_are_far_apart_need_the_tolerance_that_the_message_names(tmp
         process_bag(path, str(tmp_path / 'out.bag'), settings)
         array, = messages_in(tmp_path / 'out.bag')['/ros_3d_bb/bb_3d']
         tallest = max(array.boxes, key=lambda box: box.roi.height)
-        assert tallest.center.position.z - AXIS_BEHIND_SURFACE_M == pytest.approx(surface_m, abs=0.05)
+        assert tallest.center.position.z - PERSON_CLASS.axis == pytest.approx(surface_m, abs=0.05)
         assert not any(1.9 < box.center.position.z < 2.4 for box in array.boxes if 90 < box.roi.height < 110)
 
 

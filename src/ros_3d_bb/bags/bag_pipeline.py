@@ -141,7 +141,7 @@ class BagRun(object):
             with self._pipeline.searching():
                 _image, detections = search.result()
                 self._events.count('images processed')
-                return self._pipeline.found(message.header, detections, now_ns, camera)
+                return self._pipeline.found(message.header, detections, self._detector.names, now_ns, camera)
         elif topic != COLOR_TOPIC or self._detector is None:
             with self._events.rejecting('messages on %s' % raw.topic):
                 return self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), now_ns, camera)

@@ -1,5 +1,6 @@
 """Conversions between ROS messages and the detections, boxes, tracks and cameras of this package."""
-from typing import NamedTuple, Optional
+import re
+from typing import NamedTuple, Optional, Tuple
 
 import genpy
 import numpy as np
@@ -8,7 +9,9 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb import msg
 from ros_3d_bb.camera.camera_model import Camera, transform_from
+from ros_3d_bb.core.labels import PERSON, label_fault, score_fault, usable_label
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
+from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
@@ -20,17 +23,22 @@ LATEST_NS = 2 ** 31 * NS  # limit of stamps, as their differences must fit into 
 EDGE_FLAGS = BoundingBox3D.LEFT, BoundingBox3D.TOP, BoundingBox3D.RIGHT, BoundingBox3D.BOTTOM
 ROUNDING = 1e-9  # tolerance of eigenvalues of a covariance, relative to its largest element if that exceeds 1
 MAX_BOXES = 1000  # more boxes in one image are an error of the publisher and would stall the pipeline
+# Classes and scores follow the frame in the label of 2D boxes; frames may contain semicolons.
+CLASSES = re.compile(r'(?:;classes=([^;]*))?(?:;scores=([^;]*))?\Z')
 
 
 class Boxes2D(NamedTuple):
     """The 2D boxes of one image: (n, 4) integer pixels x1, y1, x2, y2, and the stamp and frame of the image.
 
-    `stamp_ns` is None for a plain array, which does not identify its image.
+    `stamp_ns` is None for a plain array, which does not identify its image. `labels` are the class names of the boxes;
+    `scores` (n,) are 0..1, 0 if unknown.
     """
 
     boxes: np.ndarray
     stamp_ns: Optional[int]
     frame_id: str
+    labels: Tuple[str, ...]
+    scores: np.ndarray
 
 
 def time_from(stamp_ns):
@@ -66,40 +74,91 @@ def check_transforms(message):
                              % (transform.child_frame_id, transform.header.stamp.secs))
 
 
-def boxes2d_to_msg(boxes, header):
+def boxes2d_to_msg(boxes, header, labels=None, scores=None):
     """Convert 2D boxes to std_msgs/Int32MultiArray, with the stamp and frame of their image in the layout.
 
-    `boxes` (n, 4) are x1, y1, x2, y2 in pixels, which are rounded to integers; `header` is that of the image.
+    `boxes` (n, 4) are x1, y1, x2, y2 in pixels, which are rounded to integers; `header` is that of the image. `labels`
+    are the class names of the boxes, and `scores` are 0..1; both follow in the layout if they are given. Characters of
+    class names that the layout cannot carry are replaced (`labels.usable_label`).
     """
     message = Int32MultiArray(data=np.rint(boxes).astype(int).ravel().tolist())
     label = 'boxes;stamp=%d.%09d;frame=%s' % (header.stamp.secs, header.stamp.nsecs, header.frame_id)
+    if labels is not None and len(boxes):
+        label += ';classes=' + ','.join(map(usable_label, labels))
+    if scores is not None and len(boxes):
+        label += ';scores=' + ','.join('%.3g' % score for score in scores)
     message.layout.dim = [MultiArrayDimension(label=label, size=len(boxes), stride=4 * len(boxes)),
                           MultiArrayDimension(label='x1 y1 x2 y2', size=4, stride=4)]
     return message
 
 
-def boxes2d_from_msg(message):
-    """Convert an Int32MultiArray, with or without a stamp in its layout, to Boxes2D.
+def detections2d_to_msg(detections, names, header):
+    """Convert `detection.boxes.Detections` to std_msgs/Int32MultiArray as `boxes2d_to_msg`.
 
-    Raises ValueError if the length is not a multiple of 4, there are too many boxes, or the label is malformed.
+    `names` are the class names by number.
+    """
+    return boxes2d_to_msg(detections.boxes, header, [names[number] for number in detections.classes],
+                          detections.scores)
+
+
+def boxes2d_from_msg(message):
+    """Convert an Int32MultiArray, with or without stamp, classes and scores in its layout, to Boxes2D.
+
+    Without classes, the boxes are those of people; without scores, their scores are unknown.
+
+    Raises
+    ------
+    ValueError
+        If the length is not a multiple of 4, there are too many boxes, or the label is malformed: the stamp is not a
+        number, there is not one class or one score for each box, or one of them is invalid.
     """
     if len(message.data) % 4:
         raise ValueError('2D boxes have %d numbers; a multiple of 4 expected (x1 y1 x2 y2 each)' % len(message.data))
     if len(message.data) > 4 * MAX_BOXES:
         raise ValueError('%d 2D boxes in one image; at most %d expected' % (len(message.data) // 4, MAX_BOXES))
     boxes = np.array(message.data, np.int64).reshape(-1, 4)
-    label = message.layout.dim[0].label if message.layout.dim else ''
+    label = _layout_label(message)
+    classes_and_scores = CLASSES.search(label)
+    labels, scores = _labels_and_scores(*classes_and_scores.groups(), len(boxes))
     fields = {}
-    for field in label.split(';', 2):
+    for field in label[:classes_and_scores.start()].split(';', 2):
         name, _equals, value = field.partition('=')
         fields[name] = value
     if 'stamp' not in fields:
-        return Boxes2D(boxes, None, '')
+        return Boxes2D(boxes, None, '', labels, scores)
     secs, _dot, nsecs = fields['stamp'].partition('.')
     if not (secs.isdigit() and nsecs.isdigit() and len(nsecs) == 9):
         raise ValueError('2D boxes have the label %r; boxes;stamp=<secs>.<nsecs, 9 digits>;frame=<frame_id> expected'
                          % label)
-    return Boxes2D(boxes, int(secs) * NS + int(nsecs), fields.get('frame', ''))
+    return Boxes2D(boxes, int(secs) * NS + int(nsecs), fields.get('frame', ''), labels, scores)
+
+
+def _layout_label(message):
+    return message.layout.dim[0].label if message.layout.dim else ''
+
+
+def _labels_and_scores(classes, scores, count):
+    """Class names and scores of `count` boxes from the texts in a label, which are None if they are missing."""
+    labels, numbers = (PERSON,) * count, np.zeros(count)
+    if classes:
+        labels = tuple(_entries(classes, count, 'classes'))
+        for fault in filter(None, map(label_fault, set(labels))):
+            raise ValueError('2D boxes have %s' % fault)
+    if scores:
+        try:
+            numbers = np.array(list(map(float, _entries(scores, count, 'scores'))))
+        except ValueError as error:
+            raise ValueError('2D boxes have unusable scores: %s' % error)
+        for fault in filter(None, map(score_fault, numbers)):
+            raise ValueError('2D boxes have %s' % fault)
+    return labels, numbers
+
+
+def _entries(text, count, name):
+    entries = text.split(',')
+    if len(entries) != count:
+        raise ValueError('2D boxes have %d %s for %d boxes; one for each box expected' % (len(entries), name, count))
+    return entries
 
 
 def with_stamp(message, stamp):
@@ -109,7 +168,9 @@ def with_stamp(message, stamp):
     """
     if hasattr(message, 'layout'):
         boxes = boxes2d_from_msg(message)
-        return boxes2d_to_msg(boxes.boxes, Header(stamp=stamp, frame_id=boxes.frame_id))
+        stamped = boxes2d_to_msg(boxes.boxes, Header(stamp=stamp, frame_id=boxes.frame_id))
+        stamped.layout.dim[0].label += CLASSES.search(_layout_label(message)).group()
+        return stamped
     for part in getattr(message, 'transforms', [message]):
         part.header.stamp = stamp
     return message
@@ -138,7 +199,8 @@ def boxes3d_to_msg(boxes, header, camera):
     """Convert 3D boxes (`box3d_estimator.Box3D`) to BoundingBox3DArray. Inverse of `boxes3d_from_msg`."""
     array = BoundingBox3DArray(header=header)
     for box in boxes:
-        message = BoundingBox3D(support=box.support, truncated=any(box.truncated_edges))
+        message = BoundingBox3D(label=box.label, score=box.score, support=box.support,
+                                truncated=any(box.truncated_edges))
         for flag, is_cut in zip(EDGE_FLAGS, box.truncated_edges):
             message.truncated_edges |= flag if is_cut else 0
         message.center.position = Point(*map(float, box.center_m))
@@ -167,25 +229,28 @@ def _box3d_from_msg(box):
     if box.truncated and not any(edges):
         edges = (True,) * len(EDGE_FLAGS)  # the truncated edges are unknown, so no edge is trusted
     return Box3D(_xyz(box.center.position), _xyz(box.size), rect_px, box.support, edges,
-                 covariance_m2 if covariance_m2.any() else None)
+                 covariance_m2 if covariance_m2.any() else None, box.label or PERSON, box.score)
 
 
-def usable_boxes3d(message):
-    """Select the 3D boxes of a BoundingBox3DArray that can be tracked.
+def box3d_faults(message):
+    """Describe what is wrong with each 3D box of a BoundingBox3DArray, '' for those that can be tracked.
 
-    Returns the message with the usable boxes only, and a sentence about the fault of each other box. Raises ValueError
-    if there are too many boxes.
+    Raises ValueError if there are too many boxes.
     """
     if len(message.boxes) > MAX_BOXES:
         raise ValueError('%d 3D boxes in one image; at most %d expected' % (len(message.boxes), MAX_BOXES))
-    usable, faults = BoundingBox3DArray(header=message.header), []
-    for number, box in enumerate(message.boxes):
-        fault = _box3d_fault(box)
-        if fault:
-            faults.append('3D box %d has %s' % (number, fault))
-        else:
-            usable.boxes.append(box)
-    return usable, faults
+    faults = [_box3d_fault(box) for box in message.boxes]
+    return [fault and '3D box %d has %s' % (number, fault) for number, fault in enumerate(faults)]
+
+
+def usable_boxes3d(message):
+    """Select the 3D boxes of a BoundingBox3DArray that can be tracked, see `box3d_faults`.
+
+    Returns the message with the usable boxes only, and a sentence about the fault of each other box.
+    """
+    faults = box3d_faults(message)
+    usable = [box for box, fault in zip(message.boxes, faults) if not fault]
+    return BoundingBox3DArray(header=message.header, boxes=usable), list(filter(None, faults))
 
 
 def _box3d_fault(message):
@@ -198,15 +263,21 @@ def _box3d_fault(message):
             and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T).min() > -ROUNDING * max(1, covariance_m2.max())):
         return ('the position_covariance %s; a finite, positive semi-definite matrix, or zeros where it is not known, '
                 'expected' % list(message.position_covariance))
-    return ''
+    return label_fault(box.label) or score_fault(box.score)
 
 
-def detections_from_msg(message, fixed_from_camera):
-    """Convert the usable boxes (see `usable_boxes3d`) of a BoundingBox3DArray to Detections in the fixed frame.
+def detections_from_msg(message, fixed_from_camera, indices=None, classes=ObjectClasses()):
+    """Convert the boxes of a BoundingBox3DArray with these indices to Detections in the fixed frame.
 
-    `fixed_from_camera` (4, 4) is the pose of the camera's optical frame in the fixed frame.
+    They must be usable (see `box3d_faults`); by default all boxes are converted. `fixed_from_camera` (4, 4) is the pose
+    of the camera's optical frame in the fixed frame, `classes` the table of the classes of objects.
     """
-    return [detection_from_box(box, fixed_from_camera) for box in boxes3d_from_msg(message)]
+    detections = []
+    for index in range(len(message.boxes)) if indices is None else indices:
+        box = _box3d_from_msg(message.boxes[index])
+        detection = detection_from_box(box, fixed_from_camera, classes.of(box.label))
+        detections.append(detection._replace(index=index))
+    return detections
 
 
 def tracks_to_msg(tracks, header):
@@ -215,7 +286,8 @@ def tracks_to_msg(tracks, header):
 
 
 def _track_to_msg(track):
-    message = msg.TrackedObject(id=track.id, status=track.status, moving=track.moving,
+    message = msg.TrackedObject(id=track.id, label=track.label, score=track.score, detection=track.detection,
+                                status=track.status, moving=track.moving,
                                 first_seen=time_from(track.first_seen_ns), last_seen=time_from(track.last_seen_ns),
                                 prediction_step=genpy.Duration.from_sec(track.prediction_step_s))
     message.size = Vector3(*map(float, track.size_m))
@@ -251,7 +323,8 @@ def _track_from_msg(track):
         prediction_covariance_m2 = np.array([_covariance_3x3(pose) for pose in track.prediction]).reshape(-1, 3, 3)
     return TrackedObject(track.id, _xyz(track.pose.pose.position), _xyz(track.size), velocity_mps, velocity_mps,
                          track.status, track.moving, track.first_seen.to_nsec(), track.last_seen.to_nsec(),
-                         prediction_m, track.prediction_step.to_sec(), covariance, prediction_covariance_m2)
+                         prediction_m, track.prediction_step.to_sec(), covariance, prediction_covariance_m2,
+                         track.label or PERSON, track.score, track.detection)
 
 
 def _covariances_6x6(covariances):

@@ -8,19 +8,23 @@ from geometry_msgs.msg import Point, Point32, Quaternion
 from sensor_msgs.msg import PointCloud2, PointField
 
 from ros_3d_bb.conversions.perception_msgs import tracks_to_msg
+from ros_3d_bb.core.labels import COCO
 from ros_3d_bb.msg import TrackedObject
 
 STATUS_NAMES = {TrackedObject.VISIBLE: 'visible', TrackedObject.OCCLUDED: 'occluded',
                 TrackedObject.OUT_OF_VIEW: 'out of view'}
-UNSEEN_RELIABILITY = 0.5  # of tracks that are not visible in the latest image; some planners scale costs by it
+UNSEEN_RELIABILITY = 0.5  # of tracks that are not visible in the latest image
+CLASSIFICATIONS = {'person': 'PEDESTRIAN', 'bicycle': 'BIKE', 'car': 'CAR', 'truck': 'TRUCK',
+                   'motorcycle': 'MOTORCYCLE', 'bus': 'OTHER_VEHICLE'}  # of derived_object_msgs/Object
 
 
 def people_to_msg(tracks, header, people_msgs):
-    """Convert tracks to people_msgs/People; status and size (metres) are in the tags."""
+    """Convert tracks of all classes to people_msgs/People; class, score, status and size (metres) are in the tags."""
     return people_msgs.People(header=header, people=[people_msgs.Person(
         name=str(track.id), position=Point(*track.position_m), velocity=Point(*track.velocity_mps),
-        reliability=_reliability(track), tagnames=['status', 'width', 'height'],
-        tags=[STATUS_NAMES.get(track.status, 'unknown'), '%.2f' % track.size_m[0], '%.2f' % track.size_m[2]])
+        reliability=_reliability(track), tagnames=['label', 'score', 'status', 'width', 'height'],
+        tags=[track.label, '%.2f' % track.score, STATUS_NAMES.get(track.status, 'unknown'), '%.2f' % track.size_m[0],
+              '%.2f' % track.size_m[2]])
         for track in tracks])
 
 
@@ -37,12 +41,14 @@ def obstacles_to_msg(tracks, header, costmap_converter):
 
 
 def objects_to_msg(tracks, header, derived_object_msgs):
-    """Convert tracks to derived_object_msgs/ObjectArray: upright cylinders, classified as pedestrians."""
+    """Convert tracks to derived_object_msgs/ObjectArray: upright cylinders, classified by `CLASSIFICATIONS`."""
     objects = []
     for track in tracks_to_msg(tracks, header).objects:
+        name = CLASSIFICATIONS.get(track.label, 'UNKNOWN')
         item = derived_object_msgs.Object(header=header, id=track.id, pose=track.pose.pose, twist=track.twist.twist,
-                                          object_classified=True, classification_certainty=255)
-        item.detection_level, item.classification = item.OBJECT_TRACKED, item.CLASSIFICATION_PEDESTRIAN
+                                          object_classified=name != 'UNKNOWN',
+                                          classification_certainty=int(round(255 * (track.score or 1.0))))
+        item.detection_level, item.classification = item.OBJECT_TRACKED, getattr(item, 'CLASSIFICATION_' + name)
         item.shape.type, item.shape.dimensions = item.shape.CYLINDER, [0.0, 0.0]
         item.shape.dimensions[item.shape.CYLINDER_HEIGHT] = track.size.z
         item.shape.dimensions[item.shape.CYLINDER_RADIUS] = track.size.x / 2
@@ -51,11 +57,16 @@ def objects_to_msg(tracks, header, derived_object_msgs):
 
 
 def detections3d_to_msg(tracks, header, vision_msgs):
-    """Convert tracks to vision_msgs/Detection3DArray (ROS 1), with one hypothesis each, whose id is the track ID."""
+    """Convert tracks to vision_msgs/Detection3DArray (ROS 1).
+
+    The id of the first hypothesis is the track ID. That of a second one is the number of the class in COCO (0: person),
+    if it has one, as ids are numbers. Their score is that of the track (1 if unknown) times the reliability.
+    """
     detections = []
     for track, message in zip(tracks, tracks_to_msg(tracks, header).objects):
+        ids = [track.id] + ([COCO.index(track.label)] if track.label in COCO else [])
         detection = vision_msgs.Detection3D(header=header, results=[vision_msgs.ObjectHypothesisWithPose(
-            id=track.id, score=_reliability(track), pose=message.pose)])
+            id=number, score=(track.score or 1.0) * _reliability(track), pose=message.pose) for number in ids])
         detection.bbox.center, detection.bbox.size = message.pose.pose, message.size
         detections.append(detection)
     return vision_msgs.Detection3DArray(header=header, detections=detections)

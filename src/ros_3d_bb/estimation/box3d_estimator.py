@@ -13,7 +13,9 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import FARTHEST_M as FARTHEST_DEPTH_M
-from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M, USUAL_HEIGHT_M, USUAL_WIDTH_M
+from ros_3d_bb.core.labels import PERSON
+from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
+from ros_3d_bb.core.object_classes import PERSON_CLASS, ObjectClasses
 
 # A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated:
 # detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person
@@ -22,7 +24,6 @@ BORDER_PX, BORDER_SHARE = 4, 0.02
 # Nearer people stand lower in the image. The lower edges of truncated boxes are compared at this height.
 CUT_ROWS = 1 / 30.0  # share of the image height
 SAMPLES_WANTED = 2000  # approximate number of pixels that the foreground estimator samples
-AXIS_BEHIND_SURFACE_M = 0.09  # mean over standing and walking bodies of the simulation, seen from all sides
 LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate; a lidar gives twice as many
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the person's layer for an estimate
 LEAST_WIDTH_M = 0.05
@@ -72,7 +73,8 @@ class Box3D(NamedTuple):
     `center_m` (3,) in the camera optical frame and `size_m` (width, height, width) are in metres; `rect_px` is the
     source rectangle; `support` is the share 0..1 of the samples with depth that belong to its depth layer;
     `truncated_edges` states whether the left, upper, right and lower edge of the rectangle touch the image border;
-    `covariance_m2` (3, 3) is that of the centre, None if unknown.
+    `covariance_m2` (3, 3) is that of the centre, None if unknown; `label` is the class name, and `score` is that of the
+    rectangle, 0..1, 0 if unknown.
     """
 
     center_m: np.ndarray
@@ -81,6 +83,8 @@ class Box3D(NamedTuple):
     support: float
     truncated_edges: Tuple[bool, bool, bool, bool]
     covariance_m2: Optional[Any] = None
+    label: str = PERSON
+    score: float = 0.0
 
     @property
     def truncated(self):
@@ -124,11 +128,11 @@ def sample_depth(depth, rect_px, stride_px=None):
     return Samples(np.arange(width)[columns], np.arange(height)[rows], depth_m, valid)
 
 
-def estimate_median(samples, rect_px, geometry, _nearer=()):
+def estimate_median(samples, rect_px, geometry, _nearer=(), _kind=PERSON_CLASS):
     """Estimate a box as in the thesis (3.4.2): per-axis median of the sampled points, size from the box at that depth.
 
-    Parameters and return value are those of `estimate_foreground`; nearer boxes and the tilt of the camera are ignored,
-    and there is no minimum support.
+    Parameters and return value are those of `estimate_foreground`; nearer boxes, the class and the tilt of the camera
+    are ignored, and there is no minimum support.
     """
     camera = geometry.camera
     across, down = camera.rays(samples.columns, samples.rows[:, np.newaxis])
@@ -145,13 +149,13 @@ def estimate_median(samples, rect_px, geometry, _nearer=()):
                  truncated_edges(rect_px, geometry.area_px))
 
 
-def estimate_foreground(samples, rect_px, geometry, nearer=()):
-    """Estimate a box from the person's depth layer: the nearest layer that is dominant near the middle of the box.
+def estimate_foreground(samples, rect_px, geometry, nearer=(), kind=PERSON_CLASS):
+    """Estimate a box from the object's depth layer: the nearest layer that is dominant near the middle of the box.
 
     Background beside and between the limbs may fill most of a box, but it is farther away. Flying pixels are too sparse
-    to form a layer. The position is that of the body's axis: laterally halfway between the edges of the layer, and
-    `AXIS_BEHIND_SURFACE_M` behind its mean depth. If the image border truncates the body, it is completed to the usual
-    size. All of this is done in the level frame.
+    to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges of the
+    layer, and behind its mean depth by the distance of its class. If the image border truncates the object, it is
+    completed to the usual size of its class. All of this is done in the level frame.
 
     Parameters
     ----------
@@ -160,6 +164,7 @@ def estimate_foreground(samples, rect_px, geometry, nearer=()):
     geometry : ImageGeometry
     nearer : sequence of Box3D
         Boxes of possible occluders; in their rectangles, pixels that are not behind them are masked.
+    kind : object_classes.ObjectClass
 
     Returns
     -------
@@ -196,11 +201,11 @@ def estimate_foreground(samples, rect_px, geometry, nearer=()):
         on_body = above_feet  # the floor beside the feet is as far away as the body
     left_m, right_m = edges(across_m[on_body])
     cut_left, cut_top, cut_right, cut_bottom = cut = truncated_edges(rect_px, geometry.area_px)
-    left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, USUAL_WIDTH_M)
-    top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, USUAL_HEIGHT_M)
+    left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, kind.width)
+    top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, kind.height)
     surface_m = np.array([(left_m + right_m) / 2, (top_m + bottom_m) / 2, layer_m])
-    center_m = level_from_camera.T.dot(surface_m * (1 + AXIS_BEHIND_SURFACE_M / layer_m))
     width_m = max(right_m - left_m, LEAST_WIDTH_M)
+    center_m = level_from_camera.T.dot(surface_m * (1 + kind.axis_behind(width_m) / layer_m))
     return Box3D(center_m, np.array([width_m, bottom_m - top_m, width_m]), tuple(rect_px), support, cut)
 
 
@@ -322,29 +327,31 @@ def _median(sorted_depths_m):
 
 
 class Estimator(NamedTuple):
-    """Pair of functions: `sample(depth, rect_px)` returns Samples; `estimate(samples, rect_px, geometry, nearer)`
-    returns a Box3D or None, given the boxes of possible occluders.
+    """Pair of functions: `sample(depth, rect_px)` returns Samples; `estimate(samples, rect_px, geometry, nearer, kind)`
+    returns a Box3D or None, given the boxes of possible occluders and the ObjectClass, which is that of `classes`.
     """
 
     sample: Any
     estimate: Any
+    classes: ObjectClasses = ObjectClasses()
 
 
-def estimator_named(name, stride_px=20):
-    """Create the estimator foreground or median; `stride_px` is the grid spacing of the estimator median.
+def estimator_named(name, stride_px=20, classes=ObjectClasses()):
+    """Create the estimator foreground or median; `stride_px` is the grid spacing of the estimator median, `classes` the
+    table of the classes of objects.
 
     Raises ValueError if the name is unknown or the stride is not positive.
     """
     if stride_px < 1:
         raise ValueError('stride is %d; at least 1 expected' % stride_px)
     if name == 'foreground':
-        return Estimator(sample_depth, estimate_foreground)
+        return Estimator(sample_depth, estimate_foreground, classes)
     if name == 'median':
-        return Estimator(functools.partial(sample_depth, stride_px=stride_px), estimate_median)
+        return Estimator(functools.partial(sample_depth, stride_px=stride_px), estimate_median, classes)
     raise ValueError('estimator is %r; foreground or median expected' % name)
 
 
-def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_from_camera=LEVEL):
+def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_from_camera=LEVEL, labels=None):
     """Estimate the 3D boxes of all rectangles of one image, front to back, so that nearer boxes mask their pixels.
 
     Parameters
@@ -357,6 +364,8 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_f
         Estimates that are not plausible (see `Box3D.is_plausible`) are appended. They do not mask pixels.
     level_from_camera : numpy.ndarray, (3, 3), optional
         Rotation to the level frame, see `level_rotation`. By default the camera is held level.
+    labels : sequence of str, optional
+        Class names of the rectangles. By default they are those of people.
 
     Returns
     -------
@@ -365,13 +374,14 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_f
     """
     if len(rects_px) == 0:  # most images show no people
         return []
-    boxes, nearer = [None] * len(rects_px), []
+    boxes, nearer, labels = [None] * len(rects_px), [], labels or [PERSON] * len(rects_px)
     geometry = ImageGeometry(camera, depth.measured_area(), level_from_camera)
     for number in front_to_back(rects_px, camera):
-        rect_px = rects_px[number]
-        box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, geometry, nearer)
+        rect_px, kind = rects_px[number], estimator.classes.of(labels[number])
+        box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, geometry, nearer, kind)
         if box is None:
             continue
+        box = box._replace(label=labels[number])
         if box.is_plausible:
             boxes[number] = box
             nearer.append(box)

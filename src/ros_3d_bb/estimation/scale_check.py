@@ -3,7 +3,8 @@ from collections import deque
 
 import numpy as np
 
-from ros_3d_bb.core.limits import USUAL_HEIGHT_M
+from ros_3d_bb.core.labels import PERSON
+from ros_3d_bb.core.object_classes import PERSON_CLASS
 
 LATEST = 20  # people that must agree
 LEAST_SUPPORT = 0.3  # boxes with less are often those of other objects
@@ -14,7 +15,8 @@ NEAR = 1.4  # ratio of a factor and a common one that it stands for
 
 
 class ScaleCheck(object):
-    """Heights of the latest people. People who are partly hidden, truncated or not standing are not counted.
+    """Heights of the latest people. People who are partly hidden, truncated or not standing are not counted, nor are
+    other objects.
 
     Three quarters of the heights must be too large, or too small.
     """
@@ -38,7 +40,7 @@ class ScaleCheck(object):
         if upper_m >= HEIGHTS_M[0] and lower_m <= HEIGHTS_M[1]:
             return None
         self._heights_m.clear()
-        factor = USUAL_HEIGHT_M / median_m
+        factor = PERSON_CLASS.height / median_m
         ratios = np.abs(np.log(COMMON_FACTORS / factor))
         return float(COMMON_FACTORS[ratios.argmin()] if ratios.min() < np.log(NEAR) else '%.2g' % factor)
 
@@ -46,4 +48,4 @@ class ScaleCheck(object):
 def _shows_standing_person(box):
     x1, y1, x2, y2 = box.rect_px
     is_supported = box.support >= LEAST_SUPPORT or box.size_m[1] > HEIGHTS_M[1]  # a giant is deeper than a body's layer
-    return not box.truncated and is_supported and y2 - y1 >= LEAST_ASPECT * (x2 - x1)
+    return box.label == PERSON and not box.truncated and is_supported and y2 - y1 >= LEAST_ASPECT * (x2 - x1)

@@ -11,6 +11,7 @@ from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, DEPTH_T
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg, camera_from_msg,
                                                    stamp_of)
+from ros_3d_bb.core.labels import described
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.time_sync import NS, MessageCache, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
@@ -198,7 +199,7 @@ class SampleImages(object):
             if needs_color:
                 image = imgmsg_to_rgb(color_msg).copy()
                 for box in boxes:
-                    draw_boxes(image, [box.rect_px], ['%.2f m' % box.center_m[2]])
+                    draw_boxes(image, [box.rect_px], [described(box.label, '%.2f m' % box.center_m[2])])
                 for box in boxes:
                     draw_samples(image, box.rect_px, self._sample(depth, box.rect_px))
                 self._color_pub.publish(fill_image(Image(header=header), image, 'rgb8'))

@@ -7,7 +7,8 @@ import tf2_ros
 from std_msgs.msg import Header
 
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, stamp_of, time_from, tracks_from_msg
-from ros_3d_bb.core.params import LARGEST, Param, parameters
+from ros_3d_bb.core.object_classes import read_object_classes
+from ros_3d_bb.core.params import CLASSES_FILE, LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
@@ -15,7 +16,7 @@ from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.planning.planner_outputs import outputs_from
-from ros_3d_bb.planning.planner_view import SAME_FRAME, predicted_to, rounding_m, usable_tracks
+from ros_3d_bb.planning.planner_view import SAME_FRAME, predicted_to, rounding_m, usable_tracks, with_class_widths
 
 MAX_ROUNDING_M = 0.005  # largest rounding error of a coordinate: a tenth of a typical costmap cell
 
@@ -33,6 +34,7 @@ class PlannerBridgeParams(NamedTuple):
     resend_period: float = Param(
         0.1, 'After this time without new tracks, outputs that planners take for the present are predicted to now and '
         'sent again.', 's', limits=(0.001, LARGEST))
+    classes_file: str = CLASSES_FILE
     tf_timeout: float = Param(0.2, 'How long to wait for each transform at the stamp of the tracks.', 's')
     points_prediction: float = Param(
         0.5, 'How far ahead costmaps are marked with predicted footprints; 0: current positions only. The costmap '
@@ -69,13 +71,14 @@ class PlannerTopic(object):
     def send(self, tracks, stamp_ns, received):
         """Publish tracks in the output frame; `received` are the ReceivedTracks from which they were predicted."""
         frame_id = self.output.frame or received.frame_id
-        header = Header(stamp=time_from(stamp_ns), frame_id=frame_id)
+        header = Header(stamp=time_from(0 if self.output.latest_tf else stamp_ns), frame_id=frame_id)
         self._publisher.publish(self.output.write(tracks, received.transforms[frame_id], header))
         self.held = received
 
     def empty(self, stamp_ns):
-        """Publish an empty array in the frame of the last one."""
-        self.send([], stamp_ns, self.held)
+        """Publish an empty array in the frame of the last one, if planners need it."""
+        if self.output.is_emptied:
+            self.send([], stamp_ns, self.held)
         self.held = None
 
 
@@ -115,6 +118,7 @@ class PlannerBridgeNode(object):
         self._params, = read_params(PlannerBridgeParams)
         if not self._params.robot_frame:
             raise ValueError('parameter ~robot_frame is empty; a frame such as base_link expected')
+        self._classes = read_object_classes(self._params.classes_file)
         self._topics = [PlannerTopic(output) for output in outputs_from(self._params)]
         self._lock = threading.Lock()
         self._received = None
@@ -145,7 +149,8 @@ class PlannerBridgeNode(object):
             self._transforms.go_back()
         tracks, faults = usable_tracks(tracks_from_msg(message))
         self._diagnostics.count_dropped('tracks', faults)
-        return ReceivedTracks(stamp_ns, now_ns, message.header.frame_id, tracks, self._transforms_at(message.header))
+        return ReceivedTracks(stamp_ns, now_ns, message.header.frame_id, with_class_widths(tracks, self._classes),
+                              self._transforms_at(message.header))
 
     def _transforms_at(self, header):
         """Return {frame: 4x4 matrix} from the tracks' frame to the output frames known to tf at the tracks' stamp."""
@@ -186,8 +191,9 @@ class PlannerBridgeNode(object):
                 if topic.held is None:
                     continue
                 if not 0 <= now_ns - topic.held.arrival_ns <= self._params.timeout * NS:
-                    self._diagnostics.warn('outputs emptied', 'no valid tracks for %g s: %s is emptied until the next '
-                                           'ones arrive' % (self._params.timeout, topic.output.topic))
+                    self._diagnostics.warn('outputs emptied', 'no valid tracks for %g s: %s %s until the next ones '
+                                           'arrive' % (self._params.timeout, topic.output.topic,
+                                                       'is emptied' if topic.output.is_emptied else 'is silent'))
                     topic.empty(now_ns)
                 elif topic.output.to_now and now_ns - self._received.arrival_ns >= self._params.resend_period * NS:
                     self._send(topic, now_ns)

@@ -13,7 +13,9 @@ from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import (NEWEST, boxes2d_from_msg, camera_from_msg, stamp_if_any,
                                                    stamp_of, time_from)
 from ros_3d_bb.core.limits import LARGEST_M
-from ros_3d_bb.core.params import DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.object_classes import read_object_classes
+from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param,
+                                   parameters)
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 from ros_3d_bb.estimation.box3d_estimator import LEVEL, check_rect, estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
@@ -45,6 +47,7 @@ class Bbox3dParams(NamedTuple):
     stamp_tolerance: float = STAMP_TOLERANCE
     floor_frame: str = Param('base_link')
     image_rotation: str = IMAGE_ROTATION
+    classes_file: str = CLASSES_FILE
     assumed_delay: float = Param(
         0.05, 'Processing time of the detector, used where its boxes have no stamp.', 's', live=(0, 1))
     depth_image_range: float = Param(
@@ -76,6 +79,7 @@ class EstimationStage(object):
         self._transforms = transforms if params.floor_frame else None
         self._registration = DepthRegistration(transforms, depth_info_topic) if params.depth == RAW else None
         self._color_frame, self._scale_check = '', ScaleCheck()
+        self._classes = read_object_classes(params.classes_file)
         self._error_model = None
         if params.error_model:
             try:
@@ -91,7 +95,7 @@ class EstimationStage(object):
 
         Raises ValueError, as the constructor, and keeps the old parameters if the new ones are invalid.
         """
-        estimator = estimator_named(params.estimator, params.stride)
+        estimator = estimator_named(params.estimator, params.stride, self._classes)
         if self._error_model is not None:
             self._error_model.check_estimator(params.estimator)
         self._params, self._estimator = params, estimator
@@ -140,12 +144,14 @@ class EstimationStage(object):
         depth, frame_id = self._aligned(raw, depth_msg.header.frame_id, camera)
         stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
         gap_s = abs((stamp - depth_msg.header.stamp).to_sec())
-        implausible, rects_px = [], self._usable_rects(boxes2d)
+        implausible, usable = [], self._usable_boxes(boxes2d)
         turns, level_from_camera = self._orientation(frame_id)
-        upright_rects_px = turned_boxes(rects_px, turns, camera.width, camera.height).tolist()
+        upright_rects_px = turned_boxes(usable.boxes, turns, camera.width, camera.height).tolist()
         estimates = estimate_boxes(turned_depth(depth, turns), list(map(tuple, upright_rects_px)),
-                                   turned_camera(camera, turns), self._estimator, implausible, level_from_camera)
-        boxes3d = list(filter(None, estimates))
+                                   turned_camera(camera, turns), self._estimator, implausible, level_from_camera,
+                                   usable.labels)
+        boxes3d = [box._replace(score=score) for box, score in zip(estimates, usable.scores.tolist())
+                   if box is not None]
         for box in _as_received(implausible, turns, camera):
             self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
                               '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
@@ -204,16 +210,17 @@ class EstimationStage(object):
                                   % (self._params.floor_frame, frame_id, error))
             return None
 
-    def _usable_rects(self, boxes2d):
-        """Return the rectangles (n, 4), in pixels, that are neither empty nor reversed."""
-        usable_px = []
-        for rect_px in map(tuple, boxes2d.boxes.tolist()):
+    def _usable_boxes(self, boxes2d):
+        """Return the Boxes2D whose rectangles are neither empty nor reversed."""
+        usable = []
+        for number, rect_px in enumerate(boxes2d.boxes.tolist()):
             try:
                 check_rect(rect_px)
-                usable_px.append(rect_px)
+                usable.append(number)
             except ValueError as error:
                 self._events.warn('boxes rejected', '2D %s; the others in this image are used' % error)
-        return np.array(usable_px, np.int64).reshape(-1, 4)
+        return boxes2d._replace(boxes=boxes2d.boxes[usable], labels=[boxes2d.labels[number] for number in usable],
+                                scores=boxes2d.scores[usable])
 
     def _on_lost(self, boxes2d, before_jump):
         if before_jump:

@@ -9,8 +9,8 @@ from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, IMAGE_KINDS, INFO_TOPICS,
                                                STATIC_TOPIC, TF_TOPIC, info_of_images, topic_of, uncompressed)
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg,
-                                                   boxes3d_to_msg, tracks_to_msg)
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes3d_to_msg,
+                                                   detections2d_to_msg, tracks_to_msg)
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
@@ -124,10 +124,10 @@ class Pipeline(object):
             self._estimation_stages[camera].add_boxes(message, now_ns)
         return self._outputs
 
-    def found(self, header, found, now_ns, camera=''):
-        """Process the detections of an image with the given header. Returns as `take`."""
+    def found(self, header, found, names, now_ns, camera=''):
+        """Process the detections of an image with the given header, given the class names. Returns as `take`."""
         self._now_ns, self._outputs = now_ns, []
-        self._on_detections(camera, header, found)
+        self._on_detections(camera, header, found, names)
         return self._outputs
 
     @contextlib.contextmanager
@@ -150,13 +150,13 @@ class Pipeline(object):
             found = self._detection_stages[camera].detect(color_msg, depth_msg, camera_model)
             if found is not None:
                 _image, detections = found
-                self._on_detections(camera, color_msg.header, detections)
+                self._on_detections(camera, color_msg.header, detections, RgbdDetectionStage.names)
 
-    def _on_detections(self, camera, header, detections):
+    def _on_detections(self, camera, header, detections, names):
         """Output 2D boxes, as the detector nodes do."""
         if not len(detections.boxes) and not self._publish_empty:
             return
-        message = boxes2d_to_msg(detections.boxes, header)
+        message = detections2d_to_msg(detections, names, header)
         self._outputs.append((topic_of(camera, BOXES_TOPIC), message))
         self._estimation_stages[camera].add_boxes(message, self._now_ns)
 

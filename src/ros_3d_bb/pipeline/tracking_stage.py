@@ -12,10 +12,11 @@ from ros_3d_bb.camera.alignment import POSE, target_frame_fault
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
-from ros_3d_bb.conversions.perception_msgs import (camera_from_msg, detections_from_msg, stamp_of, time_from,
-                                                   usable_boxes3d)
+from ros_3d_bb.conversions.perception_msgs import (box3d_faults, camera_from_msg, detections_from_msg, stamp_of,
+                                                   time_from)
 from ros_3d_bb.core.camera_clocks import CameraClocks
-from ros_3d_bb.core.params import DEPTH, DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.object_classes import read_object_classes
+from ros_3d_bb.core.params import CLASSES_FILE, DEPTH, DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, MessageCache
 from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
 from ros_3d_bb.tracking.measurement_model import NoiseParams
@@ -48,6 +49,7 @@ class TrackerNodeParams(NamedTuple):
     depth_scale: float = DEPTH_SCALE
     depth_cache_length: float = Param(1.0, 'How long depth images are kept for the boxes of the same stamp.', 's')
     stamp_tolerance: float = STAMP_TOLERANCE
+    classes_file: str = CLASSES_FILE
     tf_timeout: float = Param(0.2, 'How long to wait for the transform at the stamp of the boxes.', 's')
 
 
@@ -94,7 +96,8 @@ class TrackingStage(object):
         self.uses_camera_info = params.tracker != 'thesis'
         self.uses_depth = self.uses_camera_info and params.use_depth
         tracker, self._kinds = TRACKERS[params.tracker]
-        self._tracker = tracker(*self._params_of_tracker(tracking), last_id=last_id)
+        self._classes = read_object_classes(params.classes_file)
+        self._tracker = tracker(*self._params_of_tracker(tracking), last_id=last_id, classes=self._classes)
         self.lock = threading.RLock()
         self._clocks = CameraClocks()
         self._jumps = 0  # number of backward jumps in time
@@ -157,14 +160,16 @@ class TrackingStage(object):
                                   'awaited' % (stamp_ns / NS))
 
     def _track(self, message, stamp_ns, fixed_from_camera, camera, camera_name):
-        usable, faults = usable_boxes3d(message)
+        faults = box3d_faults(message)
+        usable = [index for index, fault in enumerate(faults) if not fault]
+        faults = list(filter(None, faults))
         self._events.count_dropped('3D boxes', faults)
-        if faults and not usable.boxes:  # differs from an image without people
+        if faults and not usable:  # differs from an image without people
             self._tracker.skip(stamp_ns, camera_name)
             raise ValueError('none of their %d boxes is valid; tracks are kept as they are' % len(faults))
         if camera:
             self._check_frame(message.header.frame_id, camera)
-        tracks = self._tracker.update(stamp_ns, detections_from_msg(usable, fixed_from_camera),
+        tracks = self._tracker.update(stamp_ns, detections_from_msg(message, fixed_from_camera, usable, self._classes),
                                       self._view(message.header, fixed_from_camera, camera, camera_name))
         self._events.count('images tracked')
         newest_ns = self._clocks.track(stamp_ns, camera)

@@ -19,9 +19,11 @@ class Output(NamedTuple):
 
     `write(tracks, frame_from_tracks, header)` builds the message from tracks in their original frame. `frame` is the
     frame of the message's coordinates; if empty, the frame of the tracks is used, for planners that transform messages
-    themselves. `to_now` states that the planner ignores the stamp: positions are predicted to the current time, and
-    published again while no new tracks arrive; otherwise positions are those at the stamp of the image. `float32`
-    states that the message stores coordinates as float32.
+    themselves. `to_now` states that the planner takes positions as current: they are predicted to the current time, and
+    published again while no new tracks arrive; otherwise positions are those at the stamp of the image. `latest_tf`
+    states that the planner drops positions for which tf is older than their stamp: the stamp is 0, for which tf2 takes
+    the latest transform. `float32` states that the message stores coordinates as float32. `is_emptied` states that an
+    empty array is published when the tracks are outdated; otherwise nothing is published then.
     """
 
     topic: str
@@ -29,13 +31,15 @@ class Output(NamedTuple):
     write: Callable
     frame: str = ''
     to_now: bool = False
+    latest_tf: bool = False
     float32: bool = False
+    is_emptied: bool = True
 
 
 # Outputs whose message type, given by name, is defined in a package that may not be installed. `write` takes tracks in
 # the output frame, the header and the `msg` module of the package. `frame` is the name of a parameter.
 OPTIONAL = {
-    'people': Output('/people', 'people_msgs/People', people_to_msg, to_now=True),
+    'people': Output('/people', 'people_msgs/People', people_to_msg, to_now=True, latest_tf=True),
     'teb': Output('~obstacles', 'costmap_converter/ObstacleArrayMsg', obstacles_to_msg, 'planner_frame', to_now=True,
                   float32=True),
     'mpc': Output('~objects', 'derived_object_msgs/ObjectArray', objects_to_msg, 'planner_frame', to_now=True),
@@ -78,6 +82,7 @@ def _costmap_outputs(params):
 
     Both are in the robot's frame, because coordinates are float32 and stay small there in any map. They are level in
     the frame of the tracks even if the robot is tilted, because costmaps filter points by height in the fixed frame.
+    The ring is published only with valid tracks: with `expected_update_rate` the robot stops when it stays away.
     """
     def footprints(tracks, robot_from_tracks, header):
         points_m = footprint_points(tracks, params.points_prediction, params.point_spacing)
@@ -89,5 +94,5 @@ def _costmap_outputs(params):
     outputs = [Output('~points', PointCloud2, footprints, params.robot_frame, float32=True)]
     if params.clearing_range:
         ring_m = ring_points(params.clearing_range, CLEARING_SPACING_M) + [0, 0, CLEARING_HEIGHT_M]
-        outputs.append(Output('~clearing_points', PointCloud2, ring, params.robot_frame))
+        outputs.append(Output('~clearing_points', PointCloud2, ring, params.robot_frame, is_emptied=False))
     return outputs

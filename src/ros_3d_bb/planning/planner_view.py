@@ -5,6 +5,7 @@ Positions and velocities are as in `types.TrackedObject`; points are (n, 3), met
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.core.labels import label_fault, score_fault
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
 
 SWATH_STEP_S = 0.1  # a person at 3 m/s moves 0.3 m, less than a body's width, so that the footprints overlap
@@ -30,7 +31,19 @@ def _fault_of(track):
     if len(track.prediction_m) and not track.prediction_step_s > 0:
         return ('track %d has predictions in steps of %g s; a positive step expected'
                 % (track.id, track.prediction_step_s))
+    if label_fault(track.label) or score_fault(track.score):
+        return 'track %d has %s' % (track.id, label_fault(track.label) or score_fault(track.score))
     return ''
+
+
+def with_class_widths(tracks, classes):
+    """Give elongated objects at least the length of their class (ObjectClasses) as their width.
+
+    A dog that is seen from the front appears narrow. Planners must keep clear of its whole length, whose direction is
+    unknown.
+    """
+    return [track._replace(size_m=np.maximum(track.size_m, [length_m, length_m, 0])) for track, length_m in
+            ((track, classes.of(track.label).length) for track in tracks)]
 
 
 def _walking_velocity(track):

@@ -11,11 +11,12 @@ HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the 
 HIDDEN_FEET_COST = 8.0  # cost of a box whose top matches but whose height does not: its lower part is occluded
 
 
-def associate(tracks, measurements, stamp_ns, params):
+def associate(tracks, measurements, stamp_ns, params, classes):
     """Assign measurements to tracks (arrays of TRACK and MEASUREMENT) in a cascade: recently matched, then missed, then
     tentative tracks. Returns the rows of the tracks and the columns of the measurements of the pairs.
 
-    A pair is allowed only if the track explains the detection better than a new target does.
+    A pair is allowed only if the track explains the detection better than a new target does, and both have the same
+    group of classes (ClassNumbers).
     """
     cost = kalman_filter.negative_log_likelihood(tracks['mean'], tracks['covariance'], measurements, params)
     cost += _height_cost(tracks, measurements, params.height_sigma)
@@ -23,6 +24,7 @@ def associate(tracks, measurements, stamp_ns, params):
     largest_density = 1 / (2 * np.pi * np.sqrt(np.linalg.det(measurements['noise_m2'])))
     density = np.minimum(params.new_target_density, UNSURE_SHARE * largest_density)
     cost[cost >= -2 * np.log(2 * np.pi * density)] = np.inf
+    cost[classes.group[tracks['class_number']][:, None] != classes.group[measurements['class_number']]] = np.inf
     is_missed = stamp_ns - tracks['last_ns'] >= RECENT_NS
     priority = np.where(tracks['confirmed'], is_missed.astype(int), 2)
     pairs, free = [np.zeros((2, 0), int)], np.arange(cost.shape[1])

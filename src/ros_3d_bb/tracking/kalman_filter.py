@@ -10,12 +10,13 @@ import numpy as np
 
 def predict(mean, covariance, elapsed_s, density):
     """Mean and covariance `elapsed_s` ahead, with white-noise acceleration of `density` m²/s³ (Bar-Shalom et al., 2001,
-    6.2.2)."""
+    6.2.2), which is a number or an array (n,)."""
     step = np.eye(4)
     step[0, 2] = step[1, 3] = elapsed_s
     position, both = elapsed_s ** 3 / 3, elapsed_s ** 2 / 2
     white = np.array([[position, 0, both, 0], [0, position, 0, both], [both, 0, elapsed_s, 0], [0, both, 0, elapsed_s]])
-    return mean.dot(step.T), step.dot(covariance).transpose(1, 0, 2).dot(step.T) + density * white
+    noise = np.asarray(density)[..., None, None] * white
+    return mean.dot(step.T), step.dot(covariance).transpose(1, 0, 2).dot(step.T) + noise
 
 
 def negative_log_likelihood(mean, covariance, measurements, params):

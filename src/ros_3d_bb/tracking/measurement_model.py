@@ -7,12 +7,13 @@ from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.tracking.types import NEARER_M, wrapped
 
 # Position (x, y), its covariance, and the unit vector from the camera to it in the ground plane; extents; height of the
-# centre and its variance; whether the image border truncates the width, and the lower and the upper end; support.
+# centre and its variance; whether the image border truncates the width, and the lower and the upper end; support;
+# number of the class (`class_numbers.ClassNumbers`), score, and `Detection.index`.
 MEASUREMENT = np.dtype([('position_m', float, 2), ('noise_m2', float, (2, 2)), ('ray', float, 2), ('size_m', float, 3),
                         ('z_m', float), ('z_m2', float), ('cut_sideways', bool), ('cut_ends', bool, 2),
-                        ('support', float)])
+                        ('support', float), ('class_number', int), ('score', float), ('detection', int)])
 FLOOR_M = 0.02  # lower bound of the standard deviation of a centre: people sway as they walk
-PERSON_WIDTH_M = 0.5
+WIDER_M = 0.04  # people are wider than the usual width, to which the estimator completes truncated boxes
 USUAL_PERIOD_S = 1 / 30.0  # image period assumed for the first image of a camera
 PART_M = 0.3  # a truncated box narrower than this shows only a part of the body's width
 MAX_SHIFT_M = 0.2
@@ -32,17 +33,20 @@ class NoiseParams(NamedTuple):
     noise_correlation_time: float = Param(0.15, 'How long they are correlated.', 's', live=(0, 1))
 
 
-def measurements_of(detections, view, elapsed_s, params):
+def measurements_of(detections, view, elapsed_s, params, classes):
     """Convert the detections of one image to an array of MEASUREMENT; `elapsed_s` is the time since the previous image
-    of the same camera, 0 for the first.
+    of the same camera, 0 for the first; `classes` are ClassNumbers.
 
-    If a nearer person partly occludes a detection, or the image border leaves only a part of its width, the centre is
-    shifted to half a person's width from the visible edge. The lateral position of such a box is less certain.
+    If a nearer object partly occludes a detection, or the image border leaves only a part of its width, the centre is
+    shifted to half the usual width of the class from the visible edge. The lateral position of such a box is less
+    certain.
     """
     measurements = np.zeros(len(detections), MEASUREMENT)
     if not len(detections):
         return measurements
-    positions_m, sizes_m, covariances_m2, truncated_edges, measurements['support'] = zip(*detections)
+    (positions_m, sizes_m, covariances_m2, truncated_edges, measurements['support'], labels, measurements['score'],
+     measurements['detection']) = zip(*detections)
+    measurements['class_number'] = numbers = [classes.of(label) for label in labels]
     positions_m, sizes_m, truncated_edges = np.array(positions_m), np.array(sizes_m), np.array(truncated_edges, bool)
     unknown_m2 = np.eye(3) * params.noise_unknown ** 2
     covariances_m2 = np.array([unknown_m2 if known is None else known for known in covariances_m2])
@@ -58,7 +62,8 @@ def measurements_of(detections, view, elapsed_s, params):
     cut_left, top, cut_right, bottom = truncated_edges.T
     cut_sideways = cut_left | cut_right
     cut_side = (cut_left.astype(int) - cut_right) * (sizes_m[:, 0] < PART_M)
-    shift_m = np.where(cut_sideways, cut_side, hidden) * np.clip((PERSON_WIDTH_M - sizes_m[:, 0]) / 2, 0, MAX_SHIFT_M)
+    missing_m = classes.width_m[numbers] + WIDER_M - sizes_m[:, 0]
+    shift_m = np.where(cut_sideways, cut_side, hidden) * np.clip(missing_m / 2, 0, MAX_SHIFT_M)
 
     measurements['position_m'] = positions_m[:, :2] + shift_m[:, None] * left_of_rays
     lateral_m2 = (cut_sideways | (hidden != 0)) * CUT_SIGMA_M ** 2

@@ -9,11 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import match_greedily, plane_distances
-from ros_3d_bb.tracking.types import (MOVING_SPEED, OCCLUDED, PREDICTION_STEP, PREDICTION_TIME, VISIBLE, TrackedObject,
-                                      check_steps, prediction_times_s)
+from ros_3d_bb.tracking.types import (MOVING_SPEED, NOT_DETECTED, OCCLUDED, PREDICTION_STEP, PREDICTION_TIME, VISIBLE,
+                                      TrackedObject, check_steps, prediction_times_s)
 
 
 @parameters('thesis')
@@ -35,7 +36,8 @@ class ThesisTracker(object):
     """Tracks objects from image to image.
 
     Call `update` with the detections of each image in the order of their stamps, `skip` for an image whose detections
-    are unusable, and `reset` after a jump in time. The IDs of tracks are greater than `last_id`.
+    are unusable, and `reset` after a jump in time. The IDs of tracks are greater than `last_id`. Label and score are
+    those of the latest detection; tracks never change between the groups of the table `classes`.
 
     Raises
     ------
@@ -43,7 +45,8 @@ class ThesisTracker(object):
         If a parameter is invalid; the message names it.
     """
 
-    def __init__(self, params=ThesisTrackerParams(), last_id=0):
+    def __init__(self, params=ThesisTrackerParams(), last_id=0, classes=ObjectClasses()):
+        self._classes = classes
         self.reconfigure(params)
         self._last_id = last_id
         self.reset()
@@ -60,12 +63,16 @@ class ThesisTracker(object):
         than the previous one.
         """
         params, elapsed_ns = self._params, self._advance(stamp_ns)
-        tracks = [(track, unseen_ns + elapsed_ns) for track, unseen_ns in self._tracks
+        tracks = [(track._replace(detection=NOT_DETECTED), unseen_ns + elapsed_ns) for track, unseen_ns in self._tracks
                   if unseen_ns + elapsed_ns <= params.disappearance_limit * NS]
         pairs = []
         if tracks and detections:
-            pairs = match_greedily(plane_distances([track.position_m for track, _unseen_ns in tracks],
-                                                   [detection.position_m for detection in detections]))
+            distances_m = plane_distances([track.position_m for track, _unseen_ns in tracks],
+                                          [detection.position_m for detection in detections])
+            groups, others = (np.array([self._classes.group_of(known.label) for known in objects])
+                              for objects in ([track for track, _unseen_ns in tracks], detections))
+            distances_m[groups[:, None] != others] = np.inf
+            pairs = [pair for pair in match_greedily(distances_m) if np.isfinite(distances_m[pair])]
         for row, column in pairs:
             tracks[row] = self._matched(tracks[row][0], stamp_ns, detections[column]), 0
         matched = set(column for _row, column in pairs)
@@ -73,7 +80,8 @@ class ThesisTracker(object):
             if column not in matched:
                 self._last_id += 1
                 tracks.append((TrackedObject(self._last_id, detection.position_m, detection.size_m, np.zeros(3),
-                                             np.zeros(3), VISIBLE, False, stamp_ns, stamp_ns, None, None), 0))
+                                             np.zeros(3), VISIBLE, False, stamp_ns, stamp_ns, None, None, None, None,
+                                             detection.label, detection.score, detection.index), 0))
         self._tracks = tracks
         times_s = prediction_times_s(params.prediction_time, params.prediction_step)[:, None]
         return [track._replace(status=OCCLUDED if unseen_ns else VISIBLE, prediction_step_s=params.prediction_step,
@@ -87,7 +95,8 @@ class ThesisTracker(object):
         velocity_mps, alpha = (detection.position_m - track.position_m) / elapsed_s, self._params.alpha
         return track._replace(position_m=detection.position_m, size_m=detection.size_m, last_seen_ns=stamp_ns,
                               instant_velocity_mps=velocity_mps,
-                              velocity_mps=alpha * velocity_mps + (1 - alpha) * track.velocity_mps)
+                              velocity_mps=alpha * velocity_mps + (1 - alpha) * track.velocity_mps,
+                              label=detection.label, score=detection.score, detection=detection.index)
 
     def skip(self, stamp_ns, _camera=''):
         """Skip an image whose detections are unusable: tracks do not age. Never raises, as the stamp may be wrong."""

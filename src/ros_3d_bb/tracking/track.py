@@ -2,10 +2,12 @@
 
 Fixed frame, metres, nanoseconds.
 """
+import itertools
 from typing import NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.core.object_classes import MAX_IN_GROUP
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
@@ -14,12 +16,16 @@ from ros_3d_bb.tracking.types import PREDICTION_STEP, PREDICTION_TIME, VISIBLE, 
 # `hits` counts the detections of a track, `end_hits` those that showed the lower and the upper end of the body.
 # `cut_ns` are the stamps of the latest detections of which the image border truncated these ends.
 # `unseen_s` is the time since the last detection, `missed_s` the part of it during which a detection was expected.
+# `votes` are filtered scores of the classes of the group, of which `class_number` (see `ClassNumbers`) has the highest.
+# `score` is the filtered score of the detections; `detection` is `Detection.index` in the latest image.
 TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
                   ('size_m', float, 3), ('end_hits', int, 2), ('cut_ns', np.int64, 2), ('hits', int),
                   ('first_ns', np.int64), ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float),
-                  ('status', int), ('confirmed', bool), ('moving', bool)])
+                  ('status', int), ('confirmed', bool), ('moving', bool), ('class_number', int),
+                  ('votes', float, MAX_IN_GROUP), ('score', float), ('detection', int)])
+PUBLISHED = 'id', 'status', 'moving', 'first_ns', 'last_ns', 'class_number', 'score', 'detection'
 RECENTLY_MATCHED_NS = NS // 5  # no track starts near a track that was matched less than this ago
-SMOOTHING = 0.1  # weight of the newest detection in size and height
+SMOOTHING = 0.1  # weight of the newest detection in size, height and score
 CUT_SMOOTHING = 0.02  # the same for boxes that the image border truncates sideways: the head may be outside
 CUT_LASTS_NS = NS // 2  # hysteresis: an end is visible again this long after it was last truncated
 NEVER_NS = -10 ** 18
@@ -45,7 +51,7 @@ class PredictionParams(NamedTuple):
         0.05, 'Standard deviation added for errors that stay the same for seconds.', 'm', live=(0, 0.5))
 
 
-def update_matched(tracks, rows, measurements, stamp_ns, params):
+def update_matched(tracks, rows, measurements, stamp_ns, params, classes):
     """Update the tracks in `rows` in place, which are predicted to the stamp, with one measurement each."""
     matched = tracks[rows]
     matched['mean'], matched['covariance'] = kalman_filter.update(matched['mean'], matched['covariance'], measurements,
@@ -57,42 +63,73 @@ def update_matched(tracks, rows, measurements, stamp_ns, params):
     speed_mps = np.linalg.norm(matched['mean'][:, 2:], axis=1)
     matched['moving'] = speed_mps >= params.moving_speed * np.where(matched['moving'], STILL_MOVING, 1)
     _update_size(matched, measurements, stamp_ns)
+    _update_class(matched, measurements, classes)
     tracks[rows] = matched
 
 
-def new_targets(tracks, measurements, stamp_ns, params):
-    """Start tracks from unmatched measurements, except duplicate detections of recently matched or new tracks, and
-    measurements with little support.
+def new_targets(tracks, measurements, stamp_ns, params, classes):
+    """Start tracks from unmatched measurements, except measurements with little support, and duplicate detections of
+    recently matched or new tracks of the same group of classes.
 
     Returns the new tracks, whose IDs are not set, and the indices of the measurements that started them.
     """
     new = np.zeros(len(measurements), TRACK)
     new['mean'][:, :2] = measurements['position_m']
     new['covariance'][:, :2, :2] = measurements['noise_m2']
-    new['covariance'][:, [2, 3], [2, 3]] = params.initial_speed ** 2
-    for name in ('size_m', 'z_m', 'z_m2'):
+    speeds_mps = params.initial_speed * classes.initial_speed[measurements['class_number']]
+    new['covariance'][:, [2, 3], [2, 3]] = speeds_mps[:, None] ** 2
+    for name in ('size_m', 'z_m', 'z_m2', 'class_number', 'score', 'detection'):
         new[name] = measurements[name]
     new['end_hits'] = ~measurements['cut_ends']
     new['cut_ns'] = np.where(measurements['cut_ends'], stamp_ns, NEVER_NS)
     new['hits'], new['first_ns'], new['last_ns'] = 1, stamp_ns, stamp_ns
-    occupied_m = tracks['mean'][stamp_ns - tracks['last_ns'] < RECENTLY_MATCHED_NS, :2]
+    new['votes'][np.arange(len(new)), classes.member[new['class_number']]] = _vote_weights(measurements)
+    is_recent = stamp_ns - tracks['last_ns'] < RECENTLY_MATCHED_NS
+    occupied_m = np.concatenate((tracks['mean'][is_recent, :2], new['mean'][:, :2]))
+    groups = classes.group[np.concatenate((tracks['class_number'][is_recent], new['class_number']))]
+    others, first = list(range(is_recent.sum())), is_recent.sum()
     kept = []
     for row in np.flatnonzero(measurements['support'] >= STARTING_SUPPORT).tolist():
-        others_m = np.concatenate((occupied_m, new['mean'][kept, :2]))
-        if (np.linalg.norm(others_m - new['mean'][row, :2], axis=1) >= params.duplicate_distance).all():
+        is_far = np.linalg.norm(occupied_m[others] - occupied_m[first + row], axis=1) >= params.duplicate_distance
+        if (is_far | (groups[others] != groups[first + row])).all():
             kept.append(row)
+            others.append(first + row)
     return new[kept], kept
 
 
-def duplicates(tracks, stamp_ns):
-    """Which tracks (n,) are of the person of an older track: both are confirmed, recently matched and at one place."""
+def duplicates(tracks, stamp_ns, classes):
+    """Which tracks (n,) are of the object of an older track: both are confirmed, recently matched and at one place, and
+    of one group of classes."""
     duplicate = np.zeros(len(tracks), bool)
     rows = np.flatnonzero(tracks['confirmed'] & (stamp_ns - tracks['last_ns'] < RECENTLY_MATCHED_NS))
     rows = rows[np.argsort(tracks['first_ns'][rows], kind='mergesort')]
-    for count, row in enumerate(rows[1:], 1):
-        older_m = tracks['mean'][rows[:count], :2]
-        duplicate[row] = (np.linalg.norm(older_m - tracks['mean'][row, :2], axis=1) < SAME_PERSON_M).any()
+    places_m, groups = tracks['mean'][rows, :2], classes.group[tracks['class_number'][rows]]
+    at_one_place = np.linalg.norm(places_m[:, None] - places_m, axis=2) < SAME_PERSON_M
+    duplicate[rows] = np.tril(at_one_place & (groups[:, None] == groups), -1).any(axis=1)
     return duplicate
+
+
+def _vote_weights(measurements):
+    """Weights (n,) of the detections for the class of their tracks: their scores, 1 if unknown."""
+    return np.where(measurements['score'] > 0, measurements['score'], 1)
+
+
+def _update_class(matched, measurements, classes):
+    """Filter the scores of each track with one measurement: of the classes of its group, and of its detections.
+
+    The filter is the mean of the first measurements, then a first-order filter. Unknown scores leave the score as it
+    is.
+    """
+    matched['detection'] = measurements['detection']
+    scores, numbers = measurements['score'], measurements['class_number']
+    share = np.maximum(SMOOTHING, 1 / matched['hits'])
+    known = np.where(scores > 0, scores, matched['score'])
+    matched['score'] = np.where(matched['score'] > 0, matched['score'] + share * (known - matched['score']), known)
+    groups = classes.group[numbers]
+    if (classes.size[groups] > 1).any():
+        matched['votes'] *= 1 - share[:, None]
+        matched['votes'][np.arange(len(matched)), classes.member[numbers]] += share * _vote_weights(measurements)
+        matched['class_number'] = classes.numbers[groups, matched['votes'].argmax(axis=1)]
 
 
 def _update_size(matched, measurements, stamp_ns):
@@ -127,8 +164,9 @@ def position_std_of(tracks):
     return np.sqrt(np.maximum(tracks['covariance'][:, 0, 0], tracks['covariance'][:, 1, 1]))
 
 
-def objects_of(tracks, params):
-    """Convert tracks to a list of TrackedObject with predictions at constant velocity; `params` are PredictionParams.
+def objects_of(tracks, params, classes):
+    """Convert tracks to a list of TrackedObject with predictions at constant velocity; `params` are PredictionParams,
+    `classes` ClassNumbers.
 
     A low velocity is mostly noise of a standing person. The predicted velocity v is therefore scaled by
     v² / (v² + standing_speed²). The covariance of the filter does not include errors that stay constant for seconds,
@@ -152,12 +190,12 @@ def objects_of(tracks, params):
     covariances[:, [0, 1], [0, 1]] += params.position_bias ** 2
     covariances[:, 2, 2] = tracks['z_m2']
 
-    known = [tracks[name].tolist() for name in ('id', 'status', 'moving', 'first_ns', 'last_ns')]
-    return [TrackedObject(track_id, position_m, size_m, velocity_mps, velocity_mps, status, moving, first_ns, last_ns,
-                          prediction_m, params.prediction_step, covariance, prediction_m2)
-            for track_id, status, moving, first_ns, last_ns, position_m, size_m, velocity_mps, prediction_m, covariance,
-            prediction_m2 in zip(*known, positions_m, tracks['size_m'].copy(), velocities_mps, predictions_m,
-                                 covariances, predictions_m2)]
+    columns = {name: tracks[name].tolist() for name in PUBLISHED}
+    labels = [classes.labels[number] for number in columns['class_number']]
+    return list(map(TrackedObject, columns['id'], positions_m, tracks['size_m'].copy(), velocities_mps, velocities_mps,
+                    columns['status'], columns['moving'], columns['first_ns'], columns['last_ns'], predictions_m,
+                    itertools.repeat(params.prediction_step), covariances, predictions_m2, labels, columns['score'],
+                    columns['detection']))
 
 
 def _covariances_ahead(covariance, times_s, params):

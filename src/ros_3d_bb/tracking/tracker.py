@@ -11,16 +11,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
 from ros_3d_bb.tracking.association import associate, unmatched
+from ros_3d_bb.tracking.class_numbers import ClassNumbers
 from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
 from ros_3d_bb.tracking.occlusion import SEEN, CameraVisibility, mark_missed
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
 from ros_3d_bb.tracking.track import (TRACK, PredictionParams, duplicates, new_targets, objects_of, position_std_of,
                                       update_matched)
-from ros_3d_bb.tracking.types import MOVING_SPEED, OUT_OF_VIEW, VISIBLE, check_steps
+from ros_3d_bb.tracking.types import MOVING_SPEED, NOT_DETECTED, OUT_OF_VIEW, VISIBLE, check_steps
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped
@@ -59,10 +61,10 @@ class TrackerParams(NamedTuple):
         0.35, 'How long a track stays published while a camera should detect the person and does not.', 's',
         live=(0, 5))
     out_of_view_limit: float = Param(
-        1.0, 'How long a track stays published while the person is out of view of all cameras.', 's', live=(0, 10))
+        0.5, 'How long the track of a moving person stays published while out of view of all cameras: people turn and '
+        'stop.', 's', live=(0, 10))
     max_position_std: float = Param(
-        0.5, 'A track stays published during occlusion up to this standard deviation of its position.', 'm',
-        live=(0, 2))
+        0.5, 'An undetected track stays published up to this standard deviation of its position.', 'm', live=(0, 2))
     max_age: float = Param(4.0, 'A person who reappears within this time keeps the track ID.', 's', live=(0, 30))
     max_range: float = Param(
         8.0, 'Range of the detector: people who are farther from the camera are not expected to be detected.', 'm',
@@ -81,11 +83,11 @@ class _State(NamedTuple):
 
 
 class Tracker(object):
-    """Tracks people from image to image.
+    """Tracks people and other objects from image to image.
 
     Call `update` with the detections of each image, `skip` for an image whose detections are unusable, and `reset`
     after a jump in time. Images of several cameras may arrive late and in any order. The IDs of tracks are greater than
-    `last_id`.
+    `last_id`. `classes` is the table of the classes of objects: tracks never change between its groups.
 
     Raises
     ------
@@ -93,7 +95,9 @@ class Tracker(object):
         If a parameter is invalid; the message names it.
     """
 
-    def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams(), last_id=0):
+    def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams(), last_id=0,
+                 classes=ObjectClasses()):
+        self._classes = ClassNumbers(classes)
         self.reconfigure(params, noise, prediction)
         self._start(last_id)
 
@@ -142,23 +146,26 @@ class Tracker(object):
         tracks = tracks[np.argsort(tracks['id'])]
         published = (tracks['missed_s'] <= params.max_missed_time) & (position_std_of(tracks) < params.max_position_std)
         published |= tracks['status'] == VISIBLE
-        published &= (tracks['status'] != OUT_OF_VIEW) | (tracks['unseen_s'] <= params.out_of_view_limit)
-        return objects_of(tracks[tracks['confirmed'] & published], self._prediction)
+        has_left = (tracks['status'] == OUT_OF_VIEW) & tracks['moving']
+        published &= ~has_left | (tracks['unseen_s'] <= params.out_of_view_limit)
+        return objects_of(tracks[tracks['confirmed'] & published], self._prediction, self._classes)
 
     def _step(self, state, image, observed_s, assign_id):
         """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
         stamp_ns, detections, view = image
-        params, camera = self._params, view.camera
+        params, classes, camera = self._params, self._classes, view.camera
         tracks = state.tracks.copy()
         elapsed_s = 0.0 if state.now_ns is None else (stamp_ns - state.now_ns) / NS
+        density = params.acceleration * classes.acceleration[tracks['class_number']]
         tracks['mean'], tracks['covariance'] = kalman_filter.predict(tracks['mean'], tracks['covariance'], elapsed_s,
-                                                                     params.acceleration)
+                                                                     density)
+        tracks['detection'] = NOT_DETECTED
 
         period_s = (stamp_ns - state.cameras[camera].stamp_ns) / NS if camera in state.cameras else 0.0
-        measurements = measurements_of(detections, view, period_s, self._noise)
-        rows, columns = associate(tracks, measurements, stamp_ns, params)
+        measurements = measurements_of(detections, view, period_s, self._noise, classes)
+        rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
         matches = list(zip(tracks['id'][rows].tolist(), tracks['confirmed'][rows].tolist(), columns.tolist()))
-        update_matched(tracks, rows, measurements[columns], stamp_ns, params)
+        update_matched(tracks, rows, measurements[columns], stamp_ns, params, classes)
 
         cameras = {name: latest for name, latest in state.cameras.items() if stamp_ns - latest.stamp_ns <= KNOWN_NS}
         cameras[camera] = CameraVisibility(stamp_ns, view, np.full(len(tracks), SEEN))
@@ -169,11 +176,11 @@ class Tracker(object):
         # Tentative tracks are kept for a short time only.
         max_unseen_s = np.where(tracks['confirmed'], params.max_age, TENTATIVE_TIMEOUT_S)
         kept = (tracks['unseen_s'] < max_unseen_s) & (position_std_of(tracks) < MAX_POSITION_STD_M)
-        kept &= ~duplicates(tracks, stamp_ns)
+        kept &= ~duplicates(tracks, stamp_ns, classes)
         tracks, unmatched_columns = tracks[kept], unmatched(len(detections), columns)
         new = tracks[:0]
         if len(unmatched_columns):
-            new, started = new_targets(tracks, measurements[unmatched_columns], stamp_ns, params)
+            new, started = new_targets(tracks, measurements[unmatched_columns], stamp_ns, params, classes)
             new['id'] = [assign_id(column) for column in unmatched_columns[started].tolist()]
             tracks = np.concatenate((tracks, new))
         for name, latest in cameras.items():

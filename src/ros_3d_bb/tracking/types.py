@@ -4,10 +4,12 @@ from typing import Callable, NamedTuple, Optional, Tuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera, transform_points, upright_turns
-from ros_3d_bb.core.limits import USUAL_HEIGHT_M, USUAL_WIDTH_M
+from ros_3d_bb.core.labels import PERSON
+from ros_3d_bb.core.object_classes import PERSON_CLASS
 from ros_3d_bb.core.params import Param
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
+NOT_DETECTED = -1  # index of the box of an object that was not detected
 NEARER_M = 0.25  # an occluding person is at least this much nearer to the camera than an occluded one
 MOST_STEPS = 1000  # maximum number of prediction steps, to limit memory
 VERTICAL = 0.02  # upper bound of the horizontal part of the optical axis of a camera that points straight up or down
@@ -26,7 +28,8 @@ class Detection(NamedTuple):
 
     `covariance_m2` (3, 3) is the covariance of the centre, None if unknown. `truncated_edges` states whether the image
     border truncates the object at the left, top, right and bottom, as seen by a camera held upright. `support` is the
-    share 0..1 of the depth in its 2D box that belongs to the object.
+    share 0..1 of the depth in its 2D box that belongs to the object. `label` is the class name, `score` that of the
+    detector, 0..1, 0 if unknown, and `index` the index of the object's box among those of the image.
     """
 
     position_m: np.ndarray
@@ -34,10 +37,13 @@ class Detection(NamedTuple):
     covariance_m2: Optional[np.ndarray] = None
     truncated_edges: Tuple[bool, bool, bool, bool] = (False, False, False, False)
     support: float = 1.0
+    label: str = PERSON
+    score: float = 0.0
+    index: int = NOT_DETECTED
 
 
-def detection_from_box(box, fixed_from_camera):
-    """Convert a `box3d_estimator.Box3D` of an image to a Detection in the fixed frame.
+def detection_from_box(box, fixed_from_camera, kind=PERSON_CLASS):
+    """Convert a `box3d_estimator.Box3D` of an image, whose ObjectClass is `kind`, to a Detection in the fixed frame.
 
     The cylinder is upright in the fixed frame, independent of which edge of the image is up: for a camera mounted in
     portrait, width and height are swapped.
@@ -45,22 +51,22 @@ def detection_from_box(box, fixed_from_camera):
     rotation, turns = fixed_from_camera[:3, :3], upright_turns(fixed_from_camera)
     center_m, (width_m, height_m) = box.center_m, box.size_m[:2]
     if turns % 2:
-        center_m, (height_m, width_m) = _completed_in_portrait(box)
+        center_m, (height_m, width_m) = _completed_in_portrait(box, kind)
     covariance_m2 = None if box.covariance_m2 is None else rotation.dot(box.covariance_m2).dot(rotation.T)
     edges = box.truncated_edges[-turns:] + box.truncated_edges[:-turns]
     return Detection(transform_points(fixed_from_camera, center_m), np.array([width_m, width_m, height_m]),
-                     covariance_m2, edges, box.support or 1.0)  # 0: unknown
+                     covariance_m2, edges, box.support or 1.0, box.label, box.score)  # support 0: unknown
 
 
-def _completed_in_portrait(box):
+def _completed_in_portrait(box, kind):
     """Centre (3,) of a box and its extents along the rows and the columns of an image of a camera in portrait.
 
-    The estimator completes a truncated body as if it stood upright in the image: to the usual width along the rows and
-    to the usual height along the columns. In portrait, the two are swapped. The visible end stays in place.
+    The estimator completes a truncated object as if it stood upright in the image: to the usual width along the rows
+    and to the usual height along the columns. In portrait, the two are swapped. The visible end stays in place.
     """
     center_m, extents_m, cut = np.array(box.center_m, float), np.array(box.size_m[:2], float), box.truncated_edges
-    was_completed = np.isclose(extents_m[1], USUAL_HEIGHT_M)
-    completed_m = max(extents_m[0], USUAL_HEIGHT_M), USUAL_WIDTH_M if was_completed else extents_m[1]
+    was_completed = np.isclose(extents_m[1], kind.height)
+    completed_m = max(extents_m[0], kind.height), kind.width if was_completed else extents_m[1]
     for axis, (cut_low, cut_high) in enumerate(zip(cut[:2], cut[2:])):
         if cut_low != cut_high:
             missing_m = completed_m[axis] - extents_m[axis]
@@ -107,7 +113,8 @@ class TrackedObject(NamedTuple):
     `velocity_mps` (3,) is filtered; `instant_velocity_mps` (3,) is measured between the last two detections and noisy.
     `prediction_m` (steps, 3) holds the positions after 1, 2, 3, ... times `prediction_step_s`. Stamps are nanoseconds.
     `covariance` (6, 6) is that of x, y, z and their velocities; `prediction_covariance_m2` (steps, 3, 3) that of the
-    predicted positions. Both are None for trackers that do not estimate them.
+    predicted positions. Both are None for trackers that do not estimate them. `label` is the class name, `score` the
+    filtered score of the detector, 0..1, 0 if unknown, and `detection` the `Detection.index` in the newest image.
     """
 
     id: int
@@ -123,6 +130,9 @@ class TrackedObject(NamedTuple):
     prediction_step_s: float
     covariance: Optional[np.ndarray] = None
     prediction_covariance_m2: Optional[np.ndarray] = None
+    label: str = PERSON
+    score: float = 0.0
+    detection: int = NOT_DETECTED
 
 
 def wrapped(angles):

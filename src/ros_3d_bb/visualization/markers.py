@@ -8,6 +8,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from ros_3d_bb.core.labels import described
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
@@ -38,8 +39,9 @@ class MarkerParams(NamedTuple):
 
     marker_namespaces: list = Param(
         NAMESPACES[:-1], 'Kinds of markers, each in a namespace of its own that RViz switches on and off. cylinder; '
-        'id: the track ID, followed by a question mark while the person is not detected; velocity: red, to the '
-        'position in 1 s; prediction: green, to the last predicted position; history: the path walked, fading; '
+        'id: the track ID, with the class of objects other than people, followed by a question mark while the object '
+        'is not detected; velocity: red, to the position in 1 s; prediction: green, to the last predicted position; '
+        'history: the path walked, fading; '
         'ellipse: contains the position with a probability of 95 %; prediction_ellipse: the same at each half second '
         'ahead.', choices=NAMESPACES, live=True)
     marker_color: str = Param(
@@ -116,7 +118,7 @@ class MarkerWriter(object):
         marker.type, marker.scale.z = Marker.TEXT_VIEW_FACING, 0.35
         marker.pose.position = Point(*(track.position_m + [0, 0, track.size_m[2] / 2 + 0.2]))
         is_visible = track.status == VISIBLE
-        marker.text = '%d' % track.id if is_visible else '%d?' % track.id
+        marker.text = described(track.label, '%d' % track.id if is_visible else '%d?' % track.id)
         marker.color = _color(TEXT_COLORS[self._params.marker_color] if is_visible else GREY, 1.0)
         return True
 

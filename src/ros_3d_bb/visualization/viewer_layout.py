@@ -7,6 +7,7 @@ import collections
 import cv2
 import numpy as np
 
+from ros_3d_bb.core.labels import described
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.visualization.image_overlay import colorize_depth, draw_boxes, depth_to_grey
 
@@ -71,9 +72,11 @@ def _with_range_bar(image, farthest_m):
 
 
 def box_lines(boxes):
-    """One line per 3D box: number as in the image, position in the camera's optical frame, width and height."""
-    return tuple('%d: x %+.2f  y %+.2f  z %.2f m,  %.2f m wide, %.2f m high%s'
-                 % ((number,) + tuple(box.center_m) + tuple(box.size_m[:2]) + (', truncated' if box.truncated else '',))
+    """One line per 3D box: its class if it is not a person, number as in the image, position in the camera's optical
+    frame, width and height, and its score if it is known."""
+    return tuple(described(box.label, '%d: x %+.2f  y %+.2f  z %.2f m,  %.2f m wide, %.2f m high%s%s' % (
+        (number,) + tuple(box.center_m) + tuple(box.size_m[:2])
+        + (', score %.2f' % box.score if box.score else '', ', truncated' if box.truncated else '')))
                  for number, box in enumerate(boxes, 1))
 
 
@@ -85,7 +88,7 @@ def _annotated(panel, snapshot):
     inside_px = np.clip(np.reshape(snapshot.boxes2d or (), (-1, 4)).astype(int), 0, [width, height] * 2).tolist()
     without_position = [rect_px for rect_px in inside_px if tuple(rect_px) not in located]
     rects_px = np.array([box.rect_px for box in boxes] + without_position, float).reshape(-1, 4)
-    labels = ['%d: %.2f m' % (number, box.center_m[2]) for number, box in enumerate(boxes, 1)]
+    labels = [described(box.label, '%d: %.2f m' % (number, box.center_m[2])) for number, box in enumerate(boxes, 1)]
     return draw_boxes(panel, rects_px * (panel.shape[1] / width), labels + ['no position'] * len(without_position))
 
 

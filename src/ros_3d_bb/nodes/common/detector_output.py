@@ -7,7 +7,7 @@ from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, SetBoolResponse
 
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg
+from ros_3d_bb.conversions.perception_msgs import detections2d_to_msg
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.visualization.image_overlay import draw_boxes
 
@@ -23,7 +23,8 @@ class DetectorWorker(object):
     Publishes
     ---------
     yolo_bounding_box : std_msgs/Int32MultiArray
-        x1, y1, x2, y2 of each person, in pixels; stamp and frame of the image are in `layout.dim[0].label`.
+        x1, y1, x2, y2 of each object, in pixels; stamp and frame of the image, and class and score of each object, are
+        in `layout.dim[0].label`.
     yolo_result_out : sensor_msgs/Image
         Colour image with the 2D boxes; published only if there are subscribers.
 
@@ -71,7 +72,7 @@ class DetectorWorker(object):
 
     def _publish(self, header, image, detections):
         if len(detections.boxes) or self._publish_empty:
-            self._boxes_pub.publish(boxes2d_to_msg(detections.boxes, header))
+            self._boxes_pub.publish(detections2d_to_msg(detections, self._names, header))
         if self._image_pub.get_num_connections():
             labels = ['%s %.2f' % (self._names[number], score)
                       for number, score in zip(detections.classes, detections.scores)]

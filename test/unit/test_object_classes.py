@@ -1,0 +1,103 @@
+"""Table of classes: the file, its validation, and distances to the axis."""
+import os
+
+import numpy as np
+import pytest
+import yaml
+
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.core.object_classes import (CLASSES, DEFAULT_CLASS, MAX_CLASSES, MAX_IN_GROUP, ObjectClass,
+                                           ObjectClasses, object_classes_from, read_object_classes)
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
+from ros_3d_bb.planning.planner_view import with_class_widths
+from ros_3d_bb.tracking.types import TrackedObject
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+FILE = os.path.join(ROOT, 'config', 'classes.yaml')
+CAMERA = Camera(640, 480, 600.0, 600.0, 320.0, 240.0)
+
+
+def table(**classes):
+    return {'classes': dict({'person': {}}, **classes)}
+
+
+def test_the_file_is_the_table_in_the_code():
+    assert read_object_classes(FILE) == read_object_classes('') == ObjectClasses()
+    with open(FILE) as stream:
+        assert set(yaml.safe_load(stream)) == {'default', 'classes'}
+
+
+def test_classes_are_looked_up_by_name():
+    classes = object_classes_from(dict(table(dog={'group': 'pet', 'width': 1}, cat={'group': 'pet'}),
+                                       default={'height': 0.5}))
+    assert classes.of('dog') == ObjectClass('pet', width=1.0) and classes.of('drone') == ObjectClass(height=0.5)
+    assert classes.group_of('dog') == classes.group_of('cat') == 'pet'
+    assert (classes.group_of('drone'), classes.group_of('person')) == ('drone', 'person')
+
+
+@pytest.mark.parametrize('content, reason', [
+    (None, 'the keys classes'), ([], 'the keys classes'), ({'classes': []}, 'the keys classes'),
+    (dict(table(), person={}), 'the keys classes'), ({'classes': {'dog': {}}}, 'the class person is missing'),
+    (table(dog=5), 'dog is 5; a mapping expected'), (table(dog={'widht': 1}), 'did you mean width'),
+    (table(dog={'width': -1}), 'dog.width is -1; a number from 0 to 10 expected'),
+    (table(dog={'width': float('nan')}), 'dog.width is nan'), (table(dog={'width': True}), 'dog.width is True'),
+    (table(dog={'width': '1'}), "dog.width is '1'"), (table(dog={'axis': None}), 'dog.axis is None'),
+    (table(dog={'group': 3}), 'dog.group is 3; a name expected'), (table(dog={'group': ''}), 'dog.group'),
+    (table(dog={'acceleration': 1000}), 'dog.acceleration is 1000; a number from 0 to 100'),
+    (dict(table(), default={'group': 'pet'}), 'default.group'), (dict(table(), default=3), 'default is 3'),
+    (table(**{'a;b': {}}), '1 to 64 printable'), ({'classes': {'person': {}, 3: {}}}, 'text expected, in quotes'),
+    (table(**{'class %d' % number: {} for number in range(MAX_CLASSES)}), '201 classes; at most 200'),
+    (table(**{'class %d' % number: {'group': 'a'} for number in range(MAX_IN_GROUP + 1)}), 'the group a has 9')])
+def test_invalid_tables_are_rejected(content, reason):
+    with pytest.raises(ValueError, match=reason):
+        object_classes_from(content)
+
+
+@pytest.mark.parametrize('text, reason', [(None, 'No such file'), ('a: [', 'expected'), ('a: &x 1\nb: *x', 'alias'),
+                                          ('!!python/object/apply:os.system [ls]', 'constructor'), ('', 'the keys')])
+def test_the_message_names_the_file(tmp_path, text, reason):
+    path = tmp_path / 'my_classes.yaml'
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(ValueError, match='(?s)my_classes.yaml.*%s' % reason):
+        read_object_classes(str(path))
+
+
+def test_the_axis_of_unknown_objects_is_half_a_width_behind():
+    assert DEFAULT_CLASS.axis_behind(0.6) == pytest.approx(0.3)
+    assert CLASSES['person'].axis_behind(0.6) == 0.09
+
+
+@pytest.mark.parametrize('heading_deg', [0, 20, 45, 70, 90])
+def test_the_axis_of_an_ellipse_is_half_of_its_extent_behind(heading_deg):
+    dog, (sin, cos) = CLASSES['dog'], (np.sin(np.radians(heading_deg)), np.cos(np.radians(heading_deg)))
+    across_m, along_m = (np.hypot(dog.length * one, dog.width * other) for one, other in ((sin, cos), (cos, sin)))
+    assert dog.axis_behind(across_m) == pytest.approx(along_m / 2)
+    assert dog.axis_behind(5.0) == pytest.approx(dog.width / 2)
+
+
+@pytest.mark.parametrize('label, behind_m', [('chair', 0.25), ('dog', None), ('drone', 0.25), ('person', 0.09)])
+def test_a_box_has_the_distance_of_its_class(label, behind_m):
+    depth_mm = np.full((480, 640), 5000, np.uint16)
+    depth_mm[150:350, 270:371] = 3000  # 0.5 m wide
+    box, = estimate_boxes(DepthImage(depth_mm, 0.001), [(270, 150, 371, 350)], CAMERA, estimator_named('foreground'),
+                          labels=[label])
+    behind_m = CLASSES['dog'].axis_behind(box.size_m[0]) if behind_m is None else behind_m
+    assert box.label == label and box.center_m[2] == pytest.approx(3 + behind_m, abs=0.015)
+
+
+@pytest.mark.parametrize('label, width_m, height_m', [('person', 0.46, 1.7), ('chair', 0.5, 0.9), ('drone', 0.2, 0.4)])
+def test_truncated_boxes_are_completed_to_the_size_of_their_class(label, width_m, height_m):
+    depth_mm = np.full((480, 640), 5000, np.uint16)
+    depth_mm[400:, :41] = 3000
+    box, = estimate_boxes(DepthImage(depth_mm, 0.001), [(0, 400, 41, 480)], CAMERA, estimator_named('foreground'),
+                          labels=[label])
+    assert box.size_m[:2] == pytest.approx([width_m, height_m], abs=0.02)
+
+
+def test_planners_keep_clear_of_the_length_of_elongated_objects():
+    tracks = [TrackedObject(1, np.zeros(3), np.array([0.3, 0.3, 0.5]), *[None] * 8, label=label)
+              for label in ('dog', 'person', 'chair')]
+    sizes_m = [track.size_m.tolist() for track in with_class_widths(tracks, ObjectClasses())]
+    assert sizes_m == [[0.7, 0.7, 0.5], [0.3, 0.3, 0.5], [0.3, 0.3, 0.5]]

@@ -1,0 +1,123 @@
+"""Classes of objects in the trackers: labels, filtered scores, groups, and the detection of each track."""
+import numpy as np
+import pytest
+
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.class_numbers import MAX_UNLISTED, OTHER, ClassNumbers
+from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
+from ros_3d_bb.tracking.tracker import Tracker
+from ros_3d_bb.tracking.types import NOT_DETECTED, VISIBLE, CameraView, Detection
+
+VIEW = CameraView(transform_from((0, 0, 1), OPTICAL_ROTATION), Camera(640, 480, 600, 600, 320, 240))
+TRACKERS = [Tracker, ThesisTracker]
+
+
+def at(x, y, label='person', score=0.0, index=0, height=1.0):
+    return Detection(np.array([x, y, height / 2]), np.array([0.5, 0.5, height]), np.eye(3) * 0.03 ** 2, label=label,
+                     score=score, index=index)
+
+
+def play(tracker, images, rate_hz=30):
+    """The tracks after each image, a list of detections."""
+    return [tracker.update(number * NS // rate_hz, detections, VIEW) for number, detections in enumerate(images)]
+
+
+@pytest.mark.parametrize('kind', TRACKERS)
+def test_a_track_has_the_class_of_its_detections(kind):
+    tracks = play(kind(), [[at(3, -1, 'dog', 0.75, 0), at(3, 1, 'chair', 0.5, 1)]] * 10)[-1]
+    assert [(track.label, track.detection) for track in tracks] == [('dog', 0), ('chair', 1)]
+    assert [track.score for track in tracks] == pytest.approx([0.75, 0.5])
+
+
+@pytest.mark.parametrize('kind', TRACKERS)
+def test_detections_without_class_are_people_of_unknown_score(kind):
+    track, = play(kind(), [[at(3, 0)]] * 10)[-1]
+    assert (track.label, track.score) == ('person', 0.0)
+
+
+@pytest.mark.parametrize('kind', TRACKERS)
+def test_tracks_never_change_between_groups(kind):
+    """A person walks past a chair and stops in its place."""
+    images = [[at(3, 0.04 * number - 1.2, 'person'), at(3, 0, 'chair')] for number in range(30)]
+    images += [[at(3, 0, 'chair')]] * 15 + [[at(3, 0, 'person')]] * 15
+    labels = {}
+    for tracks in play(kind(), images):
+        for track in tracks:
+            labels.setdefault(track.id, set()).add(track.label)
+    assert sorted(map(sorted, labels.values())) >= [['chair'], ['person']]
+    assert all(len(names) == 1 for names in labels.values())
+
+
+def test_two_objects_of_different_groups_may_be_at_one_place():
+    tracks = play(Tracker(), [[at(3, 0, 'person'), at(3, 0.05, 'backpack')]] * 10)[-1]
+    assert [track.label for track in tracks] == ['person', 'backpack']
+
+
+def test_the_label_is_the_most_probable_class_of_the_group():
+    """A detector confuses a dog with a cat in two of five images."""
+    confused = [[at(3, 0, 'cat', 0.5) if number % 5 < 2 else at(3, 0, 'dog', 0.5)] for number in range(60)]
+    published = play(Tracker(), confused)
+    assert set(track.id for tracks in published for track in tracks) == {1}
+    assert {track.label for tracks in published[20:] for track in tracks} == {'dog'}
+    higher_score = [[at(3, 0, 'cat', 0.9) if number % 5 < 2 else at(3, 0, 'dog', 0.3)] for number in range(60)]
+    assert play(Tracker(), higher_score)[-1][0].label == 'cat'
+
+
+def test_classes_without_scores_count_equally():
+    published = play(Tracker(), [[at(3, 0, 'couch' if number % 3 else 'chair')] for number in range(30)])
+    assert (published[-1][0].label, published[-1][0].score) == ('couch', 0.0)
+
+
+def test_the_score_is_the_mean_and_then_a_first_order_filter():
+    scores = np.random.RandomState(0).uniform(0.3, 0.9, 30)
+    published = play(Tracker(), [[at(3, 0, 'dog', score)] for score in scores])
+    assert published[7][0].score == pytest.approx(scores[:8].mean())
+    expected = scores[:10].mean()
+    for score in scores[10:]:
+        expected += 0.1 * (score - expected)
+    assert published[-1][0].score == pytest.approx(expected)
+
+
+def test_unknown_scores_leave_the_score_as_it_is():
+    published = play(Tracker(), [[at(3, 0, score=0.0 if number % 2 else 0.8)] for number in range(20)])
+    assert published[-1][0].score == pytest.approx(0.8)
+    assert play(Tracker(), [[at(3, 0, score=0.6 if number > 15 else 0.0)] for number in range(20)])[-1][0].score == 0.6
+
+
+@pytest.mark.parametrize('kind', TRACKERS)
+def test_a_track_that_was_not_detected_has_no_detection(kind):
+    tracker = kind()
+    seen, missed, again = play(tracker, [[at(3, 0, index=2)]] * 10 + [[]] + [[at(3, 0, index=1)]])[-3:]
+    assert [tracks[0].detection for tracks in (seen, missed, again)] == [2, NOT_DETECTED, 1]
+
+
+def test_the_detection_is_that_of_the_newest_image_after_a_late_one():
+    tracker = Tracker()
+    play(tracker, [[at(3, 0, index=0)]] * 10)
+    tracker.update(11 * NS // 30, [at(3, 0, index=3)], VIEW)
+    track, = tracker.update(10 * NS // 30, [at(3, 0, index=5)], VIEW)
+    assert (track.detection, track.status) == (3, VISIBLE)
+
+
+def test_classes_that_are_not_listed_are_groups_of_their_own():
+    tracks = play(Tracker(), [[at(3, 0, 'drone'), at(3, 0.1, 'pet'), at(3, 0.2, 'dog')]] * 10)[-1]
+    assert [track.label for track in tracks] == ['drone', 'pet', 'dog']
+
+
+def test_the_number_of_class_names_is_limited():
+    classes = ClassNumbers()
+    listed = len(classes.labels)
+    numbers = [classes.of('class %d' % number) for number in range(MAX_UNLISTED + 50)]
+    assert len(classes.labels) == listed + MAX_UNLISTED + 1
+    assert len(set(numbers)) == MAX_UNLISTED + 1 and classes.labels[numbers[-1]] == OTHER
+    assert classes.of(OTHER) == numbers[-1] and classes.of('class 3') == numbers[3]
+
+
+def test_furniture_moves_less_than_people():
+    """A jump of the measured position moves a chair less."""
+    moved_m = {}
+    for label in ('chair', 'person'):
+        images = [[at(3, 0, label)]] * 60 + [[at(3, 0.2, label)]] * 5
+        moved_m[label] = play(Tracker(), images)[-1][0].position_m[1]
+    assert 0 < moved_m['chair'] < 0.7 * moved_m['person']
