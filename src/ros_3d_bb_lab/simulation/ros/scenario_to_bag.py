@@ -36,6 +36,12 @@ def simulated_messages(simulator, frame, stamp_ns):
     return messages + [(TRUTH_TOPIC, truth)]
 
 
+def boxes_message(frame, boxes, stamp_ns):
+    """Topic and message of 2D boxes (n, 4), integers, of a frame."""
+    header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(frame.camera))
+    return topic_of(frame.camera, BOXES_TOPIC), boxes2d_to_msg(boxes, header)
+
+
 def scenario_images(scenario, with_boxes=False):
     """Yield the messages of each image of a scenario for `write_bag`, with ground truth and optionally 2D boxes."""
     simulator = Simulator(scenario)
@@ -45,9 +51,7 @@ def scenario_images(scenario, with_boxes=False):
         messages = simulated_messages(simulator, frame, stamp_ns)
         if with_boxes:
             boxes = [person.box_px for person in frame.people if person.box_px is not None]
-            header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(frame.camera))
-            messages.append((topic_of(frame.camera, BOXES_TOPIC),
-                             boxes2d_to_msg(np.array(boxes, int).reshape(-1, 4), header)))
+            messages.append(boxes_message(frame, np.array(boxes, int).reshape(-1, 4), stamp_ns))
         yield stamp_ns, messages
 
 

@@ -1,4 +1,5 @@
 """ROS node that simulates a robot with a camera among people."""
+import itertools
 import sys
 import threading
 import time
@@ -7,9 +8,10 @@ from typing import NamedTuple
 
 import rospy
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Int32MultiArray, Time
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, START_NS, TF_TOPIC, TYPES, topic_of
-from ros_3d_bb.conversions.perception_msgs import time_from
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, time_from
 from ros_3d_bb.core.params import WAIT_FOR_SUBSCRIBERS, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
@@ -17,15 +19,17 @@ from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import is_ending
 from ros_3d_bb.nodes.common.startup import read_params, run_node, wait_for_subscribers
 from ros_3d_bb_lab.simulation.ros.driven_robot import QUEUE_SIZE, DrivenRobot, robot_transforms
-from ros_3d_bb_lab.simulation.ros.scenario_to_bag import TRUTH_TOPIC, simulated_messages
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import TRUTH_TOPIC, boxes_message, simulated_messages
 from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
-from ros_3d_bb_lab.simulation.simulator import Simulator
+from ros_3d_bb_lab.simulation.simulator import STEP_S, Simulator
+from ros_3d_bb_lab.simulation.true_boxes import jittered_boxes
 
 CLOCK_LEAD_NS = NS  # from the time published while waiting for subscribers to the first image
 PAUSE_NS = 3 * NS  # between repetitions of a scene; separates the people of successive repetitions
 PROGRESS_S = 1.0  # between log messages
 CATCH_UP_S = 0.1  # by so much the published time may hurry after a delay; then it waits
 JOIN_S = 0.1
+LIMIT_POLL_S = 0.001
 
 
 @parameters()
@@ -42,6 +46,11 @@ class SimulatorParams(NamedTuple):
         'every run, and time waits if the machine is too slow. Otherwise, stamps are the time of the machine, and late '
         'images are skipped.')
     drive: bool = Param(False)
+    boxes: bool = Param(
+        False, 'Whether to publish the true 2D boxes of people, with edges jittered by 1 pixel, in place of a detector.')
+    supervised: bool = Param(
+        False, 'Whether another node controls the time, with ~publish_clock: the scene stands still until the first '
+        'message on ~time_limit, and its time never exceeds the last one.')
     speed: float = Param(1.0, 'Speed of the published time; 1: real time.', limits=(0.001, 1000))
     repeat: bool = Param(True, 'Whether the scene starts again 3 s after its end. Otherwise, the node exits.')
     wait_for_subscribers: int = WAIT_FOR_SUBSCRIBERS
@@ -63,6 +72,8 @@ class SimulatorNode(object):
     ----------
     cmd_vel : geometry_msgs/Twist
         Linear velocity x and angular velocity z of the robot; only with ~drive.
+    ~time_limit : std_msgs/Time
+        Time at which the published time waits; only with ~supervised.
 
     Publishes
     ---------
@@ -74,6 +85,8 @@ class SimulatorNode(object):
         Intrinsics of the colour camera.
     camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
         The same intrinsics, because depth is aligned to colour.
+    yolo_bounding_box : std_msgs/Int32MultiArray
+        True 2D boxes, jittered; only with ~boxes.
     ground_truth : ros_3d_bb/TrackedObjectArray
         People in the map; their prediction is the true future path.
     /tf : tf2_msgs/TFMessage
@@ -98,11 +111,16 @@ class SimulatorNode(object):
         kinds = {topic_of(camera, topic): kind for camera in self._simulator.cameras for topic, kind in TYPES.items()
                  if topic != TF_TOPIC}
         kinds[TRUTH_TOPIC] = TrackedObjectArray
+        if self._params.boxes:
+            kinds.update((topic_of(camera, BOXES_TOPIC), Int32MultiArray) for camera in self._simulator.cameras)
         self._pubs = {topic: rospy.Publisher(topic, kind, queue_size=10) for topic, kind in kinds.items()}
         self._tf_pub = rospy.Publisher('/' + TF_TOPIC, TYPES[TF_TOPIC], queue_size=QUEUE_SIZE)
         self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=10) if self._params.publish_clock else None
         self._renderer, self._rendering, self._failed = ThreadPoolExecutor(max_workers=1), None, False
         self._robot = DrivenRobot(self._simulator, self._diagnostics) if self._params.drive else None
+        self._limit_ns = None
+        if self._params.supervised:
+            rospy.Subscriber('~time_limit', Time, self._on_time_limit, queue_size=1)
 
     def run(self):
         """Play the scene once or repeatedly. If this fails, the exit status is 1."""
@@ -127,6 +145,8 @@ class SimulatorNode(object):
             wait_for_subscribers(self._pubs[topic_of(camera, COLOR_TOPIC)], self._params.wait_for_subscribers,
                                  lambda: self._publish_clock(START_NS))
         start_ns = START_NS + CLOCK_LEAD_NS if self._clock_pub is not None else rospy.get_rostime().to_nsec()
+        if self._params.supervised:
+            start_ns = self._stand_still(start_ns)
         while not rospy.is_shutdown():
             self._play(start_ns)
             if not self._params.repeat:
@@ -138,6 +158,18 @@ class SimulatorNode(object):
                 time.sleep(PAUSE_NS / NS)
                 start_ns = rospy.get_rostime().to_nsec()
 
+    def _stand_still(self, start_ns):
+        """Publish the start of the scene until the first time limit. Returns the time of the limit."""
+        state, period_ns = self._simulator.state_at(0.0), int(NS / self._simulator.rate)
+        for stamp_ns in itertools.count(start_ns, int(STEP_S * NS)):
+            if self._limit_ns is not None or rospy.is_shutdown():
+                self._wait_for_image()
+                return stamp_ns
+            self._publish_state(state, stamp_ns)
+            if stamp_ns // period_ns > (stamp_ns - int(STEP_S * NS)) // period_ns:
+                self._render(0, state, stamp_ns)
+            time.sleep(STEP_S)
+
     def _play(self, start_ns):
         """Play the scene once, with the first image at `start_ns`."""
         world = self._robot.restarted() if self._robot is not None else self._simulator
@@ -148,16 +180,24 @@ class SimulatorNode(object):
             due_s = began_s + time_s / self._params.speed
             time.sleep(max(0.0, due_s - time.monotonic()))
             stamp_ns = start_ns + int(round(time_s * NS))
+            while self._limit_ns is not None and stamp_ns > self._limit_ns and not rospy.is_shutdown():
+                time.sleep(LIMIT_POLL_S)
             state = world.state_at(time_s)
-            self._publish_clock(stamp_ns)
-            self._tf_pub.publish(robot_transforms(self._simulator, state, time_from(stamp_ns)))
-            if self._robot is not None:
-                self._robot.publish(state, time_from(stamp_ns))
+            self._publish_state(state, stamp_ns)
             if number is not None:
                 self._render(number, state, stamp_ns)
             if self._clock_pub is not None:
                 began_s = max(began_s, time.monotonic() - time_s / self._params.speed - CATCH_UP_S)
         self._wait_for_image()
+
+    def _publish_state(self, state, stamp_ns):
+        self._publish_clock(stamp_ns)
+        self._tf_pub.publish(robot_transforms(self._simulator, state, time_from(stamp_ns)))
+        if self._robot is not None:
+            self._robot.publish(state, time_from(stamp_ns))
+
+    def _on_time_limit(self, message):
+        self._limit_ns = message.data.to_nsec()
 
     def _render(self, number, state, stamp_ns):
         """Render and publish an image in the thread of the renderer, one at a time."""
@@ -172,9 +212,13 @@ class SimulatorNode(object):
             self._rendering.result()
 
     def _publish_image(self, number, state, stamp_ns):
-        for topic, message in simulated_messages(self._simulator, self._simulator.frame(number, state), stamp_ns):
-            if topic != TF_TOPIC:
-                self._pubs[topic].publish(message)
+        frame = self._simulator.frame(number, state)
+        messages = [entry for entry in simulated_messages(self._simulator, frame, stamp_ns) if entry[0] != TF_TOPIC]
+        if self._params.boxes:
+            boxes = jittered_boxes(frame, self._simulator.camera, self._simulator.scenario.seed)
+            messages.append(boxes_message(frame, boxes.astype(int), stamp_ns))
+        for topic, message in messages:
+            self._pubs[topic].publish(message)
         rospy.loginfo_throttle(PROGRESS_S, 'image %d of %d' % (number + 1, self._simulator.frame_count))
         self._diagnostics.count('images')
         self._diagnostics.record_latency(time_from(stamp_ns))
@@ -188,6 +232,8 @@ def _scenario(params):
     if not params.scenario:
         raise ValueError('no scenario given; set ~scenario (launch argument scenario:=) to the path of a file such as '
                          'those in config/scenarios')
+    if params.supervised and not params.publish_clock:
+        raise ValueError('parameter ~supervised is true; it needs ~publish_clock')
     if params.speed != 1 and not params.publish_clock:
         raise ValueError('parameter ~speed is %g; without ~publish_clock, 1 expected' % params.speed)
     try:
