@@ -16,7 +16,7 @@ cmake_modules() {
     'catkin_package()' > cmake_modules/CMakeLists.txt
 }
 
-# Unity builds without optimisation of headers that nobody reads: 2.5 instead of 16 minutes of CPU time.
+# A unity build of the needed targets takes 2.5 instead of 16 minutes of CPU time.
 make_planners() {  # FOLDER
   mkdir "$1/src"
   cd "$1/src"
@@ -24,16 +24,17 @@ make_planners() {  # FOLDER
   patch -s -p1 < "$archives/patches.diff"
   cmake_modules
   touch costmap_converter/CATKIN_IGNORE vision_msgs/CATKIN_IGNORE
-  export ROS_LANG_DISABLE=genlisp:geneus:gennodejs
-  catkin_make --directory "$1" -DPYTHON_EXECUTABLE="$venv/bin/python3" -DCMAKE_CXX_FLAGS='-O1 -w' \
-    -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=0 -j2 \
+  unset CMAKE_PREFIX_PATH PYTHONPATH ROS_PACKAGE_PATH  # they must not depend on the workspace of this checkout
+  export ROS_LANG_DISABLE=genlisp
+  catkin_make --directory "$1" -DPYTHON_EXECUTABLE="$venv/bin/python3" -DCATKIN_ENABLE_TESTING=OFF \
+    -DCMAKE_CXX_FLAGS='-O1 -w' -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=0 -j2 \
     costmap_2d_node layers social_layers people_msgs_generate_messages_py move_base_node navfn dwa_local_planner
 }
 
 build_planners() {
   archives=${ROS_3D_BB_DATA:-}/planners
   [ -d "$archives" ] || return 0
-  local hash; hash=$(cat "$archives"/*.tar.xz "$archives/patches.diff" "$here/tools/planners.sh" | sha1sum | cut -c1-8)
+  local hash; hash=$(cat "$archives"/*.tar.xz "$archives/patches.diff" | sha1sum | cut -c1-8)
   planners=$cache/planners-$hash
   mkdir -p "$planners"
   (

@@ -1,0 +1,138 @@
+"""navigation.launch among people, with the real move_base, costmap_2d and social_navigation_layers, on simulated time.
+
+Without the archives in ROS_3D_BB_DATA, replicas of them run (`support.replica_nodes`).
+"""
+import os
+import signal
+import subprocess
+
+import numpy as np
+import pytest
+import rospy
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import OccupancyGrid
+
+from ros_3d_bb.camera.camera_model import transform_points
+from support.driven_robot import DrivenRobot
+from support.processes import end, pid_of
+from support.real_planners import ROOT, planner_environment
+from support.ros import Recorder, header_at, wait_until
+
+LETHAL, STANDING_MPS = 100, 0.01
+STOP_S = 1.0  # after a fault the robot must stand within this time
+STARTING_S = 30.0  # for a killed node to be back
+STANDING = np.array([[6.0, 1.8], [5.0, -2.0]])
+
+
+def two_people(seconds):
+    """One stands; the other walks to and fro across the view, at 1.2 m/s."""
+    way_m = 2.4 - abs(1.2 * seconds % 9.6 - 4.8)
+    return np.array([[6.0, 3.0], [4.0, way_m]])
+
+
+@pytest.fixture(scope='module')
+def robot(tmp_path_factory):
+    """The robot; the nodes run, and nobody is there."""
+    environment, _is_real = planner_environment(str(tmp_path_factory.mktemp('packages')))
+    rospy.init_node('test_navigation')
+    nodes = subprocess.Popen(['roslaunch', os.path.join(ROOT, 'test', 'support', 'navigation.launch')], env=environment)
+    driven = DrivenRobot()
+    driven.costmap = Recorder('move_base/local_costmap/costmap', OccupancyGrid, publisher_expected=False)
+    driven.social = Recorder('social_costmap/costmap/costmap', OccupancyGrid, publisher_expected=False)
+    driven.goal = rospy.Publisher('move_base_simple/goal', PoseStamped, queue_size=1)
+    try:
+        def are_ready():
+            driven.advance(0.1, is_driven=False)
+            return (driven.costmap.messages and driven.social.messages and driven.tracks.messages
+                    and driven.goal.get_num_connections())
+        wait_until(are_ready, 'all nodes', 120.0)
+        yield driven
+    finally:
+        end(nodes)
+
+
+@pytest.fixture
+def drives(robot):
+    """The robot drives towards a goal far ahead, beside two people."""
+    robot.people, robot.sees = lambda _seconds: STANDING + [robot.place_m[0], 0], True
+    goal = PoseStamped(header=header_at(robot.now_ns, 'map'))
+    goal.pose.position.x, goal.pose.orientation.w = robot.place_m[0] + 9.0, 1.0
+    robot.goal.publish(goal)
+    until(robot, lambda: robot.velocity > 0.2, 20.0)
+    return robot
+
+
+def until(robot, condition, limit_s):
+    """Let time pass until a condition is true; returns how long it took."""
+    started_s = robot.seconds
+    while not condition():
+        robot.advance(0.1)
+        assert robot.seconds - started_s < limit_s, 'not after %g s' % limit_s
+    return robot.seconds - started_s
+
+
+def cost_at(robot, costmap, people_m, radius_m=0.0):
+    """Largest costs within a radius of places of the map, in a costmap of odom."""
+    seconds = costmap.header.stamp.to_sec() - 1000
+    inside_m = transform_points(robot.odom_from_map(seconds), np.c_[people_m, np.zeros(len(people_m))])[:, :2]
+    origin = costmap.info.origin.position
+    grid = np.array(costmap.data).reshape(costmap.info.height, costmap.info.width)
+    cells = np.floor((inside_m - [origin.x, origin.y]) / costmap.info.resolution).astype(int)
+    around = int(radius_m / costmap.info.resolution)
+    return [int(grid[max(row - around, 0):row + around + 1, max(column - around, 0):column + around + 1].max())
+            for column, row in cells]
+
+
+def test_people_are_in_the_proxemic_costmap_of_another_frame_without_a_gap(robot):
+    """Tracks are in the map, the costmap is in odom, and tf is published at 10 Hz."""
+    robot.people = two_people
+    robot.advance(1.5, is_driven=False)
+    robot.social.emptied()
+    robot.advance(6.0, is_driven=False)
+    costs = np.array([cost_at(robot, costmap, two_people(costmap.header.stamp.to_sec() - 1000), 0.3)
+                      for costmap in robot.social.messages])
+    assert len(costs) >= 15 and (costs > 0).all(), costs
+    assert costs.max() < LETHAL  # a soft cost
+
+
+def test_visible_people_are_lethal_in_the_local_costmap_and_leave_no_trail(robot):
+    robot.people = two_people
+    robot.advance(1.5, is_driven=False)
+    robot.costmap.emptied()
+    robot.advance(6.0, is_driven=False)
+    costmaps = robot.costmap.messages
+    costs = np.array([cost_at(robot, costmap, two_people(costmap.header.stamp.to_sec() - 1000)[1:])
+                      for costmap in costmaps])
+    assert len(costs) >= 20 and (costs == LETHAL).mean() >= 0.95, costs
+    robot.people = lambda _seconds: np.zeros((0, 2))
+    robot.advance(1.5, is_driven=False)  # max_missed_time and a cycle
+    assert max(robot.costmap.messages[-1].data) < LETHAL
+
+
+@pytest.mark.parametrize('people_m', [np.zeros((0, 2)), STANDING])
+def test_the_robot_does_not_stop_without_a_fault_whether_or_not_somebody_is_in_view(drives, people_m):
+    ahead_m = drives.place_m[0]
+    drives.people = lambda _seconds: people_m + [ahead_m, 0]
+    for _step in range(50):
+        drives.advance(0.1)
+        assert drives.velocity > STANDING_MPS
+
+
+def test_the_robot_stops_when_the_camera_stops_and_drives_on(drives):
+    drives.sees = False
+    assert until(drives, lambda: drives.velocity < STANDING_MPS, 5.0) <= STOP_S
+    for _step in range(25):  # also when the outputs have been emptied
+        drives.advance(0.1)
+        assert drives.velocity < STANDING_MPS
+    drives.sees = True
+    until(drives, lambda: drives.velocity > 0.1, STARTING_S)
+
+
+@pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize('node', ['tracker_node', 'planner_bridge_node'])
+def test_the_robot_stops_when_a_node_ends_and_drives_on_when_it_is_back(drives, node, number):
+    pid = pid_of(node)
+    os.kill(pid, number)
+    assert until(drives, lambda: drives.velocity < STANDING_MPS, 5.0) <= STOP_S
+    until(drives, lambda: pid_of(node) not in (None, pid), STARTING_S)
+    until(drives, lambda: drives.velocity > 0.1, STARTING_S)
