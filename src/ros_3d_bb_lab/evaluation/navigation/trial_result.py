@@ -1,11 +1,66 @@
-"""Results of trials of the navigation benchmark, and the map of a scene."""
+"""Trials of the navigation benchmark: their pace, the map and the points for move_base, and the results."""
 import numpy as np
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb_lab.simulation.collision import Rectangle
 
 CELL_M = 0.05
 OCCUPIED = 100
 STANDING_MPS, DRIVING_MPS = 0.05, 0.15
+POINT_STEP_PX, FARTHEST_POINT_M = 8, 6.0
+
+
+class Pace(object):
+    """Limit of the simulated time: `LEAD_S` after the oldest of the newest times heard from several sources.
+
+    A source that is silent for `PATIENCE_S` of the machine's time does not stop the time, but slows it down: move_base
+    sends no commands while it plans. `late` counts such steps of `LEAD_S`.
+    """
+
+    LEAD_S = 0.2
+    PATIENCE_S = 0.6
+
+    def __init__(self):
+        self._heard_ns, self._needed, self._limit_ns, self._raised_s = {}, [], None, None
+        self.late = 0
+
+    @property
+    def sources(self):
+        """Names of the sources heard so far."""
+        return set(self._heard_ns)
+
+    def heard(self, source, time_ns):
+        """Note that a source has processed its inputs up to a time."""
+        self._heard_ns[source] = time_ns
+
+    def start(self, time_ns, needed):
+        """Start at a time, with the names of the sources that limit the time from now on."""
+        self._heard_ns = dict(self._heard_ns, **{source: time_ns for source in needed})
+        self._needed = needed
+
+    def new_limit(self, now_s):
+        """Return the limit if it has grown, or None. `now_s` is the time of the machine."""
+        limit_ns = min(self._heard_ns[source] for source in self._needed) + int(self.LEAD_S * NS)
+        if self._limit_ns is not None and limit_ns <= self._limit_ns:
+            if now_s - self._raised_s < self.PATIENCE_S:
+                return None
+            self.late += 1
+            limit_ns = self._limit_ns + int(self.LEAD_S * NS)
+        self._limit_ns, self._raised_s = limit_ns, now_s
+        return limit_ns
+
+
+def points_of(depth, camera):
+    """Points (n, 3) of every `POINT_STEP_PX`-th pixel of a DepthImage up to `FARTHEST_POINT_M`, in the camera frame."""
+    v, u = (part.ravel() for part in np.mgrid[:depth.shape[0]:POINT_STEP_PX, :depth.shape[1]:POINT_STEP_PX])
+    depth_m, is_valid = depth.at(u, v)
+    is_valid &= depth_m <= FARTHEST_POINT_M
+    return camera.deproject(np.stack([u, v], axis=-1)[is_valid].astype(float), depth_m[is_valid])
+
+
+def distance_m(one, other):
+    """Distance of two positions in the plane."""
+    return float(np.hypot(*np.subtract(one, other)))
 
 
 def occupancy(room):
