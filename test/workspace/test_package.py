@@ -27,7 +27,7 @@ FOR_MELODIC = {'python3-gnupg', 'python3-pycryptodome'}
 FOR_DEBIAN = {'tf2_tools'}  # which has programs of tf2_ros there
 NODES = {node.name: node for node in node_pages.nodes()}
 REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag', 'session:=/some/session', 'record:=/some/record.json',
-                      'camera_height:=1.2']
+                      'camera_height:=1.2', 'scenario:=/some/scene.yaml']
 
 
 def inside(*parts):

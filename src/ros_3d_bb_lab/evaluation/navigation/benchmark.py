@@ -1,7 +1,7 @@
 """Closed loop: move_base drives a simulated robot among people, with different knowledge of them."""
 import argparse
-import concurrent.futures
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -17,15 +17,16 @@ from ros_3d_bb_lab.evaluation.navigation.trial_result import summaries
 
 MODES = 'ours', 'none', 'depth', 'thesis', 'truth'
 TRIAL_TIMEOUT_S = 900.0
-COLUMNS = '%-15s %-7s %5s %11s %8s %10s %11s %6s'
-TITLES = ('scene', 'mode', 'runs', 'collisions', 'reached', 'time to', 'smallest', 'stops')
+COLUMNS = '%-15s %-7s %5s %11s %14s %8s %13s %13s %6s'
+TITLES = ('scene', 'mode', 'runs', 'collisions', 'while driving', 'reached', 'time to goal', 'min distance', 'stops')
 
 
-def run_trial(scene, mode, seed, folder):
-    """Run one trial. Returns its record as a dictionary with `scene`, `mode` and `seed`.
+def run_trial(task):
+    """Run one trial: (scene, mode, seed, folder for its files). Returns its record as a dictionary with `scene`, `mode` and `seed`.
 
     Raises RuntimeError if there is no record.
     """
+    scene, mode, seed, folder = task
     name = os.path.join(folder, '%s-%s-%d' % (scene, mode, seed))
     with open(name + '.yaml', 'w') as stream:
         yaml.safe_dump(scenario_of(scene, seed), stream)
@@ -50,8 +51,8 @@ def table(result):
     lines = [COLUMNS % TITLES]
     for scene, mode, row in rows:
         time_s = '-' if row['time_to_goal_s'] is None else '%.1f s' % row['time_to_goal_s']
-        lines.append(COLUMNS % (scene, mode, row['runs'], row['collisions'], row['reached'], time_s,
-                                '%.2f m' % row['min_distance_m'], '%.1f' % row['stops']))
+        lines.append(COLUMNS % (scene, mode, row['runs'], row['collisions'], row['collisions_driving'], row['reached'],
+                                time_s, '%.2f m' % row['min_distance_m'], '%.1f' % row['stops']))
     return '\n'.join(lines)
 
 
@@ -61,14 +62,14 @@ def main():
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # runs the cleanup, which ends all processes
     print(describe_machine(), flush=True)
     trials, seeds = [], range(arguments.seed, arguments.seed + arguments.runs)
-    tasks = [(scene, mode, seed) for seed in seeds for scene in arguments.scenes for mode in arguments.modes]
     try:
         subprocess.check_output(['rospack', 'find', 'move_base'])
-        with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-            waiting = [pool.submit(run_trial, *task + (arguments.logs or folder,)) for task in tasks]
-            for finished in concurrent.futures.as_completed(waiting):
-                trials.append(finished.result())
-                print('%(scene)s, %(mode)s, seed %(seed)d: %(collisions)d collisions, %(time_to_goal_s)s s, '
+        with tempfile.TemporaryDirectory() as folder, multiprocessing.Pool(arguments.jobs) as pool:
+            tasks = [(scene, mode, seed, os.path.abspath(arguments.logs or folder)) for seed in seeds
+                     for scene in arguments.scenes for mode in arguments.modes]
+            for trial in pool.imap_unordered(run_trial, tasks):
+                trials.append(trial)
+                print('%(scene)s, %(mode)s, seed %(seed)d: %(collisions)d collisions, goal after %(time_to_goal_s)s s, '
                       '%(min_distance_m).2f m, %(stops)d stops' % trials[-1], flush=True)
                 _write(arguments.json, trials)
     except KeyboardInterrupt:

@@ -15,11 +15,12 @@ from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, camera_from_msg, time_from, transform_from_msg
 from ros_3d_bb.conversions.planner_msgs import points_to_msg
-from ros_3d_bb.core.params import Param, parameters
+from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.startup import read_params, run_node
-from ros_3d_bb_lab.evaluation.navigation.trial_result import CELL_M, Pace, distance_m, occupancy, points_of, stops
+from ros_3d_bb_lab.evaluation.navigation.trial_result import (CELL_M, Pace, distance_m, occupancy,
+                                                              points_of, stops, was_driving)
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 
 MAP_FRAME = 'map'
@@ -37,9 +38,9 @@ class NavigationTrialParams(NamedTuple):
     record: str = Param('')
     goal_x: float = Param(0.0, limits=(-1000, 1000))
     goal_y: float = Param(0.0, limits=(-1000, 1000))
-    tracks: bool = Param(False)
-    cloud: bool = Param(False)
-    timeout: float = Param(40.0)
+    tracks: bool = Param(False, 'Whether the time waits for tracks.', section=SET_BY_LAUNCH)
+    cloud: bool = Param(False, 'Whether the points of the depth images are published.', section=SET_BY_LAUNCH)
+    timeout: float = Param(30.0)
 
 
 class NavigationTrialNode(object):
@@ -85,7 +86,8 @@ class NavigationTrialNode(object):
     def __init__(self):
         self._params, = read_params(NavigationTrialParams)
         self._pace, self._costmap_seen, self._camera = Pace(), False, None
-        self._position, self._speeds_mps, self._clearances_m, self._collisions = None, [], [], 0
+        self._position, self._speeds_mps, self._clearances_m = None, [], []
+        self._collisions, self._driving_collisions = 0, 0
         self._map_pub = rospy.Publisher('map', OccupancyGrid, queue_size=1, latch=True)
         self._goal_pub = rospy.Publisher('move_base_simple/goal', PoseStamped, queue_size=1)
         self._limit_pub = rospy.Publisher('simulator_node/time_limit', Time, queue_size=1)
@@ -121,8 +123,9 @@ class NavigationTrialNode(object):
         self._goal_pub.publish(goal_message(self._params, time_from(start_ns)))
         self._pace.start(start_ns, ['commands'] + ['tracks'] * self._params.tracks + ['cloud'] * self._params.cloud)
         time_to_goal_s = self._drive(start_ns)
-        result = {'time_to_goal_s': time_to_goal_s, 'collisions': self._collisions, 'stops': stops(self._speeds_mps),
-                  'min_distance_m': min(self._clearances_m), 'late': self._pace.late}
+        result = {'time_to_goal_s': time_to_goal_s, 'collisions': self._collisions,
+                  'collisions_driving': self._driving_collisions, 'min_distance_m': min(self._clearances_m),
+                  'stops': stops(self._speeds_mps), 'late': self._pace.late}
         with open(self._params.record, 'w') as stream:
             json.dump(result, stream)
 
@@ -163,6 +166,8 @@ class NavigationTrialNode(object):
             self._position = tuple(links['odom'].dot(links['base_link'])[:2, 3])
 
     def _on_collisions(self, message):
+        if message.data > self._collisions:
+            self._driving_collisions += was_driving(self._speeds_mps)
         self._collisions = message.data
 
     def _on_costmap(self, _message):

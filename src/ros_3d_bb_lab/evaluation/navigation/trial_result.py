@@ -7,6 +7,7 @@ from ros_3d_bb_lab.simulation.collision import Rectangle
 CELL_M = 0.05
 OCCUPIED = 100
 STANDING_MPS, DRIVING_MPS = 0.05, 0.15
+CONTACT_SPEEDS = 5  # odometry of 50 ms
 POINT_STEP_PX, FARTHEST_POINT_M = 8, 6.0
 
 
@@ -87,14 +88,21 @@ def stops(speeds_mps):
     return count
 
 
+def was_driving(speeds_mps):
+    """Whether the robot was driving within the last speeds, before a contact stopped it."""
+    return bool(len(speeds_mps) and np.abs(speeds_mps[-CONTACT_SPEEDS:]).max() > STANDING_MPS)
+
+
 def summary(trials):
     """Summarise the trials of one mode, a list of dictionaries with the keys of the record of navigation_trial_node.
 
-    `collisions` is their sum; `time_to_goal_s` the mean of the trials that reached the goal, None if there is none;
+    `collisions` is the number of contacts with people in all trials, `collisions_driving` that of contacts during which
+    the robot did not stand; `time_to_goal_s` the mean of the trials that reached the goal, None if there is none;
     `min_distance_m` the smallest distance of all trials; `stops` their mean per trial.
     """
     times_s = [trial['time_to_goal_s'] for trial in trials if trial['time_to_goal_s'] is not None]
     return {'runs': len(trials), 'collisions': sum(trial['collisions'] for trial in trials),
+            'collisions_driving': sum(trial['collisions_driving'] for trial in trials),
             'runs_with_collisions': sum(trial['collisions'] > 0 for trial in trials),
             'reached': len(times_s), 'time_to_goal_s': float(np.mean(times_s)) if times_s else None,
             'min_distance_m': min(trial['min_distance_m'] for trial in trials),
