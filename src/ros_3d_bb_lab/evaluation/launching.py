@@ -9,9 +9,10 @@ ENDING_S = 40.0  # roslaunch waits up to 17 s for its nodes
 
 
 def launch(name, arguments, timeout_s, log):
-    """Run a launch file of the package on a free port until it exits or times out. Its nodes are terminated in any case.
+    """Run a launch file of the package on a free port until it exits or times out. Its nodes are ended in any case.
 
-    `arguments` is a dictionary. roslaunch runs in a separate session, so that a Ctrl-C in the terminal reaches it only once, through this function.
+    `arguments` is a dictionary. roslaunch runs in a separate session, so that a Ctrl-C in the terminal reaches it only
+    once, through this function.
     """
     port = free_port()
     command = ['roslaunch', '-p', str(port), 'ros_3d_bb', name] + ['%s:=%s' % item for item in arguments.items()]

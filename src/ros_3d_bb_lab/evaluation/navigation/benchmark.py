@@ -22,9 +22,9 @@ TITLES = ('scene', 'mode', 'runs', 'collisions', 'while driving', 'reached', 'ti
 
 
 def run_trial(task):
-    """Run one trial: (scene, mode, seed, folder for its files). Returns its record as a dictionary with `scene`, `mode` and `seed`.
+    """Run one trial: (scene, mode, seed, folder for its files).
 
-    Raises RuntimeError if there is no record.
+    Returns its record as a dictionary, with `scene`, `mode` and `seed`. Raises RuntimeError if there is no record.
     """
     scene, mode, seed, folder = task
     name = os.path.join(folder, '%s-%s-%d' % (scene, mode, seed))
@@ -63,7 +63,7 @@ def main():
     print(describe_machine(), flush=True)
     trials, seeds = [], range(arguments.seed, arguments.seed + arguments.runs)
     try:
-        subprocess.check_output(['rospack', 'find', 'move_base'])
+        _check_planners()
         with tempfile.TemporaryDirectory() as folder, multiprocessing.Pool(arguments.jobs) as pool:
             tasks = [(scene, mode, seed, os.path.abspath(arguments.logs or folder)) for seed in seeds
                      for scene in arguments.scenes for mode in arguments.modes]
@@ -77,6 +77,12 @@ def main():
     except (RuntimeError, OSError, subprocess.SubprocessError) as error:
         sys.exit('./run bench navigation: %s' % error)
     print(table(summaries(trials)))
+
+
+def _check_planners():
+    if subprocess.call(['rospack', 'find', 'move_base'], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) != 0:
+        raise RuntimeError('move_base is not installed; install ros-noetic-navigation, or set ROS_3D_BB_DATA to a '
+                           'folder that contains planners/, from which ./run builds it')
 
 
 def _write(path, trials):

@@ -53,8 +53,8 @@ def crowd(random):
     people = []
     for number in range(6):
         side, x = 1 - 2 * (number % 2), 2.5 + .8 * number
-        moves = [{'wait': float(random.uniform(0, 4))}] + _walk((_around(random, x, .8), -3.2 * side),
-                                                                  _around(random, .9, .2))
+        goal, speed = (_around(random, x, .8), -3.2 * side), _around(random, .9, .2)
+        moves = [{'wait': float(random.uniform(0, 4))}] + _walk(goal, speed)
         people.append(dict(_person((_around(random, x, .2), 3.2 * side), moves), gives_way=True))
     return people, []
 

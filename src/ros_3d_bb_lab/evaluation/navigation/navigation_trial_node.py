@@ -46,8 +46,8 @@ class NavigationTrialParams(NamedTuple):
 class NavigationTrialNode(object):
     """Send a goal to move_base, measure how the simulated robot gets there, write the record and exit.
 
-    The node controls the time of the simulator: it is never more than `Pace.LEAD_S` ahead of the newest inputs that
-    tracker and planner have processed, so results do not depend on the speed of the machine. Parameters: see
+    The node controls the time of the simulator: it is at most 0.2 s ahead of the newest inputs that tracker and planner
+    have processed, so that they keep up on a slow machine, too. Parameters: see
     `NavigationTrialParams`; launch/navigation_benchmark.launch.
 
     Subscribes

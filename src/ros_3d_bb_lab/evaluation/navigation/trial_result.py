@@ -116,6 +116,6 @@ def summaries(trials):
     def of(**given):
         return [trial for trial in trials if all(trial[key] == value for key, value in given.items())]
 
-    return {'scenes': {scene: {mode: summary(of(scene=scene, mode=mode)) for mode in modes if of(scene=scene, mode=mode)}
-                       for scene in scenes},
-            'all': {mode: summary(of(mode=mode)) for mode in modes}}
+    by_scene = {scene: {mode: summary(of(scene=scene, mode=mode)) for mode in modes if of(scene=scene, mode=mode)}
+                for scene in scenes}
+    return {'scenes': by_scene, 'all': {mode: summary(of(mode=mode)) for mode in modes}}

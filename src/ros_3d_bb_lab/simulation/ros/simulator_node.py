@@ -47,7 +47,7 @@ class SimulatorParams(NamedTuple):
         'images are skipped.')
     drive: bool = Param(False)
     boxes: bool = Param(
-        False, 'Whether to publish the true 2D boxes of people, with edges jittered by 1 pixel, in place of a detector.')
+        False, 'Whether to publish the true 2D boxes of people in place of a detector, with a jitter of 1 pixel.')
     supervised: bool = Param(
         False, 'Whether another node controls the time, with ~publish_clock: the scene stands still until the first '
         'message on ~time_limit, and its time never exceeds the last one.')
