@@ -9,7 +9,7 @@ from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
-from std_msgs.msg import Float32, UInt32
+from std_msgs.msg import Float32, Int32MultiArray, Time, UInt32
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.core.time_sync import NS
@@ -100,6 +100,26 @@ def test_invalid_parameters_are_rejected_at_the_start(path, params, reason):
     process = started('simulator_node', *params)
     output, _none = process.communicate(timeout=30)
     assert process.returncode == 1 and reason in output and 'Traceback' not in output
+
+
+def test_a_supervised_scene_stands_still_until_a_time_limit_and_waits_at_it(path):
+    with Recorder('ground_truth', TrackedObjectArray, publisher_expected=False) as truth, Recorder(
+            '/clock', Clock, publisher_expected=False) as clock, Recorder(
+            'yolo_bounding_box', Int32MultiArray, publisher_expected=False) as boxes:
+        process = started('simulator_node', 'scenario:=' + path, 'publish_clock:=true', 'supervised:=true',
+                          'boxes:=true', 'repeat:=false')
+        limits = publisher('simulator_node/time_limit', Time)
+        wait_until(lambda: len(truth.messages) >= 3, 'images of the start')
+        assert len(set(message.objects[0].pose.pose.position.y for message in truth.messages)) == 1
+        limit = clock.messages[-1].clock + rospy.Duration(0.7)
+        limits.publish(Time(limit))
+        wait_until(lambda: clock.messages[-1].clock > limit - rospy.Duration(0.02), 'the time limit')
+        time.sleep(0.5)
+        assert clock.messages[-1].clock <= limit
+        limits.publish(Time(limit + rospy.Duration(10)))
+        assert process.wait(timeout=60) == 0
+        wait_until(lambda: truth.messages[-1].objects[0].pose.pose.position.y < 0, 'the end of the scene')
+        assert len(boxes.messages) == len(truth.messages) and len(boxes.messages[0].data) == 4
 
 
 @pytest.fixture
