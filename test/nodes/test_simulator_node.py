@@ -5,19 +5,29 @@ import time
 import numpy as np
 import pytest
 import rospy
+from geometry_msgs.msg import Twist, Vector3
+from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Float32, Int32MultiArray, Time, UInt32
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
-from support.ros import Recorder, started, wait_until
+from support.ros import Recorder, publisher, started, wait_until
 
+RATE = 15
 SCENE = """
 duration: 1.0
-rate: 10.0
+rate: 15.0
 people:
 - {start: [3.0, 0.5], facing: 3.0, moves: [{to: [3.0, -0.5]}]}
+"""
+DRIVING = """
+duration: 8.0
+rate: 10.0
+people:
+- {start: [3.0, 0.0]}
 """
 TOPICS = {'camera/color/image_raw': Image, 'camera/aligned_depth_to_color/image_raw': Image,
           'camera/color/camera_info': CameraInfo, 'camera/aligned_depth_to_color/camera_info': CameraInfo,
@@ -29,6 +39,7 @@ def path(tmp_path_factory):
     rospy.init_node('test_simulator_node')
     path = tmp_path_factory.mktemp('scenario') / 'scene.yaml'
     path.write_text(SCENE)
+    (path.parent / 'driving.yaml').write_text(DRIVING)
     return str(path)
 
 
@@ -40,26 +51,37 @@ def round_of_scene(path):
     process = started('simulator_node', 'scenario:=' + path, 'publish_clock:=true', 'repeat:=false',
                       'wait_for_subscribers:=1')
     assert process.wait(timeout=60) == 0
-    wait_until(lambda: len(recorders['ground_truth'].messages) == 10, 'ten images')
+    wait_until(lambda: len(recorders['ground_truth'].messages) == RATE, 'all images')
     return {topic: recorder.messages for topic, recorder in recorders.items()}
 
 
 def test_all_messages_have_the_stamps_of_the_scene(round_of_scene):
     stamps = [message.header.stamp for message in round_of_scene['ground_truth']]
-    assert [(stamp - stamps[0]).to_nsec() for stamp in stamps] == [number * NS // 10 for number in range(10)]
+    assert [(stamp - stamps[0]).to_nsec() for stamp in stamps] == [
+        int(round(number / RATE * NS)) for number in range(RATE)]
     for topic in set(TOPICS) - {'/tf'}:
         assert [message.header.stamp for message in round_of_scene[topic]] == stamps
-    assert [message.transforms[0].header.stamp for message in round_of_scene['/tf']] == stamps
-    assert set(stamps) <= set(message.clock for message in round_of_scene['/clock'])
     times = [message.clock for message in round_of_scene['/clock']]
     assert times == sorted(times)
+
+
+def test_time_and_tf_are_published_every_10_ms_and_at_the_images(round_of_scene):
+    start = round_of_scene['ground_truth'][0].header.stamp
+    transforms = [message.transforms for message in round_of_scene['/tf']]
+    assert [[link.child_frame_id for link in links] for links in transforms] == [
+        ['odom', 'base_link', 'camera_color_optical_frame']] * len(transforms)
+    times_ns = [(links[0].header.stamp - start).to_nsec() for links in transforms]
+    images_ns = [int(round(number / RATE * NS)) for number in range(RATE)]
+    assert times_ns == sorted(set(range(0, NS + 1, NS // 100)) | set(images_ns))
+    clock_ns = [(message.clock - start).to_nsec() for message in round_of_scene['/clock']]
+    assert clock_ns[-len(times_ns):] == times_ns
 
 
 def test_without_publish_clock_stamps_are_the_time_of_the_machine(path):
     began = time.time()
     with Recorder('ground_truth', TrackedObjectArray, publisher_expected=False) as truth:
         process = started('simulator_node', 'scenario:=' + path)
-        wait_until(lambda: len(truth.messages) >= 12 and (
+        wait_until(lambda: len(truth.messages) >= RATE + 2 and (
             truth.messages[-1].header.stamp - truth.messages[0].header.stamp).to_sec() > 3, 'a second round')
         process.terminate()
         process.wait()
@@ -78,3 +100,67 @@ def test_invalid_parameters_are_rejected_at_the_start(path, params, reason):
     process = started('simulator_node', *params)
     output, _none = process.communicate(timeout=30)
     assert process.returncode == 1 and reason in output and 'Traceback' not in output
+
+
+def test_a_supervised_scene_stands_still_until_a_time_limit_and_waits_at_it(path):
+    with Recorder('ground_truth', TrackedObjectArray, publisher_expected=False) as truth, Recorder(
+            '/clock', Clock, publisher_expected=False) as clock, Recorder(
+            'yolo_bounding_box', Int32MultiArray, publisher_expected=False) as boxes:
+        process = started('simulator_node', 'scenario:=' + path, 'publish_clock:=true', 'supervised:=true',
+                          'boxes:=true', 'repeat:=false')
+        limits = publisher('simulator_node/time_limit', Time)
+        wait_until(lambda: len(truth.messages) >= 3, 'images of the start')
+        assert len(set(message.objects[0].pose.pose.position.y for message in truth.messages)) == 1
+        limit = clock.messages[-1].clock + rospy.Duration(0.7)
+        limits.publish(Time(limit))
+        wait_until(lambda: clock.messages[-1].clock > limit - rospy.Duration(0.02), 'the time limit')
+        time.sleep(0.5)
+        assert clock.messages[-1].clock <= limit
+        limits.publish(Time(limit + rospy.Duration(10)))
+        assert process.wait(timeout=60) == 0
+        wait_until(lambda: truth.messages[-1].objects[0].pose.pose.position.y < 0, 'the end of the scene')
+        assert len(boxes.messages) == len(truth.messages) and len(boxes.messages[0].data) == 4
+
+
+@pytest.fixture
+def driving(path):
+    """Recorders of the topics of a driving robot, by topic, and a publisher of commands."""
+    kinds = {'odom': Odometry, 'collisions': UInt32, 'clearance': Float32, '/tf': TFMessage}
+    recorders = {topic: Recorder(topic, kind, publisher_expected=False) for topic, kind in kinds.items()}
+    process = started('simulator_node', 'scenario:=' + os.path.join(os.path.dirname(path), 'driving.yaml'),
+                      'publish_clock:=true', 'drive:=true')
+    try:
+        yield recorders, publisher('cmd_vel', Twist), process
+    finally:
+        process.kill()
+        process.wait()
+        for recorder in recorders.values():
+            recorder.__exit__()
+
+
+def test_the_robot_obeys_commands_until_it_stops_at_a_person(driving):
+    recorders, commands, process = driving
+    odometry, collisions = recorders['odom'].messages, recorders['collisions'].messages
+
+    def collided():
+        commands.publish(Twist(linear=Vector3(x=1.0)))
+        time.sleep(0.03)
+        return any(message.data for message in collisions)
+
+    wait_until(collided, 'a collision', 60)
+    wait_until(lambda: odometry[-1].twist.twist.linear.x == 0, 'a standing robot')
+    stopped = odometry[-1]
+    process.terminate()
+    output, _none = process.communicate(timeout=30)
+    assert 'collision 1' in output and 'touches person 1' in output
+    assert set(message.data for message in collisions) == {0, 1}
+    assert {(message.header.frame_id, message.child_frame_id) for message in odometry} == {('odom', 'base_link')}
+    speeds_mps = [message.twist.twist.linear.x for message in odometry]
+    assert max(speeds_mps) == pytest.approx(1.02)  # with the odometry error of 2 %
+    transforms = {message.transforms[0].header.stamp: message.transforms for message in recorders['/tf'].messages}
+    map_odom, odom_base, _camera = transforms[stopped.header.stamp]
+    measured_m, true_m = odom_base.transform.translation.x, (
+        map_odom.transform.translation.x + odom_base.transform.translation.x)
+    assert stopped.pose.pose.position.x == measured_m == pytest.approx(1.02 * true_m, rel=1e-3)
+    assert 2.0 < true_m < 2.7  # the person stands at 3 m
+    assert min(message.data for message in recorders['clearance'].messages) == pytest.approx(0, abs=0.03)

@@ -48,7 +48,7 @@ ALLOWED = {
     'ros_3d_bb_lab.simulation': ('camera core tracking', 'cv2 yaml'),
     'ros_3d_bb_lab.simulation.ros': (
         'bags camera conversions core msg nodes.common lab.simulation',
-        'rosgraph_msgs rospy std_msgs'),
+        'geometry_msgs nav_msgs rosgraph_msgs rospy std_msgs tf2_msgs'),
     'ros_3d_bb_lab.evaluation.baselines': ('camera core tracking', 'norfair'),
     'ros_3d_bb_lab.evaluation': (
         'camera core detection detection.depth detection.yolov5 estimation sessions tracking '
@@ -65,6 +65,9 @@ ALLOWED = {
         'camera conversions core estimation msg tracking visualization lab.evaluation lab.evaluation.latency '
         'lab.simulation lab.simulation.ros',
         'cv2 nav_msgs rosgraph_msgs rospy std_msgs tf2_msgs'),
+    'ros_3d_bb_lab.evaluation.navigation': (
+        'camera conversions core msg nodes.common lab.evaluation lab.simulation',
+        'geometry_msgs nav_msgs rospy sensor_msgs std_msgs tf2_msgs yaml'),
     'ros_3d_bb_lab.evaluation.latency': (
         'bags conversions core msg nodes.common lab.evaluation',
         'rospy sensor_msgs std_msgs visualization_msgs'),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb_lab.simulation.motion import person_motion, robot_motion
-from ros_3d_bb_lab.simulation.scenario import (Follow, Furniture, Mount, Move, Person, Robot, Room, Scenario,
+from ros_3d_bb_lab.simulation.scenario import (Drive, Follow, Furniture, Mount, Move, Person, Robot, Room, Scenario,
                                                read_scenario, scenario_from)
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'config', 'scenarios')
@@ -20,6 +20,7 @@ PLACES = {'scenario': (Scenario, lambda record: record),
           'scenario.robot': (Robot, lambda record: {'robot': record}),
           'scenario.robot.cameras[1]': (Mount, lambda record: {'robot': {'cameras': [
               dict({'name': 'front'}, **record)]}}),
+          'scenario.robot.drive': (Drive, lambda record: {'robot': {'drive': record}}),
           'scenario.robot.follow': (Follow, lambda record: {'people': [{'start': [1, 1]}], 'robot': {
               'follow': dict({'person': 1}, **record)}}),
           'scenario.people[1]': (Person, lambda record: {'people': [dict({'start': [1, 1]}, **record)]}),
@@ -70,6 +71,9 @@ def test_errors_name_the_path_of_a_misspelled_key_and_of_a_value_of_the_wrong_ty
     ('scenario.robot.follow', 'distance', -1, '-1', 'more than 0'),
     ('scenario.robot.follow', 'person', .5, '0.5', 'integer'),
     ('scenario.people[1]', 'crouch', 1.1, '1.1', '0 to 1'),
+    ('scenario.robot.drive', 'acceleration', 0, '0', 'more than 0'),
+    ('scenario.robot.drive', 'footprint', [.5, 0], '0', 'more than 0'),
+    ('scenario.robot.drive', 'odometry_error', [1.0, 0], '1.0', 'less than 1'),
     ('scenario.people[1]', 'hips', -.1, '-0.1', '0 to 1'),
     ('scenario.people[1]', 'girth', 0, '0', 'more than 0'),
     ('scenario.people[1]', 'shirt', [-1, 0, 0], '-1', '255'),

@@ -134,11 +134,11 @@ def test_drift_changes_the_pose_in_odom_and_not_in_the_map():
 
 def test_the_appearance_is_random_by_the_seed_unless_specified():
     people = [Person((5, y)) for y in (-1, 0, 1)]
-    builds = {seed: [body.build for body in Simulator(scene(*people, seed=seed), CAMERA)._bodies] for seed in (1, 2)}
+    builds = {seed: [body.build for body in Simulator(scene(*people, seed=seed), CAMERA).bodies] for seed in (1, 2)}
     assert builds[1] != builds[2] and len({build.shirt for build in builds[1]}) == 3
     specified = Person((5, 0), height=1.6, girth=1.2, hips=.5, long_hair=True, short_sleeves=False, skin=(1, 2, 3),
                        hair=(4, 5, 6), shirt=(7, 8, 9), trousers=(10, 11, 12))
-    build = Simulator(scene(specified), CAMERA)._bodies[0].build
+    build = Simulator(scene(specified), CAMERA).bodies[0].build
     assert build._replace(shoes=None) == (1.6, 1.2, .5, True, False, (1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12),
                                           None)
 

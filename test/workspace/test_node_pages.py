@@ -12,6 +12,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.realsense_node import RealSenseNode
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import LatencyProbeNode
 from ros_3d_bb_lab.evaluation.latency.replay_node import ReplayNode
+from ros_3d_bb_lab.evaluation.navigation.navigation_trial_node import NavigationTrialNode
 from ros_3d_bb_lab.simulation.ros.simulator_node import SimulatorNode
 from support.masterless import masterless
 from support.planner_definitions import package
@@ -23,9 +24,11 @@ SCENARIO = os.path.join(ROOT, 'config', 'scenarios', 'empty_room.yaml')
 # Parameters with which nodes connect to all their topics; the other nodes are created as by the fuzzer.
 MORE_PARAMS = {'planner_bridge_node': {'outputs': 'costmap, people, teb, mpc, vision'},
                'realsense_node': {'publish_clock': True}, 'replay_node': {'boxes': True},
-               'simulator_node': {'scenario': SCENARIO, 'publish_clock': True}}
+               'navigation_trial_node': {'tracks': True, 'cloud': True},
+               'simulator_node': {'scenario': SCENARIO, 'publish_clock': True, 'drive': True, 'boxes': True,
+                                  'supervised': True}}
 OTHERS = {'realsense_node': RealSenseNode, 'replay_node': ReplayNode, 'simulator_node': SimulatorNode,
-          'latency_probe_node': LatencyProbeNode}
+          'latency_probe_node': LatencyProbeNode, 'navigation_trial_node': NavigationTrialNode}
 OPTIONAL_PACKAGES = 'people_msgs', 'costmap_converter', 'derived_object_msgs', 'vision_msgs'
 
 

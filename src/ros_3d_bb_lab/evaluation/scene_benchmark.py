@@ -6,7 +6,6 @@ import sys
 
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
@@ -15,13 +14,13 @@ from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.clear_mot import ClearMatcher, score
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path, scenario_paths
-from ros_3d_bb_lab.evaluation.scenes import LEAST_SHOWN, run_scene, score_detections
+from ros_3d_bb_lab.evaluation.scenes import run_scene, score_detections
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
+from ros_3d_bb_lab.simulation.true_boxes import is_in_image, jittered_boxes
 
 RANGE_M = {'yolov5': (2.0, 8.0), 'depth': (2.0, 6.0), 'exact': (0.5, 8.0)}  # evaluated range of each detector
 EVERY = {'yolov5': 2, 'depth': 2, 'exact': 1}  # every n-th image is used
-JITTER_PX = 1.0  # standard deviation of the box edges of the `exact` detector
 NEAREST_M = 0.5  # minimum distance from the camera in the plane
 HELD_M = 0.5  # maximum distance between a person and a matching track
 HORIZON_S = 1.0  # evaluated prediction horizon
@@ -47,29 +46,8 @@ def yolov5_detector(weights):
 
 
 def exact_detector(simulator):
-    """Detector for `run_scene` that returns the true boxes, with edges jittered by `JITTER_PX`.
-
-    It returns people with `is_in_image`, or with at least `LEAST_SHOWN` of the body visible.
-    """
-    seed, camera = simulator.scenario.seed, simulator.camera
-
-    def detect(frame):
-        random = np.random.RandomState([seed, frame.number])
-        jitter_px = np.rint(random.normal(0, JITTER_PX, (len(frame.people), 4)))
-        shown = [person.visible >= LEAST_SHOWN or is_in_image(person, frame.poses.map_from_camera, camera)
-                 for person in frame.people]
-        boxes = [person.box_px + jitter for person, jitter, is_shown in zip(frame.people, jitter_px, shown) if is_shown]
-        return np.clip(np.reshape(boxes, (-1, 4)), 0, [camera.width, camera.height] * 2)
-
-    return detect
-
-
-def is_in_image(person, map_from_camera, camera):
-    """Whether the body axis of a PersonTruth is between the left and right image borders, and not mostly occluded."""
-    x_m, _y, z_m = transform_points(np.linalg.inv(map_from_camera), person.position_m)
-    if person.box_px is None or person.hidden > 1 - LEAST_SHOWN or z_m <= 0:
-        return False
-    return bool(0 <= camera.fx * x_m / z_m + camera.cx < camera.width)
+    """Detector for `run_scene` that returns the boxes of `jittered_boxes`."""
+    return lambda frame: jittered_boxes(frame, simulator.camera, simulator.scenario.seed)
 
 
 def score_tracks(steps, camera):

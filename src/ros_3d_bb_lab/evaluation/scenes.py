@@ -17,8 +17,8 @@ from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, detection_from_box
 from ros_3d_bb_lab.evaluation.clear_mot import Moment
 from ros_3d_bb_lab.simulation.simulator import SimulatedFrame
+from ros_3d_bb_lab.simulation.true_boxes import LEAST_SHOWN
 
-LEAST_SHOWN = 0.3  # visible share of the body below which its position cannot be estimated
 FOUND_IOU = 0.5  # minimum IoU of a true positive
 
 

@@ -107,7 +107,7 @@ class _Knots(object):
     def _angle_to(self, position):
         """Angle between the heading and the direction to a position, -pi to pi."""
         x, y = position - self._value[:2]
-        return _wrapped(np.arctan2(y, x) - self._value[HEADING]) if x or y else 0.0
+        return wrapped(np.arctan2(y, x) - self._value[HEADING]) if x or y else 0.0
 
     def _walk(self, position, speed_mps):
         position = np.array(position, float)
@@ -128,7 +128,7 @@ class _Knots(object):
 
     def _wait(self, move):
         if move.facing is not None:
-            self._value[HEADING] += _wrapped(move.facing - self._value[HEADING])
+            self._value[HEADING] += wrapped(move.facing - self._value[HEADING])
         self._value[CROUCH] = move.crouch
         self._add(0)
         self._add(move.wait)
@@ -139,7 +139,8 @@ class _Knots(object):
         self._values.append(self._value.copy())
 
 
-def _wrapped(angle):
+def wrapped(angle):
+    """Angle plus a multiple of 2 pi, from -pi to pi."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
@@ -150,7 +151,7 @@ def _following_motion(robot, person, duration_s):
     for time_s in times_s:
         values.append([x, y, heading, 0, 0, 0])
         dx, dy = person.at(time_s).position_m - (x, y)
-        angle = _wrapped(np.arctan2(dy, dx) - heading)
+        angle = wrapped(np.arctan2(dy, dx) - heading)
         heading += np.clip(angle, -follow.rate * FOLLOW_STEP_S, follow.rate * FOLLOW_STEP_S)
         step_m = np.clip(np.hypot(dx, dy) - follow.distance, 0, follow.speed * FOLLOW_STEP_S) * max(0, np.cos(angle))
         x, y = x + step_m * np.cos(heading), y + step_m * np.sin(heading)

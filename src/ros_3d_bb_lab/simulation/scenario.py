@@ -64,6 +64,17 @@ class Mount(NamedTuple):
     pitch: float = 0.0
 
 
+class Drive(NamedTuple):
+    """Body and drive of a robot that obeys velocity commands. `footprint` is length and width around base_link."""
+
+    footprint: Tuple[float, float] = (0.51, 0.43)  # Jackal
+    speed: float = 2.0
+    rate: float = 4.0
+    acceleration: float = 2.0
+    angular_acceleration: float = 5.0
+    odometry_error: Tuple[float, float] = (0.02, 0.02)
+
+
 class Robot(NamedTuple):
     """Robot with one camera (`mount`, `pitch`) or several (`cameras`)."""
 
@@ -76,6 +87,7 @@ class Robot(NamedTuple):
     cameras: Tuple[Mount, ...] = ()
     base_height: float = 0.065  # Jackal: the wheels have a radius of 0.098 m, their axis is 0.033 m above base_link
     odometry_drift: Tuple[float, float, float] = (0.0, 0.0, 0.0)
+    drive: Drive = Drive()
 
     @property
     def mounts(self):
@@ -91,6 +103,7 @@ class Person(NamedTuple):
     crouch: float = 0.0
     moves: Tuple[Move, ...] = ()
     repeat: bool = False
+    gives_way: bool = False
     height: Optional[float] = None
     girth: Optional[float] = None
     hips: Optional[float] = None
@@ -133,11 +146,12 @@ class Scenario(NamedTuple):
 
 
 MOVE_KEYS = {'to': ('to', 'speed', 'rate'), 'turn': ('turn', 'rate'), 'wait': ('wait', 'facing', 'crouch')}
-RECORDS = {'room': Room, 'robot': Robot, 'follow': Follow}
+RECORDS = {'room': Room, 'robot': Robot, 'follow': Follow, 'drive': Drive}
 LISTS = {'furniture': Furniture, 'people': Person, 'objects': SceneObject, 'moves': Move, 'cameras': Mount}
-VECTORS = {'bounds': 4, 'at': 2, 'size': 3, 'to': 2, 'start': 2, 'pose': 3, 'mount': 3, 'odometry_drift': 3, 'color': 3,
-           'skin': 3, 'hair': 3, 'shirt': 3, 'trousers': 3}
-FLAGS, WHOLE = {'repeat', 'long_hair', 'short_sleeves', 'depth_noise'}, {'seed', 'person', 'pushed_by'}
+VECTORS = {'bounds': 4, 'at': 2, 'size': 3, 'to': 2, 'start': 2, 'pose': 3, 'mount': 3, 'odometry_drift': 3,
+           'footprint': 2, 'odometry_error': 2, 'color': 3, 'skin': 3, 'hair': 3, 'shirt': 3, 'trousers': 3}
+FLAGS = {'repeat', 'gives_way', 'long_hair', 'short_sleeves', 'depth_noise'}
+WHOLE = {'seed', 'person', 'pushed_by'}
 NAME = re.compile(r'[A-Za-z]\w*$')  # a topic namespace
 TYPES = (  # keys, check of a value, and its description
     (LISTS, lambda value: isinstance(value, list), 'a list'),
@@ -146,7 +160,9 @@ TYPES = (  # keys, check of a value, and its description
     ({'label'}, lambda value: isinstance(value, str) and not label_fault(value), 'the name of a class such as dog'))
 RANGES = (  # the same for numbers
     (WHOLE, lambda number: number == int(number) and 0 <= number < 2 ** 32, 'an integer from 0 to 4294967295'),
-    ({'duration', 'rate', 'height', 'speed', 'girth', 'distance', 'size'}, lambda number: number > 0, 'more than 0'),
+    ({'duration', 'rate', 'height', 'speed', 'girth', 'distance', 'size', 'footprint', 'acceleration',
+      'angular_acceleration'}, lambda number: number > 0, 'more than 0'),
+    ({'odometry_error'}, lambda number: -1 < number < 1, 'more than -1 and less than 1'),
     ({'rate'}, lambda number: number <= 1000, 'at most 1000'),
     ({'wait', 'color_noise'}, lambda number: number >= 0, 'at least 0'),
     ({'crouch', 'hips'}, lambda number: 0 <= number <= 1, '0 to 1'),

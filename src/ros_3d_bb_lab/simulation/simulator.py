@@ -10,7 +10,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject, prediction_times_s
 from ros_3d_bb_lab.simulation.body import Body, Build
 from ros_3d_bb_lab.simulation.mesh import box, rotation
-from ros_3d_bb_lab.simulation.motion import object_motion, person_motion, robot_motion
+from ros_3d_bb_lab.simulation.motion import State, object_motion, person_motion, robot_motion
 from ros_3d_bb_lab.simulation.renderer import render
 from ros_3d_bb_lab.simulation.room import RenderedRoom
 from ros_3d_bb_lab.simulation.sensors import ColorSensor, StereoCamera
@@ -19,6 +19,7 @@ from ros_3d_bb_lab.simulation.scene_objects import GAP_M, PushedMotion, object_m
 D435I_COLOR = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)  # camera of the measurements in the thesis
 FRONT_FROM_OPTICAL = transform_from((0, 0, 0), OPTICAL_ROTATION)
 SHADOW_RADIUS_M = 0.28
+STEP_S = 0.01  # maximum time between two states of the robot in ROS
 MIN_VISIBLE = 0.25  # minimum share of the body in the image of a person with the status VISIBLE
 MOVING_MPS = 0.05
 PREDICTION_S, PREDICTION_STEP_S = 2.0, 0.25
@@ -56,6 +57,15 @@ class Poses(NamedTuple):
         return self.map_from_odom.dot(self.odom_from_base).dot(self.base_from_camera)
 
 
+class WorldState(NamedTuple):
+    """Robot and people at one time since the start."""
+
+    time_s: float
+    robot: State
+    people: List[State]
+    map_from_odom: np.ndarray  # (4, 4)
+
+
 class SimulatedFrame(NamedTuple):
     """One image of one camera."""
 
@@ -75,7 +85,8 @@ class SimulatedFrame(NamedTuple):
 
 
 class Simulator(object):
-    """Renders a scenario (scenario.Scenario). A frame depends only on the scenario and the number of the frame.
+    """Renders a scenario (scenario.Scenario). A frame depends only on the scenario and the number of the frame, or on
+    the given state of the world.
 
     Several cameras take turns at equal intervals: of n cameras the first one has the frames 0, n, 2 n, ... All have the
     intrinsics of `camera` (camera_model.Camera).
@@ -89,15 +100,15 @@ class Simulator(object):
         self._room = RenderedRoom(scenario.room.bounds, scenario.room.height, np.random.RandomState(scenario.seed))
         self._furniture = [box(item.size, item.color, np.random.RandomState(number)).moved(item.at + (0,), item.yaw)
                            for number, item in enumerate(scenario.room.furniture)]
-        self._bodies = [Body(_build(person, scenario.seed, number), np.random.RandomState(number))
-                        for number, person in enumerate(scenario.people)]
-        self._motions = [person_motion(person, body.build.height_m, scenario.duration)
-                         for person, body in zip(scenario.people, self._bodies)]
+        self.bodies = [Body(_build(person, scenario.seed, number), np.random.RandomState(number))
+                       for number, person in enumerate(scenario.people)]
+        self.motions = [person_motion(person, body.build.height_m, scenario.duration)
+                        for person, body in zip(scenario.people, self.bodies)]
         self._meshes = [object_mesh(scene_object, np.random.RandomState(number))
                         for number, scene_object in enumerate(scenario.objects)]
         self._motions_of_objects = [self._motion_of(scene_object, mesh)
                                     for scene_object, mesh in zip(scenario.objects, self._meshes)]
-        self._robot = robot_motion(scenario.robot, self._motions, scenario.duration)
+        self._robot = robot_motion(scenario.robot, self.motions, scenario.duration)
         self._color_sensor = ColorSensor(camera, scenario.seed, scenario.color_noise)
         self._stereo = StereoCamera(camera, scenario.seed) if scenario.depth_noise else None
 
@@ -105,13 +116,23 @@ class Simulator(object):
         """Time of a frame since the start."""
         return number / self.rate
 
-    def frame(self, number):
-        """Render a frame. Returns a SimulatedFrame."""
+    def steps(self):
+        """List of (time in s, number of the image at this time or None): all multiples of `STEP_S`, and the images."""
+        count = int(self.scenario.duration / STEP_S) + 1
+        steps = {int(round(step * STEP_S * NS)): (step * STEP_S, None) for step in range(count)}
+        for number in range(self.frame_count):
+            time_s = self.time_s(number)
+            steps[int(round(time_s * NS))] = time_s, number
+        return [steps[time_ns] for time_ns in sorted(steps)]
+
+    def frame(self, number, state=None):
+        """Render a frame. `state` is the WorldState; by default, that of the moves. Returns a SimulatedFrame."""
         time_s, turn = self.time_s(number), number % len(self.cameras)
-        poses, states = self.poses_at(time_s, turn), [motion.at(time_s) for motion in self._motions]
+        state = state or self.state_at(time_s)
+        poses, states = self.poses(state, turn), state.people
         bodies = [body.posed(state.posture).moved(np.append(state.position_m, 0), state.heading_rad)
-                  for body, state in zip(self._bodies, states)]
-        states += [motion.at(time_s) for motion in self._motions_of_objects]
+                  for body, state in zip(self.bodies, states)]
+        states = list(states) + [motion.at(time_s) for motion in self._motions_of_objects]
         bodies += [mesh.moved(np.append(state.position_m, 0), state.heading_rad)
                    for mesh, state in zip(self._meshes, states[len(bodies):])]
         shadows = [(state.position_m[0], state.position_m[1], SHADOW_RADIUS_M) for state in states]
@@ -119,34 +140,48 @@ class Simulator(object):
         depth_mm = (self._stereo.measure(rendering.inverse_depth, number) if self._stereo is not None
                     else np.rint(1000 / rendering.inverse_depth).clip(0, 65535).astype(np.uint16))
         truth = [self._truth(index, state, bodies[index], rendering) for index, state in enumerate(states)]
-        people, objects = truth[:len(self._bodies)], tuple(truth[len(self._bodies):])
+        people, objects = truth[:len(self.bodies)], tuple(truth[len(self.bodies):])
         color = self._color_sensor.capture(rendering.color, number)
         return SimulatedFrame(number, time_s, color, depth_mm, poses, people, self.cameras[turn], objects)
 
-    def poses_at(self, time_s, camera=0):
-        """Poses of odometry, robot and camera at a time. `camera` is the index of the camera."""
-        robot, state = self.scenario.robot, self._robot.at(time_s)
+    def state_at(self, time_s):
+        """Return the WorldState at a time if the robot and the people follow their moves."""
+        x, y, yaw = np.array(self.scenario.robot.odometry_drift) * time_s
+        return WorldState(time_s, self._robot.at(time_s), [motion.at(time_s) for motion in self.motions],
+                          upright(x, y, 0, yaw))
+
+    def poses(self, state, camera=0):
+        """Poses of odometry, robot and camera in a WorldState. `camera` is the index of the camera."""
+        robot, (x, y) = self.scenario.robot, state.robot.position_m
         mount = robot.mounts[camera]
-        x, y, yaw = np.array(robot.odometry_drift) * time_s
-        map_from_odom = _upright(x, y, 0, yaw)
-        map_from_base = _upright(state.position_m[0], state.position_m[1], robot.base_height, state.heading_rad)
-        base_from_mount, tilted = _upright(*mount.mount + (mount.yaw,)), np.eye(4)
+        map_from_base = upright(x, y, robot.base_height, state.robot.heading_rad)
+        base_from_mount, tilted = upright(*mount.mount + (mount.yaw,)), np.eye(4)
         tilted[:3, :3] = rotation(1, mount.pitch)
-        return Poses(map_from_odom, np.linalg.inv(map_from_odom).dot(map_from_base),
+        return Poses(state.map_from_odom, np.linalg.inv(state.map_from_odom).dot(map_from_base),
                      base_from_mount.dot(tilted).dot(FRONT_FROM_OPTICAL))
 
+    def poses_at(self, time_s, camera=0):
+        """Poses at a time if the robot follows its moves, see `poses`."""
+        return self.poses(self.state_at(time_s), camera)
+
     def positions_at(self, time_s):
-        """Positions (n, 2) of people and objects in the map. The time may be after the end of the scene."""
-        motions = self._motions + self._motions_of_objects
+        """Positions (n, 2) of people and objects in the map by their moves. The time may be after the end of the scene.
+        """
+        motions = self.motions + self._motions_of_objects
         return np.array([motion.at(time_s).position_m for motion in motions]).reshape(-1, 2)
 
     def true_tracks(self, frame, stamp_ns):
         """Convert the objects of a frame to tracks (TrackedObject) in the map, first seen at the start of the scene.
 
-        Their predictions are their actual future positions.
+        Their predictions are their actual future positions. People who give way are assumed to continue as their moves,
+        from where they are.
         """
         times_s = prediction_times_s(PREDICTION_S, PREDICTION_STEP_S)
         paths = np.stack([self.positions_at(frame.time_s + time_s) for time_s in times_s], axis=1)
+        positions = np.array([person.position_m[:2] for person in frame.people]).reshape(-1, 2)
+        pushed_m = positions - self.positions_at(frame.time_s)
+        if pushed_m.any():
+            paths += pushed_m[:, None]
         start_ns = stamp_ns - int(round(frame.time_s * NS))
         return [TrackedObject(person.id, person.position_m, person.size_m, person.velocity_mps, person.velocity_mps,
                               _status(person), bool(np.linalg.norm(person.velocity_mps) > MOVING_MPS), start_ns,
@@ -155,8 +190,8 @@ class Simulator(object):
                 for person, path in zip(frame.truth, paths)]
 
     def _truth(self, index, state, body, rendering):
-        height_m, number = float(body.vertices[:, 2].max()), index - len(self._bodies)
-        width_m = self._bodies[index].width_m if number < 0 else _largest_extent(self._meshes[number])
+        height_m, number = float(body.vertices[:, 2].max()), index - len(self.bodies)
+        width_m = self.bodies[index].width_m if number < 0 else _largest_extent(self._meshes[number])
         visible = cv2.inRange(rendering.objects, index + 1, index + 1)
         count = cv2.countNonZero(visible)
         x, y, width, height = cv2.boundingRect(visible)
@@ -170,7 +205,7 @@ class Simulator(object):
     def _motion_of(self, scene_object, mesh):
         if scene_object.pushed_by is None:
             return object_motion(scene_object, self.scenario.duration)
-        return PushedMotion(self._motions[scene_object.pushed_by - 1], GAP_M + float(np.ptp(mesh.vertices[:, 0])) / 2)
+        return PushedMotion(self.motions[scene_object.pushed_by - 1], GAP_M + float(np.ptp(mesh.vertices[:, 0])) / 2)
 
 
 def _largest_extent(mesh):
@@ -184,7 +219,7 @@ def _status(person):
     return OCCLUDED if person.hidden > 1 - person.inside else OUT_OF_VIEW  # the larger share decides
 
 
-def _upright(x, y, z, yaw):
+def upright(x, y, z, yaw):
     """Transform (4, 4) of a translation and a rotation about z."""
     transform = np.eye(4)
     transform[:3, :3], transform[:3, 3] = rotation(2, yaw), (x, y, z)

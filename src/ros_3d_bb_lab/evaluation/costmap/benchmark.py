@@ -29,7 +29,7 @@ from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.costmap.costmap_score import Costmap, Sighting, score_costmaps
 from ros_3d_bb_lab.evaluation.costmap.picture import draw_costmap
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, describe_machine, scenario_path
-from ros_3d_bb_lab.evaluation.latency.benchmark import free_port, running_roslaunch
+from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
 from ros_3d_bb_lab.evaluation.scene_benchmark import RANGE_M, depth_detector
 from ros_3d_bb_lab.evaluation.scenes import run_scene
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME

@@ -4,7 +4,6 @@ import contextlib
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -12,9 +11,9 @@ from typing import NamedTuple
 
 from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine, scenario_path
 from ros_3d_bb_lab.evaluation.latency.latency_result import result_of
+from ros_3d_bb_lab.evaluation.launching import launch
 
 IMAGES = 60  # first images of the scene, played forwards and backwards: 2 s, 90 MB
-ENDING_S = 40.0  # roslaunch waits up to 17 s for its nodes
 BUSY_LOOP = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    pass'
 HARNESS = ('replay_node', 'latency_probe_node', 'rosout')  # nodes of the benchmark, which do not run on a robot
 COLUMNS = '%-16s %6s %6s %8s %8s %8s %8s %9s %9s %9s %7s'
@@ -49,7 +48,7 @@ def measured(case, arguments, bag, folder):
     options = {'bag': bag, 'record': record, 'detector': case.detector, 'weights': case.weights,
                'image_size': case.image_size, 'seconds': arguments.seconds, 'rate': arguments.rate}
     with cpu_load(int(case.loaded)), open(log, 'w') as stream:
-        launch(['%s:=%s' % option for option in options.items()], arguments.seconds + 200, stream)
+        launch('latency.launch', options, arguments.seconds + 200, stream)
     try:
         with open(record) as stream:
             recorded = json.load(stream)
@@ -70,39 +69,6 @@ def cpu_load(cores):
         for process in processes:
             process.kill()
             process.wait()
-
-
-def launch(arguments, timeout_s, log):
-    """Run roslaunch latency.launch on a free port until it exits or times out."""
-    with running_roslaunch(['ros_3d_bb', 'latency.launch'] + arguments, free_port(), log) as process, \
-            contextlib.suppress(subprocess.TimeoutExpired):  # the missing record is reported
-        process.wait(timeout_s)
-
-
-@contextlib.contextmanager
-def running_roslaunch(arguments, port, log):
-    """Context in which roslaunch runs with its own master. Its nodes are terminated in any case.
-
-    roslaunch runs in a separate session, so that a Ctrl-C in the terminal reaches it only once, through this function.
-    """
-    process = subprocess.Popen(['roslaunch', '-p', str(port)] + arguments, stdout=log, stderr=subprocess.STDOUT,
-                               start_new_session=True,
-                               env=dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % port))
-    try:
-        yield process
-    finally:
-        process.send_signal(signal.SIGINT)  # has no effect if it has exited
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(ENDING_S)
-        process.kill()
-        process.wait()
-
-
-def free_port():
-    """TCP port that is not in use."""
-    with contextlib.closing(socket.socket()) as probe:
-        probe.bind(('localhost', 0))
-        return probe.getsockname()[1]
 
 
 def row(result):

@@ -16,20 +16,30 @@ TRUTH_TOPIC = 'ground_truth'
 MAP_FRAME, ODOM_FRAME, BASE_FRAME = 'map', 'odom', 'base_link'
 
 
+def transforms_of(poses, camera):
+    """Links (parent, child, parent_from_child (4, 4)) from the map to a camera, given by its name, for `Poses`."""
+    return [(MAP_FRAME, ODOM_FRAME, poses.map_from_odom), (ODOM_FRAME, BASE_FRAME, poses.odom_from_base),
+            (BASE_FRAME, frame_id_of(camera), poses.base_from_camera)]
+
+
 def simulated_messages(simulator, frame, stamp_ns):
     """Convert a frame to (topic, message) pairs: tf, camera_info, depth, colour, and ground truth in the map.
 
     The occlusion status in the ground truth refers to the camera of the frame.
     """
     stamp, frame_id = time_from(stamp_ns), frame_id_of(frame.camera)
-    chain = [(MAP_FRAME, ODOM_FRAME, frame.poses.map_from_odom), (ODOM_FRAME, BASE_FRAME, frame.poses.odom_from_base),
-             (BASE_FRAME, frame_id, frame.poses.base_from_camera)]
     taken = CameraFrame(Header(stamp=stamp, frame_id=frame_id), simulator.camera, frame.color,
-                        DepthImage(frame.depth_mm, 0.001), chain)
+                        DepthImage(frame.depth_mm, 0.001), transforms_of(frame.poses, frame.camera))
     messages = [(topic_of(frame.camera, topic) if topic != TF_TOPIC else topic, message)
                 for topic, message in messages_of(taken)]
     truth = tracks_to_msg(simulator.true_tracks(frame, stamp_ns), Header(stamp=stamp, frame_id=MAP_FRAME))
     return messages + [(TRUTH_TOPIC, truth)]
+
+
+def boxes_message(frame, boxes, stamp_ns, labels):
+    """Topic and message of 2D boxes (n, 4), integers, with class names, of a frame."""
+    header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(frame.camera))
+    return topic_of(frame.camera, BOXES_TOPIC), boxes2d_to_msg(boxes, header, labels, [1.0] * len(boxes))
 
 
 def scenario_images(scenario, with_boxes=False):
@@ -41,10 +51,8 @@ def scenario_images(scenario, with_boxes=False):
         messages = simulated_messages(simulator, frame, stamp_ns)
         if with_boxes:
             shown = [truth for truth in frame.truth if truth.box_px is not None]
-            header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(frame.camera))
-            messages.append((topic_of(frame.camera, BOXES_TOPIC),
-                             boxes2d_to_msg(np.array([truth.box_px for truth in shown], int).reshape(-1, 4), header,
-                                            [truth.label for truth in shown], [1.0] * len(shown))))
+            boxes = np.array([truth.box_px for truth in shown], int).reshape(-1, 4)
+            messages.append(boxes_message(frame, boxes, stamp_ns, [truth.label for truth in shown]))
         yield stamp_ns, messages
 
 

@@ -1,0 +1,4 @@
+"""Closed-loop benchmark: move_base drives the simulated robot among people.
+
+May import: camera, conversions, core, msg, nodes.common, lab.evaluation, lab.simulation.
+"""

@@ -1,0 +1,201 @@
+"""ROS node that supervises one trial of the navigation benchmark."""
+import json
+import threading
+import time
+from typing import NamedTuple
+
+import rospy
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Twist
+from nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from std_msgs.msg import Float32, Header, Time, UInt32
+from tf2_msgs.msg import TFMessage
+
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
+from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, camera_from_msg, time_from, transform_from_msg
+from ros_3d_bb.conversions.planner_msgs import points_to_msg
+from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.msg import TrackedObjectArray
+from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb_lab.evaluation.navigation.trial_result import (CELL_M, Pace, distance_m, occupancy,
+                                                              points_of, stops, was_driving)
+from ros_3d_bb_lab.simulation.scenario import read_scenario
+
+MAP_FRAME = 'map'
+REACHED_M = 0.4  # the goal tolerance of move_base is 0.3 m
+POLL_S = 0.002
+START_TIMEOUT_S, TRIAL_TIMEOUT_S = 180.0, 600.0  # of the machine's time
+WARM_UP_S = 1.0  # of the published time, with standing people
+
+
+@parameters()
+class NavigationTrialParams(NamedTuple):
+    """Parameters of navigation_trial_node."""
+
+    scenario: str = Param('')
+    record: str = Param('')
+    goal_x: float = Param(0.0, limits=(-1000, 1000))
+    goal_y: float = Param(0.0, limits=(-1000, 1000))
+    tracks: bool = Param(False, 'Whether the time waits for tracks.', section=SET_BY_LAUNCH)
+    cloud: bool = Param(False, 'Whether the points of the depth images are published.', section=SET_BY_LAUNCH)
+    timeout: float = Param(30.0)
+
+
+class NavigationTrialNode(object):
+    """Send a goal to move_base, measure how the simulated robot gets there, write the record and exit.
+
+    The node controls the time of the simulator: it is at most 0.2 s ahead of the newest inputs that tracker and planner
+    have processed, so that they keep up on a slow machine, too. Parameters: see
+    `NavigationTrialParams`; launch/navigation_benchmark.launch.
+
+    Subscribes
+    ----------
+    /tf : tf2_msgs/TFMessage
+        True pose of the robot, from the simulator.
+    odom : nav_msgs/Odometry
+        Speed of the robot.
+    clearance : std_msgs/Float32
+        Distance to the nearest person.
+    collisions : std_msgs/UInt32
+        Number of collisions.
+    cmd_vel : geometry_msgs/Twist
+        Commands of move_base, which show how far it has got.
+    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
+        Tracks, which show how far the tracker has got; only with ~tracks.
+    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
+        Depth images; only with ~cloud.
+    camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
+        Intrinsics of the depth images; only with ~cloud.
+    move_base/local_costmap/costmap : nav_msgs/OccupancyGrid
+        Shows that move_base has started.
+
+    Publishes
+    ---------
+    map : nav_msgs/OccupancyGrid
+        Walls and furniture of the scene, latched.
+    move_base_simple/goal : geometry_msgs/PoseStamped
+        Goal in the map.
+    points : sensor_msgs/PointCloud2
+        Points of the depth images; only with ~cloud.
+    simulator_node/time_limit : std_msgs/Time
+        Time that the simulator does not exceed.
+    """
+
+    def __init__(self):
+        self._params, = read_params(NavigationTrialParams)
+        self._pace, self._costmap_seen, self._camera = Pace(), False, None
+        self._position, self._speeds_mps, self._clearances_m = None, [], []
+        self._collisions, self._driving_collisions = 0, 0
+        self._map_pub = rospy.Publisher('map', OccupancyGrid, queue_size=1, latch=True)
+        self._goal_pub = rospy.Publisher('move_base_simple/goal', PoseStamped, queue_size=1)
+        self._limit_pub = rospy.Publisher('simulator_node/time_limit', Time, queue_size=1)
+        rospy.Subscriber('/tf', TFMessage, self._on_tf, queue_size=100)
+        rospy.Subscriber('odom', Odometry, lambda message: self._speeds_mps.append(message.twist.twist.linear.x))
+        rospy.Subscriber('clearance', Float32, lambda message: self._clearances_m.append(message.data))
+        rospy.Subscriber('collisions', UInt32, self._on_collisions)
+        rospy.Subscriber('cmd_vel', Twist, lambda _message: self._pace.heard('commands', self._now_ns()))
+        rospy.Subscriber('move_base/local_costmap/costmap', OccupancyGrid, self._on_costmap)
+        if self._params.tracks:
+            rospy.Subscriber(TRACKS_TOPIC, TrackedObjectArray,
+                             lambda message: self._pace.heard('tracks', message.header.stamp.to_nsec()))
+        if self._params.cloud:
+            self._cloud_pub = rospy.Publisher('points', PointCloud2, queue_size=1)
+            rospy.Subscriber(INFO_TOPICS[1], CameraInfo, self._on_camera)
+            rospy.Subscriber(DEPTH_TOPIC, Image, self._on_depth, queue_size=1, buff_size=2 ** 24)
+
+    def run(self):
+        """Run the trial and write the record."""
+        self._map_pub.publish(map_message(read_scenario(self._params.scenario).room))
+        worker = threading.Thread(target=self._run, daemon=True)  # publishing in the main thread can block on SIGINT
+        worker.start()
+        while worker.is_alive() and not rospy.is_shutdown():
+            worker.join(0.1)
+
+    def _run(self):
+        if not self._started():
+            rospy.logfatal('move_base, tracker or camera did not start within %.0f s; there is no result',
+                           START_TIMEOUT_S)
+            return
+        start_ns = self._now_ns()
+        self._speeds_mps, self._clearances_m = [], []
+        self._goal_pub.publish(goal_message(self._params, time_from(start_ns)))
+        self._pace.start(start_ns, ['commands'] + ['tracks'] * self._params.tracks + ['cloud'] * self._params.cloud)
+        time_to_goal_s = self._drive(start_ns)
+        result = {'time_to_goal_s': time_to_goal_s, 'collisions': self._collisions,
+                  'collisions_driving': self._driving_collisions, 'min_distance_m': min(self._clearances_m),
+                  'stops': stops(self._speeds_mps), 'late': self._pace.late}
+        with open(self._params.record, 'w') as stream:
+            json.dump(result, stream)
+
+    def _started(self):
+        """Wait until everything runs. Returns whether it does."""
+        deadline_s, ready_ns = time.monotonic() + START_TIMEOUT_S, None
+        wanted = set(['tracks'] * self._params.tracks + ['cloud'] * self._params.cloud)
+        while time.monotonic() < deadline_s and not rospy.is_shutdown():
+            is_ready = (self._costmap_seen and self._position is not None and wanted <= self._pace.sources
+                        and self._goal_pub.get_num_connections() and self._limit_pub.get_num_connections())
+            ready_ns = (ready_ns or self._now_ns()) if is_ready else None
+            if is_ready and self._now_ns() > ready_ns + WARM_UP_S * NS:
+                return True
+            time.sleep(0.05)
+        return False
+
+    def _drive(self, start_ns):
+        """Let time pass until the robot is at the goal. Returns the time that it took, seconds, or None."""
+        deadline_s = time.monotonic() + TRIAL_TIMEOUT_S
+        while time.monotonic() < deadline_s and not rospy.is_shutdown():
+            limit_ns = self._pace.new_limit(time.monotonic())
+            if limit_ns is not None:
+                self._limit_pub.publish(Time(time_from(limit_ns)))
+            elapsed_s = (self._now_ns() - start_ns) / NS
+            if distance_m(self._position, (self._params.goal_x, self._params.goal_y)) < REACHED_M:
+                return elapsed_s
+            if elapsed_s > self._params.timeout:
+                return None
+            time.sleep(POLL_S)
+        return None
+
+    def _now_ns(self):
+        return rospy.get_rostime().to_nsec()
+
+    def _on_tf(self, message):
+        links = {link.child_frame_id: transform_from_msg(link) for link in message.transforms}
+        if 'odom' in links and 'base_link' in links:
+            self._position = tuple(links['odom'].dot(links['base_link'])[:2, 3])
+
+    def _on_collisions(self, message):
+        if message.data > self._collisions:
+            self._driving_collisions += was_driving(self._speeds_mps)
+        self._collisions = message.data
+
+    def _on_costmap(self, _message):
+        self._costmap_seen = True
+
+    def _on_camera(self, message):
+        self._camera = camera_from_msg(message)
+
+    def _on_depth(self, message):
+        if self._camera is not None:
+            self._cloud_pub.publish(points_to_msg(points_of(imgmsg_to_depth(message), self._camera), message.header))
+            self._pace.heard('cloud', message.header.stamp.to_nsec())
+
+
+def map_message(room):
+    """Convert a scenario.Room to a map."""
+    cells = occupancy(room)
+    origin = Pose(Point(room.bounds[0], room.bounds[2], 0), Quaternion(0, 0, 0, 1))
+    return OccupancyGrid(Header(frame_id=MAP_FRAME), MapMetaData(
+        resolution=CELL_M, width=cells.shape[1], height=cells.shape[0], origin=origin), cells.ravel().tolist())
+
+
+def goal_message(params, stamp):
+    """Goal of a trial in the map, facing along x."""
+    pose = Pose(Point(params.goal_x, params.goal_y, 0), Quaternion(0, 0, 0, 1))
+    return PoseStamped(Header(stamp=stamp, frame_id=MAP_FRAME), pose)
+
+
+def main():
+    """Run the node until the trial is over."""
+    run_node('navigation_trial_node', NavigationTrialNode, NavigationTrialNode.run)

@@ -1,0 +1,183 @@
+"""World with a robot that obeys commands: motion, timeout, odometry, collisions, and people who give way."""
+import numpy as np
+import pytest
+
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb_lab.simulation.driven_world import COMMAND_TIMEOUT_S, DrivenWorld
+from ros_3d_bb_lab.simulation.scenario import Drive, Furniture, Move, Person, Robot, Room, Scenario
+from ros_3d_bb_lab.simulation.simulator import PREDICTION_STEP_S, STEP_S, Simulator
+
+CAMERA = Camera(8, 6, 8, 8, 4, 3)
+ROOM = Room(bounds=(-3.0, 12.0, -4.0, 4.0))
+EXACT = Drive(odometry_error=(0.0, 0.0))
+
+
+def simulator_of(*people, **others):
+    values = dict(duration=12.0, rate=15.0, seed=4, depth_noise=False, color_noise=0.0, people=people, room=ROOM)
+    return Simulator(Scenario(**dict(values, **others)), CAMERA)
+
+
+def driven(world, until_s, command=(1.0, 0.0), from_s=0.0):
+    """States of a world every 10 ms while the command is repeated every 100 ms."""
+    states = []
+    for step in range(int(round(from_s / STEP_S)), int(round(until_s / STEP_S)) + 1):
+        if command is not None and step % 10 == 0:
+            world.command(*command)
+        states.append(world.state_at(step * STEP_S))
+    return states
+
+
+def clearances_of(world, until_s, **options):
+    """Clearances while the robot is driven, every 10 ms."""
+    found = []
+    for step in range(int(round(until_s / STEP_S)) + 1):
+        driven(world, step * STEP_S, from_s=step * STEP_S, **options)
+        found.append(world.clearance_m)
+    return found
+
+
+def test_the_robot_obeys_commands_and_stops_without_them():
+    world = DrivenWorld(simulator_of())
+    moving = driven(world, 4.0, (0.5, 0.0))
+    assert moving[0].robot.velocity_mps[0] == 0
+    np.testing.assert_allclose(moving[200].robot.velocity_mps, (.5, 0))
+    stopping = driven(world, 7.0, None, from_s=4.01)
+    speeds_mps = [state.robot.velocity_mps[0] for state in stopping]
+    assert speeds_mps[int(COMMAND_TIMEOUT_S / STEP_S) - 5] == pytest.approx(.5)
+    assert speeds_mps[-1] == 0 == speeds_mps[int((COMMAND_TIMEOUT_S + .3) / STEP_S)]
+    assert stopping[-1].robot.position_m[0] == stopping[-100].robot.position_m[0] > 1.9
+
+
+def test_the_same_commands_lead_to_the_same_states():
+    people = (Person((4.0, .2), moves=(Move(to=(-2.0, 0.0)),), gives_way=True),
+              Person((6.0, 1.0), moves=(Move(to=(6.0, -3.0)),)))
+    first, second = (driven(DrivenWorld(simulator_of(*people)), 4.0, (.8, .1)) for _run in range(2))
+    assert str(first) == str(second)
+
+
+def test_a_world_cannot_go_back():
+    world = DrivenWorld(simulator_of())
+    world.state_at(1.0)
+    with pytest.raises(ValueError, match='0.5 is before'):
+        world.state_at(.5)
+
+
+@pytest.mark.parametrize('command', [(float('nan'), 0), (0, float('inf'))])
+def test_invalid_commands_are_rejected(command):
+    world = DrivenWorld(simulator_of())
+    world.command(.5, 0)
+    with pytest.raises(ValueError, match='not finite'):
+        world.command(*command)
+    assert world.state_at(.4).robot.velocity_mps[0] == pytest.approx(.5)
+
+
+def test_odometry_drifts_and_the_map_frame_does_not():
+    robot = Robot(pose=(1.0, 2.0, 0.3), drive=Drive(odometry_error=(.1, .0)))
+    simulator = simulator_of(robot=robot)
+    world = DrivenWorld(simulator)
+    start, end = (driven(world, until_s, from_s=from_s)[-1] for until_s, from_s in ((0.0, 0.0), (4.0, .01)))
+    np.testing.assert_allclose(start.map_from_odom, np.eye(4), atol=1e-12)
+    poses = simulator.poses(end)
+    map_from_base = poses.map_from_odom.dot(poses.odom_from_base)
+    np.testing.assert_allclose(map_from_base[:2, 3], end.robot.position_m)
+    driven_m = end.robot.position_m - (1, 2)
+    np.testing.assert_allclose(poses.odom_from_base[:2, 3] - (1, 2), 1.1 * driven_m)
+    np.testing.assert_allclose(world.odometry_velocity, (1.1, 0))
+
+
+def test_without_errors_odometry_is_exact():
+    simulator = simulator_of(robot=Robot(drive=EXACT))
+    state = driven(DrivenWorld(simulator), 3.0, (.7, .9))[-1]
+    np.testing.assert_allclose(state.map_from_odom, np.eye(4), atol=1e-9)
+
+
+def test_the_robot_stops_at_furniture_and_says_so_once():
+    world = DrivenWorld(simulator_of(room=ROOM._replace(furniture=(Furniture((3.0, 0.0), (1.0, 1.0, 1.0)),))))
+    end = driven(world, 6.0)[-1]
+    assert end.robot.position_m[0] == pytest.approx(3 - .5 - .255, abs=.011)
+    collision, = world.collisions
+    assert (collision.object, collision.speed_mps) == ('furniture 1', pytest.approx(1.0))
+    assert collision.time_s == pytest.approx(2.245 + .25, abs=.03)  # and the time of the acceleration
+    backward = driven(world, 7.5, (-1.0, 0.0), from_s=6.01)[-1]
+    assert backward.robot.position_m[0] < 1.5 and len(world.collisions) == 1
+    driven(world, 11.0, from_s=7.51)
+    assert [collision.object for collision in world.collisions] == ['furniture 1'] * 2
+
+
+def test_the_robot_stops_at_walls():
+    world = DrivenWorld(simulator_of())
+    end = driven(world, 4.0, (-2.0, 0.0))[-1]
+    assert [collision.object for collision in world.collisions] == ['a wall']
+    assert end.robot.position_m[0] == pytest.approx(-3 + .255, abs=.021)
+
+
+def test_the_robot_stops_at_people_and_may_move_away():
+    world = DrivenWorld(simulator_of(Person((6.0, 2.0)), Person((2.0, 0.0))))
+    end = driven(world, 4.0)[-1]
+    assert [collision.object for collision in world.collisions] == ['person 2']
+    assert -.02 < world.clearance_m <= .011
+    away = driven(world, 6.0, (-.5, 0.0), from_s=4.01)[-1]
+    assert away.robot.position_m[0] < end.robot.position_m[0] - .5 and world.clearance_m > .5
+
+
+def test_a_person_who_walks_into_the_standing_robot_is_a_collision_at_speed_0():
+    world = DrivenWorld(simulator_of(Person((3.0, 0.0), moves=(Move(to=(-2.0, 0.0), speed=1.0),))))
+    clearances_m = clearances_of(world, 5.0, command=None)
+    assert [(collision.object, collision.speed_mps) for collision in world.collisions] == [('person 1', 0)]
+    assert min(clearances_m) < -.2 and clearances_m[-1] > 1
+
+
+def test_the_clearance_is_between_footprint_and_body():
+    simulator = simulator_of(Person((2.0, 0.0)), Person((0.0, 3.0)))
+    world = DrivenWorld(simulator)
+    assert world.clearance_m == pytest.approx(2 - .255 - simulator.bodies[0].width_m / 2)
+    assert DrivenWorld(simulator_of()).clearance_m == float('inf')
+
+
+@pytest.mark.parametrize('robot, name', [(Robot(pose=(2.9, 0.1, 0.0)), 'furniture 1'),
+                                         (Robot(pose=(0.0, 3.8, 0.0)), 'a wall')])
+def test_the_robot_must_start_at_a_free_place(robot, name):
+    room = ROOM._replace(furniture=(Furniture((3.0, 0.0), (1.0, 1.0, 1.0)),))
+    with pytest.raises(ValueError, match='overlaps ' + name):
+        DrivenWorld(simulator_of(robot=robot, room=room))
+
+
+@pytest.mark.parametrize('moves, start', [((Move(to=(-2.0, 0.0), speed=1.2),), (6.0, .1)), ((), (3.0, .1))])
+def test_people_give_way_to_the_robot(moves, start):
+    person = Person(start, moves=moves)
+    stubborn, polite = (DrivenWorld(simulator_of(person._replace(gives_way=gives_way))) for gives_way in (False, True))
+    clearances_of(stubborn, 6.0, command=(.6, 0.0))
+    assert [collision.object for collision in stubborn.collisions] == ['person 1']
+    assert min(clearances_of(polite, 6.0, command=(.6, 0.0))) > .1
+    assert polite.collisions == []
+
+
+def test_people_who_give_way_walk_where_their_moves_lead():
+    """With the robot 3.6 m away."""
+    moves = (Move(wait=1.0), Move(to=(6.0, 2.0), speed=1.0), Move(to=(6.0, -2.0), speed=1.0))
+    simulator = simulator_of(Person((3.0, 2.0), moves=moves, gives_way=True))
+    states = driven(DrivenWorld(simulator), 11.0, None)
+    for state in states[::20]:
+        np.testing.assert_allclose(state.people[0].position_m, simulator.positions_at(state.time_s)[0], atol=.35)
+    walking, end = states[300].people[0], states[-1].people[0]
+    np.testing.assert_allclose(walking.velocity_mps, (1, 0), atol=.1)
+    assert walking.posture.swing > .8 and end.posture.swing < .2
+    np.testing.assert_allclose(end.position_m, (6, -2), atol=.05)
+
+
+def test_people_who_do_not_give_way_follow_their_moves_exactly():
+    simulator = simulator_of(Person((3.0, 2.0), moves=(Move(to=(0.0, 0.0)),)))
+    for state in driven(DrivenWorld(simulator), 3.0)[::50]:
+        assert str(state.people) == str(simulator.state_at(state.time_s).people)
+
+
+def test_the_true_prediction_starts_where_a_person_was_pushed_to():
+    simulator = simulator_of(Person((3.0, .1), moves=(Move(wait=5.0), Move(to=(3.0, 3.0))), gives_way=True))
+    world, number = DrivenWorld(simulator), 60
+    driven(world, simulator.time_s(number) - .005, (.6, 0.0))
+    frame = simulator.frame(number, world.state_at(simulator.time_s(number)))
+    track, = simulator.true_tracks(frame, 10 ** 18)
+    pushed_m = track.position_m[:2] - (3, .1)
+    assert np.hypot(*pushed_m) > .1
+    planned_m = simulator.positions_at(frame.time_s + 4 * PREDICTION_STEP_S)[0]
+    np.testing.assert_allclose(track.prediction_m[3, :2], planned_m + pushed_m)

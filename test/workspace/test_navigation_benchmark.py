@@ -1,0 +1,57 @@
+"""The benchmark of navigation: what each mode starts, and one trial under roslaunch."""
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from ros_3d_bb_lab.evaluation.navigation.benchmark import MODES
+from support.launching import loaded
+from support.processes import processes_naming
+from support.real_planners import planner_environment
+
+ARGUMENTS = ['scenario:=/some/scene.yaml', 'record:=/some/record.json']
+PIPELINE = {'bbox3d_node', 'tracker_node'}
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_modes_differ_in_what_move_base_knows_of_people(mode):
+    parameters, nodes = loaded('navigation_benchmark.launch', 'mode:=' + mode, *ARGUMENTS)
+    is_tracked = mode in ('ours', 'thesis')
+    assert PIPELINE & set(nodes) == (PIPELINE if is_tracked else set())
+    assert parameters['/simulator_node/boxes'] == is_tracked
+    assert parameters.get('/tracker_node/tracker') == {'ours': 'kalman', 'thesis': 'thesis'}.get(mode)
+    assert (('ground_truth', 'ros_3d_bb/tracks') in nodes['simulator_node'].remap_args) == (mode == 'truth')
+    layers = [layer['name'] for layer in parameters['/move_base/local_costmap/plugins']]
+    assert layers == ['static_layer'] + {'depth': ['obstacle_layer'], 'none': []}.get(mode, ['people_layer']) + [
+        'inflation_layer']
+    waits_for = [name for name in ('tracks', 'cloud') if parameters['/navigation_trial_node/' + name]]
+    assert waits_for == {'depth': ['cloud'], 'none': []}.get(mode, ['tracks'])
+    assert parameters['/simulator_node/drive'] and parameters['/simulator_node/supervised']
+
+
+@pytest.mark.slow
+def test_a_robot_that_knows_nothing_of_people_drives_into_the_one_in_its_way(tmp_path):
+    environment, _is_real = planner_environment(str(tmp_path / 'packages'))
+    results, logs = str(tmp_path / 'results.json'), tmp_path / 'logs'
+    logs.mkdir()
+    subprocess.check_call([sys.executable, '-m', 'ros_3d_bb_lab.evaluation', 'navigation', '--runs', '1', '--scenes',
+                           'standing', '--modes', 'none', '--json', results],
+                          env=dict(environment, ROS_HOSTNAME='localhost', ROS_LOG_DIR=str(logs)))
+    with open(results) as stream:
+        found = json.load(stream)
+    row = found['scenes']['standing']['none']
+    assert found['all']['none'] == row
+    assert (row['runs'], row['collisions'], row['collisions_driving'], row['reached'], row['stops']) == (1, 1, 1, 0, 1)
+    assert row['time_to_goal_s'] is None and -0.03 < row['min_distance_m'] < 0.03
+    assert processes_naming(str(logs)) == 0
+
+
+def test_without_move_base_the_benchmark_says_so(tmp_path):
+    paths = [path for path in os.environ.get('ROS_PACKAGE_PATH', '').split(os.pathsep) if 'planners-' not in path]
+    process = subprocess.run([sys.executable, '-m', 'ros_3d_bb_lab.evaluation', 'navigation', '--runs', '1'],
+                             env=dict(os.environ, ROS_PACKAGE_PATH=os.pathsep.join(paths)), stdout=subprocess.PIPE,
+                             stderr=subprocess.STDOUT, universal_newlines=True)
+    assert process.returncode == 1 and 'move_base is not installed' in process.stdout
+    assert 'Traceback' not in process.stdout
