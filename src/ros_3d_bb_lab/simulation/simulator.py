@@ -178,7 +178,7 @@ class Simulator(object):
         """
         times_s = prediction_times_s(PREDICTION_S, PREDICTION_STEP_S)
         paths = np.stack([self.positions_at(frame.time_s + time_s) for time_s in times_s], axis=1)
-        positions = np.array([person.position_m[:2] for person in frame.people]).reshape(-1, 2)
+        positions = np.array([truth.position_m[:2] for truth in frame.truth]).reshape(-1, 2)
         pushed_m = positions - self.positions_at(frame.time_s)
         if pushed_m.any():
             paths += pushed_m[:, None]
