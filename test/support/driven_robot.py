@@ -38,7 +38,7 @@ class DrivenRobot(object):
     def __init__(self):
         self.now_ns, self.people, self.sees = 1000 * NS, lambda _time_s: np.zeros((0, 2)), True
         self.velocity, self.commands, self._pose, self._cmd = 0.0, 0, np.zeros(3), np.zeros(2)
-        self._sent_ns, self._answered = None, True
+        self._sent_ns, self._answered, self._commands = None, True, 0
         self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=10)
         self._tf_pub = rospy.Publisher('/tf', TFMessage, queue_size=10)
         self._odom_pub = rospy.Publisher('odometry/filtered', Odometry, queue_size=10)
@@ -78,8 +78,11 @@ class DrivenRobot(object):
     def advance(self, seconds, is_driven=True):
         """Let time pass, with 10 images a second if the camera sees; `is_driven`: move_base has a goal."""
         for _step in range(int(round(10 * seconds))):
-            self._send_tf()
-            commands = self.commands
+            self._send_tf()  # first: the tracker needs it for the boxes before
+            if self.costmap.messages:
+                self._wait_for(lambda: (self.commands > self._commands or not is_driven)
+                               and self.now_ns - _newest_ns(self.costmap) < COSTMAP_NS)
+            self._commands = self.commands
             for tick in range(PERIOD_NS // TICK_NS):
                 self.now_ns += TICK_NS
                 self._clock_pub.publish(Clock(time_from(self.now_ns)))
@@ -88,8 +91,6 @@ class DrivenRobot(object):
                 time.sleep(TICK_NS / NS)
                 if tick == 2 and self.sees:
                     self._send_boxes()
-            self._wait_for(lambda: (commands < self.commands or not is_driven)
-                           and self.now_ns - _newest_ns(self.costmap) < COSTMAP_NS)
 
     def _send_tf(self):
         stamp_ns = self.now_ns
