@@ -7,8 +7,9 @@ setup(**generate_distutils_setup(
               'ros_3d_bb.drivers', 'ros_3d_bb.estimation', 'ros_3d_bb.nodes', 'ros_3d_bb.nodes.common',
               'ros_3d_bb.pipeline', 'ros_3d_bb.planning', 'ros_3d_bb.sessions', 'ros_3d_bb.tracking',
               'ros_3d_bb.visualization', 'ros_3d_bb_lab', 'ros_3d_bb_lab.evaluation',
-              'ros_3d_bb_lab.evaluation.baselines', 'ros_3d_bb_lab.evaluation.demo',
-              'ros_3d_bb_lab.evaluation.latency', 'ros_3d_bb_lab.evaluation.navigation',
-              'ros_3d_bb_lab.evaluation.noise', 'ros_3d_bb_lab.evaluation.tracking', 'ros_3d_bb_lab.simulation',
-              'ros_3d_bb_lab.simulation.ros', 'ros_3d_bb_annotator'],
+              'ros_3d_bb_lab.evaluation.baselines', 'ros_3d_bb_lab.evaluation.costmap',
+              'ros_3d_bb_lab.evaluation.demo', 'ros_3d_bb_lab.evaluation.latency',
+              'ros_3d_bb_lab.evaluation.navigation', 'ros_3d_bb_lab.evaluation.noise',
+              'ros_3d_bb_lab.evaluation.tracking', 'ros_3d_bb_lab.simulation', 'ros_3d_bb_lab.simulation.ros',
+              'ros_3d_bb_annotator'],
     package_dir={'': 'src', 'ros_3d_bb_annotator': 'annotator/ros_3d_bb_annotator'}))

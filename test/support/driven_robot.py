@@ -3,12 +3,14 @@ import time
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import TransformStamped, Twist
+from geometry_msgs.msg import Twist
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from, transform_points
+from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
@@ -19,6 +21,7 @@ TICK_NS, PERIOD_NS, IMAGE_NS = NS // 100, NS // 10, NS // 33  # images are taken
 CAMERA, BASE_FROM_CAMERA = 'camera_color_optical_frame', transform_from((0.17, 0, 0.2), OPTICAL_ROTATION)
 DRIFT = 0.03, -0.02, 0.02  # of odom in the map: x, y (m/s) and yaw (rad/s)
 PATIENCE_S = 1.0  # real time, for an answer
+COSTMAP_NS = 4 * NS // 10  # longest time between costmaps
 
 
 def level(x, y, yaw):
@@ -29,7 +32,7 @@ class DrivenRobot(object):
     """The robot starts at the origin of the map and looks along x. Its localisation and odometry publish tf at 10 Hz.
 
     `people` is a function from seconds to positions (n, 2) in the map. `velocity` is that of the last cmd_vel. Time
-    waits for the answers of the tracker and of move_base, so that a busy machine does not look like a fault.
+    waits for the answers of the bridge and of move_base, so that a busy machine does not look like a fault.
     """
 
     def __init__(self):
@@ -44,6 +47,8 @@ class DrivenRobot(object):
         self._map_pub.publish(self._empty_map())
         rospy.Subscriber('cmd_vel', Twist, self._on_cmd_vel, queue_size=1)
         self.tracks = Recorder('ros_3d_bb/tracks', TrackedObjectArray, publisher_expected=False)
+        self.ring = Recorder('planner_bridge_node/clearing_points', PointCloud2, publisher_expected=False)
+        self.costmap = Recorder('move_base/local_costmap/costmap', OccupancyGrid, publisher_expected=False)
 
     @staticmethod
     def _empty_map():
@@ -83,34 +88,32 @@ class DrivenRobot(object):
                 time.sleep(TICK_NS / NS)
                 if tick == 2 and self.sees:
                     self._send_boxes()
-            self._wait_for(lambda: commands < self.commands or not is_driven)
+            self._wait_for(lambda: (commands < self.commands or not is_driven)
+                           and self.now_ns - _newest_ns(self.costmap) < COSTMAP_NS)
 
     def _send_tf(self):
         stamp_ns = self.now_ns
         map_from_odom, odom_from_base = np.linalg.inv(self.odom_from_map(self.seconds)), level(*self._pose)
-        self._tf_pub.publish(TFMessage([_link(stamp_ns, 'map', 'odom', map_from_odom),
-                                        _link(stamp_ns, 'odom', 'base_link', odom_from_base),
-                                        _link(stamp_ns, 'base_link', CAMERA, BASE_FROM_CAMERA)]))
+        links = transform_messages(time_from(stamp_ns), [('map', 'odom', map_from_odom), (
+            'odom', 'base_link', odom_from_base), ('base_link', CAMERA, BASE_FROM_CAMERA)])
+        self._tf_pub.publish(TFMessage(links))
         odometry = Odometry(header=header_at(stamp_ns, 'odom'), child_frame_id='base_link')
         odometry.pose.pose.position.x, odometry.pose.pose.position.y = self._pose[:2]
-        odometry.pose.pose.orientation = _link(stamp_ns, '', '', odom_from_base).transform.rotation
+        odometry.pose.pose.orientation = links[1].transform.rotation
         odometry.twist.twist.linear.x, odometry.twist.twist.angular.z = self._cmd
         self._odom_pub.publish(odometry)
 
     def _send_boxes(self):
-        """The boxes of the people in front of the camera, once the tracks of the last ones have arrived."""
+        """The boxes of the people in front of the camera, once the bridge has answered the last ones."""
         if self._sent_ns and self._answered:
-            self._answered = self._wait_for(lambda: self._newest_ns() >= self._sent_ns)
-        self._answered |= bool(self._sent_ns) and self._newest_ns() >= self._sent_ns
+            self._answered = self._wait_for(lambda: _newest_ns(self.ring) >= self._sent_ns)
+        self._answered |= bool(self._sent_ns) and _newest_ns(self.ring) >= self._sent_ns
         map_from_camera = np.linalg.inv(self.odom_from_map(self.seconds)).dot(level(*self._pose)).dot(BASE_FROM_CAMERA)
         people_m = np.asarray(self.people(self.seconds)).reshape(-1, 2)
         centers_m = transform_points(np.linalg.inv(map_from_camera), np.c_[people_m, np.full(len(people_m), 0.85)])
         self._boxes_pub.publish(boxes(self.now_ns, CAMERA, [tuple(center_m) for center_m in centers_m
                                                             if center_m[2] > 0.5]))
         self._sent_ns = self.now_ns
-
-    def _newest_ns(self):
-        return self.tracks.messages[-1].header.stamp.to_nsec() if self.tracks.messages else 0
 
     @staticmethod
     def _wait_for(condition):
@@ -120,13 +123,7 @@ class DrivenRobot(object):
         return condition()
 
 
-def _link(stamp_ns, parent, child, transform):
-    link = TransformStamped(header=header_at(stamp_ns, parent), child_frame_id=child)
-    place, turn = link.transform.translation, link.transform.rotation
-    place.x, place.y, place.z = transform[:3, 3]
-    if child == CAMERA:
-        turn.x, turn.y, turn.z, turn.w = -0.5, 0.5, -0.5, 0.5
-    else:
-        yaw = np.arctan2(transform[1, 0], transform[0, 0])
-        turn.z, turn.w = np.sin(yaw / 2), np.cos(yaw / 2)
-    return link
+def _newest_ns(recorder):
+    """Stamp of the newest message."""
+    messages = recorder.messages
+    return messages[-1].header.stamp.to_nsec() if messages else 0

@@ -1,8 +1,8 @@
 """What planners do with the messages of planner_bridge_node: replicas of the behaviour of the sources named at each."""
 import genpy
 import numpy as np
+import tf2_ros
 from geometry_msgs.msg import Point, PoseWithCovariance, Vector3
-from sensor_msgs import point_cloud2
 
 from ros_3d_bb.msg import TrackedObject
 
@@ -96,23 +96,35 @@ class JackalMpcReplica(object):
 class SocialLayerReplica(object):
     """social_navigation_layers: social_layer.cpp.
 
-    It keeps the last list and ignores its stamp. Position, and position plus velocity, are transformed by the latest
-    transform; their difference is the velocity.
+    It keeps the last list. At each update, position, and position plus velocity, are transformed at the stamp of the
+    list (0: the latest transform) without waiting; their difference is the velocity. People for whom there is no
+    transform are dropped.
+
+    Parameters
+    ----------
+    costmap_from : callable
+        The 4x4 matrix from a frame at a stamp to the costmap's frame; raises tf2_ros.TransformException.
     """
 
     def __init__(self, costmap_from):
-        self._costmap_from = costmap_from
+        self._costmap_from, self._people = costmap_from, None
 
     def receive(self, people):
         self._people = people
 
     def people(self):
         """(position (3,), velocity (3,)) of each."""
+        if self._people is None:
+            return []
+        try:
+            transform = self._costmap_from(self._people.header.frame_id, self._people.header.stamp)
+        except tf2_ros.TransformException:
+            return []
         found = []
         for person in self._people.people:
             position = np.array([person.position.x, person.position.y, person.position.z])
             end = position + [person.velocity.x, person.velocity.y, person.velocity.z]
-            start, end = moved([position, end], self._costmap_from[self._people.header.frame_id])
+            start, end = moved([position, end], transform)
             found.append((start, end - start))
         return found
 
@@ -126,8 +138,8 @@ class ObstacleLayerReplica(object):
 
     Parameters
     ----------
-    costmap_from : dict
-        4x4 matrices by frame.
+    costmap_from : callable
+        The 4x4 matrix from a frame at a stamp to the costmap's frame.
     sources : dict
         The layer's parameters of each observation source, by its name; what is not given has costmap_2d's default.
     """
@@ -143,18 +155,21 @@ class ObstacleLayerReplica(object):
         self.grid = np.full((self.cells, self.cells), FREE, np.uint8)  # [y, x], centre at the costmap's origin
 
     def receive(self, name, cloud):
-        points = np.array(list(point_cloud2.read_points(cloud, ('x', 'y', 'z')))).reshape(-1, 3)
-        points = moved_float32(points, self._costmap_from[cloud.header.frame_id])
+        offsets = {field.name: field.offset for field in cloud.fields}
+        kind = np.dtype({'names': 'xyz', 'formats': ['<f4'] * 3, 'offsets': [offsets[name] for name in 'xyz'],
+                         'itemsize': cloud.point_step})
+        points = np.frombuffer(cloud.data, kind)
+        points = np.column_stack([points[name] for name in 'xyz'])
+        points = moved_float32(points, self._costmap_from(cloud.header.frame_id, cloud.header.stamp))
         source = self._sources[name]
         inside = (points[:, 2] >= source['min_obstacle_height']) & (points[:, 2] <= source['max_obstacle_height'])
         sensor = source['sensor_frame'] or cloud.header.frame_id
-        self._clouds[name] = self._costmap_from[sensor][:3, 3], points[inside]
+        self._clouds[name] = self._costmap_from(sensor, cloud.header.stamp)[:3, 3], points[inside]
 
     def update(self):
         for name, (origin, points) in self._clouds.items():
-            if self._sources[name]['clearing']:
-                for point in points:
-                    self._clear(origin, point, self._sources[name]['raytrace_range'])
+            if self._sources[name]['clearing'] and len(points):
+                self._clear(origin, points, self._sources[name]['raytrace_range'])
         for name, (origin, points) in self._clouds.items():
             if self._sources[name]['marking']:
                 reach_m = self._sources[name]['obstacle_range']
@@ -166,14 +181,17 @@ class ObstacleLayerReplica(object):
         x, y = np.floor(np.asarray(points)[..., :2] / self.resolution).astype(int).T + self.cells // 2
         return x, y
 
-    def _clear(self, origin, point, range_m):
-        """One cell a step along the longer axis, from the sensor's cell to that of the point, as far as it reaches."""
-        start, end = np.array(self._cell(origin)), np.array(self._cell(point))
-        steps = max(np.abs(end - start).max(), 1)
-        share = min(1.0, range_m / max(self.resolution * np.linalg.norm(end - start), 1e-9))
-        line = np.rint(start + np.outer(np.arange(int(share * steps) + 1), (end - start) / steps)).astype(int)
-        line = line[((line >= 0) & (line < self.cells)).all(axis=1)]
-        self.grid[line[:, 1], line[:, 0]] = FREE
+    def _clear(self, origin, points, range_m):
+        """One cell a step along the longer axis, from the sensor's cell to those of the points, up to the range."""
+        start = np.array(self._cell(origin))
+        ways = np.column_stack(self._cell(points)) - start
+        steps = np.maximum(np.abs(ways).max(axis=1), 1)
+        shares = np.minimum(1.0, range_m / np.maximum(self.resolution * np.linalg.norm(ways, axis=1), 1e-9))
+        numbers = np.arange(steps.max() + 1)
+        lines = np.rint(start + numbers[:, None, None] * (ways / steps[:, None])).astype(int)
+        reached = numbers[:, None] <= (shares * steps).astype(int)
+        cells = lines[reached & ((lines >= 0) & (lines < self.cells)).all(axis=2)]
+        self.grid[cells[:, 1], cells[:, 0]] = FREE
 
     def lethal(self):
         """Centres of the lethal cells, (n, 2) metres."""

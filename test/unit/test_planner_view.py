@@ -44,6 +44,15 @@ def test_footprints_fill_the_cylinder_and_the_ground_ahead_without_gaps():
     assert np.linalg.norm(strip - points[np.newaxis, :, :2], axis=-1).min(axis=1).max() < 0.05
 
 
+def test_footprints_end_where_the_prediction_is_uncertain():
+    """The standard deviation grows from 0.3 m now to 0.6 m after 0.5 s: 0.5 m after 0.33 s."""
+    track = track_at([2, 0, 0.85], [1.5, 0, 0], covariance=0.3 ** 2 * np.eye(6))._replace(
+        prediction_covariance_m2=np.array([std_m ** 2 * np.eye(3) for std_m in (0.45, 0.6, 0.75, 0.9, 1, 1, 1, 1)]))
+    assert footprint_points([track], 0.5, 0.05)[:, 0].max() == pytest.approx(2.25 + 0.3 * 1.5)
+    certain = track._replace(prediction_covariance_m2=0.3 ** 2 * np.repeat(np.eye(3)[np.newaxis], 8, axis=0))
+    assert footprint_points([certain], 0.5, 0.05)[:, 0].max() == pytest.approx(2.25 + 0.5 * 1.5)
+
+
 @given(st.floats(0.02, 3), st.floats(0.01, 0.5))
 def test_a_disc_has_its_outline_and_nothing_outside(radius_m, spacing_m):
     disc, ring = disc_points(radius_m, spacing_m), ring_points(radius_m, spacing_m)

@@ -40,8 +40,8 @@ class PlannerBridgeParams(NamedTuple):
         0.5, 'How far ahead costmaps are marked with predicted footprints; 0: current positions only. The costmap '
         'does not know when people will be there, so long times block free ways.', 's')
     point_spacing: float = Param(
-        0.05, 'Distance between the points of a footprint; at most a cell of the costmap.', 'm',
-        limits=(0.001, LARGEST))
+        0.035, 'Distance between the points of a footprint; at most 0.7 of a cell of the costmap, whose grid is turned '
+        'against that of the points.', 'm', limits=(0.001, LARGEST))
     clearing_range: float = Param(
         10.0, 'Radius of the ring of points around the robot up to which the costmap is cleared before people are '
         'marked; 0: no ring. At least the raytrace_range of the costmap.', 'm')
@@ -85,7 +85,8 @@ class PlannerTopic(object):
 class PlannerBridgeNode(object):
     """Publish tracks in the message formats of planners.
 
-    ~outputs selects the published topics. If no tracks arrive for ~timeout, an empty array is published once on each.
+    ~outputs selects the published topics. If no tracks arrive for ~timeout, an empty array is published once on each,
+    except for ~clearing_points.
     Parameters: config/planner_bridge.yaml.
 
     Subscribes
@@ -103,9 +104,9 @@ class PlannerBridgeNode(object):
         `costmap`: current and predicted footprints of people, as points for an obstacle layer.
     ~clearing_points : sensor_msgs/PointCloud2
         `costmap`: ring of points around the robot up to which the costmap is cleared before people are marked. Not
-        published if ~clearing_range is 0.
+        published if ~clearing_range is 0, and while there are no valid tracks, so that a costmap can notice it.
     /people : people_msgs/People
-        `people`: for social_navigation_layers.
+        `people`: for social_navigation_layers. The stamp is 0, for which tf2 takes the latest transform.
     ~obstacles : costmap_converter/ObstacleArrayMsg
         `teb`: for teb_local_planner.
     ~objects : derived_object_msgs/ObjectArray

@@ -9,6 +9,7 @@ from ros_3d_bb.core.labels import label_fault, score_fault
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
 
 SWATH_STEP_S = 0.1  # a person at 3 m/s moves 0.3 m, less than a body's width, so that the footprints overlap
+MAX_STD_M = 0.5  # predicted positions that are less certain are not marked
 SAME_FRAME = np.eye(4)
 LOWEST, HIGHEST = 0.25, 0.75  # fractions of a cylinder's height: off the floor and below 2 m, the limit of costmaps
 
@@ -89,16 +90,29 @@ def rounding_m(tracks, b_from_a):
 
 def footprint_points(tracks, ahead_s, spacing_m):
     """Points (n, 3) of people's cylinders at three heights, and of the discs that they are predicted to cover up to
-    `ahead_s` seconds ahead, at half their height. The points of a disc are `spacing_m` apart.
+    `ahead_s` seconds ahead, at half their height, as long as their position is certain (`MAX_STD_M`). The points of a
+    disc are `spacing_m` apart.
     """
     later_s = np.linspace(0, ahead_s, int(np.ceil(ahead_s / SWATH_STEP_S)) + 1)[1:]
     points = [np.empty((0, 3))]
     for track in tracks:
         disc = disc_points(track.size_m[0] / 2, spacing_m)
         levels_m = np.outer((np.array([LOWEST, 0.5, HIGHEST]) - 0.5) * track.size_m[2], [0, 0, 1])
-        centers_m = np.vstack((track.position_m + levels_m, position_after(track, later_s)))
+        certain_s = later_s[_position_std_after(track, later_s) < MAX_STD_M]
+        centers_m = np.vstack((track.position_m + levels_m, position_after(track, certain_s)))
         points.append((centers_m[:, np.newaxis] + disc).reshape(-1, 3))
     return np.concatenate(points)
+
+
+def _position_std_after(track, ahead_s):
+    """Standard deviation (n,) of the position `ahead_s` (n,) seconds after the stamp, the larger one of x and y, metres;
+    0 if unknown.
+    """
+    if track.covariance is None or track.prediction_covariance_m2 is None:
+        return np.zeros(len(ahead_s))
+    covariances_m2 = np.concatenate((track.covariance[np.newaxis, :3, :3], track.prediction_covariance_m2))
+    std_m = np.sqrt(np.maximum(covariances_m2[:, 0, 0], covariances_m2[:, 1, 1]))
+    return np.interp(ahead_s, track.prediction_step_s * np.arange(len(std_m)), std_m)
 
 
 def disc_points(radius_m, spacing_m):

@@ -14,6 +14,7 @@ STEP_S = 0.1
 BODY_M = 0.3  # a person has left a place at this distance
 WALKING_MPS = 0.4
 TRACKED_M = 0.5  # maximum distance between a person and a matching track
+SETTLED_S = 0.3  # from the image of a new track until its marks count: latency of the pipeline and a cycle
 
 
 class Costmap(NamedTuple):
@@ -51,7 +52,7 @@ class Sighting(NamedTuple):
     tracks_m: np.ndarray
 
 
-def score_costmaps(costmaps, sightings, positions_at, walking):
+def score_costmaps(costmaps, sightings, positions_at):
     """Score the costmaps of a scene.
 
     Parameters
@@ -59,12 +60,10 @@ def score_costmaps(costmaps, sightings, positions_at, walking):
     costmaps : list of Costmap
         In the order of time.
     sightings : list of Sighting
-        In the order of time. A person counts once a track was published within `TRACKED_M`, until the next image in
+        In the order of time. A person counts `SETTLED_S` after a track was within `TRACKED_M`, until the next image in
         which the person is not visible.
     positions_at : callable
         True positions (n, 2) of the people at a time.
-    walking : callable
-        Speeds (n,) of the people at a time, m/s.
 
     Returns
     -------
@@ -75,23 +74,23 @@ def score_costmaps(costmaps, sightings, positions_at, walking):
     """
     hits = _hits(costmaps, _counted(sightings, positions_at), positions_at)
     false = [_is_false(costmap, positions_at) for costmap in costmaps]
-    trails_s = _trails_s(costmaps, positions_at, walking)
-    lethal = sum(len(cells) for cells in false)
+    trails_s = _trails_s(costmaps, positions_at)
+    lethal, wrong = sum(len(cells) for cells in false), sum(int(cells.sum()) for cells in false)
     return {'costmaps': len(costmaps), 'people': len(hits), 'recall': float(np.mean(hits)) if len(hits) else None,
-            'lethal_cells': lethal, 'false_cells': sum(int(cells.sum()) for cells in false) / lethal if lethal else None,
+            'lethal_cells': lethal, 'false_cells': wrong / lethal if lethal else None,
             'trails': len(trails_s), 'trail_p95_s': float(np.percentile(trails_s, 95)) if len(trails_s) else None}
 
 
 def _counted(sightings, positions_at):
-    """Times, and which people (n,) are visible and tracked at each."""
-    times_s, rows, tracked = [], [], False
+    """Times, and which people (n,) count at each."""
+    rows, since_s = [], np.inf
     for sighting in sightings:
         people_m = positions_at(sighting.time_s)
-        off_m = np.linalg.norm(people_m[:, None] - sighting.tracks_m[None].reshape(1, -1, 2), axis=2)
-        tracked = sighting.visible & (tracked | (off_m < TRACKED_M).any(axis=1))
-        times_s.append(sighting.time_s)
-        rows.append(tracked)
-    return np.array(times_s), rows
+        off_m = np.linalg.norm(people_m[:, None] - sighting.tracks_m.reshape(1, -1, 2), axis=2)
+        first_s = np.where((off_m < TRACKED_M).any(axis=1), sighting.time_s, np.inf)
+        since_s = np.where(sighting.visible, np.minimum(since_s, first_s), np.inf)
+        rows.append(sighting.time_s - since_s >= SETTLED_S)
+    return np.array([sighting.time_s for sighting in sightings]), rows
 
 
 def _hits(costmaps, counted, positions_at):
@@ -116,18 +115,17 @@ def _is_false(costmap, positions_at):
     return nearest_m > NEAR_M
 
 
-def _trails_s(costmaps, positions_at, walking):
+def _trails_s(costmaps, positions_at):
     """How long lethal places stay lethal after a walking person has left them.
 
     Places that another person comes near, or that the person returns to, are not counted.
     """
     times_s = np.array([costmap.time_s for costmap in costmaps])
     trails_s = []
-    for number in range(0, len(costmaps)):
-        start_s = times_s[number]
-        people_m, speeds_mps = positions_at(start_s), walking(start_s)
-        under = costmaps[number].is_lethal(people_m)
-        for person in np.flatnonzero((speeds_mps > WALKING_MPS) & (under == 1)):
+    for costmap, start_s in zip(costmaps, times_s):
+        people_m = positions_at(start_s)
+        speeds_mps = np.linalg.norm(positions_at(start_s + STEP_S) - people_m, axis=1) / STEP_S
+        for person in np.flatnonzero((speeds_mps > WALKING_MPS) & (costmap.is_lethal(people_m) == 1)):
             gone_s = start_s + BODY_M / speeds_mps[person]
             later = costmaps[np.searchsorted(times_s, gone_s):]
             lasted_s = _lasted_s(later, people_m[person], person, gone_s, positions_at)
