@@ -23,7 +23,7 @@ from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.doctor import graph_findings
-from ros_3d_bb_lab.evaluation.latency.benchmark import free_port
+from ros_3d_bb_lab.evaluation.launching import free_port
 from support.processes import end
 from support.ros import Recorder, camera_info, depth_message, header_at, wait_until
 

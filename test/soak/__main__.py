@@ -6,7 +6,7 @@ import signal
 import sys
 import tempfile
 
-from ros_3d_bb_lab.evaluation.latency.benchmark import free_port
+from ros_3d_bb_lab.evaluation.launching import free_port
 
 SCENARIOS = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'config', 'scenarios')
 SCENES = ('demo', 'thesis_e_passing', 'behind_a_pillar', 'empty_room')

@@ -11,7 +11,7 @@ import time
 from hashlib import sha1
 from unittest import mock
 
-from ros_3d_bb_lab.evaluation.latency.benchmark import free_port
+from ros_3d_bb_lab.evaluation.launching import free_port
 from support.code_blocks import ROOT
 from support.launching import RS_CAMERA_ARGUMENTS, stand_in_gazebo, stand_in_launch_file, write
 from support.screen import start_screen

@@ -8,7 +8,7 @@ import sys
 import pytest
 import yaml
 
-from ros_3d_bb_lab.evaluation.latency.benchmark import free_port
+from ros_3d_bb_lab.evaluation.launching import free_port
 from support.launching import RS_CAMERA_ARGUMENTS, stand_in_launch_file, write
 from support.small_session import write_small_session
 

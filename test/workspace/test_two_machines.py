@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from ros_3d_bb_lab.evaluation.latency.benchmark import free_port
+from ros_3d_bb_lab.evaluation.launching import free_port
 from support.processes import end
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
