@@ -61,13 +61,13 @@ ALLOWED = {
     'ros_3d_bb_lab.evaluation.demo': (
         'conversions core tracking visualization lab.evaluation lab.simulation.ros',
         'matplotlib rosbag'),
-    'ros_3d_bb_lab.evaluation.costmap': (
-        'camera conversions core estimation msg tracking visualization lab.evaluation lab.evaluation.latency '
-        'lab.simulation lab.simulation.ros',
-        'cv2 nav_msgs rosgraph_msgs rospy std_msgs tf2_msgs'),
     'ros_3d_bb_lab.evaluation.navigation': (
         'camera conversions core msg nodes.common lab.evaluation lab.simulation',
         'geometry_msgs nav_msgs rospy sensor_msgs std_msgs tf2_msgs yaml'),
+    'ros_3d_bb_lab.evaluation.costmap': (
+        'camera conversions core estimation msg tracking visualization lab.evaluation '
+        'lab.simulation lab.simulation.ros',
+        'cv2 nav_msgs rosgraph_msgs rospy std_msgs tf2_msgs'),
     'ros_3d_bb_lab.evaluation.latency': (
         'bags conversions core msg nodes.common lab.evaluation',
         'rospy sensor_msgs std_msgs visualization_msgs'),

@@ -22,7 +22,7 @@ def test_modes_differ_in_what_move_base_knows_of_people(mode):
     assert PIPELINE & set(nodes) == (PIPELINE if is_tracked else set())
     assert parameters['/simulator_node/boxes'] == is_tracked
     assert parameters.get('/tracker_node/tracker') == {'ours': 'kalman', 'thesis': 'thesis'}.get(mode)
-    assert (('ground_truth', 'ros_3d_bb/tracks') in nodes['simulator_node'].remap_args) == (mode == 'truth')
+    assert (['ground_truth', 'ros_3d_bb/tracks'] in nodes['simulator_node'].remap_args) == (mode == 'truth')
     layers = [layer['name'] for layer in parameters['/move_base/local_costmap/plugins']]
     assert layers == ['static_layer'] + {'depth': ['obstacle_layer'], 'none': []}.get(mode, ['people_layer']) + [
         'inflation_layer']

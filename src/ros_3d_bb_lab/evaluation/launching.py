@@ -9,7 +9,7 @@ ENDING_S = 40.0  # roslaunch waits up to 17 s for its nodes
 
 
 def launch(name, arguments, timeout_s, log):
-    """Run a launch file of the package on a free port until it exits or times out; `arguments` is a dictionary."""
+    """Run a launch file of the package, with a dictionary of arguments, until it exits or times out."""
     command = ['ros_3d_bb', name] + ['%s:=%s' % item for item in arguments.items()]
     with running_roslaunch(command, free_port(), log) as process, \
             contextlib.suppress(subprocess.TimeoutExpired):  # the caller reports the missing result
