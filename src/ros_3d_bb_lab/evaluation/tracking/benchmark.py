@@ -4,6 +4,7 @@ Detection errors are as measured in the thesis. Without recordings, pedestrian t
 """
 import argparse
 import json
+import math
 import os
 import sys
 import time
@@ -20,6 +21,7 @@ from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker,
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import SimulatedDetection
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
+from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
 from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, detection_of, simulate, view_of
 from ros_3d_bb_lab.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
@@ -108,10 +110,15 @@ def crowd(people, images):
 def table(trackers):
     """Format {name: scores} as lines of text."""
     lines = ['%-22s' % '' + ''.join('%20s' % name for name in trackers)]
-    for key in list(trackers.values())[0]:
-        if key != 'cpu_ms':
+    for key, value in list(trackers.values())[0].items():
+        if not isinstance(value, dict):
             lines.append('%-22s' % key + ''.join('%20s' % _text(key, scores[key]) for scores in trackers.values()))
-    for people in list(trackers.values())[0]['cpu_ms']:
+    for band, shares in list(trackers.values())[0]['coverage_95_by_range'].items():
+        for name in shares:
+            values = [scores['coverage_95_by_range'][band][name] for scores in trackers.values()]
+            lines.append('%-22s' % ('coverage_95 %s m, %s' % (band, name))
+                         + ''.join('%20s' % _text('coverage_95', value) for value in values))
+    for people in list(trackers.values())[0].get('cpu_ms', ()):
         times = ''.join('%20.2f' % scores['cpu_ms'][people] for scores in trackers.values())
         lines.append('%-22s' % ('cpu_ms, %s people' % people) + times)
     return lines
@@ -126,6 +133,8 @@ def _text(key, value):
 
 def bench(arguments):
     """Run the comparison and print it. Returns the settings and the scores of each tracker, as written by --json."""
+    if arguments.detections:
+        return _bench_detections(arguments)
     sequences = read_sequences(arguments.data) if arguments.data else made_sequences(arguments.seed)
     names = [sequence.name for sequence in sequences]
     print('sequences: %s (%s), seed %d' % (', '.join(names), arguments.data or 'generated; no recordings found',
@@ -138,6 +147,16 @@ def bench(arguments):
     print('\n'.join(table(trackers)))
     return {'sequences': names, 'recorded': bool(arguments.data), 'seed': arguments.seed,
             'repetitions': arguments.repetitions, 'seconds': arguments.seconds, 'trackers': trackers}
+
+
+def _bench_detections(arguments):
+    """Run the comparison on recorded detections, as `bench`."""
+    runs = list(read_recordings(arguments.detections, arguments.every, arguments.min_score,
+                                not arguments.no_odometry))
+    trackers = compare(runs, CONTESTANTS)
+    print('\n'.join(table(trackers)))
+    return {'sequences': [run.name for run in runs], 'every': arguments.every, 'odometry': not arguments.no_odometry,
+            'trackers': trackers}
 
 
 def main():
@@ -158,6 +177,13 @@ def _arguments():
     parser.add_argument('--data', default=data if os.path.isdir(data) else None, metavar='DIR',
                         help='folder of CSV files with the columns %s (default: $ROS_3D_BB_DATA/data/trajectories if '
                         'it exists, otherwise generated trajectories)' % ','.join(COLUMNS))
+    parser.add_argument('--detections', metavar='DIR', help='track recorded 3D detections instead: a folder of '
+                        'recordings, see doc/benchmarks.md')
+    parser.add_argument('--every', type=int, default=1, metavar='N', help='of --detections: use each N-th image')
+    parser.add_argument('--min-score', type=float, default=-math.inf, metavar='S',
+                        help='of --detections: leave out boxes with lower scores (default: none)')
+    parser.add_argument('--no-odometry', action='store_true',
+                        help='of --detections: track in the frame of the camera, as without a pose of the robot')
     parser.add_argument('--seed', type=int, default=0, metavar='N', help='random seed (default: 0)')
     parser.add_argument('--repetitions', type=int, default=2, metavar='N',
                         help='runs of each sequence with a standing and with a driving robot (default: 2)')
@@ -165,7 +191,7 @@ def _arguments():
     parser.add_argument('--bound', action='store_true', help='also score our tracker with perfect data association')
     parser.add_argument('--json', metavar='FILE', help='also write the scores to FILE')
     arguments = parser.parse_args()
-    for name in ('repetitions', 'seconds'):
+    for name in ('repetitions', 'seconds', 'every'):
         if not getattr(arguments, name) > 0:
             parser.error('--%s is %g; more than 0 expected' % (name, getattr(arguments, name)))
     if not 0 <= arguments.seed < 2 ** 32:

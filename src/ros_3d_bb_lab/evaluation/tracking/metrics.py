@@ -2,8 +2,8 @@
 
 Scored are the people that are VISIBLE in an image, and all tracks published for it, independent of their status. Tracks
 and people within `PAIRED_M` are matched one to one: as many as possible, with the least sum of distances. A track
-farther than `MATCHED_M` from every person is a false positive. It is ignored if the camera cannot decide this: at the
-borders of the field of view, and near people that are not scored. TrackEval's similarity falls from 1 at distance 0 to
+farther than `MATCHED_M` from every person is a false positive, except outside of the scored area of the run, where
+this cannot be decided. TrackEval's similarity falls from 1 at distance 0 to
 0 at `PAIRED_M`; a match requires 0.5, which corresponds to `MATCHED_M`. Errors of velocities, predictions and
 covariances are computed from the matched pairs.
 """
@@ -14,33 +14,33 @@ import numpy as np
 
 from ros_3d_bb.tracking.association import assign, plane_distances
 from ros_3d_bb.tracking.types import VISIBLE
-from ros_3d_bb_lab.evaluation.tracking.robot_motion import bearing_of, to_frame
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S
 
 PAIRED_M, MATCHED_M = 1.0, 0.5
-UNSCORED_M = 0.75  # a track within this distance of a person that is not scored most likely belongs to that person
-BORDER, BORDER_M, NEAREST_M = 0.04, 0.15, 0.5  # margins of the field of view: radians, far end, near end
+RANGES_M = 0, 8, 16, 40  # limits of the bands in which the ellipses are checked
 WITHIN_95 = 5.991  # 95 % quantile of chi squared with 2 degrees of freedom
 
 
 def score_run(run, outputs):
     """Score a tracker on a run_generator.Run, with a list of TrackedObject after each image.
 
-    Returns the results of TrackEval's HOTA, CLEAR and Identity metrics, and the errors (n, 2 + horizons, 3) of the n
-    matched tracks in position, velocity and the predictions for `HORIZONS_S`: x and y, NaN if the truth is unknown, and
-    the squared Mahalanobis distance, NaN for tracks without covariance.
+    Returns the results of TrackEval's HOTA, CLEAR and Identity metrics, the errors (n, 2 + horizons, 3) of the n
+    matched tracks in position, velocity and the predictions for `HORIZONS_S`, and the ranges (n,) of the people. An
+    error is x and y, NaN if the truth is unknown, and the squared Mahalanobis distance, NaN for tracks without
+    covariance.
     """
-    people, tracks, similarities, errors = [], [], [], []
+    people, tracks, similarities, errors, ranges_m = [], [], [], [], []
     for image, objects in zip(run.images, outputs):
-        person_ids, track_ids, similarity, image_errors = _score_image(image.truth, objects, run.camera)
+        person_ids, track_ids, similarity, image_errors, image_ranges_m = _score_image(image.truth, objects, run.in_scored_area(image, objects))
         people.append(person_ids)
         tracks.append(track_ids)
         similarities.append(similarity)
         errors += image_errors
+        ranges_m += image_ranges_m
     data = trackeval_data(people, tracks, similarities)
     with contextlib.redirect_stdout(io.StringIO()):
         results = [metric.eval_sequence(data) for metric in trackeval_metrics()]
-    return results, np.reshape(errors, (-1, 2 + len(HORIZONS_S), 3))
+    return results, np.reshape(errors, (-1, 2 + len(HORIZONS_S), 3)), np.array(ranges_m)
 
 
 def scores_of(run_scores):
@@ -48,7 +48,7 @@ def scores_of(run_scores):
 
     Scores are in percent, lengths in metres, and coverage is a share 0..1. Values without data are None.
     """
-    results_of_runs, errors_of_runs = zip(*run_scores)
+    results_of_runs, errors_of_runs, ranges_of_runs = zip(*run_scores)
     combined = []
     for metric, results in zip(trackeval_metrics(), zip(*results_of_runs)):
         combined.append(metric.combine_sequences({str(number): result for number, result in enumerate(results)}))
@@ -67,35 +67,38 @@ def scores_of(run_scores):
         scores.update({'ade_%ds_m' % horizon_s: _mean(lengths[:, 2:last + 1]),
                        'fde_%ds_m' % horizon_s: _mean(lengths[:, last]),
                        'coverage_95_%ds' % horizon_s: _coverage(distances[:, last])})
+    scores['coverage_95_by_range'] = _coverage_by_range(distances, np.concatenate(ranges_of_runs))
     return scores
 
 
-def _score_image(truth, objects, camera):
-    """IDs of the scored people and tracks, their similarity (people, tracks), and the errors of each matched pair."""
+def _coverage_by_range(distances, ranges_m):
+    """Coverage of the positions now and at the horizons of 1 s and 2 s, for each band of `RANGES_M`."""
+    columns = [('position', 0)] + [('%ds' % horizon_s, 2 + int(np.flatnonzero(HORIZONS_S == horizon_s)[0]))
+                                   for horizon_s in (1, 2)]
+    bands = {}
+    for near_m, far_m in zip(RANGES_M[:-1], RANGES_M[1:]):
+        inside = distances[(ranges_m >= near_m) & (ranges_m < far_m)]
+        bands['%d-%d' % (near_m, far_m)] = {name: _coverage(inside[:, column]) for name, column in columns}
+    return bands
+
+
+def _score_image(truth, objects, counted):
+    """IDs of the scored people and tracks, their similarity (people, tracks), and the errors and the range of each pair.
+
+    `counted` (n,) masks the tracks that are false positives without a person.
+    """
     counts = truth.status == VISIBLE
     places_m = np.array([thing.position_m[:2] for thing in objects]).reshape(-1, 2)
     distances_m = plane_distances(truth.position_m[counts].reshape(-1, 2), places_m)
     near = distances_m <= PAIRED_M
     pairs = list(zip(*assign(np.where(near, distances_m, np.inf))))
-    counted = _in_scored_area(places_m, truth, camera)
     for row, column in pairs:
         counted[column] |= distances_m[row, column] <= MATCHED_M
     similarity = np.maximum(0, 1 - distances_m[:, counted] / PAIRED_M)
     rows = np.flatnonzero(counts)
     return (truth.ids[counts], np.array([thing.id for thing in objects], int)[counted], similarity,
-            [_errors(truth, rows[row], objects[column]) for row, column in pairs])
-
-
-def _in_scored_area(places_m, truth, camera):
-    """Mask (n,) of the positions (n, 2) at which a track would be a false positive if no person is there."""
-    local_m = to_frame(truth.pose, places_m)
-    range_m = np.linalg.norm(local_m, axis=1)
-    counted = ((np.abs(bearing_of(local_m)) <= camera.field_of_view / 2 - BORDER) & (range_m >= NEAREST_M)
-               & (range_m <= camera.farthest_m - BORDER_M))
-    others_m = truth.position_m[truth.status != VISIBLE]
-    if len(others_m) and len(places_m):
-        counted &= plane_distances(places_m, others_m).min(axis=1) >= UNSCORED_M
-    return counted
+            [_errors(truth, rows[row], objects[column]) for row, column in pairs],
+            [np.linalg.norm(truth.position_m[rows[row]] - truth.pose[:2]) for row, _column in pairs])
 
 
 def _errors(truth, row, thing):
@@ -114,7 +117,8 @@ def _errors(truth, row, thing):
 
 
 def _rms(errors):
-    return float(np.sqrt(np.mean(np.sum(errors ** 2, axis=1)))) if len(errors) else None
+    known = errors[np.isfinite(errors).all(axis=1)]
+    return float(np.sqrt(np.mean(np.sum(known ** 2, axis=1)))) if len(known) else None
 
 
 def _mean(values):

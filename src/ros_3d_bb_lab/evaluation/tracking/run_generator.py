@@ -9,6 +9,7 @@ from typing import List, NamedTuple, Tuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, Detection
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel, half_width, shown
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import HARD_TO_SEE, DetectablePerson, Detector
@@ -21,6 +22,8 @@ START_S = 100.0  # stamp of the first image
 SECONDS = 60.0
 AROUND_M = (0.05, 9.0)  # people in this range of the robot are in the ground truth and occlude others
 STAYS_S = 1.5  # after the end of the recording, a track of the person is not an error for this time
+UNSCORED_M = 0.75  # a track within this distance of a person that is not scored most likely belongs to that person
+BORDER, BORDER_M, NEAREST_M = 0.04, 0.15, 0.5  # margins of the scored field of view: radians, far end, near end
 TRIES, COUNTED_EVERY_S = 25, 3.0  # random starts, and the interval for counting people in view
 OPTICAL_FROM_BODY = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], float)
 
@@ -84,6 +87,22 @@ class Run(NamedTuple):
     name: str
     camera: CameraModel
     images: Tuple[Image, ...]
+
+    def in_scored_area(self, image, tracks):
+        """Mask (n,) of the tracks that are false positives if no person is there.
+
+        The camera cannot decide this at the borders of its field of view, and near people that are not scored.
+        """
+        camera, truth = self.camera, image.truth
+        places_m = np.array([track.position_m[:2] for track in tracks]).reshape(-1, 2)
+        local_m = to_frame(truth.pose, places_m)
+        range_m = np.linalg.norm(local_m, axis=1)
+        scored = ((np.abs(bearing_of(local_m)) <= camera.field_of_view / 2 - BORDER) & (range_m >= NEAREST_M)
+                  & (range_m <= camera.farthest_m - BORDER_M))
+        others_m = truth.position_m[truth.status != VISIBLE]
+        if len(others_m) and len(places_m):
+            scored &= plane_distances(places_m, others_m).min(axis=1) >= UNSCORED_M
+        return scored
 
 
 class _Walks(NamedTuple):

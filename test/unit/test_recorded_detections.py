@@ -1,0 +1,127 @@
+"""Recorded 3D detections as runs of the tracking benchmark."""
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, TrackedObject
+from ros_3d_bb_lab.evaluation.tracking import benchmark
+from ros_3d_bb_lab.evaluation.tracking.recorded_detections import START_NS, read_recordings
+from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S
+
+CAMERA = {'width': 640, 'height': 480, 'fx': 600.0, 'fy': 600.0, 'cx': 319.5, 'cy': 239.5}
+FORWARD = '-0.5,0.5,-0.5,0.5'  # the camera looks along x of the fixed frame
+SPEED_MPS, CAMERA_MPS, IMAGES = 0.5, 1.0, 31
+
+
+def write_recording(folder, scores='0.9', ignored=''):
+    """A camera that drives along x, 10 images a second; a person ahead, and one who does not count at the side."""
+    folder.mkdir()
+    (folder / 'camera.json').write_text(json.dumps(CAMERA))
+    tables = {'poses': ['t_s,x_m,y_m,z_m,qx,qy,qz,qw'], 'ignored': ['t_s,kind,x_m,y_m,z_m,x1_px,y1_px,x2_px,y2_px'],
+              'detections': ['t_s,x_m,y_m,z_m,width_m,height_m,score'],
+              'truth': ['t_s,id,x_m,y_m,z_m,width_m,height_m,counts']}
+    for number in range(IMAGES):
+        time_s, camera_m, person_m = number / 10.0, CAMERA_MPS * number / 10.0, 8 + SPEED_MPS * number / 10.0
+        tables['poses'].append('%.1f,%g,0,1,%s' % (time_s, camera_m, FORWARD))
+        tables['detections'].append('%.1f,0,0,%g,0.5,1.7,%s' % (time_s, person_m - camera_m, scores))
+        tables['truth'] += ['%.1f,7,%g,0,1,0.5,1.7,1' % (time_s, person_m), '%.1f,8,10,2,1,0.5,1.7,0' % time_s]
+        tables['ignored'] += ['%.1f,%s' % (time_s, ignored)] if ignored else []
+    for name, lines in tables.items():
+        (folder / (name + '.csv')).write_text('\n'.join(lines) + '\n')
+    return folder
+
+
+def track(place_m):
+    return TrackedObject(1, np.append(place_m, 1.0), np.ones(3), None, None, VISIBLE, True, 0, 0, None, 0.25)
+
+
+def test_detections_and_truth_are_in_the_fixed_frame(tmp_path):
+    run, = read_recordings(str(write_recording(tmp_path / 'one')))
+    assert (run.name, len(run.images)) == ('one', IMAGES)
+    for number, image in enumerate(run.images):
+        place_m = 8 + SPEED_MPS * number / 10.0, 0.0
+        assert image.stamp_ns == START_NS + number * 10 ** 8
+        assert np.allclose(image.detections[0].position_m, place_m + (1.0,))
+        assert image.detections[0].score == 0.9 and image.detections[0].covariance_m2 is None
+        assert np.allclose(image.truth.position_m[0], place_m)
+        assert image.truth.status.tolist() == [VISIBLE, OUT_OF_VIEW]
+        assert np.allclose(image.truth.velocity_mps[0], (SPEED_MPS, 0), atol=1e-6)
+        known = number / 10.0 + HORIZONS_S <= (IMAGES - 1) / 10.0 + 1e-9
+        future_m = image.truth.future_m[0]
+        assert np.isfinite(future_m).all(axis=1).tolist() == known.tolist()
+        assert np.allclose(future_m[known, 0], place_m[0] + SPEED_MPS * HORIZONS_S[known])
+
+
+def test_without_odometry_everything_moves_towards_the_camera(tmp_path):
+    run, = read_recordings(str(write_recording(tmp_path / 'one')), with_odometry=False)
+    last = run.images[-11]
+    time_s = (IMAGES - 11) / 10.0
+    assert np.allclose(last.view.fixed_from_camera, run.images[0].view.fixed_from_camera)
+    place_m = 8 + (SPEED_MPS - CAMERA_MPS) * time_s
+    assert np.allclose(last.detections[0].position_m, (place_m, 0, 1))
+    assert np.allclose(last.truth.position_m[0], (place_m, 0))
+    assert np.allclose(last.truth.velocity_mps[0], (SPEED_MPS - CAMERA_MPS, 0), atol=1e-6)
+    assert np.allclose(last.truth.future_m[0, 1], (place_m + SPEED_MPS - CAMERA_MPS, 0))
+
+
+def test_every_nth_image_keeps_the_truth_of_all(tmp_path):
+    run, = read_recordings(str(write_recording(tmp_path / 'one')), every=3)
+    assert [image.stamp_ns for image in run.images] == [START_NS + number * 3 * 10 ** 8 for number in range(11)]
+    assert np.allclose(run.images[0].truth.future_m[0, 0], (8 + SPEED_MPS * 0.5, 0))
+
+
+@pytest.mark.parametrize('score,min_score,probability', [('2', 1.9, 1 / (1 + np.exp(-2))), ('2', 2.1, None),
+                                                         ('0.7', 0.5, 0.7), ('0.7', 0.8, None)])
+def test_scores_are_probabilities_or_log_odds(tmp_path, score, min_score, probability):
+    run, = read_recordings(str(write_recording(tmp_path / 'one', score)), min_score=min_score)
+    found = [detection.score for detection in run.images[0].detections]
+    assert found == ([] if probability is None else [pytest.approx(probability)])
+
+
+@pytest.mark.parametrize('place_m,ignored,is_scored', [
+    ((12.0, 0.0), '', True), ((41.0, 0.0), '', False), ((-3.0, 0.0), '', False), ((5.0, 4.0), '', False),
+    ((10.5, 2.0), '', False),  # a person who does not count
+    ((12.0, 0.0), 'Cyclist,12.5,0,1,0,0,0,0', False), ((12.0, 0.0), 'Cyclist,13.5,0,1,0,0,0,0', True),
+    ((12.0, 0.0), 'DontCare,nan,nan,nan,300,200,340,280', False),
+    ((12.0, 0.0), 'DontCare,nan,nan,nan,340,200,400,280', True)])
+def test_false_tracks_count_where_the_recording_is_annotated(tmp_path, place_m, ignored, is_scored):
+    run, = read_recordings(str(write_recording(tmp_path / 'one', ignored=ignored)))
+    assert run.in_scored_area(run.images[0], [track(place_m)]).tolist() == [is_scored]
+    assert run.in_scored_area(run.images[0], []).tolist() == []
+
+
+def test_a_folder_of_recordings_is_read_in_the_order_of_names(tmp_path):
+    for name in 'ba':
+        write_recording(tmp_path / name)
+    assert [run.name for run in read_recordings(str(tmp_path))] == ['a', 'b']
+
+
+@pytest.mark.parametrize('name,content,message', [
+    ('camera.json', '{"width": 640}', 'camera.json: not a camera'),
+    ('truth.csv', 't_s,id\n', 'truth.csv has the columns t_s,id; t_s,id,x_m'),
+    ('detections.csv', 't_s,x_m,y_m,z_m,width_m,height_m,score\n0,1,2,x,1,1,1\n', 'detections.csv, line 2: 0,1,2,x')])
+def test_invalid_files_are_named(tmp_path, name, content, message):
+    folder = write_recording(tmp_path / 'one')
+    (folder / name).write_text(content)
+    with pytest.raises(ValueError, match=message):
+        list(read_recordings(str(folder)))
+
+
+def test_a_folder_without_recordings_is_rejected(tmp_path):
+    with pytest.raises(ValueError, match='has no recording'):
+        list(read_recordings(str(tmp_path)))
+
+
+@pytest.mark.needs('norfair', 'trackeval')
+def test_the_command_scores_recorded_detections(monkeypatch, tmp_path, capsys):
+    write_recording(tmp_path / 'one')
+    path = tmp_path / 'scores.json'
+    monkeypatch.setattr(sys, 'argv', ['./run bench tracking', '--detections', str(tmp_path / 'one'), '--json',
+                                      str(path)])
+    benchmark.main()
+    scores = json.loads(path.read_text())['trackers']
+    assert scores['ours']['recall'] > 80 and scores['ours']['precision'] == 100
+    assert set(scores['ours']['coverage_95_by_range']) == {'0-8', '8-16', '16-40'}
+    assert 'coverage_95 0-8 m, 2s' in capsys.readouterr().out
