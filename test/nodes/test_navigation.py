@@ -53,6 +53,7 @@ def robot(tmp_path_factory):
 def drives(robot):
     """The robot drives towards a goal far ahead, beside two people."""
     robot.people, robot.sees = lambda _seconds: STANDING + [robot.place_m[0], 0], True
+    robot.is_faulty = False
     goal = PoseStamped(header=header_at(robot.now_ns, 'map'))
     goal.pose.position.x, goal.pose.orientation.w = robot.place_m[0] + 9.0, 1.0
     robot.goal.publish(goal)
@@ -130,7 +131,9 @@ def test_the_robot_stops_when_the_camera_stops_and_drives_on(drives):
 @pytest.mark.parametrize('node', ['tracker_node', 'planner_bridge_node'])
 def test_the_robot_stops_when_a_node_ends_and_drives_on_when_it_is_back(drives, node, number):
     pid = pid_of(node)
+    drives.is_faulty = True
     os.kill(pid, number)
     assert until(drives, lambda: drives.velocity < STANDING_MPS, 5.0) <= STOP_S
+    drives.is_faulty = False
     until(drives, lambda: pid_of(node) not in (None, pid), STARTING_S)
     until(drives, lambda: drives.velocity > 0.1, STARTING_S)

@@ -22,6 +22,7 @@ CAMERA, BASE_FROM_CAMERA = 'camera_color_optical_frame', transform_from((0.17, 0
 DRIFT = 0.03, -0.02, 0.02  # of odom in the map: x, y (m/s) and yaw (rad/s)
 PATIENCE_S = 1.0  # real time, for an answer
 COSTMAP_NS = 4 * NS // 10  # longest time between costmaps
+FAULTY_SPEED = 4.0
 
 
 def level(x, y, yaw):
@@ -32,13 +33,16 @@ class DrivenRobot(object):
     """The robot starts at the origin of the map and looks along x. Its localisation and odometry publish tf at 10 Hz.
 
     `people` is a function from seconds to positions (n, 2) in the map. `velocity` is that of the last cmd_vel. Time
-    waits for the answers of the bridge and of move_base, so that a busy machine does not look like a fault.
+    waits for the answers of the bridge and of move_base, so that a busy machine does not look like a fault. While
+    `is_faulty`, time does not wait for the bridge and runs faster than real time, so that a killed node is missing for
+    long enough.
     """
 
     def __init__(self):
         self.now_ns, self.people, self.sees = 1000 * NS, lambda _time_s: np.zeros((0, 2)), True
+        self.is_faulty = False
         self.velocity, self.commands, self._pose, self._cmd = 0.0, 0, np.zeros(3), np.zeros(2)
-        self._sent_ns, self._answered = None, True
+        self._sent_ns, self._answered, self._commands = None, True, 0
         self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=10)
         self._tf_pub = rospy.Publisher('/tf', TFMessage, queue_size=10)
         self._odom_pub = rospy.Publisher('odometry/filtered', Odometry, queue_size=10)
@@ -78,18 +82,19 @@ class DrivenRobot(object):
     def advance(self, seconds, is_driven=True):
         """Let time pass, with 10 images a second if the camera sees; `is_driven`: move_base has a goal."""
         for _step in range(int(round(10 * seconds))):
-            self._send_tf()
-            commands = self.commands
+            self._send_tf()  # first: the tracker needs it for the boxes before
+            if self.costmap.messages:
+                self._wait_for(lambda: (self.commands > self._commands or not is_driven)
+                               and self.now_ns - _newest_ns(self.costmap) < COSTMAP_NS)
+            self._commands = self.commands
             for tick in range(PERIOD_NS // TICK_NS):
                 self.now_ns += TICK_NS
                 self._clock_pub.publish(Clock(time_from(self.now_ns)))
                 self._pose += np.array([self._cmd[0] * np.cos(self._pose[2]), self._cmd[0] * np.sin(self._pose[2]),
                                         self._cmd[1]]) * TICK_NS / NS
-                time.sleep(TICK_NS / NS)
+                time.sleep(TICK_NS / NS / (FAULTY_SPEED if self.is_faulty else 1))
                 if tick == 2 and self.sees:
                     self._send_boxes()
-            self._wait_for(lambda: (commands < self.commands or not is_driven)
-                           and self.now_ns - _newest_ns(self.costmap) < COSTMAP_NS)
 
     def _send_tf(self):
         stamp_ns = self.now_ns
@@ -105,7 +110,7 @@ class DrivenRobot(object):
 
     def _send_boxes(self):
         """The boxes of the people in front of the camera, once the bridge has answered the last ones."""
-        if self._sent_ns and self._answered:
+        if self._sent_ns and self._answered and not self.is_faulty:
             self._answered = self._wait_for(lambda: _newest_ns(self.ring) >= self._sent_ns)
         self._answered |= bool(self._sent_ns) and _newest_ns(self.ring) >= self._sent_ns
         map_from_camera = np.linalg.inv(self.odom_from_map(self.seconds)).dot(level(*self._pose)).dot(BASE_FROM_CAMERA)

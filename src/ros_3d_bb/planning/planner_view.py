@@ -105,8 +105,8 @@ def footprint_points(tracks, ahead_s, spacing_m):
 
 
 def _position_std_after(track, ahead_s):
-    """Standard deviation (n,) of the position `ahead_s` (n,) seconds after the stamp, the larger one of x and y, metres;
-    0 if unknown.
+    """Standard deviations (n,) of the position, the larger ones of x and y, `ahead_s` (n,) seconds after the stamp,
+    metres; 0 if unknown.
     """
     if track.covariance is None or track.prediction_covariance_m2 is None:
         return np.zeros(len(ahead_s))

@@ -6,8 +6,8 @@ from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.visualization.image_overlay import draw_boxes
 
 VIEW_M = (-1.5, 6.5, -4.0, 4.0)  # x0, x1, y0, y1 shown, in the frame of the robot
-PIXELS_M = 80  # pixels per metre
-FREE, LETHAL, INFLATED = (245, 245, 245), (170, 30, 30), (250, 200, 200)
+PIXELS_M = 60  # pixels per metre
+FREE, LETHAL = (245, 245, 245), (170, 30, 30)
 TRUTH, ROBOT, GRID = (20, 120, 20), (40, 60, 160), (225, 225, 225)
 BODY_M = 0.25
 FOOTPRINT_M = np.array([[-0.254, -0.215], [-0.254, 0.215], [0.254, 0.215], [0.254, -0.215]])
@@ -29,7 +29,7 @@ def draw_costmap(path, scene, costmap):
 
 
 def _top_view(scene, costmap):
-    """The costmap around the robot, who looks up; (h, w, 3), uint8 RGB."""
+    """The costmap around the robot, which looks up; (h, w, 3), uint8 RGB."""
     x0, x1, y0, y1 = VIEW_M
     rows, columns = int((x1 - x0) * PIXELS_M), int((y1 - y0) * PIXELS_M)
     poses = scene.simulator.poses_at(costmap.time_s)
@@ -38,7 +38,7 @@ def _top_view(scene, costmap):
                                   indexing='ij')
     places_m = transform_points(map_from_robot, np.stack((ahead_m, left_m, 0 * ahead_m), axis=-1).reshape(-1, 3))
     lethal = (costmap.is_lethal(places_m[:, :2]) == 1).reshape(rows, columns)
-    view = np.where(lethal[..., None], np.uint8(LETHAL), np.uint8(FREE))
+    view = np.full((rows, columns, 3), FREE, np.uint8)
     for metres in range(int(np.ceil(x0)), int(x1) + 1):
         cv2.line(view, _pixel((metres, y0)), _pixel((metres, y1)), GRID)
     for metres in range(int(np.ceil(y0)), int(y1) + 1):
