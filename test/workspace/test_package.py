@@ -28,7 +28,7 @@ FOR_DEBIAN = {'tf2_tools'}  # which has programs of tf2_ros there
 OPTIONAL = {'move_base'}  # of navigation.launch, for robots that have it
 NODES = {node.name: node for node in node_pages.nodes()}
 REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag', 'session:=/some/session', 'record:=/some/record.json',
-                      'camera_height:=1.2', 'scenario:=/some/scene.yaml']
+                      'camera_height:=1.2']
 
 
 def inside(*parts):
