@@ -31,7 +31,8 @@ def score_run(run, outputs):
     """
     people, tracks, similarities, errors, ranges_m = [], [], [], [], []
     for image, objects in zip(run.images, outputs):
-        person_ids, track_ids, similarity, image_errors, image_ranges_m = _score_image(image.truth, objects, run.in_scored_area(image, objects))
+        person_ids, track_ids, similarity, image_errors, image_ranges_m = _score_image(
+            image.truth, objects, run.in_scored_area(image, objects))
         people.append(person_ids)
         tracks.append(track_ids)
         similarities.append(similarity)
@@ -83,7 +84,7 @@ def _coverage_by_range(distances, ranges_m):
 
 
 def _score_image(truth, objects, counted):
-    """IDs of the scored people and tracks, their similarity (people, tracks), and the errors and the range of each pair.
+    """IDs of the scored people and tracks, their similarity (people, tracks), and the errors and range of each pair.
 
     `counted` (n,) masks the tracks that are false positives without a person.
     """

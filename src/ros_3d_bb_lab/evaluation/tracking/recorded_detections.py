@@ -21,7 +21,8 @@ from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, UNSCORED
 from ros_3d_bb_lab.evaluation.tracking.trajectories import pedestrian_of
 
 TABLES = {'detections': 't_s,x_m,y_m,z_m,width_m,height_m,score', 'poses': 't_s,x_m,y_m,z_m,qx,qy,qz,qw',
-          'truth': 't_s,id,x_m,y_m,z_m,width_m,height_m,counts', 'ignored': 't_s,kind,x_m,y_m,z_m,x1_px,y1_px,x2_px,y2_px'}
+          'truth': 't_s,id,x_m,y_m,z_m,width_m,height_m,counts',
+          'ignored': 't_s,kind,x_m,y_m,z_m,x1_px,y1_px,x2_px,y2_px'}
 DONT_CARE = 'DontCare'
 START_NS = 100 * NS  # stamp of the time 0
 FARTHEST_M = 40.0  # people and tracks beyond are not scored
