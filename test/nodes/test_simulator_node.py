@@ -119,7 +119,8 @@ def test_a_supervised_scene_stands_still_until_a_time_limit_and_waits_at_it(path
         limits.publish(Time(limit + rospy.Duration(10)))
         assert process.wait(timeout=60) == 0
         wait_until(lambda: truth.messages[-1].objects[0].pose.pose.position.y < 0, 'the end of the scene')
-        assert len(boxes.messages) == len(truth.messages) and len(boxes.messages[0].data) == 4
+        wait_until(lambda: len(boxes.messages) == len(truth.messages), 'the boxes of each image')
+        assert len(boxes.messages[0].data) == 4
 
 
 @pytest.fixture

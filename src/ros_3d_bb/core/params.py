@@ -107,7 +107,8 @@ def check(params):
     for name, param in params.PARAMS.items():
         value = getattr(params, name)
         if isinstance(value, (int, float)) and not param.limits[0] <= value <= param.limits[1]:
-            value = max(-MAX_FLOAT, min(value, MAX_FLOAT))  # larger integers cannot be formatted
+            if isinstance(value, int):
+                value = max(-MAX_FLOAT, min(value, MAX_FLOAT))  # larger integers cannot be formatted
             raise ValueError('parameter ~%s is %g; %s expected' % (name, value, param.allowed))
         for word in (value if isinstance(value, (list, tuple)) else [value]) if param.choices else ():
             if word not in param.choices:
