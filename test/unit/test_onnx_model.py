@@ -5,13 +5,14 @@ import resource
 import numpy as np
 import pytest
 
+from ros_3d_bb.core.labels import COCO
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
 from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
-from ros_3d_bb.core.labels import COCO
 from ros_3d_bb.detection.weights import WeightsError
-from ros_3d_bb.sessions.session_reader import read_color, read_session
+from ros_3d_bb.detection.yolov5 import backends
 from ros_3d_bb.detection.yolov5.onnx_writer import Graph, metadata_entry
+from ros_3d_bb.sessions.session_reader import read_color, read_session
 from support.onnx_files import FLOAT, FLOAT16, UINT8, outputs_of, write_constant_network, write_mean_network
 
 DATA = os.environ.get('ROS_3D_BB_DATA', '')
@@ -133,6 +134,15 @@ def test_yolox_detects_the_person_in_a_measurement_session(session_folder, tmp_p
                     default=0) for frame in session.frames]
     assert np.mean(np.array(overlaps) >= 0.5) >= 109 / 110
     assert np.median(overlaps) >= 0.95
+
+
+@pytest.mark.parametrize('requested, largest_bytes, expected', [(0, None, 1), (3, None, 3), (0, 10, 4)])
+def test_small_networks_run_in_one_thread_by_default(tmp_path, monkeypatch, requested, largest_bytes, expected):
+    monkeypatch.setattr(backends, 'physical_cores', lambda: 64)
+    if largest_bytes is not None:
+        monkeypatch.setattr(backends, 'SMALL_BYTES', largest_bytes)
+    path = write_constant_network(tmp_path / 'a.onnx', outputs_of('yolox', BOXES, SCORES, HW), (1, 3) + HW)
+    assert 'threads: %d' % expected in backends.open_runtime(path, backends.RuntimeParams(threads=requested)).description
 
 
 COLOR = (3, 200, 5)

@@ -14,6 +14,9 @@ from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5.onnx_backend import OnnxUnusable, export_folder, open_exported
 
 MAX_THREADS = 4  # default maximum; small networks gain little from more threads
+# ONNX files up to this size use one thread by default: with YOLOX-nano (3.7 MB) the pipeline takes 84 instead of 105 %
+# of a core at 30 Hz, with the same latency.
+SMALL_BYTES = 6 * 10 ** 6
 
 
 @parameters()
@@ -27,7 +30,8 @@ class RuntimeParams(NamedTuple):
         choices=('auto', 'onnxruntime', 'torch'))
     device: str = Param('auto')
     threads: int = Param(
-        0, 'CPU threads of the network. 0: as many as this machine has cores, at most 4.', limits=(0, 1024))
+        0, 'CPU threads of the network. 0: as many as this machine has cores, at most 4; one for ONNX files of up to 6 '
+        'MB.', limits=(0, 1024))
     export_folder: str = Param(
         '', 'Folder for checkpoints exported to ONNX (four bytes for each weight), named by the SHA-256 of the '
         'checkpoint. It is created if missing and may be deleted at any time. Empty: ~/.cache/ros_3d_bb/onnx, or '
@@ -65,7 +69,8 @@ def _open_file(path, params, threads, warn):
             raise ValueError('runtime torch cannot run %s; use auto or onnxruntime, or the .pt checkpoint' % path)
         if params.device not in ('auto', 'cpu'):
             raise ValueError('device is %r, but %s runs on the CPU; use the .pt checkpoint' % (params.device, path))
-        return OnnxModel(path, threads)
+        is_small = os.path.isfile(path) and os.path.getsize(path) <= SMALL_BYTES
+        return OnnxModel(path, 1 if is_small and not params.threads else threads)
 
     if path.endswith(('.torchscript', '.torchscript.pt')):
         if params.runtime == 'onnxruntime':
