@@ -142,7 +142,8 @@ def test_small_networks_run_in_one_thread_by_default(tmp_path, monkeypatch, requ
     if largest_bytes is not None:
         monkeypatch.setattr(backends, 'SMALL_BYTES', largest_bytes)
     path = write_constant_network(tmp_path / 'a.onnx', outputs_of('yolox', BOXES, SCORES, HW), (1, 3) + HW)
-    assert 'threads: %d' % expected in backends.open_runtime(path, backends.RuntimeParams(threads=requested)).description
+    params = backends.RuntimeParams(threads=requested)
+    assert 'threads: %d' % expected in backends.open_runtime(path, params).description
 
 
 COLOR = (3, 200, 5)
