@@ -226,6 +226,28 @@ def test_the_number_of_threads_is_the_requested_one_and_limited_by_default(monke
     assert open_runtime(checkpoint, RuntimeParams(device='cpu')).description == 'ONNX Runtime on the CPU, threads: 4'
 
 
+@pytest.mark.parametrize('device, gpus, supported, expected', [
+    ('auto', 1, True, 0), ('auto', 0, True, None), ('auto', 1, False, None), ('cpu', 1, True, None),
+    ('cuda', 1, True, 0), ('cuda:1', 2, True, 1)])
+def test_onnx_files_run_on_a_gpu_if_onnx_runtime_supports_it(monkeypatch, device, gpus, supported, expected):
+    monkeypatch.setattr(backends, 'gpu_count', lambda: gpus)
+    monkeypatch.setattr(backends, 'gpus_are_supported', lambda: supported)
+    monkeypatch.setattr(backends, 'OnnxModel', lambda path, threads, gpu: gpu)
+    assert open_runtime('a.onnx', RuntimeParams(device=device)) == expected
+
+
+@needs_onnx
+def test_a_gpu_that_onnx_runtime_cannot_use_is_reported(monkeypatch):
+    """ONNX Runtime itself only logs it, and uses the CPU."""
+    import onnxruntime
+    used = []
+    session = types.SimpleNamespace(get_providers=lambda: ['CPUExecutionProvider'])
+    monkeypatch.setattr(onnxruntime, 'InferenceSession', lambda *_given, providers: used.append(providers) or session)
+    with pytest.raises(ValueError, match='cannot use the GPU 1'):
+        session_of(b'', 1, 1)
+    assert used == [[('CUDAExecutionProvider', {'device_id': 1}), 'CPUExecutionProvider']]
+
+
 @needs_onnx
 def test_waiting_threads_do_not_spin(tmp_path):
     """Threads of ONNX Runtime spin by default."""

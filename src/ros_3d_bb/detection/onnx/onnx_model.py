@@ -1,9 +1,10 @@
-"""Detection networks in ONNX files, run by ONNX Runtime on the CPU.
+"""Detection networks in ONNX files, run by ONNX Runtime.
 
 The head is recognised by the outputs for a grey image (`heads`); a YAML file beside the ONNX file can give it, and the
 preprocessing (`model_settings`).
 """
 import ast
+import contextlib
 import functools
 
 import numpy as np
@@ -31,15 +32,17 @@ class OnnxModel(object):
     file beside it is invalid.
     """
 
-    def __init__(self, path, threads):
-        self.description = 'ONNX Runtime on the CPU, threads: %d' % threads
+    def __init__(self, path, threads, gpu=None):
+        self.description = 'ONNX Runtime on ' + ('the CPU, threads: %d' % threads if gpu is None else 'cuda:%d' % gpu)
         settings, self._session = read_settings(path), None
         try:
             with open(path, 'rb') as stream:
                 content = stream.read()
             check_content(content)
-            with limited_memory(EXTRA_BYTES + 4 * len(content)):
-                self._session = session_of(content, threads)
+            # CUDA reserves more address space than there is memory.
+            limit = contextlib.ExitStack() if gpu is not None else limited_memory(EXTRA_BYTES + 4 * len(content))
+            with limit:
+                self._session = session_of(content, threads, gpu)
                 self._configure(settings, self._session.get_modelmeta().custom_metadata_map)
         except ImportError:
             raise WeightsError('weights %s: %s, or use the .pt checkpoint' % (path, INSTALL))

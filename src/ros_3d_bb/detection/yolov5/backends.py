@@ -5,11 +5,13 @@
 """
 import ctypes
 import os
+import re
 import warnings
 from typing import NamedTuple
 
 from ros_3d_bb.core.params import Param, check, parameters
 from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
+from ros_3d_bb.detection.onnx.session import gpus_are_supported
 from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5.onnx_backend import OnnxUnusable, export_folder, open_exported
 
@@ -24,9 +26,9 @@ class RuntimeParams(NamedTuple):
     """What runs the network, and where."""
 
     runtime: str = Param(
-        'auto', 'What runs the network. ONNX Runtime takes half of the time of torch on a CPU; only torch runs on a '
-        'GPU (device:=), in half precision. auto: torch on a GPU, else ONNX Runtime, or torch where that is not '
-        'installed. A checkpoint (.pt) is exported to ONNX once, see export_folder.',
+        'auto', 'What runs the network. ONNX Runtime takes half of the time of torch on a CPU; on a GPU (device:=), '
+        'torch runs checkpoints, in half precision. auto: torch on a GPU, else ONNX Runtime, or torch where that is '
+        'not installed. A checkpoint (.pt) is exported to ONNX once, see export_folder.',
         choices=('auto', 'onnxruntime', 'torch'))
     device: str = Param('auto')
     threads: int = Param(
@@ -47,7 +49,7 @@ def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
     ValueError if a parameter is out of range, the device does not exist, or the runtime cannot run this file.
     """
     check(params)
-    if params.runtime == 'onnxruntime' and params.device not in ('auto', 'cpu'):
+    if params.runtime == 'onnxruntime' and params.device not in ('auto', 'cpu') and not str(path).endswith('.onnx'):
         raise ValueError('runtime onnxruntime works on the CPU, and device is %r; use runtime torch' % params.device)
     threads = params.threads or min(physical_cores(), MAX_THREADS)
     try:
@@ -67,10 +69,8 @@ def _open_file(path, params, threads, warn):
     if path.endswith('.onnx'):
         if params.runtime == 'torch':
             raise ValueError('runtime torch cannot run %s; use auto or onnxruntime, or the .pt checkpoint' % path)
-        if params.device not in ('auto', 'cpu'):
-            raise ValueError('device is %r, but %s runs on the CPU; use the .pt checkpoint' % (params.device, path))
         is_small = os.path.isfile(path) and os.path.getsize(path) <= SMALL_BYTES
-        return OnnxModel(path, 1 if is_small and not params.threads else threads)
+        return OnnxModel(path, 1 if is_small and not params.threads else threads, gpu_for_onnx(params.device, path))
 
     if path.endswith(('.torchscript', '.torchscript.pt')):
         if params.runtime == 'onnxruntime':
@@ -87,6 +87,17 @@ def _open_file(path, params, threads, warn):
             warn('%s; using torch instead, which takes twice as long' % error)
     from ros_3d_bb.detection.yolov5.torch_backend import TorchRuntime, torch_device
     return TorchRuntime(path, torch_device(params.device), threads)
+
+
+def gpu_for_onnx(device, path):
+    """Number of the GPU on which ONNX Runtime runs a file; None for the CPU. Raises ValueError for other devices."""
+    number = re.match(r'(?:auto|cuda(?::(\d{1,3}))?)\Z', device)
+    if device == 'cpu' or device == 'auto' and not (gpu_count() and gpus_are_supported()):
+        return None
+    if number is None or not gpus_are_supported():
+        raise ValueError('device is %r, but the installed ONNX Runtime cannot run %s on it; use auto, cpu or, with '
+                         'onnxruntime-gpu, cuda' % (device, path))
+    return int(number.group(1) or 0)
 
 
 def on_gpu(device):
