@@ -133,7 +133,7 @@ def test_duplicate_boxes_do_not_start_a_second_track():
 
 def test_two_tracks_that_meet_in_one_person_become_one():
     """A detector draws two boxes of one person, at first far apart."""
-    published = play(Tracker(), 3, lambda time_s: [at(3, 0), at(3, max(0.02, 0.8 - 0.4 * time_s))])
+    published = play(Tracker(), 3, lambda time_s: [at(3, 0), at(3, max(0.02, 0.8 - 1.2 * time_s))])
     assert ids(published[10]) == [1, 2] and ids(published[-1]) == [1]
 
 

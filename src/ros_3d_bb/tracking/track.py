@@ -31,6 +31,7 @@ CUT_LASTS_NS = NS // 2  # hysteresis: an end is visible again this long after it
 NEVER_NS = -10 ** 18
 LEAST_HEIGHT_M = 0.1
 STARTING_SUPPORT = 0.2  # minimum support of a detection that starts a track: most positions with less are wrong
+NEW_NS = NS  # people pass each other later than that after they were first detected
 SAME_PERSON_M = 0.15  # two people who are both visible cannot be this close to each other
 AXES = [[0], [1], [3], [4]]  # indices of x, y and their velocities among x, y, z and their velocities
 STILL_MOVING = 0.5  # hysteresis: a moving track stops below this share of `moving_speed`
@@ -99,13 +100,15 @@ def new_targets(tracks, measurements, stamp_ns, params, classes):
 
 def duplicates(tracks, stamp_ns, classes):
     """Which tracks (n,) are of the object of an older track: both are confirmed, recently matched and at one place, and
-    of one group of classes."""
+    of one group of classes. Tracks that exist for longer than `NEW_NS` are of different objects, which pass each other.
+    """
     duplicate = np.zeros(len(tracks), bool)
     rows = np.flatnonzero(tracks['confirmed'] & (stamp_ns - tracks['last_ns'] < RECENTLY_MATCHED_NS))
     rows = rows[np.argsort(tracks['first_ns'][rows], kind='mergesort')]
     places_m, groups = tracks['mean'][rows, :2], classes.group[tracks['class_number'][rows]]
     at_one_place = np.linalg.norm(places_m[:, None] - places_m, axis=2) < SAME_PERSON_M
-    duplicate[rows] = np.tril(at_one_place & (groups[:, None] == groups), -1).any(axis=1)
+    is_new = stamp_ns - tracks['first_ns'][rows] < NEW_NS
+    duplicate[rows] = is_new & np.tril(at_one_place & (groups[:, None] == groups), -1).any(axis=1)
     return duplicate
 
 
