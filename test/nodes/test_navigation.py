@@ -31,7 +31,7 @@ def two_people(seconds):
 
 @pytest.fixture(scope='module')
 def robot(tmp_path_factory):
-    """The robot; the nodes run, and nobody is there."""
+    """The robot without people around it; the nodes run."""
     environment, _is_real = planner_environment(str(tmp_path_factory.mktemp('packages')))
     rospy.init_node('test_navigation')
     nodes = subprocess.Popen(['roslaunch', os.path.join(ROOT, 'test', 'support', 'navigation.launch')], env=environment)

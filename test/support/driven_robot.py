@@ -14,10 +14,12 @@ from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
+from ros_3d_bb_lab.simulation.driving import moved
+from ros_3d_bb_lab.simulation.simulator import upright
 from support.ros import Recorder, header_at
 from support.two_cameras import boxes
 
-TICK_NS, PERIOD_NS, IMAGE_NS = NS // 100, NS // 10, NS // 33  # images are taken so long after tf is published
+TICK_NS, PERIOD_NS = NS // 100, NS // 10
 CAMERA, BASE_FROM_CAMERA = 'camera_color_optical_frame', transform_from((0.17, 0, 0.2), OPTICAL_ROTATION)
 DRIFT = 0.03, -0.02, 0.02  # of odom in the map: x, y (m/s) and yaw (rad/s)
 PATIENCE_S = 1.0  # real time, for an answer
@@ -26,7 +28,7 @@ FAULTY_SPEED = 4.0
 
 
 def level(x, y, yaw):
-    return transform_from((x, y, 0), (0, 0, np.sin(yaw / 2), np.cos(yaw / 2)))
+    return upright(x, y, 0, yaw)
 
 
 class DrivenRobot(object):
@@ -90,8 +92,7 @@ class DrivenRobot(object):
             for tick in range(PERIOD_NS // TICK_NS):
                 self.now_ns += TICK_NS
                 self._clock_pub.publish(Clock(time_from(self.now_ns)))
-                self._pose += np.array([self._cmd[0] * np.cos(self._pose[2]), self._cmd[0] * np.sin(self._pose[2]),
-                                        self._cmd[1]]) * TICK_NS / NS
+                self._pose = moved(self._pose, self._cmd, TICK_NS / NS)
                 time.sleep(TICK_NS / NS / (FAULTY_SPEED if self.is_faulty else 1))
                 if tick == 2 and self.sees:
                     self._send_boxes()

@@ -10,7 +10,7 @@ from ros_3d_bb_lab.simulation.social_force import (BORDER_POTENTIAL, BORDER_RANG
                                                    social_force)
 
 TINY_M = 1e-6
-NOBODY = np.zeros((0, 2))
+NO_OTHERS = np.zeros((0, 2))
 distances = st.floats(.2, 3)
 angles = st.floats(-3.2, 3.2)
 speeds = st.floats(-2, 2)
@@ -85,7 +85,7 @@ def test_two_people_who_meet_pass_each_other(side):
         offset = positions[0] - positions[1]
         nearest_m = min(nearest_m, np.hypot(*offset))
         desired = [1.3 * (goal - place) / max(np.hypot(*(goal - place)), .5) for goal, place in zip(goals, positions)]
-        forces = [social_force(velocities[one], desired[one], offset[None] * sign, velocities[[1 - one]], NOBODY)
+        forces = [social_force(velocities[one], desired[one], offset[None] * sign, velocities[[1 - one]], NO_OTHERS)
                   for one, sign in ((0, 1), (1, -1))]
         velocities = np.array([next_velocity(velocity, force, .01) for velocity, force in zip(velocities, forces)])
         positions = positions + velocities * .01

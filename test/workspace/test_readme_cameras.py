@@ -45,9 +45,10 @@ class Driver(NamedTuple):
     """A driver's stream. `topics` are those of colour, its camera_info, depth, and the camera_info of raw depth.
 
     `depth_camera` is that of raw depth, None if it is registered. `links` are (parent, child, parent_from_child), the
-    first from the root. `depth_late` is the stamp of depth minus that of colour, in periods. `unrectified` is the lens
-    distortion in the camera_info of images that are rectified. `border` is the share of the width without depth at
-    both sides, and `no_depth` the value of pixels without depth.
+    first from the root; images have the last child as frame unless `frame_id` is given. `depth_late` is the stamp of
+    depth minus that of colour, in periods. `unrectified` is the lens distortion in the camera_info of images that are
+    rectified. `border` is the share of the width without depth at both sides, and `no_depth` the value of pixels
+    without depth.
     """
 
     recipe: str
@@ -56,6 +57,7 @@ class Driver(NamedTuple):
     color: str
     depth: str
     links: tuple
+    frame_id: str = ''
     rate_hz: float = 30.0
     depth_late: float = 0.0
     depth_camera: Camera = None
@@ -71,7 +73,8 @@ OPENNI_LINKS = (('camera_link', 'camera_rgb_frame', shifted(y_m=-0.045)),
                 ('camera_depth_frame', 'camera_depth_optical_frame', OPTICAL))
 OPENNI = Driver('camera_image:=/camera/rgb/image_raw \\\n  camera_info:=/camera/rgb/camera_info camera_depth:=',
                 ('/camera/rgb/image_raw', '/camera/rgb/camera_info', '/camera/depth_registered/image_raw'),
-                Camera(640, 480, 525.0, 525.0, 319.5, 239.5), 'rgb8', '32FC1', OPENNI_LINKS, depth_late=0.4,
+                Camera(640, 480, 525.0, 525.0, 319.5, 239.5), 'rgb8', '32FC1', OPENNI_LINKS,
+                frame_id='camera_rgb_optical_frame', depth_late=0.4,
                 tf_topic=TF_TOPIC, no_depth=np.nan)
 OAK = Driver('camera_image:=/oak', ('/oak/rgb/image_raw', '/oak/rgb/camera_info', '/oak/stereo/image_raw'),
              Camera(1280, 720, 1000.1, 999.5, 673.3, 339.9, 'rational_polynomial',
@@ -169,12 +172,9 @@ def color_message(driver, header, rgb):
 
 def write_stream(driver, path):
     """Write the stream of a driver to a bag, each message at its stamp."""
-    frame_id = driver.links[-1][1] if driver.depth_camera is None else 'camera_rgb_optical_frame'
     frame = scene(driver.camera).frame(0)
     color, depth_mm = (as_by_the_lens(image, driver.camera) for image in (frame.color, frame.depth_mm))
-    if driver is OPENNI:
-        frame_id = 'camera_rgb_optical_frame'
-    depth_frame = frame_id
+    frame_id = depth_frame = driver.frame_id or driver.links[-1][1]
     if driver.depth_camera is not None:
         depth_mm, depth_frame = scene(driver.depth_camera, 0.025).frame(0).depth_mm, 'camera_depth_optical_frame'
     with rosbag.Bag(path, 'w') as bag:

@@ -21,6 +21,8 @@ INFO_TOPICS = ('camera/color/camera_info', 'camera/aligned_depth_to_color/camera
 # Topics of the depth image and of its camera_info, by the parameter ~depth.
 DEPTH_TOPICS = {'aligned': (DEPTH_TOPIC, INFO_TOPICS[1]),
                 'raw': ('camera/depth/image_rect_raw', 'camera/depth/camera_info')}
+# Topic of the images with the intrinsics of the colour camera_info, by ~depth; see `info_of_images`.
+COLOR_INFO_IMAGES = {'aligned': DEPTH_TOPIC, 'raw': COLOR_TOPIC}
 CAMERA = 'camera'  # namespace of the topics of a single camera
 TYPES = {TF_TOPIC: TFMessage, COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPICS[0]: CameraInfo,
          INFO_TOPICS[1]: CameraInfo}

@@ -6,8 +6,8 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault
-from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS, info_of_images,
-                                               info_topic_beside, uncompressed)
+from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS,
+                                               info_of_images, info_topic_beside, uncompressed)
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg, camera_from_msg,
                                                    stamp_of)
@@ -75,7 +75,7 @@ class Bbox3dNode(object):
             self._diagnostics.check(self._alignment.faults)
         # Depth images are cached until their boxes arrive, so the subscriber queues must not drop any.
         subscribe(depth_topic, Image, self._on_depth, KEPT_AT_ONCE)
-        subscribe_camera_info(INFO_TOPICS[0], COLOR_TOPIC if is_raw else depth_topic, self._on_camera_info)
+        subscribe_camera_info(INFO_TOPICS[0], COLOR_INFO_IMAGES[params.depth], self._on_camera_info)
         subscribe(BOXES_TOPIC, Int32MultiArray, self._on_boxes)
         self._reconfigure_server = ReconfigureServer([params], self._reconfigure)
 

@@ -4,7 +4,8 @@ import threading
 import rospy
 from sensor_msgs.msg import Image
 
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPICS, INFO_TOPICS, info_topic_beside
+from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, COLOR_TOPIC, DEPTH_TOPICS, INFO_TOPICS,
+                                               info_topic_beside)
 from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
@@ -51,7 +52,7 @@ class DepthDetectorNode(object):
         self._worker = DetectorWorker(params, self._diagnostics, self._detect, RgbdDetectionStage.names)
         self._stage = RgbdDetectionStage(params, people, self._diagnostics, self._worker.offer, transforms,
                                          depth_info_topic)
-        subscribe_camera_info(INFO_TOPICS[0], COLOR_TOPIC if is_raw else depth_topic, self._on_camera_info)
+        subscribe_camera_info(INFO_TOPICS[0], COLOR_INFO_IMAGES[params.depth], self._on_camera_info)
         if is_raw:
             subscribe_camera_info(depth_info_topic, depth_topic, self._on_depth_camera_info, 1)
         subscribe(depth_topic, Image, self._on_depth, KEPT_AT_ONCE)

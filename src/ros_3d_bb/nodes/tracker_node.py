@@ -5,7 +5,8 @@ import rospy
 from sensor_msgs.msg import Image
 from visualization_msgs.msg import MarkerArray
 
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPICS, INFO_TOPICS, info_topic_beside, topic_of
+from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, DEPTH_TOPICS, INFO_TOPICS, info_topic_beside,
+                                               topic_of)
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_msg
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.time_sync import arrival_clock_ns
@@ -66,20 +67,21 @@ class TrackerNode(object):
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
         for camera in self._stage.cameras:
-            self._subscribe(camera, topic_of(camera, DEPTH_TOPICS[params.depth][0]), params.depth == RAW)
+            self._subscribe(camera, params.depth)
         self._reconfigure_server = ReconfigureServer(given, self._reconfigure)
 
-    def _subscribe(self, camera, depth_topic, is_raw):
+    def _subscribe(self, camera, depth):
+        depth_topic = topic_of(camera, DEPTH_TOPICS[depth][0])
+
         def of_camera(callback):
             return functools.partial(callback, camera=camera)
         subscribe(topic_of(camera, BOXES3D_TOPIC), BoundingBox3DArray, of_camera(self._on_boxes))
         if self._stage.uses_camera_info:
-            subscribe_camera_info(topic_of(camera, INFO_TOPICS[0]),
-                                  topic_of(camera, COLOR_TOPIC) if is_raw else depth_topic,
+            subscribe_camera_info(topic_of(camera, INFO_TOPICS[0]), topic_of(camera, COLOR_INFO_IMAGES[depth]),
                                   of_camera(self._on_camera_info), 1)
         if self._stage.uses_depth:
             subscribe(depth_topic, Image, of_camera(self._on_depth), KEPT_AT_ONCE)
-        if self._stage.uses_depth and is_raw:
+        if self._stage.uses_depth and depth == RAW:
             depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
             subscribe_camera_info(depth_info_topic, depth_topic, of_camera(self._on_depth_camera_info), 1)
 

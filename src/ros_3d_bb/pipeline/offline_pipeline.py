@@ -7,7 +7,8 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, IMAGE_KINDS, INFO_TOPICS,
+from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS,
+                                               IMAGE_KINDS, INFO_TOPICS,
                                                STATIC_TOPIC, TF_TOPIC, info_of_images, topic_of, uncompressed)
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes3d_to_msg,
                                                    detections2d_to_msg, tracks_to_msg)
@@ -100,8 +101,8 @@ class Pipeline(object):
         self._now_ns, self._outputs = now_ns, []
         stages = [stages[camera] for stages in (self._detection_stages, self._estimation_stages) if camera in stages]
         if topic in INFO_TOPICS:
-            is_color_raw = topic == INFO_TOPIC and self._settings.bbox3d[0].depth == RAW
-            message = info_of_images(message, self._settings.name(COLOR_TOPIC if is_color_raw else DEPTH_TOPIC, camera))
+            images = COLOR_INFO_IMAGES[self._settings.bbox3d[0].depth] if topic == INFO_TOPIC else DEPTH_TOPIC
+            message = info_of_images(message, self._settings.name(images, camera))
         if topic == INFO_TOPIC:
             if self._tracking_stage.uses_camera_info:
                 self._tracking_stage.add_camera_info(message, camera)

@@ -135,7 +135,7 @@ def _trails_s(costmaps, positions_at):
 
 
 def _lasted_s(costmaps, place_m, person, gone_s, positions_at):
-    """How long after `gone_s` a place stays lethal; None if somebody comes near or the scene ends before."""
+    """How long after `gone_s` a place stays lethal; None if a person comes near or the scene ends before."""
     lasted_s = 0.0
     for costmap in costmaps:
         lethal, = costmap.is_lethal(place_m[None])

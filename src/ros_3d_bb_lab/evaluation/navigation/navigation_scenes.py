@@ -60,7 +60,7 @@ def crowd(random):
 
 
 def pillar(random):
-    """Somebody steps out from behind a pillar when the robot is near."""
+    """A person steps out from behind a pillar when the robot is near."""
     speed = _around(random, 1.0, .15)
     moves = [{'wait': _around(random, REACHED_AFTER_S - 1.2, .4)}] + _walk((MEETING_X_M + .8, -3.2), speed)
     return [_person((MEETING_X_M + .7, 2.0), moves)], [_box((MEETING_X_M, 1.2), (.7, .7, 2.2))]
