@@ -60,9 +60,6 @@ class TrackerParams(NamedTuple):
     max_missed_time: float = Param(
         0.35, 'How long a track stays published while a camera should detect the person and does not.', 's',
         live=(0, 5))
-    out_of_view_limit: float = Param(
-        0.5, 'How long the track of a moving person stays published while out of view of all cameras: people turn and '
-        'stop.', 's', live=(0, 10))
     max_position_std: float = Param(
         0.5, 'An undetected track stays published up to this standard deviation of its position.', 'm', live=(0, 2))
     max_age: float = Param(4.0, 'A person who reappears within this time keeps the track ID.', 's', live=(0, 30))
@@ -146,8 +143,6 @@ class Tracker(object):
         tracks = tracks[np.argsort(tracks['id'])]
         published = (tracks['missed_s'] <= params.max_missed_time) & (position_std_of(tracks) < params.max_position_std)
         published |= tracks['status'] == VISIBLE
-        has_left = (tracks['status'] == OUT_OF_VIEW) & tracks['moving']
-        published &= ~has_left | (tracks['unseen_s'] <= params.out_of_view_limit)
         return objects_of(tracks[tracks['confirmed'] & published], self._prediction, self._classes)
 
     def _step(self, state, image, observed_s, assign_id):
