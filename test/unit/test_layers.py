@@ -23,8 +23,8 @@ ALLOWED = {
     'ros_3d_bb.detection.depth': ('core detection', 'cv2'),
     'ros_3d_bb.conversions': (
         'camera core estimation msg tracking',
-        'cv2 genpy geometry_msgs sensor_msgs std_msgs tf2_msgs'),
-    'ros_3d_bb.planning': ('camera conversions core tracking', 'sensor_msgs std_msgs'),
+        'cv2 genpy geometry_msgs nav_msgs sensor_msgs std_msgs tf2_msgs'),
+    'ros_3d_bb.planning': ('camera conversions core tracking', 'nav_msgs sensor_msgs std_msgs'),
     'ros_3d_bb.visualization': (
         'camera core estimation tracking',
         'cv2 genpy geometry_msgs std_msgs visualization_msgs'),

@@ -22,8 +22,11 @@ def test_dwa_drives_in_a_map_with_people_in_the_local_costmap():
     assert sorted(nodes) == ['move_base', 'planner_bridge_node']
     assert parameters[MOVE_BASE + 'base_local_planner'] == 'dwa_local_planner/DWAPlannerROS'
     assert parameters[BRIDGE + 'outputs'] == 'costmap'
-    assert layers_of(parameters, 'local_costmap') == ['obstacle_layer', 'people_layer', 'inflation_layer']
-    assert layers_of(parameters, 'global_costmap') == ['static_layer', 'obstacle_layer', 'inflation_layer']
+    assert layers_of(parameters, 'local_costmap') == ['obstacle_layer', 'people_layer', 'prediction_layer',
+                                                         'inflation_layer']
+    assert layers_of(parameters, 'global_costmap') == ['static_layer', 'obstacle_layer', 'people_layer',
+                                                          'inflation_layer']
+    assert parameters[MOVE_BASE + 'local_costmap/prediction_layer/map_topic'] == 'planner_bridge_node/costs'
     assert parameters[MOVE_BASE + 'local_costmap/rolling_window']
     assert MOVE_BASE + 'global_costmap/rolling_window' not in parameters
     assert remappings(nodes)['cmd_vel'] == 'cmd_vel'
@@ -52,13 +55,15 @@ def test_teb_gets_people_as_obstacles_and_only_the_ring_in_the_costmap():
     people_layer = MOVE_BASE + 'local_costmap/people_layer/'
     assert parameters[people_layer + 'observation_sources'] == 'clearing'
     assert parameters[people_layer + 'clearing/expected_update_rate'] == 0.5
+    assert not parameters[MOVE_BASE + 'local_costmap/prediction_layer/enabled']
     assert remappings(nodes)['~TebLocalPlannerROS/obstacles'] == 'planner_bridge_node/obstacles'
 
 
 @pytest.mark.parametrize('name, outputs, layers', [
-    ('rolling', 'costmap', ['obstacle_layer', 'inflation_layer']),
-    ('social', 'costmap, people', ['static_layer', 'obstacle_layer', 'proxemic_layer', 'inflation_layer'])])
-def test_the_global_costmap_can_have_no_map_or_people(name, outputs, layers):
+    ('rolling', 'costmap', ['obstacle_layer', 'people_layer', 'inflation_layer']),
+    ('social', 'costmap, people', ['static_layer', 'obstacle_layer', 'people_layer', 'proxemic_layer',
+                                   'inflation_layer'])])
+def test_the_global_costmap_can_have_no_map_or_a_cost_around_people(name, outputs, layers):
     parameters, _nodes = loaded('navigation.launch', 'global_costmap:=' + name)
     assert parameters[BRIDGE + 'outputs'] == outputs and layers_of(parameters, 'global_costmap') == layers
 

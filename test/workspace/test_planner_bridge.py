@@ -21,7 +21,8 @@ from support.planners import person
 
 START_NS = 1000 * NS
 PACKAGES = 'people_msgs', 'costmap_converter', 'derived_object_msgs', 'vision_msgs'
-POINTS, RING, PEOPLE, TEB, MPC = '~points', '~clearing_points', '/people', '~obstacles', '~objects'
+POINTS, COSTS, RING = '~points', '~costs', '~clearing_points'
+PEOPLE, TEB, MPC = '/people', '~obstacles', '~objects'
 FIELDS = {PEOPLE: 'people', TEB: 'obstacles', MPC: 'objects'}
 
 
@@ -56,9 +57,12 @@ class Bridge(object):
     def count(self, topic):
         return self._connections.publishers[topic].count
 
+    def message(self, topic):
+        return self._connections.publishers[topic].newest
+
     def newest(self, topic):
         """Frame and content of the last message: points (n, 3), or objects."""
-        message = self._connections.publishers[topic].newest
+        message = self.message(topic)
         if topic in FIELDS:
             return message.header.frame_id, getattr(message, FIELDS[topic])
         return message.header.frame_id, np.frombuffer(message.data, '<f4').reshape(-1, 3)
@@ -89,16 +93,32 @@ def test_costmap_points_are_in_the_robots_frame():
         frame_id, points = bridge.newest(POINTS)
         assert frame_id == bridge.newest(RING)[0] == 'base_link'
         assert (points[:, 0].min(), points[:, 0].max()) == pytest.approx((2.7, 3.3), abs=0.01)
-        assert (points[:, 1].min(), points[:, 1].max()) == pytest.approx((-0.3 - 0.5, 0.3), abs=0.01)
+        assert (points[:, 1].min(), points[:, 1].max()) == pytest.approx((-0.3 - 0.3, 0.3), abs=0.01)
         assert (points[:, 2].min(), points[:, 2].max()) == pytest.approx((0.425 - 0.1, 1.275 - 0.1), abs=1e-5)
+
+
+def test_costs_are_around_the_robot_where_it_is_now():
+    """Since the image it has moved by 1 m, which the layer of the costmap assumes, too."""
+    with bridge_with('costmap') as bridge:
+        bridge.send_tf(START_NS, 'base_link', (0, -3, 0))
+        bridge.send_tf(START_NS + NS // 10, 'base_link', (0, -2, 0))
+        bridge.set_time(START_NS + NS // 10)
+        bridge.send(START_NS, person(1, 0, 0))
+        grid = bridge.message(COSTS)
+        assert (grid.header.frame_id, grid.header.stamp.to_nsec()) == ('base_link', 0)
+        columns = np.reshape(grid.data, (grid.info.height, grid.info.width)).max(axis=0)
+        x_m = grid.info.origin.position.x + (np.flatnonzero(columns == 99) + 0.5) * grid.info.resolution
+        assert x_m.mean() == pytest.approx(2.0, abs=0.05)
+        bridge.send(START_NS + NS // 10)
+        assert not np.any(bridge.message(COSTS).data)
 
 
 def test_an_output_waits_for_the_transform_of_its_own_frame_only():
     with bridge_with('costmap, people, teb', planner_frame='odom') as bridge:
         bridge.send_tf(START_NS, 'odom', (0, 0, 0))
         bridge.send(START_NS, person(1, 2, 0))
-        assert [bridge.count(topic) for topic in (POINTS, RING, PEOPLE, TEB)] == [0, 0, 1, 1]
-        assert bridge.counts['no transform'] == 1
+        assert [bridge.count(topic) for topic in (POINTS, COSTS, RING, PEOPLE, TEB)] == [0, 0, 0, 1, 1]
+        assert bridge.counts['no transform'] == 2  # to base_link, at the stamp and latest
         frame_id, (obstacle,) = bridge.newest(TEB)
         place, twist = obstacle.polygon.points[0], obstacle.velocities.twist
         assert (frame_id, place.x, place.y) == ('odom', pytest.approx(0), pytest.approx(-2))
@@ -106,8 +126,8 @@ def test_an_output_waits_for_the_transform_of_its_own_frame_only():
         bridge.send_tf(START_NS + NS // 10, 'base_link', (0, 0, 0))
         bridge.set_time(START_NS + NS // 10)
         bridge.send(START_NS + NS // 10, person(1, 2, 0))
-        assert [bridge.count(topic) for topic in (POINTS, RING, PEOPLE, TEB)] == [1, 1, 2, 1]
-        assert bridge.counts['no transform'] == 2
+        assert [bridge.count(topic) for topic in (POINTS, COSTS, RING, PEOPLE, TEB)] == [1, 1, 1, 2, 1]
+        assert bridge.counts['no transform'] == 3
 
 
 def test_without_transform_each_output_is_emptied_once_in_the_frame_of_its_last_array():

@@ -7,6 +7,7 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
@@ -218,7 +219,7 @@ def test_costmap_points_are_exact_on_large_maps(x, y, yaw, roll_deg, pitch_deg):
     message = on_the_wire(points.write([track], np.linalg.inv(map_from_robot), header_in(points.frame)))
     sent = np.frombuffer(message.data, '<f4').reshape(-1, 3).astype(float)
     in_map = transform_points(map_from_robot, sent) - track.position_m
-    np.testing.assert_allclose(in_map, footprint_points([track], 0.5, 0.035) - track.position_m, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(in_map, footprint_points([track], 0.3, 0.035) - track.position_m, rtol=0, atol=1e-5)
     assert message.header.frame_id == 'base_link'
 
 
@@ -245,8 +246,8 @@ def test_unknown_outputs_are_rejected_with_the_nearest_known_one(outputs, said):
 
 def test_the_costmap_needs_no_package_and_no_ring_where_its_range_is_zero():
     assert [(output.topic, output.kind) for output in outputs_from(PlannerBridgeParams())] == [
-        ('~points', PointCloud2), ('~clearing_points', PointCloud2)]
-    assert [output.topic for output in outputs_from(PlannerBridgeParams(clearing_range=0.0))] == ['~points']
+        ('~points', PointCloud2), ('~costs', OccupancyGrid), ('~clearing_points', PointCloud2)]
+    assert [output.topic for output in outputs_from(PlannerBridgeParams(clearing_range=0.0))] == ['~points', '~costs']
 
 
 def test_the_robot_stops_when_either_source_of_people_stays_away():

@@ -4,7 +4,8 @@ Message classes of optional packages are passed as an argument, the `msg` module
 `types.TrackedObject` in the frame of the header.
 """
 import numpy as np
-from geometry_msgs.msg import Point, Point32, Quaternion
+from geometry_msgs.msg import Point, Point32, Pose, Quaternion
+from nav_msgs.msg import MapMetaData, OccupancyGrid
 from sensor_msgs.msg import PointCloud2, PointField
 
 from ros_3d_bb.conversions.perception_msgs import tracks_to_msg
@@ -83,3 +84,10 @@ def points_to_msg(points_m, header):
     return PointCloud2(header=header, height=1, width=len(points_m), fields=fields, point_step=12,
                        row_step=12 * len(points_m), is_dense=True, is_bigendian=False,
                        data=np.asarray(points_m, '<f4').tobytes())
+
+
+def grid_to_msg(costs, cell_m, origin_m, header):
+    """Convert costs (rows, columns), int8, of which cell (0, 0) has its corner at `origin_m`, to an OccupancyGrid."""
+    info = MapMetaData(header.stamp, cell_m, costs.shape[1], costs.shape[0],
+                       Pose(Point(origin_m[0], origin_m[1], 0), Quaternion(w=1.0)))
+    return OccupancyGrid(header, info, costs.ravel().tolist())

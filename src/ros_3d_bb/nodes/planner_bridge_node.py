@@ -37,7 +37,7 @@ class PlannerBridgeParams(NamedTuple):
     classes_file: str = CLASSES_FILE
     tf_timeout: float = Param(0.2, 'How long to wait for each transform at the stamp of the tracks.', 's')
     points_prediction: float = Param(
-        0.5, 'How far ahead costmaps are marked with predicted footprints; 0: current positions only. The costmap '
+        0.3, 'How far ahead costmaps are marked with predicted footprints; 0: current positions only. The costmap '
         'does not know when people will be there, so long times block free ways.', 's')
     point_spacing: float = Param(
         0.035, 'Distance between the points of a footprint; at most 0.7 of a cell of the costmap, whose grid is turned '
@@ -50,8 +50,8 @@ class PlannerBridgeParams(NamedTuple):
 class ReceivedTracks(NamedTuple):
     """The latest tracks, in the frame in which they were received.
 
-    `transforms` maps the frame of each output to the 4x4 matrix from the tracks' frame to it; frames that are unknown
-    to tf are omitted.
+    `transforms` maps the frame of each output, and whether it takes the latest transform, to the 4x4 matrix from the
+    tracks' frame to it; frames that are unknown to tf are omitted.
     """
 
     stamp_ns: int
@@ -70,9 +70,10 @@ class PlannerTopic(object):
 
     def send(self, tracks, stamp_ns, received):
         """Publish tracks in the output frame; `received` are the ReceivedTracks from which they were predicted."""
-        frame_id = self.output.frame or received.frame_id
-        header = Header(stamp=time_from(0 if self.output.latest_tf else stamp_ns), frame_id=frame_id)
-        self._publisher.publish(self.output.write(tracks, received.transforms[frame_id], header))
+        output = self.output
+        frame_id = output.frame or received.frame_id
+        header = Header(stamp=time_from(0 if output.latest_tf else stamp_ns), frame_id=frame_id)
+        self._publisher.publish(output.write(tracks, received.transforms[output.frame, output.latest_tf], header))
         self.held = received
 
     def empty(self, stamp_ns):
@@ -102,6 +103,9 @@ class PlannerBridgeNode(object):
     ---------
     ~points : sensor_msgs/PointCloud2
         `costmap`: current and predicted footprints of people, as points for an obstacle layer.
+    ~costs : nav_msgs/OccupancyGrid
+        `costmap`: costs of the predicted positions of walking people around the robot, up to 99 of 100, as the map of a
+        StaticLayer of a local costmap. The stamp is 0, for which tf2 takes the latest transform.
     ~clearing_points : sensor_msgs/PointCloud2
         `costmap`: ring of points around the robot up to which the costmap is cleared before people are marked. Not
         published if ~clearing_range is 0, and while there are no valid tracks, so that a costmap can notice it.
@@ -154,11 +158,13 @@ class PlannerBridgeNode(object):
                               self._transforms_at(message.header))
 
     def _transforms_at(self, header):
-        """Return {frame: 4x4 matrix} from the tracks' frame to the output frames known to tf at the tracks' stamp."""
-        transforms = {header.frame_id: SAME_FRAME}
-        for frame in sorted(set(topic.output.frame for topic in self._topics) - {'', header.frame_id}):
+        """Return the `transforms` of ReceivedTracks, at the stamp of the tracks or latest."""
+        transforms = {}
+        for frame, latest in sorted(set((topic.output.frame, topic.output.latest_tf) for topic in self._topics)):
             try:
-                transforms[frame] = self._transforms.lookup(frame, header.frame_id, header.stamp)
+                transforms[frame, latest] = (
+                    SAME_FRAME if frame in ('', header.frame_id) else
+                    self._transforms.lookup(frame, header.frame_id, rospy.Time() if latest else header.stamp))
             except tf2_ros.TransformException as error:
                 self._diagnostics.warn('no transform', 'no transform from %s to %s at %.3f: %s; nothing is published '
                                        'in %s, and an empty array after ~timeout'
@@ -170,7 +176,7 @@ class PlannerBridgeNode(object):
         transform is unknown.
         """
         received, output = self._received, topic.output
-        frame_from_tracks = received.transforms.get(output.frame or received.frame_id)
+        frame_from_tracks = received.transforms.get((output.frame, output.latest_tf))
         if frame_from_tracks is None:
             return
         tracks, stamp_ns = received.tracks, received.stamp_ns

@@ -2,12 +2,14 @@
 import importlib
 from typing import Any, Callable, NamedTuple
 
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import PointCloud2
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.conversions.planner_msgs import (detections3d_to_msg, objects_to_msg, obstacles_to_msg,
-                                                people_to_msg, points_to_msg)
+from ros_3d_bb.conversions.planner_msgs import (detections3d_to_msg, grid_to_msg, objects_to_msg,
+                                                obstacles_to_msg, people_to_msg, points_to_msg)
 from ros_3d_bb.core.params import nearest_name
+from ros_3d_bb.planning.cost_grid import CELL_M, HALF_SIZE_M, presence_costs
 from ros_3d_bb.planning.planner_view import footprint_points, in_frame, ring_points
 
 CLEARING_SPACING_M = 0.025  # half a cell of a typical costmap, so that the clearing rays pass through every cell
@@ -21,9 +23,10 @@ class Output(NamedTuple):
     frame of the message's coordinates; if empty, the frame of the tracks is used, for planners that transform messages
     themselves. `to_now` states that the planner takes positions as current: they are predicted to the current time, and
     published again while no new tracks arrive; otherwise positions are those at the stamp of the image. `latest_tf`
-    states that the planner drops positions for which tf is older than their stamp: the stamp is 0, for which tf2 takes
-    the latest transform. `float32` states that the message stores coordinates as float32. `is_emptied` states that an
-    empty array is published when the tracks are outdated; otherwise nothing is published then.
+    states that the planner applies the latest transform, or drops positions for which tf is older than their stamp: the
+    stamp is 0, for which tf2 takes the latest transform. `float32` states that the message stores coordinates as
+    float32. `is_emptied` states that an empty array is published when the tracks are outdated; otherwise nothing is
+    published then.
     """
 
     topic: str
@@ -78,11 +81,14 @@ def _optional_output(name, params):
 
 
 def _costmap_outputs(params):
-    """Outputs for costmaps: the points to mark, and a ring around the robot up to which the costmap is cleared first.
+    """Outputs for costmaps: the points to mark, a ring around the robot up to which the costmap is cleared first, and a
+    grid of the costs of predicted positions for a StaticLayer.
 
-    Both are in the robot's frame, because coordinates are float32 and stay small there in any map. They are level in
-    the frame of the tracks even if the robot is tilted, because costmaps filter points by height in the fixed frame.
-    The ring is published only with valid tracks: with `expected_update_rate` the robot stops when it stays away.
+    Points and ring are in the robot's frame, because coordinates are float32 and stay small there in any map. They are
+    level in the frame of the tracks even if the robot is tilted, because costmaps filter points by height in the fixed
+    frame. The ring is published only with valid tracks: with `expected_update_rate` the robot stops when it stays away.
+    The grid is in the robot's frame because a StaticLayer reallocates its cells when their origin changes, while
+    another thread reads them.
     """
     def footprints(tracks, robot_from_tracks, header):
         points_m = footprint_points(tracks, params.points_prediction, params.point_spacing)
@@ -91,7 +97,11 @@ def _costmap_outputs(params):
     def ring(_tracks, robot_from_tracks, header):
         return points_to_msg(ring_m.dot(robot_from_tracks[:3, :3].T), header)
 
-    outputs = [Output('~points', PointCloud2, footprints, params.robot_frame, float32=True)]
+    def costs(tracks, robot_from_tracks, header):
+        return grid_to_msg(presence_costs(tracks, robot_from_tracks), CELL_M, (-HALF_SIZE_M, -HALF_SIZE_M), header)
+
+    outputs = [Output('~points', PointCloud2, footprints, params.robot_frame, float32=True),
+               Output('~costs', OccupancyGrid, costs, params.robot_frame, latest_tf=True)]
     if params.clearing_range:
         ring_m = ring_points(params.clearing_range, CLEARING_SPACING_M) + [0, 0, CLEARING_HEIGHT_M]
         outputs.append(Output('~clearing_points', PointCloud2, ring, params.robot_frame, is_emptied=False))

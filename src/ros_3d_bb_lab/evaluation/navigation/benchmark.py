@@ -12,7 +12,7 @@ import yaml
 
 from ros_3d_bb_lab.evaluation.defaults import describe_machine
 from ros_3d_bb_lab.evaluation.launching import launch
-from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import GOAL_M, SCENES, scenario_of
+from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import CAMERAS, GOAL_M, SCENES, scenario_of
 from ros_3d_bb_lab.evaluation.navigation.trial_result import summaries
 
 MODES = 'ours', 'none', 'depth', 'thesis', 'truth'
@@ -29,7 +29,7 @@ def run_trial(task):
     scene, mode, seed, folder = task
     name = os.path.join(folder, '%s-%s-%d' % (scene, mode, seed))
     with open(name + '.yaml', 'w') as stream:
-        yaml.safe_dump(scenario_of(scene, seed), stream)
+        yaml.safe_dump(scenario_of(scene, seed, () if mode == 'thesis' else CAMERAS), stream)
     arguments = {'scenario': name + '.yaml', 'record': name + '.json', 'mode': mode, 'goal_x': GOAL_M[0],
                  'goal_y': GOAL_M[1]}
     with open(name + '.log', 'w') as log:

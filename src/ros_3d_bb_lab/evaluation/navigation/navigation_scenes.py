@@ -1,6 +1,9 @@
 """Seeded scenes of the navigation benchmark. The robot is to drive from (0, 0) to `GOAL_M`.
 
 Convention: map frame, metres, radians, seconds. The seed varies positions, speeds and start times of the people.
+
+The robot has two cameras: a person at 1 m/s who meets a robot at 0.8 m/s at a right angle stays at a bearing of 51
+degrees, which a single forward camera of 55 degrees never sees. The tracker of the thesis supports one camera only.
 """
 import numpy as np
 
@@ -10,6 +13,9 @@ BOUNDS_M = [-4.0, 13.0, -4.0, 4.0]
 MEETING_X_M = 4.0
 REACHED_AFTER_S = 5.5  # the undisturbed robot needs this time to MEETING_X_M
 DOOR_M = 1.6  # width of the door
+RATE_HZ = 10.0  # images of each camera
+CAMERAS = [{'name': name, 'mount': [0.17, side * 0.05, 0.20], 'yaw': side * 0.47}
+           for name, side in (('left', 1), ('right', -1))]
 
 
 def standing(random):
@@ -70,11 +76,12 @@ SCENES = {scene.__name__: scene for scene in (standing, head_on, crossing_left, 
                                               crowd, pillar)}
 
 
-def scenario_of(name, seed):
-    """Content of the scenario file of a scene."""
+def scenario_of(name, seed, cameras=CAMERAS):
+    """Content of the scenario file of a scene; without `cameras` the robot has one, which looks ahead."""
     random = np.random.RandomState([seed, sorted(SCENES).index(name)])
     people, furniture = SCENES[name](random)
-    return {'duration': DURATION_S, 'rate': 15.0, 'seed': seed, 'people': people, 'robot': {'pose': [0.0, 0.0, 0.0]},
+    return {'duration': DURATION_S, 'rate': RATE_HZ, 'seed': seed, 'people': people,
+            'robot': {'pose': [0.0, 0.0, 0.0], 'cameras': list(cameras)},
             'room': {'bounds': BOUNDS_M, 'height': 2.8, 'furniture': furniture}}
 
 

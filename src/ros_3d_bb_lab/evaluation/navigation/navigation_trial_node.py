@@ -1,4 +1,5 @@
 """ROS node that supervises one trial of the navigation benchmark."""
+import functools
 import json
 import threading
 import time
@@ -11,7 +12,7 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Float32, Header, Time, UInt32
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, camera_from_msg, time_from, transform_from_msg
 from ros_3d_bb.conversions.planner_msgs import points_to_msg
@@ -65,9 +66,9 @@ class NavigationTrialNode(object):
     ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
         Tracks, which show how far the tracker has got; only with ~tracks.
     camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth images; only with ~cloud.
+        Depth images of each camera of the scenario; only with ~cloud.
     camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
-        Intrinsics of the depth images; only with ~cloud.
+        Their intrinsics; only with ~cloud.
     move_base/local_costmap/costmap : nav_msgs/OccupancyGrid
         Shows that move_base has started.
 
@@ -77,15 +78,16 @@ class NavigationTrialNode(object):
         Walls and furniture of the scene, latched.
     move_base_simple/goal : geometry_msgs/PoseStamped
         Goal in the map.
-    points : sensor_msgs/PointCloud2
-        Points of the depth images; only with ~cloud.
+    camera/points : sensor_msgs/PointCloud2
+        Points of the depth images of each camera; only with ~cloud.
     simulator_node/time_limit : std_msgs/Time
         Time that the simulator does not exceed.
     """
 
     def __init__(self):
         self._params, = read_params(NavigationTrialParams)
-        self._pace, self._costmap_seen, self._camera = Pace(), False, None
+        self._scenario = read_scenario(self._params.scenario)
+        self._pace, self._costmap_seen, self._cameras = Pace(), False, {}
         self._position, self._speeds_mps, self._clearances_m = None, [], []
         self._collisions, self._driving_collisions = 0, 0
         self._map_pub = rospy.Publisher('map', OccupancyGrid, queue_size=1, latch=True)
@@ -101,13 +103,19 @@ class NavigationTrialNode(object):
             rospy.Subscriber(TRACKS_TOPIC, TrackedObjectArray,
                              lambda message: self._pace.heard('tracks', message.header.stamp.to_nsec()))
         if self._params.cloud:
-            self._cloud_pub = rospy.Publisher('points', PointCloud2, queue_size=1)
-            rospy.Subscriber(INFO_TOPICS[1], CameraInfo, self._on_camera)
-            rospy.Subscriber(DEPTH_TOPIC, Image, self._on_depth, queue_size=1, buff_size=2 ** 24)
+            for mount in self._scenario.robot.mounts:
+                self._convert_depth_of(mount.name)
+
+    def _convert_depth_of(self, camera):
+        cloud_pub = rospy.Publisher(topic_of(camera, 'camera/points'), PointCloud2, queue_size=1)
+        rospy.Subscriber(topic_of(camera, INFO_TOPICS[1]), CameraInfo,
+                         lambda message: self._cameras.update({camera: camera_from_msg(message)}))
+        rospy.Subscriber(topic_of(camera, DEPTH_TOPIC), Image, functools.partial(self._on_depth, camera, cloud_pub),
+                         queue_size=1, buff_size=2 ** 24)
 
     def run(self):
         """Run the trial and write the record."""
-        self._map_pub.publish(map_message(read_scenario(self._params.scenario).room))
+        self._map_pub.publish(map_message(self._scenario.room))
         worker = threading.Thread(target=self._run, daemon=True)  # publishing in the main thread can block on SIGINT
         worker.start()
         while worker.is_alive() and not rospy.is_shutdown():
@@ -173,12 +181,10 @@ class NavigationTrialNode(object):
     def _on_costmap(self, _message):
         self._costmap_seen = True
 
-    def _on_camera(self, message):
-        self._camera = camera_from_msg(message)
-
-    def _on_depth(self, message):
-        if self._camera is not None:
-            self._cloud_pub.publish(points_to_msg(points_of(imgmsg_to_depth(message), self._camera), message.header))
+    def _on_depth(self, camera, cloud_pub, message):
+        if camera in self._cameras:
+            points_m = points_of(imgmsg_to_depth(message), self._cameras[camera])
+            cloud_pub.publish(points_to_msg(points_m, message.header))
             self._pace.heard('cloud', message.header.stamp.to_nsec())
 
 

@@ -162,13 +162,14 @@ class SimulatorNode(object):
     def _stand_still(self, start_ns):
         """Publish the start of the scene until the first time limit. Returns the time of the limit."""
         state, period_ns = self._simulator.state_at(0.0), int(NS / self._simulator.rate)
+        number = itertools.cycle(range(len(self._simulator.cameras)))
         for stamp_ns in itertools.count(start_ns, int(STEP_S * NS)):
             if self._limit_ns is not None or rospy.is_shutdown():
                 self._wait_for_image()
                 return stamp_ns
             self._publish_state(state, stamp_ns)
             if stamp_ns // period_ns > (stamp_ns - int(STEP_S * NS)) // period_ns:
-                self._render(0, state, stamp_ns)
+                self._render(next(number), state, stamp_ns)
             time.sleep(STEP_S)
 
     def _play(self, start_ns):

@@ -1,0 +1,72 @@
+"""Grid of costs around the robot: how likely a walking person will be at a place within the time of the prediction.
+
+Robot frame, metres.
+"""
+import numpy as np
+
+from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.planning.planner_view import position_after
+
+CELL_M = 0.1
+HALF_SIZE_M = 5.0  # of the grid, whose centre is the robot
+HIGHEST = 99  # of an OccupancyGrid; 100 would be lethal
+RISKY = 0.15  # probability with the highest cost
+STEP_S = 0.1
+COMFORT_M = 0.2  # kept free around the body
+EXTENT = 3.0  # standard deviations up to which costs are computed
+
+
+def presence_costs(tracks, robot_from_tracks):
+    """Costs of the cells around the robot: the largest probability, over the times of the prediction, that a walking
+    person or the comfort zone around the body covers the cell, relative to `RISKY`.
+
+    The probability that a disc of radius r covers a point at the offset d from its expected centre is approximated by
+    pi r² N(d; 0, C + r²/4 I), where C is the covariance of the centre: the disc is replaced by a Gaussian with the same
+    area and second moments.
+
+    Parameters
+    ----------
+    tracks : list of TrackedObject
+        Those that do not move are left out: their place does not change.
+    robot_from_tracks : numpy.ndarray, (4, 4)
+
+    Returns
+    -------
+    numpy.ndarray, (n, n), int8
+        0 to `HIGHEST`. Rows are along y, columns along x; the robot is in the middle.
+    """
+    count = int(round(2 * HALF_SIZE_M / CELL_M))
+    probabilities = np.zeros((count, count))
+    for track in tracks:
+        if track.moving:
+            times_s = np.arange(0, track.prediction_step_s * len(track.prediction_m) + STEP_S / 2, STEP_S)
+            centers_m = transform_points(robot_from_tracks, position_after(track, times_s))[:, :2]
+            covariances_m2 = _covariances_after(track, times_s, robot_from_tracks[:2, :3])
+            for center_m, covariance_m2 in zip(centers_m, covariances_m2):
+                _raise_to(probabilities, center_m, covariance_m2, track.size_m[0] / 2 + COMFORT_M)
+    return np.rint(HIGHEST * np.minimum(probabilities / RISKY, 1)).astype(np.int8)
+
+
+def _raise_to(probabilities, center_m, covariance_m2, radius_m):
+    """Raise probabilities (n, n) to those of a disc at one time."""
+    spread_m2 = covariance_m2 + radius_m ** 2 / 4 * np.eye(2)
+    extent_m = EXTENT * np.sqrt(np.diag(spread_m2))
+    low, high = (np.clip(np.ceil((center_m + side * extent_m + HALF_SIZE_M) / CELL_M - 0.5), 0, len(probabilities))
+                 .astype(int) for side in (-1, 1))
+    x, y = ((np.arange(low[axis], high[axis]) + 0.5) * CELL_M - HALF_SIZE_M - center_m[axis] for axis in (0, 1))
+    (xx, xy), (_xy, yy) = np.linalg.inv(spread_m2)
+    squares = xx * x ** 2 + 2 * xy * x * y[:, np.newaxis] + yy * y[:, np.newaxis] ** 2
+    window = probabilities[low[1]:high[1], low[0]:high[0]]
+    np.maximum(window, radius_m ** 2 / 2 / np.sqrt(np.linalg.det(spread_m2)) * np.exp(-squares / 2), out=window)
+
+
+def _covariances_after(track, times_s, robot_from_tracks):
+    """Covariances (k, 2, 2) of the position of a track after times (k,) in the robot frame; 0 if unknown."""
+    if track.covariance is None or track.prediction_covariance_m2 is None:
+        return np.zeros((len(times_s), 2, 2))
+    known = np.concatenate((track.covariance[np.newaxis, :3, :3], track.prediction_covariance_m2))
+    steps = np.minimum(times_s / track.prediction_step_s, len(known) - 1)
+    before = np.minimum(steps.astype(int), len(known) - 2)
+    share = (steps - before)[:, np.newaxis, np.newaxis]
+    covariances_m2 = (1 - share) * known[before] + share * known[before + 1]
+    return robot_from_tracks @ covariances_m2 @ robot_from_tracks.T

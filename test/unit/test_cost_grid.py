@@ -1,0 +1,74 @@
+"""Costs of predicted positions around the robot, against the probability of presence."""
+import numpy as np
+import pytest
+
+from ros_3d_bb.camera.camera_model import transform_from
+from ros_3d_bb.planning.cost_grid import CELL_M, COMFORT_M, HALF_SIZE_M, HIGHEST, RISKY, presence_costs
+from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
+
+WIDTH_M = 0.5
+RADIUS_M = WIDTH_M / 2 + COMFORT_M
+
+
+def walking(position_m, velocity_mps, stds_m=(0.0, 0.0), moving=True):
+    """A track whose standard deviation grows linearly from now to the end of the prediction of 2 s."""
+    position_m, velocity_mps = np.array(position_m + (0.85,)), np.array(velocity_mps + (0.0,))
+    times_s = 0.25 * np.arange(9)
+    covariances_m2 = np.interp(times_s, (0, 2), stds_m)[:, np.newaxis, np.newaxis] ** 2 * np.eye(3)
+    covariance = np.zeros((6, 6))
+    covariance[:3, :3] = covariances_m2[0]
+    return TrackedObject(1, position_m, np.array([WIDTH_M, WIDTH_M, 1.7]), velocity_mps, velocity_mps, VISIBLE, moving,
+                         0, 0, position_m + np.outer(times_s[1:], velocity_mps), 0.25, covariance, covariances_m2[1:])
+
+
+def cost_at(costs, x_m, y_m):
+    row, column = (int((part + HALF_SIZE_M) // CELL_M) for part in (y_m, x_m))
+    return costs[row, column]
+
+
+def test_certain_predictions_have_the_highest_cost_along_the_way_and_none_beside_it():
+    costs = presence_costs([walking((1.0, -2.0), (0.0, 1.5))], np.eye(4))
+    assert costs.dtype == np.int8 and costs.shape == (100, 100)
+    for y_m in np.arange(-1.95, 1.0, 0.1):
+        assert cost_at(costs, 1.0, y_m) == HIGHEST
+        assert cost_at(costs, 1.0 + 2 * RADIUS_M, y_m) == cost_at(costs, 1.0 - 2 * RADIUS_M, y_m) == 0
+    assert cost_at(costs, 1.0, 1.0 + 2 * RADIUS_M) == cost_at(costs, 1.0, -2.0 - 2 * RADIUS_M) == 0
+
+
+def test_costs_follow_the_probability_of_presence():
+    """Against the share of samples of the predicted position that cover the cell, where that varies slowly."""
+    costs = presence_costs([walking((2.0, 0.0), (1.0, 0.0), (0.8, 0.8))], np.eye(4))
+    offsets = np.random.RandomState(3).normal(scale=0.8, size=(200000, 2))
+    for x_m, y_m in ((3.05, 0.05), (3.05, 0.95), (3.05, -1.55)):
+        nearest_m = min(4.0, max(2.0, x_m))
+        expected = (np.hypot(*(offsets + [nearest_m - x_m, -y_m]).T) < RADIUS_M).mean()
+        assert cost_at(costs, x_m, y_m) / float(HIGHEST) * RISKY == pytest.approx(expected, abs=0.02)
+
+
+def test_costs_decrease_as_the_prediction_becomes_uncertain():
+    costs = presence_costs([walking((-2.0, 0.0), (2.0, 0.0), (0.1, 1.5))], np.eye(4))
+    along = [int(cost_at(costs, x_m, 0.05)) for x_m in np.arange(-1.95, 2.0, 0.5)]
+    assert along[0] == HIGHEST and along == sorted(along, reverse=True) and along[-1] < HIGHEST / 2
+
+
+def test_standing_people_have_no_cost():
+    assert not presence_costs([walking((1.0, 0.0), (0.0, 0.0), moving=False)], np.eye(4)).any()
+    assert not presence_costs([], np.eye(4)).any()
+
+
+def test_positions_and_covariances_are_transformed_to_the_robot_frame():
+    """The robot stands at (3, 1) and looks along y of the tracks; the position is uncertain along x only."""
+    track = walking((3.0, 3.0), (0.0, 0.0), (0.0, 0.0))
+    uncertain = np.diag([1.0, 0.0, 0.0])
+    track.covariance[:3, :3] = track.prediction_covariance_m2[:] = uncertain
+    robot_from_tracks = np.linalg.inv(transform_from((3, 1, 0), (0, 0, np.sin(np.pi / 4), np.cos(np.pi / 4))))
+    costs = presence_costs([track], robot_from_tracks)
+    assert cost_at(costs, 2.0, 0.0) > 0
+    assert cost_at(costs, 2.0, 1.5) > 0 and cost_at(costs, 2.0, -1.5) > 0
+    assert cost_at(costs, 3.5, 0.0) == cost_at(costs, 0.5, 0.0) == 0
+
+
+def test_people_beyond_the_grid_and_at_its_border_do_no_harm():
+    for x_m in (-100.0, -5.2, 4.9, 5.2, 100.0):
+        costs = presence_costs([walking((x_m, x_m), (1.0, 0.5), (0.3, 0.8))], np.eye(4))
+        assert costs.shape == (100, 100) and (costs.any() == (abs(x_m) < 6))
