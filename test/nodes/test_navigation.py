@@ -104,7 +104,7 @@ def test_visible_people_are_lethal_in_the_local_costmap_and_leave_no_trail(robot
                       for costmap in costmaps])
     assert len(costs) >= 15 and (costs == LETHAL).mean() >= 0.95, costs
     robot.people = lambda _seconds: np.zeros((0, 2))
-    robot.advance(1.5, is_driven=False)  # max_missed_time and a cycle
+    robot.advance(1.5, is_driven=False)  # as long as a missed person is published, and a cycle
     assert max(robot.costmap.messages[-1].data) < LETHAL
 
 

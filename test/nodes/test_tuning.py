@@ -87,7 +87,7 @@ def test_each_value_is_in_the_group_in_which_rqt_reconfigure_shows_it(tracker):
 
 
 @pytest.mark.parametrize('node, change, words', [
-    ('tracker_node', {'max_missed_time': 1.0, 'outlier_share': 1.5, 'marker_history': 9.0},
+    ('tracker_node', {'max_age': 1.0, 'outlier_share': 1.5, 'marker_history': 9.0},
      'parameter ~outlier_share is 1.5'),
     ('tracker_node', {'target_frame': 'odom'},
      'parameter ~target_frame is read only at startup; parameters that can be changed: accel'),

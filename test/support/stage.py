@@ -27,7 +27,7 @@ STAYING = {'start': [5.0, -0.9], 'facing': 1.6, 'height': 1.7}
 SCENES = ([STAYING, {'start': [4.0, 0.8], 'facing': 3.1, 'height': 1.8}],
           [STAYING, {'start': [3.0, -1.2], 'facing': 3.1, 'height': 1.8}])  # the second person is replaced
 NEAR_M = 0.5  # people are 1.7 m apart and more
-SHOWN_S = 0.5  # how long undetected people in view are published (~max_missed_time, and an image)
+SHOWN_S = 0.5  # how long undetected people in view are published (0.4 s, and an image)
 
 
 class Stage(object):

@@ -33,6 +33,10 @@ def standing(*places):
     return lambda _time_s: [at(*place) for place in places]
 
 
+def standing_with(score):
+    return lambda _time_s: [at(3, 0)._replace(score=score)]
+
+
 def ids(objects):
     return [track.id for track in objects]
 
@@ -44,9 +48,26 @@ def test_ids_start_at_1_and_are_not_reused():
     assert ids(play(tracker, 1, standing((3, 0)))[-1]) == [3]
 
 
-def test_a_track_is_published_after_min_hits_detections():
-    published = play(Tracker(TrackerParams(min_hits=4, min_age=0.0)), 0.3, standing((3, 0)))
-    assert [len(objects) for objects in published] == [0, 0, 0, 1, 1, 1, 1, 1, 1]
+@pytest.mark.parametrize('rate_hz', [3, 5, 10, 20, 30, 60])
+def test_tracks_begin_and_end_after_the_same_time_at_any_rate(rate_hz):
+    """Boxes without a score. Below 12 Hz, the third one confirms the track."""
+    walk = play(Tracker(), 4, lambda time_s: [at(3, 0)] if time_s < 2 else [], rate_hz)
+    published_s = [number / rate_hz for number, objects in enumerate(walk) if objects]
+    assert 0.07 <= published_s[0] <= max(0.14, 2.01 / rate_hz)
+    assert 2.15 <= published_s[-1] <= max(2.45, 2 + 2.01 / rate_hz)
+    assert len(published_s) == round((published_s[-1] - published_s[0]) * rate_hz) + 1
+
+
+@pytest.mark.parametrize('score,first', [(0.95, 1), (0.5, 3), (0.35, 7), (0.1, None), (0.02, None)])
+def test_the_score_decides_when_a_track_is_published(score, first):
+    published = [len(objects) for objects in play(Tracker(), 1, standing_with(score))]
+    assert published == [0] * 30 if first is None else published == [0] * first + [1] * (30 - first)
+
+
+def test_boxes_with_low_scores_continue_a_track():
+    tracker = Tracker()
+    play(tracker, 1, standing_with(0.9))
+    assert [ids(objects) for objects in play(tracker, 1, standing_with(0.1), start_s=1)] == [[1]] * 30
 
 
 @pytest.mark.parametrize('rate_hz', [5, 60])
@@ -92,10 +113,9 @@ def test_an_occluded_person_stays_published_and_keeps_the_id():
     assert [track.status for track in walk[-1]] == [VISIBLE, VISIBLE]
 
 
-def test_a_missed_person_is_published_until_max_missed_time():
-    walk = play(Tracker(TrackerParams(max_missed_time=0.35)), 2, lambda time_s: [at(3, 0)] if time_s < 1 else [])
-    assert [bool(objects) for objects in walk[30:]] == [frame < 10 for frame in range(30)]
-    assert walk[35][0].status == OCCLUDED
+def test_a_missed_person_is_occluded_until_unpublished():
+    walk = play(Tracker(), 2, lambda time_s: [at(3, 0)] if time_s < 1 else [])
+    assert walk[29][0].status == VISIBLE and walk[33][0].status == OCCLUDED
 
 
 def test_a_person_who_leaves_the_view_is_published_while_the_position_is_certain():
@@ -284,11 +304,11 @@ def test_a_hundred_people_are_distinguished():
 
 
 def test_new_parameters_apply_from_the_next_image_on_and_tracks_are_kept():
-    """There are no more detections; by the old limits the track would end after 0.35 s, and be kept for 4 s."""
+    """There are no more detections; by the old limits, predictions reach 2 s, and the track is kept for 4 s."""
     tracker = Tracker()
     number, = ids(play(tracker, 1, standing((3, 0)))[-1])
-    tracker.reconfigure(TrackerParams(max_missed_time=2.0), NoiseParams(), PredictionParams(prediction_time=1.0))
-    missed = play(tracker, 1, standing(), start_s=1)[-1]
+    tracker.reconfigure(TrackerParams(), NoiseParams(), PredictionParams(prediction_time=1.0))
+    missed = play(tracker, 0.2, standing(), start_s=1)[-1]
     assert ids(missed) == [number] and len(missed[0].prediction_m) == 4
     tracker.reconfigure(TrackerParams(max_age=0.5), NoiseParams(), PredictionParams())
     assert play(tracker, 0.1, standing(), start_s=2)[-1] == []

@@ -102,7 +102,7 @@ def test_planner_points_diagnostics_and_live_parameters(reader, camera_bag):
             reader.types(block, **master)
         printed = subprocess.check_output(['rosparam', 'get', '/tracker_node'], env=graph.environment)
     parameters = yaml.safe_load(printed)
-    assert [parameters[name] for name in ('prediction_time', 'max_missed_time', 'max_age')] == [3.0, 1.0, 8.0]
+    assert [parameters[name] for name in ('prediction_time', 'confirmation_probability', 'max_age')] == [3.0, 0.95, 8.0]
 
 
 def test_simulation_and_doctor(reader):

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking import track_score
 from ros_3d_bb.tracking.track import position_std_of
 from ros_3d_bb.tracking.types import NEARER_M, OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, wrapped
 
@@ -68,7 +69,9 @@ def mark_missed(tracks, before, rows, cameras, camera, observed_s, max_range_m):
     held &= position_std_of(missed) > BEHIND_M
     missed['covariance'][held] = before['covariance'][held]
     missed['unseen_s'] += np.where(best == SEEN, 0, observed_s)
-    missed['missed_s'] += np.where(best == VISIBLE, observed_s, 0)
+    missed_s = np.where(best == VISIBLE, observed_s, 0)
+    missed['missed_s'] += missed_s
+    track_score.add_misses(missed, missed_s)
     missed['status'] = STATUS[best]
     tracks[rows] = missed
 

@@ -10,18 +10,19 @@ import numpy as np
 from ros_3d_bb.core.object_classes import MAX_IN_GROUP
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking import kalman_filter
+from ros_3d_bb.tracking import kalman_filter, track_score
 from ros_3d_bb.tracking.types import PREDICTION_STEP, PREDICTION_TIME, VISIBLE, TrackedObject, prediction_times_s
 
 # `hits` counts the detections of a track, `end_hits` those that showed the lower and the upper end of the body.
 # `cut_ns` are the stamps of the latest detections of which the image border truncated these ends.
+# `log_odds` is the track score (`track_score`).
 # `unseen_s` is the time since the last detection, `missed_s` the part of it during which a detection was expected.
 # `votes` are filtered scores of the classes of the group, of which `class_number` (see `ClassNumbers`) has the highest.
 # `score` is the filtered score of the detections; `detection` is `Detection.index` in the latest image.
 TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
                   ('size_m', float, 3), ('end_hits', int, 2), ('cut_ns', np.int64, 2), ('hits', int),
                   ('first_ns', np.int64), ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float),
-                  ('status', int), ('confirmed', bool), ('moving', bool), ('class_number', int),
+                  ('status', int), ('log_odds', float), ('confirmed', bool), ('moving', bool), ('class_number', int),
                   ('votes', float, MAX_IN_GROUP), ('score', float), ('detection', int)])
 PUBLISHED = 'id', 'status', 'moving', 'first_ns', 'last_ns', 'class_number', 'score', 'detection'
 RECENTLY_MATCHED_NS = NS // 5  # no track starts near a track that was matched less than this ago
@@ -57,11 +58,11 @@ def update_matched(tracks, rows, measurements, stamp_ns, params, classes):
     matched = tracks[rows]
     matched['mean'], matched['covariance'] = kalman_filter.update(matched['mean'], matched['covariance'], measurements,
                                                                   params)
+    period_s = (stamp_ns - matched['last_ns']) / NS - matched['unseen_s']
+    track_score.add_detections(matched, measurements['score'], period_s, params)
     matched['hits'] += 1
     matched['last_ns'], matched['unseen_s'], matched['missed_s'], matched['status'] = stamp_ns, 0, 0, VISIBLE
-    is_old_enough = stamp_ns - matched['first_ns'] >= params.min_age * NS
-    matched['confirmed'] |= is_old_enough & (matched['hits'] >= params.min_hits)
-    speed_mps = np.linalg.norm(matched['mean'][:, 2:], axis=1)
+    speed_mps = np.hypot(*matched['mean'][:, 2:].T)
     matched['moving'] = speed_mps >= params.moving_speed * np.where(matched['moving'], STILL_MOVING, 1)
     _update_size(matched, measurements, stamp_ns)
     _update_class(matched, measurements, classes)
@@ -69,8 +70,8 @@ def update_matched(tracks, rows, measurements, stamp_ns, params, classes):
 
 
 def new_targets(tracks, measurements, stamp_ns, params, classes):
-    """Start tracks from unmatched measurements, except measurements with little support, and duplicate detections of
-    recently matched or new tracks of the same group of classes.
+    """Start tracks from unmatched measurements, except measurements with little support or a low score, and duplicate
+    detections of recently matched or new tracks of the same group of classes.
 
     Returns the new tracks, whose IDs are not set, and the indices of the measurements that started them.
     """
@@ -84,13 +85,15 @@ def new_targets(tracks, measurements, stamp_ns, params, classes):
     new['end_hits'] = ~measurements['cut_ends']
     new['cut_ns'] = np.where(measurements['cut_ends'], stamp_ns, NEVER_NS)
     new['hits'], new['first_ns'], new['last_ns'] = 1, stamp_ns, stamp_ns
+    new['log_odds'] = track_score.log_odds_of(measurements['score'], params.even_score)
     new['votes'][np.arange(len(new)), classes.member[new['class_number']]] = _vote_weights(measurements)
     is_recent = stamp_ns - tracks['last_ns'] < RECENTLY_MATCHED_NS
     occupied_m = np.concatenate((tracks['mean'][is_recent, :2], new['mean'][:, :2]))
     groups = classes.group[np.concatenate((tracks['class_number'][is_recent], new['class_number']))]
     others, first = list(range(is_recent.sum())), is_recent.sum()
     kept = []
-    for row in np.flatnonzero(measurements['support'] >= STARTING_SUPPORT).tolist():
+    trusted = (measurements['support'] >= STARTING_SUPPORT) & (new['log_odds'] > track_score.MIN_TRACK_SCORE)
+    for row in np.flatnonzero(trusted).tolist():
         is_far = np.linalg.norm(occupied_m[others] - occupied_m[first + row], axis=1) >= params.duplicate_distance
         if (is_far | (groups[others] != groups[first + row])).all():
             kept.append(row)
@@ -104,11 +107,13 @@ def duplicates(tracks, stamp_ns, classes):
     """
     duplicate = np.zeros(len(tracks), bool)
     rows = np.flatnonzero(tracks['confirmed'] & (stamp_ns - tracks['last_ns'] < RECENTLY_MATCHED_NS))
-    rows = rows[np.argsort(tracks['first_ns'][rows], kind='mergesort')]
-    places_m, groups = tracks['mean'][rows, :2], classes.group[tracks['class_number'][rows]]
-    at_one_place = np.linalg.norm(places_m[:, None] - places_m, axis=2) < SAME_PERSON_M
     is_new = stamp_ns - tracks['first_ns'][rows] < NEW_NS
-    duplicate[rows] = is_new & np.tril(at_one_place & (groups[:, None] == groups), -1).any(axis=1)
+    if is_new.any():
+        order = np.argsort(tracks['first_ns'][rows], kind='mergesort')
+        rows, is_new = rows[order], is_new[order]
+        places_m, groups = tracks['mean'][rows, :2], classes.group[tracks['class_number'][rows]]
+        at_one_place = np.linalg.norm(places_m[:, None] - places_m, axis=2) < SAME_PERSON_M
+        duplicate[rows] = is_new & np.tril(at_one_place & (groups[:, None] == groups), -1).any(axis=1)
     return duplicate
 
 

@@ -2,10 +2,9 @@
 
 Each person is tracked by a constant-velocity Kalman filter in the plane (`kalman_filter`). Detections are assigned to
 tracks by maximum total likelihood (`association`). A detection that a new target explains better starts a track, which
-is published after a minimum number of detections (`track`). Undetected people are not dropped immediately: their tracks
-stay published for a short time if a camera should detect them, and for longer if a person or an object occludes them
-(`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep their
-track ID.
+is published once it is likely to be a person (`track_score`). Undetected people are not dropped immediately: their
+tracks stay published for a short time if a camera should detect them, and for longer if a person or an object occludes
+them (`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep their track ID.
 """
 from typing import NamedTuple
 
@@ -14,7 +13,7 @@ import numpy as np
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking import kalman_filter
+from ros_3d_bb.tracking import kalman_filter, track_score
 from ros_3d_bb.tracking.association import associate, unmatched
 from ros_3d_bb.tracking.class_numbers import ClassNumbers
 from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
@@ -55,11 +54,13 @@ class TrackerParams(NamedTuple):
     height_sigma: float = Param(
         0.06, "Standard deviation of the height of a person's boxes.", 'm', limits=(1e-6, LARGEST), live=(0.01, 0.5),
         section=ASSOCIATION)
-    min_hits: int = Param(4, 'A track is published after at least this many detections.', live=(1, 20))
-    min_age: float = Param(0.1, 'A track is published at this age at the earliest.', 's', live=(0, 2))
-    max_missed_time: float = Param(
-        0.35, 'How long a track stays published while a camera should detect the person and does not.', 's',
-        live=(0, 5))
+    confirmation_probability: float = Param(
+        0.92, 'A track is published as soon as it is an object with this probability, by the scores of its boxes and '
+        'the time for which they fit.', limits=(0.5, 0.98), live=(0.5, 0.98))
+    even_score: float = Param(
+        0.27, 'Score of the detector at which half of the boxes show an object. Boxes with much lower scores can '
+        'continue a track, but do not start one. Boxes without a score count as if it were 0.5.', limits=(0.01, 0.99),
+        live=(0.05, 0.95))
     max_position_std: float = Param(
         0.5, 'An undetected track stays published up to this standard deviation of its position.', 'm', live=(0, 2))
     max_age: float = Param(4.0, 'A person who reappears within this time keeps the track ID.', 's', live=(0, 30))
@@ -141,7 +142,8 @@ class Tracker(object):
         """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image."""
         tracks, params = self._buffer.state.tracks, self._params
         tracks = tracks[np.argsort(tracks['id'])]
-        published = (tracks['missed_s'] <= params.max_missed_time) & (position_std_of(tracks) < params.max_position_std)
+        published = tracks['log_odds'] >= track_score.MIN_TRACK_SCORE
+        published &= position_std_of(tracks) < params.max_position_std
         published |= tracks['status'] == VISIBLE
         return objects_of(tracks[tracks['confirmed'] & published], self._prediction, self._classes)
 
