@@ -72,9 +72,9 @@ def test_every_nth_image_keeps_the_truth_of_all(tmp_path):
     assert np.allclose(run.images[0].truth.future_m[0, 0], (8 + SPEED_MPS * 0.5, 0))
 
 
-@pytest.mark.parametrize('score,min_score,probability', [('2', 1.9, 1 / (1 + np.exp(-2))), ('2', 2.1, None),
+@pytest.mark.parametrize('score,min_score,probability', [('3.32', 3.3, 0.5), ('3.32', 3.4, None),
                                                          ('0.7', 0.5, 0.7), ('0.7', 0.8, None)])
-def test_scores_are_probabilities_or_log_odds(tmp_path, score, min_score, probability):
+def test_scores_are_probabilities_or_those_of_pointrcnn(tmp_path, score, min_score, probability):
     run, = read_recordings(str(write_recording(tmp_path / 'one', score)), min_score=min_score)
     found = [detection.score for detection in run.images[0].detections]
     assert found == ([] if probability is None else [pytest.approx(probability)])

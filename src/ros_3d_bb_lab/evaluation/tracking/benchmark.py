@@ -15,7 +15,7 @@ import numpy as np
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb_lab.evaluation.baselines.norfair_baseline import Norfair
+from ros_3d_bb_lab.evaluation.baselines.norfair_baseline import LIDAR, LIDAR_SCORE, Norfair
 from ros_3d_bb_lab.evaluation.baselines.oracle_association import outputs_with_perfect_association
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker, as_it_arrived
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
@@ -52,6 +52,24 @@ def outputs_of(make_tracker, run):
 CONTESTANTS = (Contestant('ours', Tracker, outputs_of),
                Contestant('thesis', OriginalTracker, lambda make, run: outputs_of(make, as_it_arrived(run))),
                Contestant('thesis_mended', ThesisTracker, outputs_of), Contestant('library', Norfair, outputs_of))
+
+
+def _outputs_of_likely(make_tracker, run):
+    """As `outputs_of`, for trackers that do not use scores: without the boxes below the score tuned for Norfair."""
+    images = [image._replace(detections=[detection for detection in image.detections
+                                         if detection.score >= LIDAR_SCORE]) for image in run.images]
+    return outputs_of(make_tracker, run._replace(images=tuple(images)))
+
+
+def _norfair_outputs(make_tracker, run):
+    """As `_outputs_of_likely`, for Norfair at the rate of the run."""
+    period_s = np.median(np.diff([image.stamp_ns for image in run.images])) / NS
+    return _outputs_of_likely(lambda: make_tracker(LIDAR._replace(rate_hz=1 / period_s)), run)
+
+
+CONTESTANTS_ON_DETECTIONS = (
+    Contestant('ours', Tracker, outputs_of), Contestant('thesis', OriginalTracker, _outputs_of_likely),
+    Contestant('thesis_mended', ThesisTracker, _outputs_of_likely), Contestant('library', Norfair, _norfair_outputs))
 BOUND = Contestant('perfect_association', Tracker, outputs_with_perfect_association)
 
 
@@ -153,7 +171,7 @@ def _bench_detections(arguments):
     """Run the comparison on recorded detections, as `bench`."""
     runs = list(read_recordings(arguments.detections, arguments.every, arguments.min_score,
                                 not arguments.no_odometry))
-    trackers = compare(runs, CONTESTANTS)
+    trackers = compare(runs, CONTESTANTS_ON_DETECTIONS)
     print('\n'.join(table(trackers)))
     return {'sequences': [run.name for run in runs], 'every': arguments.every, 'odometry': not arguments.no_odometry,
             'trackers': trackers}
