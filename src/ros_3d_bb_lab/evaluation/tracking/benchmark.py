@@ -21,6 +21,7 @@ from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker,
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import SimulatedDetection
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
+from ros_3d_bb_lab.evaluation.tracking.prediction_benchmark import predictions
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
 from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, detection_of, simulate, view_of
@@ -142,6 +143,15 @@ def table(trackers):
     return lines
 
 
+def prediction_table(prediction):
+    """Format the result of `prediction_benchmark.predictions` as lines of text."""
+    rows = (('true positions, constant velocity', 'cv_fde_2s_m'), ('true positions, ours', 'ours_fde_2s_m'),
+            ('in the 95 % ellipse', 'ours_coverage_95_2s'))
+    lines = ['%-36s' % 'error after 2 s, m' + ''.join('%13s' % name for name in prediction)]
+    return lines + ['%-36s' % title + ''.join('%13s' % _text(key, scores[key]) for scores in prediction.values())
+                    for title, key in rows]
+
+
 def _text(key, value):
     """Percentages have one digit, lengths and shares three."""
     if value is None or isinstance(value, int):
@@ -163,8 +173,11 @@ def bench(arguments):
     for contestant in contestants:
         trackers[contestant.name]['cpu_ms'] = {str(people): cpu_ms(contestant.make, people) for people in PEOPLE}
     print('\n'.join(table(trackers)))
+    prediction = predictions(Tracker, sequences)
+    print('\n'.join(prediction_table(prediction)))
     return {'sequences': names, 'recorded': bool(arguments.data), 'seed': arguments.seed,
-            'repetitions': arguments.repetitions, 'seconds': arguments.seconds, 'trackers': trackers}
+            'repetitions': arguments.repetitions, 'seconds': arguments.seconds, 'trackers': trackers,
+            'prediction': prediction}
 
 
 def _bench_detections(arguments):

@@ -1,0 +1,56 @@
+"""Predictions from the true positions of recorded pedestrians: those of the tracker, and a constant velocity.
+
+As in Schöller et al., What the Constant Velocity Model Can Teach Us About Pedestrian Motion Prediction (RA-L 2020), a
+person is observed for 8 steps of the recording, and the constant velocity is that of the last step. The tracker gets
+one person at a time, so that association has no effect. Each later position with a known future counts.
+"""
+import numpy as np
+
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.types import CameraView, Detection
+from ros_3d_bb_lab.evaluation.tracking.metrics import WITHIN_95
+
+OBSERVED = 8  # steps
+HORIZON_S = 2.0
+SIGMA_M = 0.05  # of the annotated positions, which are read as detections with this standard deviation
+SIZE_M = np.array([0.5, 0.5, 1.7])
+MAX_STEP_ERROR_S = 0.05  # largest deviation of the time of a future position
+
+
+def predictions(make_tracker, sequences):
+    """Errors of predictions 2 s ahead for each `trajectories.Sequence`, as written by --json.
+
+    Returns {name: {cv_fde_2s_m, ours_fde_2s_m, ours_coverage_95_2s}}, and their means as 'mean'; None without data.
+    """
+    scores = {}
+    for sequence in sequences:
+        rows = [row for person in sequence.pedestrians for row in _person_errors(make_tracker, person)]
+        cv_m, ours_m, distances = np.reshape(rows, (-1, 3)).T
+        scores[sequence.name] = {'cv_fde_2s_m': _mean(cv_m), 'ours_fde_2s_m': _mean(ours_m),
+                                 'ours_coverage_95_2s': _mean(distances < WITHIN_95)}
+    known = [values for values in scores.values() if values['cv_fde_2s_m'] is not None]
+    if known:
+        scores['mean'] = {key: _mean([values[key] for values in known]) for key in known[0]}
+    return scores
+
+
+def _mean(values):
+    return float(np.mean(values)) if len(values) else None
+
+
+def _person_errors(make_tracker, person):
+    """Yield the errors of both predictions, metres, and the squared Mahalanobis distance of that of the tracker."""
+    tracker, view = make_tracker(), CameraView(np.eye(4))
+    times_s, points_m = person.times_s, person.points_m
+    for row, (time_s, point_m) in enumerate(zip(times_s, points_m)):
+        detection = Detection(np.append(point_m, SIZE_M[2] / 2), SIZE_M, SIGMA_M ** 2 * np.eye(3))
+        tracks = tracker.update(int(round((time_s - times_s[0] + 1) * NS)), [detection], view)
+        later = np.flatnonzero(np.abs(times_s - time_s - HORIZON_S) < MAX_STEP_ERROR_S)
+        if row + 1 < OBSERVED or not len(later) or not tracks:
+            continue
+        future_m, velocity_mps = points_m[later[0]], (point_m - points_m[row - 1]) / (time_s - times_s[row - 1])
+        newest = max(tracks, key=lambda track: track.last_seen_ns)
+        step = int(round(HORIZON_S / newest.prediction_step_s)) - 1
+        error_m = newest.prediction_m[step, :2] - future_m
+        distance = error_m.dot(np.linalg.solve(newest.prediction_covariance_m2[step, :2, :2], error_m))
+        yield np.linalg.norm(point_m + HORIZON_S * velocity_mps - future_m), np.linalg.norm(error_m), distance
