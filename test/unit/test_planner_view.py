@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.planning.planner_view import (disc_points, footprint_points, in_frame, position_after, predicted_to,
                                              ring_points, rounding_m, usable_tracks)
-from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
+from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, TrackedObject
 
 STEP_S = 0.25
 
@@ -51,6 +51,12 @@ def test_footprints_end_where_the_prediction_is_uncertain():
     assert footprint_points([track], 0.5, 0.05)[:, 0].max() == pytest.approx(2.25 + 0.3 * 1.5)
     certain = track._replace(prediction_covariance_m2=0.3 ** 2 * np.repeat(np.eye(3)[np.newaxis], 8, axis=0))
     assert footprint_points([certain], 0.5, 0.05)[:, 0].max() == pytest.approx(2.25 + 0.5 * 1.5)
+
+
+@pytest.mark.parametrize('moving, is_marked', [(True, False), (False, True)])
+def test_people_out_of_view_are_marked_if_they_stand(moving, is_marked):
+    track = track_at([2, 0, 0.85], [1.5, 0, 0], moving=moving)._replace(status=OUT_OF_VIEW)
+    assert bool(len(footprint_points([track], 0.5, 0.05))) == is_marked
 
 
 @given(st.floats(0.02, 3), st.floats(0.01, 0.5))

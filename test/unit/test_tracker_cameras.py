@@ -114,7 +114,7 @@ def test_a_person_is_out_of_view_if_out_of_all_views():
     published = play(Tracker(), images_of(5, lambda time_s: around(0.9 + 0.4 * time_s)))
     states = [objects[0].status if objects else None for objects in published[20:]]
     assert OUT_OF_VIEW in states and states[-1] is None
-    assert 30 <= states.count(OUT_OF_VIEW) <= 60 and states.count(OCCLUDED) <= 2  # at the border
+    assert 60 <= states.count(OUT_OF_VIEW) <= 120 and states.count(OCCLUDED) <= 2  # at the border
 
 
 def test_a_camera_that_ends_neither_keeps_tracks_nor_delays_others():

@@ -7,6 +7,7 @@ import numpy as np
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.core.labels import label_fault, score_fault
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
+from ros_3d_bb.tracking.types import OUT_OF_VIEW
 
 SWATH_STEP_S = 0.1  # a person at 3 m/s moves 0.3 m, less than a body's width, so that the footprints overlap
 MAX_STD_M = 0.5  # predicted positions that are less certain are not marked
@@ -91,11 +92,13 @@ def rounding_m(tracks, b_from_a):
 def footprint_points(tracks, ahead_s, spacing_m):
     """Points (n, 3) of people's cylinders at three heights, and of the discs that they are predicted to cover up to
     `ahead_s` seconds ahead, at half their height, as long as their position is certain (`MAX_STD_M`). The points of a
-    disc are `spacing_m` apart.
+    disc are `spacing_m` apart. Walking people out of view have none, because they turn and stop.
     """
     later_s = np.linspace(0, ahead_s, int(np.ceil(ahead_s / SWATH_STEP_S)) + 1)[1:]
     points = [np.empty((0, 3))]
     for track in tracks:
+        if track.moving and track.status == OUT_OF_VIEW:
+            continue
         disc = disc_points(track.size_m[0] / 2, spacing_m)
         levels_m = np.outer((np.array([LOWEST, 0.5, HIGHEST]) - 0.5) * track.size_m[2], [0, 0, 1])
         certain_s = later_s[_position_std_after(track, later_s) < MAX_STD_M]
