@@ -53,9 +53,10 @@ def test_footprints_end_where_the_prediction_is_uncertain():
     assert footprint_points([certain], 0.5, 0.05)[:, 0].max() == pytest.approx(2.25 + 0.5 * 1.5)
 
 
-@pytest.mark.parametrize('moving, is_marked', [(True, False), (False, True)])
-def test_people_out_of_view_are_marked_if_they_stand(moving, is_marked):
-    track = track_at([2, 0, 0.85], [1.5, 0, 0], moving=moving)._replace(status=OUT_OF_VIEW)
+@pytest.mark.parametrize('moving, std_m, is_marked', [(True, 0.15, True), (True, 0.25, False), (False, 0.45, True)])
+def test_people_out_of_view_are_marked_if_they_stand_or_have_just_left(moving, std_m, is_marked):
+    track = track_at([2, 0, 0.85], [1.5, 0, 0], moving=moving, covariance=std_m ** 2 * np.eye(6))._replace(
+        status=OUT_OF_VIEW, prediction_covariance_m2=0.45 ** 2 * np.repeat(np.eye(3)[np.newaxis], 8, axis=0))
     assert bool(len(footprint_points([track], 0.5, 0.05))) == is_marked
 
 

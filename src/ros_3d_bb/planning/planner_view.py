@@ -11,6 +11,7 @@ from ros_3d_bb.tracking.types import OUT_OF_VIEW
 
 SWATH_STEP_S = 0.1  # a person at 3 m/s moves 0.3 m, less than a body's width, so that the footprints overlap
 MAX_STD_M = 0.5  # predicted positions that are less certain are not marked
+MAX_STD_UNSEEN_M = 0.2  # the same for the positions of walking people out of view
 SAME_FRAME = np.eye(4)
 LOWEST, HIGHEST = 0.25, 0.75  # fractions of a cylinder's height: off the floor and below 2 m, the limit of costmaps
 
@@ -92,17 +93,18 @@ def rounding_m(tracks, b_from_a):
 def footprint_points(tracks, ahead_s, spacing_m):
     """Points (n, 3) of people's cylinders at three heights, and of the discs that they are predicted to cover up to
     `ahead_s` seconds ahead, at half their height, as long as their position is certain (`MAX_STD_M`). The points of a
-    disc are `spacing_m` apart. Walking people out of view have none, because they turn and stop.
+    disc are `spacing_m` apart. Walking people out of view must be more certain
+    (`MAX_STD_UNSEEN_M`), because they turn and stop.
     """
     later_s = np.linspace(0, ahead_s, int(np.ceil(ahead_s / SWATH_STEP_S)) + 1)[1:]
     points = [np.empty((0, 3))]
     for track in tracks:
-        if track.moving and track.status == OUT_OF_VIEW:
+        std_m = _position_std_after(track, np.append(0, later_s))
+        if track.moving and track.status == OUT_OF_VIEW and std_m[0] >= MAX_STD_UNSEEN_M:
             continue
         disc = disc_points(track.size_m[0] / 2, spacing_m)
         levels_m = np.outer((np.array([LOWEST, 0.5, HIGHEST]) - 0.5) * track.size_m[2], [0, 0, 1])
-        certain_s = later_s[_position_std_after(track, later_s) < MAX_STD_M]
-        centers_m = np.vstack((track.position_m + levels_m, position_after(track, certain_s)))
+        centers_m = np.vstack((track.position_m + levels_m, position_after(track, later_s[std_m[1:] < MAX_STD_M])))
         points.append((centers_m[:, np.newaxis] + disc).reshape(-1, 3))
     return np.concatenate(points)
 
