@@ -63,7 +63,8 @@ def test_each_cluster_has_the_same_weight_in_the_polynomial():
 def test_variance_between_positions_is_separated_from_that_of_repetitions():
     x_m, z_m = np.repeat([[-1, 0, 1, -1, 0, 1], [1, 1, 1, 2, 2, 2]], 50, axis=1).astype(float)
     error_m = 0.03 * x_m + 0.01 * np.random.RandomState(0).normal(size=len(x_m))
-    table = MeasurementTable('made', np.stack((x_m, x_m, z_m + error_m), axis=1), np.stack((x_m, z_m), axis=1), x_m > 9)
+    table = MeasurementTable('made', np.stack((x_m, x_m, z_m + error_m), axis=1), np.stack((x_m, z_m), axis=1), x_m > 9,
+                             ('',) * len(x_m))
     assert share_between_positions(table, 'Z') == pytest.approx(6 / 7.0, abs=0.03)
     table.measured_m[:, 0] = np.nan
     assert share_between_positions(table, 'Z') is None

@@ -4,7 +4,7 @@ import pytest
 
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.noise.tables import (MeasurementTable, clusters_of,
-                                                   read_session_measurements, read_table)
+                                                   read_session_measurements, read_table, small_clusters)
 from support.noise_tables import COLUMNS, RANGES_M, SIDES_M, rows_of, write_table
 
 
@@ -49,9 +49,8 @@ def test_files_that_are_not_tables_are_rejected(tmp_path, content, reason):
 
 
 @pytest.mark.parametrize('rows,reason', [
-    ([[0, 0, '', '']] * 3, 'no measurement of Z'),
-    ([[0, 0, 288, 300]] * 5, 'all measurements have Z true = 0.3 m'),
-    ([[0, 0, 288, 300]] * 5 + [[0, 0, 588, 600]] * 2, 'only 2 measurements with Z true = 0.6 m; at least 3')])
+    ([[0, 0, '', '']] * 3, 'there are none'), ([[0, 0, 288, 300]] * 5, 'there are 5 at 0.3 m'),
+    ([[0, 0, 288, 300]] * 5 + [[0, 0, 588, 600]] * 2, 'at least 3 measurements .* there are 5 at 0.3 m, 2 at 0.6 m')])
 def test_too_few_measurements_are_rejected(tmp_path, rows, reason):
     table = read_table(write_table(tmp_path / 'table.csv', rows, COLUMNS[:4]), 'Z')
     with pytest.raises(ValueError, match=reason):
@@ -78,8 +77,11 @@ def test_people_truncated_by_the_image_border_are_marked(session_folder):
 
 def test_measurements_can_be_selected_by_truncation_and_completeness():
     x_m = np.array([0, 0, 0, 0, 1, 1, 1, 1.0])
-    table = MeasurementTable('made', np.zeros((8, 3)), np.stack((x_m, x_m), axis=1), np.arange(8) > 5)
-    assert table.whole().truth_m[:, 0].tolist() == [0, 0, 0, 0]  # two measurements at 1 are too few for a cluster
+    table = MeasurementTable('made', np.zeros((8, 3)), np.stack((x_m, x_m), axis=1), np.arange(8) > 5,
+                             tuple('abcdefgh'))
+    assert table.whole().ids == tuple('abcdef')
+    # two measurements at 1 are too few for a cluster
+    assert [len(group.error_m) for group in small_clusters(table.whole(), 'X')] == [2]
     table = MeasurementTable('made', np.arange(6.0).reshape(2, 3), np.array([[1, np.nan], [1, 2]]),
-                             np.array([False, True]))
+                             np.array([False, True]), ('a', 'b'))
     assert table.complete().measured_m.tolist() == [[3, 4, 5]]

@@ -74,6 +74,11 @@ class Measurement(NamedTuple):
         return (person.box_px,) + (boxes_of_others(person.box_px, others_px) if person.by_hand else others_px)
 
     @property
+    def name(self):
+        """ID and label."""
+        return '%s (%s)' % (self.id, self.label) if self.label else self.id
+
+    @property
     def estimate_m(self):
         """Stored position (3,) of the annotated person, or None."""
         return self.detections[self.person].estimate_m if self.detections else None
@@ -88,20 +93,36 @@ class Session(NamedTuple):
     frames: Tuple[Measurement, ...]
 
 
-def read_session(folder):
+def read_session(folder, on_left_out=None):
     """Read the `frames.json` of a session, without rejected frames. `read_color` and `read_depth` read the images.
 
-    Raises SessionError if the folder is not a session, or a field is missing or invalid.
+    Raises SessionError if the folder is not a session, or a field is missing or invalid. With `on_left_out`, invalid
+    frames are left out as rejected ones are, and it is called with their names and reasons.
     """
     content, path = read_description(folder), os.path.join(str(folder), FILE_NAME)
     frames = []
     with session_errors(path):
         camera = camera_of(content)
         for number, entry in enumerate(content['frames'], 1):
-            if not (isinstance(entry, dict) and entry.get('rejected')):
+            if isinstance(entry, dict) and entry.get('rejected'):
+                if on_left_out is not None:
+                    on_left_out(name_of(entry, number), 'rejected: %s' % entry['rejected'])
+                continue
+            try:
                 with session_errors('%s, measurement number %d' % (path, number)):
                     frames.append(frame_of(str(folder), entry))
+            except SessionError as error:
+                if on_left_out is None:
+                    raise
+                on_left_out(name_of(entry, number), str(error))
         return Session(*camera, tuple(frames))
+
+
+def name_of(entry, number):
+    """ID and label of an entry of a description, or its number if it has no ID."""
+    if not isinstance(entry, dict) or not entry.get('id'):
+        return 'measurement number %d' % number
+    return '%s (%s)' % (entry['id'], entry['label']) if entry.get('label') else str(entry['id'])
 
 
 def read_description(folder):

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.estimation.error_model import ErrorModel, MeasuredRange, Provenance, Scores, Spread, XBias, checked
+from ros_3d_bb.sessions.plausibility import likely_errors
 
 DEGREES = (0, 1, 2, 3)  # of the polynomial z_bias
 X_TERMS = ((False, True), (True, False), (True, True))  # whether x_bias has the terms slope and per_angle_m
@@ -40,14 +41,16 @@ def fit_error_model(measured_m, truth_m, source='', estimator='', camera='', dat
     """Fit an ErrorModel. More coefficients are selected only if they predict held-out positions clearly better.
 
     `measured_m` (n, 3) are the estimated x, y, z and `truth_m` (n, 2) the true x, z in metres. Measurements with equal
-    truth are repetitions at one position. Raises ValueError if there are too few positions, if all have the same range
-    or the same x, or if the bias is too steep to be inverted.
+    truth are repetitions at one position. Measurements with an implausible truth are left out (`plausibility`). Raises
+    ValueError if there are too few positions, if all have the same range or the same x, or if the bias is too steep to
+    be inverted.
     """
-    data = data_of(measured_m, truth_m)
+    data = _without_outliers(data_of(measured_m, truth_m))
     model = _fit(data)
     corrected_m, covariances = held_out(data)
     provenance = Provenance(source, estimator, camera, date, len(data.truth_m), len(np.unique(data.position)))
-    return checked(model._replace(provenance=provenance, cross_validated=scores_of(corrected_m, covariances, truth_m)))
+    scores = scores_of(corrected_m, covariances, data.truth_m)
+    return checked(model._replace(provenance=provenance, cross_validated=scores))
 
 
 def data_of(measured_m, truth_m):
@@ -65,6 +68,12 @@ def data_of(measured_m, truth_m):
             raise ValueError('measurements at %d different %s; at least 3 expected'
                              % (len(np.unique(positions[:, axis])), name))
     return Data(measured_m, truth_m, position.reshape(-1))
+
+
+def _without_outliers(data):
+    measured_m = data.measured_m[:, [0, 2]]
+    plausible = likely_errors(measured_m, data.truth_m).are_plausible(measured_m, data.truth_m)
+    return data_of(data.measured_m[plausible], data.truth_m[plausible])
 
 
 def held_out(data):

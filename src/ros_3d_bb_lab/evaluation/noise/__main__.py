@@ -13,7 +13,10 @@ def main():
     arguments = _arguments()
     folder = pathlib.Path(arguments.out)
     try:
-        analysis = analyse(_inputs(arguments))
+        inputs = _inputs(arguments)
+        for outlier in inputs.outliers:
+            print('left out of the analysis: %s' % outlier, file=sys.stderr)
+        analysis = analyse(inputs)
         write_results(folder, analysis)
     except (ValueError, OSError) as error:
         sys.exit('./run noise: %s' % error)
@@ -26,10 +29,10 @@ def _inputs(arguments):
     if arguments.session:
         estimator = arguments.estimator or 'foreground'
         session = read_session_measurements(arguments.session, estimator)
-        return Inputs(session, session, session.whole(), estimator, arguments.camera)
+        return Inputs.of_session(session, estimator, arguments.camera)
     z, x = read_table(arguments.z, 'Z'), read_table(arguments.x, 'X')
     x_variance = read_table(arguments.x_variance, 'X') if arguments.x_variance else x
-    return Inputs(z, x, x_variance, arguments.estimator or '', arguments.camera)
+    return Inputs.of_tables(z, x, x_variance, arguments.estimator or '', arguments.camera)
 
 
 def _arguments():

@@ -1,11 +1,12 @@
 """Noise analysis: statistics of both axes, comparison with theory, and the resulting error models."""
 import datetime
 import os
-from typing import Any, NamedTuple, Optional
+from typing import Any, NamedTuple, Optional, Tuple
 
 import numpy as np
 
 from ros_3d_bb.estimation.error_model import ErrorModel, MeasuredRange, Provenance, Spread, XBias, checked
+from ros_3d_bb.sessions.plausibility import Outlier
 from ros_3d_bb_lab.evaluation.error_model_fit import GROWTH_OUTSIDE, LEAST_SIGMA_M, Y_SIGMA_M, fit_error_model
 from ros_3d_bb_lab.evaluation.noise import theory
 from ros_3d_bb_lab.evaluation.noise.statistics import AxisStatistics, axis_statistics, share_between_positions
@@ -16,13 +17,33 @@ RMS_FIT_FROM_M = 1.5  # below, the error is not quadratic in the distance (thesi
 
 
 class Inputs(NamedTuple):
-    """Measurements for z, for x, and for its variance (no truncated people, as in the thesis), and their origin."""
+    """Measurements for z, for x, and for its variance (no truncated people, as in the thesis), and their origin.
+
+    `outliers` are left out of all tables.
+    """
 
     z: MeasurementTable
     x: MeasurementTable
     x_variance: MeasurementTable
     estimator: str
     camera: str
+    outliers: Tuple[Outlier, ...] = ()
+
+    @classmethod
+    def of_tables(cls, z, x, x_variance, estimator, camera):
+        """Inputs without the outliers of the tables."""
+        found = [table.outliers() for table in (z, x, x_variance)]
+        unique = {(table.name, outlier.name): outlier for table, outliers in zip((z, x, x_variance), found)
+                  for outlier in outliers}
+        tables = (table.without(outliers) for table, outliers in zip((z, x, x_variance), found))
+        return cls(*tables, estimator, camera, tuple(unique.values()))
+
+    @classmethod
+    def of_session(cls, measurements, estimator, camera):
+        """Inputs from one table without its outliers."""
+        outliers = measurements.outliers()
+        plausible = measurements.without(outliers)
+        return cls(plausible, plausible, plausible.whole(), estimator, camera, outliers)
 
 
 class Analysis(NamedTuple):
@@ -73,7 +94,10 @@ def summary_of(analysis):
     x.update(max_variance_m2=variance['max_variance_m2'], max_sigma_m=variance['max_sigma_m'],
              variance_clusters=variance['clusters'])
     scores = None if analysis.model is None else dict(analysis.model.cross_validated._asdict())
-    return {'z': _axis_summary(analysis.z), 'x': x, 'cross_validated': scores, 'theory': {
+    outliers = [{'name': outlier.name, 'measured_m': outlier.measured_m.tolist(), 'truth_m': outlier.truth_m.tolist()}
+                for outlier in analysis.inputs.outliers]
+    return {'z': _axis_summary(analysis.z), 'x': x, 'cross_validated': scores, 'outliers': outliers,
+            'left_out': [list(pair) for pair in analysis.inputs.z.left_out], 'theory': {
         'subpixel_px': theory.SUBPIXEL_PX, 'focal_times_baseline_px_m': theory.STEREO_PX_M,
         'color_focal_px': theory.COLOR_FOCAL_PX,
         'thesis_focal_px': theory.focal_px(theory.THESIS_FOV_DEG, theory.THESIS_WIDTH_PX)}}

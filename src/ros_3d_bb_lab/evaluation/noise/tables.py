@@ -5,12 +5,13 @@ that was not measured are empty, or its columns are missing. The columns `X erro
 columns are ignored.
 """
 import csv
-from typing import NamedTuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, truncated_edges
-from ros_3d_bb.sessions.session_reader import read_depth, read_session
+from ros_3d_bb.sessions.plausibility import likely_errors, outlier_of
+from ros_3d_bb.sessions.session_reader import SessionError, read_depth, read_session
 
 AXES = ('X', 'Z')
 LEAST_IN_CLUSTER = 3
@@ -20,27 +21,45 @@ ROUNDING_MM = 1.01  # errors may have been computed before the values were round
 class MeasurementTable(NamedTuple):
     """Positions x, y, z (n, 3) and ground truth x, z (n, 2) in metres, NaN if not measured, and name of the source.
 
-    `cut` (n,) is whether the left or right image border truncates the person, if known.
+    `cut` (n,) is whether the left or right image border truncates the person, if known. `ids` are the names of the
+    measurements, and `left_out` pairs (name, reason) of those that are not in the table.
     """
 
     name: str
     measured_m: np.ndarray
     truth_m: np.ndarray
     cut: np.ndarray
+    ids: Tuple[str, ...]
+    left_out: Tuple[Tuple[str, str], ...] = ()
 
     def complete(self):
         """Select the measurements with x and z."""
-        values_m = np.concatenate((self.measured_m[:, [0, 2]], self.truth_m), axis=1)
-        return self._part(np.isfinite(values_m).all(axis=1))
+        return self._part(self._is_complete())
 
     def whole(self):
-        """Select the measurements of people that are not truncated, in clusters of true x with at least 3 of them."""
-        whole = self._part(~self.cut)
-        values_m, counts = np.unique(whole.truth_m[:, 0], return_counts=True)
-        return whole._part(np.isin(whole.truth_m[:, 0], values_m[counts >= LEAST_IN_CLUSTER]))
+        """Select the measurements of people that are not truncated."""
+        return self._part(~self.cut)
+
+    def outliers(self):
+        """Outliers of the table, see `plausibility`. Measurements of one axis are not checked."""
+        complete = self.complete()
+        measured_m = complete.measured_m[:, [0, 2]]
+        likely = likely_errors(measured_m, complete.truth_m)
+        found = [outlier_of(name, likely, *positions_m)
+                 for name, *positions_m in zip(complete.ids, measured_m, complete.truth_m)]
+        return tuple(outlier for outlier in found if outlier is not None)
+
+    def without(self, outliers):
+        """Select the measurements that are not among the outliers."""
+        names = set(outlier.name for outlier in outliers)
+        return self._part(np.array([name not in names for name in self.ids]))
+
+    def _is_complete(self):
+        return np.isfinite(np.concatenate((self.measured_m[:, [0, 2]], self.truth_m), axis=1)).all(axis=1)
 
     def _part(self, mask):
-        return self._replace(measured_m=self.measured_m[mask], truth_m=self.truth_m[mask], cut=self.cut[mask])
+        return self._replace(measured_m=self.measured_m[mask], truth_m=self.truth_m[mask], cut=self.cut[mask],
+                             ids=tuple(name for name, selected in zip(self.ids, mask) if selected))
 
 
 class Cluster(NamedTuple):
@@ -51,22 +70,30 @@ class Cluster(NamedTuple):
 
 
 def clusters_of(measurements, axis):
-    """Group the errors of an axis, 'X' or 'Z', by true value. Raises ValueError if there are too few measurements."""
+    """Group the errors of an axis, 'X' or 'Z', by true value. Clusters with fewer than 3 measurements are left out.
+
+    Raises ValueError if fewer than two clusters remain.
+    """
+    clusters = [cluster for cluster in _groups_of(measurements, axis) if len(cluster.error_m) >= LEAST_IN_CLUSTER]
+    if len(clusters) < 2:
+        raise ValueError('%s: at least %d measurements at each of several values of %s true needed; there are %s' % (
+            measurements.name, LEAST_IN_CLUSTER, axis, ', '.join(
+                '%d at %g m' % (len(group.error_m), group.truth_m)
+                for group in _groups_of(measurements, axis)) or 'none'))
+    return clusters
+
+
+def small_clusters(measurements, axis):
+    """Clusters of an axis that `clusters_of` leaves out."""
+    return [cluster for cluster in _groups_of(measurements, axis) if len(cluster.error_m) < LEAST_IN_CLUSTER]
+
+
+def _groups_of(measurements, axis):
     number = AXES.index(axis)
     truth_m, measured_m = measurements.truth_m[:, number], measurements.measured_m[:, 2 * number]
     known = np.isfinite(truth_m) & np.isfinite(measured_m)
-    if not known.any():
-        raise ValueError('%s: no measurement of %s' % (measurements.name, axis))
     truth_m, error_m = truth_m[known], (measured_m - truth_m)[known]
-    clusters = [Cluster(float(value), error_m[truth_m == value]) for value in np.unique(truth_m)]
-    if len(clusters) == 1:
-        raise ValueError('%s: all measurements have %s true = %g m; the error as a function of it needs several values'
-                         % (measurements.name, axis, clusters[0].truth_m))
-    for cluster in clusters:
-        if len(cluster.error_m) < LEAST_IN_CLUSTER:
-            raise ValueError('%s: only %d measurements with %s true = %g m; at least %d needed for a variance'
-                             % (measurements.name, len(cluster.error_m), axis, cluster.truth_m, LEAST_IN_CLUSTER))
-    return clusters
+    return [Cluster(float(value), error_m[truth_m == value]) for value in np.unique(truth_m)]
 
 
 def read_table(path, axis):
@@ -81,36 +108,50 @@ def read_table(path, axis):
             for column in (axis + ' measured', axis + ' true'):
                 if column not in columns:
                     raise ValueError('%s: no column "%s"; there are: %s' % (path, column, ', '.join(columns) or 'none'))
-            rows = [[_axis_of(row, name, '%s, line %d' % (path, reader.line_num)) for name in AXES] for row in reader]
+            rows, lines = [], []
+            for row in reader:
+                lines.append('line %d' % reader.line_num)
+                rows.append([_axis_of(row, name, '%s, %s' % (path, lines[-1])) for name in AXES])
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ValueError('%s: cannot be read as a table (%s)' % (path, error))
     if not rows:
         raise ValueError('%s: a table without rows' % path)
     values_m = np.array(rows).reshape(-1, 2, 2) / 1000  # row, axis, (measured, true)
     measured_m = np.stack((values_m[:, 0, 0], np.zeros(len(rows)), values_m[:, 1, 0]), axis=1)
-    return MeasurementTable(path, measured_m, values_m[:, :, 1], np.zeros(len(rows), bool))
+    return MeasurementTable(path, measured_m, values_m[:, :, 1], np.zeros(len(rows), bool), tuple(lines))
 
 
-def read_session_measurements(folder, estimator):
+def read_session_measurements(folder, estimator, progress=lambda share: None):
     """Apply an estimator to the frames with ground truth of a measurement session, and return a MeasurementTable.
 
-    `estimator` is a name for `estimator_named`, or 'recorded' for the estimates stored in the session. Raises
-    ValueError if the session cannot be read, or none of its frames has ground truth and an estimate.
+    `estimator` is a name for `estimator_named`, or 'recorded' for the estimates stored in the session. Measurements
+    that cannot be used are `left_out`, as are rejected ones. `progress` is called with the share 0..1 of the frames
+    that are done. Raises ValueError if the session cannot be read, or no measurement can be used.
     """
-    session, measured_m, truth_m, cut = read_session(folder), [], [], []
-    for frame in session.frames:
-        position_m = None if frame.truth_m is None else _estimate(frame, session, estimator)
-        if position_m is not None:
-            measured_m.append(position_m)
-            truth_m.append(frame.truth_m)
-            cut.append(_is_cut(frame, session.camera))
-    if not measured_m:
+    left_out, rows = [], []
+    session = read_session(folder, lambda name, reason: left_out.append((name, reason)))
+    for number, frame in enumerate(session.frames):
+        progress(number / len(session.frames))
+        try:
+            rows.append((_estimate(frame, session, estimator), frame))
+        except SessionError as error:
+            left_out.append((frame.name, str(error)))
+    for position_m, frame in rows:
+        if position_m is None:
+            left_out.append((frame.name, 'no ground truth' if frame.truth_m is None else 'no estimate (%s)' % estimator))
+    used = [(position_m, frame) for position_m, frame in rows if position_m is not None]
+    if not used:
         raise ValueError('%s: no frame with ground truth and an estimate (%s)' % (folder, estimator))
-    return MeasurementTable(str(folder), np.array(measured_m), np.array(truth_m), np.array(cut))
+    return MeasurementTable(str(folder), np.array([position_m for position_m, _frame in used]),
+                            np.array([frame.truth_m for _position_m, frame in used]),
+                            np.array([_is_cut(frame, session.camera) for _position_m, frame in used]),
+                            tuple(frame.name for _position_m, frame in used), tuple(left_out))
 
 
 def _estimate(frame, session, name):
-    """Position (3,) of the annotated person of a frame, whose box is the first one, or None."""
+    """Position (3,) of the annotated person of a frame, whose box is the first one; None without truth or estimate."""
+    if frame.truth_m is None:
+        return None
     if name == 'recorded':
         return frame.estimate_m
     boxes = estimate_boxes(read_depth(frame, session), frame.boxes_px, session.camera, estimator_named(name))

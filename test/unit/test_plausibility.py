@@ -1,0 +1,140 @@
+"""Plausibility of truth: slips are found, clean measurements are not questioned, and slips do not change the model."""
+import numpy as np
+import pytest
+
+from ros_3d_bb.sessions.plausibility import FACTORS, LEAST_MEASUREMENTS, likely_errors
+from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse
+from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements
+
+SLIP_M = 0.3 + 1e-9  # larger slips must be found
+
+
+@pytest.fixture(scope='module', params=['foreground', 'recorded'])
+def table(request, session_folder):
+    return read_session_measurements(session_folder, request.param)
+
+
+def positions_of(table):
+    return table.measured_m[:, [0, 2]], table.truth_m
+
+
+def slips_of(truth_m, marks_m):
+    """True positions (x, z) that a slip could turn into others: digits lost, units, sign, next marks."""
+    for axis in (0, 1):
+        digits = '%d' % round(1000 * abs(truth_m[axis]))
+        values_mm = [float(digits[:place] + digits[place + 1:] or 0) for place in range(len(digits))]
+        for value_m in [np.copysign(value_mm / 1000, truth_m[axis]) for value_mm in values_mm] + [
+                factor * truth_m[axis] for factor in FACTORS]:
+            yield np.where(np.arange(2) == axis, value_m, truth_m)
+    yield from (factor * truth_m for factor in FACTORS)
+    yield truth_m * (-1, 1)
+    yield from marks_m
+
+
+def test_every_slip_of_more_than_0_3_m_is_found_and_no_true_position_is(table):
+    measured_m, truth_m = positions_of(table)
+    marks_m, count = np.unique(truth_m, axis=0), 0
+    for number in range(len(truth_m)):
+        others = np.arange(len(truth_m)) != number
+        likely = likely_errors(measured_m[others], truth_m[others])
+        assert likely.are_plausible(measured_m[number], truth_m[number])
+        slips_m = np.array([slip_m for slip_m in slips_of(truth_m[number], marks_m)
+                            if np.hypot(*(slip_m - truth_m[number])) > SLIP_M])
+        missed = likely.are_plausible(np.broadcast_to(measured_m[number], slips_m.shape), slips_m)
+        assert not missed.any(), (truth_m[number], slips_m[missed])
+        count += len(slips_m)
+    assert count > 25 * len(truth_m)
+
+
+def twenty_slips(table):
+    """(number of the measurement, changed measured, changed truth): 4 of each kind."""
+    measured_m, truth_m = positions_of(table)
+    far = [number for number in range(len(truth_m)) if truth_m[number, 1] > 2 and abs(truth_m[number, 0]) > 0.3][::2]
+    marks_m = np.unique(truth_m, axis=0)
+    for place, number in enumerate(far[:20]):
+        true_m, kind = truth_m[number], place % 5
+        if kind == 3:  # the estimate is that of another person
+            other = measured_m[np.argmax(np.hypot(*(truth_m - true_m).T))]
+            yield number, other, true_m
+            continue
+        distances_m = np.hypot(*(marks_m - true_m).T)
+        next_m = marks_m[np.argmin(np.where(distances_m > SLIP_M, distances_m, np.inf))]
+        yield number, measured_m[number], (true_m * (1, 0.1), true_m * 1000, next_m, None, true_m * (-1, 1))[kind]
+
+
+def changed(table, slips):
+    table = table._replace(measured_m=table.measured_m.copy(), truth_m=table.truth_m.copy())
+    for number, measured_m, truth_m in slips:
+        table.measured_m[number, [0, 2]], table.truth_m[number] = measured_m, truth_m
+    return table
+
+
+def test_twenty_slips_are_named_one_at_a_time(table):
+    assert table.outliers() == ()
+    slips = list(twenty_slips(table))
+    assert len(slips) == 20
+    for slip in slips:
+        outlier, = changed(table, [slip]).outliers()
+        assert outlier.name == table.ids[slip[0]] and outlier.name in str(outlier)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('first', [0, 5, 10])
+def test_five_slips_that_are_left_in_do_not_change_the_model(table, first):
+    results = []
+    slips = list(twenty_slips(table))[first:first + 5]
+    for measurements in (table, changed(table, slips)):
+        analysis = analyse(Inputs.of_session(measurements, '', ''))
+        scores = analysis.model.cross_validated
+        results.append([analysis.z.max_sigma_m, analysis.x_variance.max_sigma_m, scores.rmse_x_m, scores.rmse_z_m,
+                        analysis.model.z_sigma.at(2.5), analysis.model.x_sigma.at(2.5)])
+    assert results[1] == pytest.approx(results[0], rel=0.2)
+    assert len(analysis.inputs.outliers) == 5
+
+
+def made(count, seed=0, noise_m=0.01):
+    """Measured and true positions with the errors 0.1 - 0.05 z in z and -0.1 x in x."""
+    random = np.random.RandomState(seed)
+    truth_m = np.stack((random.uniform(-1, 1, count), random.uniform(1, 4, count)), axis=1)
+    error_m = np.stack((-0.1 * truth_m[:, 0], 0.1 - 0.05 * truth_m[:, 1]), axis=1)
+    return truth_m + error_m + noise_m * random.normal(size=truth_m.shape), truth_m
+
+
+def test_a_quarter_of_slips_does_not_change_the_likely_errors():
+    measured_m, truth_m = made(40)
+    clean = likely_errors(measured_m, truth_m)
+    truth_m[::4] *= 0.1
+    likely = likely_errors(measured_m, truth_m)
+    assert np.abs(likely.at(measured_m) - clean.at(measured_m)).max() < 0.02
+    assert likely.are_plausible(measured_m, truth_m).tolist() == [number % 4 != 0 for number in range(40)]
+
+
+def test_noisy_measurements_are_plausible_if_the_others_are_as_noisy():
+    measured_m, truth_m = made(60, noise_m=0.15)
+    assert likely_errors(measured_m, truth_m).are_plausible(measured_m, truth_m).all()
+    assert not likely_errors(*made(60)).are_plausible(np.array([0.0, 2.4]), np.array([0.0, 2.0]))
+
+
+def test_without_enough_others_the_limit_is_0_3_m_or_15_percent_of_the_range():
+    likely = likely_errors(*made(LEAST_MEASUREMENTS - 1))
+    near_m, far_m = np.array([0.0, 1.0]), np.array([0.0, 4.0])
+    for measured_m, limit_m in ((near_m, 0.3), (far_m, 0.6)):
+        assert likely.are_plausible(measured_m, measured_m + (0, limit_m - 0.01))
+        assert not likely.are_plausible(measured_m, measured_m + (limit_m + 0.01, 0))
+
+
+def test_outside_the_other_measurements_the_limit_grows():
+    measured_m, truth_m = made(60)
+    near = truth_m[:, 1] < 2
+    likely = likely_errors(measured_m[near], truth_m[near])
+    assert likely.are_plausible(measured_m[~near], truth_m[~near]).all()
+
+
+@pytest.mark.parametrize('factors', [(1, 0.001), (0.001, 0.001), (1, 10), (0.01, 1), (-1, 1)])
+def test_the_position_before_a_slip_is_recognised(factors):
+    truth_m = np.array([0.6, 2.5])
+    slip_m = truth_m * factors
+    likely = likely_errors(*made(60))
+    assert not likely.are_plausible([0.54, 2.475], slip_m)
+    assert likely.corrected_slip([0.54, 2.475], slip_m) == pytest.approx(truth_m)
+    assert likely.corrected_slip([0.54, 2.475], (0.1, 3.9)) is None
