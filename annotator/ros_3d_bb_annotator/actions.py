@@ -17,7 +17,7 @@ LINE = Action('', '')
 MENUS = (
     ('&File', (
         Action('ask_session', '&Open a session…', ('Ctrl+O',)),
-        Action('reload', 'Load &new measurements', ('F5',)),
+        Action('reload', '&Reload', ('F5',)),
         LINE,
         Action('ask_export', '&Export CSV…', ('Ctrl+E',)),
         Action('analyse', '&Analyse the noise…', ('Ctrl+Shift+A',)),
@@ -27,26 +27,33 @@ MENUS = (
         Action('undo', '&Undo', ('Ctrl+Z',)),
         Action('redo', '&Redo', ('Ctrl+Shift+Z', 'Ctrl+Y')),
         LINE,
-        Action('same_as_last', '&Same as the last one', ('Ctrl+L',)),
+        Action('same_as_last', '&Same as last', ('Ctrl+L',)),
+        Action('enter_for_label', 'Enter for &all of this label', ('Ctrl+Shift+L',)),
+        Action('clear_truth', '&Clear the true position', ('Ctrl+Shift+T',)),
         Action('ask_reject', 'Re&ject…', ('Ctrl+R',)),
         Action('restore', 'Res&tore', ('Ctrl+Shift+R',)),
         LINE,
         Action('start_drawing', '&Draw a box', ('D', 'Ctrl+D')),
-        Action('switch_unit', 'Millimetres or &metres', ('Ctrl+U',)),
-        Action('edit_marks', 'Marks on the &floor…', ('Ctrl+G',)))),
+        Action('edit_box', 'Move or resize the &box', ('B', 'Ctrl+B')),
+        Action('delete_box', 'D&elete the box', ('Del', 'Ctrl+Shift+D')),
+        LINE,
+        Action('switch_unit', 'Switch between millimetres and &metres', ('Ctrl+U',)),
+        Action('edit_marks', '&Floor marks…', ('Ctrl+G',)))),
     ('&Go', (
         Action('next', '&Next measurement', ('PgDown',)),
         Action('previous', '&Previous measurement', ('PgUp',)),
-        Action('next_new', 'Next ne&w measurement', ('Ctrl+N',)),
+        Action('next_new', 'Next measurement to &do', ('Ctrl+N',)),
+        Action('next_implausible', 'Next &implausible position', ('Ctrl+I',)),
         Action('first', '&First measurement', ('Alt+Home',)),
         Action('last', '&Last measurement', ('Alt+End',)),
         LINE,
-        Action('go_to_list', 'To the l&ist', ('F2',)),
-        Action('go_to_image', 'To the i&mage', ('F3',)),
-        Action('go_to_truth', 'To the &truth', ('F4',)),
-        Action('go_to_floor', 'To the fl&oor', ('F6',)),
+        Action('go_to_list', 'Focus the li&st', ('F2',)),
+        Action('go_to_search', 'Sear&ch the list', ('Ctrl+F',)),
+        Action('go_to_image', 'Focus the i&mage', ('F3',)),
+        Action('go_to_truth', 'Focus the &true position', ('F4',)),
+        Action('go_to_floor', 'Focus the fl&oor', ('F6',)),
         LINE,
-        Action('go_on', '&Go on to the next new one after an entry', ('Ctrl+T',), True))),
+        Action('go_on', '&Advance to the next measurement after an entry', ('Ctrl+T',), True))),
     ('&Person', tuple(
         Action('choose_%d' % number, 'Box &%d' % number, ('%d' % number, 'Alt+%d' % number))
         for number in range(1, 10))),
@@ -61,15 +68,19 @@ OTHER_KEYS = (
     ('The image has the keyboard focus (F3, or a click)', (
         ('arrows', 'move the cursor by 10 pixels; with Ctrl by one'),
         ('Shift + arrows', 'move the part of the image that is shown'),
-        ('Space', 'the first corner of a box at the cursor, then the second one'),
-        ('Esc', 'cancel the box that is being drawn'),
+        ('Space', 'set the first corner of a box at the cursor, then the second one'),
+        ('B, then arrows', 'move the box; with Shift its lower right corner, with Ctrl by one pixel; Enter accepts'),
+        ('Esc', 'cancel the box that is being drawn or edited'),
         ('wheel, drag', 'zoom, move; a click selects a box'),
-        ('Shift + drag', 'draw a box'))),
+        ('Shift + drag', 'draw a box'),
+        ('drag an edge', 'resize the selected box; Ctrl + drag moves it'))),
     ('The floor has the keyboard focus (F6)', (
         ('arrows', 'go from mark to mark'),
-        ('Enter, Space', 'the person stood on this mark'))),
-    ('A field of the truth has the keyboard focus (F4)', (
-        ('Enter', 'enter the truth and go on to the next new measurement'),
+        ('Enter, Space', 'enter the position of the mark'))),
+    ('The list has the keyboard focus (F2)', (
+        ('Shift + arrows', 'select several measurements: truth and rejection are entered for all of them'),)),
+    ('A field of the true position has the keyboard focus (F4)', (
+        ('Enter', 'enter the position and advance to the next measurement'),
         ('Tab', 'next field'))))
 
 
@@ -84,6 +95,8 @@ def build_menus(window):
                 continue
             action = menu.addAction(entry.text)
             action.setShortcuts([QtGui.QKeySequence(key) for key in entry.keys])
+            action.setToolTip('%s (%s)' % (_plain(entry.text), ', '.join(entry.keys)))
+            action.setIconText(_plain(entry.text).replace('Enter for all', 'All'))  # of buttons
             if entry.checked is not None:
                 action.setCheckable(True)
                 action.setChecked(entry.checked)
@@ -109,10 +122,13 @@ def keys_dialog(parent):
 
 def _overview():
     """Overview of keys as HTML, generated from the menus."""
-    sections = [(title.replace('&', ''), [(', '.join(entry.keys), entry.text.replace('&', '').rstrip('…'))
-                                          for entry in entries if entry != LINE])
+    sections = [(_plain(title), [(', '.join(entry.keys), _plain(entry.text)) for entry in entries if entry != LINE])
                 for title, entries in MENUS] + list(OTHER_KEYS)
     rows = ''.join('<tr><td colspan="2"><br><b>%s</b></td></tr>' % title
                    + ''.join('<tr><td>%s&nbsp;&nbsp;&nbsp;</td><td>%s</td></tr>' % row for row in lines)
                    for title, lines in sections)
     return '<p>In a field, digits are text; Alt and a digit selects a box there.</p><table>%s</table>' % rows
+
+
+def _plain(text):
+    return text.replace('&', '').rstrip('…')

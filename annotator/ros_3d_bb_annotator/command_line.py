@@ -3,7 +3,7 @@ import argparse
 import sys
 
 from ros_3d_bb_annotator.document import Document
-from ros_3d_bb_annotator.export import export
+from ros_3d_bb_annotator.export import default_estimator, export
 from ros_3d_bb_annotator.validation import leftovers_of, problems_of
 
 
@@ -17,7 +17,8 @@ def main(arguments=None):
         for note in document.notes:
             print('annotator: note: %s' % note, file=sys.stderr)
         if arguments.export:
-            print('%s: %d measurements' % (arguments.export, export(document, arguments.export)))
+            print('%s: %d rows' % (arguments.export, export(
+                document, arguments.export, arguments.estimator or default_estimator(document), arguments.thesis_form)))
         elif arguments.analyse:
             _analyse(document, arguments)
         else:
@@ -41,6 +42,8 @@ def _show(folder):
 def _analyse(document, arguments):
     from ros_3d_bb_annotator.analysis import analyse  # imports scipy and matplotlib
     analysed = analyse(document, arguments.out, arguments.estimator)
+    for outlier in analysed.outliers:
+        print('annotator: left out of the analysis:', outlier, file=sys.stderr)
     print(analysed.text)
     if analysed.no_model:
         print('annotator: note: no cross-validated error model: %s' % analysed.no_model, file=sys.stderr)
@@ -66,17 +69,23 @@ def _arguments(arguments):
     parser.add_argument('session', nargs='?', metavar='SESSION', help="folder of a measurement session; the old "
                         "format of the thesis is supported")
     actions = parser.add_mutually_exclusive_group()
-    actions.add_argument('--export', metavar='FILE.csv', help='write the annotated measurements as a table in '
-                         'the format of the thesis, in millimetres')
+    actions.add_argument('--export', metavar='FILE.csv', help='write a table with one row per annotated '
+                         'person, in millimetres')
     actions.add_argument('--analyse', action='store_true', help='noise analysis: report, figures and error model')
     actions.add_argument('--validate', action='store_true', help='list the problems of the session; exit with 1 if '
                          'there are any')
     parser.add_argument('--out', metavar='DIR', help='output folder of --analyse (default: SESSION/analysis)')
-    parser.add_argument('--estimator', choices=('foreground', 'median', 'recorded'), help='input of --analyse: new '
-                        'estimates, or the recorded ones (default: foreground; recorded for the old format)')
+    parser.add_argument('--estimator', choices=('foreground', 'median', 'recorded'), help='positions of --analyse and '
+                        '--export: new estimates, or the recorded ones (default: foreground; recorded for the old '
+                        'format; --export has no median)')
+    parser.add_argument('--thesis-form', action='store_true', help='--export writes the table of the thesis')
     parsed = parser.parse_args(arguments)
     if (parsed.export or parsed.analyse or parsed.validate) and not parsed.session:
         parser.error('a SESSION expected')
-    if (parsed.out or parsed.estimator) and not parsed.analyse:
-        parser.error('--out and --estimator are for --analyse')
+    if parsed.out and not parsed.analyse:
+        parser.error('--out is for --analyse')
+    if parsed.estimator and not (parsed.analyse or parsed.export and parsed.estimator != 'median'):
+        parser.error('--estimator is for --analyse, and --export, which has no median')
+    if parsed.thesis_form and not parsed.export:
+        parser.error('--thesis-form is for --export')
     return parsed

@@ -1,9 +1,11 @@
 """Dialogs with questions and messages."""
-from ros_3d_bb_annotator.measurement import Mark
-from ros_3d_bb_annotator.qt import QtCore, QtWidgets
+from ros_3d_bb.sessions.plausibility import position_text as plausible_text
+from ros_3d_bb_annotator.marks_dialog import MarksDialog
+from ros_3d_bb_annotator.qt import QtWidgets
 
-REASONS = ('', 'not on the mark', 'person truncated by the border', 'person occluded', 'no person', 'wrong depth')
-HEADER = ('name', 'X [mm]', 'Z [mm]')
+REASONS = ('', 'not on the mark', 'truncated by the image border', 'occluded', 'nobody found', 'wrong depth')
+ENTER_ALL, PLAUSIBLE_ONLY, ANALYSE = 'enter all', 'plausible only', 'analyse'
+MOST_SHOWN = 5
 
 
 def show_error(parent, what, error):
@@ -13,11 +15,72 @@ def show_error(parent, what, error):
     box.exec_()
 
 
-def ask_reason(parent, name):
+def ask_reason(parent, names):
     """Ask for the reason of a rejection. Returns an empty text if the dialog is cancelled."""
-    reason, accepted = QtWidgets.QInputDialog.getItem(parent, 'Reject', 'Reason for rejecting measurement %s:' % name,
-                                                      REASONS, 0, True)
+    what = names[0] if len(names) == 1 else '%d measurements' % len(names)
+    reason, accepted = QtWidgets.QInputDialog.getItem(parent, 'Reject', 'Reason for rejecting %s:' % what, REASONS, 0,
+                                                      True)
     return reason.strip() if accepted else ''
+
+
+def ask_implausible(parent, problems, count):
+    """Ask about implausible truths: {index: lines of text or Outlier} among `count` measurements.
+
+    Returns ENTER_ALL, PLAUSIBLE_ONLY, the truth (x, y, z) that was intended, or None to correct it.
+    """
+    found = [problem for lines in problems.values() for problem in lines]
+    box = QtWidgets.QMessageBox(QtWidgets.QMessageBox.Warning, 'Implausible position',
+                                '<b>%s</b>' % ('Is this the true position?' if count == 1 else
+                                               'The position is implausible for %d of %d measurements'
+                                               % (len(problems), count)), QtWidgets.QMessageBox.NoButton, parent)
+    lines = [str(problem) if count > 1 else _first_upper(getattr(problem, 'description', problem)) for problem in found]
+    box.setInformativeText('\n'.join(lines[:MOST_SHOWN] + ['…'] * (len(lines) > MOST_SHOWN)))
+    correct = box.addButton('&Correct it', QtWidgets.QMessageBox.RejectRole)
+    answers = {box.addButton('&Enter it anyway', QtWidgets.QMessageBox.AcceptRole): ENTER_ALL}
+    intended = {tuple(problem.intended_m) for problem in found if getattr(problem, 'intended_m', None) is not None}
+    if len(intended) == 1 and len(problems) == count:
+        (x_m, z_m), = intended
+        use = box.addButton('&Use %s' % plausible_text((x_m, z_m)), QtWidgets.QMessageBox.AcceptRole)
+        answers[use] = x_m, None, z_m
+    if len(problems) < count:
+        answers[box.addButton('Enter the &plausible ones', QtWidgets.QMessageBox.AcceptRole)] = PLAUSIBLE_ONLY
+    box.setDefaultButton(correct)
+    box.setEscapeButton(correct)
+    box.exec_()
+    return answers.get(box.clickedButton())
+
+
+def _first_upper(text):
+    return text[:1].upper() + text[1:]
+
+
+def ask_outliers(parent, outliers):
+    """Name implausible truths before an analysis. Returns the chosen index, ANALYSE, or None to cancel.
+
+    `outliers` are tuples (index, detection, Outlier).
+    """
+    dialog = QtWidgets.QDialog(parent)
+    dialog.setWindowTitle('Implausible positions')
+    dialog.resize(720, 320)
+    text = QtWidgets.QLabel('<b>%d true position%s implausible.</b> The analysis leaves such measurements out, and '
+                            'lists them in its report.' % (len(outliers), ' is' if len(outliers) == 1 else 's are'))
+    text.setWordWrap(True)
+    rows = QtWidgets.QListWidget()
+    rows.setWordWrap(True)
+    rows.addItems([str(outlier) for _index, _person, outlier in outliers])
+    rows.setCurrentRow(0)
+    buttons, results = QtWidgets.QDialogButtonBox(QtWidgets.QDialogButtonBox.Cancel), []
+    for label, result in (('&Go to it', lambda: outliers[rows.currentRow()][0]),
+                          ('&Analyse without them', lambda: ANALYSE)):
+        button = buttons.addButton(label, QtWidgets.QDialogButtonBox.ActionRole)
+        button.clicked.connect(lambda _checked, result=result: (results.append(result()), dialog.accept()))
+    rows.itemActivated.connect(lambda _item: (results.append(outliers[rows.currentRow()][0]), dialog.accept()))
+    buttons.rejected.connect(dialog.reject)
+    layout = QtWidgets.QVBoxLayout(dialog)
+    for widget in (text, rows, buttons):
+        layout.addWidget(widget)
+    dialog.exec_()
+    return results[0] if results else None
 
 
 def ask_marks(parent, marks):
@@ -25,74 +88,3 @@ def ask_marks(parent, marks):
     dialog = MarksDialog(marks, parent)
     dialog.exec_()
     return dialog.marks
-
-
-class MarksDialog(QtWidgets.QDialog):
-    """Table of marks in millimetres. `marks` are the accepted ones."""
-
-    def __init__(self, marks, parent=None):
-        super(MarksDialog, self).__init__(parent)
-        self.setWindowTitle('Marks on the floor')
-        self.resize(560, 420)
-        self.marks = tuple(marks)
-        self.table = QtWidgets.QTableWidget(0, len(HEADER), self)
-        self.table.setHorizontalHeaderLabels(HEADER)
-        self.table.horizontalHeader().setSectionResizeMode(QtWidgets.QHeaderView.Stretch)
-        for mark in marks:
-            self._add((mark.name, '%g' % round(1000 * mark.x_m, 3), '%g' % round(1000 * mark.z_m, 3)))
-        self.problem = QtWidgets.QLabel()
-        self.problem.setStyleSheet('color: #b00020')
-        self.problem.setWordWrap(True)
-        buttons = QtWidgets.QDialogButtonBox(QtWidgets.QDialogButtonBox.Ok | QtWidgets.QDialogButtonBox.Cancel)
-        for text, call in (('&Add a mark', self.add_empty), ('&Remove the mark', self.remove_current)):
-            button = buttons.addButton(text, QtWidgets.QDialogButtonBox.ActionRole)
-            button.setAutoDefault(False)
-            button.clicked.connect(call)
-        buttons.accepted.connect(self.accept)
-        buttons.rejected.connect(self.reject)
-        layout = QtWidgets.QVBoxLayout(self)
-        for widget in (QtWidgets.QLabel('X is to the right of the camera, Z ahead of it.'), self.table, self.problem,
-                       buttons):
-            layout.addWidget(widget)
-
-    def add_empty(self):
-        self._add(('', '', ''))
-        self.table.setCurrentCell(self.table.rowCount() - 1, 0)
-        self.table.setFocus()
-
-    def remove_current(self):
-        self.table.removeRow(self.table.currentRow())
-
-    def accept(self):
-        """Close the dialog if every row is a mark. Otherwise name the invalid row."""
-        try:
-            self.marks = self._read()
-        except ValueError as error:
-            self.problem.setText(str(error))
-            return
-        super(MarksDialog, self).accept()
-
-    def _add(self, texts):
-        row = self.table.rowCount()
-        self.table.insertRow(row)
-        for column, text in enumerate(texts):
-            self.table.setItem(row, column, QtWidgets.QTableWidgetItem(text))
-
-    def _read(self):
-        """Convert the rows to marks without empty rows. Raises ValueError."""
-        marks = []
-        for row in range(self.table.rowCount()):
-            name, x_mm, z_mm = (self.table.item(row, column).text().strip() for column in range(len(HEADER)))
-            if not (name or x_mm or z_mm):
-                continue
-            if not name or name in [mark.name for mark in marks]:
-                raise ValueError('Row %d: the name %r is empty or not unique' % (row + 1, name))
-            marks.append(Mark(name, *(_metres(text, 'Row %d' % (row + 1)) for text in (x_mm, z_mm))))
-        return tuple(marks)
-
-
-def _metres(text, where):
-    value_mm, is_number = QtCore.QLocale.c().toDouble(text)
-    if not is_number:
-        raise ValueError('%s: %r is not a length in millimetres' % (where, text))
-    return value_mm / 1000

@@ -3,24 +3,25 @@
 Positions are in the camera's optical frame, in metres. Only the edited fields of measurements are written, so a viewer
 can add measurements to the same session concurrently.
 """
+import contextlib
 import copy
-import json
 import os
 
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import FARTHEST_M
-from ros_3d_bb.core.atomic_file import FILE_NAME, atomic_write, locked_update
+from ros_3d_bb.core.atomic_file import FILE_NAME, locked_update
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.sessions.session_reader import (Session, SessionError, camera_of, boxes_of_others, read_color,
                                                read_depth, read_description, session_errors)
 from ros_3d_bb_annotator import legacy
-from ros_3d_bb_annotator.entries import (Edit, changed, changes_with_estimate, detections_with, entry_at, grid_of,
-                                         millimetres)
-from ros_3d_bb_annotator.measurement import ANNOTATED, NEW, FileNames, measurement_of
+from ros_3d_bb_annotator.drafts import Drafts
+from ros_3d_bb_annotator.entries import (Edit, changed, detections_of, drawn, entry_at, grid_of, mark_entry,
+                                         truth_entry, with_detections, with_person)
+from ros_3d_bb_annotator.estimates import Estimates
+from ros_3d_bb_annotator.measurement import ANNOTATED, FileNames, measurement_of
 
 ESTIMATOR = 'foreground'  # the default of bbox3d_node
-DRAFTS_NAME = '.annotator_draft.json'  # exists while there are drafts
 
 
 class Document(object):
@@ -28,7 +29,8 @@ class Document(object):
 
     `measurements` are EditedMeasurements in the order of the file; an index remains valid while the document is open.
     `grid` are the Marks on the floor. `is_old_format` is whether the session has the format of the thesis, without
-    `camera` (None) and usable depth. `notes` are messages to the user on data that cannot be recovered.
+    `camera` (None) and usable depth. `notes` are messages to the user on data that cannot be recovered. `estimates` are
+    the positions that the noise analysis uses; those stored in the session are the recorded ones.
     """
 
     def __init__(self, folder, content):
@@ -39,8 +41,8 @@ class Document(object):
         self.camera = self._session.camera
         self._content, self._signature = {'frames': []}, None
         self._undo, self._redo, self._annotated = [], [], []
-        self._drafts_path = os.path.join(folder, DRAFTS_NAME)
-        self._drafts = _read_drafts(self._drafts_path)
+        self._drafts = Drafts(folder)
+        self.estimates = Estimates(self)
         self._update(content)
 
     @classmethod
@@ -54,7 +56,7 @@ class Document(object):
     @property
     def progress(self):
         """(number of annotated or rejected measurements, number of all measurements)."""
-        return sum(measurement.state != NEW for measurement in self.measurements), len(self.measurements)
+        return sum(measurement.is_done for measurement in self.measurements), len(self.measurements)
 
     def refresh(self):
         """Read changes by other programs. Returns whether there were any. Raises SessionError."""
@@ -82,7 +84,19 @@ class Document(object):
         """Read the unitless depth image of a measurement in the old format, see `legacy.read_stretched`."""
         return legacy.read_stretched(self._usable(index).depth_path)
 
-    def estimated(self, index, box_px):
+    def positions(self, index, depth=None):
+        """Yield the estimated position (3,) of each detection, or None; see `Estimates`. Reads depth if not given."""
+        detections = self.measurements[index].detections
+        with contextlib.suppress(ValueError):
+            depth = depth if self.is_old_format or depth is not None else self.depth(index)
+        for detection in detections:
+            box = None
+            if depth is not None and detection.box_px is not None:
+                with contextlib.suppress(ValueError):  # an empty box
+                    box = self.estimated(index, detection.box_px, depth)
+            yield detection.estimate_m if self.is_old_format else None if box is None else box.center_m
+
+    def estimated(self, index, box_px, depth=None):
         """Estimate the Box3D of a 2D box (x1, y1, x2, y2) in a measurement, considering the boxes of other people.
 
         Returns None if there is not enough depth. Raises ValueError if the depth cannot be read, or the box is empty.
@@ -93,75 +107,140 @@ class Document(object):
         others_px = [detection.box_px for detection in detections if detection.box_px not in (None, box_px)]
         if not any(detection.box_px == box_px and not detection.by_hand for detection in detections):
             others_px = boxes_of_others(box_px, others_px)  # a box by hand replaces those of the same person
-        boxes_px = [box_px] + list(others_px)
-        return estimate_boxes(self.depth(index), boxes_px, self.camera, estimator_named(ESTIMATOR))[0]
+        depth = self.depth(index) if depth is None else depth
+        return estimate_boxes(depth, [box_px] + list(others_px), self.camera, estimator_named(ESTIMATOR))[0]
 
     def errors(self, index):
-        """Estimate minus truth (x, z, distance on the floor) in metres; None if either is missing."""
-        measurement = self.measurements[index]
-        if measurement.truth_m is None or measurement.estimate_m is None:
+        """Estimate minus truth (x, z, distance on the floor) of the selected person, metres; None if one is missing."""
+        self.estimates.of(index)
+        return self.known_errors(index)
+
+    def known_errors(self, index):
+        """Errors as from `errors`, or None if the estimate has not been computed."""
+        measurement, positions = self.measurements[index], self.estimates.known(index)
+        if measurement.truth_m is None or not positions or positions[measurement.person] is None:
             return None
-        dx_m, dz_m = (float(measurement.estimate_m[axis] - measurement.truth_m[axis]) for axis in (0, 2))
+        dx_m, dz_m = (float(positions[measurement.person][axis] - measurement.truth_m[axis]) for axis in (0, 2))
         return dx_m, dz_m, float(np.hypot(dx_m, dz_m))
 
-    def set_truth(self, index, x_m, z_m, y_m=None):
-        """Set the true position of the person, in front of the camera, and restore a rejected measurement.
+    def outliers(self, progress=lambda share: None):
+        """Implausible truths, as (index, detection, Outlier).
 
-        The person's box is estimated if no estimate is stored.
+        Computes missing estimates, and calls `progress` with the share 0..1 of them.
         """
+        missing = list(self.estimates.missing())
+        for count, index in enumerate(missing):
+            progress(count / len(missing))
+            self.estimates.of(index)
+        found = [(index, person, self.estimates.outlier(index, person))
+                 for index, measurement in enumerate(self.measurements) for person in measurement.truths]
+        return [each for each in found if each[2] is not None]
+
+    def is_implausible(self, index):
+        """Whether a truth of a measurement is an outlier among the known errors."""
+        return any(self.estimates.outlier(index, person) for person in self.measurements[index].truths)
+
+    def person_at(self, index, x_m, z_m):
+        """Detection that a true position belongs to: the one that the user selected, or the nearest one; None without.
+        """
+        positions = self.estimates.of(index)
+        if not any(position is not None for position in positions) or 'person' in self._content['frames'][index]:
+            return self.measurements[index].person
+        return min((number for number, position in enumerate(positions) if position is not None),
+                   key=lambda number: np.hypot(positions[number][0] - x_m, positions[number][2] - z_m))
+
+    def mark_of(self, index):
+        """Mark whose name is the label of a measurement, or None."""
+        label = self.measurements[index].label.strip().casefold()
+        return next((mark for mark in self.grid if label and mark.name.strip().casefold() == label), None)
+
+    def set_truth(self, index, x_m, z_m, y_m=None):
+        """Set the true position of the person, see `person_at`, and restore a rejected measurement."""
+        self.set_truths([index], x_m, z_m, y_m)
+
+    def set_truths(self, indices, x_m, z_m, y_m=None):
+        """Set the same true position, in front of the camera, in several measurements, which is undone in one step."""
         values_m = [value for value in (x_m, y_m, z_m) if value is not None]
         if not np.isfinite(values_m).all() or max(np.abs(values_m)) > FARTHEST_M:
             raise ValueError('truth %s is not a position within %g m' % (values_m, FARTHEST_M))
         if not z_m > 0:
             raise ValueError('truth z is %g m; more than 0 expected, as the camera looks along z' % z_m)
-        truth_mm = {'x': millimetres(x_m), 'z': millimetres(z_m)}
-        if y_m is not None:
-            truth_mm['y'] = millimetres(y_m)
-        estimate = self._missing_estimate(index, self._usable(index).person)
-        self._edit(index, dict(estimate, truth_mm=truth_mm, rejected=None))
-        self._annotated.append(index)
+        truth_mm = truth_entry(x_m, z_m, y_m)
+        self._edit(*((index, self._changes_with_truth(index, truth_mm)) for index in indices))
+        for index in indices:
+            self._annotated.append(index)
+            self.set_draft(index, {})
+
+    def clear_truth(self, index):
+        """Remove the truth of the selected person."""
+        self._edit((index, {'truth_mm': None}))
         self.set_draft(index, {})
 
-    def set_same_as_last(self, index):
-        """Set the truth of the last annotated measurement, or else of the nearest one before."""
+    def last_truth(self, index):
+        """Truth (x, y, z) of the last annotated measurement, or else of the nearest one before `index`."""
         for last in self._annotated[::-1] + list(range(index - 1, -1, -1)):
             if last != index and self.measurements[last].state == ANNOTATED:
-                x_m, y_m, z_m = self.measurements[last].truth_m
-                return self.set_truth(index, x_m, z_m, y_m)
+                return self.measurements[last].truth_m or next(iter(self.measurements[last].truths.values()))
         raise ValueError('no other measurement is annotated whose truth could be copied to measurement %s'
                          % self.measurements[index].id)
 
-    def choose_person(self, index, detection):
-        """Select the detection that the truth belongs to, by its index. It is estimated if no estimate is stored."""
+    def choose_person(self, index, person):
+        """Select a detection by its index. Each detection has its own truth."""
         count = len(self.measurements[index].detections)
-        if not 0 <= detection < count:
-            raise ValueError('detection %d does not exist; there are %d detections' % (detection, count))
-        self._edit(index, dict(self._missing_estimate(index, detection), person=int(detection)))
+        if not 0 <= person < count:
+            raise ValueError('detection %d does not exist; there are %d detections' % (person, count))
+        entry = self._content['frames'][index]
+        self._edit((index, with_person(entry, detections_of(entry), int(person))))
 
     def add_box(self, index, box_px):
-        """Add a box (x1, y1, x2, y2) drawn by hand, select it as the person, and return its estimate as `estimated`."""
-        if self.camera is None:
-            raise SessionError(legacy.NOTES[0])
-        x1, y1, x2, y2 = (int(round(edge)) for edge in box_px)
-        box_px = max(x1, 0), max(y1, 0), min(x2, self.camera.width), min(y2, self.camera.height)
-        box = self.estimated(index, box_px)
-        detections = detections_with(self._content['frames'][index], box_px, box)
-        self._edit(index, {'detections': detections, 'person': len(detections) - 1,
-                           'box': None, 'estimate_mm': None, 'original_mm': None})
+        """Add a box (x1, y1, x2, y2) drawn by hand, and select it. Returns its estimate as `estimated`.
+
+        The truth of the selected person becomes that of the new box, unless that person is another one.
+        """
+        box_px, box = self._drawn(index, box_px)
+        entry, measurement = self._content['frames'][index], self.measurements[index]
+        detections = detections_of(entry) + [drawn(box_px, box)]
+        person_px = None if measurement.person is None else measurement.detections[measurement.person].box_px
+        is_other = person_px is not None and boxes_of_others(box_px, [person_px])
+        changes = with_person(entry, detections, len(detections) - 1) if is_other else {'person': len(detections) - 1}
+        self._edit((index, dict(with_detections(detections), **changes)))
         return box
 
+    def replace_box(self, index, box_px):
+        """Replace the selected box by (x1, y1, x2, y2), drawn by hand. Returns its estimate as `estimated`."""
+        person = self.measurements[index].person
+        detections = detections_of(self._content['frames'][index])
+        box_px, box = self._drawn(index, box_px)
+        detections[person] = drawn(box_px, box)
+        self._edit((index, dict(with_detections(detections), person=person)))
+        return box
+
+    def delete_box(self, index):
+        """Delete the selected box and its truth."""
+        measurement = self.measurements[index]
+        if measurement.person is None:
+            raise ValueError('measurement %s has no box' % measurement.id)
+        detections = detections_of(self._content['frames'][index])
+        del detections[measurement.person]
+        self._edit((index, dict(with_detections(detections), person=None,
+                                truth_mm=detections[0].pop('truth_mm', None) if detections else None)))
+
     def reject(self, index, reason):
+        self.reject_all([index], reason)
+
+    def reject_all(self, indices, reason):
+        """Reject measurements, which is undone in one step."""
         if not reason.strip():
             raise ValueError('a reason is needed to reject a measurement')
-        self._edit(index, {'rejected': reason.strip()})
-        self.set_draft(index, {})
+        self._edit(*((index, {'rejected': reason.strip()}) for index in indices))
+        for index in indices:
+            self.set_draft(index, {})
 
     def restore(self, index):
-        self._edit(index, {'rejected': None})
+        self._edit((index, {'rejected': None}))
 
     def set_grid(self, marks):
-        self._edit(None, {'grid': [
-            {'name': mark.name, 'x': millimetres(mark.x_m), 'z': millimetres(mark.z_m)} for mark in marks]})
+        self._edit((None, {'grid': [mark_entry(mark) for mark in marks]}))
 
     @property
     def can_undo(self):
@@ -181,33 +260,31 @@ class Document(object):
 
     def draft(self, index):
         """Draft of a measurement, the text that was typed but not entered: {name of a field: text}."""
-        return dict(self._drafts.get(self.measurements[index].id, {}))
+        return self._drafts.of(self.measurements[index].id)
 
     def set_draft(self, index, fields):
-        """Save the draft of a measurement in a file, so that it survives a crash. Empty fields are removed."""
-        fields = {key: text for key, text in fields.items() if text}
-        if fields == self.draft(index):
-            return
-        self._drafts[self.measurements[index].id] = fields
-        used = {name: texts for name, texts in self._drafts.items() if texts}
-        try:
-            if used:
-                atomic_write(self._drafts_path, json.dumps(used).encode())
-            elif os.path.exists(self._drafts_path):
-                os.remove(self._drafts_path)
-        except OSError as error:
-            raise SessionError('%s: the typed text cannot be saved (%s)' % (self._drafts_path, error.strerror))
+        self._drafts.set(self.measurements[index].id, fields)
 
-    def _missing_estimate(self, index, person):
-        """Changes that add the estimate of a detection; {} if it has one, or it cannot be estimated."""
-        detection = None if person is None else self.measurements[index].detections[person]
-        if detection is None or detection.estimate_m is not None or detection.box_px is None:
-            return {}
-        try:
-            box = self.estimated(index, detection.box_px)
-        except ValueError:  # no depth, or a reversed box: the truth is valid nevertheless, and validation reports it
-            return {}
-        return {} if box is None else changes_with_estimate(self._content['frames'][index], person, box)
+    def _drawn(self, index, box_px):
+        """Clip a box to the image. Returns it and its estimate."""
+        if self.camera is None:
+            raise SessionError(legacy.NOTES[0])
+        x1, y1, x2, y2 = (int(round(edge)) for edge in box_px)
+        box_px = max(x1, 0), max(y1, 0), min(x2, self.camera.width), min(y2, self.camera.height)
+        return box_px, self.estimated(index, box_px)
+
+    def _changes_with_truth(self, index, truth_mm):
+        """Changes that set the truth of the person at a position. It moves from a person who cannot be there, too."""
+        self._usable(index)
+        entry = self._content['frames'][index]
+        person = self.person_at(index, truth_mm['x'] / 1000, truth_mm['z'] / 1000)
+        detections = detections_of(entry)
+        changes = {} if person is None else with_person(entry, detections, person)
+        detections = changes.get('detections', detections)
+        if any(detection.get('truth_mm') == truth_mm for detection in detections):
+            changes.update(with_detections([{key: value for key, value in detection.items()
+                                             if (key, value) != ('truth_mm', truth_mm)} for detection in detections]))
+        return dict(changes, truth_mm=truth_mm, rejected=None)
 
     def _usable(self, index):
         measurement = self.measurements[index]
@@ -215,31 +292,36 @@ class Document(object):
             raise SessionError('measurement %s: %s' % (measurement.id or index, measurement.problem))
         return measurement
 
-    def _edit(self, index, changes):
-        name = None if index is None else self.measurements[index].id
-        if name == '':
-            raise SessionError('measurement %d has no id, so its annotation cannot be saved' % index)
-        self._undo.append(self._save(Edit(index, name, changes)))
+    def _edit(self, *changes):
+        """Save changes of measurements, pairs (index, changes), where the index is None for the description."""
+        edits = []
+        for index, changed_fields in changes:
+            name = None if index is None else self.measurements[index].id
+            if name == '':
+                raise SessionError('measurement %d has no id, so its annotation cannot be saved' % index)
+            edits.append(Edit(index, name, changed_fields))
+        self._undo.append(self._save(edits))
         del self._redo[:]
 
     def _step(self, source, target):
         if not source:
             return None
         target.append(self._save(source[-1]))
-        return source.pop().index
+        return source.pop()[0].index
 
-    def _save(self, edit):
-        """Write an edit. Returns its inverse."""
+    def _save(self, edits):
+        """Write edits together. Returns their inverses."""
         try:
             with locked_update(self.folder) as content:
                 if self.is_old_format and 'form' not in content:
                     content.update(copy.deepcopy(self._content))
-                inverse = changed(content if edit.index is None else entry_at(content['frames'], edit), edit)
+                inverses = [changed(content if edit.index is None else entry_at(content['frames'], edit), edit)
+                            for edit in edits]
         except (OSError, ValueError) as error:
             raise SessionError('%s: cannot be saved (%s)' % (self.folder, getattr(error, 'strerror', error)))
         self._update(content)
         self._signature = None  # another program may write before the next refresh
-        return inverse
+        return inverses
 
     def _update(self, content):
         """Update from the content of frames.json. Unchanged measurements are not parsed again."""
@@ -248,16 +330,7 @@ class Document(object):
             self.measurements[index] if index < len(old) and old[index] == entry
             else measurement_of(self.folder, entry, files) for index, entry in enumerate(frames))
         self.grid, self._content = grid_of(content), content
-
-
-def _read_drafts(path):
-    """Read the drafts in a file, {ID of a measurement: {name of a field: text}}; {} if it cannot be read."""
-    try:
-        with open(path, encoding='utf-8') as stream:
-            content = json.load(stream)
-        return {str(name): {str(key): str(text) for key, text in fields.items()} for name, fields in content.items()}
-    except (OSError, ValueError, AttributeError, RecursionError):
-        return {}
+        self.estimates.update()
 
 
 def _signature(folder):

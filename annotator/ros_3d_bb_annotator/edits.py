@@ -2,11 +2,11 @@
 from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb_annotator import dialogs
 from ros_3d_bb_annotator.document import Document
-from ros_3d_bb_annotator.truth_panel import error_text
+from ros_3d_bb_annotator.validation import truth_problems
 
 
 class Edits(object):
-    """Edits of the current measurement of an AnnotatorWindow.
+    """Edits of the current measurement of an AnnotatorWindow, or of all selected ones.
 
     Invalid input is reported next to the fields, errors while saving in a dialog.
     """
@@ -15,18 +15,44 @@ class Edits(object):
         self._window = window
 
     def enter_truth(self, x_m, z_m, y_m=None):
-        """Set the truth, and go to the next measurement."""
-        self._enter(Document.set_truth, x_m, z_m, y_m)
+        """Set the truth of the selected measurements, and go to the next measurement."""
+        self._enter_truth(self._window.selection, (x_m, y_m, z_m))
+
+    def enter_for_label(self):
+        """Set the typed or offered truth of all measurements with the current label that are not done."""
+        window = self._window
+        if not window.measurement.label:
+            window.pane.truth.show_problem('The measurement has no label')
+            return
+        try:
+            x_m, z_m, y_m = window.pane.truth.read()
+        except ValueError as error:
+            window.pane.truth.show_problem(str(error))
+            return
+        self._enter_truth([index for index, other in enumerate(window.document.measurements)
+                           if index == window.current or (other.label == window.measurement.label and not other.is_done
+                                                          and other.detections)], (x_m, y_m, z_m))
 
     def same_as_last(self):
         """Set the truth of the last annotated measurement, and go to the next measurement."""
-        self._enter(Document.set_same_as_last)
+        try:
+            truth_m = self._window.document.last_truth(self._window.current)
+        except ValueError as error:
+            self._window.pane.truth.show_problem(str(error))
+            return
+        self._enter_truth(self._window.selection, truth_m)
+
+    def clear_truth(self):
+        """Remove the truth of the selected person."""
+        self._edit(Document.clear_truth)
+        self._window.pane.truth.begin()
 
     def ask_reject(self):
-        """Ask for a reason, reject the measurement, and go to the next one."""
-        reason = dialogs.ask_reason(self._window, self._window.measurement.id)
+        """Ask for a reason, reject the selected measurements, and go to the next one."""
+        indices = self._window.selection
+        reason = dialogs.ask_reason(self._window, [self._window.document.measurements[index].id for index in indices])
         if reason:
-            self._enter(Document.reject, reason)
+            self._enter(lambda document: document.reject_all(indices, reason), '%d rejected' % len(indices))
 
     def restore(self):
         self._edit(Document.restore)
@@ -38,15 +64,22 @@ class Edits(object):
             return
         if person >= len(measurement.detections):
             self._window.statusBar().showMessage('There is no box %d' % (person + 1))
-        elif person != measurement.person:
+        else:
             self._edit(Document.choose_person, person)
+            if self._window.pane.truth.has_keyboard():
+                self._window.pane.truth.begin()
 
     def add_box(self, box_px):
-        """Add a box that was drawn by hand, and select it as the person."""
-        if self._edit(Document.add_box, box_px):
-            has_estimate = self._window.measurement.estimate_m is not None
-            self._window.statusBar().showMessage('The box is selected as the person' if has_estimate else
-                                                 'The box has not enough depth for an estimate')
+        """Add a box that was drawn by hand, and select it. The truth has the keyboard then."""
+        self._change_box(Document.add_box, box_px)
+
+    def replace_box(self, box_px):
+        """Replace the selected box. The truth has the keyboard then."""
+        self._change_box(Document.replace_box, box_px)
+
+    def delete_box(self):
+        """Delete the selected box and its truth."""
+        self._edit(Document.delete_box)
 
     def undo(self):
         self._step(Document.undo)
@@ -60,13 +93,36 @@ class Edits(object):
         if marks != document.grid and self._succeeds(lambda: document.set_grid(marks)):
             self._show(self._window.current)
 
-    def _enter(self, edit, *values):
-        """Apply an edit that completes the current measurement."""
-        window, number = self._window, self._window.current
-        if self._edit(edit, *values):
-            rejected = window.measurement.rejected is not None
-            window.last_entry.setText('<b>%s</b>: %s' % (window.measurement.id, 'rejected' if rejected else error_text(
-                window.document.errors(number))))
+    def _change_box(self, edit, box_px):
+        if self._edit(edit, box_px):
+            position_m = self._window.document.estimates.of(self._window.current)[self._window.measurement.person]
+            self._window.statusBar().showMessage('The box is selected' if position_m is not None else
+                                                 'The box has not enough depth for an estimate')
+            self._window.pane.truth.begin()
+
+    def _enter_truth(self, indices, truth_m):
+        """Set a truth (x, y, z) of measurements. The user is asked about those where it is implausible."""
+        document = self._window.document
+        problems = {index: found for index in indices for found in [truth_problems(document, index, truth_m)] if found}
+        if problems:
+            answer = dialogs.ask_implausible(self._window, problems, len(indices))
+            if answer is None:
+                self._window.pane.truth.begin()
+                return
+            if isinstance(answer, tuple):
+                truth_m = answer
+            elif answer == dialogs.PLAUSIBLE_ONLY:
+                indices = [index for index in indices if index not in problems]
+        x_m, y_m, z_m = truth_m
+        self._enter(lambda document: document.set_truths(indices, x_m, z_m, y_m),
+                    '%d measurements' % len(indices) if len(indices) > 1 else '')
+
+    def _enter(self, edit, text):
+        """Apply an edit of the document that completes measurements. `text` describes it; empty: the error does."""
+        window, index = self._window, self._window.current
+        if self._edit(lambda document, _index: edit(document)):
+            window.last_entry.setText('<b>%s</b>: %s' % (
+                window.measurement.id, text or window.pane.error_text(window.document.errors(index))))
             if window.actions['go_on'].isChecked():
                 window.next_new()
 
@@ -79,17 +135,17 @@ class Edits(object):
         return done
 
     def _step(self, step):
-        numbers = []
-        if self._succeeds(lambda: numbers.append(step(self._window.document))):
-            self._show(self._window.current if numbers[0] is None else numbers[0])
+        indices = []
+        if self._succeeds(lambda: indices.append(step(self._window.document))):
+            self._show(self._window.current if indices[0] is None else indices[0])
 
-    def _show(self, number):
+    def _show(self, index):
         """Show the result of an edit instead of that of the previous one."""
         self._window.statusBar().clearMessage()
         self._window.last_entry.clear()
         self._window.after_edit()
-        if number is not None:
-            self._window.show_measurement(number)
+        if index is not None:
+            self._window.show_measurement(index)
 
     def _succeeds(self, edit):
         """Save the typed text, and apply an edit. Returns whether it succeeded."""

@@ -38,24 +38,40 @@ def changed(entry, edit):
     return edit._replace(changes=before)
 
 
-def detections_with(entry, box_px, box):
-    """Detections of an entry, with an additional box drawn by hand and its estimate (Box3D or None)."""
-    detections = [dict(detection) for detection in entry.get('detections') or ()]
-    if not detections:
-        recorded = {'box': entry.get('box'), 'estimate_mm': entry.get('estimate_mm', entry.get('original_mm'))}
-        recorded = {key: value for key, value in recorded.items() if value}
-        detections = [recorded] if recorded else []
-    drawn = {'box': [int(edge) for edge in box_px], 'by': 'hand'}
-    return detections + [dict(drawn, **({} if box is None else box_entry(box)))]
+def detections_of(entry):
+    """Copies of the detections of an entry. If the fields of the only detection are in the entry, they are moved."""
+    if entry.get('detections'):
+        return [dict(detection) for detection in entry['detections']]
+    recorded = {'box': entry.get('box'), 'estimate_mm': entry.get('estimate_mm', entry.get('original_mm'))}
+    recorded = {key: value for key, value in recorded.items() if value}
+    return [recorded] if recorded else []
 
 
-def changes_with_estimate(entry, number, box):
-    """Changes that add the estimate, a Box3D, to a detection of an entry."""
-    if not entry.get('detections'):  # the fields of the only detection are in the entry
-        return {'estimate_mm': box_entry(box)['estimate_mm']}
-    detections = [dict(detection) for detection in entry['detections']]
-    detections[number].update(box_entry(box))
-    return {'detections': detections}
+def with_person(entry, detections, person):
+    """Changes of an entry that select a detection. Its truth is stored in the entry, others in their detections."""
+    old, detections = int(entry.get('person', 0)), [dict(detection) for detection in detections]
+    if person == old or not detections:
+        return {'person': person}
+    truth_mm = detections[person].pop('truth_mm', None)
+    if entry.get('truth_mm') and old < len(detections):
+        detections[old]['truth_mm'] = entry['truth_mm']
+    return dict(with_detections(detections), person=person, truth_mm=truth_mm)
+
+
+def with_detections(detections):
+    """Changes of an entry that replace its detections."""
+    return {'detections': detections, 'box': None, 'estimate_mm': None, 'original_mm': None}
+
+
+def drawn(box_px, box):
+    """Detection of a box drawn by hand, and its estimate (Box3D or None)."""
+    return dict({'box': [int(edge) for edge in box_px], 'by': 'hand'}, **({} if box is None else box_entry(box)))
+
+
+def truth_entry(x_m, z_m, y_m):
+    """Field truth_mm of a true position in metres, whose y may be None."""
+    truth_mm = {'x': millimetres(x_m), 'z': millimetres(z_m)}
+    return truth_mm if y_m is None else dict(truth_mm, y=millimetres(y_m))
 
 
 def grid_of(content):
@@ -66,6 +82,11 @@ def grid_of(content):
         if not np.isfinite(mark[1:]).all():
             raise ValueError('mark %s of the grid is at (%g, %g) m; finite numbers expected' % mark)
     return marks
+
+
+def mark_entry(mark):
+    """Entry of a Mark in the grid."""
+    return {'name': mark.name, 'x': millimetres(mark.x_m), 'z': millimetres(mark.z_m)}
 
 
 def millimetres(value_m):

@@ -3,12 +3,13 @@ import itertools
 import math
 from typing import Any, NamedTuple, Optional, Tuple
 
+from ros_3d_bb_annotator.lengths import length_text, position_text
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
 GROUND, LINES, CAMERA, TEXT = (QtGui.QColor(*color) for color in (
     (250, 250, 248), (222, 222, 218), (120, 124, 130), (70, 70, 70)))
-SIGHT, MARK, POINTED = QtGui.QColor(60, 120, 200, 22), QtGui.QColor(245, 150, 40), QtGui.QColor(70, 170, 240)
-TRUTH, ESTIMATE = QtGui.QColor(30, 140, 60), QtGui.QColor(200, 30, 60)
+SIGHT, MARK, POINTED = QtGui.QColor(60, 120, 200, 22), QtGui.QColor(150, 150, 150), QtGui.QColor(0, 114, 178)
+TRUTH, ESTIMATE = QtGui.QColor(0, 90, 170), QtGui.QColor(213, 94, 0)
 MARGIN_PX, REACH_PX = 22, 16
 MARK_PX, NAME_PX = (4, 8), (9, 13)  # minimum and maximum: radius of a mark, height of its name
 STEPS_M = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
@@ -16,12 +17,13 @@ ARROWS = {Qt.Key_Left: (-1, 0), Qt.Key_Right: (1, 0), Qt.Key_Up: (0, 1), Qt.Key_
 
 
 class FloorScene(NamedTuple):
-    """Marks on the floor, positions (x, z) in metres or None, and tangents of the limits of the field of view."""
+    """Marks on the floor, positions (x, z) in metres or None, tangents of the limits of the field of view, and unit."""
 
     marks: Tuple[Any, ...]
     truth_m: Optional[Tuple[float, float]]
     estimate_m: Optional[Tuple[float, float]]
     sight: Tuple[float, float]
+    unit: str = 'mm'
 
 
 EMPTY = FloorScene((), None, None, (0.0, 0.0))
@@ -40,11 +42,11 @@ class GridView(QtWidgets.QWidget):
         self._scene, self._pointed = EMPTY, None
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.StrongFocus)
-        self.setMinimumSize(220, 220)
+        self.setMinimumSize(160, 160)
         self.setAccessibleName('floor from above')
 
     def sizeHint(self):  # noqa: N802 (Qt's name)
-        return QtCore.QSize(340, 340)
+        return QtCore.QSize(300, 260)
 
     def show_scene(self, scene):
         if scene.marks != self._scene.marks:
@@ -86,7 +88,7 @@ class GridView(QtWidgets.QWidget):
         if not self._scene.marks:
             painter.setPen(TEXT)
             painter.drawText(self.rect().adjusted(70, 6, -12, -6), Qt.AlignLeft | Qt.AlignTop | Qt.TextWordWrap,
-                             'No marks on the floor yet: Edit, Marks (Ctrl+G).')
+                             'No floor marks yet: Edit, Floor marks (Ctrl+G).')
         if self.hasFocus():
             painter.setPen(QtGui.QPen(POINTED, 2))
             painter.setBrush(Qt.NoBrush)
@@ -105,7 +107,7 @@ class GridView(QtWidgets.QWidget):
             painter.drawLine(self.place_of(4 * left_m, z_m), self.place_of(4 * right_m, z_m))
         painter.setPen(TEXT)
         for z_m in depths_m[1:]:
-            painter.drawText(QtCore.QPointF(4, self.place_of(0, z_m).y() - 2), '%g m' % z_m)
+            painter.drawText(QtCore.QPointF(4, self.place_of(0, z_m).y() - 2), length_text(z_m, self._scene.unit))
         camera = self.place_of(0, 0)
         sides = [self.place_of(tangent * 10 * far_m, 10 * far_m) for tangent in self._scene.sight]
         painter.setPen(Qt.NoPen)
@@ -126,7 +128,7 @@ class GridView(QtWidgets.QWidget):
         painter.drawText(QtCore.QRectF(place.x() - 60, place.y() + radius, 120, height + 3), Qt.AlignHCenter, mark.name)
 
     def _paint_error(self, painter):
-        """The truth as a green cross, the estimate as a red circle, a line between them."""
+        """The truth as a blue cross, the estimate as an orange circle, a line between them."""
         truth, estimate = (None if point is None else self.place_of(*point)
                            for point in (self._scene.truth_m, self._scene.estimate_m))
         painter.setBrush(Qt.NoBrush)
@@ -143,7 +145,7 @@ class GridView(QtWidgets.QWidget):
 
     def _paint_legend(self, painter):
         _set_height(painter, NAME_PX[1])
-        for row, (color, text) in enumerate(((TRUTH, '✕ truth'), (ESTIMATE, '○ estimate'))):
+        for row, (color, text) in enumerate(((TRUTH, '✕ true'), (ESTIMATE, '○ estimate'))):
             painter.setPen(color)
             painter.drawText(QtCore.QPointF(self.width() - 80, self.height() - 24 + 16 * row), text)
 
@@ -169,7 +171,8 @@ class GridView(QtWidgets.QWidget):
 
     def _point_at(self, mark):
         self._pointed = mark
-        self.setToolTip('' if mark is None else '%s: X %+.3f m, Z %.3f m' % mark)
+        self.setToolTip('' if mark is None else '%s: %s' % (
+            mark.name, position_text((mark.x_m, None, mark.z_m), self._scene.unit)))
         self.update()
 
     def _mark_at(self, position):

@@ -5,15 +5,18 @@ from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 BACKGROUND = QtGui.QColor(38, 40, 44)
 WHEEL_STEP = 1.2
 CURSOR_STEP_PX, PAN_STEP_PX = 10, 40
-CLICK_PX = 4  # maximum movement of a click on the screen
+CLICK_PX, GRAB_PX = 4, 6  # maximum movement of a click, and distance from an edge, on the screen
+ALL_EDGES, LOWER_RIGHT = (0, 1, 2, 3), (2, 3)
 ARROWS = {Qt.Key_Left: (-1, 0), Qt.Key_Right: (1, 0), Qt.Key_Up: (0, -1), Qt.Key_Down: (0, 1)}
 
 
 class ImageView(QtWidgets.QWidget):
     """View of one image. If `image` is None, `message` is the reason. `box_chosen` is emitted with the index of a box.
 
-    Wheel: zoom; drag: pan; click: select a box; Shift and drag, or drag while drawing: draw a box. Arrow keys move the
-    cursor by 10 pixels (Ctrl: 1), Shift and arrow keys pan, Space sets the corners of a box, Escape cancels it.
+    Wheel: zoom; drag: pan; click: select a box; Shift and drag, or drag while drawing: draw a box; drag an edge of the
+    selected box: resize it; Ctrl and drag: move it. Arrow keys move the cursor by 10 pixels (Ctrl: 1), Shift and arrow
+    keys pan, Space sets the corners of a box, Escape cancels it. While a box is edited, arrow keys move it, or with
+    Shift its lower right corner.
     """
 
     box_chosen = Signal(int)
@@ -22,7 +25,7 @@ class ImageView(QtWidgets.QWidget):
         super(ImageView, self).__init__(parent)
         self._name, self._shared = name, shared
         self.image, self.message, self._scene, self._legend = None, '', marking.NOTHING, None
-        self._pressed_at, self._panned_from = None, None
+        self._pressed_at, self._panned_from, self._grabbed = None, None, ()
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.StrongFocus)
         self.setMinimumSize(240, 180)
@@ -32,9 +35,14 @@ class ImageView(QtWidgets.QWidget):
     def sizeHint(self):  # noqa: N802 (Qt's name)
         return QtCore.QSize(640, 480)
 
-    def show_image(self, image, scene, message='', legend=None):
-        """Show a QImage with overlay (`marking.Scene`) and colour scale (QImage, top, bottom text), or a message."""
-        self.image, self.message, self._scene, self._legend = image, message, scene, legend
+    def show_image(self, image, scene, message=''):
+        """Show a QImage with overlay (`marking.Scene`), or a message."""
+        self.image, self.message, self._scene = image, message, scene
+        self.update()
+
+    def show_legend(self, legend):
+        """Show a colour scale (QImage, text above, text below), or none."""
+        self._legend = legend
         self.update()
 
     def show_scene(self, scene):
@@ -78,14 +86,21 @@ class ImageView(QtWidgets.QWidget):
         if event.button() != Qt.LeftButton or self.image is None:
             return
         self._pressed_at = self._panned_from = event.localPos()
-        if self._shared.drawing or event.modifiers() & Qt.ShiftModifier:
+        self._grabbed = () if self._shared.drawing else self._edges_at(event)
+        if self._grabbed:
+            self._shared.start_editing(self._scene.person_box().rect_px)
+        elif self._shared.drawing or event.modifiers() & Qt.ShiftModifier:
             self._panned_from = None
             self._point_near(event)
             self._shared.corner = None
             self._shared.set_corner()
 
     def mouseMoveEvent(self, event):  # noqa: N802
-        if self._pressed_at is not None and self._panned_from is not None:
+        if self._pressed_at is not None and self._grabbed:
+            (old_x, old_y), (x, y) = self.to_image(self._pressed_at), self.to_image(event.localPos())
+            self._shared.start_editing(self._scene.person_box().rect_px)
+            self._shared.nudge(self._grabbed, int(round(x - old_x)), int(round(y - old_y)))
+        elif self._pressed_at is not None and self._panned_from is not None:
             (old_x, old_y), (x, y) = self.to_image(self._panned_from), self.to_image(event.localPos())
             self._panned_from = event.localPos()
             self._shared.pan_by(old_x - x, old_y - y)
@@ -93,14 +108,20 @@ class ImageView(QtWidgets.QWidget):
             self._point_near(event)
         elif self.image is not None:
             self._shared.point_at(*self._pixel(event))
+            self.setCursor(Qt.SizeAllCursor if self._edges_at(event) else Qt.ArrowCursor)
 
     def mouseReleaseEvent(self, event):  # noqa: N802
         if event.button() != Qt.LeftButton or self._pressed_at is None:
             return
         moved = (event.localPos() - self._pressed_at).manhattanLength()
         clicked = self._panned_from is not None and moved <= CLICK_PX
+        was_grabbed, self._grabbed = bool(self._grabbed), ()
         self._pressed_at = self._panned_from = None
-        if self._shared.corner is not None:
+        if was_grabbed and not clicked:
+            self._shared.finish_editing()
+        elif was_grabbed:
+            self._shared.cancel()
+        elif self._shared.corner is not None:
             self._point_near(event)
             self._shared.set_corner()
         elif clicked:
@@ -116,6 +137,8 @@ class ImageView(QtWidgets.QWidget):
         key, modifiers = event.key(), event.modifiers()
         if self.image is None:
             event.ignore()
+        elif self._shared.edited is not None:
+            self._edit_by_key(key, modifiers)
         elif key in ARROWS and modifiers & Qt.ShiftModifier:
             self._shared.pan_by(*(PAN_STEP_PX / self._shared.zoom * way for way in ARROWS[key]))
         elif key in ARROWS:
@@ -127,6 +150,31 @@ class ImageView(QtWidgets.QWidget):
             self._shared.cancel()
         else:
             event.ignore()
+
+    def _edit_by_key(self, key, modifiers):
+        if key in ARROWS:
+            step = 1 if modifiers & Qt.ControlModifier else CURSOR_STEP_PX
+            self._shared.nudge(LOWER_RIGHT if modifiers & Qt.ShiftModifier else ALL_EDGES,
+                               *(step * way for way in ARROWS[key]))
+        elif key in (Qt.Key_Return, Qt.Key_Enter, Qt.Key_Space):
+            self._shared.finish_editing()
+        elif key == Qt.Key_Escape:
+            self._shared.cancel()
+
+    def _edges_at(self, event):
+        """Edges (0 to 3) of the selected box at the mouse; with Ctrl all of them inside the box; () elsewhere."""
+        box = self._scene.person_box()
+        if box is None or event.modifiers() & Qt.ShiftModifier:
+            return ()
+        place, rect = event.localPos(), self.transform().mapRect(QtCore.QRectF(
+            QtCore.QPointF(*box.rect_px[:2]), QtCore.QPointF(*box.rect_px[2:])))
+        if event.modifiers() & Qt.ControlModifier:
+            return ALL_EDGES if rect.contains(place) else ()
+        if not rect.adjusted(-GRAB_PX, -GRAB_PX, GRAB_PX, GRAB_PX).contains(place):
+            return ()
+        distances = (place.x() - rect.left(), place.y() - rect.top(), place.x() - rect.right(),
+                     place.y() - rect.bottom())
+        return tuple(edge for edge, distance in enumerate(distances) if abs(distance) <= GRAB_PX)
 
     def _pixel(self, event):
         return tuple(int(value // 1) for value in self.to_image(event.localPos()))

@@ -1,4 +1,4 @@
-"""Parser of lengths with units."""
+"""Lengths with units: parsing and formatting."""
 import re
 
 from ros_3d_bb.camera.depth_image import FARTHEST_M
@@ -22,3 +22,19 @@ def parse_length(text, unit):
     if metres > FARTHEST_M:
         raise ValueError('%.40r is %g m; at most %g m expected. Check the unit' % (text, metres, FARTHEST_M))
     return round(-metres if sign in ('-', '\u2212') else metres, 6) + 0.0  # no -0.0
+
+
+def number_text(length_m, unit, signed=False):
+    """Format a length in 'mm' or 'm' without the unit, and with a minus sign as wide as the plus sign."""
+    digits, value = (0, round(1000 * length_m)) if unit == 'mm' else (3, round(length_m, 3))
+    return (('%+.*f' if signed else '%.*f') % (digits, value + 0.0)).replace('-', '\u2212')
+
+
+def length_text(length_m, unit, signed=False):
+    """Format a length in 'mm' or 'm'."""
+    return '%s %s' % (number_text(length_m, unit, signed), unit)
+
+
+def position_text(position_m, unit):
+    """Format x and z of a position (x, y, z)."""
+    return 'X %s, Z %s' % (number_text(position_m[0], unit, True), length_text(position_m[2], unit))

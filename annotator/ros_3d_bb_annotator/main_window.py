@@ -7,7 +7,6 @@ from ros_3d_bb_annotator import dialogs
 from ros_3d_bb_annotator.actions import build_menus, keys_dialog
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.edits import Edits
-from ros_3d_bb_annotator.measurement import NEW
 from ros_3d_bb_annotator.measurement_list import MeasurementList
 from ros_3d_bb_annotator.measurement_pane import MeasurementPane
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtWidgets
@@ -15,6 +14,7 @@ from ros_3d_bb_annotator.results import Results
 
 TITLE = 'ros_3d_bb annotator'
 REFRESH_MS, WAKE_MS = 2000, 250
+SHOW_ESTIMATES_EVERY = 50
 
 
 class AnnotatorWindow(QtWidgets.QMainWindow):
@@ -31,6 +31,8 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self._connect()
         self._ahead = QtCore.QTimer(self, singleShot=True, interval=0)
         self._ahead.timeout.connect(self._read_ahead)
+        self._estimate = QtCore.QTimer(self, interval=0)
+        self._estimate.timeout.connect(self._estimate_next)
         self._refresh = QtCore.QTimer(self, interval=REFRESH_MS)
         self._refresh.timeout.connect(self._refresh_document)
         self._show_state()
@@ -38,6 +40,12 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
     @property
     def measurement(self):
         return None if self.current is None else self.document.measurements[self.current]
+
+    @property
+    def selection(self):
+        """Indices of the measurements that an entry applies to: those selected in the list, or the current one."""
+        selected = self.list.selection
+        return selected if self.current in selected else [self.current]
 
     def handler(self, name):
         """Method that an action calls: a method of the window or of one of its parts."""
@@ -66,8 +74,9 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.setWindowTitle('%s – %s' % (document.folder, TITLE))
         self._show_state()
         if document.measurements:
-            self.show_measurement(self._next_new(-1) or 0)
+            self.show_measurement(self._next_of(-1, self._is_to_do) or 0)
             self.pane.truth.begin()
+        self._start_estimates()
         self._refresh.start()
         return True
 
@@ -95,7 +104,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
             self.current = None  # another program removed the measurement
         self.after_edit()
         if count and (self.current is None or self.measurement is not before):
-            self.show_measurement(self._next_new(-1) or 0 if self.current is None else self.current)
+            self.show_measurement(self._next_of(-1, self._is_to_do) or 0 if self.current is None else self.current)
 
     def show_measurement(self, number):
         """Show a measurement. The text typed for the previous one is saved."""
@@ -124,11 +133,14 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     def next_new(self):
         """Show the next measurement that is neither annotated nor rejected."""
-        number = self._next_new(self.current)
-        if number is None:
-            self.statusBar().showMessage('No new measurements: %d of %d are done' % self.document.progress)
-        else:
-            self._go_to(number)
+        self._go_to_next(self._is_to_do, 'All done: %d of %d' % self.document.progress)
+
+    def next_implausible(self):
+        """Show the next measurement with an implausible truth."""
+        self._go_to_next(self.document.is_implausible, 'No implausible positions')
+
+    def go_to_search(self):
+        self.list.search.setFocus()
 
     def go_to_list(self):
         self.list.table.setFocus()
@@ -147,6 +159,11 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.pane.shared.start_drawing(not self.pane.shared.drawing)
         self.pane.color_view.setFocus()
 
+    def edit_box(self):
+        """Start to move or resize the selected box by the keyboard."""
+        if not self.pane.edit_box():
+            self.statusBar().showMessage('There is no box; D draws one')
+
     def show_keys(self):
         keys_dialog(self).exec_()
 
@@ -159,10 +176,12 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         """Update the window from the document."""
         self.list.update_rows()
         self._show_state()
+        self._start_estimates()
 
     def closeEvent(self, event):  # noqa: N802 (Qt's name)
         self.keep_typed()
         self._refresh.stop()
+        self._estimate.stop()
         self.results.wait()
         super(AnnotatorWindow, self).closeEvent(event)
 
@@ -170,11 +189,36 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         if 0 <= number < len(self.document.measurements):
             self.show_measurement(number)
 
-    def _next_new(self, number):
-        """Index of the next new measurement, continuing at the start after the last one; None if there is none."""
-        measurements = self.document.measurements
-        order = list(range(number + 1, len(measurements))) + list(range(number + 1))
-        return next((index for index in order if measurements[index].state == NEW), None)
+    def _go_to_next(self, is_wanted, text):
+        number = self._next_of(self.current, is_wanted)
+        if number is None:
+            self.statusBar().showMessage(text)
+        else:
+            self._go_to(number)
+
+    def _is_to_do(self, number):
+        return not self.document.measurements[number].is_done
+
+    def _next_of(self, number, is_wanted):
+        """Index of the next measurement for which `is_wanted(index)`, from the start after the last one; None if none.
+        """
+        count = len(self.document.measurements)
+        order = list(range(number + 1, count)) + list(range(min(number + 1, count)))
+        return next((index for index in order if is_wanted(index)), None)
+
+    def _start_estimates(self):
+        """Compute the estimates of annotated measurements while the window is idle."""
+        self._missing = self.document.estimates.missing()
+        self._estimate.start()
+
+    def _estimate_next(self):
+        index = None if self.results.is_busy else next(self._missing, None)
+        if index is None:
+            self._estimate.stop()
+        else:
+            self.document.estimates.of(index)
+        if index is None or index % SHOW_ESTIMATES_EVERY == 0:
+            self.list.update_rows()
 
     def _read_ahead(self):
         """Read the images of neighbouring measurements, one measurement per idle event."""
@@ -186,7 +230,12 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     def _on_drawing(self, drawing):
         self.statusBar().showMessage('Drag a box around the person, or move the cursor with the arrows and set two '
-                                     'corners with Space; Esc cancels it' if drawing else '')
+                                     'corners with Space; Esc cancels' if drawing else '')
+
+    def _on_unit(self):
+        """Show all lengths in the unit of the fields."""
+        self.list.show_unit(self.pane.truth.unit)
+        self.pane.update_unit()
 
     def _keep_draft(self, texts):
         try:
@@ -202,8 +251,13 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         measurement = self.measurement
         self.actions['undo'].setEnabled(bool(self.document and self.document.can_undo))
         self.actions['redo'].setEnabled(bool(self.document and self.document.can_redo))
+        self.actions['clear_truth'].setEnabled(measurement is not None and measurement.truth_m is not None)
+        self.actions['enter_for_label'].setEnabled(measurement is not None and bool(measurement.label))
+        for name in ('edit_box', 'delete_box'):
+            self.actions[name].setEnabled(measurement is not None and measurement.person is not None)
         self.actions['restore'].setEnabled(measurement is not None and measurement.rejected is not None)
-        for name in ('same_as_last', 'ask_reject', 'start_drawing', 'next', 'previous', 'next_new', 'first', 'last'):
+        for name in ('same_as_last', 'ask_reject', 'start_drawing', 'next', 'previous', 'next_new', 'next_implausible',
+                     'first', 'last', 'go_to_search'):
             self.actions[name].setEnabled(measurement is not None)
         for name in ('ask_export', 'analyse', 'edit_marks', 'reload'):
             self.actions[name].setEnabled(self.document is not None)
@@ -211,19 +265,20 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     def _lay_out(self):
         self.setWindowTitle(TITLE)
-        self.resize(1400, 860)
+        self.resize(QtCore.QSize(1400, 860).boundedTo(QtWidgets.QApplication.primaryScreen().availableSize()))
         split = QtWidgets.QSplitter(Qt.Horizontal)
         split.addWidget(self.list)
         split.addWidget(self.pane)
         split.setStretchFactor(1, 1)
-        split.setSizes([330, 1070])
+        split.setSizes([self.width() * 28 // 100, self.width() * 72 // 100])
         self.setCentralWidget(split)
-        for place, name in enumerate(('same_as_last', 'ask_reject', 'start_drawing', 'restore')):
+        self.split = split
+        for place, name in enumerate(('same_as_last', 'enter_for_label', 'start_drawing', 'ask_reject')):
             button = QtWidgets.QToolButton()
             button.setDefaultAction(self.actions[name])
             button.setSizePolicy(QtWidgets.QSizePolicy.Expanding, QtWidgets.QSizePolicy.Fixed)
             self.pane.buttons.addWidget(button, place // 2, place % 2)
-        self.progress.setFixedWidth(220)
+        self.progress.setFixedWidth(160)
         self.statusBar().addPermanentWidget(self.last_entry)
         self.statusBar().addPermanentWidget(self.progress)
 
@@ -231,6 +286,8 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.list.chosen.connect(self.show_measurement)
         self.pane.person_chosen.connect(self.edits.choose_person)
         self.pane.shared.box_drawn.connect(self.edits.add_box)
+        self.pane.shared.box_edited.connect(self.edits.replace_box)
+        self.pane.truth.unit_changed.connect(self._on_unit)
         self.pane.shared.drawing_changed.connect(self._on_drawing)
         self.pane.truth.entered.connect(self.edits.enter_truth)
         self.pane.truth.typed.connect(self._keep_draft)
@@ -252,8 +309,22 @@ def run_window(folder=None):
     wake = QtCore.QTimer(interval=WAKE_MS)  # Python handles signals only while it executes bytecode
     wake.timeout.connect(lambda: None)
     wake.start()
-    window = AnnotatorWindow()
+    window, settings = AnnotatorWindow(), QtCore.QSettings('ros_3d_bb', 'annotator')
+    _restore_layout(window, settings)
     window.show()
     if folder is not None:
         QtCore.QTimer.singleShot(0, lambda: window.open_session(folder))
-    return application.exec_()
+    status = application.exec_()
+    settings.setValue('geometry', window.saveGeometry())
+    settings.setValue('split', window.split.saveState())
+    settings.setValue('unit', window.pane.truth.unit)
+    return status
+
+
+def _restore_layout(window, settings):
+    """Restore size, division and unit of the window as it was closed."""
+    for name, restore in (('geometry', window.restoreGeometry), ('split', window.split.restoreState)):
+        if settings.value(name) is not None:
+            restore(settings.value(name))
+    if settings.value('unit') == 'm':
+        window.pane.truth.switch_unit()

@@ -3,11 +3,11 @@ from typing import Any, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from ros_3d_bb.visualization.image_overlay import BOX_COLOR, INVALID_COLOR, VALID_COLOR
+from ros_3d_bb.visualization.image_overlay import INVALID_COLOR, VALID_COLOR
 
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui
 
-CHOSEN, OTHER, DRAWN = QtGui.QColor(*BOX_COLOR), QtGui.QColor(255, 205, 60), QtGui.QColor(70, 200, 255)
+CHOSEN, OTHER, DRAWN = QtGui.QColor(255, 159, 28), QtGui.QColor(120, 200, 255), QtGui.QColor(255, 255, 255)
 CAPTION = QtGui.QColor(0, 0, 0, 150)
 SAMPLE_PX, SAMPLES_APART_PX = 3, 9  # on the screen
 
@@ -33,6 +33,10 @@ class Scene(NamedTuple):
         inside = [((x2 - x1) * (y2 - y1), number) for number, (x1, y1, x2, y2), _label, _by_hand in self.boxes
                   if x1 <= x < x2 and y1 <= y < y2]
         return min(inside)[1] if inside else None
+
+    def person_box(self):
+        """MarkedBox of the person, or None."""
+        return next((box for box in self.boxes if box.number == self.person), None)
 
 
 NOTHING = Scene((), None, ())

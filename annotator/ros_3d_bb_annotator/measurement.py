@@ -4,7 +4,8 @@ from typing import NamedTuple, Optional, Tuple
 
 from ros_3d_bb.sessions.session_reader import RecordedDetection, SessionError, frame_of, session_errors
 
-NEW, ANNOTATED, REJECTED = 'new', 'annotated', 'rejected'
+NEW, ANNOTATED, REJECTED, NOBODY = 'new', 'annotated', 'rejected', 'nobody found'
+STATES = NEW, NOBODY, ANNOTATED, REJECTED
 # Field of the stretched depth of the old format. Its name differs from that of depth in metric units.
 STRETCHED_DEPTH = 'stretched_depth'
 
@@ -20,7 +21,8 @@ class Mark(NamedTuple):
 class EditedMeasurement(NamedTuple):
     """One measurement, with the fields of `session_reader.Measurement`.
 
-    `person` is None without detections; `truth_m` is (x, y, z), where y may be None; `stamp_text` is
+    `person` is the selected detection, or None without detections, and `truth_m` its true position (x, y, z), where y
+    may be None; `stamp_text` is
     '<secs>.<nsecs>' or empty; `problem` is the fault of an invalid measurement or None.
     """
 
@@ -37,14 +39,42 @@ class EditedMeasurement(NamedTuple):
 
     @property
     def state(self):
-        """'new', 'annotated' or 'rejected'."""
+        """One of STATES."""
         if self.rejected is not None:
             return REJECTED
-        return NEW if self.truth_m is None else ANNOTATED
+        if not self.detections and self.problem is None:
+            return NOBODY
+        return ANNOTATED if self.truths else NEW
 
     @property
-    def estimate_m(self):
+    def is_done(self):
+        return self.state in (ANNOTATED, REJECTED)
+
+    @property
+    def name(self):
+        """ID and label."""
+        return '%s (%s)' % (self.id, self.label) if self.label else self.id
+
+    @property
+    def truths(self):
+        """True positions (x, y, z) by the index of their detection; y may be None."""
+        truths = {number: truth_of(detection) for number, detection in enumerate(self.detections)
+                  if detection.truth_m is not None and number != self.person}
+        if self.truth_m is not None and self.person is not None:
+            truths[self.person] = self.truth_m
+        return truths
+
+    @property
+    def recorded_m(self):
+        """Stored estimate of the person, (3,) or None."""
         return None if self.person is None else self.detections[self.person].estimate_m
+
+
+def truth_of(annotated):
+    """True position (x, y, z) of a measurement or detection of `session_reader`; None if not annotated."""
+    if annotated.truth_m is None:
+        return None
+    return float(annotated.truth_m[0]), annotated.truth_y_m, float(annotated.truth_m[1])
 
 
 class FileNames(object):
@@ -78,7 +108,7 @@ def measurement_of(folder, entry, files):
         return EditedMeasurement(str(known.get('id', '')), '', '', problem=str(error),
                                  rejected=str(known['rejected']) if known.get('rejected') else None)
     missing = [os.path.relpath(path, folder) for path in (frame.color_path, frame.depth_path) if path not in files]
-    truth_m = None if frame.truth_m is None else (float(frame.truth_m[0]), frame.truth_y_m, float(frame.truth_m[1]))
-    return EditedMeasurement(frame.id, frame.color_path, frame.depth_path, str(entry.get('stamp') or ''), frame.label,
-                             frame.detections, frame.person if frame.detections else None, truth_m, frame.rejected,
-                             'there is no file %s' % ' and no file '.join(missing) if missing else None)
+    return EditedMeasurement(
+        frame.id, frame.color_path, frame.depth_path, str(entry.get('stamp') or ''), frame.label, frame.detections,
+        frame.person if frame.detections else None, truth_of(frame), frame.rejected,
+        'there is no file %s' % ' and no file '.join(missing) if missing else None)

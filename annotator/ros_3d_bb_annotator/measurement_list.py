@@ -1,10 +1,17 @@
-"""List of measurements with their states: a Qt model, and a view with a filter."""
+"""List of measurements with their states: a Qt model, and a view with a filter and a search."""
+from ros_3d_bb_annotator.lengths import number_text
+from ros_3d_bb_annotator.measurement import ANNOTATED, NEW, NOBODY, REJECTED, STATES
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
-COLUMNS = ('measurement', 'state', 'error')
-COLORS = {'new': QtGui.QColor(60, 120, 200), 'annotated': QtGui.QColor(30, 140, 60),
-          'rejected': QtGui.QColor(150, 150, 150)}
-PROBLEM = QtGui.QColor(190, 0, 40)
+COLUMNS = ('ID', 'Label', 'State', 'X', 'Z', 'Error')
+STATE_COLUMN, NUMBERS = COLUMNS.index('State'), ('X', 'Z', 'Error')
+IMPLAUSIBLE, INVALID = 'implausible', 'invalid'
+# Okabe and Ito's colours, which are different for all kinds of colour vision
+COLORS = {NEW: QtGui.QColor(0, 114, 178), NOBODY: QtGui.QColor(170, 80, 0), ANNOTATED: QtGui.QColor(40, 40, 40),
+          REJECTED: QtGui.QColor(130, 130, 130), IMPLAUSIBLE: QtGui.QColor(150, 60, 0),
+          INVALID: QtGui.QColor(150, 60, 0)}
+WARNING_GROUND = QtGui.QColor(255, 224, 178)
+SORT_ROLE = Qt.UserRole
 
 
 class MeasurementModel(QtCore.QAbstractTableModel):
@@ -12,7 +19,7 @@ class MeasurementModel(QtCore.QAbstractTableModel):
 
     def __init__(self, parent=None):
         super(MeasurementModel, self).__init__(parent)
-        self._document, self._count = None, 0
+        self._document, self._count, self.unit = None, 0, 'mm'
 
     def show_document(self, document):
         self.beginResetModel()
@@ -34,21 +41,71 @@ class MeasurementModel(QtCore.QAbstractTableModel):
     def headerData(self, section, orientation, role=Qt.DisplayRole):  # noqa: N802
         if role == Qt.DisplayRole and orientation == Qt.Horizontal:
             return COLUMNS[section]
+        if role == Qt.ToolTipRole and COLUMNS[section] in NUMBERS:
+            return {'X': 'True X [%s]', 'Z': 'True Z [%s]'}.get(
+                COLUMNS[section], 'Distance of the analysed estimate from the true position [%s]') % self.unit
         return None
 
+    def state_of(self, row):
+        """State that is shown: that of the measurement, 'implausible' or 'invalid'."""
+        measurement = self._document.measurements[row]
+        if measurement.problem is not None and measurement.rejected is None:
+            return INVALID
+        return IMPLAUSIBLE if self._document.is_implausible(row) else measurement.state
+
+    def matches(self, row, state, text):
+        """Whether a row has a state ('': any) and contains a text."""
+        measurement = self._document.measurements[row]
+        texts = [measurement.id, measurement.label, measurement.rejected or ''] + self._texts(row)[STATE_COLUMN:]
+        return state in ('', self.state_of(row)) and any(text.casefold() in part.casefold() for part in texts)
+
     def data(self, index, role=Qt.DisplayRole):
-        measurement = self._document.measurements[index.row()]
+        row, column = index.row(), index.column()
         if role == Qt.DisplayRole:
-            errors = self._document.errors(index.row())
-            error = '' if errors is None else '%.0f mm' % (1000 * errors[2])
-            return (measurement.id, measurement.state, error)[index.column()]
+            return self._texts(row)[column]
+        if role == SORT_ROLE:
+            return self._sort_key(row, column)
         if role == Qt.ForegroundRole:
-            return QtGui.QBrush(PROBLEM if measurement.problem else COLORS[measurement.state])
+            return QtGui.QBrush(COLORS[self.state_of(row)])
+        if role == Qt.BackgroundRole and self.state_of(row) == IMPLAUSIBLE:
+            return QtGui.QBrush(WARNING_GROUND)
         if role == Qt.ToolTipRole:
-            return measurement.problem or measurement.rejected or measurement.label or None
-        if role == Qt.TextAlignmentRole and index.column() == 2:
+            measurement = self._document.measurements[row]
+            return measurement.problem or measurement.rejected or measurement.name
+        if role == Qt.TextAlignmentRole and COLUMNS[column] in NUMBERS:
             return int(Qt.AlignRight | Qt.AlignVCenter)
         return None
+
+    def _values_m(self, row):
+        """True x and z, and the distance of the estimate, or None."""
+        truth_m, errors_m = self._document.measurements[row].truth_m, self._document.known_errors(row)
+        x_m, _y_m, z_m = truth_m or (None, None, None)
+        return x_m, z_m, None if errors_m is None else errors_m[2]
+
+    def _texts(self, row):
+        measurement = self._document.measurements[row]
+        values_m = zip(self._values_m(row), (True, False, False))
+        return [measurement.id, measurement.label, self.state_of(row)] + [
+            '' if value_m is None else number_text(value_m, self.unit, signed) for value_m, signed in values_m]
+
+    def _sort_key(self, row, column):
+        if COLUMNS[column] not in NUMBERS:
+            return self._texts(row)[column]
+        value_m = self._values_m(row)[NUMBERS.index(COLUMNS[column])]
+        return float('-inf') if value_m is None else value_m
+
+
+class Filter(QtCore.QSortFilterProxyModel):
+    """Rows with a state and a text."""
+
+    state, text = '', ''
+
+    def show(self, state, text):
+        self.state, self.text = state, text
+        self.invalidateFilter()
+
+    def filterAcceptsRow(self, row, _parent):  # noqa: N802 (Qt's name)
+        return not (self.state or self.text) or self.sourceModel().matches(row, self.state, self.text)
 
 
 class MeasurementList(QtWidgets.QWidget):
@@ -58,19 +115,30 @@ class MeasurementList(QtWidgets.QWidget):
 
     def __init__(self, parent=None):
         super(MeasurementList, self).__init__(parent)
-        self._model, self._filter = MeasurementModel(self), QtCore.QSortFilterProxyModel(self)
+        self._model, self._filter = MeasurementModel(self), Filter(self)
         self._filter.setSourceModel(self._model)
-        self._filter.setFilterKeyColumn(COLUMNS.index('state'))
-        self.filter_box = QtWidgets.QComboBox()
-        for state in ('',) + tuple(COLORS):
-            self.filter_box.addItem('%s only' % state, state)
-        self.filter_box.currentIndexChanged.connect(
-            lambda _row: self._filter.setFilterFixedString(self.filter_box.currentData()))
+        self._filter.setSortRole(SORT_ROLE)
+        self.filter_box, self.search = QtWidgets.QComboBox(), QtWidgets.QLineEdit()
+        for state in ('',) + STATES + (IMPLAUSIBLE,):
+            self.filter_box.addItem(state, state)
+        self.search.setPlaceholderText('Search (Ctrl+F)')
+        self.search.setClearButtonEnabled(True)
+        self.filter_box.currentIndexChanged.connect(self._on_filter)
+        self.search.textChanged.connect(self._on_filter)
         self.table = self._make_table()
         layout = QtWidgets.QVBoxLayout(self)
         layout.setContentsMargins(6, 6, 0, 6)
-        layout.addWidget(self.filter_box)
-        layout.addWidget(self.table)
+        for widget in (self.filter_box, self.search, self.table):
+            layout.addWidget(widget)
+
+    @property
+    def selection(self):
+        """Indices of the selected measurements in the order of the session."""
+        return sorted(self._filter.mapToSource(index).row() for index in self.table.selectionModel().selectedRows())
+
+    def show_unit(self, unit):
+        self._model.unit = unit
+        self._model.update_rows()
 
     def show_document(self, document):
         self._document = document
@@ -85,17 +153,19 @@ class MeasurementList(QtWidgets.QWidget):
         """Select the current measurement without emitting `chosen`."""
         index = self._filter.mapFromSource(self._model.index(number, 0))
         self.blockSignals(True)
-        if index.isValid():
-            self.table.setCurrentIndex(index)
-        else:
+        if not index.isValid():
             self.table.clearSelection()
+        elif index.row() != self.table.currentIndex().row():
+            self.table.setCurrentIndex(index)
         self.blockSignals(False)
 
     def _make_table(self):
         table = QtWidgets.QTableView()
         table.setModel(self._filter)
         table.setSelectionBehavior(QtWidgets.QTableView.SelectRows)
-        table.setSelectionMode(QtWidgets.QTableView.SingleSelection)
+        table.setSelectionMode(QtWidgets.QTableView.ExtendedSelection)
+        table.setSortingEnabled(True)
+        table.sortByColumn(-1, Qt.AscendingOrder)  # the order of the session
         table.setTabKeyNavigation(False)
         table.setShowGrid(False)
         table.setWordWrap(False)
@@ -103,10 +173,9 @@ class MeasurementList(QtWidgets.QWidget):
         table.verticalHeader().hide()
         table.verticalHeader().setSectionResizeMode(QtWidgets.QHeaderView.Fixed)  # no sizes of invisible rows
         table.verticalHeader().setDefaultSectionSize(table.fontMetrics().height() + 6)
-        table.horizontalHeader().setSectionResizeMode(0, QtWidgets.QHeaderView.Stretch)
-        for column, text in ((1, 'annotated'), (2, '00000 mm')):
-            table.horizontalHeader().setSectionResizeMode(column, QtWidgets.QHeaderView.Fixed)
-            table.horizontalHeader().resizeSection(column, table.fontMetrics().boundingRect(text).width() + 14)
+        header, metrics = table.horizontalHeader(), table.fontMetrics()
+        for column, text in enumerate(('00000_00', 'Label', 'nobody found', '\u22120.000', '00.000', 'Error')):
+            header.resizeSection(column, metrics.boundingRect(text).width() + 12)
         table.selectionModel().currentChanged.connect(self._on_current)
         return table
 
@@ -114,8 +183,12 @@ class MeasurementList(QtWidgets.QWidget):
         if index.isValid():
             self.chosen.emit(self._filter.mapToSource(index).row())
 
+    def _on_filter(self):
+        self._filter.show(self.filter_box.currentData(), self.search.text().strip())
+
     def _show_counts(self):
-        states = [measurement.state for measurement in self._document.measurements]
+        states = [self._model.state_of(row) for row in range(self._model.rowCount())]
         self.filter_box.setItemText(0, 'all measurements (%d)' % len(states))
-        for row, state in enumerate(COLORS, 1):
-            self.filter_box.setItemText(row, '%s only (%d)' % (state, states.count(state)))
+        for row in range(1, self.filter_box.count()):
+            state = self.filter_box.itemData(row)
+            self.filter_box.setItemText(row, '%s (%d)' % (state, states.count(state)))

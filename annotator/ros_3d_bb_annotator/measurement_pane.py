@@ -2,16 +2,21 @@
 import html
 
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
+from ros_3d_bb.visualization.image_overlay import DEPTH_RANGE_M
 from ros_3d_bb_annotator.document import ESTIMATOR
 from ros_3d_bb_annotator.grid_view import FloorScene, GridView
 from ros_3d_bb_annotator.image_view import ImageView
+from ros_3d_bb_annotator.lengths import length_text, position_text
 from ros_3d_bb_annotator.marking import MarkedBox, Scene
+from ros_3d_bb_annotator.measurement import NOBODY
+from ros_3d_bb_annotator.measurement_list import COLORS, IMPLAUSIBLE
 from ros_3d_bb_annotator.pictures import PictureCache, depth_scale
 from ros_3d_bb_annotator.qt import Qt, QtWidgets, Signal
 from ros_3d_bb_annotator.shared_view import SharedView
-from ros_3d_bb_annotator.truth_panel import TruthPanel
+from ros_3d_bb_annotator.truth_panel import TruthPanel, error_text
+from ros_3d_bb_annotator.validation import truth_problems
 
-STATE_COLORS = {'new': '#3c78c8', 'annotated': '#1e8c3c', 'rejected': '#787878'}
+NOBODY_TEXT = 'Nobody was found: draw a box around the person (D), or reject the measurement (Ctrl+R).'
 HEADER = '<span style="font-size: large"><b>%s</b></span> &nbsp; <b style="color: %s">%s</b> &nbsp; %s'
 
 
@@ -30,17 +35,19 @@ class MeasurementPane(QtWidgets.QWidget):
         self.header, self.banner = _label(), _label()
         self.readout = QtWidgets.QLabel()
         self.people, self.buttons = QtWidgets.QListWidget(), QtWidgets.QGridLayout()
-        self._document, self._pictures, self._measurement, self._shown = None, None, None, None
+        self._document, self._pictures, self._measurement, self._shown, self._index = (None,) * 5
         self._scale, self._samples_shown = depth_scale(), True
         self._lay_out()
         self.header.setText('No session is open: File, Open a session (Ctrl+O).')
         for view in (self.color_view, self.depth_view):
             view.box_chosen.connect(self.person_chosen)
         self.people.setAlternatingRowColors(True)
+        self.people.setWordWrap(True)
+        self.people.setHorizontalScrollBarPolicy(Qt.ScrollBarAlwaysOff)
         for signal in (self.people.itemActivated, self.people.itemClicked):
             signal.connect(lambda item: self.person_chosen.emit(self.people.row(item)))
         self.shared.pointed.connect(self._show_readout)
-        self.truth.previewed.connect(self._show_floor)
+        self.truth.previewed.connect(self._show_preview)
 
     def set_usable(self, usable):
         """Enable the widgets if there is a current measurement."""
@@ -50,26 +57,33 @@ class MeasurementPane(QtWidgets.QWidget):
     def show_document(self, document):
         """Set the document. No measurement is shown yet."""
         self._document, self._pictures, self._shown = document, PictureCache(document), None
-        self.read_ahead, self.read_again = self._pictures.read_ahead, self._pictures.clear
+        self.read_ahead = self._pictures.read_ahead
         self.header.setText('This session contains no measurements yet.')
-        self.banner.setText('<br>'.join(html.escape(note) for note in document.notes))
-        self.banner.setVisible(bool(document.notes))
+        self._show_banner(document.notes)
+
+    def read_again(self):
+        """Read the images again when they are shown."""
+        self._pictures.clear()
+        self._document.estimates.clear()
 
     def show_measurement(self, number):
         """Show a measurement, also if it has changed."""
-        self._measurement = measurement = self._document.measurements[number]
-        self._shown = pictures = self._pictures.of(number)
+        self._index, self._measurement = number, self._document.measurements[number]
+        measurement, pictures = self._measurement, self._pictures.of(number)
+        self._shown = pictures
+        self._document.estimates.of(number, pictures.depth)
         self._show_header(measurement)
+        self._show_banner(self._document.notes + (NOBODY_TEXT,) * (measurement.state == NOBODY))
         image = pictures.color_image or pictures.depth_image
         if image is not None:
             self.shared.show_size(image.width(), image.height())
         self.shared.cancel()
         scene = self._scene()
         self.color_view.show_image(pictures.color_image, scene, pictures.color_problem)
-        self.depth_view.show_image(pictures.depth_image, scene, pictures.depth_problem,
-                                   (self._scale, '%g m' % pictures.farthest_m, '0 m') if pictures.depth else None)
+        self.depth_view.show_image(pictures.depth_image, scene, pictures.depth_problem)
+        self.depth_view.show_legend(self._legend() if pictures.depth else None)
         self._show_people(measurement)
-        self.truth.show_truth(measurement.truth_m, measurement.estimate_m, self._document.draft(number))
+        self.truth.show_truth(measurement.truth_m, self._document.draft(number), self._document.mark_of(number))
         self._show_readout()
 
     def show_samples(self, shown):
@@ -80,19 +94,63 @@ class MeasurementPane(QtWidgets.QWidget):
             self.depth_view.show_scene(scene)
 
     def _scene(self):
-        return _scene_of(self._measurement, self._shown.depth if self._samples_shown else None)
+        return self._scene_of(self._shown.depth if self._samples_shown else None)
+
+    def error_text(self, errors_m):
+        """Text of errors (x, z, ...) in the current unit."""
+        return error_text(errors_m, self.truth.unit)
+
+    def update_unit(self):
+        """Show the lengths in the unit of the truth, which has changed."""
+        if self._measurement is not None:
+            self.show_samples(self._samples_shown)
+            self.depth_view.show_legend(self._legend() if self._shown.depth else None)
+            self._show_people(self._measurement)
+            self._show_readout()
+
+    def edit_box(self):
+        """Start to move or resize the selected box by the keyboard."""
+        box = self._scene().person_box() if self._measurement is not None else None
+        if box is not None:
+            self.shared.start_editing(box.rect_px)
+            self.color_view.setFocus()
+        return box is not None
+
+    def _legend(self):
+        return self._scale, length_text(DEPTH_RANGE_M, self.truth.unit), length_text(0, self.truth.unit)
 
     def _show_header(self, measurement):
         details = [text for text in (measurement.label, measurement.stamp_text and 'at %s s' % measurement.stamp_text,
-                                     measurement.rejected and 'because: %s' % measurement.rejected,
+                                     measurement.rejected and 'reason: %s' % measurement.rejected,
                                      measurement.problem) if text]
-        self.header.setText(HEADER % (html.escape(measurement.id), STATE_COLORS[measurement.state], measurement.state,
+        state = IMPLAUSIBLE if self._document.is_implausible(self._index) else measurement.state
+        self.header.setText(HEADER % (html.escape(measurement.id), COLORS[state].name(), state,
                                       html.escape(' · '.join(details))))
+
+    def _scene_of(self, depth):
+        """Overlay of the measurement. With a DepthImage it contains the samples of the estimator in each box."""
+        boxes = []
+        for number, (detection, position_m) in enumerate(
+                zip(self._measurement.detections, self._document.estimates.of(self._index))):
+            if detection.box_px is not None:
+                distance = '' if position_m is None else ': %s' % length_text(position_m[2], self.truth.unit)
+                boxes.append(MarkedBox(number, detection.box_px, '%d%s' % (number + 1, distance), detection.by_hand))
+        sample = estimator_named(ESTIMATOR).sample
+        samples = () if depth is None else tuple(
+            sample(depth, box.rect_px) for box in boxes
+            if box.rect_px[0] < box.rect_px[2] and box.rect_px[1] < box.rect_px[3])
+        return Scene(tuple(boxes), self._measurement.person, samples)
+
+    def _show_banner(self, texts):
+        self.banner.setText('<br>'.join(html.escape(text) for text in texts))
+        self.banner.setVisible(bool(texts))
 
     def _show_people(self, measurement):
         self.people.clear()
-        for number, detection in enumerate(measurement.detections):
-            item = QtWidgets.QListWidgetItem(_detection_text(number, detection))
+        positions = self._document.estimates.of(self._index)
+        for number, (detection, position_m) in enumerate(zip(measurement.detections, positions)):
+            item = QtWidgets.QListWidgetItem(
+                _detection_text(number, detection, position_m, measurement.truths.get(number), self.truth.unit))
             font = item.font()
             font.setBold(number == measurement.person)
             item.setFont(font)
@@ -102,14 +160,27 @@ class MeasurementPane(QtWidgets.QWidget):
 
     def _show_readout(self):
         depth, camera = (self._shown.depth, self._document.camera) if self._shown is not None else (None, None)
-        self.readout.setText(_readout_text(self.shared.cursor, depth, camera))
+        self.readout.setText(_readout_text(self.shared.cursor, depth, camera, self.truth.unit))
 
-    def _show_floor(self, truth_m):
-        """Show the floor with the typed truth (x, z), or without truth for None."""
-        estimate_m, camera = self._measurement.estimate_m, self._document.camera
+    def _show_preview(self, truth_m):
+        """Show error and floor for the typed truth (x, y, z), or without truth for None."""
+        measurement, document = self._measurement, self._document
+        person, warning = measurement.person, ''
+        if truth_m is not None and person is not None:
+            person = document.person_at(self._index, truth_m[0], truth_m[2])
+            if person != measurement.person:
+                warning = 'Box %d is the nearest: it is selected on Enter' % (person + 1)
+            if truth_problems(document, self._index, truth_m):
+                warning = 'Implausible: check position, unit and box'
+        position_m = None if person is None else document.estimates.of(self._index)[person]
+        error_m = None if truth_m is None or position_m is None else (
+            float(position_m[0]) - truth_m[0], float(position_m[2]) - truth_m[2])
+        self.truth.show_error(self.error_text(error_m), warning)
+        camera = document.camera
         sight = (0.0, 0.0) if camera is None else (-camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx)
-        self.floor.show_scene(FloorScene(self._document.grid, truth_m,
-                                         None if estimate_m is None else tuple(estimate_m[[0, 2]].tolist()), sight))
+        self.floor.show_scene(FloorScene(
+            document.grid, None if truth_m is None else (truth_m[0], truth_m[2]),
+            None if position_m is None else tuple(position_m[[0, 2]].tolist()), sight, self.truth.unit))
 
     def _lay_out(self):
         views = QtWidgets.QSplitter(Qt.Horizontal)
@@ -125,7 +196,7 @@ class MeasurementPane(QtWidgets.QWidget):
         layout.addLayout(self._lower_part())
 
     def _lower_part(self):
-        people_box, floor_box = QtWidgets.QGroupBox('Boxes: which is the person?'), QtWidgets.QGroupBox('Floor')
+        people_box, floor_box = QtWidgets.QGroupBox('Boxes'), QtWidgets.QGroupBox('Floor from above')
         QtWidgets.QVBoxLayout(people_box).addWidget(self.people)
         middle = QtWidgets.QVBoxLayout()
         middle.addWidget(self.truth, 1)
@@ -134,7 +205,8 @@ class MeasurementPane(QtWidgets.QWidget):
         floor_layout.setContentsMargins(4, 4, 4, 4)
         floor_layout.addWidget(self.floor)
         layout = QtWidgets.QHBoxLayout()
-        layout.addWidget(people_box, 3)
+        people_box.setMinimumWidth(self.fontMetrics().boundingRect('recorded: X +0000').width())
+        layout.addWidget(people_box, 4)
         layout.addLayout(middle, 4)
         layout.addWidget(floor_box, 4)
         return layout
@@ -147,43 +219,26 @@ def _label():
     return label
 
 
-def _scene_of(measurement, depth):
-    """Overlay of a measurement. With a DepthImage it contains the samples of the estimator in each box."""
-    boxes = []
-    for number, detection in enumerate(measurement.detections):
-        if detection.box_px is not None:
-            distance = '' if detection.estimate_m is None else ': %.2f m' % detection.estimate_m[2]
-            boxes.append(MarkedBox(number, detection.box_px, '%d%s' % (number + 1, distance), detection.by_hand))
-    sample = estimator_named(ESTIMATOR).sample
-    samples = () if depth is None else tuple(
-        sample(depth, box.rect_px) for box in boxes
-        if box.rect_px[0] < box.rect_px[2] and box.rect_px[1] < box.rect_px[3])
-    return Scene(tuple(boxes), measurement.person, samples)
-
-
-def _detection_text(number, detection):
-    """Description of a detection in two lines."""
-    position = 'no estimate' if detection.estimate_m is None else (
-        'X %s  Z %.3f m' % (_signed(detection.estimate_m[0]), detection.estimate_m[2]))
+def _detection_text(number, detection, position_m, truth_m, unit):
+    """Description of a detection: the analysed estimate, the recorded one, and details."""
     details = (detection.support is not None and 'support %.0f %%' % (100 * detection.support),
                detection.truncated and 'truncated', detection.by_hand and 'drawn by hand')
-    return '%d: %s\n     %s' % (number + 1, position, ', '.join(filter(None, details)))
+    lines = ('no estimate' if position_m is None else position_text(position_m, unit),
+             detection.estimate_m is not None and 'recorded: %s' % position_text(detection.estimate_m, unit),
+             truth_m is not None and 'true: %s' % position_text(truth_m, unit), ', '.join(filter(None, details)))
+    return '%d: %s' % (number + 1, '\n'.join(filter(None, lines)))
 
 
-def _readout_text(cursor, depth, camera):
+def _readout_text(cursor, depth, camera, unit):
     """Text with pixel, depth and position at the cursor (u, v) or None. `depth` is a DepthImage or None."""
     if cursor is None:
-        return 'Point at the image: pixel, depth, X Y Z'
+        return 'Point at the image to read pixel, depth and position'
     text = 'pixel (%d, %d)' % cursor
     if depth is None:
         return text
     depth_m, valid = depth.at(*cursor)
     if not valid:
-        return text + '    no depth there'
+        return text + '    no depth'
     x_m, y_m, z_m = camera.deproject(cursor, depth_m).tolist()
-    return text + '    depth %.3f m    X %s  Y %s  Z %.3f m' % (depth_m, _signed(x_m), _signed(y_m), z_m)
-
-
-def _signed(value_m):
-    """Format metres with a sign, with a minus sign as wide as the plus sign."""
-    return ('%+.3f' % value_m).replace('-', '−')
+    return text + '    depth %s    X %s  Y %s  Z %s' % (
+        length_text(depth_m, unit), length_text(x_m, unit, True), length_text(y_m, unit, True), length_text(z_m, unit))

@@ -4,23 +4,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.visualization.image_overlay import colorize_depth, depth_to_grey
+from ros_3d_bb.visualization.image_overlay import DEPTH_RANGE_M, colorize_depth, depth_to_grey
 from ros_3d_bb_annotator.qt import QtGui
 
 CACHE_SIZE = 7  # number of measurements: the current one and its neighbours
-FARTHEST_PERCENT = 90  # farther surfaces, the end of the room, are blue
-RANGES_M = (1, 2, 3, 4, 6, 8, 10, 15, 20, 40)
 
 
 class Pictures(NamedTuple):
-    """QImages of a measurement or None, with the problems, the DepthImage or None, and the end of its colour scale."""
+    """QImages of a measurement or None, with the problems, and the DepthImage or None."""
 
     color_image: Any
     color_problem: str
     depth_image: Any
     depth_problem: str
     depth: Any
-    farthest_m: float
 
 
 class PictureCache(object):
@@ -50,22 +47,11 @@ class PictureCache(object):
         color, color_problem = _read_or_error(self._document.color, number)
         if self._document.is_old_format:
             depth, (stretched, depth_problem) = None, _read_or_error(self._document.stretched_depth, number)
-            shown, farthest_m = None if stretched is None else _grey_image(stretched), 0.0
+            shown = None if stretched is None else _grey_image(stretched)
         else:
             depth, depth_problem = _read_or_error(self._document.depth, number)
-            farthest_m = 0.0 if depth is None else _farthest_of(depth)
-            shown = None if depth is None else colorize_depth(depth_to_grey(depth, farthest_m))
-        return Pictures(_image_of(color), color_problem, _image_of(shown), depth_problem, depth, farthest_m)
-
-
-def _farthest_of(depth):
-    """End of the colour scale for a DepthImage, one of RANGES_M."""
-    depth_m = depth.values[::4, ::4].astype(float) * depth.scale_m
-    depth_m = depth_m[np.isfinite(depth_m) & (depth_m > 0)]
-    if not depth_m.size:
-        return RANGES_M[-1]
-    far_m = np.percentile(depth_m, FARTHEST_PERCENT)
-    return next((range_m for range_m in RANGES_M if range_m >= far_m), RANGES_M[-1])
+            shown = None if depth is None else colorize_depth(depth_to_grey(depth, DEPTH_RANGE_M))
+        return Pictures(_image_of(color), color_problem, _image_of(shown), depth_problem, depth)
 
 
 def _grey_image(values):

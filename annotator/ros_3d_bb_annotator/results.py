@@ -2,28 +2,41 @@
 import os
 
 from ros_3d_bb_annotator import dialogs
-from ros_3d_bb_annotator.export import export
-from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets
+from ros_3d_bb_annotator.export import default_estimator, export
+from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
-TITLES = {
-    'figure_5_2.png': 'Depth error by distance, and the theory of stereo cameras',
-    'figure_5_3.png': 'Z error by true Z', 'figure_5_4.png': 'Variance of the Z error',
-    'figure_5_5.png': 'X error by true X', 'figure_5_6.png': 'Variance of the X error',
-    'figure_5_7.png': 'Distribution of the Z error', 'figure_5_8.png': 'Distribution of the X error'}
+FORMS = ('CSV, one row per person (*.csv)', 'CSV in the form of the thesis (*.csv)')
+
+
+class Cancelled(Exception):
+    """Raised in the thread of a Work that is cancelled."""
 
 
 class Work(QtCore.QThread):
-    """Calls `work()` in a thread. Afterwards `result` is its return value, or `error` its exception."""
+    """Calls `work(progress)` in a thread. Afterwards `result` is its return value, or `error` its exception.
+
+    `work` calls `progress` with the share 0..1 that is done, which raises Cancelled after `cancel`.
+    """
+
+    progressed = Signal(float)
 
     def __init__(self, work, parent=None):
         super(Work, self).__init__(parent)
-        self._work, self.result, self.error = work, None, None
+        self._work, self._is_cancelled, self.result, self.error = work, False, None, None
 
     def run(self):
         try:
-            self.result = self._work()
+            self.result = self._work(self._progress)
         except Exception as error:  # reported by the thread that waits
             self.error = error
+
+    def cancel(self):
+        self._is_cancelled = True
+
+    def _progress(self, share):
+        if self._is_cancelled:
+            raise Cancelled()
+        self.progressed.emit(share)
 
 
 class Results(QtCore.QObject):
@@ -33,54 +46,82 @@ class Results(QtCore.QObject):
         super(Results, self).__init__(window)
         self._window, self._work, self.figures = window, None, None
 
-    def ask_export(self):
-        """Ask for a file and write the table of errors to it."""
-        path, _kind = QtWidgets.QFileDialog.getSaveFileName(
-            self._window, 'Export CSV', os.path.join(self._window.document.folder, 'measurements.csv'), 'CSV (*.csv)')
-        if path:
-            self.export(path)
+    @property
+    def is_busy(self):
+        return self._work is not None and self._work.isRunning()
 
-    def export(self, path):
+    def ask_export(self):
+        """Ask for a file and its form, and write the table of errors to it."""
+        path, form = QtWidgets.QFileDialog.getSaveFileName(
+            self._window, 'Export CSV', os.path.join(self._window.document.folder, 'measurements.csv'),
+            ';;'.join(FORMS))
+        if path:
+            self.export(path, form == FORMS[1])
+
+    def export(self, path, in_thesis_form=False):
         """Write the table of errors to a file, or show an error message."""
+        document = self._window.document
         try:
-            count = export(self._window.document, path)
+            count = export(document, path, default_estimator(document), in_thesis_form)
         except (ValueError, OSError) as error:
             dialogs.show_error(self._window, 'The table was not written', error)
             return
-        self._window.statusBar().showMessage('%d measurements written to %s' % (count, path))
+        self._window.statusBar().showMessage('%d rows written to %s' % (count, path))
 
     def analyse(self):
-        """Run the noise analysis and show its figures. Editing is blocked meanwhile."""
+        """Name implausible truths, run the noise analysis and show its figures. Editing is blocked meanwhile."""
         self._window.keep_typed()
-        waiting = QtWidgets.QProgressDialog('The noise analysis takes some seconds.', '', 0, 0, self._window)
-        waiting.setWindowTitle('Noise analysis')
-        waiting.setCancelButton(None)
-        waiting.setWindowModality(Qt.WindowModal)
-        waiting.setMinimumDuration(0)
-        waiting.show()
         document = self._window.document
-        self._work = Work(lambda: _analysed(document), self)
-        self._work.finished.connect(lambda: self._on_analysed(waiting))
-        self._work.start()
+        self._start('Estimating positions…', lambda progress: document.outliers(progress), self._on_outliers)
 
     def wait(self):
         """Wait for a running analysis, because threads must end before Qt is destroyed."""
         if self._work is not None:
+            self._work.cancel()
             self._work.wait()
 
-    def _on_analysed(self, waiting):
+    def _start(self, text, work, then):
+        """Run `work(progress)` in a thread with a progress dialog, and call `then(result)` if it succeeds."""
+        waiting = QtWidgets.QProgressDialog(text, 'Cancel', 0, 100, self._window)
+        waiting.setWindowTitle('Noise analysis')
+        waiting.setWindowModality(Qt.WindowModal)
+        waiting.setMinimumDuration(300)
+        waiting.setAutoReset(False)
+        self._work = Work(work, self)
+        waiting.canceled.connect(self._work.cancel)
+        self._work.progressed.connect(lambda share: waiting.setValue(int(100 * share)))
+        self._work.finished.connect(lambda: self._on_finished(waiting, then))
+        waiting.setValue(0)
+        self._work.start()
+
+    def _on_finished(self, waiting, then):
         waiting.reset()
         waiting.deleteLater()
-        if self._work.error is not None:
-            dialogs.show_error(self._window, 'The noise analysis failed', self._work.error)
-            return
-        self.figures = AnalysisWindow(self._work.result, self._window)
+        work = self._work
+        if isinstance(work.error, Cancelled):
+            self._window.statusBar().showMessage('The noise analysis was cancelled')
+        elif work.error is not None:
+            dialogs.show_error(self._window, 'The noise analysis failed', work.error)
+        else:
+            then(work.result)
+
+    def _on_outliers(self, outliers):
+        answer = dialogs.ask_outliers(self._window, outliers) if outliers else dialogs.ANALYSE
+        if answer == dialogs.ANALYSE:
+            document = self._window.document
+            self._start('Fitting the error model…', lambda progress: _analysed(document, progress), self._on_analysed)
+        elif answer is not None:
+            self._window.show_measurement(answer)
+            self._window.pane.truth.begin()
+
+    def _on_analysed(self, analysed):
+        self.figures = AnalysisWindow(analysed, self._window)
         self.figures.show()
 
 
-def _analysed(document):
+def _analysed(document, progress):
     from ros_3d_bb_annotator.analysis import analyse  # optional scipy and matplotlib take a second
-    return analyse(document)
+    return analyse(document, progress=progress)
 
 
 class AnalysisWindow(QtWidgets.QDialog):
@@ -90,16 +131,18 @@ class AnalysisWindow(QtWidgets.QDialog):
         super(AnalysisWindow, self).__init__(parent)
         self.setWindowTitle('Noise analysis – %s' % analysed.folder)
         self.setAttribute(Qt.WA_DeleteOnClose)
-        self.resize(1150, 780)
+        self.resize(QtCore.QSize(1150, 780).boundedTo(
+            QtWidgets.QApplication.primaryScreen().availableSize() * 0.95))
         summary = QtWidgets.QLabel('\n'.join(filter(None, (
             analysed.text, analysed.no_model and 'No cross-validated error model: %s' % analysed.no_model,
+            '; '.join(map(str, analysed.outliers)) and 'Left out: ' + '; '.join(map(str, analysed.outliers)),
             'Report, figures and error model are in %s' % analysed.folder))))
         summary.setTextInteractionFlags(Qt.TextSelectableByMouse)
         summary.setWordWrap(True)
-        self._figure_paths, self._full = analysed.figure_paths, QtGui.QPixmap()
+        self._figures, self._full = analysed.figures, QtGui.QPixmap()
         self.names, self.picture, self._area = QtWidgets.QListWidget(), QtWidgets.QLabel(), QtWidgets.QScrollArea()
-        self.names.addItems([TITLES[os.path.basename(path)] for path in analysed.figure_paths])
-        self.names.setFixedWidth(280)
+        self.names.addItems([title for _path, title in analysed.figures])
+        self.names.setFixedWidth(240)
         self.names.setWordWrap(True)
         self.picture.setAlignment(Qt.AlignCenter)
         self.picture.setStyleSheet('background: white')
@@ -123,7 +166,7 @@ class AnalysisWindow(QtWidgets.QDialog):
         self._fit()
 
     def _show(self, row):
-        self._full = QtGui.QPixmap(self._figure_paths[row])
+        self._full = QtGui.QPixmap(self._figures[row][0])
         self._fit()
 
     def _fit(self):

@@ -10,19 +10,21 @@ class SharedView(QtCore.QObject):
 
     Image coordinates are continuous: pixel (u, v) covers u..u+1 and v..v+1. `center` is the point in the centre of the
     view as shares 0..1 of width and height. `cursor` and `corner`, the first corner of a box that is being drawn, are
-    pixels (u, v) or None. `changed`: views must be repainted; `box_drawn`: (x1, y1, x2, y2) in pixels.
+    pixels (u, v) or None. `edited` is the box that is being moved or resized, [x1, y1, x2, y2], or None. `changed`:
+    views must be repainted; `box_drawn` and `box_edited`: (x1, y1, x2, y2) in pixels.
     """
 
     changed = Signal()
     pointed = Signal()
     drawing_changed = Signal(bool)
     box_drawn = Signal(object)
+    box_edited = Signal(object)
 
     def __init__(self, parent=None):
         super(SharedView, self).__init__(parent)
         self.size = (640, 480)
         self.zoom, self.center = MIN_ZOOM, (0.5, 0.5)
-        self.cursor, self.corner, self.drawing = None, None, False
+        self.cursor, self.corner, self.drawing, self.edited = None, None, False, None
 
     def show_size(self, width, height):
         """Set the size of the images in pixels. Zoom and position are kept."""
@@ -89,11 +91,35 @@ class SharedView(QtCore.QObject):
         if min(box_px[2] - box_px[0], box_px[3] - box_px[1]) >= MIN_BOX_PX:
             self.box_drawn.emit(box_px)
 
+    def start_editing(self, box_px):
+        """Start to move or resize a box (x1, y1, x2, y2)."""
+        self.cancel()
+        self.edited = list(box_px)
+        self.changed.emit()
+
+    def nudge(self, edges, columns, rows):
+        """Move edges of the box that is being edited, a subset of (0, 1, 2, 3), by pixels."""
+        for edge in edges:
+            limit = self.size[edge % 2]
+            self.edited[edge] = min(max(self.edited[edge] + (rows if edge % 2 else columns), 0), limit)
+        self.changed.emit()
+
+    def finish_editing(self):
+        """Complete the box that is being edited, unless it is tiny."""
+        x1, y1, x2, y2 = self.edited
+        self.cancel()
+        box_px = min(x1, x2), min(y1, y2), max(x1, x2), max(y1, y2)
+        if min(box_px[2] - box_px[0], box_px[3] - box_px[1]) >= MIN_BOX_PX:
+            self.box_edited.emit(box_px)
+
     def cancel(self):
+        self.edited = None
         self.start_drawing(False)
 
     def rubber_band(self):
-        """Box that is being drawn, (x1, y1, x2, y2), including the pixels of both corners, or None."""
+        """Box that is being drawn or edited, (x1, y1, x2, y2), including the pixels of both corners, or None."""
+        if self.edited is not None:
+            return tuple(self.edited)
         if self.corner is None or self.cursor is None:
             return None
         (u1, v1), (u2, v2) = self.corner, self.cursor

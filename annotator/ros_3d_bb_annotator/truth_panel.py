@@ -1,11 +1,11 @@
 """Fields for the truth of a measurement, and the resulting error."""
-import contextlib
 import math
 
-from ros_3d_bb_annotator.lengths import METRES, parse_length
+from ros_3d_bb_annotator.lengths import METRES, length_text, parse_length
 from ros_3d_bb_annotator.qt import QtCore, QtGui, QtWidgets, Signal
 
-FIELDS = (('x', '&X, right of the camera'), ('z', '&Z, ahead of it'), ('y', '&Y, below it (optional)'))
+FIELDS = (('x', '&X (right)'), ('z', '&Z (ahead)'), ('y', '&Y (down)'))
+WARNING = '#a04000'
 UNITS = ('mm', 'm')
 TYPING_MS = 300  # typed text is saved after a pause of this length
 
@@ -26,20 +26,22 @@ class TruthPanel(QtWidgets.QGroupBox):
     """Panel of the truth.
 
     Signals: `entered` with (x_m, z_m, y_m or None) when Enter is pressed on a complete position; `typed` with the text
-    of the fields to be saved; `previewed` with the current (x_m, z_m), or None if incomplete.
+    of the fields to be saved; `previewed` with the current (x_m, y_m or None, z_m), or None if incomplete;
+    `unit_changed` when `unit` is another one.
     """
 
     entered = Signal(float, float, object)
     typed = Signal(dict)
     previewed = Signal(object)
+    unit_changed = Signal()
 
     def __init__(self, parent=None):
-        super(TruthPanel, self).__init__('Truth', parent)
+        super(TruthPanel, self).__init__('True position', parent)
         self.fields = {name: LengthEdit() for name, _label in FIELDS}
         self.unit_box = QtWidgets.QComboBox()
         self.unit_box.addItems(UNITS)
         self.error_label, self.hint_label = QtWidgets.QLabel(), QtWidgets.QLabel()
-        self._estimate_m, self._stored = None, self.texts()
+        self._stored = self.texts()
         self._timer = QtCore.QTimer(self, singleShot=True, interval=TYPING_MS)
         self._timer.timeout.connect(self.flush)
         self._lay_out()
@@ -48,24 +50,29 @@ class TruthPanel(QtWidgets.QGroupBox):
             field.returnPressed.connect(self._on_enter)
         self.unit_box.activated.connect(self._on_unit)
 
-    def show_truth(self, truth_m, estimate_m, draft):
-        """Show the truth (x, y, z) of a measurement or None, or its draft. `estimate_m` is (3,) or None."""
+    @property
+    def unit(self):
+        return self.unit_box.currentText()
+
+    def show_truth(self, truth_m, draft, offered=None):
+        """Show the truth (x, y, z) of a person or None, or its draft, or else the position of an offered Mark."""
         self._timer.stop()
-        self._estimate_m = estimate_m
-        unit = draft.get('unit', self.unit_box.currentText())
-        unit = unit if unit in UNITS else UNITS[0]
-        self.unit_box.setCurrentText(unit)
-        x_m, y_m, z_m = truth_m or (None, None, None)
-        self._stored = {'x': _text_of(x_m, unit), 'z': _text_of(z_m, unit), 'y': _text_of(y_m, unit), 'unit': unit}
-        shown = dict(self._stored, **draft)
+        if draft.get('unit', self.unit) != self.unit and draft['unit'] in UNITS:
+            self.unit_box.setCurrentText(draft['unit'])
+            self.unit_changed.emit()
+        hint = 'Typed, but not entered yet: press Enter' if draft else ''
+        if truth_m is None and offered is not None:
+            truth_m = offered.x_m, None, offered.z_m
+            hint = hint or 'Mark %s: press Enter to accept it' % offered.name
+        self._stored = {name: _text_of(value_m, self.unit) for name, value_m in zip('xyz', truth_m or (None,) * 3)}
         for name, field in self.fields.items():
-            field.setText(shown[name])
-        self._show_hint('typed, but not saved as truth yet: press Enter' if draft else '')
-        self._show_error()
+            field.setText(draft.get(name, '' if draft else self._stored[name]))
+        self._show_hint(hint)
+        self.preview()
 
     def texts(self):
         """Text of the fields and the unit: {name: text}."""
-        return dict({name: field.text() for name, field in self.fields.items()}, unit=self.unit_box.currentText())
+        return dict({name: field.text() for name, field in self.fields.items()}, unit=self.unit)
 
     def begin(self):
         self.fields['x'].setFocus()
@@ -87,7 +94,7 @@ class TruthPanel(QtWidgets.QGroupBox):
         self._on_unit()
 
     def show_problem(self, text):
-        self._show_hint(text, 'color: #b00020')
+        self._show_hint(text, 'color: %s; font-weight: bold' % WARNING)
 
     def read(self):
         """Return (x_m, z_m, y_m or None). Raises ValueError with the name of the invalid field."""
@@ -96,7 +103,7 @@ class TruthPanel(QtWidgets.QGroupBox):
             if name == 'y' and not field.text().strip():
                 continue
             try:
-                values_m[name] = parse_length(field.text(), self.unit_box.currentText())
+                values_m[name] = parse_length(field.text(), self.unit)
             except ValueError as error:
                 raise ValueError('%s: %s' % (name.upper(), error if field.text().strip() else 'a length is missing'))
         return values_m['x'], values_m['z'], values_m.get('y')
@@ -105,8 +112,10 @@ class TruthPanel(QtWidgets.QGroupBox):
         form = QtWidgets.QFormLayout(self)
         for name, label in FIELDS:
             form.addRow(label, self.fields[name])
+            self.fields[name].setMinimumWidth(60)
             self.fields[name].setAccessibleName(label.replace('&', ''))
-        form.addRow('&unit', self.unit_box)
+        self.fields['y'].setPlaceholderText('optional')
+        form.addRow('&Unit', self.unit_box)
         self.error_label.setWordWrap(True)
         self.error_label.setTextFormat(QtCore.Qt.RichText)
         self.hint_label.setWordWrap(True)
@@ -115,12 +124,12 @@ class TruthPanel(QtWidgets.QGroupBox):
 
     def _on_typed(self):
         self._show_hint('')
-        self._show_error()
+        self.preview()
         self._timer.start()
 
     def _on_unit(self, _index=None):
         """Convert the fields from the previous unit to the current unit."""
-        unit = self.unit_box.currentText()
+        unit = self.unit
         other = UNITS[1 - UNITS.index(unit)]
         for name, field in self.fields.items():
             try:
@@ -128,7 +137,8 @@ class TruthPanel(QtWidgets.QGroupBox):
             except ValueError:
                 continue  # incomplete text is kept
             field.setText(_text_of(length_m, unit))
-        self._show_error()
+        self.unit_changed.emit()
+        self.preview()
         self._timer.start()
 
     def _on_enter(self):
@@ -141,27 +151,33 @@ class TruthPanel(QtWidgets.QGroupBox):
         self._timer.stop()
         self.entered.emit(*position)
 
-    def _show_error(self):
-        error_m = truth_m = None
-        with contextlib.suppress(ValueError):  # no complete position yet
-            x_m, z_m, _y_m = self.read()
-            truth_m = x_m, z_m
-            if self._estimate_m is not None:
-                error_m = float(self._estimate_m[0]) - x_m, float(self._estimate_m[2]) - z_m
-        self.error_label.setText(error_text(error_m))
-        self.previewed.emit(truth_m)
+    def preview(self):
+        """Emit `previewed`."""
+        try:
+            x_m, z_m, y_m = self.read()
+        except ValueError:  # no complete position yet
+            self.previewed.emit(None)
+            return
+        self.previewed.emit((x_m, y_m, z_m))
+
+    def show_error(self, error_text, warning):
+        """Show the error of the typed position, and a warning about it or an empty text."""
+        self.error_label.setText(error_text)
+        if warning:
+            self.show_problem(warning)
 
     def _show_hint(self, text, style=''):
         self.hint_label.setStyleSheet(style)
         self.hint_label.setText(text)
 
 
-def error_text(error_m):
+def error_text(error_m, unit):
     """Text of errors (x, z) in metres, or of None."""
     if error_m is None:
         return 'Error: –'
-    axes = 'X %+.0f mm, Z %+.0f mm' % (1000 * error_m[0], 1000 * error_m[1])
-    return 'Error: <b>%s</b>, %.0f mm on the floor' % (axes.replace('-', '−'), 1000 * math.hypot(*error_m[:2]))
+    return 'Error: <b>X %s, Z %s</b>, distance %s' % (
+        length_text(error_m[0], unit, True), length_text(error_m[1], unit, True),
+        length_text(math.hypot(*error_m[:2]), unit))
 
 
 def _text_of(length_m, unit):

@@ -4,14 +4,14 @@ import os
 import pathlib
 
 from ros_3d_bb.sessions.session_reader import SessionError, read_description
-from ros_3d_bb_annotator.measurement import ANNOTATED, REJECTED
+from ros_3d_bb_annotator.measurement import REJECTED
 
-MAX_ERROR_M = 1.0  # a larger error means that the estimate is of another person, or the truth of another place
 HALF_PERSON_M = 0.5  # the body of a person whose axis is just outside the image may be visible
 
 
 def problems_of(document):
     """Yield the problems of a document as lines of text. Rejected measurements are skipped."""
+    document.outliers()  # computes all estimates
     counts = collections.Counter(measurement.id for measurement in document.measurements)
     for name in sorted(name for name, count in counts.items() if count > 1):
         yield '%s: %d measurements have this id' % (name, counts[name])
@@ -41,12 +41,12 @@ def _problems_at(document, index):
         document.color(index)
         if document.is_old_format:
             document.stretched_depth(index)
-            return _truth_problems(document, index)
+            return _problems_of_truths(document, index)
         document.depth(index)
     except SessionError as error:
         return [str(error)]
     boxes = _box_problems(document, index)
-    return boxes or _estimate_problems(document, index) + _truth_problems(document, index)
+    return boxes or _estimate_problems(document, index) + _problems_of_truths(document, index)
 
 
 def _box_problems(document, index):
@@ -59,29 +59,39 @@ def _box_problems(document, index):
 
 def _estimate_problems(document, index):
     """Problems of the person's box: it is missing, or it cannot be estimated from the images."""
-    measurement = document.measurements[index]
-    box_px = None if measurement.person is None else measurement.detections[measurement.person].box_px
-    if box_px is None:
-        return ['no person is detected, and no box is drawn'] if measurement.state == ANNOTATED else []
-    if document.estimated(index, box_px) is None:
-        return ['box (%d, %d, %d, %d) has not enough depth for an estimate' % box_px]
+    measurement, positions = document.measurements[index], document.estimates.of(index)
+    if measurement.person is None:
+        return ['nobody was found, and no box is drawn']
+    if measurement.detections[measurement.person].box_px is None:
+        return ['the person has no box'] if measurement.truths else []
+    if positions[measurement.person] is None:
+        return ['box (%d, %d, %d, %d) has not enough depth for an estimate'
+                % measurement.detections[measurement.person].box_px]
     return []
 
 
-def _truth_problems(document, index):
-    """Problems of the truth: it is outside the field of view, or far from the estimate."""
-    camera, truth_m, errors_m = document.camera, document.measurements[index].truth_m, document.errors(index)
-    if truth_m is None:
-        return []
+def _problems_of_truths(document, index):
+    return [problem for person, truth_m in document.measurements[index].truths.items()
+            for problem in view_problems(document, truth_m)
+            + [outlier.description for outlier in [document.estimates.outlier(index, person)] if outlier is not None]]
+
+
+def truth_problems(document, index, truth_m):
+    """Problems of a true position (x, y, z) before it is entered: lines of text, or an Outlier."""
+    person = document.person_at(index, truth_m[0], truth_m[2])
+    outlier = None if person is None else document.estimates.outlier(index, person, truth_m)
+    return view_problems(document, truth_m) + ([] if outlier is None else [outlier])
+
+
+def view_problems(document, truth_m):
+    """Problems of a true position (x, y, z) with the field of view of the camera."""
     x_m, _y_m, z_m = truth_m
     if not z_m > 0:
         return ['truth z is %g m; more than 0 expected' % z_m]
-    problems = []
-    if camera is not None:
-        left_m, right_m = camera.deproject([(0, camera.cy), (camera.width, camera.cy)], z_m)[:, 0]
-        if not left_m - HALF_PERSON_M <= x_m <= right_m + HALF_PERSON_M:
-            problems.append('truth x is %g m, outside the image, which shows %.2f to %.2f m at %g m'
-                            % (x_m, left_m, right_m, z_m))
-    if errors_m is not None and errors_m[2] > MAX_ERROR_M:
-        problems.append('truth and estimate are %.2f m apart' % errors_m[2])
-    return problems
+    if document.camera is None:
+        return []
+    left_m, right_m = document.camera.deproject(
+        [(0, document.camera.cy), (document.camera.width, document.camera.cy)], z_m)[:, 0]
+    if left_m - HALF_PERSON_M <= x_m <= right_m + HALF_PERSON_M:
+        return []
+    return ['truth x is %g m, outside the image, which shows %.2f to %.2f m at %g m' % (x_m, left_m, right_m, z_m)]

@@ -68,14 +68,15 @@ class Driver(object):
             try:
                 replies.append(reply(dialog))
             finally:
-                dialog.close()  # a reply that fails must not leave the test waiting
+                if dialog.isVisible():
+                    dialog.close()  # a reply that fails must not leave the test waiting
 
         QtCore.QTimer.singleShot(0, reply_when_it_is_there)
         act()
+        self.wait_for(lambda: replies)
         self.window.activateWindow()  # a window manager would
         QtTest.QTest.qWaitForWindowActive(self.window)
         self.settle()
-        assert replies, 'no dialog was opened'
         return replies[0]
 
     def wait_for(self, condition):

@@ -32,7 +32,7 @@ def test_the_output_folder_and_the_estimator_of_the_analysis_can_be_chosen(tmp_p
     assert main(['--analyse', session, '--out', out, '--estimator', 'recorded']) == 0
     text = capsys.readouterr().out
     assert 'f(z) = ' in text and 'report: %s' % os.path.join(out, 'report.html') in text
-    assert {'report.html', 'summary.json', 'error_model.yaml', 'figure_5_3.png'} <= set(os.listdir(out))
+    assert {'report.html', 'report.pdf', 'summary.json', 'error_model.yaml', 'z_error.png'} <= set(os.listdir(out))
     with open(os.path.join(out, 'summary.json')) as stream:
         assert len(json.load(stream)['z']['clusters']) == 6
     assert read_error_model(os.path.join(out, 'error_model.yaml')).provenance.estimator == 'recorded'
@@ -41,10 +41,10 @@ def test_the_output_folder_and_the_estimator_of_the_analysis_can_be_chosen(tmp_p
 @pytest.mark.parametrize('break_it,problem', [
     (lambda entry: entry['detections'][0].update(box=[10, 4, 26, 49]), 'box (10, 4, 26, 49) is not inside the image'),
     (lambda entry: entry['detections'][1].update(box=[26, 4, 10, 44]), 'is not inside the image'),
-    (lambda entry: entry.update(truth_mm={'x': -466.5, 'z': 3600}), 'apart'),
+    (lambda entry: entry.update(truth_mm={'x': -466.5, 'z': 3600}), 'is implausible'),
     (lambda entry: entry.update(truth_mm={'x': 2000, 'z': 2000}), 'outside the image'),
     (lambda entry: entry.update(truth_mm={'x': 0, 'z': -2000}), 'truth z is -2 m'),
-    (lambda entry: entry.update(detections=[]), 'no person')])
+    (lambda entry: entry.update(detections=[]), 'nobody was found')])
 def test_problems_are_listed(folder, capsys, break_it, problem):
     change_json(folder, lambda content: break_it(content['frames'][1]))
     assert main(['--validate', folder]) == 1

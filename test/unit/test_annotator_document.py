@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb.sessions.session_reader import SessionError, read_session
+from ros_3d_bb.sessions.session_reader import SessionError, annotated_people, read_session
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.measurement import Mark
 from support.small_session import (FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json, write_measurement,
@@ -30,12 +30,17 @@ def test_a_new_session_is_read(document):
     assert document.depth(0).values[20, 20] == NEAR_MM and document.depth(0).scale_m == 0.001
 
 
-def test_errors_are_those_of_the_selected_person(document):
+def test_errors_are_those_of_the_analysed_estimate_of_the_selected_person(document):
     assert document.errors(0) is None
     document.set_truth(0, -0.5, 2.1)
-    assert document.errors(0) == pytest.approx((0.0335, -0.1, np.hypot(0.0335, 0.1)))
+    x_m, _y_m, z_m = document.estimated(0, NEAR_BOX).center_m  # not the recorded 2.0 m
+    assert z_m == pytest.approx(2.09)
+    assert document.errors(0) == pytest.approx((x_m + 0.5, z_m - 2.1, np.hypot(x_m + 0.5, z_m - 2.1)))
     document.choose_person(0, 1)
-    assert document.errors(0)[:2] == pytest.approx((1.2, 0.9))
+    assert document.errors(0) is None  # each person has a truth of its own
+    document.set_truth(0, 0.7, 3.0)
+    assert document.errors(0)[1] == pytest.approx(0.09, abs=0.01)
+    assert document.measurements[0].truths == {0: (-0.5, None, 2.1), 1: (0.7, None, 3.0)}
     for number in (-1, 2):
         with pytest.raises(ValueError, match='detection %d .*2 detections' % number):
             document.choose_person(0, number)
@@ -43,8 +48,8 @@ def test_errors_are_those_of_the_selected_person(document):
 
 def test_truth_is_saved_immediately_and_read_by_benchmarks(document, folder):
     document.set_truth(1, 0.1, 2.3)
-    document.set_truth(2, 0.1, 2.3, -0.05)
     document.choose_person(2, 1)
+    document.set_truth(2, 0.1, 2.3, -0.05)
     entries = read_json(folder)['frames']
     assert entries[1]['truth_mm'] == {'x': 100, 'z': 2300} and entries[2]['truth_mm'] == {'x': 100, 'z': 2300, 'y': -50}
     frames = read_session(folder).frames
@@ -65,15 +70,13 @@ def test_positions_not_in_front_of_the_camera_are_rejected(document, folder, x_m
 
 def test_the_truth_of_the_last_annotation_is_copied(document):
     with pytest.raises(ValueError, match=document.measurements[0].id):
-        document.set_same_as_last(0)
+        document.last_truth(0)
     document.set_truth(2, 0.1, 2.3, 0.4)
     document.set_truth(1, 0.2, 2.5)
-    document.set_same_as_last(3)
-    assert document.measurements[3].truth_m == (0.2, None, 2.5)
+    assert document.last_truth(3) == (0.2, None, 2.5)
     reopened = Document.open(document.folder)  # the order of annotation is unknown: the nearest one before
     reopened.reject(3, 'blurred')
-    reopened.set_same_as_last(3)
-    assert reopened.measurements[3].truth_m == (0.1, 0.4, 2.3) and reopened.measurements[3].state == 'annotated'
+    assert reopened.last_truth(3) == (0.1, 0.4, 2.3)
 
 
 def test_rejected_measurements_are_skipped_and_can_be_restored(document, folder):
@@ -90,7 +93,7 @@ def test_rejected_measurements_are_skipped_and_can_be_restored(document, folder)
 def test_all_edits_can_be_undone_and_redone(document, folder):
     def content():
         return json.dumps(read_json(folder), sort_keys=True)
-    edits = [lambda: document.set_truth(0, 0.1, 2.0), lambda: document.set_same_as_last(1),
+    edits = [lambda: document.set_truth(0, 0.1, 2.0), lambda: document.set_truths([1, 3], 0.1, 2.0),
              lambda: document.reject(1, 'blurred'), lambda: document.choose_person(2, 1),
              lambda: document.add_box(2, (1, 1, 30, 40)), lambda: document.set_grid([Mark('B2', 0.5, 2.5)]),
              lambda: document.restore(1), lambda: document.set_truth(0, 0.2, 2.1, 0.3)]
@@ -149,12 +152,13 @@ def test_measurements_added_by_a_viewer_are_kept_and_shown(document, folder):
 def test_two_annotators_keep_the_fields_of_each_other(document, folder):
     other = Document.open(folder)
     document.set_truth(0, 0.1, 2.0)
-    other.choose_person(0, 1)
+    other.add_box(0, (1, 1, 30, 40))
     other.set_truth(1, 0.3, 2.2)
     assert read_json(folder)['frames'][0]['truth_mm'] == {'x': 100, 'z': 2000}
-    assert document.refresh() and document.measurements[0].person == 1 and states(document)[1] == 'annotated'
+    assert document.refresh() and len(document.measurements[0].detections) == 3
+    assert states(document)[1] == 'annotated'
     document.undo()
-    assert read_json(folder)['frames'][0]['person'] == 1
+    assert len(read_json(folder)['frames'][0]['detections']) == 3
 
 
 def test_a_moved_measurement_is_found_by_its_id_and_a_removed_one_is_named(document, folder):
@@ -179,6 +183,65 @@ def test_an_edit_that_cannot_be_saved_raises_an_error_and_changes_nothing(docume
         document.set_truth(0, 0.1, 2.0)
     with pytest.raises(SessionError, match=str(folder)):
         document.set_draft(0, {'x': '1'})
+
+
+def test_the_truth_belongs_to_the_nearest_box_unless_one_was_selected(document):
+    document.set_truth(0, 0.72, 2.9)
+    assert document.measurements[0].person == 1 and document.errors(0)[2] < 0.25
+    document.choose_person(1, 0)
+    document.set_truth(1, 0.72, 2.9)
+    assert document.measurements[1].person == 0
+    document.choose_person(1, 1)
+    document.set_truth(1, 0.72, 2.9)  # nobody else can be there
+    assert document.measurements[1].truths == {1: (0.72, None, 2.9)}
+
+
+def test_several_people_on_marks_are_all_analysed(document, folder):
+    document.set_truth(0, -0.5, 2.1)
+    document.choose_person(0, 1)
+    document.set_truth(0, 0.7, 3.0)
+    people = list(annotated_people(read_session(folder).frames))
+    assert [(one.person, one.truth_m.tolist()) for one in people] == [(1, [0.7, 3.0]), (0, [-0.5, 2.1])]
+    assert [one.boxes_px for one in people] == [(FAR_BOX, NEAR_BOX), (NEAR_BOX, FAR_BOX)]
+    document.clear_truth(0)
+    reopened = Document.open(folder)
+    assert reopened.measurements[0].truths == {0: (-0.5, None, 2.1)} and states(reopened)[0] == 'annotated'
+    reopened.choose_person(0, 0)
+    assert reopened.measurements[0].truth_m == (-0.5, None, 2.1)
+
+
+def test_a_measurement_without_boxes_has_a_state_of_its_own_and_is_not_done(document, folder):
+    document.delete_box(0)
+    document.set_truth(0, 0.7, 3.0)
+    document.delete_box(0)
+    assert states(document)[0] == 'nobody found' and document.progress == (0, 4)
+    assert states(Document.open(folder))[0] == 'nobody found'
+    with pytest.raises(ValueError, match='no box'):
+        document.delete_box(0)
+    document.add_box(0, NEAR_BOX)
+    assert states(document)[0] == 'new'
+
+
+def test_boxes_are_replaced_and_deleted_with_their_truth(document, folder):
+    document.set_truth(0, -0.5, 2.1)
+    document.replace_box(0, (11, 5, 25, 44))
+    box = opened(folder)[0].detections[0]
+    assert box.box_px == (11, 5, 25, 44) and box.by_hand and opened(folder)[0].truth_m == (-0.5, None, 2.1)
+    document.delete_box(0)
+    assert [one.box_px for one in opened(folder)[0].detections] == [FAR_BOX] and opened(folder)[0].truths == {}
+    document.undo()
+    assert opened(folder)[0].truths == {0: (-0.5, None, 2.1)}
+
+
+def test_the_mark_of_a_label_is_found(document, folder):
+    assert document.mark_of(0) is None
+    change_json(folder, lambda content: content['frames'][0].update(label=' a1'))
+    document.refresh()
+    assert document.mark_of(0) == Mark('A1', -0.5, 2.0)
+
+
+def opened(folder):
+    return Document.open(folder).measurements
 
 
 def test_drafts_are_restored_until_the_truth_is_entered(document, folder):

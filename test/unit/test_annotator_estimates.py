@@ -7,6 +7,7 @@ import pytest
 
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_annotator.document import Document
+from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements
 from support.small_session import FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json
 
 
@@ -34,7 +35,7 @@ def test_a_box_drawn_by_hand_replaces_that_of_the_same_person(document, folder):
 def test_a_box_without_depth_is_added_without_estimate(document):
     cv2.imwrite(document.measurements[0].depth_path, np.zeros((48, 64), np.uint16))
     assert document.add_box(0, (1, 1, 9, 9)) is None
-    assert document.measurements[0].estimate_m is None and document.measurements[0].person == 2
+    assert document.estimates.of(0)[2] is None and document.measurements[0].person == 2
 
 
 @pytest.mark.parametrize('box_px', [(5, 5, 5, 9), (9, 5, 5, 9), (70, 5, 90, 9), (-9, 5, 0, 9)])
@@ -56,7 +57,7 @@ def single(folder):
 
 def test_a_box_is_added_to_a_session_of_one_box_per_frame(single):
     before, document = read_json(single), Document.open(single)
-    recorded_m = document.measurements[0].estimate_m
+    recorded_m = document.measurements[0].recorded_m
     document.add_box(0, FAR_BOX)
     assert len(document.measurements[0].detections) == 2
     assert document.measurements[0].detections[0].estimate_m.tolist() == recorded_m.tolist()
@@ -65,31 +66,30 @@ def test_a_box_is_added_to_a_session_of_one_box_per_frame(single):
     assert document.undo() == 0 and read_json(single) == before
 
 
-@pytest.mark.parametrize('edit', [lambda document: document.set_truth(0, 0.1, 2.0),
-                                  lambda document: document.choose_person(0, 0)])
-def test_a_box_without_estimate_is_estimated_when_it_is_needed(document, folder, edit):
+def test_estimates_do_not_need_recorded_ones_and_are_those_of_the_analysis(document, folder):
     change_json(folder, lambda content: [content['frames'][0]['detections'][0].pop(name) for name in (
         'estimate_mm', 'size_mm', 'support', 'truncated')])
     document.refresh()
-    before = read_json(folder)
-    edit(document)
-    expected = document.estimated(0, NEAR_BOX)
-    detection = Document.open(folder).measurements[0].detections[0]
-    assert np.abs(detection.estimate_m - expected.center_m).max() < 1e-5 and detection.support > 0.5
-    os.remove(document.measurements[0].depth_path)
-    edit(document)  # what is stored is not estimated again
-    assert document.measurements[0].estimate_m == pytest.approx(detection.estimate_m)
-    document.undo()
-    document.undo()
-    assert read_json(folder) == before
+    for index in range(2):
+        document.set_truth(index, -0.5, 2.1)
+    table = read_session_measurements(folder, 'foreground')
+    assert table.measured_m.tolist() == [document.estimates.of(index)[0].tolist() for index in range(2)]
+    assert document.estimates.of(0)[0] == pytest.approx(document.estimated(0, NEAR_BOX).center_m)
+    assert 'estimate_mm' not in read_json(folder)['frames'][0]['detections'][0]
 
 
-def test_the_only_box_of_a_measurement_is_estimated_when_truth_is_entered(single):
-    change_json(single, lambda content: content['frames'][0].pop('estimate_mm'))
-    document = Document.open(single)
-    document.set_truth(0, -0.466, 2.09)
-    assert document.errors(0)[2] < 0.1 and len(read_json(single)['frames'][0]['estimate_mm']) == 3
-    assert 'detections' not in read_json(single)['frames'][0]
+def test_estimates_are_computed_once_and_again_for_other_boxes(document, monkeypatch):
+    reads = []
+    read = document.depth
+    monkeypatch.setattr(document, 'depth', lambda index: reads.append(index) or read(index))
+    document.set_truth(0, -0.5, 2.1)
+    assert document.errors(0) == document.errors(0) and reads == [0]
+    assert list(document.estimates.missing()) == []
+    document.replace_box(0, (12, 6, 24, 40))
+    assert list(document.estimates.missing()) == [0] and document.known_errors(0) is None
+    document.errors(0)
+    document.estimates.clear()
+    assert document.known_errors(0) is None
 
 
 @pytest.mark.parametrize('break_it', [

@@ -7,9 +7,9 @@ import pytest
 import conftest
 from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb_annotator.document import Document
-from ros_3d_bb_annotator.export import COLUMNS, export, rows_of
+from ros_3d_bb_annotator.export import THESIS_COLUMNS, export, rows_of
 from ros_3d_bb_lab.evaluation.noise.tables import read_table
-from support.small_session import change_json
+from support.small_session import NEAR_BOX, change_json
 
 
 def read_rows(path):
@@ -22,29 +22,44 @@ def read_rows(path):
 def test_the_table_of_the_session_contains_the_numbers_of_the_thesis(session_folder, tmp_path):
     path = str(tmp_path / 'table.csv')
     document = Document.open(session_folder)
-    assert export(document, path) == len(document.measurements)
+    assert export(document, path, 'recorded', in_thesis_form=True) == len(document.measurements)
     header, rows = read_rows(path)
     if conftest.DATA:
         author_header, author_rows = read_rows(os.path.join(session_folder, 'csv', 'new_measurements.csv'))
         assert header == author_header and set(rows) <= set(author_rows)
         # the author's dictionary keeps equal measurements only once
         assert [row for row in author_rows if row in set(rows)] == sorted(set(rows)) and len(set(rows)) == 103
-    assert header == list(COLUMNS) and len(read_table(path, 'X').complete().truth_m) == len(document.measurements)
-    for index, measurement in enumerate(document.measurements):
-        x_m, z_m, _plane_m = document.errors(index)
-        assert min(abs(row[4] - 1000 * x_m) + abs(row[6] - 1000 * z_m) for row in rows
-                   if row[1] == round(1000 * measurement.truth_m[0])
-                   and row[3] == round(1000 * measurement.truth_m[2])) < 2
+    assert header == list(THESIS_COLUMNS)
+    assert len(read_table(path, 'X').complete().truth_m) == len(document.measurements)
 
 
-def test_values_are_integer_millimetres_and_errors_measured_minus_true(document, tmp_path):
-    document.set_truth(0, -0.5, 2.1004)
-    document.set_truth(1, -0.5, 2.1004)
-    document.choose_person(1, 1)
-    assert export(document, str(tmp_path / 'table.csv')) == 2
+def test_a_row_contains_box_estimates_and_truth_in_all_axes(document, tmp_path):
+    document.set_truth(0, -0.5, 2.1004, 0.01)
+    path = str(tmp_path / 'table.csv')
+    assert export(document, path, 'foreground') == 1
+    with open(path, newline='') as stream:
+        row, = csv.DictReader(stream)
+    x_m, y_m, z_m = document.estimated(0, NEAR_BOX).center_m
+    assert (row['id'], row['label'], row['stamp']) == ('m0', 'by the door', '1616161616.000000005')
+    assert [int(row[edge]) for edge in ('x1', 'y1', 'x2', 'y2')] == list(NEAR_BOX) and row['implausible'] == ''
+    assert [float(row[axis + ' measured']) for axis in 'XYZ'] == pytest.approx(
+        [1000 * x_m, 1000 * y_m, 1000 * z_m], abs=0.06)
+    assert [float(row[axis + ' recorded']) for axis in 'XYZ'] == [-466.5, 33, 2000]
+    assert [float(row[axis + ' true']) for axis in 'XYZ'] == [-500, 10, 2100.4]
+    assert float(row['Z error']) == pytest.approx(1000 * z_m - 2100.4, abs=0.06)
+    assert read_table(path, 'Z').truth_m.tolist() == [[-0.5, 2.1004]]
+
+
+def test_the_form_of_the_thesis_has_integers(document, tmp_path):
+    for index in range(2):
+        document.choose_person(index, index)
+        document.set_truth(index, -0.5, 2.1004)
+    assert export(document, str(tmp_path / 'table.csv'), 'recorded', in_thesis_form=True) == 2
     assert (tmp_path / 'table.csv').read_text() == (
         'X measured,X true,Z measured,Z true,X error,X absolute error,Z error,Z absolute error\n'
         '-466,-500,2000,2100,34,34,-100,100\n700,-500,3000,2100,1200,1200,900,900\n')
+    rows = list(rows_of(document, 'foreground'))
+    assert [row[-1] for row in rows] == ['', 'yes']  # implausible
 
 
 def test_only_annotated_measurements_with_an_estimate_are_exported(document, tmp_path):
@@ -53,13 +68,13 @@ def test_only_annotated_measurements_with_an_estimate_are_exported(document, tmp
     document.reject(1, 'blurred')
     change_json(str(tmp_path), lambda content: content['frames'][2].update(detections=[]))
     document.refresh()
-    assert len(rows_of(document)) == 1
+    assert len(list(rows_of(document, 'foreground'))) == 1
 
 
 def test_an_empty_table_or_an_unwritable_file_raises_an_error(document, tmp_path):
     with pytest.raises(SessionError, match=str(tmp_path)):
-        export(document, str(tmp_path / 'table.csv'))
+        export(document, str(tmp_path / 'table.csv'), 'foreground')
     document.set_truth(0, 0.0, 2.0)
     with pytest.raises(SessionError, match=str(tmp_path)):
-        export(document, str(tmp_path / 'missing' / 'table.csv'))
+        export(document, str(tmp_path / 'missing' / 'table.csv'), 'foreground')
     assert not os.path.exists(str(tmp_path / 'table.csv'))

@@ -21,7 +21,7 @@ def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder
         with pytest.raises(SessionError, match='m1.png: missing'):
             read(1)
     document.reject(1, 'no images')
-    document.set_truth(2, 0.1, 2.0)
+    document.set_truth(2, -0.5, 2.1)
     assert list(problems_of(document)) == []
 
 

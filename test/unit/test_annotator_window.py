@@ -17,29 +17,27 @@ def place_in(view, x, y):
 
 def test_the_error_of_a_typed_truth_is_shown_and_enter_saves_it_and_goes_on(drive, folder):
     drive.press('-476.5', Qt.Key_Tab, '2050')
-    assert 'X +10 mm, Z −50 mm' in drive.window.pane.truth.error_label.text() and drive.measurement(0).truth_m is None
+    assert 'X −29 mm, Z +40 mm' in drive.window.pane.truth.error_label.text() and drive.measurement(0).truth_m is None
     drive.press(Qt.Key_Return)
     assert opened(folder)[0].truth_m == (-0.4765, None, 2.05)
     assert drive.window.current == 1 and drive.window.progress.text() == '1 of 4 done'
-    assert 'X +10 mm, Z −50 mm' in drive.window.last_entry.text()
-    drive.press('0,1 m', Qt.Key_Tab, '2.1m', Qt.Key_Tab, '-30', Qt.Key_Return)
-    assert opened(folder)[1].truth_m == (0.1, -0.03, 2.1) and drive.window.current == 2
+    assert 'X −29 mm, Z +40 mm' in drive.window.last_entry.text()
+    drive.press('-0,5 m', Qt.Key_Tab, '2.1m', Qt.Key_Tab, '-30', Qt.Key_Return)
+    assert opened(folder)[1].truth_m == (-0.5, -0.03, 2.1) and drive.window.current == 2
 
 
-def test_the_error_of_a_box_without_estimate_is_shown_when_its_truth_is_entered(folder, window_on):
-    change_json(folder, lambda content: content['frames'][0]['detections'][0].pop('estimate_mm'))
-    drive = window_on(folder)
-    drive.press('-400', Qt.Key_Tab, '2000')
-    assert 'Error: –' in drive.window.pane.truth.error_label.text()
-    drive.press(Qt.Key_Return, Qt.Key_PageUp)
-    expected = drive.document.errors(0)
-    assert expected is not None and 'Z %+.0f mm' % (1000 * expected[1]) in drive.window.last_entry.text()
-    assert drive.window.last_entry.text().split('Error: ')[1] in drive.window.pane.truth.error_label.text()
+def test_list_boxes_and_error_show_the_analysed_estimate_and_the_recorded_one_beside_it(drive):
+    text = drive.window.pane.people.item(0).text()
+    assert 'Z 2090 mm' in text.split('recorded')[0] and 'recorded: X −466, Z 2000 mm' in text
+    drive.press('-500', Qt.Key_Tab, '2050', Qt.Key_Return, Qt.Key_PageUp)
+    assert 'Z +40 mm' in drive.window.pane.truth.error_label.text()
+    distance_m = drive.document.errors(0)[2]
+    assert drive.window.list.table.model().index(0, 5).data() == '%.0f' % (1000 * distance_m)
 
 
 @pytest.mark.parametrize('x, z, problem, field', [
     ('12e', '2000', "X: '12e' is not a length", 'x'), ('100', '', 'Z: a length is missing', 'z'),
-    ('100', '-5', 'truth z is -0.005 m', None), ('100', '2000000', 'at most 100 m expected', 'z')])
+    ('-500', '', 'Z: a length is missing', 'z'), ('100', '2000000', 'at most 100 m expected', 'z')])
 def test_invalid_truth_is_reported_next_to_the_fields(drive, x, z, problem, field):
     drive.press(x, Qt.Key_Tab, z, Qt.Key_Return)
     truth = drive.window.pane.truth
@@ -49,12 +47,14 @@ def test_invalid_truth_is_reported_next_to_the_fields(drive, x, z, problem, fiel
 
 
 def test_the_unit_can_be_switched(drive, folder):
-    drive.press('1500', (Qt.Key_U, CONTROL))
-    assert drive.window.pane.truth.fields['x'].text() == '1.5'
+    drive.press('-500', (Qt.Key_U, CONTROL))
+    assert drive.window.pane.truth.fields['x'].text() == '-0.5'
+    assert 'Z 2.090 m' in drive.window.pane.people.item(0).text()
     drive.press(Qt.Key_Tab, '2', Qt.Key_Return)
-    assert opened(folder)[0].truth_m == (1.5, None, 2.0)
-    drive.press('0.25', Qt.Key_Tab, '3', Qt.Key_Return)  # the unit stays
-    assert opened(folder)[1].truth_m == (0.25, None, 3.0)
+    assert opened(folder)[0].truth_m == (-0.5, None, 2.0)
+    drive.press('-0.25', Qt.Key_Tab, '2.1', Qt.Key_Return)  # the unit stays
+    assert opened(folder)[1].truth_m == (-0.25, None, 2.1)
+    assert drive.window.list.table.model().index(1, 4).data() == '2.100'
 
 
 def test_digits_select_the_person_outside_fields_and_alt_and_a_digit_keeps_the_typed_text(drive, folder):
@@ -79,6 +79,7 @@ def test_a_click_on_a_box_or_its_list_entry_selects_it(drive, folder, name):
     drive.click(view, place_in(view, 33, 24))  # between the people
     assert opened(folder)[0].person == 0
     people = drive.window.pane.people
+    people.scrollToItem(people.item(1))
     drive.click(people.viewport(), QtCore.QPointF(people.visualItemRect(people.item(1)).center()))
     assert opened(folder)[0].person == 1
 
@@ -106,7 +107,7 @@ def test_a_drag_moves_what_both_views_show(drive):
     pane = drive.window.pane
     drive.press(Qt.Key_F3, '+', '+', '+')
     before = place_in(pane.depth_view, 30, 20)
-    start = QtCore.QPointF(100, 80)
+    start = place_in(pane.color_view, 33, 24)  # between the people
     drive.drag(pane.color_view, start, start + QtCore.QPointF(30, 20))
     moved = place_in(pane.depth_view, 30, 20) - before
     assert (moved - QtCore.QPointF(30, 20)).manhattanLength() < 1 and len(drive.measurement(0).detections) == 2
@@ -116,10 +117,11 @@ def test_a_drag_moves_what_both_views_show(drive):
 
 def test_the_readout_contains_pixel_depth_and_position(drive, folder):
     drive.press(Qt.Key_F3, *[Qt.Key_Left, (Qt.Key_Right, CONTROL)])
-    assert drive.window.pane.readout.text() == 'pixel (23, 24)    depth 2.000 m    X −0.300  Y +0.000  Z 2.000 m'
+    assert drive.window.pane.readout.text() == (
+        'pixel (23, 24)    depth 2000 mm    X −300 mm  Y +0 mm  Z 2000 mm')
     cv2.imwrite(os.path.join(folder, 'depth', 'm0.png'), np.zeros((48, 64), np.uint16))
     drive.press(Qt.Key_F5, Qt.Key_F3, Qt.Key_Left)
-    assert drive.window.pane.readout.text().endswith('no depth there')
+    assert drive.window.pane.readout.text().endswith('no depth')
 
 
 def test_a_click_on_a_mark_sets_the_truth(drive, folder):
@@ -143,8 +145,8 @@ def test_marks_are_edited_in_a_dialog_and_selected_by_the_keyboard(drive, folder
         dialog.accept()
     drive.answer(add_marks, lambda: drive.press((Qt.Key_G, CONTROL)))
     assert Document.open(folder).grid == (Mark('A1', -0.5, 2.0), Mark('B1', 0, 2), Mark('B2', 0, 3))
-    drive.press(Qt.Key_F6, Qt.Key_Up, Qt.Key_Up, Qt.Key_Left, Qt.Key_Right, Qt.Key_Return)  # B1 is nearest; then B2
-    assert opened(folder)[0].truth_m in ((0, None, 2), (0, None, 3))
+    drive.press(Qt.Key_F6, Qt.Key_Up, Qt.Key_Left, Qt.Key_Return)  # B1 is nearest; then A1
+    assert opened(folder)[0].truth_m == (-0.5, None, 2)
     drive.press((Qt.Key_Z, CONTROL), (Qt.Key_Z, CONTROL))
     assert Document.open(folder).grid == (Mark('A1', -0.5, 2.0),)
 
@@ -155,14 +157,14 @@ def test_invalid_marks_are_rejected(drive, folder):
         dialog.accept()
         return dialog.problem.text(), dialog.isVisible()
     problem, still_there = drive.answer(enter_nonsense, lambda: drive.press((Qt.Key_G, CONTROL)))
-    assert 'Row 2' in problem and still_there and len(Document.open(folder).grid) == 1
+    assert 'Row 2' in problem and "'__import__" in problem and still_there and len(Document.open(folder).grid) == 1
 
 
 def test_same_as_last_copies_the_truth_and_reports_if_there_is_none(drive, folder):
     drive.press((Qt.Key_L, CONTROL))
     assert drive.measurement(0).id in drive.window.pane.truth.hint_label.text()
-    drive.press('100', Qt.Key_Tab, '2000', Qt.Key_Return, (Qt.Key_L, CONTROL), (Qt.Key_L, CONTROL))
-    assert [measurement.truth_m for measurement in opened(folder)] == [(0.1, None, 2.0)] * 3 + [None]
+    drive.press('-500', Qt.Key_Tab, '2100', Qt.Key_Return, (Qt.Key_L, CONTROL), (Qt.Key_L, CONTROL))
+    assert [measurement.truth_m for measurement in opened(folder)] == [(-0.5, None, 2.1)] * 3 + [None]
 
 
 def test_reject_asks_for_a_reason_and_restore_undoes_it(drive, folder):
@@ -176,32 +178,139 @@ def test_reject_asks_for_a_reason_and_restore_undoes_it(drive, folder):
     drive.answer(give_reason, lambda: drive.press((Qt.Key_R, CONTROL)))
     assert opened(folder)[0].rejected == 'moved' and drive.window.current == 1
     drive.press(Qt.Key_PageUp)
-    assert 'because: moved' in drive.window.pane.header.text() and 'rejected' in drive.window.last_entry.text()
+    assert 'reason: moved' in drive.window.pane.header.text() and 'rejected' in drive.window.last_entry.text()
     drive.press((Qt.Key_R, CONTROL | SHIFT))
     assert opened(folder)[0].state == 'new' and drive.window.last_entry.text() == ''
 
 
+def buttons_of(dialog):
+    return {button.text().replace('&', ''): button for button in dialog.findChildren(QtWidgets.QPushButton)}
+
+
+def test_an_implausible_position_is_asked_about_and_enter_corrects_it(drive, folder):
+    def correct(dialog):
+        assert dialog.defaultButton().text() == '&Correct it'
+        dialog.defaultButton().click()
+        return dialog.informativeText()
+    drive.press('-500', Qt.Key_Tab, '2.1')
+    assert 'Implausible' in drive.window.pane.truth.hint_label.text()
+    text = drive.answer(correct, lambda: drive.press(Qt.Key_Return))
+    assert 'Z 2 mm is implausible' in text and 'Z 2100 mm would be plausible' in text
+    assert drive.measurement(0).truth_m is None and drive.window.pane.truth.fields['z'].text() == '2.1'
+    drive.answer(lambda dialog: buttons_of(dialog)['Use X −500, Z 2100 mm'].click(),
+                 lambda: drive.press(Qt.Key_Return))
+    assert opened(folder)[0].truth_m == (-0.5, None, 2.1)
+
+
+def test_a_kept_implausible_position_is_marked_and_named_before_the_analysis(drive, folder):
+    for _measurement in range(3):
+        drive.press('-500', Qt.Key_Tab, '2100', Qt.Key_Return)
+    drive.press('-500', Qt.Key_Tab, '210')
+    drive.answer(lambda dialog: buttons_of(dialog)['Enter it anyway'].click(), lambda: drive.press(Qt.Key_Return))
+    shown = drive.window.list.table.model()
+    assert shown.index(3, 2).data() == 'implausible' and shown.index(3, 0).data(Qt.BackgroundRole) is not None
+    assert shown.index(2, 2).data() == 'annotated' and shown.index(2, 0).data(Qt.BackgroundRole) is None
+    drive.press(Qt.Key_PageUp)
+
+    def go_to_it(dialog):
+        text = dialog.findChild(QtWidgets.QListWidget).item(0).text()
+        buttons_of(dialog)['Go to it'].click()
+        return text
+    text = drive.answer(go_to_it, lambda: drive.press((Qt.Key_A, CONTROL | SHIFT)))
+    assert text.startswith('m3 (by the door): ') and 'Z 210 mm' in text and drive.window.current == 3
+    assert Document.open(folder).outliers()[0][0] == 3  # after a restart
+
+
+def test_the_truth_of_several_people_is_entered_in_one_image(drive, folder):
+    drive.press((Qt.Key_T, CONTROL), '720', Qt.Key_Tab, '3000')
+    assert 'Box 2 is the nearest' in drive.window.pane.truth.hint_label.text()
+    drive.press(Qt.Key_Return, (Qt.Key_1, ALT), '-500', Qt.Key_Tab, '2100', Qt.Key_Return)
+    assert opened(folder)[0].truths == {1: (0.72, None, 3.0), 0: (-0.5, None, 2.1)}
+    drive.press((Qt.Key_T, CONTROL | SHIFT))
+    assert opened(folder)[0].truths == {1: (0.72, None, 3.0)} and drive.window.pane.truth.fields['x'].text() == ''
+
+
+def test_a_measurement_without_boxes_has_a_banner_and_digits_after_drawing_go_to_the_truth(folder, window_on):
+    change_json(folder, lambda content: content['frames'][0].update(detections=[]))
+    drive = window_on(folder)
+    assert 'Nobody was found' in drive.window.pane.banner.text() and drive.window.pane.banner.isVisible()
+    assert drive.window.list.table.model().index(0, 2).data() == 'nobody found'
+    view = drive.window.pane.color_view
+    drive.drag(view, place_in(view, 10.5, 4.5), place_in(view, 25.5, 43.5), SHIFT)
+    drive.press('-500', Qt.Key_Tab, '2100', Qt.Key_Return)
+    assert opened(folder)[0].truth_m == (-0.5, None, 2.1) and drive.window.pane.banner.isHidden()
+
+
+def test_boxes_are_moved_resized_and_deleted(drive, folder):
+    view = drive.window.pane.color_view
+    x1, y1, x2, y2 = NEAR_BOX
+    drive.drag(view, place_in(view, x2, 24), place_in(view, x2 + 4, 24))
+    assert opened(folder)[0].detections[0].box_px == (x1, y1, x2 + 4, y2)
+    drive.drag(view, place_in(view, 18, 24), place_in(view, 20, 27), CONTROL)
+    assert opened(folder)[0].detections[0].box_px == (x1 + 2, y1 + 3, x2 + 6, y2 + 3)
+    drive.press((Qt.Key_B, CONTROL), (Qt.Key_Left, CONTROL), (Qt.Key_Up, CONTROL | SHIFT), Qt.Key_Return)
+    assert opened(folder)[0].detections[0].box_px == (x1 + 1, y1 + 3, x2 + 5, y2 + 2)
+    drive.press((Qt.Key_B, CONTROL), Qt.Key_Right, Qt.Key_Escape, (Qt.Key_D, CONTROL | SHIFT))
+    assert [one.box_px for one in opened(folder)[0].detections] == [FAR_BOX]
+    drive.press((Qt.Key_Z, CONTROL))
+    assert len(opened(folder)[0].detections) == 2
+
+
+def test_the_mark_of_a_label_is_offered_and_entered_for_all_of_the_label(folder, window_on):
+    change_json(folder, lambda content: [entry.update(label='A1') for entry in content['frames'][:3]])
+    drive = window_on(folder)
+    truth = drive.window.pane.truth
+    assert truth.fields['z'].text() == '2000' and 'Mark A1' in truth.hint_label.text()
+    assert drive.document.draft(0) == {}
+    drive.press((Qt.Key_L, CONTROL | SHIFT))
+    assert [one.truth_m for one in opened(folder)] == [(-0.5, None, 2.0)] * 3 + [None] and drive.window.current == 3
+    drive.press((Qt.Key_Z, CONTROL))  # in one step
+    assert [one.truth_m for one in opened(folder)] == [None] * 4
+
+
+def test_truth_and_rejection_are_entered_for_all_selected_measurements(drive, folder):
+    drive.press(Qt.Key_F2, (Qt.Key_Down, SHIFT), (Qt.Key_Down, SHIFT), Qt.Key_F4)
+    assert drive.window.selection == [0, 1, 2]
+    drive.press('-500', Qt.Key_Tab, '2100', Qt.Key_Return)
+    assert [one.state for one in opened(folder)] == ['annotated'] * 3 + ['new'] and drive.window.selection == [3]
+    drive.press(Qt.Key_F2, (Qt.Key_Up, SHIFT))
+    drive.answer(lambda dialog: (dialog.setTextValue('no person'), dialog.accept()),
+                 lambda: drive.press((Qt.Key_R, CONTROL)))
+    assert [one.state for one in opened(folder)] == ['annotated'] * 2 + ['rejected'] * 2
+
+
+def test_the_list_is_sorted_and_searched(drive):
+    table, search = drive.window.list.table, drive.window.list.search
+    drive.press('-500', Qt.Key_Tab, '2050', Qt.Key_Return, '-500', Qt.Key_Tab, '2150', Qt.Key_Return)
+    table.sortByColumn(4, Qt.DescendingOrder)
+    assert [table.model().index(row, 0).data() for row in range(2)] == ['m1', 'm0']
+    drive.press((Qt.Key_F, CONTROL), 'm3')
+    assert table.model().rowCount() == 1
+    search.setText('2150')
+    assert [table.model().index(row, 0).data() for row in range(table.model().rowCount())] == ['m1']
+
+
 def test_undo_starts_with_typed_text_and_undo_and_redo_show_their_measurement(drive, folder):
-    drive.press('100', Qt.Key_Tab, '2000', Qt.Key_Return, '200', Qt.Key_Tab, '2000', Qt.Key_Return)
+    drive.press('-500', Qt.Key_Tab, '2000', Qt.Key_Return, '-450', Qt.Key_Tab, '2000', Qt.Key_Return)
     drive.press('7', (Qt.Key_Z, CONTROL))
     assert drive.window.pane.truth.fields['x'].text() == '' and opened(folder)[1].state == 'annotated'
     drive.press((Qt.Key_Z, CONTROL), (Qt.Key_Z, CONTROL))
     assert drive.window.current == 0 and [measurement.state for measurement in opened(folder)] == ['new'] * 4
     drive.press((Qt.Key_Y, CONTROL))
-    assert opened(folder)[0].truth_m == (0.1, None, 2.0) and drive.window.pane.truth.fields['x'].text() == '100'
+    assert opened(folder)[0].truth_m == (-0.5, None, 2.0) and drive.window.pane.truth.fields['x'].text() == '-500'
     drive.press((Qt.Key_Z, CONTROL | SHIFT))
-    assert opened(folder)[1].truth_m == (0.2, None, 2.0) and drive.window.current == 1
+    assert opened(folder)[1].truth_m == (-0.45, None, 2.0) and drive.window.current == 1
     assert not drive.window.actions['redo'].isEnabled()
 
 
 def test_the_list_selects_and_filters_and_going_on_can_be_switched_off(drive):
-    drive.press((Qt.Key_T, CONTROL), '1', Qt.Key_Tab, '2000', Qt.Key_Return)
+    drive.press((Qt.Key_T, CONTROL), '-500', Qt.Key_Tab, '2000', Qt.Key_Return)
     assert drive.window.current == 0 and drive.measurement(0).state == 'annotated'
     drive.press(Qt.Key_F2, Qt.Key_Down)
     assert drive.window.current == 1
-    drive.window.list.filter_box.setCurrentIndex(2)
+    drive.window.list.filter_box.setCurrentIndex(drive.window.list.filter_box.findData('annotated'))
     shown = drive.window.list.table.model()
     assert shown.rowCount() == 1 and shown.index(0, 0).data() == 'm0'
-    assert shown.index(0, 2).data() == '468 mm'
+    assert shown.index(0, 5).data() == '90'
     drive.window.list.filter_box.setCurrentIndex(1)
-    assert shown.rowCount() == 3 and drive.window.list.filter_box.itemText(1) == 'new only (3)'
+    assert shown.rowCount() == 3 and drive.window.list.filter_box.itemText(1) == 'new (3)'

@@ -135,7 +135,7 @@ def test_the_old_format_opens_and_lost_data_are_reported(window_on, tmp_path):
 def test_an_edit_that_cannot_be_saved_gives_a_message(drive, folder):
     os.rename(os.path.join(folder, 'frames.json'), os.path.join(folder, 'away.json'))
     os.mkdir(os.path.join(folder, 'frames.json'))
-    message = drive.answer(message_of, lambda: drive.press('1', Qt.Key_Tab, '2000', Qt.Key_Return))
+    message = drive.answer(message_of, lambda: drive.press('-500', Qt.Key_Tab, '2000', Qt.Key_Return))
     assert folder in message
     assert drive.window.pane.truth.fields['z'].text() == '2000'
 
@@ -176,7 +176,8 @@ def test_export_and_analysis(window_on, tmp_path):
     driver.press((Qt.Key_A, CONTROL | SHIFT))
     driver.wait_for(lambda: driver.window.results.figures is not None)
     figures = driver.window.results.figures
-    assert figures.names.count() == 7 and figures.picture.pixmap().width() > 500
+    assert figures.names.count() == 7  # no model, and no figure of it: the bias is too steep
+    assert figures.picture.pixmap().width() > 500
     first = figures.picture.pixmap().cacheKey()
     figures.names.setCurrentRow(1)
     assert figures.picture.pixmap().cacheKey() != first
@@ -186,7 +187,7 @@ def test_export_and_analysis(window_on, tmp_path):
 def test_navigation_and_a_failed_analysis_do_not_change_the_session(drive, folder):
     before = read_json(folder)
     drive.press(Qt.Key_PageDown, Qt.Key_PageUp, Qt.Key_F3, '+', '-', '0', Qt.Key_P)
-    message = drive.answer(message_of, lambda: (drive.press((Qt.Key_A, CONTROL | SHIFT)), drive.window.results.wait()))
+    message = drive.answer(message_of, lambda: drive.press((Qt.Key_A, CONTROL | SHIFT)))
     assert 'no frame with ground truth' in message
     drive.close()
     assert read_json(folder) == before

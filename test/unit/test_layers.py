@@ -54,7 +54,7 @@ ALLOWED = {
         'camera core detection detection.depth detection.yolov5 estimation sessions tracking '
         'lab.evaluation.baselines lab.simulation',
         'cv2 matplotlib'),
-    'ros_3d_bb_lab.evaluation.noise': ('estimation sessions lab.evaluation', 'matplotlib scipy'),
+    'ros_3d_bb_lab.evaluation.noise': ('core estimation sessions lab.evaluation', 'matplotlib scipy'),
     'ros_3d_bb_lab.evaluation.tracking': (
         'camera core tracking lab.evaluation.baselines',
         'scipy trackeval'),

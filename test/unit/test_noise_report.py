@@ -3,21 +3,27 @@
 With ROS_3D_BB_DATA the tables are those of the thesis; otherwise they are generated with its mean errors and standard
 deviations.
 """
+import base64
+import datetime
 import json
 import os
 import re
 import sys
 
 import cv2
+import numpy as np
 import pytest
 
 import conftest
 from ros_3d_bb.estimation.error_model import read_error_model
+from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.noise import __main__ as command
 from support.noise_tables import rows_of, write_table
+from support.small_session import change_json
+from support.synthetic_session import write_synthetic_session
 
 pytestmark = pytest.mark.slow  # each model is fitted many times
-FIGURES = ['figure_5_%d.png' % number for number in range(2, 9)]
+FIGURES = ['layout', 'z_error', 'z_variance', 'x_error', 'x_variance', 'sigma', 'z_distribution', 'x_distribution']
 
 
 def run(monkeypatch, *arguments):
@@ -54,12 +60,20 @@ def test_the_numbers_are_those_of_the_thesis(out):
 
 def test_the_report_contains_all_figures(out):
     page = (out / 'report.html').read_text(encoding='utf-8')
-    assert re.findall('<img src="([^"]*)"', page) == FIGURES
-    for name in FIGURES:
-        image = cv2.imread(str(out / name))
+    names = FIGURES + ['depth_error'] * bool(conftest.DATA)  # theory needs the baseline, which is that of the thesis
+    embedded = [base64.b64decode(data) for data in re.findall('<img src="data:image/png;base64,([^"]*)"', page)]
+    assert sorted(embedded) == sorted((out / (name + '.png')).read_bytes() for name in names)
+    for data in embedded:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
         assert image.shape[0] > 300 and image.std() > 5
-    assert '69°' in page and '614.7 px' in page and 'D435i &lt;&amp;&gt;' in page
-    assert '>None' not in page and 'nan' not in page
+    assert ('69°' in page) == ('614.7 px' in page) == bool(conftest.DATA) and 'D435i &lt;&amp;&gt;' in page
+    text = re.sub('base64,[^"]*', '', page)
+    assert '>None' not in text and 'nan' not in text and 'src="d' in text and 'href' not in text
+
+
+def test_the_report_is_also_written_as_pdf(out):
+    data = (out / 'report.pdf').read_bytes()
+    assert data.startswith(b'%PDF-') and data.count(b'/Type /Page\n') + data.count(b'/Type /Page ') >= 4
 
 
 def test_the_error_models_can_be_read_and_correct_the_bias(out):
@@ -77,6 +91,35 @@ def test_a_session_is_analysed_in_the_same_way(session_folder, tmp_path, monkeyp
     model = read_error_model(tmp_path / 'out' / 'error_model.yaml')
     assert model.provenance.measurements in (110, 85) and model.provenance.estimator == 'recorded'
     assert 'report.html' in capsys.readouterr().out
+    page = (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
+    camera = read_session(session_folder).camera
+    assert 'fx %.2f, fy %.2f' % camera[2:4] in page and 'leave-one-position-out' in page
+    assert datetime.date.today().isoformat() in page
+
+
+def test_what_was_left_out_is_listed_and_does_not_prevent_the_analysis(tmp_path, monkeypatch, capsys):
+    folder = write_synthetic_session(str(tmp_path / 'session'))
+
+    def spoil(content):
+        frames = content['frames']
+        frames[0]['truth_mm']['z'] /= 10
+        frames[1]['rejected'] = 'not on the mark'
+        del frames[2]['depth']
+        os.remove(os.path.join(folder, frames[3]['depth']))
+        frames[4]['label'] = 'A1'
+        frames[4]['truth_mm']['z'] = 7000
+        del frames[5]['truth_mm']
+    change_json(folder, spoil)
+    run(monkeypatch, folder, '--out', tmp_path / 'out')
+    errors = capsys.readouterr().err.splitlines()
+    assert [line.split(': ')[1] for line in errors] == ['frame-000', 'frame-004 (A1)']
+    assert 'Z 160 mm is implausible' in errors[0] and 'Z 1600 mm would be plausible' in errors[0]
+    summary = json.loads((tmp_path / 'out' / 'summary.json').read_text())
+    assert [outlier['name'] for outlier in summary['outliers']] == ['frame-000', 'frame-004 (A1)']
+    assert dict(map(tuple, summary['left_out'])).keys() == {'frame-001', 'frame-002', 'frame-003', 'frame-005'}
+    page = (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
+    assert 'rejected: not on the mark' in page and 'no ground truth' in page and 'Z 160 mm' in page
+    assert summary['z']['max_sigma_m'] < 0.05
 
 
 def test_without_positions_in_both_axes_the_model_has_the_form_of_the_thesis(tmp_path, monkeypatch):

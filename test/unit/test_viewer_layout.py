@@ -47,7 +47,7 @@ def test_2d_boxes_without_a_3d_box_are_drawn_and_others_only_once():
 def test_the_range_bar_has_the_colours_of_the_depths():
     picture = compose(view(depth=DepthImage(np.zeros((240, 320), np.uint16), 0.001)), 320, 6.0)
     bar = picture[:240, 640 - 15].astype(int)
-    assert bar[20, 0] > bar[20, 2] + 50 and bar[-20, 2] > bar[-20, 0] + 50  # near is red, far is blue
+    assert bar[-20, 0] > bar[-20, 2] + 100 and bar[20, 2] > bar[20, 0]  # near is yellow, at the bottom; far is blue
     assert picture[100, 400].tolist() == [0, 0, 0]
 
 

@@ -26,6 +26,7 @@ from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscrib
 from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshots
 from ros_3d_bb.sessions.session_writer import append
 from ros_3d_bb.visualization.cv_window import Window
+from ros_3d_bb.visualization.image_overlay import DEPTH_RANGE_M
 from ros_3d_bb.visualization.viewer_layout import FrameRate, compose, text_image
 
 CAMERA_INFO_TOPIC = INFO_TOPICS[0]
@@ -49,7 +50,8 @@ class ViewerParams(NamedTuple):
     window_rate: float = Param(
         15.0, 'Maximum rate of drawing the window, which is drawn for new images only.', 'Hz', limits=(0.1, 10000))
     panel_width: int = Param(480, 'Width of each of the three images in the window.', 'pixels', limits=(80, 10000))
-    depth_image_range: float = Param(6.0, 'Depth at the far end of the colours.', 'm', limits=(0.1, 10000))
+    depth_image_range: float = Param(
+        DEPTH_RANGE_M, 'Depth at the far end of the colours.', 'm', limits=(0.1, 10000))
 
 
 class ViewerNode(object):

@@ -112,8 +112,12 @@ class Outlier(NamedTuple):
     intended_m: Optional[np.ndarray]
 
     def __str__(self):
-        text = '%s: the truth %s is implausible, the estimate is %s' % (
-            self.name, position_text(self.truth_m), position_text(self.measured_m))
+        return '%s: %s' % (self.name, self.description)
+
+    @property
+    def description(self):
+        text = 'the true position %s is implausible, the estimate is %s' % (
+            position_text(self.truth_m), position_text(self.measured_m))
         return text if self.intended_m is None else '%s; %s would be plausible (wrong unit, lost digit or sign?)' % (
             text, position_text(self.intended_m))
 
@@ -127,4 +131,4 @@ def outlier_of(name, likely, measured_m, truth_m):
 
 def position_text(position_m):
     """Format a position (x, z) in millimetres."""
-    return ('X %.0f mm, Z %.0f mm' % tuple(1000 * np.asarray(position_m, float) + 0.0)).replace('-', '\u2212')
+    return ('X %.0f, Z %.0f mm' % tuple(1000 * np.asarray(position_m, float) + 0.0)).replace('-', '\u2212')

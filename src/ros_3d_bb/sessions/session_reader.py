@@ -30,7 +30,8 @@ class RecordedDetection(NamedTuple):
     """Detected person in an image. Values that are not stored are None.
 
     `box_px` is (x1, y1, x2, y2), `estimate_m` (x, y, z) in the optical frame, `size_m` (width, height). `support` and
-    `truncated` are those of box3d_estimator.Box3D. `by_hand`: a user drew the box.
+    `truncated` are those of box3d_estimator.Box3D. `by_hand`: a user drew the box. `truth_m` (x, z) and `truth_y_m` are
+    the ground truth of this person, unless it is that of the measurement.
     """
 
     box_px: Optional[Tuple[int, int, int, int]]
@@ -39,6 +40,8 @@ class RecordedDetection(NamedTuple):
     support: Optional[float] = None
     truncated: Optional[bool] = None
     by_hand: bool = False
+    truth_m: Optional[np.ndarray] = None
+    truth_y_m: Optional[float] = None
 
 
 class Measurement(NamedTuple):
@@ -125,6 +128,16 @@ def name_of(entry, number):
     return '%s (%s)' % (entry['id'], entry['label']) if entry.get('label') else str(entry['id'])
 
 
+def annotated_people(frames):
+    """One Measurement for each person with ground truth in frames, in which several people may stand on marks."""
+    for frame in frames:
+        if frame.truth_m is not None:
+            yield frame
+        for number, detection in enumerate(frame.detections):
+            if number != frame.person and detection.truth_m is not None:
+                yield frame._replace(person=number, truth_m=detection.truth_m, truth_y_m=detection.truth_y_m)
+
+
 def read_description(folder):
     """Content of the `frames.json` of a folder as a dictionary, whose fields are not checked. Raises SessionError."""
     path = os.path.join(str(folder), FILE_NAME)
@@ -171,13 +184,9 @@ def frame_of(folder, entry):
     person, truth_mm, stamp = int(entry.get('person', 0)), entry.get('truth_mm'), entry.get('stamp')
     if not 0 <= person < max(1, len(detections)):
         raise ValueError('person is %d, but there are %d detections' % (person, len(detections)))
-    truth_m = truth_y_m = None
-    if truth_mm is not None:
-        truth_m = _metres([truth_mm['x'], truth_mm['z']], 2)
-        truth_y_m = None if truth_mm.get('y') is None else _metres([truth_mm['y']], 1)[0]
     return Measurement(
         str(entry['id']), os.path.join(folder, entry['color']), os.path.join(folder, entry['depth']),
-        tuple(_detection_from(detection) for detection in detections), person, truth_m, truth_y_m,
+        tuple(_detection_from(detection) for detection in detections), person, *_truth_from(truth_mm),
         str(entry['rejected']) if entry.get('rejected') else None, None if stamp is None else _stamp_ns_from(stamp),
         str(entry.get('label', '')))
 
@@ -228,7 +237,16 @@ def _detection_from(entry):
     return RecordedDetection(tuple(int(edge) for edge in _numbers(entry['box'], 4)) if entry.get('box') else None,
                              estimate_m, _metres(entry.get('size_mm'), 2),
                              None if support is None else float(_numbers([support], 1)[0]),
-                             None if truncated is None else bool(truncated), entry.get('by') == 'hand')
+                             None if truncated is None else bool(truncated), entry.get('by') == 'hand',
+                             *_truth_from(entry.get('truth_mm') if 'color' not in entry else None))
+
+
+def _truth_from(truth_mm):
+    """(x, z) and y in metres of a field truth_mm; None if missing."""
+    if truth_mm is None:
+        return None, None
+    y_mm = truth_mm.get('y')
+    return _metres([truth_mm['x'], truth_mm['z']], 2), None if y_mm is None else float(_metres([y_mm], 1)[0])
 
 
 def _stamp_ns_from(text):

@@ -4,7 +4,8 @@ import numpy as np
 
 BOX_COLOR, TEXT_COLOR = (40, 220, 60), (0, 0, 0)
 OUTSIDE_PX = 4  # edges outside the image are drawn at this distance from it
-VALID_COLOR, INVALID_COLOR, CORNER_COLOR = (255, 0, 0), (0, 0, 255), (160, 32, 240)
+VALID_COLOR, INVALID_COLOR, CORNER_COLOR = (255, 140, 0), (0, 90, 255), (160, 32, 240)
+DEPTH_RANGE_M = 6.0  # default of the far end of the colours of depth
 
 
 def draw_boxes(image, boxes, labels):
@@ -32,7 +33,7 @@ def draw_caption(image, text):
 def draw_samples(image, rect_px, samples):
     """Draw the depth samples of a box as in Fig. 3.5 of the thesis. Returns the image.
 
-    Red: valid depth; blue: no depth; purple: corners of the box.
+    Orange: valid depth; blue: no depth; purple: corners of the box.
     """
     height, width = image.shape[:2]
     x1, y1, x2, y2 = np.clip(rect_px, 0, [width, height] * 2).tolist()
@@ -55,7 +56,7 @@ def depth_to_grey(depth, farthest_m):
 
 
 def colorize_depth(grey):
-    """Convert the output of `depth_to_grey` to colours: near is red, far is blue, no depth is black."""
-    colors = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_JET)[..., ::-1])
+    """Convert the output of `depth_to_grey` to colours: near is yellow, far is dark blue, no depth is black."""
+    colors = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_VIRIDIS)[..., ::-1])
     colors[grey == 0] = 0
     return colors

@@ -57,13 +57,13 @@ def compose(snapshot, panel_width_px, farthest_m, lines=(), warnings=()):
 
 
 def _with_range_bar(image, farthest_m):
-    """Draw the colour scale of depth along the right border, labelled in metres."""
+    """Draw the colour scale of depth along the right border, near at the bottom, labelled in metres."""
     height, width = image.shape[:2]
     left, right, bottom = width - MARGIN_PX - BAR_WIDTH_PX, width - MARGIN_PX, height - BAR_TOP_PX
-    grey = np.rint(np.linspace(255, 1, bottom - BAR_TOP_PX)).astype(np.uint8)
+    grey = np.rint(np.linspace(1, 255, bottom - BAR_TOP_PX)).astype(np.uint8)
     image[BAR_TOP_PX:bottom, left:right] = colorize_depth(np.repeat(grey[:, None], BAR_WIDTH_PX, axis=1))
     for metres in range(0, int(farthest_m) + 1, max(1, int(farthest_m) // 6)):
-        row = BAR_TOP_PX + int(round(metres / farthest_m * (bottom - BAR_TOP_PX)))
+        row = bottom - int(round(metres / farthest_m * (bottom - BAR_TOP_PX)))
         cv2.line(image, (left - 4, row), (left, row), INK, 1)
         text = '%d m' % metres
         text_width = cv2.getTextSize(text, FONT, FONT_SCALE, 1)[0][0]

@@ -15,7 +15,7 @@ import numpy as np
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, truncated_edges
 from ros_3d_bb.estimation.error_model import read_error_model, write_error_model
-from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
+from ros_3d_bb.sessions.session_reader import annotated_people, read_color, read_depth, read_session
 from ros_3d_bb_lab.evaluation.defaults import default_weights, scenario_path
 from ros_3d_bb_lab.evaluation.error_model_fit import coverage, data_of, fit_error_model, held_out
 from ros_3d_bb_lab.evaluation.scenes import position_errors_m
@@ -174,7 +174,7 @@ def main():
             _bench_scenarios(arguments)
             return
         session = read_session(arguments.data)
-        session = session._replace(frames=tuple(frame for frame in session.frames if frame.truth_m is not None))
+        session = session._replace(frames=tuple(annotated_people(session.frames)))
         if not session.frames:
             raise ValueError('%s has no frame with ground truth' % arguments.data)
         model = read_error_model(arguments.error_model) if arguments.error_model else None

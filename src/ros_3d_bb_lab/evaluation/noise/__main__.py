@@ -15,13 +15,13 @@ def main():
     try:
         inputs = _inputs(arguments)
         for outlier in inputs.outliers:
-            print('left out of the analysis: %s' % outlier, file=sys.stderr)
+            print('left out of the analysis:', outlier, file=sys.stderr)
         analysis = analyse(inputs)
         write_results(folder, analysis)
     except (ValueError, OSError) as error:
         sys.exit('./run noise: %s' % error)
     print(text_of(analysis))
-    print('report: %s' % (folder / 'report.html'))
+    print('report: %s (and report.pdf)' % (folder / 'report.html'))
 
 
 def _inputs(arguments):

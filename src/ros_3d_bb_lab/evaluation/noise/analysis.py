@@ -29,6 +29,14 @@ class Inputs(NamedTuple):
     camera: str
     outliers: Tuple[Outlier, ...] = ()
 
+    @property
+    def is_thesis(self):
+        """Whether the measurements are those of the thesis: its tables, or a session of its camera."""
+        names = set(os.path.basename(str(table.name)) for table in (self.z, self.x, self.x_variance))
+        camera = self.z.camera
+        return names <= set(theory.THESIS_TABLES) or (
+            camera is not None and abs(camera.fx - theory.COLOR_FOCAL_PX) < 0.01)
+
     @classmethod
     def of_tables(cls, z, x, x_variance, estimator, camera):
         """Inputs without the outliers of the tables."""
@@ -54,7 +62,7 @@ class Analysis(NamedTuple):
 
     `model` is the cross-validated error model; if it is None, `no_model` is the reason. `thesis_form` is the error
     model in the form of the thesis, with the same polynomials and the largest variance at all positions; None if its
-    bias is not invertible.
+    bias is not invertible. `date` is that of the analysis.
     """
 
     inputs: Inputs
@@ -67,6 +75,7 @@ class Analysis(NamedTuple):
     thesis_form: Optional[ErrorModel]
     model: Optional[ErrorModel]
     no_model: str
+    date: str
 
     @property
     def variance_clusters(self):
@@ -74,8 +83,12 @@ class Analysis(NamedTuple):
         return [(name, cluster) for name, axis in (('Z', self.z), ('X', self.x_variance)) for cluster in axis.clusters]
 
 
-def analyse(inputs):
-    """Analyse `inputs`, and return an Analysis. Raises ValueError if there are too few measurements."""
+def analyse(inputs, progress=lambda share: None):
+    """Analyse `inputs`, and return an Analysis. `progress` is called with the share 0..1 that is done.
+
+    Raises ValueError if there are too few measurements.
+    """
+    progress(0.0)
     z, x, x_variance = (axis_statistics(clusters_of(measurements, axis), degree) for measurements, axis, degree in (
         (inputs.z, 'Z', Z_DEGREE), (inputs.x, 'X', X_DEGREE), (inputs.x_variance, 'X', X_DEGREE)))
     names = set(os.path.basename(os.path.abspath(table.name)) for table in (inputs.z, inputs.x, inputs.x_variance))
@@ -83,9 +96,11 @@ def analyse(inputs):
               'date': datetime.date.today().isoformat()}
     thesis_form, _reason = _or_reason(_thesis_form, z, x, x_variance, origin)
     known = inputs.x.complete()
+    progress(0.3)
     model, reason = _or_reason(fit_error_model, known.measured_m, known.truth_m, **origin)
+    progress(1.0)
     return Analysis(inputs, z, x, x_variance, _rms_poly(z), share_between_positions(inputs.z, 'Z'),
-                    share_between_positions(inputs.x_variance, 'X'), thesis_form, model, reason)
+                    share_between_positions(inputs.x_variance, 'X'), thesis_form, model, reason, origin['date'])
 
 
 def summary_of(analysis):
@@ -94,10 +109,11 @@ def summary_of(analysis):
     x.update(max_variance_m2=variance['max_variance_m2'], max_sigma_m=variance['max_sigma_m'],
              variance_clusters=variance['clusters'])
     scores = None if analysis.model is None else dict(analysis.model.cross_validated._asdict())
+    is_thesis = analysis.inputs.is_thesis
     outliers = [{'name': outlier.name, 'measured_m': outlier.measured_m.tolist(), 'truth_m': outlier.truth_m.tolist()}
                 for outlier in analysis.inputs.outliers]
     return {'z': _axis_summary(analysis.z), 'x': x, 'cross_validated': scores, 'outliers': outliers,
-            'left_out': [list(pair) for pair in analysis.inputs.z.left_out], 'theory': {
+            'left_out': [list(pair) for pair in analysis.inputs.z.left_out], 'theory': None if not is_thesis else {
         'subpixel_px': theory.SUBPIXEL_PX, 'focal_times_baseline_px_m': theory.STEREO_PX_M,
         'color_focal_px': theory.COLOR_FOCAL_PX,
         'thesis_focal_px': theory.focal_px(theory.THESIS_FOV_DEG, theory.THESIS_WIDTH_PX)}}

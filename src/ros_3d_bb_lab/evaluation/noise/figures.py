@@ -1,4 +1,4 @@
-"""Figures of chapter 5 of the thesis as PNG files."""
+"""Figures of the noise analysis as PNG files."""
 import matplotlib
 import numpy as np
 from scipy import stats
@@ -13,17 +13,36 @@ import matplotlib.pyplot as plt  # noqa: E402
 SIZE_IN, DPI = (7.2, 4.2), 110
 COLUMNS = 3
 MANY_CLUSTERS = 12
-MEASURED, FITTED, THEORY, OTHER = 'tab:blue', 'tab:orange', 'tab:green', '0.55'
+MEASURED, FITTED, THEORY, OTHER = '#0072b2', '#d55e00', '#000000', '0.55'  # different for all colour vision
 
 
-def write_figures(folder, analysis):
-    _rms(folder / 'figure_5_2.png', analysis)
-    _error_by_truth(folder / 'figure_5_3.png', analysis.z, 'Z')
-    _variances(folder / 'figure_5_4.png', analysis.z, 'Z')
-    _error_by_truth(folder / 'figure_5_5.png', analysis.x, 'X')
-    _variances(folder / 'figure_5_6.png', analysis.x_variance, 'X')
-    _histograms(folder / 'figure_5_7.png', clusters_of(analysis.inputs.z, 'Z'), 'Z')
-    _histograms(folder / 'figure_5_8.png', clusters_of(analysis.inputs.x_variance, 'X'), 'X')
+def write_figures(folder, analysis, progress=lambda share: None):
+    """Write the figures as PNG files into a folder (pathlib.Path). Returns {name: caption} in the order of the report.
+    """
+    z, x, tables = analysis.z, analysis.x, analysis.inputs
+    drawings = [
+        ('layout.png', 'true positions (number of measurements) and estimates, from above', _layout, (tables.z,)),
+        ('z_error.png', 'error in Z by true Z, and f(z)', _error_by_truth, (z, 'Z')),
+        ('z_variance.png', 'variance of the error in Z by true Z', _variances, (z, 'Z')),
+        ('x_error.png', 'error in X by true X, and f(x)', _error_by_truth, (x, 'X')),
+        ('x_variance.png', 'variance of the error in X by true X', _variances, (analysis.x_variance, 'X')),
+        ('sigma.png', 'standard deviation of the error model by range, and remaining errors of the positions', _sigmas,
+         (analysis,)),
+        ('z_distribution.png', 'density of the error in Z, and the fitted Gaussian', _histograms,
+         (clusters_of(tables.z, 'Z'), 'Z')),
+        ('x_distribution.png', 'density of the error in X, and the fitted Gaussian', _histograms,
+         (clusters_of(tables.x_variance, 'X'), 'X')),
+        ('depth_error.png', 'error in Z by distance, and the theory of stereo cameras', _rms, (analysis,))]
+    if not len(tables.z.complete().truth_m):
+        drawings = drawings[1:]
+    if analysis.model is None:
+        drawings = [drawing for drawing in drawings if drawing[0] != 'sigma.png']
+    if not tables.is_thesis:
+        drawings.pop()
+    for number, (name, _caption, draw, arguments) in enumerate(drawings):
+        progress(number / len(drawings))
+        draw(folder / name, *arguments)
+    return {name: caption for name, caption, _draw, _arguments in drawings}
 
 
 def polynomial_text(poly, variable):
@@ -36,8 +55,40 @@ def polynomial_text(poly, variable):
     return text
 
 
+def _layout(path, measurements):
+    """View from above: true positions with the number of their measurements, and the estimates."""
+    complete = measurements.complete()
+    places_m, counts = np.unique(complete.truth_m, axis=0, return_counts=True)
+    figure, axes = plt.subplots(figsize=(6.2, 4.8))
+    axes.plot(complete.measured_m[:, 0], complete.measured_m[:, 2], '.', color=FITTED, label='estimate')
+    axes.plot(places_m[:, 0], places_m[:, 1], 'x', color=MEASURED, markersize=8, label='true position')
+    for place_m, count in zip(places_m, counts):
+        axes.annotate('%d' % count, place_m, (5, 4), textcoords='offset points', fontsize=8)
+    axes.plot(0, 0, '^', color='0.3', markersize=11, label='camera')
+    axes.set_aspect('equal', 'datalim')
+    _finish(figure, axes, path, 'X [m]', 'Z [m]')
+
+
+def _sigmas(path, analysis):
+    """Standard deviations of the model by range, and the remaining mean errors of the positions."""
+    model, complete = analysis.model, analysis.inputs.z.complete()
+    error_m = model.corrected(complete.measured_m)[:, [0, 2]] - complete.truth_m
+    places_m, place = np.unique(complete.truth_m, axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    range_m = np.linspace(model.measured_range.z_min_m, model.measured_range.z_max_m, 100)
+    figure, axes = plt.subplots(figsize=SIZE_IN)
+    for axis, name, spread, color, marker in ((0, 'X', model.x_sigma, FITTED, 's'),
+                                              (1, 'Z', model.z_sigma, MEASURED, 'o')):
+        axes.plot(range_m, spread.at(range_m), color=color, label='σ of %s, model' % name)
+        rms_m = np.sqrt(np.bincount(place, error_m[:, axis] ** 2) / np.bincount(place))
+        axes.plot(places_m[:, 1], rms_m, marker, color=color, alpha=0.6,
+                  label='remaining RMS error in %s, positions' % name)
+    axes.set_ylim(bottom=0)
+    _finish(figure, axes, path, 'true Z [m]', 'error [m]')
+
+
 def _rms(path, analysis):
-    """Figure 5.2: RMS of the depth error by distance, and the theoretical error of stereo cameras."""
+    """RMS of the depth error by distance, and the theoretical error of stereo cameras."""
     truth_m = [cluster.truth_m for cluster in analysis.z.clusters]
     distance_m = np.linspace(0, 1.05 * max(truth_m), 100)
     figure, axes = plt.subplots(figsize=SIZE_IN)
@@ -60,7 +111,7 @@ def _rms(path, analysis):
 
 
 def _error_by_truth(path, axis, name):
-    """Figures 5.3 and 5.5: mean error by true value, with bars of one standard deviation, and the fitted polynomial."""
+    """Mean error by true value, with bars of one standard deviation, and the fitted polynomial."""
     truth_m = np.array([cluster.truth_m for cluster in axis.clusters])
     figure, axes = plt.subplots(figsize=SIZE_IN)
     axes.axhline(0, color='0.8', linewidth=1)
@@ -74,7 +125,7 @@ def _error_by_truth(path, axis, name):
 
 
 def _variances(path, axis, name):
-    """Figures 5.4 and 5.6: variance of each cluster."""
+    """Variance of each cluster."""
     figure, axes = plt.subplots(figsize=SIZE_IN)
     positions = np.arange(len(axis.clusters))
     axes.bar(positions, [cluster.variance_m2 for cluster in axis.clusters], color=MEASURED)
@@ -89,7 +140,7 @@ def _variances(path, axis, name):
 
 
 def _histograms(path, clusters, name):
-    """Figures 5.7 and 5.8: density of the errors of each cluster, with the fitted Gaussian."""
+    """Density of the errors of each cluster, with the fitted Gaussian."""
     rows = -(-len(clusters) // COLUMNS)
     figure, grid = plt.subplots(rows, COLUMNS, figsize=(9, 2.4 * rows), squeeze=False)
     for axes, cluster in zip(grid.ravel(), clusters):

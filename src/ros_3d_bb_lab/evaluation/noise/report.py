@@ -1,42 +1,44 @@
-"""Output of the noise analysis: a folder with an HTML report, figures, summary and error models, and a short text."""
-import html
+"""Output of the noise analysis: a folder with a report, its figures, a summary and error models, and a short text."""
 import json
 
 from ros_3d_bb.estimation.error_model import write_error_model
+from ros_3d_bb.sessions.plausibility import position_text
 from ros_3d_bb_lab.evaluation.noise import theory
 from ros_3d_bb_lab.evaluation.noise.analysis import RMS_FIT_FROM_M, summary_of
+from ros_3d_bb_lab.evaluation.noise.blocks import Figure, Heading, Paragraph, Table, numbered
 from ros_3d_bb_lab.evaluation.noise.figures import polynomial_text, write_figures
+from ros_3d_bb_lab.evaluation.noise.html_report import html_report
+from ros_3d_bb_lab.evaluation.noise.pdf_report import pdf_report
 from ros_3d_bb_lab.evaluation.noise.statistics import DISTRIBUTIONS, LEAST_TO_TEST
+from ros_3d_bb_lab.evaluation.noise.tables import LEAST_IN_CLUSTER, small_clusters
 
+TITLE = 'Position errors of a depth camera'
 SIMILAR = 0.05  # log-likelihood per measurement; smaller differences are not significant
-PAGE = '''<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>Noise analysis</title><style>
-body { font: 16px/1.5 sans-serif; max-width: 54em; margin: 2em auto; padding: 0 1em; color: #222; }
-table { border-collapse: collapse; margin: 1em 0; } td, th { padding: 0.15em 0.8em; text-align: right; }
-th { border-bottom: 1px solid #888; } td:first-child, th:first-child { text-align: left; padding-left: 0; }
-img { max-width: 100%%; } figure { margin: 1.5em 0; } figcaption { color: #555; font-size: 0.9em; }
-</style></head><body>
-<h1>Noise analysis</h1>
-%s
-</body></html>
-'''
+ESTIMATORS = {'foreground': 'foreground (that of bbox3d_node)', 'median': 'median (that of the thesis)',
+              'recorded': 'recorded (as stored with the measurements)', '': 'unknown'}
 
 
-def write_results(folder, analysis):
-    """Write the report with its figures, summary.json and the error models into a folder (pathlib.Path).
+def write_results(folder, analysis, progress=lambda share: None):
+    """Write the report as HTML and PDF, its figures, summary.json and the error models into a folder (pathlib.Path).
 
-    The folder is created if it does not exist. Raises OSError.
+    Returns the figures as pairs (path, caption). The folder is created if it does not exist. `progress` is called with
+    the share 0..1 that is done. Raises OSError.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    write_figures(folder, analysis)
-    sections = _summary, _theory, _focal_lengths, _z, _x, _distributions, _model
-    page = PAGE % '\n'.join(piece for section in sections for piece in section(analysis))
-    (folder / 'report.html').write_text(page, encoding='utf-8')
+    captions = write_figures(folder, analysis, lambda share: progress(0.6 * share))
+    sections = _summary, _setup, _left_out, _z, _x, _model, _distributions, _theory
+    blocks = [block for section in sections for block in section(analysis)]
+    blocks = list(numbered(block._replace(caption=captions[block.name]) if isinstance(block, Figure) else block
+                           for block in blocks if not isinstance(block, Figure) or block.name in captions))
+    (folder / 'report.html').write_text(html_report(TITLE, blocks, folder), encoding='utf-8')
+    progress(0.7)
+    pdf_report(folder / 'report.pdf', TITLE, blocks, folder)
     (folder / 'summary.json').write_text(json.dumps(summary_of(analysis), indent=1), encoding='utf-8')
     for name, model in (('error_model_thesis_form.yaml', analysis.thesis_form),
                         ('error_model.yaml', analysis.model or analysis.thesis_form)):
         if model is not None:
             write_error_model(folder / name, model)
+    return tuple((str(folder / name), caption) for name, caption in captions.items())
 
 
 def text_of(analysis):
@@ -48,135 +50,205 @@ def text_of(analysis):
 
 
 def _summary(analysis):
-    inputs = analysis.inputs
-    far = max(analysis.z.clusters, key=lambda cluster: abs(cluster.mean_m))
-    tested = [cluster for _name, cluster in analysis.variance_clusters if cluster.tested]
-    gaussian = sum(cluster.looks_gaussian for cluster in tested)
-    return [
-        _paragraph('Errors of the measured positions of people. Error is measured minus true; X is to the right of the '
-                   'camera, Z ahead of it. A cluster is the set of all measurements with one true value.'),
-        _table(('', 'X', 'Z'), (
-            ('measurements of the mean', _count(analysis.x), _count(analysis.z)),
-            ('measurements of the variance', _count(analysis.x_variance), _count(analysis.z)),
-            ('mean error f', polynomial_text(analysis.x.poly, 'x'), polynomial_text(analysis.z.poly, 'z')),
+    inputs, model = analysis.inputs, analysis.model
+    rows = [('measurements (mean error)', _count(analysis.x), _count(analysis.z)),
+            ('measurements (variance)', _count(analysis.x_variance), _count(analysis.z)),
+            ('mean error f [m]', polynomial_text(analysis.x.poly, 'x'), polynomial_text(analysis.z.poly, 'z')),
             ('largest variance σ² [m²]', '%.5f' % analysis.x_variance.max_variance_m2,
              '%.5f' % analysis.z.max_variance_m2),
             ('largest standard deviation σ [m]', '%.4f' % analysis.x_variance.max_sigma_m,
-             '%.4f' % analysis.z.max_sigma_m))),
-        _paragraph('At Z = %.2f m the mean error is %+.3f m, %.1f times the standard deviation there: inflating '
-                   'obstacles by σ alone does not cover it.' % (
-                       far.truth_m, far.mean_m, abs(far.mean_m) / max(far.sigma_m, 1e-6))
-                   if abs(far.mean_m) > far.sigma_m else 'The mean error never exceeds the standard deviation.',
-                   'The error model at the end of this page corrects the mean error.',
-                   'Both tests accept a Gaussian for %d of %d tested clusters.' % (gaussian, len(tested))),
-        _paragraph('Estimator: %s. Camera: %s. Z: %s. X: %s. Variance of X: %s.' % (
-            inputs.estimator, inputs.camera, inputs.z.name, inputs.x.name, inputs.x_variance.name))]
+             '%.4f' % analysis.z.max_sigma_m)]
+    header = '', 'X', 'Z'
+    if model is not None:
+        rows.append(('RMSE after correction, positions left out [m]', '%.3f' % model.cross_validated.rmse_x_m,
+                     '%.3f' % model.cross_validated.rmse_z_m))
+    if inputs.is_thesis:
+        rows += [('thesis: mean error f [m]',) + tuple(
+                     polynomial_text(theory.THESIS_RESULTS[axis][0], axis.lower()) for axis in 'XZ'),
+                 ('thesis: largest variance σ² [m²]',) + tuple(
+                     '%.5f' % theory.THESIS_RESULTS[axis][1] for axis in 'XZ')]
+    pieces = [
+        Paragraph('This report describes how far positions of people, as measured by a depth camera, are from their '
+                  'true positions, and a model of these errors. Error is measured minus true. X is to the right of the '
+                  'camera and Z ahead of it, in its optical frame.'), Table('main results', header, tuple(rows))]
+    if inputs.is_thesis:
+        pieces.append(Paragraph(
+            'The rows of the thesis are those of its chapter 5.' if inputs.estimator in ('', 'median', 'recorded') else
+            'The rows of the thesis are those of its chapter 5, with its own estimator (median), and more data.'))
+    far = max(analysis.z.clusters, key=lambda cluster: abs(cluster.mean_m))
+    text = ('At Z = %.2f m the mean error in Z is %+.3f m, %.1f times the standard deviation there: inflating '
+            'obstacles by σ alone does not cover it. The error model corrects the mean error.' % (
+                far.truth_m, far.mean_m, abs(far.mean_m) / max(far.sigma_m, 1e-6))
+            if abs(far.mean_m) > far.sigma_m else 'The mean error never exceeds the standard deviation.')
+    if model is not None:
+        text += (' Validated at positions that were not used for the fit, the 95 %% ellipse of the model contains '
+                 '%.0f %% of the measurements, and the remaining error in the plane is %.3f m (RMSE).'
+                 % (100 * model.cross_validated.coverage_95, model.cross_validated.rmse_plane_m))
+    return pieces + [Paragraph(text)]
 
 
-def _theory(analysis):
-    far = analysis.z.clusters[-1]
-    return [
-        _heading('Depth error and the theory of stereo cameras'),
-        _paragraph('A stereo camera with a matching error of s pixels has a depth error of d² · s / (f · b) at '
-                   'distance d, for one pixel on a plane. The curved surface of a person and the detector increase '
-                   'the error; averaging over many pixels decreases it.',
-                   'The measured RMS includes the mean error; the standard deviation does not.',
-                   'If the RMS is much larger than the standard deviation, most of the error is bias.',
-                   'At %.2f m: RMS %.4f m, standard deviation %.4f m, theory %.4f m.' % (
-                       far.truth_m, far.rms_m, far.sigma_m, theory.stereo_rms_m(far.truth_m, theory.STEREO_PX_M))),
-        _figure('figure_5_2.png', 'Figure 5.2: depth error by distance.' + (
-            '' if analysis.rms_poly is None else ' The fit begins at %.1f m.' % RMS_FIT_FROM_M))]
+def _setup(analysis):
+    inputs = analysis.inputs
+    camera, complete = inputs.z.camera, inputs.z.complete()
+    positions = len(set(map(tuple, complete.truth_m.tolist())))
+    rows = [('date of the analysis', analysis.date),
+            ('dates of the measurements (UTC)', inputs.z.dates or 'not stored'),
+            ('camera', inputs.camera), ('estimator', ESTIMATORS.get(inputs.estimator, inputs.estimator)),
+            ('measurements from', ', '.join(sorted(set(str(table.name) for table in (
+                inputs.z, inputs.x, inputs.x_variance))))),
+            ('measurements', '%d used with X and Z, at %d positions' % (len(complete.truth_m), positions)),
+            ('left out', '%d rejected or unusable, %d outliers' % (len(inputs.z.left_out), len(inputs.outliers)))]
+    if camera is not None:
+        rows += [('image', '%d × %d pixels' % camera[:2]), ('focal lengths', 'fx %.2f, fy %.2f pixels' % camera[2:4]),
+                 ('principal point', 'cx %.2f, cy %.2f pixels' % camera[4:6]),
+                 ('field of view', '%.1f° × %.1f°' % tuple(
+                     theory.fov_deg(focal, size) for focal, size in zip(camera[2:4], camera[:2]))),
+                 ('distortion', '%s: %s' % (camera.distortion_model, ', '.join(
+                     '%g' % value for value in camera.distortion)) if camera.distortion else 'none')]
+    return [Heading('Measurements and camera'), Table('measurements and camera', ('', 'value'), tuple(rows)),
+            Paragraph('A cluster is the set of all measurements with one true value of X, or of Z. Clusters of fewer '
+                      'than %d measurements are left out of the statistics of that axis.' % LEAST_IN_CLUSTER),
+            Figure('layout.png', '')]
 
 
-def _focal_lengths(_analysis):
-    thesis_px = theory.focal_px(theory.THESIS_FOV_DEG, theory.THESIS_WIDTH_PX)
-    color_deg = theory.fov_deg(theory.COLOR_FOCAL_PX, theory.THESIS_WIDTH_PX)
-    stereo_px = theory.STEREO_PX_M / theory.THESIS_BASELINE_M
-    return [
-        _paragraph('The thesis derives f = %.0f px from the 69° of the data sheet. These are the field of view of the '
-                   'whole 16:9 colour sensor, but the images of 640×480 pixels (4:3) are cropped: the intrinsics of '
-                   'the camera are f = %.1f px, %.1f°. With 69° the theoretical error is %.0f %% too large.'
-                   % (thesis_px, theory.COLOR_FOCAL_PX, color_deg, 100 * (theory.COLOR_FOCAL_PX / thesis_px - 1)),
-                   'Depth is measured by the infrared stereo pair, not by the colour camera, and aligning it to colour '
-                   "does not change its error. The pair's f · b follows from the depth images of the thesis: all "
-                   'depths are 610.14 m / n with integer n (1/32 pixel of disparity), so f · b is %.3f px·m, and f is '
-                   '%.0f px with the baseline of 50 mm. This f is used here, with s = %.2f px as recommended by Intel.'
-                   % (theory.STEREO_PX_M, stereo_px, theory.SUBPIXEL_PX))]
+def _left_out(analysis):
+    inputs = analysis.inputs
+    reasons = {}
+    for name, reason in inputs.z.left_out:
+        reasons.setdefault(reason, []).append(name)
+    rows = [(str(len(names)), reason, ', '.join(names)) for reason, names in sorted(reasons.items())]
+    rows += [(str(len(cluster.error_m)), 'fewer than %d with %s = %.2f m' % (LEAST_IN_CLUSTER, axis, cluster.truth_m),
+              'statistics of %s only' % axis) for axis, table in (('Z', inputs.z), ('X', inputs.x_variance))
+             for cluster in small_clusters(table, axis)]
+    pieces = [Heading('Measurements that were left out')]
+    pieces.append(Table('rejected and unusable measurements', ('number', 'reason', 'measurements'), tuple(rows)) if rows
+                  else Paragraph('No measurement was rejected, and none was unusable.'))
+    if not inputs.outliers:
+        return pieces + [Paragraph('There are no outliers: no true position is implausible.')]
+    return pieces + [
+        Paragraph('Outliers have a true position whose error is far from what the other measurements make likely: '
+                  'probably a slip in the entry, or the box of another person. They are left out of all results.'),
+        Table('outliers', ('measurement', 'true', 'estimate', 'would be plausible'), tuple(
+            (outlier.name, position_text(outlier.truth_m), position_text(outlier.measured_m),
+             '–' if outlier.intended_m is None else position_text(outlier.intended_m)) for outlier in inputs.outliers))]
 
 
 def _z(analysis):
-    return [_heading('Z'), _figure('figure_5_3.png', 'Figure 5.3: Z error by true Z.'),
-            _cluster_table(analysis.z, 'Z'),
-            _figure('figure_5_4.png', 'Figure 5.4: variance of the Z error in each cluster.'),
-            _paragraph('The polynomial is fitted to the mean errors of the clusters, with equal weights.',
-                       _between_text(analysis.z_between, 'Z', 'X'))]
+    return [Heading('Errors in Z, the distance ahead'),
+            Paragraph('f(z) = %s metres, fitted to the mean errors of the clusters with equal weights. %s' % (
+                polynomial_text(analysis.z.poly, 'z'), _between_text(analysis.z_between, 'Z', 'X'))),
+            Figure('z_error.png', ''), _cluster_table(analysis.z, 'Z', 'errors in Z by true Z'),
+            Figure('z_variance.png', '')]
 
 
 def _x(analysis):
-    pieces = [_heading('X'), _figure('figure_5_5.png', 'Figure 5.5: X error by true X.'),
-              _cluster_table(analysis.x, 'X')]
+    pieces = [Heading('Errors in X, to the side'),
+              Paragraph('f(x) = %s metres. %s' % (polynomial_text(analysis.x.poly, 'x'),
+                                                  _between_text(analysis.x_between, 'X', 'Z'))),
+              Figure('x_error.png', ''), _cluster_table(analysis.x, 'X', 'errors in X by true X')]
     if analysis.x_variance != analysis.x:
-        pieces += [_paragraph('The mean error is that of all measurements. Variance and distribution are those of %s '
-                              'measurements without people who are truncated by the image border:'
-                              % _count(analysis.x_variance)), _cluster_table(analysis.x_variance, 'X')]
-    return pieces + [_figure('figure_5_6.png', 'Figure 5.6: variance of the X error in each cluster.'),
-                     _paragraph(_between_text(analysis.x_between, 'X', 'Z'))]
+        pieces += [Paragraph('The mean error is that of all measurements. Variance and distribution are those of the '
+                             '%s measurements of people who are not truncated by the image border.'
+                             % _count(analysis.x_variance)),
+                   _cluster_table(analysis.x_variance, 'X', 'errors in X of people who are not truncated')]
+    return pieces + [Figure('x_variance.png', '')]
 
 
 def _distributions(analysis):
     header = ('cluster', 'n', 'Shapiro–Wilk p', 'Anderson–Darling', 'critical at 5 %', 'Gaussian?')
+    tested = [cluster for _name, cluster in analysis.variance_clusters if cluster.tested]
     return [
-        _heading('Distribution of the errors'),
-        _figure('figure_5_7.png', 'Figure 5.7: density of the Z error in each cluster, and the fitted Gaussian.'),
-        _figure('figure_5_8.png', 'Figure 5.8: density of the X error in each cluster, and the fitted Gaussian.'),
-        _paragraph('Shapiro–Wilk rejects a Gaussian if p is below 0.05, Anderson–Darling if its statistic exceeds the '
-                   'critical value. Small clusters are seldom rejected, which does not prove that they are Gaussian. '
-                   'Clusters with fewer than %d measurements, or with equal errors, are not tested.' % LEAST_TO_TEST),
-        _paragraph('The last columns compare distributions by the mean log density of held-out measurements in '
-                   'five-fold cross-validation; ★ marks the largest value, the best distribution.',
-                   _best_text(analysis)),
-        _table(header + tuple(name for name, _fit in DISTRIBUTIONS),
-               [_distribution_row(name, cluster) for name, cluster in analysis.variance_clusters])]
+        Heading('Distribution of the errors'),
+        Paragraph('Both tests accept a Gaussian for %d of %d tested clusters. Shapiro–Wilk rejects a Gaussian if p is '
+                  'below 0.05, Anderson–Darling if its statistic exceeds the critical value. Small clusters are seldom '
+                  'rejected, which does not prove that they are Gaussian. Clusters with fewer than %d measurements, or '
+                  'with equal errors, are not tested.' % (sum(cluster.looks_gaussian for cluster in tested),
+                                                          len(tested), LEAST_TO_TEST)),
+        Figure('z_distribution.png', ''), Figure('x_distribution.png', ''),
+        Paragraph('The last columns compare distributions by the mean log density of held-out measurements in '
+                  'five-fold cross-validation; * marks the largest value, the best distribution. '
+                  + _best_text(analysis)),
+        Table('normality tests, and mean log densities', header + tuple(name for name, _fit in DISTRIBUTIONS),
+              tuple(_distribution_row(name, cluster) for name, cluster in analysis.variance_clusters))]
 
 
 def _model(analysis):
     if analysis.model is None:
-        pieces = [_paragraph('No cross-validated model: %s. error_model.yaml has the form of the thesis instead.'
-                             % analysis.no_model)]
+        pieces = [Paragraph('No cross-validated model: %s. error_model.yaml has the form of the thesis instead.'
+                            % analysis.no_model)]
     else:
         pieces = _model_pieces(analysis.model)
-    return [_heading('Error model')] + pieces + [_paragraph(
-        'error_model_thesis_form.yaml has the form of the thesis: the polynomials of the first table, and the largest '
-        'standard deviation at all positions.' if analysis.thesis_form is not None
-        else 'There is no model in the form of the thesis: the polynomials of the first table are not invertible.',
-        'The keys of both are explained in config/error_models/README.md.')]
+    return [Heading('Error model and its validation')] + pieces + [Paragraph(
+        ('error_model_thesis_form.yaml has the form of the thesis: the polynomials of the first table, and the largest '
+         'standard deviation at all positions.' if analysis.thesis_form is not None
+         else 'There is no model in the form of the thesis: the polynomials of the first table are not invertible.'))]
 
 
 def _model_pieces(model):
     scores, limits = model.cross_validated, model.measured_range
     z_bias = ' '.join('%+.4f%s' % (value, {0: '', 1: ' z', 2: ' z²', 3: ' z³'}[len(model.z_bias) - 1 - number])
                       for number, value in enumerate(model.z_bias))
+    ranges_m = [limits.z_min_m + share * (limits.z_max_m - limits.z_min_m) for share in (0, 0.25, 0.5, 0.75, 1)]
     return [
-        _paragraph('error_model.yaml is for bbox3d_node. It is fitted to the %d measurements with both X and Z, at %d '
-                   'positions with equal weights. Its number of coefficients was selected by cross-validation.'
-                   % (model.provenance.measurements, model.provenance.positions)),
-        _table(('part', 'value'), (
-            ('bias of Z', z_bias), ('bias of X', '%+.4f x %+.4f x/z %+.4f' % model.x_bias),
+        Paragraph('error_model.yaml, in the folder of this report, is for bbox3d_node (error_model:=FILE), which '
+                  'removes the bias and sets the covariance of positions. It is fitted to the %d measurements with '
+                  'X and Z, at %d positions with equal weights. Its number of coefficients was selected by '
+                  'cross-validation. x and z are the true position in metres.' % (model.provenance.measurements,
+                                                                model.provenance.positions)),
+        Table('error model', ('part', 'value'), (
+            ('bias of Z [m]', z_bias), ('bias of X [m]', '%+.4f x %+.4f x/z %+.4f' % model.x_bias),
             ('σ of Z [m]', _spread_text(model.z_sigma)), ('σ of X [m]', _spread_text(model.x_sigma)),
             ('measured range', 'Z from %.2f to %.2f m, |X| to %.2f m'
-             % (limits.z_min_m, limits.z_max_m, limits.x_max_m)))),
-        _paragraph('Cross-validation, each position corrected by a model of all others: RMSE %.3f m in X, %.3f m in Z, '
-                   '%.3f m in the plane. The 68 %% ellipse contains %.0f %% of the measurements, the 95 %% ellipse '
-                   '%.0f %%.' % (scores.rmse_x_m, scores.rmse_z_m, scores.rmse_plane_m,
-                                 100 * scores.coverage_68, 100 * scores.coverage_95),
-                   'Outside the measured range the bias is that at its limit, and the standard deviation grows by '
-                   '%.1f m per metre.' % model.growth_outside)]
+             % (limits.z_min_m, limits.z_max_m, limits.x_max_m)),
+            ('outside of it', 'bias as at its limit; σ grows by %.1f m per metre' % model.growth_outside))),
+        Table('standard deviation of the model by range', ('true Z [m]', 'σ of X [m]', 'σ of Z [m]'), tuple(
+            ('%.2f' % range_m, '%.4f' % model.x_sigma.at(range_m), '%.4f' % model.z_sigma.at(range_m))
+            for range_m in ranges_m)),
+        Figure('sigma.png', ''),
+        Paragraph('Leave-one-position-out cross-validation: the measurements of each position are corrected by a model '
+                  'of all other positions. The coverage is the share of them inside the ellipse of that model; ideally '
+                  'it is that of the ellipse. σ is widened until the 95 % ellipse contains 95 %, because errors have '
+                  'longer tails than a Gaussian; the 68 % ellipse then contains more than 68 %.'),
+        Table('leave-one-position-out cross-validation', ('quantity', 'value'), (
+            ('RMSE in X', '%.3f m' % scores.rmse_x_m), ('RMSE in Z', '%.3f m' % scores.rmse_z_m),
+            ('RMSE in the plane', '%.3f m' % scores.rmse_plane_m),
+            ('coverage of the 68 % ellipse', '%.0f %%' % (100 * scores.coverage_68)),
+            ('coverage of the 95 % ellipse', '%.0f %%' % (100 * scores.coverage_95))))]
 
 
-def _cluster_table(axis, name):
-    return _table(('true %s [m]' % name, 'n', 'mean error [m]', 'standard deviation [m]', 'variance [m²]', 'RMS [m]'),
-                  [('%.2f' % cluster.truth_m, '%d' % cluster.count, '%+.4f' % cluster.mean_m, '%.4f' % cluster.sigma_m,
-                    '%.6f' % cluster.variance_m2, '%.4f' % cluster.rms_m) for cluster in axis.clusters])
+def _theory(analysis):
+    """Comparison with the theory of the thesis, whose baseline is known."""
+    if not analysis.inputs.is_thesis:
+        return []
+    far = analysis.z.clusters[-1]
+    thesis_px = theory.focal_px(theory.THESIS_FOV_DEG, theory.THESIS_WIDTH_PX)
+    color_deg = theory.fov_deg(theory.COLOR_FOCAL_PX, theory.THESIS_WIDTH_PX)
+    return [
+        Heading('Error in Z and the theory of stereo cameras (thesis 5.2)'),
+        Paragraph('A stereo camera with a matching error of s pixels has a depth error of d² · s / (f · b) at distance '
+                  'd, for one pixel on a plane. The curved surface of a person and the detector increase the error; '
+                  'averaging over many pixels decreases it. The measured RMS includes the mean error; the standard '
+                  'deviation does not. At %.2f m: RMS %.4f m, standard deviation %.4f m, theory %.4f m.%s' % (
+                      far.truth_m, far.rms_m, far.sigma_m, theory.stereo_rms_m(far.truth_m, theory.STEREO_PX_M),
+                      '' if analysis.rms_poly is None else ' The fit to the RMS begins at %.1f m.' % RMS_FIT_FROM_M)),
+        Figure('depth_error.png', ''),
+        Paragraph('The thesis derives f = %.0f px from the 69° of the data sheet. These are the field of view of the '
+                  'whole 16:9 colour sensor, but the images of 640×480 pixels (4:3) are cropped: the intrinsics of '
+                  'the camera are f = %.1f px, %.1f°. With 69° the theoretical error is %.0f %% too large. '
+                  'Depth is measured by the infrared stereo pair, not by the colour camera, and aligning it to colour '
+                  "does not change its error. The pair's f · b follows from the depth images of the thesis: all "
+                  'depths are 610.14 m / n with integer n (1/32 pixel of disparity), so f · b is %.3f px·m, and f is '
+                  '%.0f px with the baseline of 50 mm. This f is used here, with s = %.2f px as recommended by Intel.'
+                  % (thesis_px, theory.COLOR_FOCAL_PX, color_deg, 100 * (theory.COLOR_FOCAL_PX / thesis_px - 1),
+                     theory.STEREO_PX_M, theory.STEREO_PX_M / theory.THESIS_BASELINE_M, theory.SUBPIXEL_PX))]
+
+
+def _cluster_table(axis, name, caption):
+    return Table(caption, ('true %s [m]' % name, 'n', 'mean error [m]', 'standard deviation [m]', 'variance [m²]',
+                           'RMS [m]'),
+                 tuple(('%.2f' % cluster.truth_m, '%d' % cluster.count, '%+.4f' % cluster.mean_m,
+                        '%.4f' % cluster.sigma_m, '%.6f' % cluster.variance_m2, '%.4f' % cluster.rms_m)
+                       for cluster in axis.clusters))
 
 
 def _distribution_row(name, cluster):
@@ -187,7 +259,7 @@ def _distribution_row(name, cluster):
     return row + (
         '%.4f' % cluster.shapiro_p, '%.2f' % cluster.anderson, '%.2f' % cluster.anderson_critical,
         'not rejected' if cluster.looks_gaussian else 'no') + tuple(
-            '%.2f%s' % (cluster.log_likelihoods[kind], ' ★' if cluster.log_likelihoods[kind] == best else '')
+            '%.2f%s' % (cluster.log_likelihoods[kind], ' *' if cluster.log_likelihoods[kind] == best else '')
             for kind, _fit in DISTRIBUTIONS)
 
 
@@ -223,24 +295,3 @@ def _spread_text(spread):
 
 def _count(axis):
     return str(sum(cluster.count for cluster in axis.clusters))
-
-
-def _heading(text):
-    return '<h2>%s</h2>' % html.escape(text)
-
-
-def _paragraph(*sentences):
-    return '<p>%s</p>' % html.escape(' '.join(sentence for sentence in sentences if sentence))
-
-
-def _table(header, rows):
-    lines = [_row('th', header)] + [_row('td', row) for row in rows]
-    return '<table>\n%s\n</table>' % '\n'.join(lines)
-
-
-def _row(cell, texts):
-    return '<tr>%s</tr>' % ''.join('<%s>%s</%s>' % (cell, html.escape(text), cell) for text in texts)
-
-
-def _figure(name, caption):
-    return '<figure><img src="%s" alt="%s"><figcaption>%s</figcaption></figure>' % (name, caption, caption)

@@ -5,13 +5,15 @@ that was not measured are empty, or its columns are missing. The columns `X erro
 columns are ignored.
 """
 import csv
-from typing import NamedTuple, Tuple
+import datetime
+from typing import Any, NamedTuple, Tuple
 
 import numpy as np
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, truncated_edges
 from ros_3d_bb.sessions.plausibility import likely_errors, outlier_of
-from ros_3d_bb.sessions.session_reader import SessionError, read_depth, read_session
+from ros_3d_bb.sessions.session_reader import SessionError, annotated_people, read_depth, read_session
 
 AXES = ('X', 'Z')
 LEAST_IN_CLUSTER = 3
@@ -22,7 +24,8 @@ class MeasurementTable(NamedTuple):
     """Positions x, y, z (n, 3) and ground truth x, z (n, 2) in metres, NaN if not measured, and name of the source.
 
     `cut` (n,) is whether the left or right image border truncates the person, if known. `ids` are the names of the
-    measurements, and `left_out` pairs (name, reason) of those that are not in the table.
+    measurements, and `left_out` pairs (name, reason) of those that are not in the table. `camera` (a Camera) and
+    `dates` are those of a session; None and '' if unknown.
     """
 
     name: str
@@ -31,6 +34,8 @@ class MeasurementTable(NamedTuple):
     cut: np.ndarray
     ids: Tuple[str, ...]
     left_out: Tuple[Tuple[str, str], ...] = ()
+    camera: Any = None
+    dates: str = ''
 
     def complete(self):
         """Select the measurements with x and z."""
@@ -130,28 +135,33 @@ def read_session_measurements(folder, estimator, progress=lambda share: None):
     """
     left_out, rows = [], []
     session = read_session(folder, lambda name, reason: left_out.append((name, reason)))
-    for number, frame in enumerate(session.frames):
-        progress(number / len(session.frames))
+    people = list(annotated_people(session.frames))
+    for number, frame in enumerate(people):
+        progress(number / len(people))
         try:
             rows.append((_estimate(frame, session, estimator), frame))
         except SessionError as error:
             left_out.append((frame.name, str(error)))
-    for position_m, frame in rows:
-        if position_m is None:
-            left_out.append((frame.name, 'no ground truth' if frame.truth_m is None else 'no estimate (%s)' % estimator))
+    left_out += [(frame.name, 'no estimate (%s)' % estimator) for position_m, frame in rows if position_m is None]
+    left_out += [(frame.name, 'no ground truth') for frame in session.frames if not any(annotated_people([frame]))]
     used = [(position_m, frame) for position_m, frame in rows if position_m is not None]
     if not used:
         raise ValueError('%s: no frame with ground truth and an estimate (%s)' % (folder, estimator))
     return MeasurementTable(str(folder), np.array([position_m for position_m, _frame in used]),
                             np.array([frame.truth_m for _position_m, frame in used]),
                             np.array([_is_cut(frame, session.camera) for _position_m, frame in used]),
-                            tuple(frame.name for _position_m, frame in used), tuple(left_out))
+                            tuple(frame.name for _position_m, frame in used), tuple(left_out), session.camera,
+                            _dates_of([frame for _position_m, frame in used]))
+
+
+def _dates_of(frames):
+    days = [datetime.datetime.fromtimestamp(frame.stamp_ns // NS, datetime.timezone.utc).date().isoformat()
+            for frame in frames if frame.stamp_ns is not None]
+    return ' to '.join(sorted({min(days), max(days)})) if days else ''
 
 
 def _estimate(frame, session, name):
-    """Position (3,) of the annotated person of a frame, whose box is the first one; None without truth or estimate."""
-    if frame.truth_m is None:
-        return None
+    """Position (3,) of the annotated person of a frame, whose box is the first one, or None."""
     if name == 'recorded':
         return frame.estimate_m
     boxes = estimate_boxes(read_depth(frame, session), frame.boxes_px, session.camera, estimator_named(name))

@@ -1,0 +1,42 @@
+"""Report as one HTML file that contains its figures."""
+import base64
+import html
+
+from ros_3d_bb_lab.evaluation.noise.blocks import Figure, Heading, Paragraph
+
+PAGE = '''<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>
+body {{ font: 16px/1.5 sans-serif; max-width: 54em; margin: 2em auto; padding: 0 1em; color: #222; }}
+table {{ border-collapse: collapse; margin: 0.3em 0 1.2em; font-size: 0.9em; }}
+td, th {{ padding: 0.15em 0.8em; text-align: right; vertical-align: top; }}
+th {{ border-bottom: 1px solid #888; }} td:first-child, th:first-child {{ text-align: left; padding-left: 0; }}
+img {{ max-width: 100%; }} figure {{ margin: 1.5em 0; }}
+figcaption, .caption {{ color: #444; font-size: 0.9em; margin: 0.5em 0 0; }}
+</style></head><body>
+<h1>{title}</h1>
+{body}
+</body></html>
+'''
+
+
+def html_report(title, blocks, folder):
+    """Render blocks as HTML text. Figures are read from a folder (pathlib.Path)."""
+    return PAGE.format(title=html.escape(title), body='\n'.join(_rendered(block, folder) for block in blocks))
+
+
+def _rendered(block, folder):
+    if isinstance(block, Heading):
+        return '<h2>%s</h2>' % html.escape(block.text)
+    if isinstance(block, Paragraph):
+        return '<p>%s</p>' % html.escape(block.text)
+    caption = html.escape(block.caption)
+    if isinstance(block, Figure):
+        data = base64.b64encode((folder / block.name).read_bytes()).decode()
+        return '<figure><img src="data:image/png;base64,%s" alt="%s"><figcaption>%s</figcaption></figure>' % (
+            data, caption, caption)
+    rows = [_row('th', block.header)] + [_row('td', row) for row in block.rows]
+    return '<p class="caption">%s</p>\n<table>\n%s\n</table>' % (caption, '\n'.join(rows))
+
+
+def _row(cell, texts):
+    return '<tr>%s</tr>' % ''.join('<%s>%s</%s>' % (cell, html.escape(text), cell) for text in texts)
