@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import rospy
 from rosgraph_msgs.msg import Log
-from sensor_msgs.msg import CameraInfo, Image
-from std_msgs.msg import Header, Int32MultiArray
+from sensor_msgs.msg import CameraInfo, Image, Joy
+from std_msgs.msg import Empty, Header, Int32MultiArray
 from std_srvs.srv import SetBool, SetBoolResponse, Trigger
 
 from ros_3d_bb.camera.depth_image import DepthImage
@@ -123,7 +123,11 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def headless(folder):
-    with launched('viewer.launch', 'session:=' + folder, 'window:=false', 'label:=A1', 'enable_service:=d/enable'):
+    params = os.path.join(os.path.dirname(folder), 'timer.yaml')
+    with open(params, 'w') as stream:
+        stream.write('{timer_delay: 0.5, timer_count: 2, timer_interval: 0.3}')
+    with launched('viewer.launch', 'session:=' + folder, 'window:=false', 'label:=A1', 'enable_service:=d/enable',
+                  'params:=' + params):
         yield
 
 
@@ -227,6 +231,30 @@ def window(rig, monkeypatch, tmp_path):
         started.wait()
 
 
+def test_the_timer_is_started_by_topic_and_joystick_and_the_last_measurement_is_deleted(rig, folder):
+    rospy.set_param('viewer_node/label', 'C3')
+    timer, joystick = publisher('viewer_node/timer', Empty), publisher('joy', Joy)
+    wait_until(lambda: timer.get_num_connections() and joystick.get_num_connections(), 'the connections')
+    for start in (lambda: timer.publish(Empty()),
+                  lambda: [joystick.publish(Joy(buttons=[pressed])) for pressed in (1, 1)]):
+        count = len(entries(folder))
+        start()
+
+        def stored():
+            rig.send()
+            rospy.sleep(0.1)
+            return len(entries(folder)) >= count + 2
+        wait_until(stored, 'two measurements')
+        for _image in range(8):
+            rig.send()
+            rospy.sleep(0.1)
+        assert len(entries(folder)) == count + 2 and entries(folder)[-1].label == 'C3'
+    last = entries(folder)[-1]
+    answer = rospy.ServiceProxy('viewer_node/delete_last', Trigger)()
+    assert answer.success and last.id in answer.message
+    assert len(entries(folder)) == count + 1 and not os.path.exists(last.color_path)
+
+
 def test_keys_store_pause_and_quit(rig, window):
     process, folder = window
     sent = rig.send()
@@ -238,6 +266,12 @@ def test_keys_store_pause_and_quit(rig, window):
     wait_until(stored, 'a measurement')
     check_stored(folder, sent, 0)
     assert entries(folder)[0].label == 'by hand' and len(entries(folder)) == 1
+    for key in ('l', 'b', '7', 'Return'):
+        press_key(key)
+        rospy.sleep(0.3)
+    assert rospy.get_param('window/label') == 'b7'
+    press_key('d')
+    wait_until(lambda: not entries(folder), 'the deletion')
     with Recorder('/rosout', Log, False) as log:
         press_key('p')
         wait_until(lambda: any('the service /detector/enable does not respond' in message.msg

@@ -19,7 +19,7 @@ from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.sessions import session_writer
 from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshot
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb.sessions.session_writer import append, stored_depth
+from ros_3d_bb.sessions.session_writer import append, remove, stored_depth
 from support.small_session import read_json
 
 CAMERA = Camera(64, 48, 60.0, 61.0, 31.5, 23.25, 'plumb_bob', (0.1, -0.2, 0.001, 0.002, 0.03))
@@ -113,6 +113,22 @@ def test_ids_are_ascending_for_equal_images_and_after_measurements_were_removed(
         del content['frames'][0]
     ids.append(append(folder, measurement(2, stamp_ns=NS))[0])  # an earlier stamp, as of a bag
     assert ids == sorted(set(ids)) and len(ids) == 3
+
+
+def test_a_measurement_is_removed_with_its_images_unless_it_is_annotated(folder):
+    ids = [append(folder, measurement(number))[0] for number in range(3)]
+    remove(folder, ids[1])
+    session = read_session(folder)
+    assert [frame.id for frame in session.frames] == [ids[0], ids[2]]
+    assert sorted(os.listdir(os.path.join(folder, 'color'))) == [ids[0] + '.png', ids[2] + '.png']
+    np.testing.assert_array_equal(read_color(session.frames[1], session.camera), measurement(2).color.pixels)
+    with pytest.raises(ValueError, match='no longer'):
+        remove(folder, ids[1])
+    with atomic_file.locked_update(folder) as content:
+        content['frames'][1]['truth_mm'] = {'x': 0, 'z': 2000}
+    with pytest.raises(ValueError, match='annotated'):
+        remove(folder, ids[2])
+    assert append(folder, measurement(3))[0] not in ids
 
 
 def _append_many(folder, first):

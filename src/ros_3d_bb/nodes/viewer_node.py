@@ -7,9 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import rospy
-from rosgraph.masterapi import MasterError
-from sensor_msgs.msg import Image
-from std_msgs.msg import Int32MultiArray
+from sensor_msgs.msg import Image, Joy
+from std_msgs.msg import Empty, Int32MultiArray
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
@@ -20,18 +19,20 @@ from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameter
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.master import NO_ANSWER, on_new_master, patient_master
+from ros_3d_bb.nodes.common.label import Label
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
+from ros_3d_bb.sessions.burst import Burst
 from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshots
-from ros_3d_bb.sessions.session_writer import append
+from ros_3d_bb.sessions.session_writer import append, remove
 from ros_3d_bb.visualization.cv_window import Window
 from ros_3d_bb.visualization.image_overlay import DEPTH_RANGE_M
-from ros_3d_bb.visualization.viewer_layout import FrameRate, compose, text_image
+from ros_3d_bb.visualization.viewer_layout import FrameRate, compose, draw_countdown, text_image
 
 CAMERA_INFO_TOPIC = INFO_TOPICS[0]
 ENABLE_SERVICE = 'detector/enable'
-KEYS = 'keys: s saves, p pauses the detector, q quits'
+KEYS = 'keys: s save    t timer    d delete the last one    l label    p pause the detector    q quit'
+TIMER_PERIOD_S = 0.1
 
 
 @parameters()
@@ -49,9 +50,15 @@ class ViewerParams(NamedTuple):
     stamp_tolerance: float = STAMP_TOLERANCE
     window_rate: float = Param(
         15.0, 'Maximum rate of drawing the window, which is drawn for new images only.', 'Hz', limits=(0.1, 10000))
-    panel_width: int = Param(480, 'Width of each of the three images in the window.', 'pixels', limits=(80, 10000))
+    panel_width: int = Param(
+        320, 'Width of each of the three images in the window; 320 fits a screen of 1024 pixels.', 'pixels',
+        limits=(80, 10000))
     depth_image_range: float = Param(
         DEPTH_RANGE_M, 'Depth at the far end of the colours.', 'm', limits=(0.1, 10000))
+    timer_delay: float = Param(5.0, 'Countdown of the timer before its first measurement.', 's')
+    timer_count: int = Param(3, 'Number of measurements of the timer.', limits=(1, 1000))
+    timer_interval: float = Param(1.0, 'Time between the measurements of the timer.', 's')
+    joy_button: int = Param(0, 'Index of the joystick button that starts or cancels the timer.')
 
 
 class ViewerNode(object):
@@ -71,12 +78,18 @@ class ViewerNode(object):
         2D boxes.
     ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
         3D boxes.
+    ~timer : std_msgs/Empty
+        Starts the timer, as the key `t` does: a countdown and a burst of measurements. A second message cancels it.
+    joy : sensor_msgs/Joy
+        Joystick, such as a presenter on the floor mark: a button starts the timer.
 
     Services
     --------
     ~capture : std_srvs/Trigger
         Appends the newest image and its boxes to the session, as the key `s` does. The response names the stored
         measurement or the reason for the failure.
+    ~delete_last : std_srvs/Trigger
+        Deletes the newest measurement that was stored since the start of the node, as the key `d` does.
 
     Calls
     -----
@@ -95,7 +108,14 @@ class ViewerNode(object):
         self._rate, self._received_topics, self._answer = FrameRate(), set(), ''
         self._captured_ns, self._is_warned, self._is_paused = None, False, False
         self._label, self._diagnostics = Label(self._params.label), Diagnostics()
-        rospy.Service('~capture', Trigger, lambda _request: TriggerResponse(*self.capture()))
+        self._stored_ids, self._is_pressed = [], False
+        self._burst = Burst(self._params.timer_delay, self._params.timer_count, self._params.timer_interval)
+        for name, action in (('~capture', self.capture), ('~delete_last', self.delete_last)):
+            rospy.Service(name, Trigger, lambda _request, action=action: TriggerResponse(*action()))
+        rospy.Timer(rospy.Duration(TIMER_PERIOD_S), self._on_timer, reset=True)
+        # not recorded as inputs, whose silence would be reported
+        rospy.Subscriber('~timer', Empty, lambda _message: self._burst.toggle(time.monotonic()), queue_size=1)
+        rospy.Subscriber('joy', Joy, self._on_joy, queue_size=10)
         for topic, kind, callback in ((BOXES3D_TOPIC, BoundingBox3DArray, self._on_boxes3d),
                                       (BOXES_TOPIC, Int32MultiArray, self._on_boxes2d),
                                       (DEPTH_TOPIC, Image, self._on_depth), (COLOR_TOPIC, Image, self._on_color)):
@@ -143,6 +163,17 @@ class ViewerNode(object):
             self._snapshots.add_boxes3d(stamp_of(message), arrival_clock_ns(), boxes3d_from_msg(usable))
             self._is_warned = False
 
+    def _on_joy(self, message):
+        button = self._params.joy_button
+        was_pressed, self._is_pressed = self._is_pressed, any(message.buttons[button:button + 1])
+        if self._is_pressed and not was_pressed:
+            self._burst.toggle(time.monotonic())
+
+    def _on_timer(self, _event):
+        if self._burst.is_due(time.monotonic()):
+            is_stored, _answer = self.capture()
+            self._burst.report(time.monotonic(), is_stored)
+
     def _on_lost(self, stamp_ns):
         self._diagnostics.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f '
                                'of the colour image received; waiting for the next' % (stamp_ns / NS))
@@ -159,6 +190,20 @@ class ViewerNode(object):
                 self._diagnostics.warn('measurements not stored', self._answer)
             return done, self._answer
 
+    def delete_last(self):
+        """Delete the newest measurement that this node has stored. Returns whether it was deleted, and a message."""
+        with self._capture_lock:
+            try:
+                if not self._stored_ids:
+                    raise ValueError('no measurement was stored since the start')
+                remove(self._params.session, self._stored_ids[-1])
+                done, self._answer = True, 'deleted %s' % self._stored_ids.pop()
+                rospy.loginfo('%s', self._answer)
+            except (ValueError, OSError) as error:
+                done, self._answer = False, 'not deleted: %s' % error
+                rospy.logwarn('%s', self._answer)
+            return done, self._answer
+
     def _stored(self):
         """Store the newest snapshot and return a message about it. Raises ValueError or OSError on failure."""
         if not self._params.session:
@@ -167,6 +212,7 @@ class ViewerNode(object):
         label = self._label.from_master()
         name, count = append(self._params.session, snapshot, label)
         self._captured_ns = snapshot.stamp_ns
+        self._stored_ids.append(name)
         found = ('without 3D boxes' if snapshot.boxes3d is None else
                  'with %d 3D box%s' % (len(snapshot.boxes3d), '' if len(snapshot.boxes3d) == 1 else 'es'))
         return 'saved %s %s%s: number %d in %s' % (name, found, label and ', label %s' % label, count,
@@ -218,13 +264,17 @@ class ViewerNode(object):
             rospy.spin()
             return
         with ThreadPoolExecutor(1) as others:  # on exit, waits for measurements that are being stored
-            actions = {'s': self.capture, 'p': self.pause_or_resume}
+            actions = {'s': self.capture, 'd': self.delete_last, 'p': self.pause_or_resume,
+                       't': lambda: self._burst.toggle(time.monotonic()), 'l': self._label.start_typing}
             shown, key = None, ''
             while not (rospy.is_shutdown() or key == 'q' or self._window.is_closed):
                 due_s = time.monotonic() + 1 / self._params.window_rate
                 shown = self._show(shown)
                 key = self._window.key(max(1, int(1000 * (due_s - time.monotonic()))))
-                if key in actions:
+                if self._label.typed is not None:
+                    self._label.type(key)
+                    key = ''
+                elif key in actions:
                     others.submit(actions[key]).add_done_callback(_complain)
             if self._is_paused and not rospy.is_shutdown():
                 others.submit(self.pause_or_resume)
@@ -241,15 +291,19 @@ class ViewerNode(object):
             self._window.show(text_image((KEYS,), (self._why_nothing(),), 3 * self._params.panel_width))
             return None
         label = self._label.from_cache()
+        if self._label.typed is not None:
+            label = '%s_ (Enter sets it, Esc cancels)' % self._label.typed
+        countdown = self._burst.text(time.monotonic())
         content = (snapshot.stamp_ns, snapshot.boxes2d, snapshot.boxes3d is None, rate_hz == 0, self._answer,
-                   self._is_paused, label)
+                   self._is_paused, label, countdown)
         if content == shown:
             return shown
         lines = ('%.1f images/s    stamp %d.%09d    %s' % ((rate_hz,) + divmod(snapshot.stamp_ns, NS) + (
                      'no 3D boxes' if snapshot.boxes3d is None else '3D boxes: %d' % len(snapshot.boxes3d),)),
                  'session: %s    label: %s' % (self._params.session or 'none', label or 'none'), KEYS, self._answer)
         warnings = list(self._warnings(snapshot, is_early, rate_hz))
-        self._window.show(compose(snapshot, self._params.panel_width, self._params.depth_image_range, lines, warnings))
+        picture = compose(snapshot, self._params.panel_width, self._params.depth_image_range, lines, warnings)
+        self._window.show(draw_countdown(picture, countdown))
         self._diagnostics.record_latency(time_from(snapshot.stamp_ns))
         return content
 
@@ -265,34 +319,6 @@ class ViewerNode(object):
 def _complain(future):
     if future.exception() is not None:
         rospy.logerr('the action of the key failed: %r', future.exception())
-
-
-class Label(object):
-    """The parameter ~label, `default` if unset; kept without a master, and set again on a restarted one."""
-
-    def __init__(self, default):
-        self._default, self._newest = default, default
-        on_new_master(self._restore)
-
-    def from_master(self):
-        """Request the label from the master, because rospy's cache is updated with a delay."""
-        with contextlib.suppress(*NO_ANSWER):
-            try:
-                self._newest = str(patient_master().getParam(rospy.resolve_name('~label')))
-            except MasterError:  # the parameter is not set
-                self._newest = self._default
-        return self._newest
-
-    def from_cache(self):
-        """Return the label from rospy's cache, without a request to the master."""
-        with contextlib.suppress(*NO_ANSWER):
-            self._newest = str(rospy.get_param_cached('~label', self._default))
-        return self._newest
-
-    def _restore(self):
-        # rospy assumes that its subscription to the parameter persists, but a new master has lost it.
-        patient_master().subscribeParam(rospy.get_node_uri(), rospy.resolve_name('~label'))
-        rospy.set_param('~label', self._newest)
 
 
 def main():

@@ -92,6 +92,17 @@ def _annotated(panel, snapshot):
     return draw_boxes(panel, rects_px * (panel.shape[1] / width), labels + ['no position'] * len(without_position))
 
 
+def draw_countdown(picture, text):
+    """Draw a short text that can be read from afar. Returns the picture."""
+    if text:
+        height_px = picture.shape[0] // 3
+        scale = height_px / cv2.getTextSize(text, FONT, 1, 1)[0][1]
+        for ink, thickness in (((0, 0, 0), 7), (WARNING_INK, 3)):
+            cv2.putText(picture, text, (MARGIN_PX * 4, height_px + MARGIN_PX * 4), FONT, scale, ink,
+                        max(1, int(thickness * scale / 2)), cv2.LINE_AA)
+    return picture
+
+
 def text_image(lines, warnings, width_px):
     """Image of lines of text, followed by warnings."""
     rows = [(line, INK) for line in lines] + [(line, WARNING_INK) for line in warnings]

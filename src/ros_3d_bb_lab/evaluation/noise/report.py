@@ -193,8 +193,7 @@ def _model_pieces(model):
         Paragraph('error_model.yaml, in the folder of this report, is for bbox3d_node (error_model:=FILE), which '
                   'removes the bias and sets the covariance of positions. It is fitted to the %d measurements with '
                   'X and Z, at %d positions with equal weights. Its number of coefficients was selected by '
-                  'cross-validation. x and z are the true position in metres.' % (model.provenance.measurements,
-                                                                model.provenance.positions)),
+                  'cross-validation. x and z are the true position in metres.' % model.provenance[-2:]),
         Table('error model', ('part', 'value'), (
             ('bias of Z [m]', z_bias), ('bias of X [m]', '%+.4f x %+.4f x/z %+.4f' % model.x_bias),
             ('σ of Z [m]', _spread_text(model.z_sigma)), ('σ of X [m]', _spread_text(model.x_sigma)),
