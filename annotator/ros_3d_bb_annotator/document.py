@@ -132,13 +132,12 @@ class Document(object):
         for count, index in enumerate(missing):
             progress(count / len(missing))
             self.estimates.of(index)
-        found = [(index, person, self.estimates.outlier(index, person))
-                 for index, measurement in enumerate(self.measurements) for person in measurement.truths]
-        return [each for each in found if each[2] is not None]
+        return [(index, person, self.estimates.outlier(index, person))
+                for index, people in sorted(self.estimates.implausible().items()) for person in people]
 
     def is_implausible(self, index):
         """Whether a truth of a measurement is an outlier among the known errors."""
-        return any(self.estimates.outlier(index, person) for person in self.measurements[index].truths)
+        return index in self.estimates.implausible()
 
     def person_at(self, index, x_m, z_m):
         """Detection that a true position belongs to: the one that the user selected, or the nearest one; None without.

@@ -14,7 +14,7 @@ from ros_3d_bb_annotator.results import Results
 
 TITLE = 'ros_3d_bb annotator'
 REFRESH_MS, WAKE_MS = 2000, 250
-SHOW_ESTIMATES_EVERY = 50
+SHOW_ESTIMATES_EVERY = 100
 
 
 class AnnotatorWindow(QtWidgets.QMainWindow):
@@ -85,6 +85,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.pane.read_again()
         self._refresh.start()
         self._refresh_document()
+        self._start_estimates()
         if self.current is not None:
             self.keep_typed()
             self.show_measurement(self.current)
@@ -208,7 +209,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     def _start_estimates(self):
         """Compute the estimates of annotated measurements while the window is idle."""
-        self._missing = self.document.estimates.missing()
+        self._missing, self._computed = self.document.estimates.missing(), 0
         self._estimate.start()
 
     def _estimate_next(self):
@@ -217,7 +218,8 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
             self._estimate.stop()
         else:
             self.document.estimates.of(index)
-        if index is None or index % SHOW_ESTIMATES_EVERY == 0:
+            self._computed += 1
+        if self._computed and (index is None or self._computed % SHOW_ESTIMATES_EVERY == 0):
             self.list.update_rows()
 
     def _read_ahead(self):

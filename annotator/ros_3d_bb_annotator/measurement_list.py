@@ -51,7 +51,8 @@ class MeasurementModel(QtCore.QAbstractTableModel):
         measurement = self._document.measurements[row]
         if measurement.problem is not None and measurement.rejected is None:
             return INVALID
-        return IMPLAUSIBLE if self._document.is_implausible(row) else measurement.state
+        state = measurement.state
+        return IMPLAUSIBLE if state == ANNOTATED and self._document.is_implausible(row) else state
 
     def matches(self, row, state, text):
         """Whether a row has a state ('': any) and contains a text."""

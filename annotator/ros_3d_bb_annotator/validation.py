@@ -80,7 +80,12 @@ def truth_problems(document, index, truth_m):
     """Problems of a true position (x, y, z) before it is entered: lines of text, or an Outlier."""
     person = document.person_at(index, truth_m[0], truth_m[2])
     outlier = None if person is None else document.estimates.outlier(index, person, truth_m)
-    return view_problems(document, truth_m) + ([] if outlier is None else [outlier])
+    if outlier is None:
+        return view_problems(document, truth_m)
+    positions = document.estimates.of(index)
+    return view_problems(document, truth_m) + [outlier] + [
+        'it would be plausible for box %d' % (other + 1) for other, position_m in enumerate(positions)
+        if position_m is not None and document.estimates.outlier(index, other, truth_m) is None]
 
 
 def view_problems(document, truth_m):

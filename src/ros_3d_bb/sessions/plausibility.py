@@ -14,6 +14,7 @@ LIMIT_M, LIMIT_SIGMAS = 0.2, 6.0  # of the deviation with them: the larger of a 
 GROWTH_OUTSIDE = 0.2  # of the limit, per metre outside the other measurements
 TWICE_THE_VARIANCE_M = 3.0  # range at which stereo noise has doubled the variance of near people
 TUKEY, MAD_TO_SIGMA, LEAST_SIGMA_M, STEPS = 4.685, 1.4826, 0.02, 30
+CONVERGED = 1e-4  # metres, and metres per metre
 FACTORS = (1000.0, 100.0, 10.0, 0.1, 0.01, 0.001)  # of a wrong unit, or of a lost zero
 SLIPS = ((-1.0, 1.0),) + tuple(pair for factor in FACTORS for pair in ((1.0, factor), (factor, 1.0), (factor, factor)))
 
@@ -92,7 +93,9 @@ def _robust_line(values_m, error_m, noise, weights):
         residuals_m = scaled_m - columns.dot(line)
         sigma_m = max(MAD_TO_SIGMA * _weighted_median(np.abs(residuals_m), weights), LEAST_SIGMA_M)
         roots = np.sqrt(weights) * np.maximum(0, 1 - (residuals_m / (TUKEY * sigma_m)) ** 2)
-        line = np.linalg.lstsq(columns * roots[:, np.newaxis], scaled_m * roots, rcond=1e-9)[0]
+        previous, line = line, np.linalg.lstsq(columns * roots[:, np.newaxis], scaled_m * roots, rcond=1e-9)[0]
+        if np.abs(line - previous).max() < CONVERGED:
+            break
     return line, sigma_m
 
 
