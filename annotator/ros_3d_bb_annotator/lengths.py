@@ -27,7 +27,7 @@ def parse_length(text, unit):
 def number_text(length_m, unit, signed=False):
     """Format a length in 'mm' or 'm' without the unit, and with a minus sign as wide as the plus sign."""
     digits, value = (0, round(1000 * length_m)) if unit == 'mm' else (3, round(length_m, 3))
-    return (('%+.*f' if signed else '%.*f') % (digits, value + 0.0)).replace('-', '\u2212')
+    return (('%+.*f' if signed and value else '%.*f') % (digits, value + 0.0)).replace('-', '\u2212')
 
 
 def length_text(length_m, unit, signed=False):

@@ -77,7 +77,7 @@ def test_the_recorded_positions_are_analysed(tmp_path):
         document.set_truth(index, x_mm / 1000.0, z_mm / 1000.0)
     analysed = analyse(document)
     assert analysed.folder == str(tmp_path / 'analysis') and 'error_model.yaml' in os.listdir(analysed.folder)
-    assert analysed.text.startswith('f(z) = ') and len(analysed.figure_paths) == 7
+    assert analysed.text.startswith('f(z) = ') and len(analysed.figures) == 8
     with pytest.raises(ValueError, match='recorded'):
         analyse(document, estimator='foreground')
 

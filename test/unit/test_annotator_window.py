@@ -8,7 +8,7 @@ import pytest
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.measurement import Mark
 from support.small_session import FAR_BOX, NEAR_BOX, change_json
-from support.window import ALT, CONTROL, SHIFT, Qt, QtCore, QtWidgets, opened
+from support.window import ALT, CONTROL, SHIFT, Qt, QtCore, QtGui, QtWidgets, opened
 
 
 def place_in(view, x, y):
@@ -118,7 +118,7 @@ def test_a_drag_moves_what_both_views_show(drive):
 def test_the_readout_contains_pixel_depth_and_position(drive, folder):
     drive.press(Qt.Key_F3, *[Qt.Key_Left, (Qt.Key_Right, CONTROL)])
     assert drive.window.pane.readout.text() == (
-        'pixel (23, 24)    depth 2000 mm    X −300 mm  Y +0 mm  Z 2000 mm')
+        'pixel (23, 24)    depth 2000 mm    X −300 mm  Y 0 mm  Z 2000 mm')
     cv2.imwrite(os.path.join(folder, 'depth', 'm0.png'), np.zeros((48, 64), np.uint16))
     drive.press(Qt.Key_F5, Qt.Key_F3, Qt.Key_Left)
     assert drive.window.pane.readout.text().endswith('no depth')
@@ -149,6 +149,27 @@ def test_marks_are_edited_in_a_dialog_and_selected_by_the_keyboard(drive, folder
     assert opened(folder)[0].truth_m == (-0.5, None, 2)
     drive.press((Qt.Key_Z, CONTROL), (Qt.Key_Z, CONTROL))
     assert Document.open(folder).grid == (Mark('A1', -0.5, 2.0),)
+
+
+def test_marks_are_pasted_read_from_files_and_generated(drive, folder, tmp_path):
+    (tmp_path / 'marks.csv').write_text('name,x,z\nD1,1 m,2 m\n')
+
+    def edit(dialog):
+        QtGui.QGuiApplication.clipboard().setText('B1\t0\t2000')
+        dialog.paste()
+        dialog.open(str(tmp_path / 'marks.csv'))
+        dialog.x_field.setText('100 200')
+        dialog.z_field.setText('3000')
+        dialog.add_grid()
+        assert 'not unique' in dialog.problem.text()  # the grid has a B1 as well
+        dialog.x_field.setText('100')
+        dialog.remove_current()
+        dialog.table.setCurrentCell(0, 0)
+        dialog.remove_current()
+        dialog.add_grid()
+        dialog.accept()
+    drive.answer(edit, lambda: drive.press((Qt.Key_G, CONTROL)))
+    assert Document.open(folder).grid == (Mark('B1', 0, 2), Mark('D1', 1, 2), Mark('A1', 0.1, 3))
 
 
 def test_invalid_marks_are_rejected(drive, folder):

@@ -66,6 +66,7 @@ def _layout(path, measurements):
         axes.annotate('%d' % count, place_m, (5, 4), textcoords='offset points', fontsize=8)
     axes.plot(0, 0, '^', color='0.3', markersize=11, label='camera')
     axes.set_aspect('equal', 'datalim')
+    axes.margins(0.1)
     _finish(figure, axes, path, 'X [m]', 'Z [m]')
 
 

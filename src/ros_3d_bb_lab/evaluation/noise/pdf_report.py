@@ -12,7 +12,7 @@ from matplotlib.backends.backend_pdf import PdfPages  # noqa: E402
 WIDTH_IN, HEIGHT_IN, MARGIN_IN = 8.27, 11.69, 0.8
 TEXT_PT, SMALL_PT, HEADING_PT, TITLE_PT = 9, 8, 13, 18
 LINE = 1.45  # relative to the size of the text
-CHARACTER = 0.50  # mean width of a character, relative to its height
+CHARACTER, CELL_CHARACTER = 0.50, 0.60  # mean width of characters in text, and in short cells, relative to height
 POINTS = 72.0
 LARGEST_FIGURE_IN = 4.6
 
@@ -80,10 +80,11 @@ class _Writer(object):
         """Write a table with its caption above. Cells of the last column are wrapped."""
         columns = list(zip(table.header, *table.rows))
         widths = [max(map(len, cells)) + 2 for cells in columns]
-        full = (WIDTH_IN - 2 * MARGIN_IN) * POINTS / CHARACTER
+        full = (WIDTH_IN - 2 * MARGIN_IN) * POINTS / CELL_CHARACTER
         last = max(20, int(full / SMALL_PT) - sum(widths[:-1]))
         size_pt = min(SMALL_PT, full / (sum(widths[:-1]) + min(widths[-1], last)))
-        self.keep(0.8)
+        height_in = size_pt * LINE / POINTS * (len(table.rows) + 2)
+        self.keep(height_in if height_in < HEIGHT_IN / 3 else 0.8)
         self.write(table.caption, SMALL_PT, color='0.3')
         for number, row in enumerate((table.header,) + tuple(table.rows)):
             wrapped = textwrap.wrap(row[-1], last) or ['']
@@ -91,7 +92,7 @@ class _Writer(object):
             x_in = MARGIN_IN
             for cell, width in zip(row[:-1], widths):
                 self._put(cell, x_in, size_pt, weight='bold' if number == 0 else 'normal')
-                x_in += width * CHARACTER * size_pt / POINTS
+                x_in += width * CELL_CHARACTER * size_pt / POINTS
             for line in wrapped:
                 self._put(line, x_in, size_pt, weight='bold' if number == 0 else 'normal')
                 self.skip(size_pt * LINE / POINTS)

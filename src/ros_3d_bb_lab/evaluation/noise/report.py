@@ -97,7 +97,7 @@ def _setup(analysis):
             ('measurements from', ', '.join(sorted(set(str(table.name) for table in (
                 inputs.z, inputs.x, inputs.x_variance))))),
             ('measurements', '%d used with X and Z, at %d positions' % (len(complete.truth_m), positions)),
-            ('left out', '%d rejected or unusable, %d outliers' % (len(inputs.z.left_out), len(inputs.outliers)))]
+            ('left out', 'rejected or unusable: %d, outliers: %d' % (len(inputs.z.left_out), len(inputs.outliers)))]
     if camera is not None:
         rows += [('image', '%d × %d pixels' % camera[:2]), ('focal lengths', 'fx %.2f, fy %.2f pixels' % camera[2:4]),
                  ('principal point', 'cx %.2f, cy %.2f pixels' % camera[4:6]),

@@ -1,0 +1,33 @@
+"""Floor marks from tables as text, and grids of marks."""
+import pytest
+
+from ros_3d_bb_annotator.marks import grid_of, parse_marks
+from ros_3d_bb_annotator.measurement import Mark
+
+MARKS = (Mark('A1', -0.6, 1.5), Mark('B1', 0.0, 1.5))
+
+
+@pytest.mark.parametrize('text', [
+    'A1, -600, 1500\nB1, 0, 1500', 'name,x,z\n"A1",-600,1500\n\n"B1",0,1500\n', 'A1\t-600\t1500\r\nB1\t0\t1500',
+    'A1;-0,6 m;1,5 m\nB1;0;1500', 'Mark X Z\nA1 -60cm 150cm\nB1 0 1.5m'])
+def test_tables_are_parsed(text):
+    assert parse_marks(text) == MARKS
+
+
+@pytest.mark.parametrize('text,named', [
+    ('A1, -600', 'line 1 is'), ('A1, -600, 1500\nB1, far, 1500', "line 2: 'far' is not a length"),
+    ('A1, -600, -1500', 'line 1: Z is -1500; more than 0'), ('A1, 0, 0', 'more than 0'),
+    ('A1, 0, 900000', 'at most 100 m'),
+    (', 0, 1500', 'the name is empty'), ('A1, 0, 1500\na1, 0, 2000', 'a1 is not unique'), ('A1, nan, 1500', 'nan')])
+def test_invalid_tables_are_rejected(text, named):
+    with pytest.raises(ValueError, match=named):
+        parse_marks(text)
+
+
+def test_a_grid_has_columns_and_rows():
+    marks = grid_of('-600 0; 0.6m', '1500 2m')
+    assert [mark.name for mark in marks] == ['A1', 'B1', 'C1', 'A2', 'B2', 'C2']
+    assert marks[0] == Mark('A1', -0.6, 1.5) and marks[5] == Mark('C2', 0.6, 2.0)
+    for x_texts, z_texts in (('', '1500'), ('0', ''), ('0', '-1'), ('a', '1')):
+        with pytest.raises(ValueError):
+            grid_of(x_texts, z_texts)
