@@ -109,6 +109,15 @@ class Filter(QtCore.QSortFilterProxyModel):
         return not (self.state or self.text) or self.sourceModel().matches(row, self.state, self.text)
 
 
+class Table(QtWidgets.QTableView):
+    """Table whose selection is extended by the user only, not while the window goes on with Ctrl or Shift pressed."""
+
+    def selectionCommand(self, index, event=None):  # noqa: N802 (Qt's name)
+        if event is None:
+            return QtCore.QItemSelectionModel.ClearAndSelect | QtCore.QItemSelectionModel.Rows
+        return super(Table, self).selectionCommand(index, event)
+
+
 class MeasurementList(QtWidgets.QWidget):
     """List with a filter. `chosen` is emitted with the index of the measurement that the user selects."""
 
@@ -161,7 +170,7 @@ class MeasurementList(QtWidgets.QWidget):
         self.blockSignals(False)
 
     def _make_table(self):
-        table = QtWidgets.QTableView()
+        table = Table()
         table.setModel(self._filter)
         table.setSelectionBehavior(QtWidgets.QTableView.SelectRows)
         table.setSelectionMode(QtWidgets.QTableView.ExtendedSelection)

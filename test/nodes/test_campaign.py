@@ -160,7 +160,7 @@ def test_the_bag_contains_the_measured_images(campaign, folder):
 def test_the_table_contains_the_errors_of_the_campaign_to_the_millimetre(annotated, tmp_path):
     session, expected = annotated
     table = str(tmp_path / 'table.csv')
-    assert run_annotator('--export', table, session) == '%s: %d measurements\n' % (table, len(expected))
+    assert run_annotator('--export', table, '--thesis-form', session) == '%s: %d rows\n' % (table, len(expected))
     with open(table) as stream:
         rows = [{name: int(text) / 1000.0 for name, text in row.items()} for row in csv.DictReader(stream)]
     written = np.array([[row[name] for name in ('X measured', 'Z measured', 'X true', 'Z true', 'X error', 'Z error')]
