@@ -11,6 +11,7 @@ from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, Detection
+from support.cylinders import mounted
 
 CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)  # sees x from -0.6 to 0.6 of the depth
 VIEW = CameraView(transform_from((0, 0, 1), OPTICAL_ROTATION), CAMERA)
@@ -350,3 +351,51 @@ def test_the_height_of_a_person_is_constant_on_a_slope(slope, cut, height):
     assert set(ids(objects)[0] for objects in published[4:]) == {1}
     assert all(abs(objects[0].size_m[2] - 1.7) < 0.1 for objects in published[4:])
     assert published[-1][0].position_m[2] == pytest.approx(0.85 + slope * 7.97, abs=0.05)
+
+
+CROWD = np.array([(2.5, 0.8), (3, -0.6), (3.5, 0.3), (4.5, -1.2), (5, 1)])
+CROWD_MPS = np.array([(0, 0), (0.2, 0.3), (-0.6, 0), (0, 0.8), (0.5, -0.5)])
+
+
+def turned(points, angle):
+    return points.dot([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+
+
+@pytest.mark.parametrize('rate_hz', [5, 30])
+@pytest.mark.parametrize('jump_m,angle', [((0, 0.5), 0), ((0.5, 0), 0), ((-0.35, 0.35), 0), ((0, 0), 0.12),
+                                          ((0.3, 0.2), -0.1)])
+def test_people_keep_their_ids_when_the_odometry_jumps(jump_m, angle, rate_hz):
+    random = np.random.RandomState(1)
+
+    def places(time_s):
+        return turned(CROWD + time_s * CROWD_MPS, angle * (time_s >= 1)) + np.multiply(jump_m, time_s >= 1)
+
+    def detections(time_s):
+        return [at(*place) for place in places(time_s) + random.normal(0, 0.02, CROWD.shape)]
+    tracker = Tracker()
+    before = play(tracker, 1, detections, rate_hz)[-1]
+    jumped = mounted(1, yaw_deg=np.degrees(angle))
+    jumped[:2, 3] = jump_m
+    after = play(tracker, 1, detections, rate_hz, 1, CameraView(jumped, CAMERA))
+    assert ids(before) == [1, 2, 3, 4, 5] and tracker.common_motions == 1
+    for frame, objects in enumerate(after):
+        assert ids(objects) == ids(before)
+        errors_m = np.array([track.position_m[:2] for track in objects]) - places(1 + frame / rate_hz)
+        assert np.linalg.norm(errors_m, axis=1).max() < 0.1
+    speeds_mps = np.array([track.velocity_mps[:2] for track in after[-1]])
+    np.testing.assert_allclose(speeds_mps, turned(CROWD_MPS, angle), atol=0.25)
+
+
+def test_people_who_move_differently_do_not_move_the_frame():
+    """Two of five jump by 0.5 m; the others, and a sixth one who is not detected in that image, do not."""
+    jumps_m = np.array([(0, 0.5), (0, 0.5), (0, 0), (0, 0), (0, 0)])
+
+    def detections(time_s):
+        hidden = [at(3, 1.5)] if time_s < 1 else []
+        return hidden + [at(*place) for place in CROWD + jumps_m * (time_s >= 1)]
+    tracker = Tracker()
+    play(tracker, 1, detections)
+    after = play(tracker, 0.2, detections, start_s=1)
+    assert not tracker.common_motions
+    for place in CROWD[2:]:
+        assert min(np.linalg.norm(track.position_m[:2] - place) for track in after[0]) < 0.02

@@ -52,6 +52,15 @@ def test_a_backward_jump_in_time_is_handled_once(rig):
     assert rig.send(stamp_ns - 19 * NS + PERIOD_NS).header.stamp < time_from(stamp_ns)
 
 
+def test_a_jump_of_the_odometry_is_reported_once(rig):
+    """All people are at offset positions from one image on, because the pose of the camera is wrong."""
+    places_m = np.array([(-1, 0, 3), (0, 0, 4), (1.5, 0, 5)])
+    for frame in range(60):
+        rig.add_boxes(boxes(START_NS + frame * PERIOD_NS, centers_m=places_m + (0.6 * (frame >= 30), 0, 0)), 0)
+    assert rig.events.counts['common motion compensated'] == 1
+    assert ids(rig.newest) == [1, 2, 3]
+
+
 def test_an_optical_target_frame_is_rejected():
     """By its name when the tracker starts, by that of the boxes when they arrive."""
     with pytest.raises(ValueError, match='camera_rgb_optical_frame is an optical frame.*camera_height'):

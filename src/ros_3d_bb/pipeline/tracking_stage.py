@@ -169,9 +169,14 @@ class TrackingStage(object):
             raise ValueError('none of their %d boxes is valid; tracks are kept as they are' % len(faults))
         if camera:
             self._check_frame(message.header.frame_id, camera)
+        motions = self._tracker.common_motions
         tracks = self._tracker.update(stamp_ns, detections_from_msg(message, fixed_from_camera, usable, self._classes),
                                       self._view(message.header, fixed_from_camera, camera, camera_name))
         self._events.count('images tracked')
+        if self._tracker.common_motions > motions:
+            self._events.warn('common motion compensated', 'the people at %.3f jumped together: the pose of the camera '
+                              'in %s jumped, as after an error of the odometry; all tracks are moved with them'
+                              % (stamp_ns / NS, self._params.target_frame))
         newest_ns = self._clocks.track(stamp_ns, camera)
         self._on_tracks(tracks, Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame))
 

@@ -45,6 +45,8 @@ class ThesisTracker(object):
         If a parameter is invalid; the message names it.
     """
 
+    common_motions = 0  # as of `Tracker`; not recognised
+
     def __init__(self, params=ThesisTrackerParams(), last_id=0, classes=ObjectClasses()):
         self._classes = classes
         self.reconfigure(params)

@@ -2,7 +2,8 @@
 
 Each person is tracked by a constant-velocity Kalman filter in the plane (`kalman_filter`). Detections are assigned to
 tracks by maximum total likelihood (`association`). A detection that a new target explains better starts a track, which
-is published once it is likely to be a person (`track_score`). Undetected people are not dropped immediately: their
+is published once it is likely to be a person (`track_score`). If most people seem to jump in the same way, the pose of
+the camera jumped, and all tracks are moved (`common_motion`). Undetected people are not dropped immediately: their
 tracks stay published for a short time if a camera should detect them, and for longer if a person or an object occludes
 them (`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep their track ID.
 """
@@ -16,6 +17,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter, track_score
 from ros_3d_bb.tracking.association import associate, unmatched
 from ros_3d_bb.tracking.class_numbers import ClassNumbers
+from ros_3d_bb.tracking.common_motion import common_motion, move
 from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
 from ros_3d_bb.tracking.occlusion import SEEN, CameraVisibility, mark_missed
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
@@ -71,13 +73,14 @@ class TrackerParams(NamedTuple):
 
 
 class _State(NamedTuple):
-    """State of the tracker after an image: the tracks, the stamp of the latest image, and the `CameraVisibility` of the
-    latest image of each camera.
+    """State of the tracker after an image: the tracks, the stamp of the latest image, the `CameraVisibility` of the
+    latest image of each camera, and the number of images with a common motion.
     """
 
     tracks: np.ndarray
     now_ns: int
     cameras: dict
+    common_motions: int
 
 
 class Tracker(object):
@@ -100,7 +103,7 @@ class Tracker(object):
         self._start(last_id)
 
     def _start(self, last_id):
-        self._buffer = OutOfSequenceBuffer(self._step, _State(np.zeros(0, TRACK), None, {}), last_id)
+        self._buffer = OutOfSequenceBuffer(self._step, _State(np.zeros(0, TRACK), None, {}, 0), last_id)
 
     def reconfigure(self, params, noise, prediction):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
@@ -138,6 +141,11 @@ class Tracker(object):
         self._buffer.insert(DetectedImage(stamp_ns, tuple(detections), view))
         return self.objects()
 
+    @property
+    def common_motions(self):
+        """Number of images in which the pose of the camera jumped (`common_motion`), since the last reset."""
+        return self._buffer.state.common_motions
+
     def objects(self):
         """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image."""
         tracks, params = self._buffer.state.tracks, self._params
@@ -161,6 +169,10 @@ class Tracker(object):
         period_s = (stamp_ns - state.cameras[camera].stamp_ns) / NS if camera in state.cameras else 0.0
         measurements = measurements_of(detections, view, period_s, self._noise, classes)
         rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
+        motion = common_motion(tracks, measurements, rows, columns, view, classes)
+        if motion is not None:
+            move(tracks, *motion, view)
+            rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
         matches = list(zip(tracks['id'][rows].tolist(), tracks['confirmed'][rows].tolist(), columns.tolist()))
         update_matched(tracks, rows, measurements[columns], stamp_ns, params, classes)
 
@@ -183,4 +195,4 @@ class Tracker(object):
         for name, latest in cameras.items():
             added = np.full(len(new), SEEN if name == camera else OUT_OF_VIEW)
             cameras[name] = latest._replace(visibility=np.concatenate((latest.visibility[kept], added)))
-        return _State(tracks, stamp_ns, cameras), matches
+        return _State(tracks, stamp_ns, cameras, state.common_motions + (motion is not None)), matches

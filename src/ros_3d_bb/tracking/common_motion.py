@@ -1,0 +1,108 @@
+"""Common motion: if most people seem to jump in the same way, the pose of the camera jumped, and not the people.
+
+A motion (3,) is a translation in the plane and a rotation about the camera, (x, y, angle), metres and radians. Each
+pair of a track and a measurement votes for the motions that explain it alone (as in RANSAC, Fischler and Bolles 1981).
+The best one is refined by least squares, weighted with the covariances of the innovations.
+"""
+import numpy as np
+
+from ros_3d_bb.tracking.types import VISIBLE
+
+# Squared Mahalanobis distances of innovations below which 90 % and 99 % lie (chi-square, 2 degrees of freedom).
+USUAL, GATE = 4.6, 9.2
+SIGNIFICANT = 25.0  # squared Mahalanobis distance of a motion: 1 of 60000 is larger by chance (3 degrees of freedom)
+FEWEST = 3  # people: two may turn or stop together
+MOST = 12  # people who vote, to limit the computing time
+LEAST_M, LARGEST_M = 0.1, 1.0  # of the jump of a person: less is left to the filter, more may be another person
+PRIOR_STD = np.array([0.5, 0.5, 0.1])  # of a jump; keeps the fit of people in one direction well-conditioned
+FITS = 3  # the pairs are selected and the motion is fitted this many times
+
+
+def common_motion(tracks, measurements, rows, columns, view, classes):
+    """Motion of the frame since the previous image, and its covariance (3, 3). None unless less than half of the
+    people who were visible before fit their measurements, and one motion explains two thirds of them.
+
+    `tracks` are predicted to the image. `rows` and `columns` are the pairs of tracks and measurements that were
+    associated without a motion.
+    """
+    was_visible = tracks['confirmed'] & (tracks['status'] == VISIBLE)
+    visible = np.flatnonzero(was_visible)
+    if len(visible) < FEWEST or len(measurements) < FEWEST:
+        return None
+    is_far = (np.abs(tracks['mean'][rows, :2] - measurements['position_m'][columns]) > LEAST_M).any(axis=1)
+    is_fit = was_visible[rows] & ~is_far
+    if 2 * np.count_nonzero(is_fit) >= len(visible):
+        return None
+    far = np.flatnonzero(was_visible[rows] & is_far)
+    distances2 = _distances2(*_innovations(tracks[rows[far]], measurements[columns[far]]))
+    if 2 * (np.count_nonzero(is_fit) + np.count_nonzero(distances2 < USUAL)) >= len(visible):
+        return None
+    return _estimate(tracks[visible[:MOST]], measurements, view, classes)
+
+
+def move(tracks, motion, covariance, view):
+    """Apply a motion of the frame and its covariance to tracks, in place."""
+    jacobians = _jacobians(tracks['mean'][:, :2], view)
+    tracks['mean'][:, :2] += jacobians.dot(motion)
+    tracks['covariance'][:, :2, :2] += jacobians @ covariance @ jacobians.transpose(0, 2, 1)
+
+
+def _estimate(tracks, measurements, view, classes):
+    innovations, inverses = _innovations(tracks[:, None], measurements)
+    allowed = np.linalg.norm(innovations, axis=2) < LARGEST_M
+    allowed &= classes.group[tracks['class_number']][:, None] == classes.group[measurements['class_number']]
+    if not allowed.any():
+        return None
+    jacobians = _jacobians(tracks['mean'][:, :2], view)
+    motions = _motions_of_one(innovations, jacobians)[allowed].reshape(-1, 3)
+    for _fit in range(FITS):
+        rows, columns = _explained(motions, innovations, inverses, jacobians, allowed)
+        if len(set(columns.tolist())) < FEWEST or 3 * len(rows) < 2 * len(tracks):
+            return None
+        motion, covariance = _least_squares(innovations[rows, columns], inverses[rows, columns], jacobians[rows])
+        motions = motion[None]
+    return (motion, covariance) if motion.dot(np.linalg.solve(covariance, motion)) > SIGNIFICANT else None
+
+
+def _motions_of_one(innovations, jacobians):
+    """The translation and the rotation (n, m, 2, 3) that explain each innovation (n, m, 2)."""
+    motions = np.zeros(innovations.shape[:2] + (2, 3))
+    motions[..., 0, :2] = innovations
+    turns = jacobians[:, None, :, 2]
+    motions[..., 1, 2] = (turns * innovations).sum(axis=2) / np.maximum((turns ** 2).sum(axis=2), 1e-6)
+    return motions
+
+
+def _explained(motions, innovations, inverses, jacobians, allowed):
+    """Rows and columns of the pairs that the best one of the motions (k, 3) explains."""
+    residuals = innovations - (jacobians @ motions.T).transpose(2, 0, 1)[:, :, None]
+    distances2 = np.where(allowed, _distances2(residuals, inverses), np.inf)
+    nearest = distances2.min(axis=2)
+    best = np.minimum(nearest, GATE).sum(axis=1).argmin()
+    rows = np.flatnonzero(nearest[best] < GATE)
+    return rows, distances2[best, rows].argmin(axis=1)
+
+
+def _least_squares(innovations, inverses, jacobians):
+    weighted = jacobians.transpose(0, 2, 1) @ inverses
+    covariance = np.linalg.inv(np.diag(PRIOR_STD ** -2) + (weighted @ jacobians).sum(axis=0))
+    return covariance.dot((weighted @ innovations[..., None]).sum(axis=0)[:, 0]), covariance
+
+
+def _jacobians(positions_m, view):
+    """Derivatives (n, 2, 3) of positions (n, 2) by a motion."""
+    x_m, y_m = (positions_m - view.fixed_from_camera[:2, 3]).T
+    jacobians = np.zeros((len(positions_m), 2, 3))
+    jacobians[:, [0, 1], [0, 1]] = 1
+    jacobians[:, 0, 2], jacobians[:, 1, 2] = -y_m, x_m
+    return jacobians
+
+
+def _innovations(tracks, measurements):
+    """Innovations (..., 2) and the inverses (..., 2, 2) of their covariances."""
+    covariances = tracks['covariance'][..., :2, :2] + measurements['noise_m2']
+    return measurements['position_m'] - tracks['mean'][..., :2], np.linalg.inv(covariances)
+
+
+def _distances2(innovations, inverses):
+    return ((inverses @ innovations[..., None])[..., 0] * innovations).sum(axis=-1)
