@@ -16,6 +16,7 @@ from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.detection.onnx.model_settings import ModelSettings, settings_from
 from support.code_blocks import claimed
 from support.onnx_files import outputs_of, write_constant_network
+from support.recordings import write_recording
 
 DEMO_AND_TESTS = claimed('./run demo\n./run test')
 BUILD = claimed('./run build')
@@ -36,10 +37,11 @@ STAMPED = claimed('message = Int32MultiArray', 'python')
 # Options that shorten a benchmark.
 BENCHMARKS = [(claimed('./run bench accuracy --boxes'), ''), (claimed('./run bench accuracy --scenarios'), ''),
               (claimed('./run bench scenes'), ''), (claimed('./run bench speed\n'), ' --images 1'),
-              (claimed('./run bench tracking'), ' --seconds 3 --repetitions 1'),
+              (claimed('./run bench tracking --seed'), ' --seconds 3 --repetitions 1'),
               (claimed('./run bench latency'), ' --cases free --seconds 2')]
 DETECTOR_SPEED = claimed('./run bench speed --weights')
 DETECTORS = claimed('./run bench detector')
+DETECTIONS = claimed('./run bench tracking --detections')
 YAML = [claimed('max_obstacles:', 'yaml')]
 MODEL_SETTINGS = [claimed('# %s.yaml' % name, 'yaml') for name in (
     'yolo11n', 'people_yolov7', 'yolox_legacy', 'nanodet', 'picodet_s_416', 'with_nms')]
@@ -179,6 +181,12 @@ def test_detectors_are_compared(reader, clone, data):
     write_constant_network(reader.home / 'yolox_nano.onnx', outputs)
     printed = reader.types(DETECTORS, clone, appended=' --every 50', ROS_3D_BB_DATA=data)
     assert re.search(r'^yolox_nano.onnx  *0 .*^depth ', printed, re.DOTALL | re.MULTILINE)
+
+
+def test_trackers_are_compared_on_recorded_detections(reader, clone, tmp_path):
+    folder = str(write_recording(tmp_path / 'one'))
+    printed = reader.types(DETECTIONS, clone, replaced=[('DIR', folder)])
+    assert re.search(r'^  one  *31 images, HOTA ours \d', printed, re.MULTILINE), printed
 
 
 def test_stamp_and_frame_in_the_layout_of_2d_boxes():
