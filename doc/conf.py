@@ -2,7 +2,6 @@
 
 The root of the repository is the folder of the sources, so that Sphinx checks every link between pages, and to files.
 """
-import glob
 import os
 import re
 
@@ -10,8 +9,6 @@ from docutils import nodes
 from latex2mathml.converter import convert
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-FIRST = ['architecture', 'frames_and_time', 'error_model', 'tracking', 'session', 'decisions', 'glossary',
-         'launch_files']
 LINK = re.compile(r'\[([^\]]*)\]\(([^)\s#]+)\)')
 
 project = 'ros_3d_bb'
@@ -32,25 +29,25 @@ html_show_sphinx = html_show_copyright = html_copy_source = False
 html_math_renderer = 'mathml'
 
 
-def _names(folder):
-    """The pages in a folder, as Sphinx names them."""
-    paths = glob.glob(os.path.join(ROOT, folder, '*.md'), recursive=True)
-    names = [os.path.relpath(path, ROOT)[:-len('.md')] for path in paths]
-    return sorted(names, key=lambda name: (not name.endswith('index'), name))
+def _navigation(source):
+    """The sections of the first page as Sphinx's navigation: captions, and the pages to which the sections link."""
+    captions = []
+    for section in source.split('\n## ')[1:]:
+        paths = [os.path.join('doc', link.group(2)) for link in LINK.finditer(section)]
+        captions.append((section.splitlines()[0], paths))
+    names = os.listdir(os.path.join(ROOT, 'doc', 'nodes'))
+    captions.append(('Nodes', sorted('doc/nodes/' + name for name in names if name != 'index.md')))
+    return [(caption, ['/' + os.path.normpath(path)[:-len('.md')] for path in paths]) for caption, paths in captions]
 
 
 def _prepare(_app, name, source):
-    """Tell Sphinx the order of the pages, and keep only the words of links to folders, which no site has."""
+    """Tell Sphinx the navigation, and keep only the words of links to folders, which no site has."""
     here = os.path.dirname(os.path.join(ROOT, name))
     source[0] = LINK.sub(
         lambda link: link.group(1) if os.path.isdir(os.path.join(here, link.group(2))) else link.group(), source[0])
     if name == root_doc:
-        first = ['doc/' + page for page in FIRST]
-        others = [other for other in _names('doc') + _names('config/**') if other not in first + [root_doc]]
-        for caption, names in (('How it works', ['README', 'CONTRIBUTING'] + first), ('More', others),
-                               ('Nodes', _names('doc/nodes'))):
-            pages = '\n'.join('/' + page for page in names)
-            source[0] += '\n```{toctree}\n:hidden:\n:caption: %s\n\n%s\n```\n' % (caption, pages)
+        for caption, pages in _navigation(source[0]):
+            source[0] += '\n```{toctree}\n:hidden:\n:caption: %s\n\n%s\n```\n' % (caption, '\n'.join(pages))
 
 
 def _write_inline(self, node):

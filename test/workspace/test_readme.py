@@ -11,12 +11,12 @@ import xml.etree.ElementTree as ElementTree
 
 import pytest
 
+from ros_3d_bb.planning.planner_outputs import NAMES, OPTIONAL
 from support.code_blocks import PAGES, ROOT, claimed, unclaimed
 from support.pages import node_pages
 
 NAMED = PAGES + ('doc/error_model.md',)  # its blocks are the record of a campaign
-BENCHMARKS = ['| | here | thesis', '| | `ours` | `thesis`', '| case | markers | 50 %']
-DRAWING = claimed('camera/color/image_raw ──►', 'text')
+DRAWING, CITATION = claimed('camera/color/image_raw ──►', 'text'), claimed('@mastersthesis', 'bibtex')
 FORMAT = re.compile(r'%[-+\d.]*[a-zA-Z]')
 
 
@@ -41,10 +41,16 @@ def rows_below(page, header):
     return [cells_of(line) for line in lines[:ends[0]]]
 
 
-def table_of(page, beginning):
-    """{first cell of a row: {heading: cell}} of the only table whose first line begins like this."""
-    header, = [line for line in text_of(page).splitlines() if line.startswith(beginning)]
-    return {row[0]: dict(zip(cells_of(header)[1:], row[1:])) for row in rows_below(page, header)}
+def section_of(page, title):
+    """Text below the heading of the second level."""
+    _before, text = text_of(page).split('\n## %s\n' % title)
+    return text.split('\n## ')[0]
+
+
+def figures_in(text):
+    """Words of all table cells."""
+    return set(word for line in text.splitlines() if line.startswith('|')
+               for cell in cells_of(line) for word in [cell] + re.split('[, ]+', cell))
 
 
 def topics_of_nodes(*sections):
@@ -68,7 +74,7 @@ def test_nodes_and_topics_of_the_drawing_exist():
 
 def test_topics_of_the_table_are_published_with_their_types():
     published = topics_of_nodes('Publishes')
-    rows = rows_below('README.md', '| topic | type | |')
+    rows = rows_below('doc/topics.md', '| topic | type | |')
     assert len(rows) > 8
     for topics, kind, _meaning in rows:
         for topic in re.findall(r'`([^`]+)`', topics):
@@ -78,19 +84,43 @@ def test_topics_of_the_table_are_published_with_their_types():
                 assert topic in published and kind in ('`%s`' % published[topic], ''), topic
 
 
-def test_services_of_the_readme_are_those_of_the_nodes():
-    named = re.findall(r'`(\w+_node/\w+)`(?: and `(\w+_node/\w+)`)? \(`(std_srvs/\w+)`\)', prose_of('README.md'))
+def test_services_of_the_table_are_those_of_the_nodes():
+    named = re.findall(r'`(\w+_node/\w+)`(?: and `(\w+_node/\w+)`)? \(`(std_srvs/\w+)`\)', prose_of('doc/topics.md'))
     found = {name: kind for *names, kind in named for name in names if name}
     assert len(found) == 3 and found.items() <= topics_of_nodes('Services').items()
 
 
-@pytest.mark.parametrize('beginning', BENCHMARKS)
-def test_figures_of_the_readme_are_those_of_the_benchmarks(beginning):
-    measured = table_of('doc/benchmarks.md', beginning)
-    shown = table_of('README.md', beginning)
-    assert len(shown) > 2
-    for name, figures in shown.items():
-        assert figures.items() <= measured[name].items(), name
+def test_the_readme_is_short_and_has_three_tables():
+    lines = text_of('README.md').splitlines()
+    assert len(lines) < 200
+    assert len([line for line in lines if line.startswith('|---')]) == 3
+
+
+def test_figures_of_the_readme_are_those_of_the_benchmarks():
+    lines = [line for line in section_of('README.md', 'Accuracy and speed').splitlines() if line.startswith('- ')]
+    assert len(lines) == 5
+    for line in lines:
+        heading = re.search(r'benchmarks\.md#([\w-]+)', line).group(1).replace('-', ' ').capitalize()
+        figures = re.findall(r'\*\*(.+?)\*\*', line)
+        assert figures and set(figures) <= figures_in(section_of('doc/benchmarks.md', heading)), line
+
+
+def test_planners_of_the_readme_are_the_outputs_of_the_bridge():
+    shown = {row[0].strip('`'): row[2] for row in rows_below('README.md', '| `planner:=` | for | package needed | '
+                                                             'tested with |')}
+    assert set(shown) == set(NAMES)
+    for name, topic in rows_below('doc/planners.md', '| `planner:=` | topic, type |'):
+        output = OPTIONAL.get(name.strip('`'))
+        assert output is None or (topic == '`%s`, `%s`' % (output.topic, output.kind)
+                                  and shown[name.strip('`')] == '`%s`' % output.kind.split('/')[0])
+
+
+def test_the_citation_is_bibtex_of_the_thesis():
+    fields = dict(re.findall(r'^  (\w+) = {(.*)},?$', CITATION.text, re.MULTILINE))
+    assert CITATION.text.count('{') == CITATION.text.count('}') and CITATION.text.endswith('}\n}\n')
+    assert {'author', 'title', 'school', 'type', 'year'} <= set(fields)
+    source = ' '.join(section_of('doc/tracking.md', 'Sources').split())
+    assert fields['title'] in source and '%s %s' % (fields['school'].split(',')[0], fields['year']) in source
 
 
 def test_messages_in_the_table_of_symptoms_are_in_the_code():
@@ -101,7 +131,7 @@ def test_messages_in_the_table_of_symptoms_are_in_the_code():
             text = getattr(node, 'value', getattr(node, 's', None))  # `s` before Python 3.8
             if isinstance(text, str):
                 texts.append(FORMAT.sub('…', text))
-    rows = rows_below('README.md', '| what you see | cause | what to do |')
+    rows = rows_below('doc/troubleshooting.md', '| what you see | cause | what to do |')
     quoted = [message for row in rows for message in re.findall(r'`([^`]+)`', row[0]) if ' ' in message]
     assert len(quoted) > 10
     assert [message for message in quoted if not any(message in text for text in texts)] == []
@@ -119,7 +149,7 @@ def test_named_files_and_launch_arguments_exist(page):
 
 
 @pytest.mark.parametrize('page,header,launch_file', [
-    ('README.md', '| argument | |', 'pipeline.launch'), ('doc/realsense.md', '| argument | |', 'realsense.launch')])
+    ('doc/robot.md', '| argument | |', 'pipeline.launch'), ('doc/realsense.md', '| argument | |', 'realsense.launch')])
 def test_arguments_of_tables_are_those_of_the_launch_file(page, header, launch_file):
     tree = ElementTree.parse(os.path.join(ROOT, 'launch', launch_file))
     known = set(argument.get('name') for argument in tree.getroot().findall('arg'))
@@ -128,7 +158,7 @@ def test_arguments_of_tables_are_those_of_the_launch_file(page, header, launch_f
 
 
 def test_figures_of_other_work_name_their_source():
-    rows = rows_below('README.md', '| | they | here |')
+    rows = rows_below('doc/benchmarks.md', '| | they | here |')
     assert len(rows) > 4
     for source, _they, _here in rows:
         assert re.search(r'thesis, chapter \d|\]\(https://\S+\)', source), source

@@ -1,4 +1,5 @@
 """Each command of the README and of doc/ that starts nodes, on its own master: its topics receive messages."""
+import math
 import re
 import subprocess
 import sys
@@ -31,6 +32,7 @@ PLANNER = claimed('roslaunch ros_3d_bb pipeline.launch weights:=$HOME/yolov5n.pt
 PLANNER_POINTS = claimed('rostopic echo -n 1 /planner_bridge_node')
 DIAGNOSTICS = claimed('rostopic echo -n 1 /diagnostics')
 LIVE = [claimed('rosrun dynamic_reconfigure dynparam set /tracker_node ' + beginning) for beginning in ('pred', '"{')]
+MOUNT = claimed('rosrun tf2_ros static_transform_publisher')
 SLIDERS = claimed('rosrun rqt_reconfigure')
 SIMULATION = claimed('roslaunch ros_3d_bb simulation.launch scenario:=')
 DOCTOR = claimed('rosrun ros_3d_bb doctor\n')
@@ -43,6 +45,18 @@ def test_jackal_launch_starts_camera_tracker_and_planner_bridge(reader, camera_b
     with reader.running(JACKAL, READER_BAG=camera_bag) as graph:
         graph.start(['rosrun', 'tf2_ros', 'static_transform_publisher', *'0 0 0 0 0 0 odom base_link'.split()])
         graph.hears(TRACKS, 'planner_bridge_node/points:width')
+
+
+def test_a_camera_mount_with_positive_pitch_looks_down(reader):
+    with reader.running(PIPELINE) as robot:
+        with reader.running(MOUNT, ROS_MASTER_URI=robot.environment['ROS_MASTER_URI']) as mount:
+            mount.hears('tf_static:transforms')
+            printed = subprocess.check_output(['rostopic', 'echo', '-n', '1', '/tf_static'], env=mount.environment)
+    transform, = yaml.safe_load(printed.decode().split('---')[0])['transforms']
+    assert (transform['header']['frame_id'], transform['child_frame_id']) == ('base_link', 'camera_link')
+    rotation = transform['transform']['rotation']
+    forward_z = 2 * (rotation['x'] * rotation['z'] - rotation['y'] * rotation['w'])
+    assert abs(forward_z + math.sin(math.radians(20))) < 1e-3
 
 
 def test_desk_launch_shows_rviz_on_the_master_of_the_robot(reader, camera_bag):

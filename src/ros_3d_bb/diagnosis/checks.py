@@ -203,4 +203,4 @@ def _nodes(seen, is_explained):
         if level == 0:
             yield Finding(name, sentence)
         elif not is_explained:
-            yield Finding(name, '', sentence, 'see its log, and "Troubleshooting" in the README')
+            yield Finding(name, '', sentence, 'see its log, and doc/troubleshooting.md')
