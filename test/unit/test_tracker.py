@@ -59,7 +59,7 @@ def test_tracks_begin_and_end_after_the_same_time_at_any_rate(rate_hz):
     assert len(published_s) == round((published_s[-1] - published_s[0]) * rate_hz) + 1
 
 
-@pytest.mark.parametrize('score,first', [(0.95, 1), (0.5, 3), (0.35, 7), (0.1, None), (0.02, None)])
+@pytest.mark.parametrize('score,first', [(0.95, 3), (0.5, 3), (0.35, 7), (0.1, None), (0.02, None)])
 def test_the_score_decides_when_a_track_is_published(score, first):
     published = [len(objects) for objects in play(Tracker(), 1, standing_with(score))]
     assert published == [0] * 30 if first is None else published == [0] * first + [1] * (30 - first)

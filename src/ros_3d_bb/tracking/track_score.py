@@ -14,7 +14,8 @@ import numpy as np
 HIT_CORRELATION_S = 0.08  # without scores, four images at 30 Hz or three independent ones confirm a track by default
 MISS_CORRELATION_S = 0.15  # the causes of misses, such as poses and partial occlusion, last longer
 UNKNOWN_SCORE = 0.5
-MAX_LOG_ODDS = 2.0  # of the score of a detection: detectors are overconfident
+# Of the score of a detection. A high score does not mean that the position is right, as of a person half hidden.
+MIN_LOG_ODDS, MAX_LOG_ODDS = -2.0, 1.0
 HIT = 0.4  # of a detection where a track is expected: little, because false detections repeat at their place, too
 MISS = math.log(0.1)  # detectors miss about one of ten visible people
 MAX_TRACK_SCORE = 4.0  # earlier evidence is forgotten: an undetected person is published for 0.4 s
@@ -26,7 +27,7 @@ def log_odds_of(scores, even_score):
     detections with the score `even_score` do."""
     known = np.minimum(np.where(scores > 0, scores, UNKNOWN_SCORE), 0.9999)
     log_odds = np.log(known / (1 - known)) - _logit(even_score)
-    return np.minimum(np.maximum(log_odds, -MAX_LOG_ODDS), MAX_LOG_ODDS)
+    return np.minimum(np.maximum(log_odds, MIN_LOG_ODDS), MAX_LOG_ODDS)
 
 
 def _logit(probability):
