@@ -28,9 +28,10 @@ class Document(object):
     """Session that is being annotated. Use `Document.open` to create one.
 
     `measurements` are EditedMeasurements in the order of the file; an index remains valid while the document is open.
-    `grid` are the Marks on the floor. `is_old_format` is whether the session has the format of the thesis, without
-    `camera` (None) and usable depth. `notes` are messages to the user on data that cannot be recovered. `estimates` are
-    the positions that the noise analysis uses; those stored in the session are the recorded ones.
+    `progress` is (number of annotated or rejected measurements, number of all). `grid` are the Marks on the floor.
+    `is_old_format` is whether the session has the format of the thesis, without `camera` (None) and usable depth.
+    `notes` are messages to the user on data that cannot be recovered. `estimates` are the positions that the noise
+    analysis uses; those stored in the session are the recorded ones.
     """
 
     def __init__(self, folder, content):
@@ -52,11 +53,6 @@ class Document(object):
         content = legacy.read(folder) if legacy.is_old_format(folder) else read_description(folder)
         with session_errors(os.path.join(folder, FILE_NAME)):
             return cls(folder, content)
-
-    @property
-    def progress(self):
-        """(number of annotated or rejected measurements, number of all measurements)."""
-        return sum(measurement.is_done for measurement in self.measurements), len(self.measurements)
 
     def refresh(self):
         """Read changes by other programs. Returns whether there were any. Raises SessionError."""
@@ -329,6 +325,7 @@ class Document(object):
             self.measurements[index] if index < len(old) and old[index] == entry
             else measurement_of(self.folder, entry, files) for index, entry in enumerate(frames))
         self.grid, self._content = grid_of(content), content
+        self.progress = sum(measurement.is_done for measurement in self.measurements), len(self.measurements)
         self.estimates.update()
 
 

@@ -32,8 +32,10 @@ class Estimates(object):
         positions = self.known(index)
         if positions is None:
             positions = tuple(self._document.positions(index, depth))
-            self._known[index] = self._document.measurements[index].detections, positions
-            self.update()
+            measurement = self._document.measurements[index]
+            self._known[index] = measurement.detections, positions
+            if measurement.truths:
+                self.update()
         return positions
 
     def known(self, index):
