@@ -11,7 +11,7 @@ CELL_M = 0.1
 HALF_SIZE_M = 5.0  # of the grid, whose centre is the robot
 HIGHEST = 99  # of an OccupancyGrid; 100 would be lethal
 RISKY = 0.15  # probability with the highest cost
-STEP_S = 0.1
+STEP_S, HORIZON_S = 0.1, 2.0
 COMFORT_M = 0.2  # kept free around the body
 EXTENT = 3.0  # standard deviations up to which costs are computed
 
@@ -39,7 +39,8 @@ def presence_costs(tracks, robot_from_tracks):
     probabilities = np.zeros((count, count))
     for track in tracks:
         if track.moving:
-            times_s = np.arange(0, track.prediction_step_s * len(track.prediction_m) + STEP_S / 2, STEP_S)
+            end_s = min(track.prediction_step_s * len(track.prediction_m), HORIZON_S)
+            times_s = np.arange(0, end_s + STEP_S / 2, STEP_S)
             centers_m = transform_points(robot_from_tracks, position_after(track, times_s))[:, :2]
             covariances_m2 = _covariances_after(track, times_s, robot_from_tracks[:2, :3])
             for center_m, covariance_m2 in zip(centers_m, covariances_m2):
