@@ -1,10 +1,11 @@
 """Conversions between ROS messages and the detections, boxes, tracks and cameras of this package."""
+import functools
 import re
 from typing import NamedTuple, Optional, Tuple
 
 import genpy
 import numpy as np
-from geometry_msgs.msg import Point, PoseWithCovariance, Vector3
+from geometry_msgs.msg import PoseWithCovariance
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb import msg
@@ -182,10 +183,14 @@ def camera_from_msg(message):
     realsense2_camera labels the inverse Brown-Conrady model of librealsense as plumb_bob; the two differ by a few
     hundredths of a pixel. Raises ValueError if K is zero, as for an uncalibrated camera, or as `Camera`.
     """
-    if not any(message.K):
+    return _camera_of(message.width, message.height, tuple(message.K), message.distortion_model, tuple(message.D))
+
+
+@functools.lru_cache(maxsize=16)  # cameras send their calibration with each image
+def _camera_of(width, height, matrix, distortion_model, distortion):
+    if not any(matrix):
         raise ValueError('it is empty (all of K is zero): the driver does not know the calibration of the camera')
-    return Camera(message.width, message.height, message.K[0], message.K[4], message.K[2], message.K[5],
-                  message.distortion_model, message.D)
+    return Camera(width, height, matrix[0], matrix[4], matrix[2], matrix[5], distortion_model, distortion)
 
 
 def transform_from_msg(message):
@@ -203,9 +208,8 @@ def boxes3d_to_msg(boxes, header, camera):
                                 truncated=any(box.truncated_edges))
         for flag, is_cut in zip(EDGE_FLAGS, box.truncated_edges):
             message.truncated_edges |= flag if is_cut else 0
-        message.center.position = Point(*map(float, box.center_m))
-        message.center.orientation.w = 1.0
-        message.size = Vector3(*map(float, box.size_m))
+        _set_position(message.center, box.center_m.tolist())
+        _set_xyz(message.size, box.size_m.tolist())
         if box.covariance_m2 is not None:
             message.position_covariance = np.ravel(box.covariance_m2).tolist()
         x1, y1, x2, y2 = box.rect_px
@@ -219,65 +223,77 @@ def boxes3d_to_msg(boxes, header, camera):
 
 def boxes3d_from_msg(message):
     """Convert a BoundingBox3DArray to a tuple of `box3d_estimator.Box3D`. Inverse of `boxes3d_to_msg`."""
-    return tuple(map(_box3d_from_msg, message.boxes))
+    return _boxes3d_with(_position_covariances(message), message)
 
 
-def _box3d_from_msg(box):
-    roi, covariance_m2 = box.roi, np.reshape(box.position_covariance, (3, 3))
+def _position_covariances(message):
+    """Covariances (n, 3, 3) of a BoundingBox3DArray."""
+    return np.array([box.position_covariance for box in message.boxes], float).reshape(-1, 3, 3)
+
+
+def _boxes3d_with(covariances_m2, message):
+    is_known = covariances_m2.any(axis=(1, 2)).tolist()
+    return tuple(_box3d_from_msg(box, covariance_m2 if known else None)
+                 for box, covariance_m2, known in zip(message.boxes, covariances_m2, is_known))
+
+
+def _box3d_from_msg(box, covariance_m2):
+    roi = box.roi
     rect_px = (roi.x_offset, roi.y_offset, roi.x_offset + roi.width, roi.y_offset + roi.height)
     edges = tuple([bool(box.truncated_edges & flag) for flag in EDGE_FLAGS])
     if box.truncated and not any(edges):
         edges = (True,) * len(EDGE_FLAGS)  # the truncated edges are unknown, so no edge is trusted
-    return Box3D(_xyz(box.center.position), _xyz(box.size), rect_px, box.support, edges,
-                 covariance_m2 if covariance_m2.any() else None, box.label or PERSON, box.score)
-
-
-def box3d_faults(message):
-    """Describe what is wrong with each 3D box of a BoundingBox3DArray, '' for those that can be tracked.
-
-    Raises ValueError if there are too many boxes.
-    """
-    if len(message.boxes) > MAX_BOXES:
-        raise ValueError('%d 3D boxes in one image; at most %d expected' % (len(message.boxes), MAX_BOXES))
-    faults = [_box3d_fault(box) for box in message.boxes]
-    return [fault and '3D box %d has %s' % (number, fault) for number, fault in enumerate(faults)]
+    return Box3D(_xyz(box.center.position), _xyz(box.size), rect_px, box.support, edges, covariance_m2,
+                 box.label or PERSON, box.score)
 
 
 def usable_boxes3d(message):
-    """Select the 3D boxes of a BoundingBox3DArray that can be tracked, see `box3d_faults`.
+    """Convert the 3D boxes of a BoundingBox3DArray that can be tracked.
 
-    Returns the message with the usable boxes only, and a sentence about the fault of each other box.
+    Returns {index in the message: `box3d_estimator.Box3D`}, and a sentence about the fault of each other box. Raises
+    ValueError if there are too many boxes.
     """
-    faults = box3d_faults(message)
-    usable = [box for box, fault in zip(message.boxes, faults) if not fault]
-    return BoundingBox3DArray(header=message.header, boxes=usable), list(filter(None, faults))
+    if len(message.boxes) > MAX_BOXES:
+        raise ValueError('%d 3D boxes in one image; at most %d expected' % (len(message.boxes), MAX_BOXES))
+    usable, faults = {}, []
+    covariances_m2 = _position_covariances(message)
+    is_covariance = _are_covariances(covariances_m2).tolist()
+    for index, box in enumerate(_boxes3d_with(covariances_m2, message)):
+        fault = _box3d_fault(box, is_covariance[index])
+        if fault:
+            faults.append('3D box %d has %s' % (index, fault))
+        else:
+            usable[index] = box
+    return usable, faults
 
 
-def _box3d_fault(message):
-    box = _box3d_from_msg(message)
+def _are_covariances(matrices_m2):
+    """Whether each of some matrices (n, 3, 3) is finite and positive semi-definite, (n,)."""
+    is_finite = (np.abs(matrices_m2) < FARTHEST_M).all(axis=(1, 2))
+    matrices_m2 = np.where(is_finite[:, np.newaxis, np.newaxis], matrices_m2, 0)
+    smallest_m2 = np.linalg.eigvalsh(matrices_m2 + matrices_m2.transpose(0, 2, 1)).min(axis=1)
+    return is_finite & (smallest_m2 > -ROUNDING * np.maximum(1, matrices_m2.max(axis=(1, 2))))
+
+
+def _box3d_fault(box, is_covariance):
+    """Describe what is wrong with a Box3D from a message, '' if it can be tracked."""
     if not box.is_plausible:
         return ('centre (%g, %g, %g) and size (%g, %g); finite numbers and sizes of more than 0 and less than %g m '
                 'expected' % (tuple(box.center_m) + tuple(box.size_m[:2]) + (LARGEST_M,)))
-    covariance_m2 = np.reshape(message.position_covariance, (3, 3))
-    if not ((np.abs(covariance_m2) < FARTHEST_M).all()
-            and np.linalg.eigvalsh(covariance_m2 + covariance_m2.T).min() > -ROUNDING * max(1, covariance_m2.max())):
+    if not is_covariance:
         return ('the position_covariance %s; a finite, positive semi-definite matrix, or zeros where it is not known, '
-                'expected' % list(message.position_covariance))
+                'expected' % np.ravel(box.covariance_m2).tolist())
     return label_fault(box.label) or score_fault(box.score)
 
 
-def detections_from_msg(message, fixed_from_camera, indices=None, classes=ObjectClasses()):
-    """Convert the boxes of a BoundingBox3DArray with these indices to Detections in the fixed frame.
+def detections_from_boxes3d(boxes, fixed_from_camera, classes=ObjectClasses()):
+    """Convert usable boxes (see `usable_boxes3d`) to a list of Detection in the fixed frame.
 
-    They must be usable (see `box3d_faults`); by default all boxes are converted. `fixed_from_camera` (4, 4) is the pose
-    of the camera's optical frame in the fixed frame, `classes` the table of the classes of objects.
+    `boxes` is {index: `box3d_estimator.Box3D`}, `fixed_from_camera` (4, 4) the pose of the camera's optical frame in
+    the fixed frame, `classes` the table of the classes of objects.
     """
-    detections = []
-    for index in range(len(message.boxes)) if indices is None else indices:
-        box = _box3d_from_msg(message.boxes[index])
-        detection = detection_from_box(box, fixed_from_camera, classes.of(box.label))
-        detections.append(detection._replace(index=index))
-    return detections
+    return [detection_from_box(box, fixed_from_camera, classes.of(box.label))._replace(index=index)
+            for index, box in boxes.items()]
 
 
 def tracks_to_msg(tracks, header):
@@ -290,11 +306,13 @@ def _track_to_msg(track):
                                 status=track.status, moving=track.moving,
                                 first_seen=time_from(track.first_seen_ns), last_seen=time_from(track.last_seen_ns),
                                 prediction_step=genpy.Duration.from_sec(track.prediction_step_s))
-    message.size = Vector3(*map(float, track.size_m))
-    message.twist.twist.linear = Vector3(*map(float, track.velocity_mps))
-    message.prediction = [PoseWithCovariance() for _position_m in track.prediction_m]
-    for pose, position_m in zip([message.pose] + message.prediction, [track.position_m, *track.prediction_m]):
-        pose.pose.position, pose.pose.orientation.w = Point(*map(float, position_m)), 1.0
+    _set_xyz(message.size, track.size_m.tolist())
+    _set_xyz(message.twist.twist.linear, track.velocity_mps.tolist())
+    _set_position(message.pose.pose, track.position_m.tolist())
+    for position_m in track.prediction_m.tolist():
+        pose = PoseWithCovariance()
+        _set_position(pose.pose, position_m)
+        message.prediction.append(pose)
     if track.covariance is not None:
         message.pose.covariance, message.twist.covariance = _covariances_6x6([track.covariance[:3, :3],
                                                                               track.covariance[3:, 3:]])
@@ -337,6 +355,16 @@ def _covariances_6x6(covariances):
 
 def _covariance_3x3(with_covariance):
     return np.reshape(with_covariance.covariance, (6, 6))[:3, :3]
+
+
+def _set_position(pose, position_m):
+    """Set the position of a geometry_msgs/Pose that is not rotated."""
+    _set_xyz(pose.position, position_m)
+    pose.orientation.w = 1.0
+
+
+def _set_xyz(message, values):
+    message.x, message.y, message.z = values
 
 
 def _xyz(message):
