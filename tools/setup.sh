@@ -39,14 +39,18 @@ set_up_python() {
   echo "$wanted" > "$venv/installed"
 }
 
+setup() {
+  set_up_system
+  set_up_python
+}
+
 link_into_workspace() {
   mkdir -p "$workspace/src"
   ln -sfn "$here" "$workspace/src/ros_3d_bb"
 }
 
 build() {
-  set_up_system
-  set_up_python
+  setup
   say "building in $workspace"
   link_into_workspace
   catkin_make --directory "$workspace" -DPYTHON_EXECUTABLE="$venv/bin/python3" > "$workspace/build.log" 2>&1 || {

@@ -6,8 +6,7 @@ run_tests() {
     -h|--help) help ;;
     --fast)
       [ $# -eq 1 ] || fail "test --fast takes no further arguments, not '$2'"
-      set_up_system
-      set_up_python
+      setup
       cd "$here"
       "$venv/bin/python3" -m pytest -q -n 2 --dist loadfile -m 'not slow' test/unit ;;
     *) run_some_tests "$@" ;;

@@ -1,6 +1,7 @@
 """Names in the README and in doc/: topics, services, files, arguments, messages and figures exist as written.
 
-test_readme_tools.py, test_readme_graphs.py, test_readme_campaign.py and test_readme_cameras.py run the blocks of code.
+test_readme_tools.py, test_readme_graphs.py, test_readme_campaign.py and test_readme_cameras.py run the blocks of code,
+test_readme_container.py checks those with containers.
 """
 import ast
 import glob
@@ -60,7 +61,7 @@ def topics_of_nodes(*sections):
 
 
 def test_every_block_of_code_is_run():
-    for name in ('tools', 'graphs', 'campaign', 'cameras'):
+    for name in ('tools', 'graphs', 'campaign', 'cameras', 'container'):
         importlib.import_module('test_readme_' + name)  # they claim their blocks
     assert unclaimed() == []
 
