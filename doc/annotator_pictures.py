@@ -1,6 +1,6 @@
 """Make the pictures of the annotator in doc/images: a session of simulated people, annotated in its own window.
 
-PYTHONPATH=src:annotator xvfb-run -a python3 doc/annotator_pictures.py doc/images
+PYTHONPATH=src:annotator xvfb-run -a python3 doc/annotator_pictures.py doc/images (or ./run pictures)
 """
 import json
 import os
@@ -21,7 +21,9 @@ from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
 ROOM, ROBOT = Room(bounds=(-2.0, 7.0, -3.0, 3.0)), Robot()
 PLACES_M = [(x, z) for z in (1.5, 2.0, 2.5, 3.0, 4.0) for x in (-0.5, 0.0, 0.5)]
 PASSER_BY_M = (-0.9, 4.4)
+IMPLAUSIBLE_M = {7: 1.0}  # slips in truth by the number of the measurement
 COLORS = 128
+SIZE_PX = 1400, 860
 
 
 def write_session(folder):
@@ -30,8 +32,7 @@ def write_session(folder):
         os.makedirs(os.path.join(folder, name), exist_ok=True)
     frames = [_write_frame(folder, number, place) for number, place in enumerate(PLACES_M)]
     camera = dict(D435I_COLOR._asdict(), distortion=[0] * 5, depth_scale=0.001, frame='camera_color_optical_frame')
-    grid = [{'name': 'ABC'[number % 3] + str(number // 3 + 1), 'x': 1000 * x_m, 'z': 1000 * z_m}
-            for number, (x_m, z_m) in enumerate(PLACES_M)]
+    grid = [{'name': _mark(number), 'x': 1000 * x_m, 'z': 1000 * z_m} for number, (x_m, z_m) in enumerate(PLACES_M)]
     with open(os.path.join(folder, 'frames.json'), 'w') as stream:
         json.dump({'camera': camera, 'grid': grid, 'frames': frames}, stream)
 
@@ -45,8 +46,13 @@ def _write_frame(folder, number, place):
     boxes_px = [tuple(int(edge) for edge in person.box_px) for person in frame.people if person.box_px is not None]
     estimates = estimate_boxes(DepthImage(frame.depth_mm, 0.001), boxes_px, D435I_COLOR, estimator_named('foreground'))
     detections = [dict({} if box is None else box_entry(box), box=box_px) for box_px, box in zip(boxes_px, estimates)]
-    return {'id': '%03d' % number, 'color': 'color/' + name, 'depth': 'depth/' + name, 'label': 'first campaign',
+    return {'id': '%03d' % number, 'color': 'color/' + name, 'depth': 'depth/' + name, 'label': _mark(number),
             'stamp': '%d.%09d' % (1616161616 + 7 * number, 123456789), 'detections': detections}
+
+
+def _mark(number):
+    """Name of the floor mark of a measurement."""
+    return 'ABC'[number % 3] + str(number // 3 + 1)
 
 
 def _map_from(x_m, z_m):
@@ -58,13 +64,14 @@ def take_pictures(session, folder):
     """Annotate a part of the session, and write the pictures."""
     application = make_application()
     window = AnnotatorWindow()
+    window.resize(*SIZE_PX)
     window.show()
     window.open_session(session)
     for number, (x_m, z_m) in enumerate(PLACES_M[:10]):
         if number == 4:
             window.document.reject(4, 'not on the mark')
         else:
-            window.document.set_truth(number, x_m, z_m)
+            window.document.set_truth(number, x_m, z_m + IMPLAUSIBLE_M.get(number, 0))
     window.after_edit()
     window.show_measurement(10)
     window.pane.truth.fields['x'].setText('0')
@@ -74,7 +81,7 @@ def take_pictures(session, folder):
     application.processEvents()
     _save(window, os.path.join(folder, 'annotator.png'))
     window.document.restore(4)  # each cluster needs three measurements
-    for number in [4] + list(range(10, len(PLACES_M))):
+    for number in [4] + list(IMPLAUSIBLE_M) + list(range(10, len(PLACES_M))):
         window.document.set_truth(number, *PLACES_M[number])
     window.actions['analyse'].trigger()
     while window.results.figures is None:

@@ -8,7 +8,7 @@ apt_packages=(
   python3-rosbag python3-rosgraph python3-rospkg python3-rospy python3-rostest python3-scipy python3-sensor-msgs
   python3-setuptools python3-std-srvs python3-tf2-ros python3-venv python3-visualization-msgs python3-yaml ros-core
   ros-geometry-msgs ros-message-generation ros-message-runtime ros-sensor-msgs ros-std-msgs rosbash rviz tf2-tools
-  xdotool xvfb)
+  xauth xdotool xvfb)
 
 set_up_system() {
   command -v apt-get > /dev/null || { say "no apt-get here; taking it that ROS is installed"; return; }

@@ -22,7 +22,7 @@ def test_help_starts_nothing(arguments):
 
 @pytest.mark.parametrize('arguments', [
     ('tset',), ('test', '--quick'), ('test', '--fast', 'x'), ('test', 'missing.py'), ('test', '-k'), ('build', 'x'),
-    ('setup', 'x'),
+    ('setup', 'x'), ('pictures', 'missing'),
     ('lint', '--all'), ('demo', '--fast'), ('demo', 'missing'), ('demo', 'rate:=fast'),
     ('demo', 'weights:=missing.pt')])
 def test_unknown_arguments_are_errors(arguments):
