@@ -90,7 +90,7 @@ class Box3D(NamedTuple):
     def is_plausible(self):
         """Whether the centre is nearer than `FARTHEST_M`, and width and height are between 0 and `LARGEST_M`."""
         width_m, height_m, _width_m = self.size_m.tolist()
-        return (max(map(abs, self.center_m.tolist())) < FARTHEST_M
+        return (all([abs(along_m) < FARTHEST_M for along_m in self.center_m.tolist()])
                 and 0 < width_m < LARGEST_M and 0 < height_m < LARGEST_M)
 
 
