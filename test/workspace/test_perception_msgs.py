@@ -10,14 +10,13 @@ from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_fr
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, boxes3d_from_msg,
-                                                   boxes3d_to_msg, camera_from_msg, detections_from_boxes3d,
-                                                   stamp_of, time_from, tracks_from_msg, tracks_to_msg,
-                                                   usable_boxes3d, with_stamp)
+                                                   boxes3d_to_msg, camera_from_msg, stamp_of, time_from,
+                                                   tracks_from_msg, tracks_to_msg, usable_boxes3d, with_stamp)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject as Track
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject as Track, detections_from_boxes
 from support.masterless import on_the_wire
 
 INT32 = st.integers(-2 ** 31, 2 ** 31 - 1)
@@ -178,7 +177,7 @@ def detection_of(box, roll_deg=0, pitch_deg=0, yaw_deg=0):
         map_from_camera = map_from_camera.dot(transform_from((0, 0, 0), quaternion))
     map_from_camera = map_from_camera.dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
     boxes = boxes3d_from_msg(BoundingBox3DArray(boxes=[box]))
-    detection, = detections_from_boxes3d(dict(enumerate(boxes)), map_from_camera)
+    detection, = detections_from_boxes(dict(enumerate(boxes)), map_from_camera)
     return detection
 
 
@@ -204,7 +203,7 @@ def test_an_unusable_3d_box_does_not_affect_the_others(wrong):
     usable, faults = usable_boxes3d(message)
     assert list(usable) == [0, 2] and len(message.boxes) == 3
     assert len(faults) == 1 and faults[0].startswith('3D box 1 has ')
-    detections = detections_from_boxes3d(usable, np.eye(4))
+    detections = detections_from_boxes(usable, np.eye(4))
     assert [(detection.index, detection.position_m[0]) for detection in detections] == [(0, -1.0), (2, 2.0)]
 
 
@@ -279,7 +278,7 @@ def test_tracks_fill_every_field():
     tracker = ThesisTracker()
     for frame in range(5):
         boxes, _faults = usable_boxes3d(BoundingBox3DArray(boxes=[box_of(x_m=0.1 * frame)]))
-        tracks = tracker.update(NS + frame * NS // 10, detections_from_boxes3d(boxes, np.eye(4)))
+        tracks = tracker.update(NS + frame * NS // 10, detections_from_boxes(boxes, np.eye(4)))
     message = on_the_wire(tracks_to_msg(tracks, header(NS, 'map')))
     assert isinstance(message, TrackedObjectArray) and message.header.frame_id == 'map'
     track, = message.objects

@@ -12,11 +12,10 @@ from ros_3d_bb import msg
 from ros_3d_bb.camera.camera_model import Camera, transform_from
 from ros_3d_bb.core.labels import PERSON, label_fault, score_fault, usable_label
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
-from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
-from ros_3d_bb.tracking.types import TrackedObject, detection_from_box
+from ros_3d_bb.tracking.types import TrackedObject
 
 BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC = 'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'
 NEWEST = genpy.Time(0)  # tf returns the latest transform for stamp 0
@@ -284,16 +283,6 @@ def _box3d_fault(box, is_covariance):
         return ('the position_covariance %s; a finite, positive semi-definite matrix, or zeros where it is not known, '
                 'expected' % np.ravel(box.covariance_m2).tolist())
     return label_fault(box.label) or score_fault(box.score)
-
-
-def detections_from_boxes3d(boxes, fixed_from_camera, classes=ObjectClasses()):
-    """Convert usable boxes (see `usable_boxes3d`) to a list of Detection in the fixed frame.
-
-    `boxes` is {index: `box3d_estimator.Box3D`}, `fixed_from_camera` (4, 4) the pose of the camera's optical frame in
-    the fixed frame, `classes` the table of the classes of objects.
-    """
-    return [detection_from_box(box, fixed_from_camera, classes.of(box.label))._replace(index=index)
-            for index, box in boxes.items()]
 
 
 def tracks_to_msg(tracks, header):
