@@ -26,7 +26,7 @@ class Case(NamedTuple):
 
     name: str
     detector: str    # of pipeline.launch
-    image_size: int  # of the network
+    image_size: int  # of the network; 0: adaptive
     weights: str     # path of the model file
     loaded: bool     # whether another process loads a core
 
@@ -34,7 +34,8 @@ class Case(NamedTuple):
 def cases_of(weights):
     """All cases for a list of model files: the first is that of the YOLOv5 cases, each other is a case of its own."""
     detectors = [('free', 'none', 0, ''), ('depth', 'depth', 0, '')]
-    detectors += [('yolov5-%d' % size, 'yolov5', size, path) for path in weights[:1] for size in (512, 640)]
+    detectors += [('yolov5-%s' % (size or 'auto'), 'yolov5', size, path)
+                  for path in weights[:1] for size in (512, 640, 0)]
     detectors += [(os.path.splitext(os.path.basename(path))[0], 'yolov5', 640, path) for path in weights[1:]]
     return [Case(name + ('+load' if loaded else ''), detector, size, path, loaded)
             for loaded in (False, True) for name, detector, size, path in detectors]
@@ -129,7 +130,7 @@ def main():
 
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench latency', description=__doc__)
-    parser.add_argument('--cases', help='some of free, depth, yolov5-512, yolov5-640 and the names of further model '
+    parser.add_argument('--cases', help='some of free, depth, yolov5-512, yolov5-640, yolov5-auto and the names of further model '
                         'files, each with or without +load, separated by commas (default: all)')
     parser.add_argument('--seconds', type=float, default=20.0, help='duration of a measurement (default: 20)')
     parser.add_argument('--rate', type=float, default=30.0, metavar='HZ', help='images per second (default: 30)')
