@@ -130,8 +130,8 @@ def main():
 
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench latency', description=__doc__)
-    parser.add_argument('--cases', help='some of free, depth, yolov5-512, yolov5-640, yolov5-auto and the names of further model '
-                        'files, each with or without +load, separated by commas (default: all)')
+    parser.add_argument('--cases', help='some of free, depth, yolov5-512, yolov5-640, yolov5-auto and the names of '
+                        'further model files, each with or without +load, separated by commas (default: all)')
     parser.add_argument('--seconds', type=float, default=20.0, help='duration of a measurement (default: 20)')
     parser.add_argument('--rate', type=float, default=30.0, metavar='HZ', help='images per second (default: 30)')
     parser.add_argument('--weights', nargs='+', default=list(filter(None, [default_weights()])), metavar='FILE',
