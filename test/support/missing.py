@@ -43,4 +43,5 @@ def imports_when_loaded(path):
 
 def misses_something(item):
     """Whether a module or program is missing that a test needs: `@pytest.mark.needs('module')`."""
-    return any(is_missing(name) and shutil.which(name) is None for mark in item.iter_markers('needs') for name in mark.args)
+    names = [name for mark in item.iter_markers('needs') for name in mark.args]
+    return any(is_missing(name) and shutil.which(name) is None for name in names)
