@@ -21,23 +21,24 @@ myst_enable_extensions = ['dollarmath']
 highlight_language = 'none'
 myst_heading_anchors = 3  # links to #headings are those of the repository's own pages
 html_theme = 'alabaster'
+html_static_path, html_css_files = ['static'], ['style.css']
 html_theme_options = {'page_width': '1200px', 'body_max_width': '900px', 'sidebar_width': '240px',
                       'code_font_size': '0.8em', 'description': 'People in 3D for a ROS 1 robot',
                       'font_family': 'DejaVu Sans, sans-serif'}
-html_sidebars = {'**': ['about.html', 'navigation.html', 'searchbox.html']}
+html_sidebars = {'**': ['about.html', 'searchbox.html', 'navigation.html']}
 html_show_sphinx = html_show_copyright = html_copy_source = False
 html_math_renderer = 'mathml'
 
 
 def _navigation(source):
-    """The sections of the first page as Sphinx's navigation: captions, and the pages to which the sections link."""
+    """The sections of the first page as Sphinx's navigation: captions, and the links of the sections."""
     captions = []
     for section in source.split('\n## ')[1:]:
-        paths = [os.path.join('doc', link.group(2)) for link in LINK.finditer(section)]
-        captions.append((section.splitlines()[0], paths))
-    names = os.listdir(os.path.join(ROOT, 'doc', 'nodes'))
-    captions.append(('Nodes', sorted('doc/nodes/' + name for name in names if name != 'index.md')))
-    return [(caption, ['/' + os.path.normpath(path)[:-len('.md')] for path in paths]) for caption, paths in captions]
+        captions.append((section.splitlines()[0], [link.groups() for link in LINK.finditer(section)]))
+    names = set(os.path.splitext(name)[0] for name in os.listdir(os.path.join(ROOT, 'doc', 'nodes'))) - {'index'}
+    captions.append(('Nodes', [(name, 'nodes/%s.md' % name) for name in sorted(names)]))
+    return [(caption, ['%s </%s>' % (text, os.path.normpath(os.path.join('doc', path))[:-len('.md')])
+                       for text, path in links]) for caption, links in captions]
 
 
 def _prepare(_app, name, source):
@@ -48,6 +49,13 @@ def _prepare(_app, name, source):
     if name == root_doc:
         for caption, pages in _navigation(source[0]):
             source[0] += '\n```{toctree}\n:hidden:\n:caption: %s\n\n%s\n```\n' % (caption, '\n'.join(pages))
+
+
+def _write_first_page(app, _exception):
+    """A page at the root of the site, which leads to the contents."""
+    with open(os.path.join(app.outdir, 'index.html'), 'w') as stream:
+        stream.write('<!DOCTYPE html><title>%s</title><meta http-equiv="refresh" content="0; url=%s.html">\n'
+                     % (project, root_doc))
 
 
 def _write_inline(self, node):
@@ -63,4 +71,5 @@ def _write_block(self, node):
 def setup(app):
     """Formulas as MathML, which browsers show without a script."""
     app.connect('source-read', _prepare)
+    app.connect('build-finished', _write_first_page)
     app.add_html_math_renderer('mathml', (_write_inline, None), (_write_block, None))

@@ -24,7 +24,7 @@ DATA = os.environ.get('ROS_3D_BB_DATA', '')
 
 def pytest_addoption(parser):
     parser.addoption('--leave-out', action='store_true',
-                     help='deselect tests that need packages of requirements.txt that are not installed')
+                     help='deselect tests that need packages of requirements.txt, or programs, that are not installed')
 
 
 def left_out(config):
@@ -33,7 +33,7 @@ def left_out(config):
 
 
 def pytest_configure(config):
-    config.addinivalue_line('markers', 'needs(*modules): modules that a test imports when it runs')
+    config.addinivalue_line('markers', 'needs(*names): modules and programs that a test needs when it runs')
 
 
 def pytest_report_header(config):

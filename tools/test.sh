@@ -14,6 +14,7 @@ run_tests() {
 }
 
 run_all_tests() {
+  apt_packages+=(chromium)  # in which a test reads the site
   build
   say "running all tests (data: ${ROS_3D_BB_DATA:-made by the tests})"
   rm -rf "$workspace/build/test_results"
@@ -42,6 +43,7 @@ run_some_tests() {
     shift
   done
   [ ${#paths[@]} -gt 0 ] || paths=("$here/test/unit" "$here/test/workspace")
+  apt_packages+=(chromium)
   build
   cd "$here"
   local status=0 by_pytest=()

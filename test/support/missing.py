@@ -3,6 +3,7 @@ import ast
 import importlib.util
 import os
 import re
+import shutil
 
 TEST = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
@@ -41,5 +42,6 @@ def imports_when_loaded(path):
 
 
 def misses_something(item):
-    """Whether a module is missing that a test needs: `@pytest.mark.needs('module')`."""
-    return any(is_missing(name) for mark in item.iter_markers('needs') for name in mark.args)
+    """Whether a module or program is missing that a test needs: `@pytest.mark.needs('module')`."""
+    names = [name for mark in item.iter_markers('needs') for name in mark.args]
+    return any(is_missing(name) and shutil.which(name) is None for name in names)

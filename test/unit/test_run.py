@@ -1,6 +1,7 @@
 """The arguments of ./run. Nothing is installed or built."""
 import os
 import subprocess
+import sys
 
 import pytest
 
@@ -28,3 +29,13 @@ def test_help_starts_nothing(arguments):
 def test_unknown_arguments_are_errors(arguments):
     status, printed, errors = run(*arguments)
     assert status == 2 and not printed and arguments[-1].split(':=')[-1] in errors
+
+
+@pytest.mark.slow
+def test_unit_tests_need_no_workspace():
+    """`./run test --fast` runs them without a build: they import neither messages nor a master."""
+    environment = {name: value for name, value in os.environ.items() if name not in ('PYTHONPATH', 'CMAKE_PREFIX_PATH')}
+    collected = subprocess.run([sys.executable, '-m', 'pytest', '-q', '--collect-only', '-p', 'no:cacheprovider',
+                                os.path.dirname(os.path.abspath(__file__))], env=environment, stdout=subprocess.PIPE,
+                               universal_newlines=True)
+    assert collected.returncode == 0, collected.stdout[-2000:]

@@ -1,5 +1,6 @@
-"""The GitHub workflow for forks conforms to GitHub's schema and to the documented variables of industrial_ci."""
+"""The GitHub workflows for forks conform to GitHub's schema and to the documented variables of industrial_ci."""
 import os
+import re
 import subprocess
 import sys
 
@@ -10,6 +11,7 @@ from support.industrial_ci_variables import HOOKS, VARIABLES
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 WORKFLOW = os.path.join(ROOT, '.github', 'workflows', 'industrial_ci.yml')
+SITE_WORKFLOW = os.path.join(ROOT, '.github', 'workflows', 'site.yml')
 
 
 @pytest.fixture
@@ -18,9 +20,16 @@ def job():
         return yaml.safe_load(stream)['jobs']['ros']
 
 
-def test_the_workflow_conforms_to_the_schema_of_github():
+def test_workflows_conform_to_the_schema_of_github():
     subprocess.check_call([sys.executable, '-m', 'check_jsonschema', '--builtin-schema', 'vendor.github-workflows',
-                           WORKFLOW])
+                           WORKFLOW, SITE_WORKFLOW])
+
+
+def test_the_site_is_published_with_the_versions_that_are_tested():
+    with open(SITE_WORKFLOW, encoding='utf-8') as stream, \
+            open(os.path.join(ROOT, 'test', 'requirements.txt'), encoding='utf-8') as requirements:
+        tested, pinned = requirements.read(), re.findall(r'[\w-]+==[\d.]+', stream.read())
+    assert len(pinned) == 3 and all('\n%s;' % version in tested for version in pinned)
 
 
 def test_only_documented_variables_of_industrial_ci_are_set(job):

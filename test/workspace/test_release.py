@@ -1,5 +1,6 @@
 """Input of the release tools: package.xml, the changelog, and the Debian package of each key."""
 import os
+import re
 
 import yaml
 from catkin_pkg.changelog import Changelog, populate_changelog_from_rst
@@ -64,6 +65,18 @@ def test_every_key_has_its_packages_of_debian_in_the_table():
     assert set(table) == set(depend.name for kind in KINDS for depend in getattr(package, kind))
     for key, systems in table.items():
         assert list(systems) == ['debian'] and systems['debian'], key
+
+
+def test_the_page_of_licences_names_every_dependency_once():
+    with open(os.path.join(ROOT, 'doc', 'licences.md')) as stream:
+        rows = re.findall(r'^\| (`.*?) \| (.+) \|$', stream.read(), re.MULTILINE)
+    named = [name for names, _licence in rows for name in re.findall('`(.*?)`', names)]
+    required = set()
+    for path in ('requirements.txt', 'requirements_no_deps.txt'):
+        with open(os.path.join(ROOT, 'test', path)) as stream:
+            required.update(re.findall(r'^([\w-]+)', stream.read(), re.MULTILINE))
+    package = parse_package(os.path.join(ROOT, 'package.xml'))
+    assert sorted(named) == sorted(required | set(depend.name for kind in KINDS for depend in getattr(package, kind)))
 
 
 def test_the_licence_is_a_file_with_its_text():
