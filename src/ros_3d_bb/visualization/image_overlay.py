@@ -1,6 +1,6 @@
 """Overlays of the pipeline's results on images. Images are (height, width, 3), uint8, RGB, and modified in place.
 
-OpenCV is imported only where it is used: it takes 100 MB, and most nodes draw images only while somebody looks at them.
+OpenCV is imported only where it is used: it takes 100 MB, and most nodes draw images only while they have subscribers.
 """
 import numpy as np
 
