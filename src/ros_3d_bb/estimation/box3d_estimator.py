@@ -193,7 +193,8 @@ class _SampledImage(object):
         rects_px = np.array(rects_px, np.int64)
         first, stride, count = _grids(rects_px, depth.shape)
         self._slices, camera = _grid_slices(first, stride, count), geometry.camera
-        self._flat_px = _without_distortion(rects_px, camera)
+        flat_px = _without_distortion(rects_px, camera)
+        self._slopes_down = _slopes_down(flat_px, geometry)
         rows, columns = (first[:, axis, None] + stride[:, axis, None] * np.arange(size)  # also beyond `count`
                          for axis, size in enumerate((GRID_ROWS, GRID_COLUMNS)))
         depth_m = _grid_depths(depth, self._slices, count)
@@ -209,7 +210,7 @@ class _SampledImage(object):
         self._down_m = along_axis(1) if geometry.level_from_camera[1, 2] > LOOKS_DOWN else None
         self._measured = np.count_nonzero(known, axis=1)
         self._usable = self._measured >= np.maximum(LEAST_MEASURED * count.prod(axis=1), 1)
-        self._usable &= np.isfinite(self._flat_px).all(axis=1)
+        self._usable &= np.isfinite(flat_px).all(axis=1)
         left, right = rects_px[:, 0, None], rects_px[:, 2, None]
         in_middle = np.exp(-0.5 * ((columns - (left + right) / 2.0) / ((right - left) / 4.0)) ** 2)
         self._occluding_mm = [0] * len(rects_px)  # depth up to which plausible boxes mask the samples of others
@@ -222,11 +223,10 @@ class _SampledImage(object):
         ahead_mm = self._ahead_mm[group]
         for member, occluder in np.argwhere(occluders[group]).tolist():
             self._mask(ahead_mm[member].reshape(GRID_ROWS, GRID_COLUMNS), group[member], occluder)
-        usable = self._usable[group] & (ahead_mm != UNKNOWN_MM).any(axis=1)
-        group, ahead_mm = group[usable], ahead_mm[usable]
-        if not len(group):
-            return []
         ordered = SortedDistances(ahead_mm)
+        usable = self._usable[group] & (ordered.count > 0)
+        if not usable.all():
+            return self.estimates(group[usable], occluders) if usable.any() else []
         layers_mm = nearest_dominant_layers(ahead_mm, self._weights[group], ordered)
         first, end = ordered.within(layers_mm, BODY_HALF_DEPTH_MM)
         supports = (end - first) / self._measured[group]
@@ -235,7 +235,7 @@ class _SampledImage(object):
         layers_m = ordered.means(first + tenth, end - tenth) / 1000
         nearest_mm, farthest_mm = (ordered.at(rank).astype(np.uint16)[:, None] for rank in (first, end - 1))
         on_body = (ahead_mm >= nearest_mm) & (ahead_mm <= farthest_mm)
-        top_m, bottom_m = layers_m * _slopes_down(self._flat_px[group], self._geometry)
+        top_m, bottom_m = layers_m * self._slopes_down[:, group]
         if self._down_m is not None:
             # The floor beside the feet is as far away as the body.
             above_feet = on_body & (self._down_m[group] < bottom_m[:, None] - FEET_M)

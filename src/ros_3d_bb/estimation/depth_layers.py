@@ -38,7 +38,7 @@ class SortedDistances(object):
         return self._keys.searchsorted(limits_mm + self._offsets_mm) - self._first
 
     def at(self, ranks):
-        """Distances (n,) at ranks (n,), millimetres."""
+        """Distances at ranks (..., n), millimetres, with the shape of the ranks."""
         return self._keys[self._first + ranks] - self._offsets_mm
 
     def within(self, middles_mm, half_mm):
@@ -92,8 +92,8 @@ def edges(ordered):
     last = ordered.count - 1
     rank, part = np.divmod(last * EDGE_PERCENT, 100)
     after = np.minimum(rank + 1, last)
-    low_mm, high_mm = ordered.at(rank), ordered.at(last - rank)
-    low_mm = low_mm + (ordered.at(after) - low_mm) * part / 100.0
-    high_mm = high_mm - (high_mm - ordered.at(last - after)) * part / 100.0
+    low_mm, above_mm, below_mm, high_mm = ordered.at(np.stack((rank, after, last - after, last - rank)))
+    low_mm = low_mm + (above_mm - low_mm) * part / 100.0
+    high_mm = high_mm - (high_mm - below_mm) * part / 100.0
     beyond_mm = (high_mm - low_mm) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
     return low_mm - beyond_mm, high_mm + beyond_mm
