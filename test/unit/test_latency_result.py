@@ -83,5 +83,5 @@ def test_each_model_file_is_a_case_with_and_without_load():
     assert [case.name for case in cases_of([]) if not case.loaded] == ['free', 'depth']
     cases = {case.name: case for case in cases_of(['/a/yolov5n.pt', '/b/yolox_nano.onnx'])}
     assert set(cases) == {name + load for load in ('', '+load')
-                          for name in ('free', 'depth', 'yolov5-512', 'yolov5-640', 'yolox_nano')}
+                          for name in ('free', 'depth', 'yolov5-512', 'yolov5-640', 'yolov5-auto', 'yolox_nano')}
     assert cases['yolov5-512'].weights == '/a/yolov5n.pt' and cases['yolox_nano+load'].weights == '/b/yolox_nano.onnx'
