@@ -89,7 +89,7 @@ def details(result):
     """Format the results by node and by stage, and the trend, as text."""
     trend, grew = result['trend'], result['trend']['rss_mb_per_minute']
     compared = {node: ', %.2f times its limit' % found['times_limit'] for node, found in result['nodes'].items()}
-    lines = ['  %-22s %5.1f %% of a core, %4.0f MB, %+.2f MB a minute'
+    lines = ['  %-31s %5.1f %% of a core, %4.0f MB, %+.2f MB a minute'
              % (node, result['cpu_percent'][node], result['rss_mb'][node], grew[node]) + compared.get(node, '')
              for node in sorted(result['cpu_percent'])]
     stages = ['%s %s' % (stage, '-' if value is None else '%.1f' % value)
