@@ -104,7 +104,7 @@ def draw_scene(path, panels, people, tracks, robot, lines):
     """
     rows = (len(panels) + COLUMNS - 1) // COLUMNS
     text_share = LINE_IN * (len(lines) + 3) / SIZE_IN[1]  # with the labels of the axis
-    grid = gridspec.GridSpec(rows + 1, COLUMNS, height_ratios=[1] * rows + [1.8], left=0.03, right=0.99, top=0.99,
+    grid = gridspec.GridSpec(rows + 1, COLUMNS, height_ratios=[1] * rows + [1.8], left=0.04, right=0.99, top=0.99,
                              bottom=text_share, wspace=0.02, hspace=0.08)
     figure = pyplot.figure(figsize=SIZE_IN, dpi=DPI)
     for number, panel in enumerate(panels):
@@ -120,10 +120,11 @@ def draw_scene(path, panels, people, tracks, robot, lines):
 def _draw_paths(axes, people, tracks, robot):
     for number, path in sorted(people.items()):
         axes.plot(*zip(*path), color=TRUTH_COLOR, linewidth=6)
-        axes.annotate('person %d' % number, path[-1])
+        axes.annotate('person %d' % number, path[-1], (6, -12), textcoords='offset points')
     for number, path in sorted(tracks.items()):
         line, = axes.plot(*zip(*path))
-        axes.annotate(str(number), path[0], color=line.get_color(), weight='bold')
+        axes.annotate(str(number), path[0], (-4, 6), textcoords='offset points', color=line.get_color(), weight='bold',
+                      bbox={'boxstyle': 'round', 'facecolor': 'white', 'edgecolor': line.get_color()}, zorder=9)
     axes.plot(robot[:, 0], robot[:, 1], color=ROBOT_COLOR, marker='o', markevery=[-1] if len(robot) else [])
     axes.set_aspect('equal', 'datalim')
     axes.grid(True)
