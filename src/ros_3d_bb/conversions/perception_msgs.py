@@ -222,21 +222,11 @@ def boxes3d_to_msg(boxes, header, camera):
 
 def boxes3d_from_msg(message):
     """Convert a BoundingBox3DArray to a tuple of `box3d_estimator.Box3D`. Inverse of `boxes3d_to_msg`."""
-    return _boxes3d_with(_position_covariances(message), message)
+    return tuple(map(_box3d_from_msg, message.boxes))
 
 
-def _position_covariances(message):
-    """Covariances (n, 3, 3) of a BoundingBox3DArray."""
-    return np.array([box.position_covariance for box in message.boxes], float).reshape(-1, 3, 3)
-
-
-def _boxes3d_with(covariances_m2, message):
-    is_known = covariances_m2.any(axis=(1, 2)).tolist()
-    return tuple(_box3d_from_msg(box, covariance_m2 if known else None)
-                 for box, covariance_m2, known in zip(message.boxes, covariances_m2, is_known))
-
-
-def _box3d_from_msg(box, covariance_m2):
+def _box3d_from_msg(box):
+    covariance_m2 = np.reshape(box.position_covariance, (3, 3)) if any(box.position_covariance) else None
     roi = box.roi
     rect_px = (roi.x_offset, roi.y_offset, roi.x_offset + roi.width, roi.y_offset + roi.height)
     edges = tuple([bool(box.truncated_edges & flag) for flag in EDGE_FLAGS])
@@ -255,10 +245,9 @@ def usable_boxes3d(message):
     if len(message.boxes) > MAX_BOXES:
         raise ValueError('%d 3D boxes in one image; at most %d expected' % (len(message.boxes), MAX_BOXES))
     usable, faults = {}, []
-    covariances_m2 = _position_covariances(message)
-    is_covariance = _are_covariances(covariances_m2).tolist()
-    for index, box in enumerate(_boxes3d_with(covariances_m2, message)):
-        fault = _box3d_fault(box, is_covariance[index])
+    for index, box_msg in enumerate(message.boxes):
+        box = _box3d_from_msg(box_msg)
+        fault = _box3d_fault(box, box_msg.position_covariance)
         if fault:
             faults.append('3D box %d has %s' % (index, fault))
         else:
@@ -266,23 +255,33 @@ def usable_boxes3d(message):
     return usable, faults
 
 
-def _are_covariances(matrices_m2):
-    """Whether each of some matrices (n, 3, 3) is finite and positive semi-definite, (n,)."""
-    is_finite = (np.abs(matrices_m2) < FARTHEST_M).all(axis=(1, 2))
-    matrices_m2 = np.where(is_finite[:, np.newaxis, np.newaxis], matrices_m2, 0)
-    smallest_m2 = np.linalg.eigvalsh(matrices_m2 + matrices_m2.transpose(0, 2, 1)).min(axis=1)
-    return is_finite & (smallest_m2 > -ROUNDING * np.maximum(1, matrices_m2.max(axis=(1, 2))))
-
-
-def _box3d_fault(box, is_covariance):
+def _box3d_fault(box, position_covariance):
     """Describe what is wrong with a Box3D from a message, '' if it can be tracked."""
     if not box.is_plausible:
         return ('centre (%g, %g, %g) and size (%g, %g); finite numbers and sizes of more than 0 and less than %g m '
                 'expected' % (tuple(box.center_m) + tuple(box.size_m[:2]) + (LARGEST_M,)))
-    if not is_covariance:
+    if not _is_covariance(position_covariance):
         return ('the position_covariance %s; a finite, positive semi-definite matrix, or zeros where it is not known, '
-                'expected' % np.ravel(box.covariance_m2).tolist())
+                'expected' % list(position_covariance))
     return label_fault(box.label) or score_fault(box.score)
+
+
+def _is_covariance(elements_m2):
+    """Whether a 3x3 matrix, given by rows, is finite and positive semi-definite.
+
+    It is if the Gaussian elimination of its symmetric part, plus the tolerance, has positive pivots. For single small
+    matrices, arithmetic is several times as fast as numpy's eigenvalues.
+    """
+    if not all(-FARTHEST_M < element_m2 < FARTHEST_M for element_m2 in elements_m2):
+        return False
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = elements_m2
+    tolerance_m2 = ROUNDING * max(1, max(elements_m2)) / 2
+    xy, xz, yz = (xy + yx) / 2, (xz + zx) / 2, (yz + zy) / 2
+    pivot_x = xx + tolerance_m2
+    if pivot_x <= 0:
+        return False
+    pivot_y, yz = yy + tolerance_m2 - xy * xy / pivot_x, yz - xy * xz / pivot_x
+    return pivot_y > 0 and zz + tolerance_m2 - xz * xz / pivot_x - yz * yz / pivot_y > 0
 
 
 def tracks_to_msg(tracks, header):
