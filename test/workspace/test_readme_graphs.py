@@ -27,6 +27,7 @@ PYREALSENSE = claimed('pip3 install pyrealsense2\n')
 RECORDING = claimed('roslaunch ros_3d_bb realsense.launch file:=')
 PLAYBACK = claimed('roslaunch ros_3d_bb playback.launch')
 OWN_DETECTOR = claimed('import cv2, rospy', 'python')
+TRACK_PRINTER = claimed('import rospy', 'python')
 BESIDE_DETECTOR = claimed('roslaunch ros_3d_bb pipeline.launch detector:=none')
 PLANNER = claimed('roslaunch ros_3d_bb pipeline.launch weights:=$HOME/yolov5n.pt planner:=')
 PLANNER_POINTS = claimed('rostopic echo -n 1 /planner_bridge_node')
@@ -103,6 +104,20 @@ def test_another_detector(reader, tmp_path):
         graph.starts_camera(str(tmp_path / 'scene.bag'))
         graph.start([sys.executable, str(tmp_path / 'detector.py')])
         graph.hears('yolo_bounding_box:data', BOXES, TRACKS)
+
+
+def test_a_node_prints_the_tracks(reader, camera_bag, tmp_path):
+    (tmp_path / 'printer.py').write_text(TRACK_PRINTER.text)
+    with reader.running(PIPELINE) as graph:
+        graph.starts_camera(camera_bag)
+        graph.hears(TRACKS)
+        printer = subprocess.Popen([sys.executable, '-u', str(tmp_path / 'printer.py')], env=graph.environment,
+                                   stdout=subprocess.PIPE, universal_newlines=True)
+        try:
+            assert re.match(r'person \d+ at [-\d.]+ [-\d.]+ in map, [-\d.]+ m/s to x', printer.stdout.readline())
+        finally:
+            printer.terminate()
+            printer.wait()
 
 
 def test_planner_points_diagnostics_and_live_parameters(reader, camera_bag):
