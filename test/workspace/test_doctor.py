@@ -5,6 +5,7 @@ import subprocess
 import sys
 from unittest import mock
 
+import cv2
 import numpy as np
 import pytest
 import rosbag
@@ -43,7 +44,7 @@ def changed(bag, folder, change):
 
 
 def found_in(path, camera='', target_frame=''):
-    return bag_findings(argparse.Namespace(bag=str(path), camera=camera, target_frame=target_frame))
+    return bag_findings(argparse.Namespace(bag=str(path), camera=camera, target_frame=target_frame))[0]
 
 
 def faults_in(path, **options):
@@ -53,7 +54,7 @@ def faults_in(path, **options):
 def test_a_sound_bag_has_no_faults(bag):
     process = subprocess.run(['rosrun', 'ros_3d_bb', 'doctor', bag], stdout=subprocess.PIPE, universal_newlines=True)
     lines = process.stdout.splitlines()
-    assert process.returncode == 0 and lines[-1] == 'doctor: no faults found', process.stdout
+    assert process.returncode == 0 and 'doctor: no faults found' in lines, process.stdout
     assert any(line.startswith('ok     transforms: camera_color_optical_frame to map') for line in lines)
     assert 'ok     boxes and depth: 100 % paired by stamp' in lines
 
@@ -125,6 +126,41 @@ def test_a_missing_target_frame_is_reported(bag):
 def test_names_of_topics_are_given_as_remappings(bag, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, 'argv', ['doctor', DEPTH[1:] + ':=/front/depth/image_raw'])
     assert faults_in(changed(bag, tmp_path, renamed)) == []
+
+
+def of_another_driver(topic, message):
+    if topic in ('/ground_truth', '/yolo_bounding_box'):
+        return '/another' + topic, message
+    return (topic.replace('/camera/color', '/cam0/rgb')
+            .replace('/camera/aligned_depth_to_color', '/cam0/depth_to_rgb'), message)
+
+
+def next_command_in(command, folder):
+    """The next command that a command of the doctor prints; empty if there is none."""
+    printed = subprocess.run(['bash', '-c', command], cwd=str(folder), stdout=subprocess.PIPE, universal_newlines=True)
+    return ''.join(line[len('next: '):] for line in printed.stdout.splitlines() if line.startswith('next: '))
+
+
+def test_next_commands_lead_from_a_bag_with_other_names_to_a_picture_of_its_tracks(bag, tmp_path):
+    again = next_command_in('rosrun ros_3d_bb doctor ' + changed(bag, tmp_path, of_another_driver), tmp_path)
+    assert 'camera/aligned_depth_to_color/image_raw:=/cam0/depth_to_rgb/image_raw' in again
+    process = next_command_in(again, tmp_path)
+    assert 'process_bag' in process and next_command_in(process, tmp_path) == ''
+    picture = cv2.imread(str(tmp_path / 'tracked.png'))
+    assert (picture == [60, 220, 40]).all(axis=2).any()  # 2D boxes in the images of that topic
+    assert 'scene_report' in next_command_in('rosrun ros_3d_bb doctor tracked.bag', tmp_path)
+
+
+def test_the_next_command_asks_for_the_pose_of_a_camera_alone(bag, tmp_path):
+    def alone(topic, message):
+        return ('/another/tf' if topic == '/tf' else topic), message
+    command = next_command_in('rosrun ros_3d_bb doctor ' + changed(bag, tmp_path, alone), tmp_path)
+    assert '--camera-height HEIGHT --camera-tilt TILT' in command and '--remap' not in command
+
+
+@pytest.mark.parametrize('change', [metres, other_intrinsics, empty_info])
+def test_there_is_no_next_command_before_a_fault_is_fixed(bag, tmp_path, change):
+    assert next_command_in('rosrun ros_3d_bb doctor ' + changed(bag, tmp_path, change), tmp_path) == ''
 
 
 def of_front(topic, message):

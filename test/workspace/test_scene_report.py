@@ -61,6 +61,15 @@ def test_the_command_prints_the_table_and_writes_the_image_next_to_the_bag(bag):
     assert picture == 'picture: %s' % bag.replace('.bag', '.png') and os.path.exists(bag.replace('.bag', '.png'))
 
 
+def test_without_ground_truth_the_tracks_are_listed(tmp_path):
+    path = str(tmp_path / 'tracked.bag')
+    write_bag(((stamp_ns, [pair for pair in messages if pair[0] != 'ground_truth'])
+               for stamp_ns, messages in images_with_tracks('map')), path)
+    assert write_report(path, str(tmp_path / 'tracked.png')) == [
+        'track  images  first seen  last seen', '    7       9       0.0 s      0.8 s', '9 of 9 images answered']
+    assert (tmp_path / 'tracked.png').exists()
+
+
 @pytest.mark.parametrize('picture', ['no_such_folder/report.png', 'report.xyz'])
 def test_an_image_that_cannot_be_written_is_an_error(bag, tmp_path, picture):
     with pytest.raises((OSError, ValueError)):

@@ -36,17 +36,26 @@ def silence_fault(stream, topics, used=(), seconds=5.0, is_bag=False):
 
 
 def _rename(stream, topics, used, start):
+    role, other = stream.role, other_topic(stream, topics, used)
+    if not other:
+        return '%s; there is no other topic of the type %s' % (start, role.kind)
+    launch = ' (launch argument %s:=%s)' % (role.argument, other) if role.argument else ''
+    return '%s, or, if it is %s, remap %s:=%s%s' % (start, other, role.name, other, launch)
+
+
+def other_topic(stream, topics, used=()):
+    """Return the name of the topic that a Stream without messages probably has; empty if there is none.
+
+    `topics` is {name: type}; those in `used` have another role. Depth is preferred for depth, and not for colour.
+    """
     role, is_depth = stream.role, 'depth' in stream.role.name
     others = sorted(name for name, kind in topics.items()
                     if kind in role.kinds and name != stream.topic and name not in used
                     and not ('/ros_3d_bb/' in name and kind.endswith('/Image'))  # debug images of this package
                     # image_transport publishes both transports of any image, but only one of them is usable
                     and (kind != COMPRESSED_IMAGE or name.endswith('/compressedDepth') == is_depth))
-    if not others:
-        return '%s; there is no other topic of the type %s' % (start, role.kind)
-    other = nearest_name(stream.topic, others)
-    launch = ' (launch argument %s:=%s)' % (role.argument, other) if role.argument else ''
-    return '%s, or, if it is %s, remap %s:=%s%s' % (start, other, role.name, other, launch)
+    others = [name for name in others if ('depth' in name.lower()) == is_depth] or others
+    return nearest_name(stream.topic, others) if others else ''
 
 
 def clock_fault(stream, use_sim_time):

@@ -1,4 +1,4 @@
-"""Report on the bag of a scene with ground truth: an image of the scene, and a table of tracking metrics."""
+"""Report on the tracks in a bag: a picture, and a table; of a simulated scene, the table compares them with truth."""
 import argparse
 import os
 import sys
@@ -30,13 +30,14 @@ class Recording(NamedTuple):
     """Scene in a bag."""
 
     moments: list      # a Moment per image, without tracks if the tracker did not publish a message for the image
+    has_truth: bool    # whether the bag contains ground truth
     answered: int      # number of images for which the tracker published a message
     boxes: dict        # 2D boxes (n, 4) by stamp
     robot: np.ndarray  # path of the robot in the map, (n, 2)
 
 
 def read_recording(bag):
-    """Read a Recording from an open bag. Raises ValueError if tracks or truth are missing, or their frames differ."""
+    """Read a Recording from an open bag. Raises ValueError if tracks are missing, or the frames of truth differ."""
     truth, tracks, boxes, links, robot = {}, {}, {}, {}, []
     boxes_topics = topics_of_cameras(bag, BOXES_TOPIC)
     for topic, message, _time in bag.read_messages(['/' + TRUTH_TOPIC, '/' + TRACKS_TOPIC, '/tf'] + boxes_topics):
@@ -51,16 +52,30 @@ def read_recording(bag):
         else:
             by_stamp = truth if topic == '/' + TRUTH_TOPIC else tracks
             by_stamp[stamp_of(message)] = message
-    for name, by_stamp in ((TRUTH_TOPIC, truth), (TRACKS_TOPIC, tracks)):
-        if not by_stamp:
-            raise ValueError('the bag has no messages on /%s; a recorded run of simulation.launch expected' % name)
+    if not tracks:
+        raise ValueError('the bag has no messages on /%s; a recorded run of simulation.launch, or a result of '
+                         'process_bag expected' % TRACKS_TOPIC)
     frames = set(message.header.frame_id for by_stamp in (truth, tracks) for message in by_stamp.values())
     if len(frames) > 1:
         raise ValueError('truth and tracks have the frames %s; one frame expected' % ', '.join(sorted(frames)))
-    moments = [Moment(stamp_ns, tracks_from_msg(truth[stamp_ns]),
+    moments = [Moment(stamp_ns, tracks_from_msg(truth[stamp_ns]) if truth else [],
                       tracks_from_msg(tracks[stamp_ns]) if stamp_ns in tracks else [])
-               for stamp_ns in sorted(truth)]
-    return Recording(moments, len(set(truth) & set(tracks)), boxes, np.array(robot).reshape(-1, 2))
+               for stamp_ns in sorted(truth or tracks)]
+    answered = len(set(truth or tracks) & set(tracks))
+    return Recording(moments, bool(truth), answered, boxes, np.array(robot).reshape(-1, 2))
+
+
+def table_of_tracks(moments):
+    """Format the times for which the tracks of a list of Moment are visible, as lines of text."""
+    stamps = {}
+    for moment in moments:
+        for track in moment.tracks:
+            if track.status == VISIBLE:
+                stamps.setdefault(track.id, []).append(moment.stamp_ns)
+    first_ns = moments[0].stamp_ns
+    return ['track  images  first seen  last seen'] + [
+        '%5d  %6d  %8.1f s  %7.1f s' % (number, len(seen), (seen[0] - first_ns) / NS, (seen[-1] - first_ns) / NS)
+        for number, seen in sorted(stamps.items())]
 
 
 def topics_of_cameras(bag, topic):
@@ -81,13 +96,17 @@ def paths_of(recording):
     return people, tracks
 
 
-def panels_of(bag, recording, count=PANELS):
-    """Colour images at regular intervals with their 2D boxes. Images with a message of 2D boxes are preferred."""
+def panels_of(bag, recording, color_topic='', count=PANELS):
+    """Colour images at regular intervals with their 2D boxes. Images with a message of 2D boxes are preferred.
+
+    `color_topic` is the name of colour in the bag, if it is not that of the nodes.
+    """
     stamps = [moment.stamp_ns for moment in recording.moments]
     stamps = [stamp_ns for stamp_ns in stamps if stamp_ns in recording.boxes] or stamps
     wanted = set(stamps[pick] for pick in np.linspace(0, len(stamps) - 1, count + 2)[1:-1].astype(int))
     panels = []
-    for _topic, message, _time in bag.read_messages(topics_of_cameras(bag, COLOR_TOPIC)):
+    topics = [color_topic] if color_topic else topics_of_cameras(bag, COLOR_TOPIC)
+    for _topic, message, _time in bag.read_messages(topics):
         stamp_ns = message.header.stamp.to_nsec()
         if stamp_ns in wanted:
             boxes = recording.boxes.get(stamp_ns, np.zeros((0, 4), int))
@@ -104,7 +123,7 @@ def draw_scene(path, panels, people, tracks, robot, lines):
     """
     rows = (len(panels) + COLUMNS - 1) // COLUMNS
     text_share = LINE_IN * (len(lines) + 3) / SIZE_IN[1]  # with the labels of the axis
-    grid = gridspec.GridSpec(rows + 1, COLUMNS, height_ratios=[1] * rows + [1.8], left=0.03, right=0.99, top=0.99,
+    grid = gridspec.GridSpec(rows + 1, COLUMNS, height_ratios=[1] * rows + [1.8], left=0.04, right=0.99, top=0.99,
                              bottom=text_share, wspace=0.02, hspace=0.08)
     figure = pyplot.figure(figsize=SIZE_IN, dpi=DPI)
     for number, panel in enumerate(panels):
@@ -120,36 +139,40 @@ def draw_scene(path, panels, people, tracks, robot, lines):
 def _draw_paths(axes, people, tracks, robot):
     for number, path in sorted(people.items()):
         axes.plot(*zip(*path), color=TRUTH_COLOR, linewidth=6)
-        axes.annotate('person %d' % number, path[-1])
+        axes.annotate('person %d' % number, path[-1], (6, -12), textcoords='offset points')
     for number, path in sorted(tracks.items()):
         line, = axes.plot(*zip(*path))
-        axes.annotate(str(number), path[0], color=line.get_color(), weight='bold')
+        axes.annotate(str(number), path[0], (-4, 6), textcoords='offset points', color=line.get_color(), weight='bold',
+                      bbox={'boxstyle': 'round', 'facecolor': 'white', 'edgecolor': line.get_color()}, zorder=9)
     axes.plot(robot[:, 0], robot[:, 1], color=ROBOT_COLOR, marker='o', markevery=[-1] if len(robot) else [])
     axes.set_aspect('equal', 'datalim')
     axes.grid(True)
-    axes.set(title='map in metres: true paths (grey), tracks with their IDs (colour), robot (black)')
+    axes.set(title='map in metres: %stracks with their IDs (colour)%s' % (
+        'true paths (grey), ' if people else '', ', robot (black)' if len(robot) else ''))
 
 
-def write_report(bag_path, picture_path):
+def write_report(bag_path, picture_path, color_topic=''):
     """Write the picture and return the table, a list of lines. Raises ValueError or OSError."""
     with rosbag.Bag(bag_path) as bag:
         recording = read_recording(bag)
-        lines = table(score(recording.moments))
+        lines = table(score(recording.moments)) if recording.has_truth else table_of_tracks(recording.moments)
         lines.append('%d of %d images answered' % (recording.answered, len(recording.moments)))
         people, tracks = paths_of(recording)
-        draw_scene(picture_path, panels_of(bag, recording), people, tracks, recording.robot, lines)
+        draw_scene(picture_path, panels_of(bag, recording, color_topic), people, tracks, recording.robot, lines)
     return lines
 
 
 def main():
     """Run the command `scene_report`."""
     parser = argparse.ArgumentParser(prog='scene_report', description=__doc__)
-    parser.add_argument('bag', help='bag recorded by simulation.launch record:=...')
+    parser.add_argument('bag', help='bag recorded by simulation.launch record:=..., or written by process_bag')
     parser.add_argument('picture', nargs='?', help='image file to write (default: the name of the bag with .png)')
+    parser.add_argument('--color-topic', default='', metavar='TOPIC',
+                        help='colour images in the bag, if their topic is not %s' % COLOR_TOPIC)
     arguments = parser.parse_args()
     picture = arguments.picture or os.path.splitext(arguments.bag)[0] + '.png'
     try:
-        lines = write_report(arguments.bag, picture)
+        lines = write_report(arguments.bag, picture, arguments.color_topic)
     except (ValueError, OSError, rosbag.ROSBagException) as error:
         sys.exit('scene_report: %s: %s; no report was written' % (arguments.bag, error))
     print('\n'.join(lines + ['picture: %s' % picture]))

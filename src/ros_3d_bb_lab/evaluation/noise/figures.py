@@ -67,7 +67,7 @@ def _layout(path, measurements):
     axes.plot(0, 0, '^', color='0.3', markersize=11, label='camera')
     axes.set_aspect('equal', 'datalim')
     axes.margins(0.1)
-    _finish(figure, axes, path, 'X [m]', 'Z [m]')
+    _finish(figure, axes, path, 'X [m]', 'Z [m]', 'lower right')  # few measurements are beside the camera
 
 
 def _sigmas(path, analysis):
@@ -161,10 +161,10 @@ def _histograms(path, clusters, name):
     _save(figure, path)
 
 
-def _finish(figure, axes, path, x_label, y_label):
+def _finish(figure, axes, path, x_label, y_label, legend_at='best'):
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=8, loc=legend_at)
     axes.grid(alpha=0.25)
     _save(figure, path)
 

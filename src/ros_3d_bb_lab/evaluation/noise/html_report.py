@@ -10,6 +10,7 @@ body {{ font: 16px/1.5 sans-serif; max-width: 54em; margin: 2em auto; padding: 0
 table {{ border-collapse: collapse; margin: 0.3em 0 1.2em; font-size: 0.9em; }}
 td, th {{ padding: 0.15em 0.8em; text-align: right; vertical-align: top; }}
 th {{ border-bottom: 1px solid #888; }} td:first-child, th:first-child {{ text-align: left; padding-left: 0; }}
+.pairs td, .pairs th {{ text-align: left; }}
 img {{ max-width: 100%; }} figure {{ margin: 1.5em 0; }}
 figcaption, .caption {{ color: #444; font-size: 0.9em; margin: 0.5em 0 0; }}
 </style></head><body>
@@ -35,7 +36,8 @@ def _rendered(block, folder):
         return '<figure><img src="data:image/png;base64,%s" alt="%s"><figcaption>%s</figcaption></figure>' % (
             data, caption, caption)
     rows = [_row('th', block.header)] + [_row('td', row) for row in block.rows]
-    return '<p class="caption">%s</p>\n<table>\n%s\n</table>' % (caption, '\n'.join(rows))
+    kind = ' class="pairs"' if len(block.header) == 2 else ''  # names and values, which may be text
+    return '<p class="caption">%s</p>\n<table%s>\n%s\n</table>' % (caption, kind, '\n'.join(rows))
 
 
 def _row(cell, texts):
