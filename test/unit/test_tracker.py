@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.track import PredictionParams
@@ -298,7 +299,7 @@ def test_tracks_end_during_a_long_pause_of_the_camera():
 def test_a_hundred_people_are_distinguished():
     places = [(1.5 + 0.45 * row, (column - 4.5) * 0.5) for row in range(10) for column in range(10)]
     view = VIEW._replace(intrinsics=CAMERA._replace(fx=64.0, fy=64.0))
-    walk = play(Tracker(TrackerParams(max_range=9)), 1, standing(*places), view=view)
+    walk = play(Tracker(detector=DetectorModel(max_range_m=9.0)), 1, standing(*places), view=view)
     assert len(walk[-1]) == 100
     for track in walk[-1]:
         assert np.hypot(*(track.position_m[:2] - np.array(places[track.id - 1]))) < 0.25

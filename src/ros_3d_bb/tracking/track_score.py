@@ -17,7 +17,6 @@ UNKNOWN_SCORE = 0.5
 # Of the score of a detection. A high score does not mean that the position is right, as of a person half hidden.
 MIN_LOG_ODDS, MAX_LOG_ODDS = -2.0, 1.0
 HIT = 0.4  # of a detection where a track is expected: little, because false detections repeat at their place, too
-MISS = math.log(0.1)  # detectors miss about one of ten visible people
 MAX_TRACK_SCORE = 4.0  # earlier evidence is forgotten: an undetected person is published for 0.4 s
 MIN_TRACK_SCORE = -2.0  # with less (12 % probability), tracks do not start, and undetected tracks are not published
 
@@ -47,6 +46,6 @@ def add_detections(tracks, scores, elapsed_s, params):
     tracks['confirmed'] |= tracks['log_odds'] >= _logit(params.confirmation_probability)
 
 
-def add_misses(tracks, elapsed_s):
+def add_misses(tracks, elapsed_s, detection_probability):
     """Subtract misses of tracks that a camera should have detected, and has not for `elapsed_s` (n,)."""
-    tracks['log_odds'] += np.minimum(elapsed_s / MISS_CORRELATION_S, 1) * MISS
+    tracks['log_odds'] += np.minimum(elapsed_s / MISS_CORRELATION_S, 1) * math.log(1 - detection_probability)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
@@ -19,7 +20,7 @@ from ros_3d_bb.tracking.association import associate, unmatched
 from ros_3d_bb.tracking.class_numbers import ClassNumbers
 from ros_3d_bb.tracking.common_motion import common_motion, move
 from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
-from ros_3d_bb.tracking.occlusion import SEEN, CameraVisibility, mark_missed
+from ros_3d_bb.tracking.occlusion import DEFAULT_RANGE_M, SEEN, CameraVisibility, learned_range, mark_missed
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
 from ros_3d_bb.tracking.track import (TRACK, PredictionParams, duplicates, new_targets, objects_of, position_std_of,
                                       update_matched)
@@ -66,9 +67,6 @@ class TrackerParams(NamedTuple):
     max_position_std: float = Param(
         0.5, 'An undetected track stays published up to this standard deviation of its position.', 'm', live=(0, 2))
     max_age: float = Param(4.0, 'A person who reappears within this time keeps the track ID.', 's', live=(0, 30))
-    max_range: float = Param(
-        8.0, 'Range of the detector: people who are farther from the camera are not expected to be detected.', 'm',
-        live=(1, 20))
     moving_speed: float = MOVING_SPEED
 
 
@@ -88,7 +86,8 @@ class Tracker(object):
 
     Call `update` with the detections of each image, `skip` for an image whose detections are unusable, and `reset`
     after a jump in time. Images of several cameras may arrive late and in any order. The IDs of tracks are greater than
-    `last_id`. `classes` is the table of the classes of objects: tracks never change between its groups.
+    `last_id`. `classes` is the table of the classes of objects: tracks never change between its groups. `detector` is
+    a DetectorModel.
 
     Raises
     ------
@@ -97,8 +96,8 @@ class Tracker(object):
     """
 
     def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams(), last_id=0,
-                 classes=ObjectClasses()):
-        self._classes = ClassNumbers(classes)
+                 classes=ObjectClasses(), detector=DetectorModel()):
+        self._classes, self._detector = ClassNumbers(classes), detector
         self.reconfigure(params, noise, prediction)
         self._start(last_id)
 
@@ -158,7 +157,7 @@ class Tracker(object):
     def _step(self, state, image, observed_s, assign_id):
         """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
         stamp_ns, detections, view = image
-        params, classes, camera = self._params, self._classes, view.camera
+        params, classes, detector, camera = self._params, self._classes, self._detector, view.camera
         tracks = state.tracks.copy()
         elapsed_s = 0.0 if state.now_ns is None else (stamp_ns - state.now_ns) / NS
         density = params.acceleration * classes.acceleration[tracks['class_number']]
@@ -166,21 +165,27 @@ class Tracker(object):
                                                                      density)
         tracks['detection'] = NOT_DETECTED
 
-        period_s = (stamp_ns - state.cameras[camera].stamp_ns) / NS if camera in state.cameras else 0.0
-        measurements = measurements_of(detections, view, period_s, self._noise, classes)
+        latest = state.cameras.get(camera)
+        period_s = (stamp_ns - latest.stamp_ns) / NS if latest else 0.0
+        measurements = measurements_of(detections, view, period_s, self._noise, classes, detector)
         rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
         motion = common_motion(tracks, measurements, rows, columns, view, classes)
         if motion is not None:
             move(tracks, *motion, view)
             rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
         matches = list(zip(tracks['id'][rows].tolist(), tracks['confirmed'][rows].tolist(), columns.tolist()))
-        update_matched(tracks, rows, measurements[columns], stamp_ns, params, classes)
+        matched = measurements[columns]
+        update_matched(tracks, rows, matched, stamp_ns, params, classes)
 
+        range_m = detector.max_range_m
+        if range_m is None:
+            range_m = learned_range(latest.range_m if latest else DEFAULT_RANGE_M,
+                                    matched['distance_m'][tracks['confirmed'][rows]])
         cameras = {name: latest for name, latest in state.cameras.items() if stamp_ns - latest.stamp_ns <= KNOWN_NS}
-        cameras[camera] = CameraVisibility(stamp_ns, view, np.full(len(tracks), SEEN))
+        cameras[camera] = CameraVisibility(stamp_ns, view, np.full(len(tracks), SEEN), range_m)
         missed = unmatched(len(tracks), rows)
         if len(missed):
-            mark_missed(tracks, state.tracks, missed, cameras, camera, observed_s, params.max_range)
+            mark_missed(tracks, state.tracks, missed, cameras, camera, observed_s, detector.detection_probability)
 
         # Tentative tracks are kept for a short time only.
         max_unseen_s = np.where(tracks['confirmed'], params.max_age, TENTATIVE_TIMEOUT_S)
@@ -192,7 +197,7 @@ class Tracker(object):
             new, started = new_targets(tracks, measurements[unmatched_columns], stamp_ns, params, classes)
             new['id'] = [assign_id(column) for column in unmatched_columns[started].tolist()]
             tracks = np.concatenate((tracks, new))
-        for name, latest in cameras.items():
+        for name, seen in cameras.items():
             added = np.full(len(new), SEEN if name == camera else OUT_OF_VIEW)
-            cameras[name] = latest._replace(visibility=np.concatenate((latest.visibility[kept], added)))
+            cameras[name] = seen._replace(visibility=np.concatenate((seen.visibility[kept], added)))
         return _State(tracks, stamp_ns, cameras, state.common_motions + (motion is not None)), matches
