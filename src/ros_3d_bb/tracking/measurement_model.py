@@ -6,11 +6,11 @@ import numpy as np
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.tracking.types import NEARER_M, wrapped
 
-# Position (x, y), its covariance, the distance from the camera and the unit vector from the
+# Position (x, y), its covariance and whether that is assumed, the distance from the camera and the unit vector from the
 # camera in the ground plane; extents; height of the centre and its variance; whether the image border truncates the
 # width, and the lower and the upper end; support; number of the class (`class_numbers.ClassNumbers`), score, and
 # `Detection.index`.
-MEASUREMENT = np.dtype([('position_m', float, 2), ('noise_m2', float, (2, 2)),
+MEASUREMENT = np.dtype([('position_m', float, 2), ('noise_m2', float, (2, 2)), ('noise_assumed', bool),
                         ('distance_m', float), ('ray', float, 2), ('size_m', float, 3), ('z_m', float), ('z_m2', float),
                         ('cut_sideways', bool), ('cut_ends', bool, 2), ('support', float), ('class_number', int),
                         ('score', float), ('detection', int)])
@@ -31,7 +31,7 @@ class NoiseParams(NamedTuple):
     """Parameters of the position errors of boxes."""
 
     noise_unknown: float = Param(
-        0.1, 'Standard deviation of boxes without a covariance.', 'm', live=(0, 1))
+        0.1, 'Standard deviation of boxes without a covariance, lasting errors included.', 'm', live=(0, 1))
 
 
 def measurements_of(detections, view, elapsed_s, params, classes, detector):
@@ -50,6 +50,7 @@ def measurements_of(detections, view, elapsed_s, params, classes, detector):
     measurements['class_number'] = numbers = [classes.of(label) for label in labels]
     positions_m, sizes_m, truncated_edges = np.array(positions_m), np.array(sizes_m), np.array(truncated_edges, bool)
     unknown_m2 = np.eye(3) * params.noise_unknown ** 2
+    measurements['noise_assumed'] = [known is None for known in covariances_m2]
     covariances_m2 = np.array([unknown_m2 if known is None else known for known in covariances_m2])
 
     distances_m, bearings = view.bearings(positions_m)
