@@ -4,7 +4,7 @@ The latest image of each camera classifies each undetected track, and the best r
 cannot see is therefore neither out of view nor missed while another camera detects it, sees it occluded or should
 detect it. A camera that stops sending images is ignored after a short time.
 """
-from typing import NamedTuple
+from typing import NamedTuple, Optional
 
 import numpy as np
 
@@ -34,13 +34,14 @@ RANGE_GAIN = 0.05  # of the filter that learns the range
 
 
 class CameraVisibility(NamedTuple):
-    """The latest image of a camera, SEEN or the result of `classify_visibility` for each track (n,), and the range in
-    which people are expected to be detected."""
+    """The latest image of a camera, SEEN or the result of `classify_visibility` for each track (n,), the range in which
+    people are expected to be detected, and whether most people fit their tracks (`common_motion`), None if unknown."""
 
     stamp_ns: int
     view: CameraView
     visibility: np.ndarray
     range_m: float
+    fits: Optional[bool]
 
 
 def learned_range(range_m, distances_m, confirmed, rows):

@@ -18,7 +18,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter, noise_scale, track_score
 from ros_3d_bb.tracking.association import associate, unmatched
 from ros_3d_bb.tracking.class_numbers import ClassNumbers
-from ros_3d_bb.tracking.common_motion import common_motion, move
+from ros_3d_bb.tracking.common_motion import common_motion, may_jump, move
 from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
 from ros_3d_bb.tracking.occlusion import DEFAULT_RANGE_M, SEEN, CameraVisibility, learned_range, mark_missed
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
@@ -175,7 +175,12 @@ class Tracker(object):
         measurements = measurements_of(detections, view, period_s, self._noise, classes, detector)
         noise_scale.widen(state.log_noise_scale, measurements)
         rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
-        motion = common_motion(tracks, measurements, rows, columns, view, classes)
+        was_seen = latest.visibility == SEEN if latest else np.zeros(len(tracks), bool)
+        motion, fits = common_motion(tracks, was_seen, measurements, rows, columns, view, classes)
+        if motion is not None and not may_jump(state.cameras, camera, stamp_ns):
+            motion = None
+        if fits is None and latest:
+            fits = latest.fits
         if motion is not None:
             move(tracks, *motion, view)
             rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
@@ -189,7 +194,7 @@ class Tracker(object):
             range_m = learned_range(latest.range_m if latest else DEFAULT_RANGE_M, matched['distance_m'],
                                     tracks['confirmed'], rows)
         cameras = {name: latest for name, latest in state.cameras.items() if stamp_ns - latest.stamp_ns <= KNOWN_NS}
-        cameras[camera] = CameraVisibility(stamp_ns, view, np.full(len(tracks), SEEN), range_m)
+        cameras[camera] = CameraVisibility(stamp_ns, view, np.full(len(tracks), SEEN), range_m, fits)
         missed = unmatched(len(tracks), rows)
         if len(missed):
             mark_missed(tracks, state.tracks, missed, cameras, camera, observed_s, detector.detection_probability)
