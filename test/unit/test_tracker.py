@@ -52,10 +52,10 @@ def test_ids_start_at_1_and_are_not_reused():
 
 @pytest.mark.parametrize('rate_hz', [3, 5, 10, 20, 30, 60])
 def test_tracks_begin_and_end_after_the_same_time_at_any_rate(rate_hz):
-    """Boxes without a score. At 10 Hz, the third one confirms the track, at lower rates the second one."""
+    """Boxes without a score. Below 12 Hz, the third one confirms the track."""
     walk = play(Tracker(), 4, lambda time_s: [at(3, 0)] if time_s < 2 else [], rate_hz)
     published_s = [number / rate_hz for number, objects in enumerate(walk) if objects]
-    assert 0.07 <= published_s[0] <= (0.14 if rate_hz > 10 else max(0.21, 1.01 / rate_hz))
+    assert 0.07 <= published_s[0] <= max(0.14, 2.01 / rate_hz)
     assert 2.15 <= published_s[-1] <= max(2.45, 2 + 2.01 / rate_hz)
     assert len(published_s) == round((published_s[-1] - published_s[0]) * rate_hz) + 1
 

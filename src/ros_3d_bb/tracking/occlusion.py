@@ -48,9 +48,9 @@ def learned_range(range_m, distances_m, confirmed, rows):
     """Range after an image with the tracks in `rows` detected at `distances_m` (k,): `DEFAULT_RANGE_M`, or the filtered
     mean distance of the confirmed (n,) ones farther away. Beyond it, detectors miss people often."""
     is_far = distances_m > DEFAULT_RANGE_M
-    if is_far.any():
-        is_far &= confirmed[rows]
-    far_m = distances_m[is_far]
+    if not is_far.any():
+        return range_m
+    far_m = distances_m[is_far & confirmed[rows]]
     if not len(far_m):
         return range_m
     return range_m + (1 - (1 - RANGE_GAIN) ** len(far_m)) * (far_m.mean() - range_m)

@@ -2,8 +2,8 @@
 
 The score is the sum of the log-likelihood ratios of the detections and misses of a track (Sittler 1964; Blackman and
 Popoli, Design and Analysis of Modern Tracking Systems, 1999, 6.2). Those of successive images are not independent:
-detectors repeat their errors. An image therefore counts the more, the longer the time since the previous one: at high
-image rates, the score depends on the time and not on the number of images.
+detectors repeat their errors. An image therefore counts in proportion to the time since the previous one, and fully
+after a correlation time: at high image rates, the score depends on the time and not on the number of images.
 
 Convention: `tracks` are arrays of `track.TRACK` and modified in place.
 """
@@ -11,8 +11,7 @@ import math
 
 import numpy as np
 
-# Without scores, four images at 30 Hz, three at 10 Hz, or two at least 0.2 s apart confirm a track by default.
-HIT_WEIGHT, HIT_CORRELATION_S = 1.15, 0.074
+HIT_CORRELATION_S = 0.08  # without scores, four images at 30 Hz or three independent ones confirm a track by default
 MISS_CORRELATION_S = 0.15  # the causes of misses, such as poses and partial occlusion, last longer
 UNKNOWN_SCORE = 0.5
 # Of the score of a detection. A high score does not mean that the position is right, as of a person half hidden.
@@ -42,7 +41,7 @@ def add_detections(tracks, scores, elapsed_s, params):
     1954).
     """
     log_odds = log_odds_of(scores, params.even_score)
-    sums = tracks['log_odds'] + HIT_WEIGHT * (1 - np.exp(-elapsed_s / HIT_CORRELATION_S)) * (log_odds + HIT)
+    sums = tracks['log_odds'] + np.minimum(elapsed_s / HIT_CORRELATION_S, 1) * (log_odds + HIT)
     tracks['log_odds'] = np.minimum(np.maximum(sums, log_odds), MAX_TRACK_SCORE)
     tracks['confirmed'] |= tracks['log_odds'] >= _logit(params.confirmation_probability)
 

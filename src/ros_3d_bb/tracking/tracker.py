@@ -150,14 +150,14 @@ class Tracker(object):
     def objects(self):
         """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image."""
         state, params, prediction = self._buffer.state, self._params, self._prediction
-        tracks = state.tracks[np.argsort(state.tracks['id'])]
+        tracks = state.tracks.take(np.argsort(state.tracks['id']))
         published = tracks['log_odds'] >= track_score.MIN_TRACK_SCORE
         published &= position_std_of(tracks) < params.max_position_std
         published |= tracks['status'] == VISIBLE
         if state.log_noise_scale < 0:
             prediction = prediction._replace(position_bias=noise_scale.lasting_std(
                 state.log_noise_scale, self._noise.noise_unknown, prediction.position_bias))
-        return objects_of(tracks[tracks['confirmed'] & published], prediction, self._classes)
+        return objects_of(tracks.compress(tracks['confirmed'] & published), prediction, self._classes)
 
     def _step(self, state, image, observed_s, assign_id):
         """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
@@ -185,7 +185,7 @@ class Tracker(object):
             move(tracks, *motion, view)
             rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
         matches = list(zip(tracks['id'][rows].tolist(), tracks['confirmed'][rows].tolist(), columns.tolist()))
-        matched = measurements[columns]
+        matched = measurements.take(columns)
         log_noise_scale = noise_scale.learn(state.log_noise_scale, tracks, rows, matched)
         update_matched(tracks, rows, matched, stamp_ns, params, classes)
 
@@ -209,8 +209,9 @@ class Tracker(object):
             new, started = new_targets(tracks, measurements[unmatched_columns], stamp_ns, params, classes)
             new['id'] = [assign_id(column) for column in unmatched_columns[started].tolist()]
             tracks = np.concatenate((tracks, new))
-        for name, seen in cameras.items():
-            added = np.full(len(new), SEEN if name == camera else OUT_OF_VIEW)
-            cameras[name] = seen._replace(visibility=np.concatenate((seen.visibility[kept], added)))
+        if len(new) or not kept.all():
+            for name, seen in cameras.items():
+                added = np.full(len(new), SEEN if name == camera else OUT_OF_VIEW)
+                cameras[name] = seen._replace(visibility=np.concatenate((seen.visibility[kept], added)))
         return _State(tracks, stamp_ns, cameras, state.common_motions + (motion is not None),
                       log_noise_scale), matches
