@@ -16,8 +16,8 @@ from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import array_from, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, boxes3d_from_msg,
-                                                   boxes3d_to_msg, camera_from_msg, detections_from_msg,
-                                                   tracks_from_msg, tracks_to_msg, usable_boxes3d)
+                                                   boxes3d_to_msg, camera_from_msg, tracks_from_msg,
+                                                   tracks_to_msg, usable_boxes3d)
 from ros_3d_bb.conversions.planner_msgs import points_to_msg
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
@@ -38,6 +38,7 @@ from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.planning.planner_view import footprint_points, in_frame, predicted_to, usable_tracks
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb.visualization.markers import MarkerParams
+from ros_3d_bb.tracking.types import detections_from_boxes
 from ros_3d_bb_annotator import legacy
 from ros_3d_bb_annotator.lengths import parse_length
 from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
@@ -76,7 +77,7 @@ def _boxes3d(source, _folder):
 
 def _detections(source, _folder):
     usable, _faults = usable_boxes3d(hostile.boxes3d(source, NOW_NS))
-    for detection in detections_from_msg(usable, FROM_CAMERA):
+    for detection in detections_from_boxes(usable, FROM_CAMERA):
         assert np.isfinite(detection.position_m).all() and (detection.size_m > 0).all()
 
 
@@ -272,7 +273,7 @@ FUNCTIONS = {  # name: (function of a Source and a folder, relative frequency)
     'imgmsg_to_depth': (_made(imgmsg_to_depth, DEPTH_TOPIC), 8),
     'camera_from_msg': (_made(camera_from_msg, INFO_TOPICS[0]), 8),
     'boxes2d_from_msg, boxes2d_to_msg': (_boxes2d, 6), 'boxes3d_from_msg, boxes3d_to_msg': (_boxes3d, 3),
-    'usable_boxes3d, detections_from_msg': (_detections, 4), 'tracks, planners': (_tracks, 3),
+    'usable_boxes3d, detections_from_boxes': (_detections, 4), 'tracks, planners': (_tracks, 3),
     'estimate_boxes': (_estimates, 2), 'decode_rows, ranked, non_maximum_suppression': (_predictions, 3),
     'decode_heads': (_heads, 2), 'params_from': (_params, 15), 'parse_length': (_length, 10),
     'scenario_from': (_scenario, 2), 'read_scenario': (_file(read_scenario, 'scenario.yaml', *SCENARIOS), 0.1),

@@ -103,7 +103,7 @@ def test_changed_parameters_apply_from_the_next_image_on(camera, output, images)
     """An empty array means that no people were detected. A request with an unknown class is rejected as a whole."""
     client = Client('yolov5_node', timeout=TIMEOUT_S)
     changes = [({'confidence': 1.0}, 0), ({'confidence': 0.25}, 1), ({'confidence': 1.0, 'classes': 'unicorn'}, 1),
-               ({'image_size': 320}, 1)]
+               ({'image_size': 320}, 1), ({'image_size': 0}, 1)]
     for number, (change, count) in enumerate(changes):
         client.update_configuration(change)
         camera.publish(color_message(images[0][0], START + number))

@@ -2,19 +2,17 @@
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from hypothesis.extra import numpy as hnp
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.object_classes import PERSON_CLASS
-from ros_3d_bb.estimation.box3d_estimator import (EDGE_PERCENT, ImageGeometry, check_rect,
-                                                  complete_truncated_extent, edges, estimate_boxes,
-                                                  estimate_foreground, estimate_median, estimator_named,
-                                                  nearest_dominant_layer, sample_depth, truncated_edges, within)
+from ros_3d_bb.estimation.box3d_estimator import (GRID_COLUMNS, GRID_ROWS, ImageGeometry, check_rect,
+                                                  complete_truncated_extent, estimate_boxes, estimate_foreground,
+                                                  estimate_median, estimator_named, sample_depth, sample_grid,
+                                                  truncated_edges)
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
-MILLIMETRES = hnp.arrays(int, st.integers(1, 60), elements=st.integers(300, 9000))
 
 
 def of(camera):
@@ -49,10 +47,9 @@ def test_the_grid_is_centred_and_clipped_to_the_image(x1, y1, width, height, str
     assert [tuple(pixel) for pixel in samples.pixels.reshape(-1, 2).tolist()] == expected
 
 
-@pytest.mark.parametrize('stride', [None, 7])
 @pytest.mark.parametrize('rect', [(10, 10, 10, 20), (20, 10, 10, 20), (10, 20, 20, 10), (10 ** 9, 0, 2 * 10 ** 9, 9)])
-def test_rectangles_without_samples(rect, stride):
-    assert sample_depth(flat(1000), rect, stride).valid.size == 0
+def test_rectangles_without_samples(rect):
+    assert sample_depth(flat(1000), rect, 7).valid.size == sample_grid(flat(1000), rect).valid.size == 0
     if rect[0] < 64:
         with pytest.raises(ValueError, match=r'box \(%d, %d, %d, %d\)' % rect):
             check_rect(rect)
@@ -62,7 +59,7 @@ def test_rectangles_without_samples(rect, stride):
                                                  (np.inf, 1, np.float32), (-1, 1, np.float32)])
 def test_no_estimate_without_valid_depth(depth, scale_m, dtype):
     image = flat(depth, scale_m, dtype)
-    assert not sample_depth(image, (0, 0, 64, 48)).valid.any()
+    assert not sample_grid(image, (0, 0, 64, 48)).valid.any()
     for name in ('foreground', 'median'):
         outside = estimate_boxes(flat(2000), [(70, 10, 90, 20)], CAMERA, estimator_named(name))
         assert estimate_boxes(image, [(0, 0, 64, 48)], CAMERA, estimator_named(name)) == outside == [None]
@@ -86,8 +83,10 @@ def test_support_is_the_share_of_samples_with_depth_that_are_on_the_body():
     assert box.support == pytest.approx(40 / 64)
 
 
-def foreground(depth, rect, nearer=()):
-    return estimate_foreground(sample_depth(depth, rect), rect, of(CAMERA), nearer)
+def foreground(depth, rect, *others, camera=CAMERA):
+    """The box of the first of several rectangles."""
+    rects = [rect] + list(others)
+    return estimate_foreground(depth, rects, of(camera), [PERSON_CLASS] * len(rects))[0]
 
 
 @given(st.integers(500, 5000), st.floats(0.4, 1), st.integers(400, 3000))
@@ -111,8 +110,8 @@ def test_foreground_masks_pixels_of_occluders():
     near, far = (10, 5, 34, 45), (28, 10, 50, 40)
     in_front = foreground(depth, near)
     assert in_front.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis)
-    assert foreground(depth, far, [in_front]).center_m[2] == pytest.approx(3.0 + PERSON_CLASS.axis)
-    assert foreground(depth, (12, 8, 30, 44), [in_front]) is None
+    assert foreground(depth, far, near).center_m[2] == pytest.approx(3.0 + PERSON_CLASS.axis)
+    assert in_front.rect_px == near and foreground(depth, (12, 8, 30, 44), near) is None
 
 
 def test_foreground_ignores_flying_pixels():
@@ -123,12 +122,37 @@ def test_foreground_ignores_flying_pixels():
     assert box.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis)
 
 
-def test_foreground_samples_about_as_many_pixels_in_every_box():
-    depth = DepthImage(np.full((480, 640), 1000, np.uint16), 0.001)
-    rects = ((0, 0, 640, 480), (100, 100, 260, 400), (-5000, -5000, 5000, 5000), (300, 200, 350, 240))
-    assert all(1500 <= sample_depth(depth, rect).valid.size <= 4500 for rect in rects)
-    assert sample_depth(flat(1000), (-2 ** 31, -2 ** 31, 2 ** 31 - 1, 2 ** 31 - 1), 20).valid.size <= 12
-    assert sample_depth(depth, (300, 200, 310, 220)).valid.size == 200
+def test_boxes_do_not_depend_on_the_other_boxes_in_the_image():
+    """A row of people side by side, estimated together and one by one."""
+    depth = DepthImage(np.full((480, 640), 6000, np.uint16), 0.001)
+    rects = [(80 * number, 100 - 5 * number, 80 * number + 60, 400) for number in range(8)]
+    for number, (x1, y1, x2, y2) in enumerate(rects):
+        depth.values[y1 + 10:y2 - 10, x1 + 10:x2 - 10] = 2000 + 300 * number
+    camera = Camera(640, 480, 600, 600, 319.5, 239.5)
+    for box, rect in zip(estimate_foreground(depth, rects, of(camera), [PERSON_CLASS] * len(rects)), rects):
+        alone = foreground(depth, rect, camera=camera)
+        np.testing.assert_array_equal(box.center_m, alone.center_m)
+        np.testing.assert_array_equal(box.size_m, alone.size_m)
+        assert (box.rect_px, box.support) == (rect, alone.support)
+
+
+def test_occluders_of_occluders_mask_pixels():
+    """Three people in a row, each covering half of the next: without the nearest one, the second would be wrong."""
+    depth = flat(6000)
+    depth.values[4:44, 30:54], depth.values[4:44, 18:42], depth.values[4:44, 6:30] = 4000, 3000, 2000
+    rects = [(30, 4, 54, 42), (18, 4, 42, 43), (6, 4, 30, 44)]
+    boxes = estimate_foreground(depth, rects, of(CAMERA), [PERSON_CLASS] * 3)
+    np.testing.assert_allclose([box.center_m[2] - PERSON_CLASS.axis for box in boxes], [4, 3, 2], atol=1e-9)
+
+
+@given(st.integers(-90, 80), st.integers(-90, 80), st.integers(1, 2 ** 31), st.integers(1, 200))
+def test_the_grid_of_the_foreground_covers_the_visible_part(x1, y1, width, height):
+    samples = sample_grid(flat(1000), (x1, y1, x1 + width, y1 + height))
+    for ticks, most, low, high in ((samples.columns, GRID_COLUMNS, max(x1, 0), min(x1 + width, 64)),
+                                   (samples.rows, GRID_ROWS, max(y1, 0), min(y1 + height, 48))):
+        assert len(ticks) == 0 if low >= high else (most / 2 <= len(ticks) <= most or len(ticks) == high - low)
+        stride = np.diff(ticks).max(initial=1)
+        assert len(ticks) == 0 or (low <= ticks[0] < low + stride and high - stride <= ticks[-1] < high)
 
 
 @pytest.mark.parametrize('background_mm', [0, 5000])
@@ -213,11 +237,11 @@ def test_lens_distortion_is_corrected(camera, x_m):
     """Within 3 cm in position and 6 cm in height; without the correction, positions at the sides are wrong."""
     center_m = np.array([x_m, 0.3, 3.0])
     depth, rect = plate_in(camera, center_m, (0.5, 1.7))
-    samples, axis_m = sample_depth(depth, rect), center_m * (1 + PERSON_CLASS.axis / 3)
-    box = estimate_foreground(samples, rect, of(camera))
+    axis_m = center_m * (1 + PERSON_CLASS.axis / 3)
+    box = foreground(depth, rect, camera=camera)
     np.testing.assert_allclose(box.center_m, axis_m, atol=0.03)
     assert box.size_m[1] == pytest.approx(1.7, abs=0.06) and box.size_m[0] == pytest.approx(0.5, abs=0.05)
-    flat = estimate_foreground(samples, rect, of(Camera(*camera[:6])))
+    flat = foreground(depth, rect, camera=Camera(*camera[:6]))
     assert x_m == 0 or abs(flat.center_m[0] - axis_m[0]) > 0.08
 
 
@@ -235,48 +259,13 @@ def test_the_median_is_that_of_undistorted_points(camera):
 def test_no_estimate_at_right_angles_to_the_axis_of_a_fisheye(name):
     camera = Camera(640, 480, 150, 150, 319.5, 239.5, 'equidistant', (0, 0, 0, 0))
     estimator, rect = estimator_named(name), (10, 200, 60, 280)
-    samples = estimator.sample(DepthImage(np.full((480, 640), 2.0), 1.0), rect)
-    assert estimator.estimate(samples, rect, of(camera), ()) is None
+    depth = DepthImage(np.full((480, 640), 2.0), 1.0)
+    assert estimator.estimate(depth, [rect], of(camera), [PERSON_CLASS]) == [None]
 
 
 def test_a_rectangle_beyond_the_image_of_a_distorting_lens_has_an_estimate():
     rect = (-2 ** 31, 100, 300, 2 ** 31 - 1)
-    estimator, depth = estimator_named('foreground'), DepthImage(np.full((480, 640), 2.0), 1.0)
-    assert np.isfinite(estimator.estimate(estimator.sample(depth, rect), rect, of(WIDE), ()).center_m).all()
-
-
-@given(hnp.arrays(float, st.integers(1, 50), elements=st.floats(-5, 5)))
-def test_edges_are_extrapolated_percentiles(x_m):
-    low_m, high_m = np.percentile(x_m, [EDGE_PERCENT, 100 - EDGE_PERCENT])
-    beyond_m = (high_m - low_m) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
-    np.testing.assert_allclose(edges(x_m), (low_m - beyond_m, high_m + beyond_m), atol=1e-9)
-
-
-def test_edges_of_a_uniform_body():
-    x_m = np.random.RandomState(0).permutation(np.linspace(-0.3, 0.2, 1001))
-    np.testing.assert_allclose(edges(x_m), (-0.3, 0.2), atol=1e-9)
-
-
-@given(MILLIMETRES, st.integers(0, 9000), st.integers(0, 500))
-def test_within_includes_its_bounds_as_the_rounded_difference_does(depths_mm, middle_mm, half_mm):
-    depths_m, middle_m, half_m = np.sort(depths_mm) * 0.001, middle_mm * 0.001, half_mm * 0.001
-    expected_m = depths_m[np.abs(depths_m - middle_m) <= half_m]
-    np.testing.assert_array_equal(within(depths_m, middle_m, half_m), expected_m)
-
-
-@given(MILLIMETRES, st.integers(0, 100))
-def test_the_layer_is_in_the_range_of_the_depths_in_any_order(depths_mm, seed):
-    depths_m = depths_mm * 0.001
-    sorted_depths_m, even = np.sort(depths_m), np.ones(len(depths_m))
-    layer_m = nearest_dominant_layer(depths_m, even, sorted_depths_m)
-    assert sorted_depths_m[0] <= layer_m <= sorted_depths_m[-1]
-    assert layer_m == nearest_dominant_layer(np.random.RandomState(seed).permutation(depths_m), even, sorted_depths_m)
-
-
-def test_the_nearest_dominant_layer_is_the_person():
-    depths_m = np.array([0.9] * 5 + [2.0] * 30 + [4.0] * 50)  # a few flying pixels, a person, a wall
-    assert nearest_dominant_layer(depths_m, np.ones(85), depths_m) == 2.0
-    assert nearest_dominant_layer(depths_m, np.where(depths_m == 2.0, 0.1, 1.0), depths_m) == 4.0
+    assert np.isfinite(foreground(DepthImage(np.full((480, 640), 2.0), 1.0), rect, camera=WIDE).center_m).all()
 
 
 def test_a_truncated_body_is_completed_at_the_truncated_end():

@@ -7,7 +7,7 @@ from hypothesis import assume, example, given, settings, strategies as st
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.tracking.occlusion import classify_visibility, depths_towards
-from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, CameraView, detection_from_box
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, CameraView, detections_from_boxes
 from support.cylinders import Cylinder, mounted, rect_of, render
 
 LANDSCAPE, PORTRAIT = Camera(160, 120, 110, 110, 79.5, 59.5), Camera(120, 160, 110, 110, 59.5, 79.5)
@@ -60,7 +60,7 @@ def test_a_cut_body_is_completed_the_way_it_stands(height_m, pitch_deg, roll_deg
     assume((shown == 0).sum() > 60)
     box, = estimate_boxes(depth, [rect_of(shown, 0)], camera, FOREGROUND)
     assume(box is not None)
-    detection = detection_from_box(box, map_from_camera)
+    detection, = detections_from_boxes({0: box}, map_from_camera)
     _left, top, _right, bottom = detection.truncated_edges
     assert detection.size_m[0] < 0.65
     assert np.linalg.norm(detection.position_m[:2] - person[:2]) < 0.3

@@ -8,7 +8,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import LEVEL, estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import CameraView, detection_from_box
+from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
@@ -119,7 +119,7 @@ def test_a_person_cut_at_the_hips_is_one_track_of_one_height():
         box, = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [rect_px], simulator.camera,
                               estimator_named('foreground'))
         map_from_camera = frame.poses.map_from_camera
-        tracks = tracker.update(int(frame.time_s * NS), [detection_from_box(box, map_from_camera)],
+        tracks = tracker.update(int(frame.time_s * NS), detections_from_boxes({0: box}, map_from_camera),
                                 CameraView(map_from_camera, simulator.camera))
         ids |= {track.id for track in tracks}
         heights_m += [track.size_m[2] for track in tracks]

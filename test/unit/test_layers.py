@@ -70,7 +70,7 @@ ALLOWED = {
         'cv2 nav_msgs rosgraph_msgs rospy std_msgs tf2_msgs'),
     'ros_3d_bb_lab.evaluation.latency': (
         'bags conversions core msg nodes.common lab.evaluation',
-        'rospy sensor_msgs std_msgs visualization_msgs'),
+        'rosgraph roslib rospy sensor_msgs std_msgs visualization_msgs'),
 }
 QT = {'PyQt5', 'python_qt_binding'}
 SESSION_MODULES = 'command_line', 'document', 'export', 'analysis', 'legacy'  # of the annotator: no windows

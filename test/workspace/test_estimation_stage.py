@@ -32,6 +32,33 @@ def scene(wall_m, person_m=PERSON_M):
     return depth_m
 
 
+class Tilting(object):
+    """Transforms of a camera with the given vectors that point up, one for each image."""
+
+    def __init__(self, ups):
+        self._ups = iter(ups)
+
+    def lookup(self, _target_frame, _source_frame, _stamp):
+        camera_from_floor = np.eye(4)
+        camera_from_floor[:3, 2] = next(self._ups)
+        return camera_from_floor
+
+
+def test_each_image_has_the_tilt_of_the_camera_at_its_time():
+    ups = (0, -1, 0), (0, -1, 0), (0, -np.cos(0.4), np.sin(0.4)), (0, -1, 0)
+    lengths_m = []
+
+    def on_frame(*frame):
+        _header, _depth, (box,) = stage.estimate(*frame)
+        lengths_m.append(box.center_m[2])
+    stage = EstimationStage(Bbox3dParams(), EventCounter(), on_frame, Tilting(ups))
+    stage.add_camera_info(CameraInfo(header=HEADER, width=640, height=480, K=INTRINSICS), 0)
+    stage.add_depth(fill_image(Image(header=HEADER), scene(6.0), '32FC1'), 0)
+    for _image in ups:
+        stage.add_boxes(boxes2d_to_msg(np.array([PERSON_PX]), HEADER), 0)
+    assert lengths_m[0] == lengths_m[1] == lengths_m[3] != lengths_m[2]
+
+
 def estimate(depth_m, rects_px, events, estimator='foreground', labels=None, scores=None, **params):
     """The 3D boxes of an image. All of them can be tracked, and their regions are inside the image."""
     results = []

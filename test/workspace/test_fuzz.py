@@ -64,7 +64,7 @@ def test_tracks_of_absurd_size_are_not_sent_to_planners():
 def test_edges_far_outside_the_image_are_clipped(monkeypatch):
     """OpenCV needs a tenth of a second for an edge of 2^31 pixels."""
     corners = []
-    monkeypatch.setattr(image_overlay.cv2, 'rectangle', lambda _image, *given: corners.extend(given[0] + given[1]))
+    monkeypatch.setattr('cv2.rectangle', lambda _image, *given: corners.extend(given[0] + given[1]))
     image_overlay.draw_boxes(np.zeros((48, 64, 3), np.uint8),
                              np.array([[-2 ** 31, 5, 2 ** 31 - 1, 20], [3, 4, 9, 1e300]]), ['', ''])
     assert corners == [-4, 5, 68, 20, 3, 4, 9, 52]

@@ -10,6 +10,7 @@ import pytest
 
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import usage_of
+from ros_3d_bb_lab.evaluation.latency.rospy_limit import topics_of
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.processes import processes_naming
@@ -41,7 +42,8 @@ def benchmark(tmp_path):
 
 def test_results_are_written_and_no_process_remains(bag, benchmark, tmp_path):
     results = str(tmp_path / 'latency.json')
-    process = benchmark('--bag', bag, '--cases', 'free', '--seconds', '5', '--rate', '10', '--json', results)
+    process = benchmark('--bag', bag, '--cases', 'free', '--seconds', '5', '--rate', '10', '--limits', '--json',
+                        results)
     printed, _nothing = process.communicate()
     assert process.returncode == 0, printed
     with open(results) as stream:
@@ -51,6 +53,10 @@ def test_results_are_written_and_no_process_remains(bag, benchmark, tmp_path):
     assert (case['name'], case['detector'], case['load']) == ('free', 'free', 'none')
     assert case['output_hz'] > 0 and 0 < case['p50_ms'] <= case['p95_ms'] <= case['p99_ms']
     assert NODES <= set(case['cpu_percent']) & set(case['rss_mb']) & set(case['trend']['rss_mb_per_minute'])
+    assert set(case['nodes']) == {'bbox3d_node', 'tracker_node'}
+    for node, found in case['nodes'].items():
+        assert found['cpu_percent'] == case['cpu_percent'][node] and found['limit_percent'] > 0
+        assert found['times_limit'] == pytest.approx(found['cpu_percent'] / found['limit_percent'])
     assert processes_naming(str(tmp_path)) == 0
 
 
@@ -70,6 +76,14 @@ def test_invalid_arguments_and_bags_are_rejected(benchmark, arguments, status, r
     process = benchmark('--bag', 'some.bag', *arguments)
     printed, _nothing = process.communicate()
     assert process.returncode == status and reason in printed
+
+
+def test_the_topics_of_a_limit_are_those_of_the_node_without_diagnostics_and_reconfiguration():
+    published = [['/tracks', ['/tracker']], ['/rosout', ['/tracker']], ['/diagnostics', ['/tracker', '/other']],
+                 ['/tracker/parameter_updates', ['/tracker']], ['/boxes', ['/other']]]
+    subscribed = [['/boxes', ['/tracker']], ['/tf', ['/tracker', '/other']], ['/clock', ['/tracker']],
+                  ['/tracks', ['/other', '/rviz']]]
+    assert topics_of('/tracker', (published, subscribed, [])) == ({'/boxes': 0, '/tf': 1}, {'/tracks': 2})
 
 
 def test_usage_is_the_cpu_time_and_the_memory_of_a_process():

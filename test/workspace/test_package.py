@@ -3,6 +3,7 @@ import ast
 import glob
 import os
 import re
+import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 
@@ -68,6 +69,12 @@ def test_every_import_is_declared_and_every_dependency_is_used():
     needed -= OPTIONAL
     needed = needed - {'ros_3d_bb'} | {'message_runtime'} | FOR_MELODIC | FOR_DEBIAN
     assert declared('depend', 'exec_depend') == needed
+
+
+@pytest.mark.parametrize('node', ['bbox3d_node', 'tracker_node', 'planner_bridge_node'])
+def test_nodes_that_rarely_draw_images_do_not_load_opencv(node):
+    code = 'import sys, ros_3d_bb.nodes.%s; sys.exit("cv2" in sys.modules)' % node
+    assert subprocess.call([sys.executable, '-c', code]) == 0
 
 
 def test_imports_of_the_tests_are_declared_or_in_their_requirements():

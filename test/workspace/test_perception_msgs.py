@@ -9,15 +9,14 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
-from ros_3d_bb.conversions.perception_msgs import (box3d_faults, boxes2d_from_msg, boxes2d_to_msg,
-                                                   boxes3d_from_msg, boxes3d_to_msg, camera_from_msg,
-                                                   detections_from_msg, stamp_of, time_from, tracks_from_msg,
-                                                   tracks_to_msg, usable_boxes3d, with_stamp)
+from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, boxes3d_from_msg,
+                                                   boxes3d_to_msg, camera_from_msg, stamp_of, time_from,
+                                                   tracks_from_msg, tracks_to_msg, usable_boxes3d, with_stamp)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject as Track
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject as Track, detections_from_boxes
 from support.masterless import on_the_wire
 
 INT32 = st.integers(-2 ** 31, 2 ** 31 - 1)
@@ -135,6 +134,18 @@ def test_camera_info_has_the_lens_distortion(lens):
     assert infos[0].distortion_model == (lens[0] or 'plumb_bob') and len(infos[0].D) == (len(lens[1]) or 5)
 
 
+def test_a_changed_calibration_replaces_the_previous_one():
+    info = CameraInfo(width=640, height=480, K=[600, 0, 320, 0, 610, 240, 0, 0, 1], distortion_model='plumb_bob',
+                      D=[0.1, 0, 0, 0, 0])
+    assert camera_from_msg(info) == camera_from_msg(on_the_wire(info))
+    for change in ({'width': 848}, {'K': [601] + list(info.K[1:])}, {'D': [0.2, 0, 0, 0, 0]}, {'D': []}):
+        before = camera_from_msg(info)
+        for name, value in change.items():
+            setattr(info, name, value)
+        assert camera_from_msg(info) != before
+    assert (camera_from_msg(info).width, camera_from_msg(info).fx, camera_from_msg(info).distortion) == (848, 601, ())
+
+
 def test_3d_boxes_fill_every_field():
     box = Box3D(np.array([0.1, 0.2, 3.0]), np.array([0.5, 1.7, 0.5]), (-10, 20, 700, 300), 0.75,
                 (True, False, True, False))
@@ -165,7 +176,8 @@ def detection_of(box, roll_deg=0, pitch_deg=0, yaw_deg=0):
         quaternion = np.eye(4)[axis] * np.sin(angle / 2) + np.eye(4)[3] * np.cos(angle / 2)
         map_from_camera = map_from_camera.dot(transform_from((0, 0, 0), quaternion))
     map_from_camera = map_from_camera.dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
-    detection, = detections_from_msg(BoundingBox3DArray(boxes=[box]), map_from_camera)
+    boxes = boxes3d_from_msg(BoundingBox3DArray(boxes=[box]))
+    detection, = detections_from_boxes(dict(enumerate(boxes)), map_from_camera)
     return detection
 
 
@@ -189,10 +201,9 @@ def test_an_unusable_3d_box_does_not_affect_the_others(wrong):
     good, other = box_of(x_m=-1.0), box_of(x_m=2.0, width_m=9.99, covariance_m2=np.eye(3))
     message = BoundingBox3DArray(header=header(7), boxes=[good, box_of(**wrong), other])
     usable, faults = usable_boxes3d(message)
-    assert usable.boxes == [good, other] and usable.header == message.header
+    assert list(usable) == [0, 2] and len(message.boxes) == 3
     assert len(faults) == 1 and faults[0].startswith('3D box 1 has ')
-    assert len(message.boxes) == 3 and [bool(fault) for fault in box3d_faults(message)] == [False, True, False]
-    detections = detections_from_msg(message, np.eye(4), [0, 2])
+    detections = detections_from_boxes(usable, np.eye(4))
     assert [(detection.index, detection.position_m[0]) for detection in detections] == [(0, -1.0), (2, 2.0)]
 
 
@@ -203,7 +214,7 @@ def test_3d_boxes_with_unusable_classes_or_scores_are_dropped(wrong):
     for name, value in wrong.items():
         setattr(bad, name, value)
     usable, faults = usable_boxes3d(BoundingBox3DArray(boxes=[bad, good]))
-    assert usable.boxes == [good] and len(faults) == 1
+    assert list(usable) == [1] and len(faults) == 1
 
 
 @given(st.integers(0, 2 ** 32 - 1), st.floats(-6, 7.9), st.integers(1, 3))
@@ -212,8 +223,8 @@ def test_covariances_are_usable_unless_a_variance_is_negative(seed, power, rank)
     covariance_m2 = factor.dot(factor.T) * 10 ** power / np.abs(factor.dot(factor.T)).max()
     boxes = [box_of(covariance_m2=covariance_m2), box_of(covariance_m2=covariance_m2 - 3.1 * 10 ** power * np.eye(3))]
     usable, faults = usable_boxes3d(BoundingBox3DArray(boxes=boxes))
-    assert [list(box.position_covariance) for box in usable.boxes] == [covariance_m2.ravel().tolist()]
-    assert len(faults) == 1
+    np.testing.assert_array_equal(usable.pop(0).covariance_m2, covariance_m2)
+    assert not usable and len(faults) == 1
 
 
 def test_detections_are_upright_in_the_fixed_frame():
@@ -266,8 +277,8 @@ def test_the_covariance_of_tracks_and_predictions_survives():
 def test_tracks_fill_every_field():
     tracker = ThesisTracker()
     for frame in range(5):
-        detections = detections_from_msg(BoundingBox3DArray(boxes=[box_of(x_m=0.1 * frame)]), np.eye(4))
-        tracks = tracker.update(NS + frame * NS // 10, detections)
+        boxes, _faults = usable_boxes3d(BoundingBox3DArray(boxes=[box_of(x_m=0.1 * frame)]))
+        tracks = tracker.update(NS + frame * NS // 10, detections_from_boxes(boxes, np.eye(4)))
     message = on_the_wire(tracks_to_msg(tracks, header(NS, 'map')))
     assert isinstance(message, TrackedObjectArray) and message.header.frame_id == 'map'
     track, = message.objects

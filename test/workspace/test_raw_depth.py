@@ -135,7 +135,8 @@ def test_cameras_may_be_rotated_and_raw_depth_compressed(bag, tmp_path, turns):
     _messages, expected_m = boxes_in(tmp_path / 'plain')
     _messages, found_m = boxes_in(tmp_path / 'raw')
     assert found_m.shape == expected_m.shape == (IMAGES * len(PEOPLE), 3)
-    assert np.linalg.norm(found_m.dot(turned_rotation(turns).T) - expected_m, axis=1).max() < 0.01
+    # Two pixels at 4.8 m: the rotated image has its samples in other columns.
+    assert np.linalg.norm(found_m.dot(turned_rotation(turns).T) - expected_m, axis=1).max() < 0.015
 
 
 def test_the_nodes_publish_the_same(bag, tmp_path):

@@ -82,7 +82,7 @@ def test_the_node_publishes_nothing_from_before_a_jump():
         def lookup(target, source, stamp):
             transforms.lookup(target, source, stamp)
             return TransformStamped(transform=Transform(rotation=Quaternion(-0.5, 0.5, -0.5, 0.5)))
-        connections.buffers[0].lookup_transform = lookup
+        connections.buffers[0].lookup_transform_core = lookup
         send('front', 20)
         transforms.while_waiting['rear'] = lambda: send('front', 0)
         send('rear', 20)

@@ -84,16 +84,14 @@ def transform_from(translation, quaternion):
     Raises ValueError if the quaternion cannot be normalised (zero, nan or inf).
     """
     quaternion = np.asarray(quaternion, float)
-    norm = np.linalg.norm(quaternion)
+    norm = np.sqrt(quaternion.dot(quaternion))
     if not (np.isfinite(norm) and norm > 1e-6):
         raise ValueError('quaternion %s is not a rotation' % (tuple(quaternion.tolist()),))
-    x, y, z, w = quaternion / norm
-    matrix = np.eye(4)
-    matrix[:3, :3] = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
-    matrix[:3, 3] = translation
-    return matrix
+    x, y, z, w = (quaternion / norm).tolist()
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), translation[0]],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), translation[1]],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), translation[2]],
+                     [0.0, 0.0, 0.0, 1.0]])
 
 
 def quaternion_from(matrix):

@@ -4,7 +4,7 @@ from typing import NamedTuple
 import numpy as np
 
 FARTHEST_M = 100.0  # beyond the range of any depth camera
-WIDEST_BORDER, BORDER_STEP = 0.05, 4  # of images without depth: share of the image; pixels between samples
+WIDEST_BORDER, BORDER_STEP = 0.05, 12  # of images without depth: share of the image; pixels between samples
 
 
 class DepthImage(NamedTuple):

@@ -128,7 +128,8 @@ def units_fault(depth):
     valid = values[np.isfinite(values) & (values > 0)]
     if valid.size < LEAST_SAMPLES:
         return ''
-    median_m = float(np.median(valid)) * depth.scale_m
+    lower, upper = np.sort(valid)[[(valid.size - 1) // 2, valid.size // 2]].tolist()  # np.median takes much longer
+    median_m = (lower + upper) / 2 * depth.scale_m
     if NEAREST_M <= median_m <= FARTHEST_M:
         return ''
     integers = depth.values.dtype.kind == 'u'

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.core.params import LARGEST, Param, parameters
+from ros_3d_bb.detection.adaptive_size import SIZES
 from ros_3d_bb.detection.boxes import Detections, non_maximum_suppression
 
 RESIZE_MODES = ('center', 'corner', 'stretch')
@@ -30,8 +31,9 @@ class DetectionParams(NamedTuple):
         100, 'Largest number of detections in an image; the best ones are kept.', limits=(1, LARGEST), live=(1, 300))
     image_size: int = Param(
         640, "Longer side of the network's input, rounded up to its stride (32, P6 models 64). Smaller is faster and "
-        'misses people farther away. Exports with a fixed size ignore it.', 'pixels', limits=(1, MAX_INPUT_PX),
-        live=(160, 1280))
+        'misses people farther away. 0: yolov5_node chooses the largest of 320, 416, 512 and 640 that keeps up with '
+        'the images; 640 elsewhere. Exports with a fixed size ignore it.', 'pixels', limits=(0, MAX_INPUT_PX),
+        live=(0, 1280))
 
 
 class Resize(NamedTuple):
@@ -83,9 +85,19 @@ class NetworkDetector(object):
         self._network, self._params = network, params
         self.names, self.description = network.names, network.description  # class names by number; text for logs
         self._classes = [class_number(entry, network.names) for entry in params.classes]
-        size = int(np.ceil(params.image_size / float(network.stride))) * network.stride
+        size = int(np.ceil((params.image_size or max(SIZES)) / float(network.stride))) * network.stride
         self._input_hw = network.input_hw or (size, size)
         self._stride = network.stride if network.input_hw is None else None
+
+    @property
+    def has_fixed_size(self):
+        """Whether the network accepts only one size, so that `image_size` has no effect."""
+        return self._network.input_hw is not None
+
+    @property
+    def input_px(self):
+        """Longer side of the network's input, pixels."""
+        return max(self._input_hw)
 
     def with_params(self, params):
         """Return a detector with the same network and other parameters. Raises ValueError like the constructor."""

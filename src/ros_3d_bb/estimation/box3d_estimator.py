@@ -3,8 +3,7 @@
 Conventions: a rectangle (x1, y1, x2, y2) contains the pixels x1 <= u < x2, y1 <= v < y2. Positions are in the camera
 optical frame, metres. The level frame of a camera has the same origin, x horizontally to the right, y down and z
 horizontally ahead; `level_from_camera` (3, 3) rotates the optical frame to it. Depth layers are layers of z in the
-level frame, because people stand upright there. In `sorted_depths_m` (nearest first), a layer is a slice and its median
-an element.
+level frame, because people stand upright there.
 """
 import functools
 from typing import Any, NamedTuple, Optional, Tuple
@@ -15,7 +14,9 @@ from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import FARTHEST_M as FARTHEST_DEPTH_M
 from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
-from ros_3d_bb.core.object_classes import PERSON_CLASS, ObjectClasses
+from ros_3d_bb.core.object_classes import ObjectClasses
+from ros_3d_bb.estimation.depth_layers import (BODY_HALF_DEPTH_MM, FARTHEST_LAYER_M, UNKNOWN_MM, SortedDistances, edges,
+                                               millimetres, nearest_dominant_layers)
 
 # A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated:
 # detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person
@@ -23,22 +24,16 @@ from ros_3d_bb.core.object_classes import PERSON_CLASS, ObjectClasses
 BORDER_PX, BORDER_SHARE = 4, 0.02
 # Nearer people stand lower in the image. The lower edges of truncated boxes are compared at this height.
 CUT_ROWS = 1 / 30.0  # share of the image height
-SAMPLES_WANTED = 2000  # approximate number of pixels that the foreground estimator samples
+# Largest number of rows and columns that the foreground estimator samples; on average, it samples two thirds of them.
+GRID_ROWS, GRID_COLUMNS = 48, 32
 LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate; a lidar gives twice as many
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the person's layer for an estimate
 LEAST_WIDTH_M = 0.05
 LEVEL = np.eye(3)  # of a camera that is held level
 MAX_TILT_RAD, MAX_ROLL_RAD = np.radians(65), np.radians(45)
 LEAST_AHEAD = 0.05  # lower bound of the horizontal part of a ray
+MIDDLE_M = 32.0  # of the lateral positions that fit into 16 bits of millimetres
 LOOKS_DOWN, FEET_M = np.sin(np.radians(10)), 0.3  # a camera with more tilt sees the floor beside the feet, this high
-
-# Half the depth extent of a person with stretched arms; points farther from the median are not part of the person.
-BODY_HALF_DEPTH_M = 0.35
-TRUNK_HALF_DEPTH_M = 0.25  # without arms and legs: a wall close behind must not shift the median
-BIN_M, LAYER_BINS = 0.05, 5  # bin width of the depth histogram, and thickness of a layer in bins
-MEDIANS = 3  # maximum number of iterations of the median of the trunk
-FIRST_LAYER_SHARE = 0.5  # the nearest layer with at least this share of the largest layer weight is the person
-EDGE_PERCENT = 5  # percentage of the layer's pixels ignored at the left and at the right: arms, flying pixels
 
 
 class Samples(NamedTuple):
@@ -94,13 +89,12 @@ class Box3D(NamedTuple):
     @property
     def is_plausible(self):
         """Whether the centre is nearer than `FARTHEST_M`, and width and height are between 0 and `LARGEST_M`."""
-        x_m, y_m, z_m = np.abs(self.center_m).tolist()
         width_m, height_m, _width_m = self.size_m.tolist()
-        return (x_m < FARTHEST_M and y_m < FARTHEST_M and z_m < FARTHEST_M
+        return (all([abs(along_m) < FARTHEST_M for along_m in self.center_m.tolist()])
                 and 0 < width_m < LARGEST_M and 0 < height_m < LARGEST_M)
 
 
-def sample_depth(depth, rect_px, stride_px=None):
+def sample_depth(depth, rect_px, stride_px):
     """Sample a rectangle on a centred grid of every `stride_px` pixels, clipped to the image (thesis 3.4.2).
 
     Parameters
@@ -108,8 +102,7 @@ def sample_depth(depth, rect_px, stride_px=None):
     depth : depth_image.DepthImage
     rect_px : (x1, y1, x2, y2)
         There are no samples in an empty or reversed rectangle.
-    stride_px : int, optional
-        Default: a stride that gives about `SAMPLES_WANTED` samples in rectangles of any size.
+    stride_px : int
 
     Returns
     -------
@@ -117,96 +110,201 @@ def sample_depth(depth, rect_px, stride_px=None):
     """
     height, width = depth.shape
     x1, y1, x2, y2 = map(int, rect_px)
-    if stride_px is None:
-        visible_columns = min(max(x2, 0), width) - min(max(x1, 0), width)
-        visible_rows = min(max(y2, 0), height) - min(max(y1, 0), height)
-        visible_px = max(0, visible_columns) * max(0, visible_rows)
-        stride_px = max(1, int(np.sqrt(visible_px / SAMPLES_WANTED)))
-    columns, rows = _ticks(x1, x2, width, stride_px), _ticks(y1, y2, height, stride_px)
+    return _samples_at(depth, _ticks(y1, y2, height, stride_px), _ticks(x1, x2, width, stride_px))
+
+
+def sample_grid(depth, rect_px):
+    """Sample the visible part of a rectangle on the grid of the foreground estimator, as `sample_depth`."""
+    (slices,) = _grid_slices(*_grids(np.array([rect_px], np.int64), depth.shape))
+    return _samples_at(depth, *slices)
+
+
+def _samples_at(depth, rows, columns):
+    """Samples in rows and columns (slices)."""
+    height, width = depth.shape
     depth_m = depth.part(rows, columns).astype(float) * depth.scale_m
     valid = (depth_m > 0) & (depth_m <= FARTHEST_DEPTH_M)
     return Samples(np.arange(width)[columns], np.arange(height)[rows], depth_m, valid)
 
 
-def estimate_median(samples, rect_px, geometry, _nearer=(), _kind=PERSON_CLASS):
+def estimate_median(samples, rect_px, geometry):
     """Estimate a box as in the thesis (3.4.2): per-axis median of the sampled points, size from the box at that depth.
 
-    Parameters and return value are those of `estimate_foreground`; nearer boxes, the class and the tilt of the camera
-    are ignored, and there is no minimum support.
+    Returns a Box3D, or None without a valid depth or if the rectangle cannot be undistorted. The tilt of the camera is
+    ignored.
     """
     camera = geometry.camera
     across, down = camera.rays(samples.columns, samples.rows[:, np.newaxis])
     seen = samples.valid & ~np.isnan(across)  # the distortion model does not define a ray for every pixel
-    flat_px = _without_distortion(rect_px, camera)
-    if flat_px is None or not seen.any():
+    (flat_px,) = _without_distortion(np.array([rect_px]), camera)
+    if not (np.isfinite(flat_px).all() and seen.any()):
         return None
     points = np.stack((across * samples.depth_m, down * samples.depth_m, samples.depth_m), axis=-1)[seen]
     x1, y1, x2, y2 = flat_px
     center_m = np.median(points, axis=0)
     width_m, height_m = (x2 - x1) / camera.fx * center_m[2], (y2 - y1) / camera.fy * center_m[2]
-    on_body = np.abs(samples.depth_m[samples.valid] - center_m[2]) <= BODY_HALF_DEPTH_M
+    on_body = np.abs(samples.depth_m[samples.valid] - center_m[2]) <= BODY_HALF_DEPTH_MM / 1000.0
     return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px), on_body.mean(),
                  truncated_edges(rect_px, geometry.area_px))
 
 
-def estimate_foreground(samples, rect_px, geometry, nearer=(), kind=PERSON_CLASS):
-    """Estimate a box from the object's depth layer: the nearest layer that is dominant near the middle of the box.
+def estimate_foreground(depth, rects_px, geometry, kinds):
+    """Estimate a box from the depth layer of the object in each rectangle of an image: the nearest layer that is
+    dominant near the middle of the rectangle.
 
-    Background beside and between the limbs may fill most of a box, but it is farther away. Flying pixels are too sparse
-    to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges of the
-    layer, and behind its mean depth by the distance of its class. If the image border truncates the object, it is
-    completed to the usual size of its class. All of this is done in the level frame.
+    Background beside and between the limbs may fill most of a rectangle, but it is farther away. Flying pixels are too
+    sparse to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges
+    of the layer, and behind its mean depth by the distance of its class. If the image border truncates the object, it
+    is completed to the usual size of its class. All of this is done in the level frame.
+
+    In the rectangles of nearer objects (see `front_to_back`) with plausible boxes, pixels that are not behind them are
+    masked. Rectangles are therefore estimated in groups, each after those in front of it.
 
     Parameters
     ----------
-    samples : Samples
-    rect_px : (x1, y1, x2, y2)
+    depth : depth_image.DepthImage
+    rects_px : sequence of (x1, y1, x2, y2)
     geometry : ImageGeometry
-    nearer : sequence of Box3D
-        Boxes of possible occluders; in their rectangles, pixels that are not behind them are masked.
-    kind : object_classes.ObjectClass
+    kinds : sequence of object_classes.ObjectClass
+        That of each rectangle.
 
     Returns
     -------
-    Box3D or None
+    list of Box3D or None
         None if less than `LEAST_MEASURED` of the samples have a valid depth and a viewing ray, if the layer contains
         less than `LEAST_SUPPORT` of those with depth, or if the rectangle cannot be undistorted.
     """
-    camera, level_from_camera = geometry.camera, geometry.level_from_camera
-    across_m, down_m, ahead_m = _level_coordinates(samples, camera, level_from_camera)
-    own = samples.valid & (ahead_m > 0)  # nan: the distortion model does not define a ray for every pixel
-    measured = np.count_nonzero(own)
-    if nearer:
-        own = own & ~_occluders(samples, ahead_m, rect_px, nearer, level_from_camera)
-    flat_px = _without_distortion(rect_px, camera)
-    if flat_px is None or not own.any() or measured < LEAST_MEASURED * own.size:
-        return None
+    image = _SampledImage(depth, rects_px, geometry, kinds)
+    boxes = [None] * len(rects_px)
+    occluders, pending = _occluders(rects_px, geometry.camera), np.ones(len(rects_px), bool)
+    while pending.any():
+        group = np.flatnonzero(pending & ~occluders[:, pending].any(axis=1))
+        pending[group] = False
+        for number, box in image.estimates(group, occluders):
+            boxes[number] = box
+    return boxes
 
-    x1, y1, x2, y2 = rect_px
-    in_middle = np.exp(-0.5 * ((samples.columns - (x1 + x2) / 2.0) / ((x2 - x1) / 4.0)) ** 2)
-    depths_m = np.sort(ahead_m[own])
-    layer_m = nearest_dominant_layer(ahead_m[own], np.broadcast_to(in_middle, own.shape)[own], depths_m)
-    body_m = within(depths_m, layer_m, BODY_HALF_DEPTH_M)
-    support = len(body_m) / float(measured)
-    if support < LEAST_SUPPORT:
-        return None
 
-    on_body = own & (np.abs(ahead_m - layer_m) <= BODY_HALF_DEPTH_M)
-    # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
-    tenth = len(body_m) // 10
-    layer_m = body_m[tenth:len(body_m) - tenth].mean()
-    top_m, bottom_m = layer_m * _slopes_down(flat_px, camera, level_from_camera)
-    above_feet = on_body & (down_m < bottom_m - FEET_M)
-    if level_from_camera[1, 2] > LOOKS_DOWN and above_feet.any():
-        on_body = above_feet  # the floor beside the feet is as far away as the body
-    left_m, right_m = edges(across_m[on_body])
-    cut_left, cut_top, cut_right, cut_bottom = cut = truncated_edges(rect_px, geometry.area_px)
-    left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, kind.width)
-    top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, kind.height)
-    surface_m = np.array([(left_m + right_m) / 2, (top_m + bottom_m) / 2, layer_m])
-    width_m = max(right_m - left_m, LEAST_WIDTH_M)
-    center_m = level_from_camera.T.dot(surface_m * (1 + kind.axis_behind(width_m) / layer_m))
-    return Box3D(center_m, np.array([width_m, bottom_m - top_m, width_m]), tuple(rect_px), support, cut)
+class _SampledImage(object):
+    """Depth samples of all rectangles of an image, and the boxes estimated from them; see `estimate_foreground`."""
+
+    def __init__(self, depth, rects_px, geometry, kinds):
+        self._rects_px, self._kinds, self._geometry = list(map(tuple, rects_px)), kinds, geometry
+        rects_px = np.array(rects_px, np.int64)
+        first, stride, count = _grids(rects_px, depth.shape)
+        self._slices, camera = _grid_slices(first, stride, count), geometry.camera
+        flat_px = _without_distortion(rects_px, camera)
+        self._slopes_down = _slopes_down(flat_px, geometry)
+        rows, columns = (first[:, axis, None] + stride[:, axis, None] * np.arange(size)  # also beyond `count`
+                         for axis, size in enumerate((GRID_ROWS, GRID_COLUMNS)))
+        depth_m = _grid_depths(depth, self._slices, count)
+        x, y = (along.astype(np.float32) for along in camera.rays(columns[:, None, :], rows[:, :, None]))
+
+        def along_axis(axis):
+            to_x, to_y, to_z = geometry.level_from_camera[axis].tolist()
+            return ((to_x * x + (to_y * y + to_z)) * depth_m).reshape(len(depth_m), -1)
+        ahead_m = along_axis(2)
+        known = (ahead_m > 0) & (ahead_m <= FARTHEST_LAYER_M)  # nan: the distortion model has no ray for every pixel
+        self._ahead_mm = millimetres(ahead_m, known)
+        self._across_mm = millimetres(np.clip(along_axis(0) + MIDDLE_M, 0, 2 * MIDDLE_M), known)
+        self._down_m = along_axis(1) if geometry.level_from_camera[1, 2] > LOOKS_DOWN else None
+        self._measured = np.count_nonzero(known, axis=1)
+        self._usable = self._measured >= np.maximum(LEAST_MEASURED * count.prod(axis=1), 1)
+        self._usable &= np.isfinite(flat_px).all(axis=1)
+        left, right = rects_px[:, 0, None], rects_px[:, 2, None]
+        in_middle = np.exp(-0.5 * ((columns - (left + right) / 2.0) / ((right - left) / 4.0)) ** 2)
+        self._occluding_mm = [0] * len(rects_px)  # depth up to which plausible boxes mask the samples of others
+        self._weights = np.repeat(in_middle[:, None], GRID_ROWS, axis=1).reshape(ahead_m.shape)
+
+    def estimates(self, group, occluders):
+        """Pairs (number, Box3D) of the rectangles in `group` (k,) that have a box, after those of their `occluders`
+        (n, n).
+        """
+        ahead_mm = self._ahead_mm[group]
+        for member, occluder in np.argwhere(occluders[group]).tolist():
+            self._mask(ahead_mm[member].reshape(GRID_ROWS, GRID_COLUMNS), group[member], occluder)
+        ordered = SortedDistances(ahead_mm)
+        usable = self._usable[group] & (ordered.count > 0)
+        if not usable.all():
+            return self.estimates(group[usable], occluders) if usable.any() else []
+        layers_mm = nearest_dominant_layers(ahead_mm, self._weights[group], ordered)
+        first, end = ordered.within(layers_mm, BODY_HALF_DEPTH_MM)
+        supports = (end - first) / self._measured[group]
+        # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
+        tenth = (end - first) // 10
+        layers_m = ordered.means(first + tenth, end - tenth) / 1000
+        nearest_mm, farthest_mm = (ordered.at(rank).astype(np.uint16)[:, None] for rank in (first, end - 1))
+        on_body = (ahead_mm >= nearest_mm) & (ahead_mm <= farthest_mm)
+        top_m, bottom_m = layers_m * self._slopes_down[:, group]
+        if self._down_m is not None:
+            # The floor beside the feet is as far away as the body.
+            above_feet = on_body & (self._down_m[group] < bottom_m[:, None] - FEET_M)
+            on_body = np.where(above_feet.any(axis=1)[:, None], above_feet, on_body)
+        across_mm = np.where(on_body, self._across_mm[group], np.uint16(UNKNOWN_MM))
+        left_m, right_m = np.array(edges(SortedDistances(across_mm))) / 1000 - MIDDLE_M
+        values = zip(group.tolist(), supports.tolist(), layers_m.tolist(), left_m.tolist(), right_m.tolist(),
+                     top_m.tolist(), bottom_m.tolist())
+        return [(number, self._box(number, support, *extents_m)) for number, support, *extents_m in values
+                if support >= LEAST_SUPPORT]
+
+    def _mask(self, grid_mm, number, occluder):
+        """Mask the samples of a rectangle (rows, columns) that are in the rectangle of an occluder and not behind it.
+
+        What is nearer than its body is masked as well: parts of it may be far in front of its layer.
+        """
+        left, top, right, bottom = self._rects_px[occluder]
+        rows, columns = self._slices[number]
+        rows = slice(_rank(rows, top), _rank(rows, bottom))
+        columns = slice(_rank(columns, left), _rank(columns, right))
+        part = grid_mm[rows, columns]
+        part[part <= self._occluding_mm[occluder]] = UNKNOWN_MM
+
+    def _box(self, number, support, layer_m, left_m, right_m, top_m, bottom_m):
+        rect_px, kind = self._rects_px[number], self._kinds[number]
+        cut_left, cut_top, cut_right, cut_bottom = cut = truncated_edges(rect_px, self._geometry.area_px)
+        left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, kind.width)
+        top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, kind.height)
+        surface_m = np.array([(left_m + right_m) / 2, (top_m + bottom_m) / 2, layer_m])
+        width_m = max(right_m - left_m, LEAST_WIDTH_M)
+        behind_m = kind.axis_behind(width_m)
+        center_m = self._geometry.level_from_camera.T.dot(surface_m * (1 + behind_m / layer_m))
+        box = Box3D(center_m, np.array([width_m, bottom_m - top_m, width_m]), rect_px, support, cut)
+        if box.is_plausible:
+            self._occluding_mm[number] = int(1000 * (layer_m + behind_m)) + BODY_HALF_DEPTH_MM
+        return box
+
+
+def _grids(rects_px, shape):
+    """Grids of samples in the visible parts of rectangles (n, 4): first pixels, strides and numbers of pixels, each
+    (n, 2) as (row, column).
+    """
+    low = np.minimum(np.maximum(rects_px[:, 1::-1], 0), shape)
+    extent = np.maximum(np.minimum(np.maximum(rects_px[:, :1:-1], 0), shape) - low, 0)
+    stride = np.maximum(-(-extent // (GRID_ROWS, GRID_COLUMNS)), 1)
+    count = -(-extent // stride)
+    return low + (extent - (count - 1) * stride - 1) // 2, stride, count
+
+
+def _grid_slices(first, stride, count):
+    """Slices (rows, columns) of grids."""
+    ends = first + stride * count
+    return [(slice(top, bottom, down), slice(left, right, across)) for (top, left), (bottom, right), (down, across)
+            in zip(first.tolist(), ends.tolist(), stride.tolist())]
+
+
+def _grid_depths(depth, slices, count):
+    """Depths (n, GRID_ROWS, GRID_COLUMNS) at the pixels of grids, metres; 0 where none is measured."""
+    values = np.zeros((len(slices), GRID_ROWS, GRID_COLUMNS), np.float32)
+    for grid, (rows, columns), grid_slices in zip(values, count.tolist(), slices):
+        grid[:rows, :columns] = depth.part(*grid_slices)
+    values *= np.float32(depth.scale_m)
+    values[~((values > 0) & (values <= FARTHEST_DEPTH_M))] = 0
+    return values
+
+
+def _rank(pixels, limit):
+    """Number of pixels (slice) before a limit; more than all if the limit is beyond the last one."""
+    return max(0, -((pixels.start - limit) // pixels.step))
 
 
 def level_rotation(up):
@@ -231,86 +329,36 @@ def level_rotation(up):
     return np.stack((np.cross(down, ahead), down, ahead))
 
 
-def _level_coordinates(samples, camera, level_from_camera):
-    """x and z (h, w) of the samples in the level frame, metres; nan for pixels without a ray."""
-    x, y = camera.rays(samples.columns, samples.rows[:, np.newaxis])
-    return ((to_x * x + to_y * y + to_z) * samples.depth_m for to_x, to_y, to_z in level_from_camera)
+def _slopes_down(flat_px, geometry):
+    """y / z in the level frame of the rays through the middles of the upper and of the lower edges, (2, n)."""
+    camera, level_from_camera = geometry.camera, geometry.level_from_camera
+    x = ((flat_px[:, 0] + flat_px[:, 2]) / 2.0 - camera.cx) / camera.fx
+    y = (flat_px[:, 1::2].T - camera.cy) / camera.fy
+    (down_x, down_y, down_z), (ahead_x, ahead_y, ahead_z) = level_from_camera[1:].tolist()
+    return (down_x * x + down_y * y + down_z) / np.maximum(ahead_x * x + ahead_y * y + ahead_z, LEAST_AHEAD)
 
 
-def _slopes_down(flat_px, camera, level_from_camera):
-    """y / z in the level frame of the rays through the middles of the upper and the lower edge, (2,)."""
-    left_px, top_px, right_px, bottom_px = flat_px
-    x = ((left_px + right_px) / 2.0 - camera.cx) / camera.fx
-    rays = np.array([(x, (row_px - camera.cy) / camera.fy, 1.0) for row_px in (top_px, bottom_px)])
-    _across, down, ahead = level_from_camera.dot(rays.T)
-    return down / np.maximum(ahead, LEAST_AHEAD)
-
-
-def _without_distortion(rect_px, camera):
-    """Undistort a rectangle by the midpoints of its edges; None if a midpoint has no undistorted position.
+def _without_distortion(rects_px, camera):
+    """Undistort rectangles (n, 4) by the midpoints of their edges; nan if a midpoint has no undistorted position.
 
     Outside the image, where the distortion is unknown, the distortion at the image border is used.
     """
     if not camera.distortion_model:
-        return rect_px
-    x1, y1, x2, y2 = rect_px
-    middles = np.array([(x1, (y1 + y2) / 2.0), ((x1 + x2) / 2.0, y1), (x2, (y1 + y2) / 2.0), ((x1 + x2) / 2.0, y2)])
+        return rects_px
+    x1, y1, x2, y2 = rects_px.T
+    x, y = (x1 + x2) / 2.0, (y1 + y2) / 2.0
+    middles = np.stack((x1, y, x, y1, x2, y, x, y2), axis=1).reshape(-1, 4, 2)
     inside = np.clip(middles, 0, (camera.width, camera.height))
-    left, top, right, bottom = (middles + camera.undistort(inside) - inside).tolist()
-    flat_px = left[0], top[1], right[0], bottom[1]
-    return None if np.isnan(flat_px).any() else flat_px
+    flat_px = middles + camera.undistort(inside) - inside
+    return np.stack((flat_px[:, 0, 0], flat_px[:, 1, 1], flat_px[:, 2, 0], flat_px[:, 3, 1]), axis=1)
 
 
-def _occluders(samples, ahead_m, rect_px, boxes, level_from_camera):
-    """Samples (h, w) in the rectangle of any of the boxes that are not behind its body.
-
-    What is nearer than that body is masked as well: parts of it may be far in front of its layer.
-    """
-    masked = np.zeros(ahead_m.shape, bool)
-    left, top, right, bottom = rect_px
-    for box in boxes:
-        x1, y1, x2, y2 = box.rect_px
-        if x1 < right and x2 > left and y1 < bottom and y2 > top:
-            part = (slice(*samples.rows.searchsorted((y1, y2))), slice(*samples.columns.searchsorted((x1, x2))))
-            masked[part] |= ahead_m[part] <= level_from_camera[2].dot(box.center_m) + BODY_HALF_DEPTH_M
-    return masked
-
-
-def nearest_dominant_layer(depths_m, weights, sorted_depths_m):
-    """Depth of the trunk of the person: the median of the nearest dominant layer of the weighted depth histogram.
-
-    `depths_m` and `weights` have shape (n,); `sorted_depths_m` holds the same depths, nearest first.
-    """
-    bins = ((depths_m - sorted_depths_m[0]) / BIN_M).astype(int)
-    histogram = np.convolve(np.bincount(bins, weights), np.ones(LAYER_BINS), 'same')
-    first = np.argmax(histogram >= FIRST_LAYER_SHARE * histogram.max())
-    best = first + np.argmax(histogram[first:first + LAYER_BINS])
-    nearest, farthest = ((sorted_depths_m - sorted_depths_m[0]) / BIN_M).searchsorted(
-        (best - LAYER_BINS // 2, best + LAYER_BINS // 2 + 1))
-    median_m = _median(sorted_depths_m[nearest:farthest])
-    for _ in range(MEDIANS):
-        before_m, median_m = median_m, _median(within(sorted_depths_m, median_m, TRUNK_HALF_DEPTH_M))
-        if median_m == before_m:
-            break
-    return median_m
-
-
-def within(sorted_depths_m, middle_m, half_m):
-    """The slice of the sorted depths within `half_m` of `middle_m`."""
-    offsets_m = sorted_depths_m - middle_m
-    return sorted_depths_m[offsets_m.searchsorted(-half_m):offsets_m.searchsorted(half_m, 'right')]
-
-
-def edges(x_m):
-    """Left and right edge of a body with points at x (n,), metres, under the assumption of a uniform width."""
-    last = len(x_m) - 1
-    rank, part = divmod(last * EDGE_PERCENT, 100)
-    after = min(rank + 1, last)
-    in_place_m = np.partition(x_m, (rank, after, last - after, last - rank))
-    low_m = in_place_m[rank] + (in_place_m[after] - in_place_m[rank]) * part / 100.0
-    high_m = in_place_m[last - rank] - (in_place_m[last - rank] - in_place_m[last - after]) * part / 100.0
-    beyond_m = (high_m - low_m) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
-    return low_m - beyond_m, high_m + beyond_m
+def _occluders(rects_px, camera):
+    """Which rectangles (n, n) overlap each rectangle and are of nearer objects."""
+    x1, y1, x2, y2 = np.array(rects_px, np.int64).T
+    overlap = (x1 < x2[:, None]) & (x2 > x1[:, None]) & (y1 < y2[:, None]) & (y2 > y1[:, None])
+    order = np.argsort(front_to_back(rects_px, camera))
+    return overlap & (order < order[:, None])
 
 
 def complete_truncated_extent(low, high, cut_low, cut_high, usual):
@@ -321,14 +369,9 @@ def complete_truncated_extent(low, high, cut_low, cut_high, usual):
     return low, high + (missing if cut_high and not cut_low else 0.0)
 
 
-def _median(sorted_depths_m):
-    last = len(sorted_depths_m) - 1
-    return (sorted_depths_m[last // 2] + sorted_depths_m[last - last // 2]) / 2
-
-
 class Estimator(NamedTuple):
-    """Pair of functions: `sample(depth, rect_px)` returns Samples; `estimate(samples, rect_px, geometry, nearer, kind)`
-    returns a Box3D or None, given the boxes of possible occluders and the ObjectClass, which is that of `classes`.
+    """Pair of functions: `sample(depth, rect_px)` returns the Samples in a rectangle, and `estimate(depth, rects_px,
+    geometry, kinds)` the Box3D or None of each rectangle, whose ObjectClass in `kinds` is that of `classes`.
     """
 
     sample: Any
@@ -345,14 +388,18 @@ def estimator_named(name, stride_px=20, classes=ObjectClasses()):
     if stride_px < 1:
         raise ValueError('stride is %d; at least 1 expected' % stride_px)
     if name == 'foreground':
-        return Estimator(sample_depth, estimate_foreground, classes)
+        return Estimator(sample_grid, estimate_foreground, classes)
     if name == 'median':
-        return Estimator(functools.partial(sample_depth, stride_px=stride_px), estimate_median, classes)
+        sample = functools.partial(sample_depth, stride_px=stride_px)
+
+        def estimate(depth, rects_px, geometry, _kinds):
+            return [estimate_median(sample(depth, rect_px), rect_px, geometry) for rect_px in rects_px]
+        return Estimator(sample, estimate, classes)
     raise ValueError('estimator is %r; foreground or median expected' % name)
 
 
 def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_from_camera=LEVEL, labels=None):
-    """Estimate the 3D boxes of all rectangles of one image, front to back, so that nearer boxes mask their pixels.
+    """Estimate the 3D boxes of all rectangles of one image.
 
     Parameters
     ----------
@@ -361,7 +408,7 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_f
     camera : camera_model.Camera
     estimator : Estimator
     implausible : list, optional
-        Estimates that are not plausible (see `Box3D.is_plausible`) are appended. They do not mask pixels.
+        Estimates that are not plausible (see `Box3D.is_plausible`) are appended.
     level_from_camera : numpy.ndarray, (3, 3), optional
         Rotation to the level frame, see `level_rotation`. By default the camera is held level.
     labels : sequence of str, optional
@@ -374,18 +421,15 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_f
     """
     if len(rects_px) == 0:  # most images show no people
         return []
-    boxes, nearer, labels = [None] * len(rects_px), [], labels or [PERSON] * len(rects_px)
+    labels = labels or [PERSON] * len(rects_px)
     geometry = ImageGeometry(camera, depth.measured_area(), level_from_camera)
-    for number in front_to_back(rects_px, camera):
-        rect_px, kind = rects_px[number], estimator.classes.of(labels[number])
-        box = estimator.estimate(estimator.sample(depth, rect_px), rect_px, geometry, nearer, kind)
+    boxes = estimator.estimate(depth, rects_px, geometry, list(map(estimator.classes.of, labels)))
+    for number, box in enumerate(boxes):
         if box is None:
             continue
         box = box._replace(label=labels[number])
-        if box.is_plausible:
-            boxes[number] = box
-            nearer.append(box)
-        elif implausible is not None:
+        boxes[number] = box if box.is_plausible else None
+        if implausible is not None and not box.is_plausible:
             implausible.append(box)
     return boxes
 

@@ -13,8 +13,8 @@ from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes2d_from_msg, boxes3d_from_msg,
-                                                   camera_from_msg, stamp_if_any, stamp_of, time_from, usable_boxes3d)
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes2d_from_msg, camera_from_msg,
+                                                   stamp_if_any, stamp_of, time_from, usable_boxes3d)
 from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
@@ -158,9 +158,9 @@ class ViewerNode(object):
 
     def _on_boxes3d(self, message):
         with self._diagnostics.receiving('3D boxes'), self._lock:
-            usable, faults = usable_boxes3d(message)
+            boxes, faults = usable_boxes3d(message)
             self._diagnostics.count_dropped('3D boxes', faults)
-            self._snapshots.add_boxes3d(stamp_of(message), arrival_clock_ns(), boxes3d_from_msg(usable))
+            self._snapshots.add_boxes3d(stamp_of(message), arrival_clock_ns(), tuple(boxes.values()))
             self._is_warned = False
 
     def _on_joy(self, message):

@@ -1,8 +1,12 @@
 """ROS node that detects people in colour images with a network."""
+import time
+
 import rospy
 from sensor_msgs.msg import Image
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC
+from ros_3d_bb.conversions.perception_msgs import stamp_of
+from ros_3d_bb.detection.adaptive_size import AdaptiveSize
 from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
@@ -17,7 +21,8 @@ from ros_3d_bb.pipeline.detection_stage import CameraRotation, Yolov5NodeParams,
 class Yolov5Node(object):
     """Detect people in colour images.
 
-    Only the newest image is processed; images that arrive during a detection are skipped, except for the newest.
+    Only the newest image is processed; images that arrive during a detection are skipped, except for the newest. With
+    ~image_size 0, the input size is reduced until no image is skipped, and increased when there is time.
     Parameters: config/yolov5.yaml; some can be changed at run time.
 
     Subscribes
@@ -34,7 +39,9 @@ class Yolov5Node(object):
     def __init__(self):
         params, detection, running = given = read_params(Yolov5NodeParams, DetectionParams, RuntimeParams)
         self._detector = opened_yolov5(params.weights, detection, running, rospy.logwarn)
+        self._params, self._sizes = detection, AdaptiveSize()
         self._diagnostics = Diagnostics()
+        self._diagnostics.show('image size', lambda: '%d pixels' % self._detector.input_px)
         transforms = Transforms(wait_s=0)
         self._rotation = CameraRotation(params, transforms, transforms.close)
         self._worker = DetectorWorker(params, self._diagnostics, self._detect, self._detector.names)
@@ -44,14 +51,27 @@ class Yolov5Node(object):
         ReconfigureServer(given, self._reconfigure)
 
     def _reconfigure(self, _params, detection, _running):
-        self._detector = self._detector.with_params(detection)  # each image uses either old or new parameters
+        self._params = detection
+        self._set_params()
+
+    def _set_params(self):
+        """Use the parameters from the next image on, with the adaptive size if it is wanted."""
+        size = self._params.image_size or self._sizes.size
+        self._detector = self._detector.with_params(self._params._replace(image_size=size))
 
     def _on_image(self, message):
         with self._diagnostics.receiving('colour images'):
+            self._sizes.add_image(stamp_of(message))
             self._worker.offer(message)
 
     def _detect(self, message):
+        start_s = time.monotonic()
         result = detect_in_color(self._detector, message, self._rotation.turns(message.header.frame_id))
+        is_adaptive = not self._params.image_size and not self._detector.has_fixed_size
+        if is_adaptive and self._sizes.add_detection(time.monotonic() - start_s):
+            self._set_params()
+            self._diagnostics.note('changes of the image size', 'detecting in images of %d pixels from now on, to keep '
+                                   'up with the camera (~image_size 0)' % self._sizes.size)
         self._diagnostics.count('images processed')
         return result
 

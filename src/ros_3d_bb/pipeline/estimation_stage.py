@@ -1,4 +1,5 @@
 """Estimation stage: 3D boxes from 2D boxes, depth images and camera_info, shared by bbox3d_node and process_bag."""
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -145,7 +146,7 @@ class EstimationStage(object):
         stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
         gap_s = abs((stamp - depth_msg.header.stamp).to_sec())
         implausible, usable = [], self._usable_boxes(boxes2d)
-        turns, level_from_camera = self._orientation(frame_id)
+        turns, level_from_camera = _orientation(self._params.image_rotation, self._up(frame_id))
         upright_rects_px = turned_boxes(usable.boxes, turns, camera.width, camera.height).tolist()
         estimates = estimate_boxes(turned_depth(depth, turns), list(map(tuple, upright_rects_px)),
                                    turned_camera(camera, turns), self._estimator, implausible, level_from_camera,
@@ -186,29 +187,22 @@ class EstimationStage(object):
                               'set ~depth_scale: %g (now %g); positions and sizes are wrong until then'
                               % (factor, factor * scale_m, scale_m))
 
-    def _orientation(self, frame_id):
-        """Return the quarter turns that make the image upright, and the rotation from the frame of the upright image
-        to the level frame (`box3d_estimator.level_rotation`); `LEVEL` if the tilt is unknown.
-        """
-        up = self._up(frame_id)
-        turns = turns_for(self._params.image_rotation, up)
-        return turns, LEVEL if up is None else level_rotation(turned_rotation(turns).dot(up))
-
     def _up(self, frame_id):
-        """Return the unit vector (3,) that points up in the optical frame; None if tf does not contain it.
+        """Return the unit vector that points up in the optical frame, as a tuple; None if tf does not contain it.
 
         The latest transform is used: the camera is fixed to the robot, so no wait for the image stamp is necessary.
         """
         if self._transforms is None:
             return None
         try:
-            return self._transforms.lookup(frame_id, self._params.floor_frame, NEWEST)[:3, 2]
+            camera_from_floor = self._transforms.lookup(frame_id, self._params.floor_frame, NEWEST)
         except tf2_ros.TransformException as error:
             if TILT_UNKNOWN not in self._events.counts:
                 self._events.note(TILT_UNKNOWN, 'the tilt of the camera is unknown, as there is no transform from '
                                   '%s to %s: %s; it is assumed to be level (~floor_frame)'
                                   % (self._params.floor_frame, frame_id, error))
             return None
+        return tuple(camera_from_floor[:3, 2].tolist())
 
     def _usable_boxes(self, boxes2d):
         """Return the Boxes2D whose rectangles are neither empty nor reversed."""
@@ -248,6 +242,15 @@ class EstimationStage(object):
         return ('no depth image with their stamp %.3f received on %s: colour and depth are %.3f s apart at best; to '
                 'pair them, set ~stamp_tolerance: %.2f'
                 % (stamp_ns / NS, self._depth_topic, gap_s, np.ceil(100 * gap_s) / 100))
+
+
+@functools.lru_cache(maxsize=16)  # a camera that is fixed to the robot has the same tilt in each image
+def _orientation(image_rotation, up):
+    """Return the quarter turns that make the image upright, and the rotation from the frame of the upright image to the
+    level frame (`box3d_estimator.level_rotation`); `LEVEL` if the tilt is unknown (`up` is None).
+    """
+    turns = turns_for(image_rotation, up)
+    return turns, LEVEL if up is None else level_rotation(turned_rotation(turns).dot(up))
 
 
 def _as_received(boxes3d, turns, camera):

@@ -12,8 +12,7 @@ from ros_3d_bb.camera.alignment import POSE, target_frame_fault
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
-from ros_3d_bb.conversions.perception_msgs import (box3d_faults, camera_from_msg, detections_from_msg, stamp_of,
-                                                   time_from)
+from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of, time_from, usable_boxes3d
 from ros_3d_bb.core.camera_clocks import CameraClocks
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import CLASSES_FILE, DEPTH, DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
@@ -24,7 +23,7 @@ from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
-from ros_3d_bb.tracking.types import CameraView
+from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
 
 TRACKERS = {'thesis': (ThesisTracker, [ThesisTrackerParams]),
             'kalman': (Tracker, [TrackerParams, NoiseParams, PredictionParams])}
@@ -160,17 +159,15 @@ class TrackingStage(object):
                                   'awaited' % (stamp_ns / NS))
 
     def _track(self, message, stamp_ns, fixed_from_camera, camera, camera_name):
-        faults = box3d_faults(message)
-        usable = [index for index, fault in enumerate(faults) if not fault]
-        faults = list(filter(None, faults))
+        boxes, faults = usable_boxes3d(message)
         self._events.count_dropped('3D boxes', faults)
-        if faults and not usable:  # differs from an image without people
+        if faults and not boxes:  # differs from an image without people
             self._tracker.skip(stamp_ns, camera_name)
             raise ValueError('none of their %d boxes is valid; tracks are kept as they are' % len(faults))
         if camera:
             self._check_frame(message.header.frame_id, camera)
         motions = self._tracker.common_motions
-        tracks = self._tracker.update(stamp_ns, detections_from_msg(message, fixed_from_camera, usable, self._classes),
+        tracks = self._tracker.update(stamp_ns, detections_from_boxes(boxes, fixed_from_camera, self._classes),
                                       self._view(message.header, fixed_from_camera, camera, camera_name))
         self._events.count('images tracked')
         if self._tracker.common_motions > motions:

@@ -21,19 +21,20 @@ def associate(tracks, measurements, stamp_ns, params, classes):
     cost = kalman_filter.negative_log_likelihood(tracks['mean'], tracks['covariance'], measurements, params)
     cost += _height_cost(tracks, measurements, params.height_sigma)
     # An uncertain detection fits a new target and a track about equally well; the track takes precedence.
-    largest_density = 1 / (2 * np.pi * np.sqrt(np.linalg.det(measurements['noise_m2'])))
+    noise_m2 = measurements['noise_m2']
+    determinant = noise_m2[:, 0, 0] * noise_m2[:, 1, 1] - noise_m2[:, 0, 1] * noise_m2[:, 1, 0]
+    largest_density = 1 / (2 * np.pi * np.sqrt(determinant))
     density = np.minimum(params.new_target_density, UNSURE_SHARE * largest_density)
     cost[cost >= -2 * np.log(2 * np.pi * density)] = np.inf
     cost[classes.group[tracks['class_number']][:, None] != classes.group[measurements['class_number']]] = np.inf
     is_missed = stamp_ns - tracks['last_ns'] >= RECENT_NS
     priority = np.where(tracks['confirmed'], is_missed.astype(int), 2)
     pairs, free = [np.zeros((2, 0), int)], np.arange(cost.shape[1])
-    for rank in range(3):
-        candidates = np.flatnonzero(priority == rank)
-        if len(candidates) and len(free):
-            rows, columns = assign(cost[np.ix_(candidates, free)])
-            pairs.append((candidates[rows], free[columns]))
-            free = np.delete(free, columns)
+    for rank in sorted(set(priority.tolist())):
+        candidates = (priority == rank).nonzero()[0]
+        rows, columns = assign(cost[candidates[:, None], free])
+        pairs.append((candidates[rows], free[columns]))
+        free = free[unmatched(len(free), columns)]
     return np.concatenate(pairs, axis=1)
 
 
@@ -87,6 +88,6 @@ def assign(costs):
 
 def unmatched(count, matched):
     """Indices (k,) below `count` that are not in `matched`, in increasing order. Faster than np.setdiff1d."""
-    is_matched = np.zeros(count, bool)
-    is_matched[matched] = True
-    return np.flatnonzero(~is_matched)
+    is_unmatched = np.ones(count, bool)
+    is_unmatched[matched] = False
+    return is_unmatched.nonzero()[0]

@@ -21,47 +21,43 @@ def predict(mean, covariance, elapsed_s, density):
 
 def negative_log_likelihood(mean, covariance, measurements, params):
     """-2 log(2 pi p) (n, m), where p is the density of each measurement given each object, per m²."""
-    logs = [_fit(mean[:, None], covariance[:, None], measurements, component)[0] for component in _components(params)]
-    return -2 * np.logaddexp(*logs)
+    (inlier, outlier), _innovation, _inverse = _fit(mean[:, None], covariance[:, None], measurements, params)
+    return -2 * np.logaddexp(inlier, outlier)
 
 
 def update(mean, covariance, measurements, params):
     """Mean and covariance after one measurement for each state; the mixture is reduced to one Gaussian."""
-    means, covariances, logs = [], [], []
-    for component in _components(params):
-        log, innovation, inverse = _fit(mean, covariance, measurements, component)
-        inverse_xx, inverse_xy, inverse_yy = inverse
-        gain = covariance[:, :, :2] @ np.array([[inverse_xx, inverse_xy], [inverse_xy, inverse_yy]]).transpose(2, 0, 1)
-        means.append(mean + (gain @ np.stack(innovation, axis=-1)[..., None])[..., 0])
-        covariances.append(covariance - gain @ covariance[:, :2])
-        logs.append(log)
+    logs, (x, y), (inverse_xx, inverse_xy, inverse_yy) = (
+        [values[..., None] for values in group] for group in _fit(mean, covariance, measurements, params))
+    of_x, of_y = covariance[:, 0], covariance[:, 1]
+    gain_x, gain_y = inverse_xx * of_x + inverse_xy * of_y, inverse_xy * of_x + inverse_yy * of_y
+    means = mean + gain_x * x + gain_y * y
+    covariances = covariance - gain_x[..., None] * of_x[:, None] - gain_y[..., None] * of_y[:, None]
     share = np.exp(logs[1] - np.logaddexp(*logs))
     shift = means[1] - means[0]
-    mixed = covariances[0] + share[:, None, None] * (covariances[1] - covariances[0])
-    mixed += (share * (1 - share))[:, None, None] * shift[:, :, None] * shift[:, None, :]
-    return means[0] + share[:, None] * shift, (mixed + mixed.transpose(0, 2, 1)) / 2
+    mixed = covariances[0] + share[..., None] * (covariances[1] - covariances[0])
+    mixed += (share * (1 - share) * shift)[:, :, None] * shift[:, None, :]
+    return means[0] + share * shift, (mixed + mixed.transpose(0, 2, 1)) / 2
 
 
-def _components(params):
-    """(weight, offset_m, spread_m) of the inlier and of the outlier component."""
-    return ((1 - params.outlier_share, 0.0, 0.0),
-            (params.outlier_share, params.outlier_offset, params.outlier_spread))
-
-
-def _fit(mean, covariance, measurements, component):
-    """Log likelihood, innovation (x, y) and inverse innovation covariance (xx, xy, yy) of one mixture component.
+def _fit(mean, covariance, measurements, params):
+    """Log likelihoods, innovations (x, y) and inverse innovation covariances (xx, xy, yy). The first axis of each is
+    that of the components of the mixture, the inliers and the outliers.
 
     Computed element by element, because numpy is several times slower on stacks of 2x2 matrices.
     """
-    weight, offset_m, spread_m = component
+    components = (2,) + (1,) * (mean.ndim - 1)
+    shares = np.reshape((1 - params.outlier_share, params.outlier_share), components)
+    offsets_m, spreads_m = (np.reshape((0, outlier_m), components)
+                            for outlier_m in (params.outlier_offset, params.outlier_spread))
     ray_x, ray_y = measurements['ray'][..., 0], measurements['ray'][..., 1]
-    x = measurements['position_m'][..., 0] - offset_m * ray_x - mean[..., 0]
-    y = measurements['position_m'][..., 1] - offset_m * ray_y - mean[..., 1]
-    noise_m2, spread_m2 = measurements['noise_m2'], spread_m ** 2
-    xx = covariance[..., 0, 0] + (noise_m2[..., 0, 0] + spread_m2 * ray_x * ray_x)
-    xy = covariance[..., 0, 1] + (noise_m2[..., 0, 1] + spread_m2 * ray_x * ray_y)
-    yy = covariance[..., 1, 1] + (noise_m2[..., 1, 1] + spread_m2 * ray_y * ray_y)
+    x = measurements['position_m'][..., 0] - mean[..., 0] - offsets_m * ray_x
+    y = measurements['position_m'][..., 1] - mean[..., 1] - offsets_m * ray_y
+    noise_m2, spreads_m2 = measurements['noise_m2'], spreads_m ** 2
+    xx = covariance[..., 0, 0] + noise_m2[..., 0, 0] + spreads_m2 * (ray_x * ray_x)
+    xy = covariance[..., 0, 1] + noise_m2[..., 0, 1] + spreads_m2 * (ray_x * ray_y)
+    yy = covariance[..., 1, 1] + noise_m2[..., 1, 1] + spreads_m2 * (ray_y * ray_y)
     determinant = xx * yy - xy * xy
     inverse = yy / determinant, -xy / determinant, xx / determinant
     distance = inverse[0] * x * x + 2 * inverse[1] * x * y + inverse[2] * y * y
-    return np.log(max(weight, 1e-12)) - (distance + np.log(determinant)) / 2, (x, y), inverse
+    return np.log(np.maximum(shares, 1e-12)) - (distance + np.log(determinant)) / 2, (x, y), inverse

@@ -5,7 +5,7 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera, transform_points, upright_turns
 from ros_3d_bb.core.labels import PERSON
-from ros_3d_bb.core.object_classes import PERSON_CLASS
+from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import Param
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
@@ -42,20 +42,37 @@ class Detection(NamedTuple):
     index: int = NOT_DETECTED
 
 
-def detection_from_box(box, fixed_from_camera, kind=PERSON_CLASS):
-    """Convert a `box3d_estimator.Box3D` of an image, whose ObjectClass is `kind`, to a Detection in the fixed frame.
+def detections_from_boxes(boxes, fixed_from_camera, classes=ObjectClasses()):
+    """Convert the boxes of an image to a list of Detection in the fixed frame.
 
-    The cylinder is upright in the fixed frame, independent of which edge of the image is up: for a camera mounted in
+    The cylinders are upright in the fixed frame, independent of which edge of the image is up: for a camera mounted in
     portrait, width and height are swapped.
+
+    Parameters
+    ----------
+    boxes : dict
+        {index: `box3d_estimator.Box3D`}, where index is `Detection.index`.
+    fixed_from_camera : numpy.ndarray, (4, 4)
+        Pose of the camera's optical frame in the fixed frame.
+    classes : object_classes.ObjectClasses
     """
+    if not boxes:
+        return []
     rotation, turns = fixed_from_camera[:3, :3], upright_turns(fixed_from_camera)
-    center_m, (width_m, height_m) = box.center_m, box.size_m[:2]
+    centers_m, extents_m = ([box.center_m for box in boxes.values()], [box.size_m[:2] for box in boxes.values()])
     if turns % 2:
-        center_m, (height_m, width_m) = _completed_in_portrait(box, kind)
-    covariance_m2 = None if box.covariance_m2 is None else rotation.dot(box.covariance_m2).dot(rotation.T)
-    edges = box.truncated_edges[-turns:] + box.truncated_edges[:-turns]
-    return Detection(transform_points(fixed_from_camera, center_m), np.array([width_m, width_m, height_m]),
-                     covariance_m2, edges, box.support or 1.0, box.label, box.score)  # support 0: unknown
+        centers_m, extents_m = zip(*[_completed_in_portrait(box, classes.of(box.label)) for box in boxes.values()])
+    positions_m, extents_m = transform_points(fixed_from_camera, centers_m), np.array(extents_m)
+    widths_m, heights_m = extents_m[:, ::-1].T if turns % 2 else extents_m.T
+    unknown_m2 = np.zeros((3, 3))
+    covariances_m2 = rotation.dot([unknown_m2 if box.covariance_m2 is None else box.covariance_m2
+                                   for box in boxes.values()]).transpose(1, 0, 2).dot(rotation.T)
+    sizes_m = np.stack((widths_m, widths_m, heights_m), axis=1)
+    return [Detection(position_m, size_m, None if box.covariance_m2 is None else covariance_m2,
+                      box.truncated_edges[-turns:] + box.truncated_edges[:-turns], box.support or 1.0,  # 0: unknown
+                      box.label, box.score, index)
+            for (index, box), position_m, size_m, covariance_m2 in zip(boxes.items(), positions_m, sizes_m,
+                                                                       covariances_m2)]
 
 
 def _completed_in_portrait(box, kind):

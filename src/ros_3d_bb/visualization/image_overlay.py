@@ -1,5 +1,7 @@
-"""Overlays of the pipeline's results on images. Images are (height, width, 3), uint8, RGB, and modified in place."""
-import cv2
+"""Overlays of the pipeline's results on images. Images are (height, width, 3), uint8, RGB, and modified in place.
+
+OpenCV is imported only where it is used: it takes 100 MB, and most nodes draw images only while they have subscribers.
+"""
 import numpy as np
 
 BOX_COLOR, TEXT_COLOR = (40, 220, 60), (0, 0, 0)
@@ -10,6 +12,7 @@ DEPTH_RANGE_M = 6.0  # default of the far end of the colours of depth
 
 def draw_boxes(image, boxes, labels):
     """Draw 2D boxes (n, 4) with labels, which may be empty. Returns the image."""
+    import cv2
     height, width = image.shape[:2]
     # OpenCV also iterates over the parts of edges outside the image: an edge of 2^31 pixels takes a tenth of a second.
     clipped = np.clip(np.reshape(boxes, (-1, 4)), -OUTSIDE_PX, [width + OUTSIDE_PX, height + OUTSIDE_PX] * 2)
@@ -27,6 +30,7 @@ def draw_boxes(image, boxes, labels):
 
 def draw_caption(image, text):
     """Draw a line of text in the upper left corner. Returns the image."""
+    import cv2
     return cv2.putText(image, text, (8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.8, TEXT_COLOR, 2, cv2.LINE_AA)
 
 
@@ -35,6 +39,7 @@ def draw_samples(image, rect_px, samples):
 
     Orange: valid depth; blue: no depth; purple: corners of the box.
     """
+    import cv2
     height, width = image.shape[:2]
     x1, y1, x2, y2 = np.clip(rect_px, 0, [width, height] * 2).tolist()
     for corner in ((x1, y1), (x2, y2)):
@@ -57,6 +62,7 @@ def depth_to_grey(depth, farthest_m):
 
 def colorize_depth(grey):
     """Convert the output of `depth_to_grey` to colours: near is yellow, far is dark blue, no depth is black."""
+    import cv2
     colors = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_VIRIDIS)[..., ::-1])
     colors[grey == 0] = 0
     return colors

@@ -1,10 +1,10 @@
 """RViz markers of tracks: cylinders and arrows as in Fig. 4.1 of the thesis, histories, and ellipses of covariances."""
 import functools
-from typing import NamedTuple
+from typing import NamedTuple, Optional, Sequence
 
 import genpy
 import numpy as np
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -25,7 +25,11 @@ TEXT_COLORS = {'id': WHITE, 'status': WHITE, 'thesis': GREEN}  # by ~marker_colo
 VELOCITY_SHOWN_S = 1.0  # the velocity arrow ends at the position after this time
 MIN_ARROW_M = 0.05  # RViz cannot orient an arrow without length
 # Diameters of shaft and head. If both arrows have the same direction, the tip of the thin one remains visible.
-VELOCITY_WIDTHS_M, PREDICTION_WIDTHS_M = (0.07, 0.14), (0.04, 0.11)
+VELOCITY_SCALE, PREDICTION_SCALE = Vector3(0.07, 0.14, 0), Vector3(0.04, 0.11, 0)
+# Height of the text, and widths of the lines.
+TEXT_SCALE, HISTORY_SCALE = Vector3(0, 0, 0.35), Vector3(0.05, 0, 0)
+ELLIPSE_SCALE, PREDICTION_ELLIPSE_SCALE = Vector3(0.03, 0, 0), Vector3(0.015, 0, 0)
+UPRIGHT = Quaternion(0, 0, 0, 1)
 CHI2_95 = 5.991  # 95 % quantile of chi squared with 2 degrees of freedom: squared semi-axes in standard deviations
 CIRCLE = np.array([(np.cos(angle), np.sin(angle)) for angle in np.linspace(0, 2 * np.pi, 25)])
 ELLIPSES_EVERY_S = 0.5  # along the prediction
@@ -53,6 +57,21 @@ class MarkerParams(NamedTuple):
         2.0, 'RViz removes markers that are not updated for this long; 0: never.', 's', live=(0, 10))
 
 
+class _Look(NamedTuple):
+    """The fields in which the markers of a track differ, see visualization_msgs/Marker.
+
+    `pose` is None for the centre of the track. Markers share messages, which must not be modified.
+    """
+
+    type: int
+    scale: Vector3
+    color: ColorRGBA
+    pose: Optional[Pose] = None
+    points: Sequence[Point] = ()
+    colors: Sequence[ColorRGBA] = ()
+    text: str = ''
+
+
 class MarkerWriter(object):
     """Converts tracks to markers, with one namespace per kind of marker. The ID of a marker is that of its track.
 
@@ -66,6 +85,7 @@ class MarkerWriter(object):
     def __init__(self, params=MarkerParams()):
         self._drawn = set()  # (namespace, id)
         self._histories = {}  # by track ID: an anchor (3,), and the path relative to it, [(stamp_ns, Point)]
+        self._outlines = {}  # of the ellipses, by track ID
         self.reconfigure(params)
 
     def reconfigure(self, params):
@@ -81,13 +101,16 @@ class MarkerWriter(object):
         its stamp and the fixed frame."""
         now_ns = header.stamp.to_nsec()
         self._histories = {track.id: self._extended_history(track, now_ns) for track in tracks}
+        self._outlines = _outlines_of(tracks) if 'ellipse' in self._params.marker_namespaces else {}
         markers = []
         for track in tracks:
+            pose = _pose(track.position_m)
             for namespace, shape in self._shapes:
-                marker = Marker(header=header, ns=namespace, id=track.id, lifetime=self._lifetime)
-                marker.pose.position, marker.pose.orientation.w = Point(*track.position_m), 1.0
-                if shape(marker, track):
-                    markers.append(marker)
+                look = shape(track)
+                if look is not None:
+                    markers.append(Marker(header, namespace, track.id, look.type, Marker.ADD, look.pose or pose,
+                                          look.scale, look.color, self._lifetime, False, look.points, look.colors,
+                                          look.text, '', False))
         drawn = {(marker.ns, marker.id) for marker in markers}
         markers += [Marker(header=header, ns=namespace, id=track_id, action=Marker.DELETE)
                     for namespace, track_id in sorted(self._drawn - drawn)]
@@ -105,58 +128,55 @@ class MarkerWriter(object):
             steps.pop()
         if not steps:
             anchor_m = foot_m
-        return anchor_m, steps + [(now_ns, Point(*(foot_m - anchor_m)))]
+        return anchor_m, steps + [(now_ns, _point(*(foot_m - anchor_m).tolist()))]
 
-    # Each shape fills in a marker and returns whether there is anything to draw.
+    # Each shape returns the `_Look` of its marker, None if there is nothing to draw.
 
-    def _cylinder(self, marker, track):
-        marker.type, marker.color = Marker.CYLINDER, _color(self._rgb(track), 0.65 if track.status == VISIBLE else 0.2)
-        marker.scale.x, marker.scale.y, marker.scale.z = track.size_m
-        return True
+    def _cylinder(self, track):
+        return _Look(Marker.CYLINDER, Vector3(*track.size_m.tolist()),
+                     _color(self._rgb(track), 0.65 if track.status == VISIBLE else 0.2))
 
-    def _id(self, marker, track):
-        marker.type, marker.scale.z = Marker.TEXT_VIEW_FACING, 0.35
-        marker.pose.position = Point(*(track.position_m + [0, 0, track.size_m[2] / 2 + 0.2]))
-        is_visible = track.status == VISIBLE
-        marker.text = described(track.label, '%d' % track.id if is_visible else '%d?' % track.id)
-        marker.color = _color(TEXT_COLORS[self._params.marker_color] if is_visible else GREY, 1.0)
-        return True
+    def _id(self, track):
+        is_visible, (x, y, z) = track.status == VISIBLE, track.position_m.tolist()
+        return _Look(Marker.TEXT_VIEW_FACING, TEXT_SCALE,
+                     _color(TEXT_COLORS[self._params.marker_color] if is_visible else GREY, 1.0),
+                     text=described(track.label, '%d' % track.id if is_visible else '%d?' % track.id),
+                     pose=Pose(_point(x, y, z + (float(track.size_m[2]) / 2 + 0.2)), UPRIGHT))
 
-    def _velocity(self, marker, track):
-        return _fill_arrow(marker, track, VELOCITY_SHOWN_S * track.instant_velocity_mps, RED, VELOCITY_WIDTHS_M)
+    def _velocity(self, track):
+        return _arrow(track, VELOCITY_SHOWN_S * track.instant_velocity_mps, RED, VELOCITY_SCALE)
 
-    def _prediction(self, marker, track):
-        offset_m = track.prediction_m[-1] - track.position_m if len(track.prediction_m) else np.zeros(3)
-        return _fill_arrow(marker, track, offset_m, GREEN, PREDICTION_WIDTHS_M)
+    def _prediction(self, track):
+        if not len(track.prediction_m):
+            return None
+        return _arrow(track, track.prediction_m[-1] - track.position_m, GREEN, PREDICTION_SCALE)
 
-    def _history(self, marker, track):
+    def _history(self, track):
         anchor_m, steps = self._histories[track.id]
         if len(steps) < 2:
-            return False
-        marker.type, marker.scale.x, marker.pose.position = Marker.LINE_STRIP, 0.05, Point(*anchor_m)
-        rgb, now_ns, fading = self._rgb(track), steps[-1][0], 0.85 / (self._params.marker_history * NS)
-        marker.color = _color(rgb, 0.9)  # not 1: RViz would draw the whole line opaque
-        marker.points = [point for _stamp_ns, point in steps]
-        marker.colors = [_color(rgb, round(0.9 - fading * (now_ns - stamp_ns), 2)) for stamp_ns, _point in steps]
-        return True
+            return None
+        stamps_ns, points = zip(*steps)
+        now_ns, fading = stamps_ns[-1], 0.85 / (self._params.marker_history * NS)
+        shades = _shades(self._rgb(track))
+        return _Look(Marker.LINE_STRIP, HISTORY_SCALE, shades[0.9],  # not 1: RViz would draw the whole line opaque
+                     points=points, pose=_pose(anchor_m),
+                     colors=[shades[round(0.9 - fading * (now_ns - stamp_ns), 2)] for stamp_ns in stamps_ns])
 
-    def _ellipse(self, marker, track):
-        if track.covariance is None:
-            return False
-        marker.type, marker.scale.x, marker.color = Marker.LINE_STRIP, 0.03, _color(self._rgb(track), 0.9)
-        marker.points, = _ellipses(track.covariance[np.newaxis, :2, :2], _to_foot(track)[np.newaxis])
-        return True
+    def _ellipse(self, track):
+        if track.id not in self._outlines:
+            return None
+        return _Look(Marker.LINE_STRIP, ELLIPSE_SCALE, _color(self._rgb(track), 0.9),
+                     points=self._outlines[track.id])
 
-    def _prediction_ellipses(self, marker, track):
+    def _prediction_ellipses(self, track):
         if track.prediction_covariance_m2 is None or not len(track.prediction_m):
-            return False
+            return None
         stride = max(int(round(ELLIPSES_EVERY_S / track.prediction_step_s)), 1)
         shown = np.s_[stride - 1::stride]
         feet_m = track.prediction_m[shown] - track.position_m + _to_foot(track)
-        marker.type, marker.scale.x, marker.color = Marker.LINE_LIST, 0.015, _color(GREEN, 0.6)
-        for outline in _ellipses(track.prediction_covariance_m2[shown, :2, :2], feet_m):
-            marker.points += [point for ends in zip(outline, outline[1:]) for point in ends]
-        return bool(marker.points)
+        points = [point for outline in _ellipses(track.prediction_covariance_m2[shown, :2, :2], feet_m)
+                  for ends in zip(outline, outline[1:]) for point in ends]
+        return _Look(Marker.LINE_LIST, PREDICTION_ELLIPSE_SCALE, _color(GREEN, 0.6), points=points) if points else None
 
     def _rgb(self, track):
         if self._params.marker_color == 'status':
@@ -169,12 +189,21 @@ def _to_foot(track):
     return np.array([0, 0, FLOOR_OFFSET_M - track.size_m[2] / 2])
 
 
-def _fill_arrow(marker, track, offset_m, rgb, widths_m):
-    """Make the marker an arrow from the centre of the track along `offset_m`."""
-    marker.type, marker.color = Marker.ARROW, _color(rgb, 1.0 if track.status == VISIBLE else 0.4)
-    marker.points = [Point(), Point(*offset_m)]
-    marker.scale.x, marker.scale.y = widths_m
-    return np.linalg.norm(offset_m) >= MIN_ARROW_M
+def _arrow(track, offset_m, rgb, scale):
+    """The `_Look` of an arrow from the centre of the track along `offset_m`; None if it is too short."""
+    if not np.linalg.norm(offset_m) >= MIN_ARROW_M:
+        return None
+    return _Look(Marker.ARROW, scale, _color(rgb, 1.0 if track.status == VISIBLE else 0.4),
+                 points=[Point(), _point(*offset_m.tolist())])
+
+
+def _outlines_of(tracks):
+    """Outlines of the 95 % confidence ellipses of the positions of tracks, {track ID: list of Point}."""
+    known = [track for track in tracks if track.covariance is not None]
+    if not known:
+        return {}
+    outlines = _ellipses(np.array([track.covariance[:2, :2] for track in known]), np.array(list(map(_to_foot, known))))
+    return {track.id: outline for track, outline in zip(known, outlines)}
 
 
 def _ellipses(covariances_m2, centers_m):
@@ -183,7 +212,24 @@ def _ellipses(covariances_m2, centers_m):
     semi_axes_m = np.sqrt(CHI2_95 * np.maximum(variances_m2, 0))
     offsets_m = np.matmul(CIRCLE * semi_axes_m[:, np.newaxis], axes.transpose(0, 2, 1))
     outlines_m = (offsets_m + centers_m[:, np.newaxis, :2]).tolist()
-    return [[Point(x, y, z) for x, y in outline_m] for outline_m, z in zip(outlines_m, centers_m[:, 2].tolist())]
+    return [[_point(x, y, z) for x, y in outline_m] for outline_m, z in zip(outlines_m, centers_m[:, 2].tolist())]
+
+
+def _pose(position_m):
+    return Pose(_point(*position_m.tolist()), UPRIGHT)
+
+
+def _point(x, y, z):
+    """Create a Point. genpy's constructor with arguments takes several times as long."""
+    point = Point()
+    point.x, point.y, point.z = x, y, z
+    return point
+
+
+@functools.lru_cache(maxsize=None)
+def _shades(rgb):
+    """Colour messages by opacity, 0 to 1 in steps of 0.01."""
+    return {percentage / 100: _color(rgb, percentage / 100) for percentage in range(101)}
 
 
 @functools.lru_cache(maxsize=None)

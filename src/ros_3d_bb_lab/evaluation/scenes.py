@@ -14,7 +14,7 @@ from ros_3d_bb.estimation.error_model import corrected_boxes
 from ros_3d_bb.tracking.association import match_greedily
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import CameraView, detection_from_box
+from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
 from ros_3d_bb_lab.evaluation.clear_mot import Moment
 from ros_3d_bb_lab.simulation.simulator import SimulatedFrame
 from ros_3d_bb_lab.simulation.true_boxes import LEAST_SHOWN
@@ -65,7 +65,7 @@ def _detections(depth, boxes, camera, map_from_camera, error_model):
     estimated = estimate_boxes(depth, rects_px, camera, estimator_named('foreground'),
                                level_from_camera=level_rotation(map_from_camera[2, :3]))
     found = corrected_boxes([box for box in estimated if box is not None], error_model)
-    return [detection_from_box(box, map_from_camera) for box in found]
+    return detections_from_boxes(dict(enumerate(found)), map_from_camera)
 
 
 def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6.0):

@@ -25,7 +25,7 @@ from ros_3d_bb.estimation.box3d_estimator import (ImageGeometry, estimate_boxes,
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import CameraView, Detection, detection_from_box
+from ros_3d_bb.tracking.types import CameraView, Detection, detections_from_boxes
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
 from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
@@ -104,7 +104,7 @@ class Ours(object):
 
     def track(self, stamp_ns, boxes):
         """Update the tracks with one image. Returns the tracks."""
-        detections = [detection_from_box(box, FIXED_FROM_CAMERA) for box in boxes]
+        detections = detections_from_boxes(dict(enumerate(boxes)), FIXED_FROM_CAMERA)
         return self._tracker.update(stamp_ns, detections, self._view)
 
 

@@ -14,6 +14,7 @@ from ros_3d_bb.detection.depth.person_classifier import (BEST_HOG, PersonHog, Pe
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_person_clusters, grid_of
 
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
+SURE_SCORE = 0.95  # further scales are not evaluated from this score on
 MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person
 
 
@@ -71,8 +72,10 @@ class DepthPeople(object):
             features = shape_features_of(blob.mask, blob.window(grid.ahead_m), shape.thickness_m)
             if person_score(features, BEST_HOG, shape.cut_top) < self._params.min_score:
                 continue  # rejected by its shape alone: HOG cannot raise the score enough
-            hog = self._hog.score(pyramid, person_window_of(blob, shape, grid, camera, floor))
-            score = person_score(features, hog, shape.cut_top)
+            for hog in self._hog.scores(pyramid, person_window_of(blob, shape, grid, camera, floor)):
+                score = person_score(features, hog, shape.cut_top)
+                if score >= SURE_SCORE:
+                    break
             if score >= self._params.min_score:
                 box = box_of(blob, shape, grid, camera, floor)
                 x_m = ((box[0] + box[2]) / 2.0 - camera.cx) / camera.fx * shape.depth_m

@@ -11,7 +11,7 @@ import numpy as np
 WINDOW_PX = (64, 128)
 PERSON_PX = 96  # height of the person in the detector's window
 SHIFT_PX = 8  # the window is also evaluated this far to each side, above and below
-SCALES = (0.88, 1.0, 1.13)
+SCALES = (1.0, 0.88, 1.13)  # in the order of evaluation
 LOW_SCORE = -0.5  # lower HOG scores are clipped to this
 BEST_HOG = 2.5  # HOG scores rarely exceed this
 STEREO_NOISE_PER_M = 0.0034  # depth noise is this * depth**2; Intel RealSense D435: 0.065 px at 19 px*m
@@ -40,14 +40,16 @@ class PersonHog(object):
         self._hog = cv2.HOGDescriptor(WINDOW_PX, (16, 16), (8, 8), (8, 8), 9)
         self._hog.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())
 
-    def score(self, pyramid, window):
-        """Best SVM score near a PersonWindow: positive for a person, at least LOW_SCORE. See `pyramid_of`."""
-        scores = [LOW_SCORE]
+    def scores(self, pyramid, window):
+        """Yield the best SVM score near a PersonWindow after each of `SCALES`: positive for a person, at least
+        LOW_SCORE. See `pyramid_of`.
+        """
+        best = LOW_SCORE
         for scale in SCALES:
             patch = _patch(pyramid, window, PERSON_PX / ((window.soles - window.crown) * scale))
             weights = self._hog.detect(patch, hitThreshold=LOW_SCORE, winStride=(SHIFT_PX, SHIFT_PX))[1]
-            scores.extend(np.ravel(weights))
-        return float(max(scores))
+            best = max([best] + np.ravel(weights).tolist())
+            yield best
 
 
 def shape_features_of(mask, ahead_m, thickness_m):
@@ -63,17 +65,28 @@ def shape_features_of(mask, ahead_m, thickness_m):
     columns = mask.sum(axis=0) >= max(4, mask.shape[0] // 4)
     relief_m = 0.0
     if columns.any():
-        rows = np.arange(mask.shape[0], dtype=float)[:, None]
-        rise_m, rows = (values - np.nanmedian(values, axis=0)
-                        for values in (np.where(mask, values, np.nan)[:, columns] for values in (ahead_m, rows)))
-        slope = np.nansum(rise_m * rows) / max(np.nansum(rows ** 2), 1)  # of a wall in the image of a tilted camera
-        relief_m = np.nanpercentile(np.abs(rise_m - slope * rows), 80)
+        cells = mask[:, columns]
+        rise_m = _above_column_medians(ahead_m[:, columns], cells)
+        rows = _above_column_medians(np.arange(len(mask), dtype=float)[:, None], cells)
+        slope = rise_m.dot(rows) / max(rows.dot(rows), 1)  # of a wall in the image of a tilted camera
+        relief_m = np.percentile(np.abs(rise_m - slope * rows), 80)
     noise_m = 0.01 + STEREO_NOISE_PER_M * np.median(ahead_m[mask]) ** 2
     return np.array([max(mask.mean(), 0.5), np.clip(relief_m / noise_m, 0.8, 2.0), thickness_m])
 
 
+def _above_column_medians(values, mask):
+    """Values (k,) in the cells of a mask, less the median of those in the same column; each column has some.
+
+    np.nanmedian gives the same medians in twenty times the time.
+    """
+    ordered = np.sort(np.where(mask, values, np.inf), axis=0)
+    count, columns = mask.sum(axis=0), np.arange(mask.shape[1])
+    medians = (ordered[(count - 1) // 2, columns] + ordered[count // 2, columns]) / 2
+    return (values - medians)[mask]
+
+
 def person_score(features, hog, headless):
-    """Probability that a cluster is a person, from `shape_features_of` and `PersonHog.score`.
+    """Probability that a cluster is a person, from `shape_features_of` and `PersonHog.scores`.
 
     `headless`: the top of the cluster is cut by the image border.
     """

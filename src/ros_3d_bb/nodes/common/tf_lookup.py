@@ -75,7 +75,7 @@ class Transforms(object):
         with self._listener.news:
             while True:
                 try:
-                    transform = self._buffer.lookup_transform(frames[0], frames[1], stamp)
+                    transform = self._buffer.lookup_transform_core(frames[0], frames[1], stamp)
                     self._from_before = False
                     return transform_from_msg(transform)
                 except tf2_ros.TransformException as error:

@@ -10,12 +10,13 @@ import tempfile
 from typing import NamedTuple
 
 from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine, scenario_path
-from ros_3d_bb_lab.evaluation.latency.latency_result import result_of
+from ros_3d_bb_lab.evaluation.latency.latency_result import LIMIT, SUBSCRIBING, result_of
 from ros_3d_bb_lab.evaluation.launching import launch
 
 IMAGES = 60  # first images of the scene, played forwards and backwards: 2 s, 90 MB
 BUSY_LOOP = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    pass'
-HARNESS = ('replay_node', 'latency_probe_node', 'rosout')  # nodes of the benchmark, which do not run on a robot
+# Nodes of the benchmark, which do not run on a robot.
+HARNESS = 'replay_node', 'latency_probe_node', 'rosout', 'limit_audience'
 COLUMNS = '%-16s %6s %6s %8s %8s %8s %8s %9s %9s %9s %7s'
 TITLES = ('case', 'in Hz', 'out Hz', 'p50 ms', 'p95 ms', 'p99 ms', 'dropped', 'CPU %', 'camera %', 'memory MB', 'load')
 
@@ -25,7 +26,7 @@ class Case(NamedTuple):
 
     name: str
     detector: str    # of pipeline.launch
-    image_size: int  # of the network
+    image_size: int  # of the network; 0: adaptive
     weights: str     # path of the model file
     loaded: bool     # whether another process loads a core
 
@@ -33,7 +34,8 @@ class Case(NamedTuple):
 def cases_of(weights):
     """All cases for a list of model files: the first is that of the YOLOv5 cases, each other is a case of its own."""
     detectors = [('free', 'none', 0, ''), ('depth', 'depth', 0, '')]
-    detectors += [('yolov5-%d' % size, 'yolov5', size, path) for path in weights[:1] for size in (512, 640)]
+    detectors += [('yolov5-%s' % (size or 'auto'), 'yolov5', size, path)
+                  for path in weights[:1] for size in (512, 640, 0)]
     detectors += [(os.path.splitext(os.path.basename(path))[0], 'yolov5', 640, path) for path in weights[1:]]
     return [Case(name + ('+load' if loaded else ''), detector, size, path, loaded)
             for loaded in (False, True) for name, detector, size, path in detectors]
@@ -46,7 +48,8 @@ def measured(case, arguments, bag, folder):
     """
     record, log = (os.path.join(folder, case.name + suffix) for suffix in ('.json', '.log'))
     options = {'bag': bag, 'record': record, 'detector': case.detector, 'weights': case.weights,
-               'image_size': case.image_size, 'seconds': arguments.seconds, 'rate': arguments.rate}
+               'image_size': case.image_size, 'seconds': arguments.seconds, 'rate': arguments.rate,
+               'limits': arguments.limits, 'warm_up': 8.0 if arguments.limits else 3.0}
     with cpu_load(int(case.loaded)), open(log, 'w') as stream:
         launch('latency.launch', options, arguments.seconds + 200, stream)
     try:
@@ -73,7 +76,8 @@ def cpu_load(cores):
 
 def row(result):
     """Format a result as a line of the table."""
-    nodes = [node for node in result['cpu_percent'] if node not in HARNESS]
+    nodes = [node for node in result['cpu_percent']
+             if node not in HARNESS and not node.endswith((LIMIT, SUBSCRIBING))]
     times = ['-' if result[key] is None else '%.1f' % result[key] for key in ('p50_ms', 'p95_ms', 'p99_ms')]
     return COLUMNS % ((result['name'], '%.1f' % result['input_hz'], '%.1f' % result['output_hz']) + tuple(times) + (
         result['dropped'], '%.1f' % sum(result['cpu_percent'][node] for node in nodes),
@@ -84,8 +88,9 @@ def row(result):
 def details(result):
     """Format the results by node and by stage, and the trend, as text."""
     trend, grew = result['trend'], result['trend']['rss_mb_per_minute']
-    lines = ['  %-22s %5.1f %% of a core, %4.0f MB, %+.2f MB a minute'
-             % (node, result['cpu_percent'][node], result['rss_mb'][node], grew[node])
+    compared = {node: ', %.2f times its limit' % found['times_limit'] for node, found in result['nodes'].items()}
+    lines = ['  %-31s %5.1f %% of a core, %4.0f MB, %+.2f MB a minute'
+             % (node, result['cpu_percent'][node], result['rss_mb'][node], grew[node]) + compared.get(node, '')
              for node in sorted(result['cpu_percent'])]
     stages = ['%s %s' % (stage, '-' if value is None else '%.1f' % value)
               for stage, value in result['stages_ms'].items()]
@@ -125,8 +130,8 @@ def main():
 
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench latency', description=__doc__)
-    parser.add_argument('--cases', help='some of free, depth, yolov5-512, yolov5-640 and the names of further model '
-                        'files, each with or without +load, separated by commas (default: all)')
+    parser.add_argument('--cases', help='some of free, depth, yolov5-512, yolov5-640, yolov5-auto and the names of '
+                        'further model files, each with or without +load, separated by commas (default: all)')
     parser.add_argument('--seconds', type=float, default=20.0, help='duration of a measurement (default: 20)')
     parser.add_argument('--rate', type=float, default=30.0, metavar='HZ', help='images per second (default: 30)')
     parser.add_argument('--weights', nargs='+', default=list(filter(None, [default_weights()])), metavar='FILE',
@@ -136,6 +141,9 @@ def _arguments():
     images.add_argument('--scenario', type=scenario_path, default='demo', metavar='SCENARIO',
                         help='scenario; its first %d images are played (default: demo)' % IMAGES)
     images.add_argument('--bag', help='bag written by scenario_to_bag or session_to_bag with --boxes')
+    parser.add_argument('--limits', action='store_true',
+                        help='also give the CPU usage of each node as a multiple of its limit: that of a bare rospy '
+                        'node that runs beside it, receives the same messages and publishes messages of the same size')
     parser.add_argument('--json', metavar='FILE', help='also write the results to this file')
     arguments = parser.parse_args()
     if not (arguments.seconds > 0 and arguments.rate > 0):
