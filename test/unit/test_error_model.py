@@ -7,6 +7,7 @@ import pytest
 import yaml
 from hypothesis import given, settings, strategies as st
 
+from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.estimation.box3d_estimator import Box3D
 from ros_3d_bb.estimation.error_model import (STEEPEST_BIAS, Scores, Spread, XBias, checked, corrected_boxes,
                                               read_error_model, write_error_model)
@@ -89,6 +90,20 @@ def test_models_survive_a_file(tmp_path_factory, model, scores):
     assert read_error_model(path) == model._replace(cross_validated=scores)
 
 
+@pytest.mark.parametrize('range_m', [None, 20.0])
+def test_the_detector_survives_a_file(tmp_path, range_m):
+    model = MODEL._replace(detector=DetectorModel(0.06, 1.2, 0.8, range_m))
+    write_error_model(tmp_path / 'model.yaml', model)
+    assert read_error_model(tmp_path / 'model.yaml') == model
+
+
+@pytest.mark.parametrize('edit', [lambda content: content.pop('detector'),
+                                  lambda content: content.update(detector={}),
+                                  lambda content: content.update(detector={'correlation_time_s': 0.5})])
+def test_missing_keys_of_the_detector_have_defaults(tmp_path, edit):
+    assert read_error_model(edited(tmp_path, edit)).detector == DetectorModel()
+
+
 def edited(folder, edit):
     path = folder / 'model.yaml'
     write_error_model(path, MODEL)
@@ -109,7 +124,15 @@ def edited(folder, edit):
     (lambda content: content.update(y_sigma_m=float('nan')), 'y_sigma_m is nan; a number expected'),
     (lambda content: content.update(y_sigma_m=True), 'y_sigma_m is True'),
     (lambda content: content.update(x_sigma=3), 'x_sigma is 3; the keys constant_m, growth, near_m2 expected'),
-    (lambda content: content.update(y_sigma_m=0), 'y_sigma_m is 0; more than 0')])
+    (lambda content: content.update(y_sigma_m=0), 'y_sigma_m is 0; more than 0'),
+    (lambda content: content['detector'].update(max_rang_m=9), r'unknown key detector\.max_rang_m; did you mean '
+     r'detector\.max_range_m'),
+    (lambda content: content['detector'].update(max_range_m=-1), r'detector\.max_range_m is -1; more than 0, or null'),
+    (lambda content: content['detector'].update(max_range_m='far'), "detector.max_range_m is 'far'; a number expected"),
+    (lambda content: content['detector'].update(detection_probability=1), r'detection_probability is 1; more than 0'),
+    (lambda content: content['detector'].update(lasting_sigma_m=-0.1), r'lasting_sigma_m is -0\.1; 0 to 10 expected'),
+    (lambda content: content['detector'].update(correlation_time_s=1e9), 'correlation_time_s is 1e'),
+    (lambda content: content.update(detector=8), 'detector is 8; the keys lasting_sigma_m')])
 def test_invalid_files_are_rejected(tmp_path, edit, reason):
     path = edited(tmp_path, edit)
     with pytest.raises(ValueError, match=reason) as error:

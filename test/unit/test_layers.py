@@ -54,9 +54,10 @@ ALLOWED = {
         'camera core detection detection.depth detection.yolov5 estimation sessions tracking '
         'lab.evaluation.baselines lab.simulation',
         'cv2 matplotlib'),
-    'ros_3d_bb_lab.evaluation.noise': ('core estimation sessions lab.evaluation', 'matplotlib scipy'),
+    'ros_3d_bb_lab.evaluation.noise': (
+        'camera core estimation sessions tracking lab.evaluation lab.evaluation.tracking', 'matplotlib scipy'),
     'ros_3d_bb_lab.evaluation.tracking': (
-        'camera core tracking lab.evaluation.baselines',
+        'camera core estimation tracking lab.evaluation.baselines',
         'scipy trackeval'),
     'ros_3d_bb_lab.evaluation.demo': (
         'conversions core tracking visualization lab.evaluation lab.simulation.ros',

@@ -5,10 +5,12 @@ import sys
 import numpy as np
 import pytest
 
+from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, TrackedObject
 from ros_3d_bb_lab.evaluation.tracking import benchmark
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import START_NS, read_recordings
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S
+from support.error_models import MODEL
 from support.recordings import CAMERA_MPS, IMAGES, SPEED_MPS, write_recording
 
 
@@ -104,3 +106,17 @@ def test_the_command_scores_recorded_detections(monkeypatch, tmp_path, capsys):
     assert scores['ours']['recall'] > 80 and scores['ours']['precision'] == 100
     assert set(scores['ours']['coverage_95_by_range']) == {'0-8', '8-16', '16-40'}
     assert 'coverage_95 0-8 m, 2s' in capsys.readouterr().out
+
+
+@pytest.mark.needs('norfair', 'trackeval')
+def test_the_command_uses_an_error_model(monkeypatch, tmp_path):
+    """The boxes are right; a model with a bias of 1 m moves them away from the person."""
+    write_recording(tmp_path / 'one')
+    write_error_model(tmp_path / 'model.yaml', MODEL._replace(
+        z_bias=(1.0,), measured_range=MODEL.measured_range._replace(z_min_m=1.5, x_z_min_m=1.5)))
+    path = tmp_path / 'scores.json'
+    monkeypatch.setattr(sys, 'argv', ['./run bench tracking', '--detections', str(tmp_path / 'one'), '--json',
+                                      str(path), '--error-model', str(tmp_path / 'model.yaml')])
+    benchmark.main()
+    scores = json.loads(path.read_text())
+    assert scores['error_model'] == str(tmp_path / 'model.yaml') and scores['trackers']['ours']['recall'] == 0

@@ -265,3 +265,47 @@ def test_stamps_that_hardly_advance_are_rejected_until_they_do():
             tracker.update(NS + MOST_KEPT, [], FRONT)
     tracker.update(NS, [], LEFT)
     tracker.update(NS + LATEST_NS + 1, [], FRONT)
+
+
+GROUP = [(IN_BOTH, 2.5), (IN_BOTH + 0.12, 3.5), (IN_BOTH - 0.1, 4.2), (IN_BOTH + 0.05, 5.5)]  # bearings, ranges
+
+
+def group_images(seconds, rate_hz, offset_m=(0, 0), jump_m=(0, 0), jump_s=np.inf, sigma_m=0.04):
+    """Images of cameras that take turns at `rate_hz` each, and see the people of GROUP: the second one at offset
+    positions, both with a jump of the frame at `jump_s`."""
+    random = np.random.RandomState(0)
+    for number in range(int(seconds * rate_hz) * 2):
+        time_s, view = number / (2 * rate_hz), (FRONT, LEFT)[number % 2]
+        moved_m = np.multiply(jump_m, time_s >= jump_s)
+        pose = np.array(view.fixed_from_camera)
+        pose[:2, 3] += moved_m
+        shift_m = moved_m + np.multiply(offset_m, view is LEFT)
+        places_m = [around(*person) + shift_m + 0.5 * sigma_m * random.normal(size=2) for person in GROUP]
+        yield (START_NS + int(round(time_s * NS)),
+               [Detection(np.append(place_m, 0.85), np.array([0.5, 0.5, 1.7]), np.eye(3) * sigma_m ** 2)
+                for place_m in places_m], view._replace(fixed_from_camera=pose))
+
+
+def steps_m(published):
+    """Distances of the tracks between successive images."""
+    return [np.linalg.norm(after.position_m - before.position_m)
+            for objects, later in zip(published, published[1:]) for before, after in zip(objects, later)]
+
+
+@pytest.mark.parametrize('rate_hz', [10, 30])
+@pytest.mark.parametrize('offset_m', [(0.1, 0), (0.2, 0), (0, 0.2), (0.3, 0), (0, -0.3)])
+def test_cameras_whose_poses_disagree_do_not_move_the_frame(rate_hz, offset_m):
+    tracker = Tracker()
+    published = play(tracker, group_images(4, rate_hz, offset_m))[rate_hz:]
+    assert not tracker.common_motions
+    assert all(ids(objects) == [1, 2, 3, 4] for objects in published)
+    assert max(steps_m(published)) < 0.4 * np.linalg.norm(offset_m)
+
+
+@pytest.mark.parametrize('rate_hz', [10, 30])
+def test_the_frame_of_two_cameras_jumps_once(rate_hz):
+    tracker = Tracker()
+    published = play(tracker, group_images(4, rate_hz, jump_m=(0.5, 0.2), jump_s=2))
+    assert tracker.common_motions == 1 and ids(published[-1]) == [1, 2, 3, 4]
+    errors_m = [track.position_m[:2] - around(*GROUP[track.id - 1]) - (0.5, 0.2) for track in published[-1]]
+    assert np.abs(errors_m).max() < 0.05

@@ -85,7 +85,7 @@ def test_one_command_starts_camera_and_pipeline(camera_package):
     assert parameters['/yolov5_node/weights'] == '/some/yolov5n.pt'
     assert parameters['/tracker_node/target_frame'] == 'odom'
     assert parameters['/planner_bridge_node/outputs'] == 'costmap'
-    assert parameters['/bbox3d_node/error_model'] == '/some/model.yaml'
+    assert parameters['/bbox3d_node/error_model'] == parameters['/tracker_node/error_model'] == '/some/model.yaml'
 
 
 @pytest.mark.parametrize('extras, arguments, expected', [

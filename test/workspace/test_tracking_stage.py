@@ -1,4 +1,6 @@
 """From 3D boxes and transforms to tracks, without a master: effects of one invalid or untimely message on the next."""
+import os
+
 import numpy as np
 import pytest
 from sensor_msgs.msg import CameraInfo, Image
@@ -7,7 +9,9 @@ from std_msgs.msg import Header
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import time_from
+from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.estimation.error_model import read_error_model, write_error_model
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
 from support.two_cameras import START_NS, Rig, boxes
 
@@ -132,3 +136,25 @@ def test_an_image_without_any_valid_box_does_not_age_tracks(rig):
             rig.send(stamp_ns + number * PERIOD_NS, z=float('nan'))
     assert ids(rig.send(stamp_ns + 31 * PERIOD_NS)) == before
     assert rig.events.counts['3D boxes dropped'] == 30
+
+
+def absent(rig, frames):
+    """Send images without boxes after those of `stand`. Returns the last result."""
+    return [rig.send(START_NS + (30 + frame) * PERIOD_NS, count=0) for frame in range(frames)][-1]
+
+
+def test_the_error_model_gives_the_tracker_the_range_of_the_detector(tmp_path):
+    """A person 3 m ahead is not expected to be detected by a detector with a range of 2 m."""
+    models = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'error_models')
+    model = read_error_model(os.path.join(models, 'd435i_thesis.yaml'))
+    write_error_model(tmp_path / 'model.yaml', model._replace(detector=DetectorModel(max_range_m=2.0)))
+    usual, near = Rig(), Rig(error_model=str(tmp_path / 'model.yaml'))
+    for rig in (usual, near):
+        stand(rig)
+    assert [ids(absent(rig, 25)) for rig in (usual, near)] == [[], [1]]
+
+
+@pytest.mark.parametrize('tracker', ['kalman', 'thesis'])
+def test_a_missing_error_model_is_named(tracker):
+    with pytest.raises(ValueError, match='nowhere.yaml.*absolute path expected'):
+        Rig(tracker=tracker, error_model='nowhere.yaml')

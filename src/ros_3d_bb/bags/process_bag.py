@@ -83,6 +83,7 @@ def _settings_from(given):
         settings = settings._replace(**{node: read_params(path, getattr(settings, node))})
     cameras = given.cameras and [camera.strip() for camera in given.cameras.split(',')]
     for node, name, value in (('yolov5', 'weights', given.weights), ('bbox3d', 'error_model', given.error_model),
+                              ('tracker', 'error_model', given.error_model),
                               ('tracker', 'target_frame', given.target_frame), ('tracker', 'cameras', cameras)):
         if value:
             settings = with_params(settings, node, **{name: value})

@@ -203,8 +203,8 @@ def boxes3d_to_msg(boxes, header, camera):
     """Convert 3D boxes (`box3d_estimator.Box3D`) to BoundingBox3DArray. Inverse of `boxes3d_from_msg`."""
     array = BoundingBox3DArray(header=header)
     for box in boxes:
-        message = BoundingBox3D(label=box.label, score=box.score, support=box.support,
-                                truncated=any(box.truncated_edges))
+        score, support = np.float32([box.score, box.support]).tolist()  # as received, so that process_bag does the same
+        message = BoundingBox3D(label=box.label, score=score, support=support, truncated=any(box.truncated_edges))
         for flag, is_cut in zip(EDGE_FLAGS, box.truncated_edges):
             message.truncated_edges |= flag if is_cut else 0
         _set_position(message.center, box.center_m.tolist())

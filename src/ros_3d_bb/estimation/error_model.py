@@ -11,6 +11,8 @@ from typing import NamedTuple, Optional
 import numpy as np
 import yaml
 
+from ros_3d_bb.core import detector_model
+from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
 
@@ -87,7 +89,7 @@ class ErrorModel(NamedTuple):
 
     `z_bias` holds the coefficients of a polynomial in z, highest power first; `y_sigma_m` is an assumption, as the
     ground truth does not include y; `growth_outside` is the standard deviation added to each axis per metre outside
-    `measured_range`, m/m; `cross_validated` is None if not measured.
+    `measured_range`, m/m; `cross_validated` is None if not measured. `detector` is for the tracker.
     """
 
     z_bias: tuple
@@ -99,6 +101,7 @@ class ErrorModel(NamedTuple):
     growth_outside: float
     provenance: Provenance
     cross_validated: Optional[Scores]
+    detector: DetectorModel = DetectorModel()
 
     def corrected(self, position_m):
         """Remove the bias from measured positions (..., 3). Inverse of `biased`.
@@ -211,6 +214,7 @@ def checked(model):
         raise ValueError('y_sigma_m is %g; more than 0 expected' % model.y_sigma_m)
     if model.growth_outside < 0:
         raise ValueError('growth_outside is %g; 0 or more expected' % model.growth_outside)
+    detector_model.checked(model.detector)
     return model
 
 
@@ -225,6 +229,14 @@ def read_error_model(path):
             return checked(_filled(ErrorModel, load_yaml(stream), ''))
         except (ValueError, OverflowError, yaml.YAMLError) as error:
             raise ValueError('%s: not an error model: %s' % (path, error))
+
+
+def error_model_of_param(path):
+    """The ErrorModel of the parameter ~error_model of a node; None if it is empty. Raises ValueError."""
+    try:
+        return read_error_model(path) if path else None
+    except OSError as error:
+        raise ValueError('the error model cannot be read: %s; an absolute path expected' % error)
 
 
 def write_error_model(path, model):
@@ -246,8 +258,9 @@ def _line(name, value):
 
 def _filled(kind, content, where):
     """Convert YAML content to a value of `kind`, a NamedTuple or a plain type; `where` is its key."""
-    if kind == Optional[Scores]:
-        return None if content is None else _filled(Scores, content, where)
+    for optional in (Scores, float):
+        if kind == Optional[optional]:
+            return None if content is None else _filled(optional, content, where)
     if hasattr(kind, '_fields'):
         return _filled_fields(kind, content, where)
     if kind is tuple and isinstance(content, list) and content:
@@ -269,6 +282,6 @@ def _filled_fields(kind, content, where):
             raise ValueError('unknown key %s%s; did you mean %s%s?'
                              % (prefix, name, prefix, nearest_name(str(name), kind._fields)))
     for name in kind._fields:
-        if name not in content:
+        if name not in content and name not in kind._field_defaults:
             raise ValueError('the key %s%s is missing' % (prefix, name))
-    return kind(**{name: _filled(kind.__annotations__[name], content[name], prefix + name) for name in kind._fields})
+    return kind(**{name: _filled(kind.__annotations__[name], value, prefix + name) for name, value in content.items()})

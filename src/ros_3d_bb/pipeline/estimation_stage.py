@@ -19,7 +19,7 @@ from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTAT
                                    parameters)
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 from ros_3d_bb.estimation.box3d_estimator import LEVEL, check_rect, estimate_boxes, estimator_named, level_rotation
-from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
+from ros_3d_bb.estimation.error_model import corrected_boxes, error_model_of_param
 from ros_3d_bb.estimation.scale_check import ScaleCheck
 from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
 
@@ -81,12 +81,7 @@ class EstimationStage(object):
         self._registration = DepthRegistration(transforms, depth_info_topic) if params.depth == RAW else None
         self._color_frame, self._scale_check = '', ScaleCheck()
         self._classes = read_object_classes(params.classes_file)
-        self._error_model = None
-        if params.error_model:
-            try:
-                self._error_model = read_error_model(params.error_model)
-            except OSError as error:
-                raise ValueError('the error model cannot be read: %s; an absolute path expected' % error)
+        self._error_model = error_model_of_param(params.error_model)
         cache_ns, tolerance_ns = int(params.cache_length * NS), int(params.stamp_tolerance * NS)
         self._sync = StampSynchronizer(cache_ns, tolerance_ns, int(params.assumed_delay * NS), on_frame, self._on_lost)
         self.reconfigure(params)

@@ -17,6 +17,7 @@ from ros_3d_bb.core.camera_clocks import CameraClocks
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import CLASSES_FILE, DEPTH, DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, MessageCache
+from ros_3d_bb.estimation.error_model import error_model_of_param
 from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.occlusion import depths_towards
@@ -41,6 +42,7 @@ class TrackerNodeParams(NamedTuple):
         'covariance, models outliers and occlusion, and re-identifies people after it. thesis: greedy nearest '
         'neighbour, averaged velocity and straight prediction, for comparison.', choices=('kalman', 'thesis'))
     target_frame: str = Param('map')
+    error_model: str = Param('')
     cameras: list = Param(())
     camera_frame: str = Param('')
     use_depth: bool = Param(True, 'Whether depth images are used to find out that a person is occluded.')
@@ -96,7 +98,9 @@ class TrackingStage(object):
         self.uses_depth = self.uses_camera_info and params.use_depth
         tracker, self._kinds = TRACKERS[params.tracker]
         self._classes = read_object_classes(params.classes_file)
-        self._tracker = tracker(*self._params_of_tracker(tracking), last_id=last_id, classes=self._classes)
+        model = error_model_of_param(params.error_model)
+        more = {'detector': model.detector} if model and tracker is Tracker else {}
+        self._tracker = tracker(*self._params_of_tracker(tracking), last_id=last_id, classes=self._classes, **more)
         self.lock = threading.RLock()
         self._clocks = CameraClocks()
         self._jumps = 0  # number of backward jumps in time

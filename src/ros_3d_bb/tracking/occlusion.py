@@ -4,7 +4,7 @@ The latest image of each camera classifies each undetected track, and the best r
 cannot see is therefore neither out of view nor missed while another camera detects it, sees it occluded or should
 detect it. A camera that stops sending images is ignored after a short time.
 """
-from typing import NamedTuple
+from typing import NamedTuple, Optional
 
 import numpy as np
 
@@ -29,17 +29,34 @@ STATUS = np.array([OCCLUDED, OCCLUDED, OUT_OF_VIEW, VISIBLE])  # indexed by the 
 RECENT_NS = NS  # a camera whose latest image is older is ignored
 BEHIND_M = 0.45  # upper bound of the position's standard deviation of a person who stays behind an occluder
 OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
+DEFAULT_RANGE_M = 8.0  # of a D435 and YOLOv5n
+RANGE_GAIN = 0.05  # of the filter that learns the range
 
 
 class CameraVisibility(NamedTuple):
-    """The latest image of a camera, and SEEN or the result of `classify_visibility` for each track (n,)."""
+    """The latest image of a camera, SEEN or the result of `classify_visibility` for each track (n,), the range in which
+    people are expected to be detected, and whether most people fit their tracks (`common_motion`), None if unknown."""
 
     stamp_ns: int
     view: CameraView
     visibility: np.ndarray
+    range_m: float
+    fits: Optional[bool]
 
 
-def mark_missed(tracks, before, rows, cameras, camera, observed_s, max_range_m):
+def learned_range(range_m, distances_m, confirmed, rows):
+    """Range after an image with the tracks in `rows` detected at `distances_m` (k,): `DEFAULT_RANGE_M`, or the filtered
+    mean distance of the confirmed (n,) ones farther away. Beyond it, detectors miss people often."""
+    is_far = distances_m > DEFAULT_RANGE_M
+    if is_far.any():
+        is_far &= confirmed[rows]
+    far_m = distances_m[is_far]
+    if not len(far_m):
+        return range_m
+    return range_m + (1 - (1 - RANGE_GAIN) ** len(far_m)) * (far_m.mean() - range_m)
+
+
+def mark_missed(tracks, before, rows, cameras, camera, observed_s, detection_probability):
     """Update the status of the undetected tracks in `rows`, and the times for which they are undetected and missed.
 
     An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
@@ -47,12 +64,13 @@ def mark_missed(tracks, before, rows, cameras, camera, observed_s, max_range_m):
 
     `tracks` are predicted to the stamp of the image, `before` are the same tracks after the previous image. `cameras`
     maps each camera to its CameraVisibility; `camera` is that of the image, which accounts for `observed_s` seconds.
+    `detection_probability` is that of a visible person.
     Modifies `tracks` and the `visibility` of the image.
     """
     image, missed, before = cameras[camera], tracks[rows], before[rows]
-    visibility = _visibility(missed, tracks, image.view, max_range_m)
+    visibility = _visibility(missed, tracks, image)
     held = (visibility == VISIBLE) & (missed['status'] == OCCLUDED)
-    held[held] = _visibility(before[held], tracks, image.view, max_range_m) == OCCLUDED
+    held[held] = _visibility(before[held], tracks, image) == OCCLUDED
     visibility[held] = OCCLUDED
     image.visibility[rows] = visibility
     best = visibility
@@ -60,8 +78,8 @@ def mark_missed(tracks, before, rows, cameras, camera, observed_s, max_range_m):
         if name != camera and image.stamp_ns - other.stamp_ns <= RECENT_NS:
             # The person may also stay behind what occludes the view of another camera.
             hidden = (other.visibility[rows] == OCCLUDED) & (missed['status'] == OCCLUDED) & (visibility != VISIBLE)
-            hidden[hidden] = _visibility(missed[hidden], tracks, other.view, max_range_m) == VISIBLE
-            hidden[hidden] = _visibility(before[hidden], tracks, other.view, max_range_m) == OCCLUDED
+            hidden[hidden] = _visibility(missed[hidden], tracks, other) == VISIBLE
+            hidden[hidden] = _visibility(before[hidden], tracks, other) == OCCLUDED
             held |= hidden
             best = np.minimum(best, other.visibility[rows])
     held &= best == OCCLUDED
@@ -71,17 +89,18 @@ def mark_missed(tracks, before, rows, cameras, camera, observed_s, max_range_m):
     missed['unseen_s'] += np.where(best == SEEN, 0, observed_s)
     missed_s = np.where(best == VISIBLE, observed_s, 0)
     missed['missed_s'] += missed_s
-    track_score.add_misses(missed, missed_s)
+    track_score.add_misses(missed, missed_s, detection_probability)
     missed['status'] = STATUS[best]
     tracks[rows] = missed
 
 
-def _visibility(missed, tracks, view, max_range_m):
-    """Visibility (k,) of missed tracks in a camera's view."""
+def _visibility(missed, tracks, image):
+    """Visibility (k,) of missed tracks in the view of a CameraVisibility."""
     if not len(missed):
         return np.zeros(0, int)
     occluding = tracks[tracks['confirmed'] & (tracks['missed_s'] < OCCLUDING_S)]
-    return classify_visibility(view, _positions_of(missed), missed['size_m'], _positions_of(occluding), max_range_m)
+    return classify_visibility(image.view, _positions_of(missed), missed['size_m'], _positions_of(occluding),
+                               image.range_m)
 
 
 def _positions_of(tracks):

@@ -19,11 +19,12 @@ from ros_3d_bb.tracking.types import PREDICTION_STEP, PREDICTION_TIME, VISIBLE, 
 # `unseen_s` is the time since the last detection, `missed_s` the part of it during which a detection was expected.
 # `votes` are filtered scores of the classes of the group, of which `class_number` (see `ClassNumbers`) has the highest.
 # `score` is the filtered score of the detections; `detection` is `Detection.index` in the latest image.
+# `innovation_m` is the innovation of the latest image, for `noise_scale`.
 TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
                   ('size_m', float, 3), ('end_hits', int, 2), ('cut_ns', np.int64, 2), ('hits', int),
                   ('first_ns', np.int64), ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float),
                   ('status', int), ('log_odds', float), ('confirmed', bool), ('moving', bool), ('class_number', int),
-                  ('votes', float, MAX_IN_GROUP), ('score', float), ('detection', int)])
+                  ('votes', float, MAX_IN_GROUP), ('score', float), ('detection', int), ('innovation_m', float, 2)])
 PUBLISHED = 'id', 'status', 'moving', 'first_ns', 'last_ns', 'class_number', 'score', 'detection'
 RECENTLY_MATCHED_NS = NS // 5  # no track starts near a track that was matched less than this ago
 SMOOTHING = 0.1  # weight of the newest detection in size, height and score

@@ -11,15 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking import kalman_filter, track_score
+from ros_3d_bb.tracking import kalman_filter, noise_scale, track_score
 from ros_3d_bb.tracking.association import associate, unmatched
 from ros_3d_bb.tracking.class_numbers import ClassNumbers
-from ros_3d_bb.tracking.common_motion import common_motion, move
+from ros_3d_bb.tracking.common_motion import common_motion, may_jump, move
 from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
-from ros_3d_bb.tracking.occlusion import SEEN, CameraVisibility, mark_missed
+from ros_3d_bb.tracking.occlusion import DEFAULT_RANGE_M, SEEN, CameraVisibility, learned_range, mark_missed
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
 from ros_3d_bb.tracking.track import (TRACK, PredictionParams, duplicates, new_targets, objects_of, position_std_of,
                                       update_matched)
@@ -66,21 +67,19 @@ class TrackerParams(NamedTuple):
     max_position_std: float = Param(
         0.5, 'An undetected track stays published up to this standard deviation of its position.', 'm', live=(0, 2))
     max_age: float = Param(4.0, 'A person who reappears within this time keeps the track ID.', 's', live=(0, 30))
-    max_range: float = Param(
-        8.0, 'Range of the detector: people who are farther from the camera are not expected to be detected.', 'm',
-        live=(1, 20))
     moving_speed: float = MOVING_SPEED
 
 
 class _State(NamedTuple):
     """State of the tracker after an image: the tracks, the stamp of the latest image, the `CameraVisibility` of the
-    latest image of each camera, and the number of images with a common motion.
+    latest image of each camera, the number of images with a common motion, and the learned `noise_scale`.
     """
 
     tracks: np.ndarray
     now_ns: int
     cameras: dict
     common_motions: int
+    log_noise_scale: float
 
 
 class Tracker(object):
@@ -88,7 +87,8 @@ class Tracker(object):
 
     Call `update` with the detections of each image, `skip` for an image whose detections are unusable, and `reset`
     after a jump in time. Images of several cameras may arrive late and in any order. The IDs of tracks are greater than
-    `last_id`. `classes` is the table of the classes of objects: tracks never change between its groups.
+    `last_id`. `classes` is the table of the classes of objects: tracks never change between its groups. `detector` is
+    a DetectorModel.
 
     Raises
     ------
@@ -97,13 +97,14 @@ class Tracker(object):
     """
 
     def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams(), last_id=0,
-                 classes=ObjectClasses()):
-        self._classes = ClassNumbers(classes)
+                 classes=ObjectClasses(), detector=DetectorModel()):
+        self._classes, self._detector = ClassNumbers(classes), detector
         self.reconfigure(params, noise, prediction)
         self._start(last_id)
 
-    def _start(self, last_id):
-        self._buffer = OutOfSequenceBuffer(self._step, _State(np.zeros(0, TRACK), None, {}, 0), last_id)
+    def _start(self, last_id, log_noise_scale=0.0):
+        state = _State(np.zeros(0, TRACK), None, {}, 0, log_noise_scale)
+        self._buffer = OutOfSequenceBuffer(self._step, state, last_id)
 
     def reconfigure(self, params, noise, prediction):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
@@ -111,8 +112,8 @@ class Tracker(object):
         self._params, self._noise, self._prediction = params, noise, prediction
 
     def reset(self):
-        """Delete all tracks, as after a jump in time. IDs are not reused."""
-        self._start(self._buffer.last_id)
+        """Delete all tracks, as after a jump in time. IDs are not reused, and the learned noise is kept."""
+        self._start(self._buffer.last_id, self._buffer.state.log_noise_scale)
 
     def skip(self, stamp_ns, camera=''):
         """Skip an image whose detections are unusable: tracks do not age. Never raises, as the image may be late."""
@@ -148,17 +149,20 @@ class Tracker(object):
 
     def objects(self):
         """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image."""
-        tracks, params = self._buffer.state.tracks, self._params
-        tracks = tracks[np.argsort(tracks['id'])]
+        state, params, prediction = self._buffer.state, self._params, self._prediction
+        tracks = state.tracks[np.argsort(state.tracks['id'])]
         published = tracks['log_odds'] >= track_score.MIN_TRACK_SCORE
         published &= position_std_of(tracks) < params.max_position_std
         published |= tracks['status'] == VISIBLE
-        return objects_of(tracks[tracks['confirmed'] & published], self._prediction, self._classes)
+        if state.log_noise_scale < 0:
+            prediction = prediction._replace(position_bias=noise_scale.lasting_std(
+                state.log_noise_scale, self._noise.noise_unknown, prediction.position_bias))
+        return objects_of(tracks[tracks['confirmed'] & published], prediction, self._classes)
 
     def _step(self, state, image, observed_s, assign_id):
         """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
         stamp_ns, detections, view = image
-        params, classes, camera = self._params, self._classes, view.camera
+        params, classes, detector, camera = self._params, self._classes, self._detector, view.camera
         tracks = state.tracks.copy()
         elapsed_s = 0.0 if state.now_ns is None else (stamp_ns - state.now_ns) / NS
         density = params.acceleration * classes.acceleration[tracks['class_number']]
@@ -166,33 +170,47 @@ class Tracker(object):
                                                                      density)
         tracks['detection'] = NOT_DETECTED
 
-        period_s = (stamp_ns - state.cameras[camera].stamp_ns) / NS if camera in state.cameras else 0.0
-        measurements = measurements_of(detections, view, period_s, self._noise, classes)
+        latest = state.cameras.get(camera)
+        period_s = (stamp_ns - latest.stamp_ns) / NS if latest else 0.0
+        measurements = measurements_of(detections, view, period_s, self._noise, classes, detector)
+        noise_scale.widen(state.log_noise_scale, measurements)
         rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
-        motion = common_motion(tracks, measurements, rows, columns, view, classes)
+        was_seen = latest.visibility == SEEN if latest else np.zeros(len(tracks), bool)
+        motion, fits = common_motion(tracks, was_seen, measurements, rows, columns, view, classes)
+        if motion is not None and not may_jump(state.cameras, camera, stamp_ns):
+            motion = None
+        if fits is None and latest:
+            fits = latest.fits
         if motion is not None:
             move(tracks, *motion, view)
             rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
         matches = list(zip(tracks['id'][rows].tolist(), tracks['confirmed'][rows].tolist(), columns.tolist()))
-        update_matched(tracks, rows, measurements[columns], stamp_ns, params, classes)
+        matched = measurements[columns]
+        log_noise_scale = noise_scale.learn(state.log_noise_scale, tracks, rows, matched)
+        update_matched(tracks, rows, matched, stamp_ns, params, classes)
 
+        range_m = detector.max_range_m
+        if range_m is None:
+            range_m = learned_range(latest.range_m if latest else DEFAULT_RANGE_M, matched['distance_m'],
+                                    tracks['confirmed'], rows)
         cameras = {name: latest for name, latest in state.cameras.items() if stamp_ns - latest.stamp_ns <= KNOWN_NS}
-        cameras[camera] = CameraVisibility(stamp_ns, view, np.full(len(tracks), SEEN))
+        cameras[camera] = CameraVisibility(stamp_ns, view, np.full(len(tracks), SEEN), range_m, fits)
         missed = unmatched(len(tracks), rows)
         if len(missed):
-            mark_missed(tracks, state.tracks, missed, cameras, camera, observed_s, params.max_range)
+            mark_missed(tracks, state.tracks, missed, cameras, camera, observed_s, detector.detection_probability)
 
         # Tentative tracks are kept for a short time only.
         max_unseen_s = np.where(tracks['confirmed'], params.max_age, TENTATIVE_TIMEOUT_S)
         kept = (tracks['unseen_s'] < max_unseen_s) & (position_std_of(tracks) < MAX_POSITION_STD_M)
         kept &= ~duplicates(tracks, stamp_ns, classes)
-        tracks, unmatched_columns = tracks[kept], unmatched(len(detections), columns)
+        tracks, unmatched_columns = tracks.compress(kept), unmatched(len(detections), columns)
         new = tracks[:0]
         if len(unmatched_columns):
             new, started = new_targets(tracks, measurements[unmatched_columns], stamp_ns, params, classes)
             new['id'] = [assign_id(column) for column in unmatched_columns[started].tolist()]
             tracks = np.concatenate((tracks, new))
-        for name, latest in cameras.items():
+        for name, seen in cameras.items():
             added = np.full(len(new), SEEN if name == camera else OUT_OF_VIEW)
-            cameras[name] = latest._replace(visibility=np.concatenate((latest.visibility[kept], added)))
-        return _State(tracks, stamp_ns, cameras, state.common_motions + (motion is not None)), matches
+            cameras[name] = seen._replace(visibility=np.concatenate((seen.visibility[kept], added)))
+        return _State(tracks, stamp_ns, cameras, state.common_motions + (motion is not None),
+                      log_noise_scale), matches

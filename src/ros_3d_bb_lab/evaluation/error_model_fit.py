@@ -26,7 +26,8 @@ UNKNOWN = Provenance('', '', '', '', 0, 0)
 
 
 class Data(NamedTuple):
-    """Measured positions (n, 3), true (x, z) (n, 2), both in metres, and indices of the true positions (n,)."""
+    """Measured positions (n, 3), true (x, z) (n, 2), both in metres, and indices of the true positions, or of the
+    groups of measurements, (n,)."""
 
     measured_m: np.ndarray
     truth_m: np.ndarray
@@ -37,15 +38,15 @@ class Data(NamedTuple):
         return 1.0 / np.bincount(self.position)[self.position]
 
 
-def fit_error_model(measured_m, truth_m, source='', estimator='', camera='', date=''):
+def fit_error_model(measured_m, truth_m, source='', estimator='', camera='', date='', groups=None):
     """Fit an ErrorModel. More coefficients are selected only if they predict held-out positions clearly better.
 
     `measured_m` (n, 3) are the estimated x, y, z and `truth_m` (n, 2) the true x, z in metres. Measurements with equal
-    truth are repetitions at one position. Measurements with an implausible truth are left out (`plausibility`). Raises
-    ValueError if there are too few positions, if all have the same range or the same x, or if the bias is too steep to
-    be inverted.
+    truth are repetitions at one position; `groups` (n,) replaces positions, as by the people of a recording, who move.
+    Measurements with an implausible truth are left out (`plausibility`). Raises ValueError if there are too few
+    positions, if all have the same range or the same x, or if the bias is too steep to be inverted.
     """
-    data = _without_outliers(data_of(measured_m, truth_m))
+    data = _without_outliers(data_of(measured_m, truth_m, groups))
     model = _fit(data)
     corrected_m, covariances = held_out(data)
     provenance = Provenance(source, estimator, camera, date, len(data.truth_m), len(np.unique(data.position)))
@@ -53,8 +54,8 @@ def fit_error_model(measured_m, truth_m, source='', estimator='', camera='', dat
     return checked(model._replace(provenance=provenance, cross_validated=scores))
 
 
-def data_of(measured_m, truth_m):
-    """Validate measurements and index their positions. Raises ValueError."""
+def data_of(measured_m, truth_m, groups=None):
+    """Validate measurements and index their positions, or `groups` (n,). Raises ValueError."""
     measured_m, truth_m = np.asarray(measured_m, float), np.asarray(truth_m, float)
     if measured_m.shape != (len(truth_m), 3) or truth_m.shape != (len(truth_m), 2):
         raise ValueError('measured %s and truth %s; (n, 3) and (n, 2) expected' % (measured_m.shape, truth_m.shape))
@@ -67,13 +68,15 @@ def data_of(measured_m, truth_m):
         if len(np.unique(positions[:, axis])) < 3:
             raise ValueError('measurements at %d different %s; at least 3 expected'
                              % (len(np.unique(positions[:, axis])), name))
+    if groups is not None:
+        _groups, position = np.unique(groups, return_inverse=True)
     return Data(measured_m, truth_m, position.reshape(-1))
 
 
 def _without_outliers(data):
     measured_m = data.measured_m[:, [0, 2]]
     plausible = likely_errors(measured_m, data.truth_m).are_plausible(measured_m, data.truth_m)
-    return data_of(data.measured_m[plausible], data.truth_m[plausible])
+    return data_of(data.measured_m[plausible], data.truth_m[plausible], data.position[plausible])
 
 
 def held_out(data):

@@ -1,11 +1,18 @@
-"""Analyse the noise of measured positions: figures, normality tests, error models and a report."""
+"""Analyse the noise of measured positions: figures, normality tests, error models and a report.
+
+With --recordings, fit an error model to recorded 3D boxes of moving people with ground truth. Only this measures the
+section `detector` of the model; sessions and tables write its defaults.
+"""
 import argparse
 import pathlib
 import sys
 
+from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse
+from ros_3d_bb_lab.evaluation.noise.recordings import fit_recordings
 from ros_3d_bb_lab.evaluation.noise.report import text_of, write_results
 from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements, read_table
+from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings
 
 
 def main():
@@ -13,6 +20,8 @@ def main():
     arguments = _arguments()
     folder = pathlib.Path(arguments.out)
     try:
+        if arguments.recordings:
+            return _fit_recordings(arguments, folder)
         inputs = _inputs(arguments)
         for outlier in inputs.outliers:
             print('left out of the analysis:', outlier, file=sys.stderr)
@@ -21,7 +30,21 @@ def main():
     except (ValueError, OSError) as error:
         sys.exit('./run noise: %s' % error)
     print(text_of(analysis))
+    print('detector: not measured, default values; --recordings measures it')
     print('report: %s (and report.pdf)' % (folder / 'report.html'))
+
+
+def _fit_recordings(arguments, folder):
+    """Write the error model of recordings, and print its values for the tracker. Raises ValueError or OSError."""
+    runs = list(read_recordings(arguments.recordings))
+    model = fit_recordings(runs, ', '.join(run.name for run in runs), arguments.camera)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_error_model(folder / 'error_model.yaml', model)
+    print('%d errors of %d people, RMSE after correction, people left out: %.3f m'
+          % (model.provenance.measurements, model.provenance.positions, model.cross_validated.rmse_plane_m))
+    for name, value in model.detector._asdict().items():
+        print('%s: %s' % (name, 'unknown' if value is None else '%.3g' % value))
+    print('error model: %s' % (folder / 'error_model.yaml'))
 
 
 def _inputs(arguments):
@@ -38,6 +61,8 @@ def _inputs(arguments):
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run noise', description=__doc__)
     parser.add_argument('session', nargs='?', help='folder of a measurement session; or use --z and --x')
+    parser.add_argument('--recordings', metavar='DIR', help='recorded 3D boxes with ground truth instead, as of '
+                        './run bench tracking --detections')
     parser.add_argument('--z', metavar='CSV', help='table of the Z error, millimetres')
     parser.add_argument('--x', metavar='CSV', help='table of the X error')
     parser.add_argument('--x-variance', metavar='CSV', help='table for the variance of X, without people truncated by '
@@ -48,9 +73,10 @@ def _arguments():
                         '(default: any)')
     parser.add_argument('--camera', default='unknown', help='name stored in the error model')
     arguments = parser.parse_args()
-    if bool(arguments.session) == bool(arguments.z or arguments.x or arguments.x_variance):
-        parser.error('either a SESSION or tables expected')
-    if not arguments.session and not (arguments.z and arguments.x):
+    tables = arguments.z or arguments.x or arguments.x_variance
+    if bool(arguments.session) + bool(arguments.recordings) + bool(tables) != 1:
+        parser.error('either a SESSION, --recordings or tables expected')
+    if tables and not (arguments.z and arguments.x):
         parser.error('both --z and --x expected')
     return arguments
 

@@ -3,6 +3,7 @@
 Detection errors are as measured in the thesis. Without recordings, pedestrian trajectories are generated.
 """
 import argparse
+import functools
 import json
 import math
 import os
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb_lab.evaluation.baselines.norfair_baseline import LIDAR, LIDAR_SCORE, Norfair
@@ -22,7 +24,7 @@ from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import SimulatedDetection
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb_lab.evaluation.tracking.prediction_benchmark import predictions
-from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings
+from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings, with_error_model
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
 from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, detection_of, simulate, view_of
 from ros_3d_bb_lab.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
@@ -184,10 +186,16 @@ def _bench_detections(arguments):
     """Run the comparison on recorded detections, as `bench`."""
     runs = list(read_recordings(arguments.detections, arguments.every, arguments.min_score,
                                 not arguments.no_odometry))
-    trackers = compare(runs, CONTESTANTS_ON_DETECTIONS)
+    contestants = CONTESTANTS_ON_DETECTIONS
+    if arguments.error_model:
+        model = read_error_model(arguments.error_model)
+        runs = [with_error_model(run, model) for run in runs]
+        ours = contestants[0]._replace(make=functools.partial(Tracker, detector=model.detector))
+        contestants = (ours,) + contestants[1:]
+    trackers = compare(runs, contestants)
     print('\n'.join(table(trackers)))
     return {'sequences': [run.name for run in runs], 'every': arguments.every, 'odometry': not arguments.no_odometry,
-            'trackers': trackers}
+            'error_model': arguments.error_model, 'trackers': trackers}
 
 
 def main():
@@ -215,6 +223,8 @@ def _arguments():
                         help='of --detections: leave out boxes with lower scores (default: none)')
     parser.add_argument('--no-odometry', action='store_true',
                         help='of --detections: track in the frame of the camera, as without a pose of the robot')
+    parser.add_argument('--error-model', metavar='FILE', help='of --detections: correct the boxes by an error model '
+                        '(./run noise --recordings), and give the tracker their covariance (default: none)')
     parser.add_argument('--seed', type=int, default=0, metavar='N', help='random seed (default: 0)')
     parser.add_argument('--repetitions', type=int, default=2, metavar='N',
                         help='runs of each sequence with a standing and with a driving robot (default: 2)')

@@ -2,7 +2,8 @@
 
 As in Schöller et al., What the Constant Velocity Model Can Teach Us About Pedestrian Motion Prediction (RA-L 2020), a
 person is observed for 8 steps of the recording, and the constant velocity is that of the last step. The tracker gets
-one person at a time, so that association has no effect. Each later position with a known future counts.
+one person at a time, in the order of appearance, so that association has no effect, and without covariances: it learns
+the noise of the recording from earlier people. Each later position with a known future counts.
 """
 import numpy as np
 
@@ -12,7 +13,6 @@ from ros_3d_bb_lab.evaluation.tracking.metrics import WITHIN_95
 
 OBSERVED = 8  # steps
 HORIZON_S = 2.0
-SIGMA_M = 0.05  # of the annotated positions, which are read as detections with this standard deviation
 SIZE_M = np.array([0.5, 0.5, 1.7])
 MAX_STEP_ERROR_S = 0.05  # largest deviation of the time of a future position
 
@@ -24,7 +24,9 @@ def predictions(make_tracker, sequences):
     """
     scores = {}
     for sequence in sequences:
-        rows = [row for person in sequence.pedestrians for row in _person_errors(make_tracker, person)]
+        tracker = make_tracker()
+        people = sorted(sequence.pedestrians, key=lambda person: person.start_s)
+        rows = [row for person in people for row in _person_errors(tracker, person)]
         cv_m, ours_m, distances = np.reshape(rows, (-1, 3)).T
         scores[sequence.name] = {'cv_fde_2s_m': _mean(cv_m), 'ours_fde_2s_m': _mean(ours_m),
                                  'ours_coverage_95_2s': _mean(distances < WITHIN_95)}
@@ -38,12 +40,13 @@ def _mean(values):
     return float(np.mean(values)) if len(values) else None
 
 
-def _person_errors(make_tracker, person):
+def _person_errors(tracker, person):
     """Yield the errors of both predictions, metres, and the squared Mahalanobis distance of that of the tracker."""
-    tracker, view = make_tracker(), CameraView(np.eye(4))
+    tracker.reset()
+    view = CameraView(np.eye(4))
     times_s, points_m = person.times_s, person.points_m
     for row, (time_s, point_m) in enumerate(zip(times_s, points_m)):
-        detection = Detection(np.append(point_m, SIZE_M[2] / 2), SIZE_M, SIGMA_M ** 2 * np.eye(3))
+        detection = Detection(np.append(point_m, SIZE_M[2] / 2), SIZE_M)
         tracks = tracker.update(int(round((time_s - times_s[0] + 1) * NS)), [detection], view)
         later = np.flatnonzero(np.abs(times_s - time_s - HORIZON_S) < MAX_STEP_ERROR_S)
         if row + 1 < OBSERVED or not len(later) or not tracks:

@@ -58,6 +58,24 @@ class RecordedRun(NamedTuple):
         return counted & ~((pixels[:, None] >= low) & (pixels[:, None] <= high)).all(axis=2).any(axis=1)
 
 
+def with_error_model(run, model):
+    """The RecordedRun with boxes that an `error_model.ErrorModel` corrects, and their covariances."""
+    return run._replace(images=tuple(
+        image._replace(detections=_corrected(image.detections, image.view.fixed_from_camera, model))
+        for image in run.images))
+
+
+def _corrected(detections, fixed_from_camera, model):
+    camera_from_fixed, rotation = np.linalg.inv(fixed_from_camera), fixed_from_camera[:3, :3]
+    corrected = []
+    for detection in detections:
+        center_m = model.corrected(transform_points(camera_from_fixed, detection.position_m))
+        covariance_m2 = rotation.dot(model.covariance(center_m)).dot(rotation.T)
+        corrected.append(detection._replace(position_m=transform_points(fixed_from_camera, center_m),
+                                            covariance_m2=covariance_m2))
+    return corrected
+
+
 def read_recordings(folder, every=1, min_score=-np.inf, with_odometry=True):
     """Yield the runs of the recordings in the subfolders of a folder, or of a folder that is itself a recording.
 

@@ -1,0 +1,135 @@
+"""Detector model: from recordings with ground truth to the tracker."""
+import sys
+
+import numpy as np
+import pytest
+
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.core.detector_model import DetectorModel
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.estimation.error_model import read_error_model
+from ros_3d_bb.tracking.occlusion import DEFAULT_RANGE_M, learned_range
+from ros_3d_bb.tracking.tracker import Tracker
+from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, CameraView, Detection
+from ros_3d_bb_lab.evaluation.noise import __main__ as command
+from ros_3d_bb_lab.evaluation.noise.recordings import detection_range, fit_recordings, lasting_errors, match_people
+from ros_3d_bb_lab.evaluation.tracking.recorded_detections import RecordedRun, with_error_model
+from ros_3d_bb_lab.evaluation.tracking.run_generator import Image, RunTruth
+from support.recordings import write_recording
+
+CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)
+VIEW = CameraView(transform_from((0, 0, 1), OPTICAL_ROTATION), CAMERA)
+SIZE_M = np.array([0.5, 0.5, 1.7])
+PERIOD_S = 0.1
+LASTING_M, TIME_S, INDEPENDENT_M, PROBABILITY, RANGE_M = 0.06, 0.4, 0.03, 0.9, 12.0
+
+
+def run_of(people=12, images=150, seed=0):
+    """People walk around at 2 to 18 m; beyond 12 m, one of three is detected."""
+    random = np.random.RandomState(seed)
+    slow_m, kept = np.zeros((people, 2)), np.exp(-PERIOD_S / TIME_S)
+    starts_m, phases = np.linspace(3, 17, people), random.uniform(0, 6, people)
+    taken = []
+    for number in range(images):
+        time_s = number * PERIOD_S
+        slow_m = kept * slow_m + LASTING_M * np.sqrt(1 - kept ** 2) * random.normal(size=(people, 2))
+        places_m = np.stack((starts_m + np.sin(0.3 * time_s + phases), 2 * np.sin(0.5 * time_s + phases)), axis=1)
+        measured_m = places_m + slow_m + INDEPENDENT_M * random.normal(size=(people, 2))
+        ranges_m = np.hypot(*places_m.T)
+        found = random.uniform(size=people) < np.where(ranges_m < RANGE_M, PROBABILITY, 0.33)
+        truth = RunTruth(np.arange(people), places_m, None, None, np.full(people, VISIBLE), None)
+        detections = [Detection(np.append(place_m, 0.85), SIZE_M) for place_m in measured_m[found]]
+        stamp_ns = int(round((1 + time_s) * NS))
+        taken.append(Image(stamp_ns, detections, VIEW, truth, [], stamp_ns, VIEW))
+    return RecordedRun('made', tuple(taken), None)
+
+
+@pytest.fixture(scope='module')
+def run():
+    return run_of()
+
+
+def test_errors_detections_and_range_of_a_recording_are_measured(run):
+    model = fit_recordings([run], 'made', 'none')
+    detector = model.detector
+    assert detector.lasting_sigma_m == pytest.approx(LASTING_M, rel=0.15)
+    assert detector.correlation_time_s == pytest.approx(TIME_S, rel=0.35)
+    assert detector.detection_probability == pytest.approx(PROBABILITY, abs=0.02) and detector.max_range_m == RANGE_M
+    sigma_m = np.hypot(LASTING_M, INDEPENDENT_M)
+    assert sigma_m < model.z_sigma.at(8.0) < 2 * sigma_m and abs(model.z_bias[-1]) < 0.05  # widened for few people
+    assert model.provenance.positions == 12
+
+
+def test_the_model_gives_recorded_boxes_covariances(run):
+    model = fit_recordings([run], 'made', 'none')._replace(z_bias=(0.5,))
+    box, = with_error_model(run, model).images[0].detections[:1]
+    assert box.position_m[0] == pytest.approx(run.images[0].detections[0].position_m[0] - 0.5, abs=0.01)
+    assert box.covariance_m2[0, 0] == pytest.approx(model.z_sigma.at(box.position_m[0]) ** 2, rel=0.01)
+
+
+def test_a_recording_without_misses_has_no_range(run):
+    people = match_people([run])
+    probability, range_m = detection_range(people.range_m, np.ones(len(people.range_m), bool))
+    assert range_m is None and probability == 0.99
+
+
+def test_single_images_do_not_show_how_long_errors_last():
+    with pytest.raises(ValueError, match='0 pairs of errors of a person within 1.5 s; at least 100 expected'):
+        lasting_errors(np.zeros((50, 2)), np.arange(50), np.arange(50) * NS)
+
+
+def test_recordings_without_people_are_rejected(run):
+    nobody = run._replace(images=tuple(image._replace(truth=image.truth._replace(
+        status=np.full(12, OUT_OF_VIEW))) for image in run.images))
+    with pytest.raises(ValueError, match='no person in the recordings counts'):
+        fit_recordings([nobody], 'made', 'none')
+
+
+def test_the_command_writes_the_model(tmp_path, monkeypatch, capsys, run):
+    monkeypatch.setattr(command, 'read_recordings', lambda folder: [run])
+    monkeypatch.setattr(sys, 'argv', ['./run noise', '--recordings', 'made', '--out', str(tmp_path / 'out')])
+    command.main()
+    detector = read_error_model(tmp_path / 'out' / 'error_model.yaml').detector
+    assert detector.max_range_m == RANGE_M and 'max_range_m: 12' in capsys.readouterr().out
+
+
+def test_a_recording_of_one_person_is_rejected(tmp_path, monkeypatch):
+    write_recording(tmp_path / 'one')
+    monkeypatch.setattr(sys, 'argv', ['./run noise', '--recordings', str(tmp_path), '--out', str(tmp_path / 'out')])
+    with pytest.raises(SystemExit, match='different x; at least 3 expected'):
+        command.main()
+    assert not (tmp_path / 'out').exists()
+
+
+def test_the_range_is_learned_from_people_farther_away():
+    range_m = DEFAULT_RANGE_M
+    for _image in range(100):
+        range_m = learned_range(range_m, np.array([3.0, 7.0]), np.ones(2, bool), np.array([1, 0]))
+    assert range_m == DEFAULT_RANGE_M
+    for _image in range(100):
+        range_m = learned_range(range_m, np.array([3.0, 12.0, 20.0, 90.0]), np.array([True] * 3 + [False]),
+                                np.array([0, 2, 1, 3]))
+    assert range_m == pytest.approx(16.0, abs=0.1)
+
+
+def leave(detector, distance_m, others_m=()):
+    """A person stands there for two seconds, at times with others, and is then not detected. Returns the time for which
+    the track is published."""
+    tracker = Tracker(detector=detector)
+    for number in range(120):
+        places_m = [(distance_m, 0, 0.85)] + [(x_m, 2, 0.85) for x_m in others_m]
+        boxes = [Detection(np.array(place_m), SIZE_M, 0.0016 * np.eye(3)) for place_m in places_m]
+        tracks = tracker.update(NS + number * NS // 30, boxes if number < 60 else boxes[1:], VIEW)
+        if number > 60 and not [track for track in tracks if abs(track.position_m[1]) < 1]:
+            return (number - 60) / 30.0
+    return np.inf
+
+
+def test_a_person_within_the_learned_range_is_missed():
+    assert leave(DetectorModel(), 12.0, (18.0,)) < 0.5
+    assert leave(DetectorModel(max_range_m=8.0), 12.0, (18.0,)) > 1
+    assert leave(DetectorModel(max_range_m=13.0), 12.0) < 0.5
+
+
+def test_detectors_that_miss_people_often_end_tracks_later():
+    assert leave(DetectorModel(detection_probability=0.5), 4.0) > 2 * leave(DetectorModel(), 4.0)
