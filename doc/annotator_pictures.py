@@ -1,4 +1,4 @@
-"""Make the pictures of the annotator in doc/images: a session of simulated people, annotated in its own window.
+"""Make the pictures of viewer and annotator in doc/images: a session of simulated people, in its own window.
 
 PYTHONPATH=src:annotator xvfb-run -a python3 doc/annotator_pictures.py doc/images (or ./run pictures)
 """
@@ -11,8 +11,12 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
+from ros_3d_bb.nodes.viewer_node import KEYS
+from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshot
 from ros_3d_bb.sessions.session_writer import box_entry
+from ros_3d_bb.visualization.viewer_layout import compose, draw_countdown
 from ros_3d_bb_annotator.main_window import AnnotatorWindow, make_application
 from ros_3d_bb_annotator.qt import QtGui
 from ros_3d_bb_lab.simulation.scenario import Person, Robot, Room, Scenario
@@ -24,6 +28,7 @@ PASSER_BY_M = (-0.9, 4.4)
 IMPLAUSIBLE_M = {7: 1.0}  # slips in truth by the number of the measurement
 COLORS = 128
 SIZE_PX = 1400, 860
+VIEWER_PANEL_PX, STAMP_NS = 320, 1616161686 * NS
 
 
 def write_session(folder):
@@ -37,13 +42,21 @@ def write_session(folder):
         json.dump({'camera': camera, 'grid': grid, 'frames': frames}, stream)
 
 
-def _write_frame(folder, number, place):
+def _simulated(number, place):
     people = tuple(Person(_map_from(x_m, z_m), heading) for (x_m, z_m), heading in ((place, 3.0), (PASSER_BY_M, 1.2)))
-    frame = Simulator(Scenario(duration=1.0, rate=1.0, seed=number, room=ROOM, robot=ROBOT, people=people)).frame(0)
+    return Simulator(Scenario(duration=1.0, rate=1.0, seed=number, room=ROOM, robot=ROBOT, people=people)).frame(0)
+
+
+def _boxes_of(frame):
+    return [tuple(int(edge) for edge in person.box_px) for person in frame.people if person.box_px is not None]
+
+
+def _write_frame(folder, number, place):
+    frame = _simulated(number, place)
     name = '%03d.png' % number
     cv2.imwrite(os.path.join(folder, 'color', name), frame.color[..., ::-1])
     cv2.imwrite(os.path.join(folder, 'depth', name), frame.depth_mm)
-    boxes_px = [tuple(int(edge) for edge in person.box_px) for person in frame.people if person.box_px is not None]
+    boxes_px = _boxes_of(frame)
     estimates = estimate_boxes(DepthImage(frame.depth_mm, 0.001), boxes_px, D435I_COLOR, estimator_named('foreground'))
     detections = [dict({} if box is None else box_entry(box), box=box_px) for box_px, box in zip(boxes_px, estimates)]
     return {'id': '%03d' % number, 'color': 'color/' + name, 'depth': 'depth/' + name, 'label': _mark(number),
@@ -92,9 +105,26 @@ def take_pictures(session, folder):
     window.close()
 
 
+def take_viewer_picture(path):
+    """Write what viewer_node shows of a measurement, three seconds before a burst."""
+    frame = _simulated(10, PLACES_M[10])
+    depth, boxes_px = DepthImage(frame.depth_mm, 0.001), _boxes_of(frame)
+    boxes = [box for box in estimate_boxes(depth, boxes_px, D435I_COLOR, estimator_named('foreground')) if box]
+    snapshot = Snapshot(STAMP_NS, ColorImage(frame.color, 'camera_color_optical_frame'), depth, None, boxes_px, boxes)
+    lines = ('30.0 images/s    stamp %d.%09d    3D boxes: %d' % (divmod(STAMP_NS, NS) + (len(boxes),)),
+             'session: campaign    label: %s' % _mark(10), KEYS)
+    picture = draw_countdown(compose(snapshot, VIEWER_PANEL_PX, 6.0, lines), '3')
+    height, width = picture.shape[:2]
+    _save_image(QtGui.QImage(picture.tobytes(), width, height, 3 * width, QtGui.QImage.Format_RGB888), path)
+
+
 def _save(widget, path):
-    """Save a picture of a widget with a palette of its own: a third of the size."""
-    image = widget.grab().toImage().convertToFormat(QtGui.QImage.Format_RGB32)
+    _save_image(widget.grab().toImage(), path)
+
+
+def _save_image(image, path):
+    """Save a picture with a palette of its own: a third of the size."""
+    image = image.convertToFormat(QtGui.QImage.Format_RGB32)
     pixels = np.frombuffer(image.constBits().asarray(image.byteCount()), np.uint8)
     pixels = pixels.reshape(-1, 4)[:, :3].astype(np.float32)
     chosen = np.random.RandomState(0).permutation(len(pixels))[:30000]
@@ -111,3 +141,4 @@ if __name__ == '__main__':
     with tempfile.TemporaryDirectory() as place:
         write_session(os.path.join(place, 'session'))
         take_pictures(os.path.join(place, 'session'), sys.argv[1])
+    take_viewer_picture(os.path.join(sys.argv[1], 'campaign_viewer.png'))

@@ -81,8 +81,9 @@ def survey(folder, pages, width_px, timeout_s=120):
     missing = []
     with _server(folder, SURVEY % (json.dumps(pages), width_px), missing) as address:
         result = subprocess.run(
-            [shutil.which('chromium') or 'chromium', '--headless', '--no-sandbox', '--disable-gpu', '--dump-dom',
-             '--enable-logging=stderr', '--virtual-time-budget=%d' % (1000 * timeout_s), address + '/survey'],
+            [shutil.which('chromium') or 'chromium', '--headless', '--no-sandbox', '--disable-gpu',
+             '--disable-dev-shm-usage', '--dump-dom', '--enable-logging=stderr',
+             '--virtual-time-budget=%d' % (1000 * timeout_s), address + '/survey'],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=timeout_s, universal_newlines=True)
     console = re.findall(r'CONSOLE.*', result.stderr)
     text = re.search(r'<body>(\{.*\})</body>', result.stdout, re.DOTALL)

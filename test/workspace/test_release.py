@@ -36,11 +36,11 @@ def released(text):
 
 
 def test_the_changelog_can_be_read_and_has_the_version():
-    """Forthcoming lines become a version, as in catkin_prepare_release; 0.1.0 is not released."""
+    """Forthcoming lines become a version, as in catkin_prepare_release; the newest one is that of package.xml."""
     with open(os.path.join(ROOT, 'CHANGELOG.rst')) as stream:
         text = stream.read()
     version = package_for('noetic').version
-    assert version == max(released(text) or ['0.1.0'], key=lambda name: [int(part) for part in name.split('.')])
+    assert version == max(released(text), key=lambda name: [int(part) for part in name.split('.')])
     label = get_forthcoming_label(text)
     if label:
         version, text = '99.0.0', rename_section(text, label, '99.0.0 (2030-01-01)')
