@@ -11,6 +11,7 @@ import yaml
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray, MultiArrayDimension
 
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, STATIC_TOPIC, TF_TOPIC
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.detection.onnx.model_settings import ModelSettings, settings_from
@@ -29,6 +30,7 @@ OTHER_COMPUTER = claimed('#!/bin/bash\nsource /opt/ros')
 ARGUMENTS = claimed('roslaunch --ros-args')
 INSTALL_ON_DEBIAN, OWN_TESTS = claimed('sudo apt install build-essential'), claimed('catkin_make -Dros_3d_bb')
 SAMPLE_BAG = claimed('cd && rosrun ros_3d_bb scenario_to_bag')
+RECORD = claimed('rosbag record -O my.bag ')
 PROCESS_BAG = claimed('rosrun ros_3d_bb process_bag some.bag')
 PROCESS_BAGS = claimed('rosrun ros_3d_bb process_bag day1')
 SESSION_TO_BAG = claimed('rosrun ros_3d_bb session_to_bag')
@@ -137,6 +139,10 @@ def test_the_other_computers_script_runs_its_arguments(reader, tmp_path):
 def test_the_arguments_are_listed(reader):
     listed = set(re.findall(r'^\s+(\w+)(?: \(default .*\))?: ', reader.types(ARGUMENTS), re.MULTILINE))
     assert {'detector', 'weights', 'error_model', 'frame_world', 'planner'} <= listed
+
+
+def test_the_recorded_topics_are_the_inputs():
+    assert RECORD.text.split()[4:] == [COLOR_TOPIC, INFO_TOPICS[0], DEPTH_TOPIC, TF_TOPIC, STATIC_TOPIC]
 
 
 def test_one_or_many_bags_are_processed(reader, camera_bag):
