@@ -116,7 +116,7 @@ def test_a_node_without_a_parameter_file_is_reconfigured(clients):
 def test_the_command_of_dynamic_reconfigure_works(tracker, wait_for_line):
     def dynparam(*arguments):
         command = ('rosrun', 'dynamic_reconfigure', 'dynparam') + arguments
-        return subprocess.check_output(command, stderr=subprocess.STDOUT, universal_newlines=True, timeout=TIMEOUT_S)
+        return subprocess.check_output(command, universal_newlines=True, timeout=TIMEOUT_S)
     assert dynparam('list').split() == ['/' + node for node in sorted(NODES + ['plain_tracker'])]
     dynparam('set', '/tracker_node', 'prediction_time', '3.0')
     wait_for_line('~prediction_time changed from 2.0 to 3.0')
