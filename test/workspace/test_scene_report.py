@@ -55,10 +55,14 @@ def test_tracks_are_compared_with_the_truth_of_their_stamp(bag):
 
 def test_the_command_prints_the_table_and_writes_the_image_next_to_the_bag(bag):
     output = subprocess.check_output(['rosrun', 'ros_3d_bb', 'scene_report', bag], universal_newlines=True)
-    _titles, person, _images, answered, picture = output.splitlines()
+    _titles, person, summary, picture, report = output.splitlines()
     assert person.split()[0] == '1' and '0.200 m' in person and ' 7 ' in person and ' 90 %' in person
-    assert answered == '9 of 10 images answered'
+    assert summary.endswith('; 9 of 10 images answered')
     assert picture == 'picture: %s' % bag.replace('.bag', '.png') and os.path.exists(bag.replace('.bag', '.png'))
+    assert report == 'report: %s' % bag.replace('.bag', '.html')
+    with open(bag.replace('.bag', '.html'), encoding='utf-8') as stream:
+        page = stream.read()
+    assert '<td>0.200 m</td>' in page and 'src="data:image/png;base64,' in page and 'http' not in page
 
 
 def test_without_ground_truth_the_tracks_are_listed(tmp_path):
@@ -66,7 +70,8 @@ def test_without_ground_truth_the_tracks_are_listed(tmp_path):
     write_bag(((stamp_ns, [pair for pair in messages if pair[0] != 'ground_truth'])
                for stamp_ns, messages in images_with_tracks('map')), path)
     assert write_report(path, str(tmp_path / 'tracked.png')) == [
-        'track  images  first seen  last seen', '    7       9       0.0 s      0.8 s', '9 of 9 images answered']
+        'track  images  first seen  last seen', '    7       9       0.0 s      0.8 s',
+        'number of tracks: 1; 9 of 9 images answered']
     assert (tmp_path / 'tracked.png').exists()
 
 

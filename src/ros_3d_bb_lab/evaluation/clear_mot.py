@@ -111,11 +111,9 @@ def _visible_s(visible_ns, all_ns):
 
 
 def table(scene_score):
-    """Format the scores as lines of text."""
-    lines = ['person  visible   tracked  ID switches  track IDs     RMSE     worst']
-    for person in scene_score.people:
-        lines.append('%6d  %5.1f s  %6.0f %%  %11d  %-9s  %6.3f m  %6.3f m'
-                     % (person.person, person.visible_s, 100 * person.followed, person.switches,
-                        ' '.join(map(str, person.ids)) or '-', person.rmse_m, person.worst_m))
-    lines.append('%d images, %.3f false tracks per image' % (scene_score.images, scene_score.false_share))
-    return lines
+    """Format the scores as a table of text: a header and rows, and a sentence on all images."""
+    rows = [('%d' % person.person, '%.1f s' % person.visible_s, '%.0f %%' % (100 * person.followed),
+             '%d' % person.switches, ' '.join(map(str, person.ids)) or '-', '%.3f m' % person.rmse_m,
+             '%.3f m' % person.worst_m) for person in scene_score.people]
+    return (('person', 'visible', 'tracked', 'ID switches', 'track IDs', 'RMSE', 'worst'), rows,
+            '%d images, %.3f false tracks per image' % (scene_score.images, scene_score.false_share))

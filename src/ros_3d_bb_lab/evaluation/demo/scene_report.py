@@ -1,6 +1,9 @@
-"""Report on the tracks in a bag: a picture, and a table; of a simulated scene, the table compares them with truth."""
+"""Report on the tracks in a bag: a picture and a table, also as an HTML file that contains both. Of a simulated scene,
+the table compares the tracks with truth.
+"""
 import argparse
 import os
+import pathlib
 import sys
 from typing import NamedTuple
 
@@ -16,6 +19,8 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_caption
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score, table
+from ros_3d_bb_lab.evaluation.html_report import html_report
+from ros_3d_bb_lab.evaluation.report_blocks import Figure, Paragraph, Table
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
 
 matplotlib.use('Agg')
@@ -66,16 +71,22 @@ def read_recording(bag):
 
 
 def table_of_tracks(moments):
-    """Format the times for which the tracks of a list of Moment are visible, as lines of text."""
+    """Format the times for which the tracks of a list of Moment are visible, as `clear_mot.table`."""
     stamps = {}
     for moment in moments:
         for track in moment.tracks:
             if track.status == VISIBLE:
                 stamps.setdefault(track.id, []).append(moment.stamp_ns)
     first_ns = moments[0].stamp_ns
-    return ['track  images  first seen  last seen'] + [
-        '%5d  %6d  %8.1f s  %7.1f s' % (number, len(seen), (seen[0] - first_ns) / NS, (seen[-1] - first_ns) / NS)
-        for number, seen in sorted(stamps.items())]
+    rows = [('%d' % number, '%d' % len(seen), '%.1f s' % ((seen[0] - first_ns) / NS),
+             '%.1f s' % ((seen[-1] - first_ns) / NS)) for number, seen in sorted(stamps.items())]
+    return ('track', 'images', 'first seen', 'last seen'), rows, 'number of tracks: %d' % len(rows)
+
+
+def lines_of(header, rows):
+    """Format a table of text as lines with columns that are aligned to the right."""
+    widths = [max(map(len, column)) for column in zip(header, *rows)]
+    return ['  '.join(text.rjust(width) for text, width in zip(row, widths)) for row in [header] + rows]
 
 
 def topics_of_cameras(bag, topic):
@@ -152,13 +163,22 @@ def _draw_paths(axes, people, tracks, robot):
 
 
 def write_report(bag_path, picture_path, color_topic=''):
-    """Write the picture and return the table, a list of lines. Raises ValueError or OSError."""
+    """Write the picture, and the report beside it as HTML. Returns the table, a list of lines. Raises ValueError or
+    OSError.
+    """
     with rosbag.Bag(bag_path) as bag:
         recording = read_recording(bag)
-        lines = table(score(recording.moments)) if recording.has_truth else table_of_tracks(recording.moments)
-        lines.append('%d of %d images answered' % (recording.answered, len(recording.moments)))
+        header, rows, summary = (table(score(recording.moments)) if recording.has_truth
+                                 else table_of_tracks(recording.moments))
+        summary = '%s; %d of %d images answered' % (summary, recording.answered, len(recording.moments))
+        lines = lines_of(header, rows) + [summary]
         people, tracks = paths_of(recording)
         draw_scene(picture_path, panels_of(bag, recording, color_topic), people, tracks, recording.robot, lines)
+    picture = pathlib.Path(picture_path)
+    blocks = (Figure(picture.name, 'Images with 2D boxes, and paths in the map'), Paragraph(summary + '.'),
+              Table('People and their tracks' if recording.has_truth else 'Tracks', header, tuple(rows)))
+    title = 'Tracks in %s' % os.path.basename(bag_path)
+    picture.with_suffix('.html').write_text(html_report(title, blocks, picture.parent), encoding='utf-8')
     return lines
 
 
@@ -175,4 +195,4 @@ def main():
         lines = write_report(arguments.bag, picture, arguments.color_topic)
     except (ValueError, OSError, rosbag.ROSBagException) as error:
         sys.exit('scene_report: %s: %s; no report was written' % (arguments.bag, error))
-    print('\n'.join(lines + ['picture: %s' % picture]))
+    print('\n'.join(lines + ['picture: %s' % picture, 'report: %s.html' % os.path.splitext(picture)[0]]))

@@ -3,7 +3,7 @@ import textwrap
 
 import matplotlib
 
-from ros_3d_bb_lab.evaluation.noise.blocks import Figure, Heading, Paragraph
+from ros_3d_bb_lab.evaluation.report_blocks import Figure, Heading, Paragraph
 
 matplotlib.use('Agg')  # works without a display
 import matplotlib.pyplot as plt  # noqa: E402

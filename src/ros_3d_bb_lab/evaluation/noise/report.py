@@ -3,14 +3,14 @@ import json
 
 from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.sessions.plausibility import position_text
+from ros_3d_bb_lab.evaluation.html_report import html_report
 from ros_3d_bb_lab.evaluation.noise import theory
 from ros_3d_bb_lab.evaluation.noise.analysis import RMS_FIT_FROM_M, summary_of
-from ros_3d_bb_lab.evaluation.noise.blocks import Figure, Heading, Paragraph, Table, numbered
 from ros_3d_bb_lab.evaluation.noise.figures import polynomial_text, write_figures
-from ros_3d_bb_lab.evaluation.noise.html_report import html_report
 from ros_3d_bb_lab.evaluation.noise.pdf_report import pdf_report
 from ros_3d_bb_lab.evaluation.noise.statistics import DISTRIBUTIONS, LEAST_TO_TEST
 from ros_3d_bb_lab.evaluation.noise.tables import LEAST_IN_CLUSTER, small_clusters
+from ros_3d_bb_lab.evaluation.report_blocks import Figure, Heading, Paragraph, Table, numbered
 
 TITLE = 'Position errors of a depth camera'
 SIMILAR = 0.05  # log-likelihood per measurement; smaller differences are not significant

@@ -1,8 +1,9 @@
 """Report as one HTML file that contains its figures."""
 import base64
 import html
+import mimetypes
 
-from ros_3d_bb_lab.evaluation.noise.blocks import Figure, Heading, Paragraph
+from ros_3d_bb_lab.evaluation.report_blocks import Figure, Heading, Paragraph
 
 PAGE = '''<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>
@@ -33,8 +34,8 @@ def _rendered(block, folder):
     caption = html.escape(block.caption)
     if isinstance(block, Figure):
         data = base64.b64encode((folder / block.name).read_bytes()).decode()
-        return '<figure><img src="data:image/png;base64,%s" alt="%s"><figcaption>%s</figcaption></figure>' % (
-            data, caption, caption)
+        return '<figure><img src="data:%s;base64,%s" alt="%s"><figcaption>%s</figcaption></figure>' % (
+            mimetypes.guess_type(block.name)[0], data, caption, caption)
     rows = [_row('th', block.header)] + [_row('td', row) for row in block.rows]
     kind = ' class="pairs"' if len(block.header) == 2 else ''  # names and values, which may be text
     return '<p class="caption">%s</p>\n<table%s>\n%s\n</table>' % (caption, kind, '\n'.join(rows))
