@@ -211,10 +211,8 @@ class _SampledImage(object):
         self._measured = np.count_nonzero(known, axis=1)
         self._usable = self._measured >= np.maximum(LEAST_MEASURED * count.prod(axis=1), 1)
         self._usable &= np.isfinite(flat_px).all(axis=1)
-        left, right = rects_px[:, 0, None], rects_px[:, 2, None]
-        in_middle = np.exp(-0.5 * ((columns - (left + right) / 2.0) / ((right - left) / 4.0)) ** 2)
+        self._weights = _middle_weights(columns, rects_px)
         self._occluding_mm = [0] * len(rects_px)  # depth up to which plausible boxes mask the samples of others
-        self._weights = np.repeat(in_middle[:, None], GRID_ROWS, axis=1).reshape(ahead_m.shape)
 
     def estimates(self, group, occluders):
         """Pairs (number, Box3D) of the rectangles in `group` (k,) that have a box, after those of their `occluders`
@@ -234,18 +232,21 @@ class _SampledImage(object):
         tenth = (end - first) // 10
         layers_m = ordered.means(first + tenth, end - tenth) / 1000
         nearest_mm, farthest_mm = (ordered.at(rank).astype(np.uint16)[:, None] for rank in (first, end - 1))
-        on_body = (ahead_mm >= nearest_mm) & (ahead_mm <= farthest_mm)
         top_m, bottom_m = layers_m * self._slopes_down[:, group]
+        left_m, right_m = self._edges(group, (ahead_mm >= nearest_mm) & (ahead_mm <= farthest_mm), bottom_m)
+        values = zip(group.tolist(), supports.tolist(), layers_m.tolist(), left_m.tolist(), right_m.tolist(),
+                     top_m.tolist(), bottom_m.tolist())
+        return [(number, self._box(number, support, *extents_m)) for number, support, *extents_m in values
+                if support >= LEAST_SUPPORT]
+
+    def _edges(self, group, on_body, bottom_m):
+        """Left and right edges (2, k) of the bodies whose samples are given (k, samples), metres."""
         if self._down_m is not None:
             # The floor beside the feet is as far away as the body.
             above_feet = on_body & (self._down_m[group] < bottom_m[:, None] - FEET_M)
             on_body = np.where(above_feet.any(axis=1)[:, None], above_feet, on_body)
         across_mm = np.where(on_body, self._across_mm[group], np.uint16(UNKNOWN_MM))
-        left_m, right_m = np.array(edges(SortedDistances(across_mm))) / 1000 - MIDDLE_M
-        values = zip(group.tolist(), supports.tolist(), layers_m.tolist(), left_m.tolist(), right_m.tolist(),
-                     top_m.tolist(), bottom_m.tolist())
-        return [(number, self._box(number, support, *extents_m)) for number, support, *extents_m in values
-                if support >= LEAST_SUPPORT]
+        return np.array(edges(SortedDistances(across_mm))) / 1000 - MIDDLE_M
 
     def _mask(self, grid_mm, number, occluder):
         """Mask the samples of a rectangle (rows, columns) that are in the rectangle of an occluder and not behind it.
@@ -300,6 +301,13 @@ def _grid_depths(depth, slices, count):
     values *= np.float32(depth.scale_m)
     values[~((values > 0) & (values <= FARTHEST_DEPTH_M))] = 0
     return values
+
+
+def _middle_weights(columns, rects_px):
+    """Weights (n, samples) of the samples in columns (n, GRID_COLUMNS): a Gaussian about the middle of a rectangle."""
+    left, right = rects_px[:, 0, None], rects_px[:, 2, None]
+    weights = np.exp(-0.5 * ((columns - (left + right) / 2.0) / ((right - left) / 4.0)) ** 2)
+    return np.repeat(weights[:, None], GRID_ROWS, axis=1).reshape(len(columns), -1)
 
 
 def _rank(pixels, limit):
