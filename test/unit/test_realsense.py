@@ -102,8 +102,9 @@ def test_the_depth_unit_is_read(tmp_path):
 def test_stamps_without_metadata_start_at_arrival_and_follow_the_cameras_clock(tmp_path):
     path = write_recording(str(tmp_path / ('old' + SUFFIX)), [colored(0)] * 3, [sloping_depth()] * 3,
                            clock=rs.timestamp_domain.hardware_clock, start_ms=5000.0)
-    stamps = [frame.stamp_ns for frame in play(path, 3)[1]]
-    assert stamps[0] > 1600000000 * NS
+    # On a busy machine, librealsense may pair two depth images with one colour image, whose stamp is then repeated.
+    stamps = np.unique([frame.stamp_ns for frame in play(path, 3)[1]])
+    assert stamps[0] > 1600000000 * NS and len(stamps) > 1
     np.testing.assert_allclose(np.diff(stamps), STEP_MS * 1e6, atol=10)
 
 
