@@ -102,11 +102,13 @@ def test_boxes_do_not_wait_for_a_camera_info_with_the_other_stamp(of_depth):
 
 def test_the_gap_to_the_nearest_depth_image():
     recorder = Recorder(tolerance_ns=0)
-    assert recorder.sync.gap_ns(NS) is None
+    assert recorder.sync.gap_text(NS) == ''
     recorder.add('depth', NS, 0, 'depth')
     recorder.add('boxes', NS + 112 * MS, 0, 'boxes')
     recorder.sync.end()
-    assert recorder.frames == [('boxes', None, None)] and recorder.sync.gap_ns(NS + 112 * MS) == 112 * MS
+    assert recorder.frames == [('boxes', None, None)]
+    text = recorder.sync.gap_text(NS + 112 * MS)
+    assert '0.112 s apart' in text and text.endswith('~stamp_tolerance: 0.12')
 
 
 @pytest.fixture

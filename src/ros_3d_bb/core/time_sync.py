@@ -1,5 +1,6 @@
 """Time synchronization of messages by stamp. Stamps are integer nanoseconds."""
 import collections
+import math
 import time
 from typing import Any, NamedTuple
 
@@ -132,10 +133,14 @@ class StampSynchronizer(object):
         """Stamp of the newest depth image, None before the first."""
         return self._depths.newest_ns
 
-    def gap_ns(self, stamp_ns):
-        """Difference between a stamp and that of the nearest depth image, None if there is no depth image."""
+    def gap_text(self, stamp_ns):
+        """Sentence about the stamp of the nearest depth image, and how to pair it; '' if there is no depth image."""
         depth = self._depths.nearest(stamp_ns, float('inf'))
-        return None if depth is None else abs(depth.stamp_ns - stamp_ns)
+        if depth is None:
+            return ''
+        gap_s = abs(depth.stamp_ns - stamp_ns) / NS
+        return ('colour and depth are %.3f s apart at best; to pair them, set ~stamp_tolerance: %.2f'
+                % (gap_s, math.ceil(100 * gap_s) / 100))
 
     @property
     def has_camera(self):

@@ -185,8 +185,10 @@ class RgbdDetectionStage(object):
         if of_time_before:
             self._events.count('colour images of a time before')
             return
-        self._events.warn('colour images without depth', 'no depth image and camera_info with the stamp %.3f of the '
-                          'colour image arrived; waiting for the next' % (stamp_of(color_msg) / NS))
+        stamp_ns = stamp_of(color_msg)
+        reasons = ['no depth image and camera_info with the stamp %.3f of the colour image arrived' % (stamp_ns / NS),
+                   self._sync.gap_text(stamp_ns), 'waiting for the next']
+        self._events.warn('colour images without depth', '; '.join(filter(None, reasons)))
 
     def detect(self, color_msg, depth_msg, camera):
         """Return the RGB image, (height, width, 3), and the Detections in it; None while the floor is unknown.

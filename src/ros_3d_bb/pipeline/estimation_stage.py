@@ -233,10 +233,8 @@ class EstimationStage(object):
             return ('no depth image with their stamp %.3f received on %s; the newest has %.3f, and %.1f s are kept '
                     '(~cache_length): the detector is %.1f s slower than that'
                     % (stamp_ns / NS, self._depth_topic, newest_ns / NS, kept_s, too_old_s))
-        gap_s = self._sync.gap_ns(stamp_ns) / NS
-        return ('no depth image with their stamp %.3f received on %s: colour and depth are %.3f s apart at best; to '
-                'pair them, set ~stamp_tolerance: %.2f'
-                % (stamp_ns / NS, self._depth_topic, gap_s, np.ceil(100 * gap_s) / 100))
+        return ('no depth image with their stamp %.3f received on %s: %s'
+                % (stamp_ns / NS, self._depth_topic, self._sync.gap_text(stamp_ns)))
 
 
 @functools.lru_cache(maxsize=16)  # a camera that is fixed to the robot has the same tilt in each image
