@@ -13,8 +13,8 @@ class RedDetector(torch.nn.Module):
         columns = torch.nonzero(red.any(dim=0)).flatten()
         lines = torch.nonzero(red.any(dim=1)).flatten()
         if columns.numel() > 0:
-            x1, x2 = columns[0].item(), columns[-1].item() + 1.0
-            y1, y2 = lines[0].item(), lines[-1].item() + 1.0
+            x1, x2 = float(columns[0]), float(columns[-1]) + 1.0
+            y1, y2 = float(lines[0]), float(lines[-1]) + 1.0
             row[0, 0, :6] = torch.tensor([(x1 + x2) / 2, (y1 + y2) / 2, x2 - x1, y2 - y1, 0.95, 0.98])
         return (row,)
 
