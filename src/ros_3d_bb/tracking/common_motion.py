@@ -6,8 +6,6 @@ The best one is refined by least squares, weighted with the covariances of the i
 """
 import numpy as np
 
-from ros_3d_bb.core.time_sync import NS
-
 # Squared Mahalanobis distances of innovations below which 90 % and 99 % lie (chi-square, 2 degrees of freedom).
 USUAL, GATE = 4.6, 9.2
 SIGNIFICANT = 25.0  # squared Mahalanobis distance of a motion: 1 of 60000 is larger by chance (3 degrees of freedom)
@@ -15,55 +13,43 @@ FEWEST = 3  # people: two may turn or stop together
 MOST = 12  # people who vote, to limit the computing time
 LEAST_M, LARGEST_M = 0.1, 1.0  # of the jump of a person: less is left to the filter, more may be another person
 PRIOR_STD = np.array([0.5, 0.5, 0.1])  # of a jump; keeps the fit of people in one direction well-conditioned
-RECENT_NS = NS  # a camera whose latest image is older is ignored
 FITS = 3  # the pairs are selected and the motion is fitted this many times
 
 
-def may_jump(cameras, camera, stamp_ns):
-    """Whether a common motion in an image can be that of the frame, by the CameraVisibility of the previous images.
+def may_jump(latest, others):
+    """Whether people who do not fit an image can show a motion of the frame, by the CameraVisibility of the previous
+    image of the camera, None if it is the first one, and those of the other cameras.
 
     If the poses of several cameras disagree, people seem to jump from the image of one to that of the other. The people
     must therefore have fitted the images of the camera before, and those of the others.
     """
-    others = [other for name, other in cameras.items() if name != camera and stamp_ns - other.stamp_ns <= RECENT_NS]
-    if not others:
-        return True
-    return camera in cameras and bool(cameras[camera].fits) and all(other.fits is not False for other in others)
+    return not others or bool(latest and latest.fits) and all(other.fits is not False for other in others)
 
 
-def common_motion(tracks, was_seen, measurements, rows, columns, view, classes):
-    """Motion of the frame since the previous image, and its covariance (3, 3), and whether most people fit without it.
-
-    The motion is None unless less than half of the people fit their measurements, and one motion explains two thirds
-    of them. Both are None for less than `FEWEST` people. The people are the confirmed tracks of those that the camera
-    detected in its previous image, the mask `was_seen` (n,).
+def most_fit(tracks, known, measurements, rows, columns):
+    """Whether at least half of the known people (n,) fit their measurements without a motion; None for less than
+    `FEWEST` people.
 
     `tracks` are predicted to the image. `rows` and `columns` are the pairs of tracks and measurements that were
     associated without a motion.
     """
-    was_visible = tracks['confirmed'] & was_seen
-    visible = np.flatnonzero(was_visible)
-    if len(visible) < FEWEST or len(measurements) < FEWEST:
-        return None, None
+    people = np.count_nonzero(known)
+    if people < FEWEST or len(measurements) < FEWEST:
+        return None
     is_far = (np.abs(tracks['mean'][rows, :2] - measurements['position_m'][columns]) > LEAST_M).any(axis=1)
-    is_fit = was_visible[rows] & ~is_far
-    if 2 * np.count_nonzero(is_fit) >= len(visible):
-        return None, True
-    far = np.flatnonzero(was_visible[rows] & is_far)
+    near = np.count_nonzero(known[rows] & ~is_far)
+    if 2 * near >= people:
+        return True
+    far = np.flatnonzero(known[rows] & is_far)
     distances2 = _distances2(*_innovations(tracks[rows[far]], measurements[columns[far]]))
-    if 2 * (np.count_nonzero(is_fit) + np.count_nonzero(distances2 < USUAL)) >= len(visible):
-        return None, True
-    return _estimate(tracks[visible[:MOST]], measurements, view, classes), False
+    return 2 * (near + np.count_nonzero(distances2 < USUAL)) >= people
 
 
-def move(tracks, motion, covariance, view):
-    """Apply a motion of the frame and its covariance to tracks, in place."""
-    jacobians = _jacobians(tracks['mean'][:, :2], view)
-    tracks['mean'][:, :2] += jacobians.dot(motion)
-    tracks['covariance'][:, :2, :2] += jacobians @ covariance @ jacobians.transpose(0, 2, 1)
-
-
-def _estimate(tracks, measurements, view, classes):
+def common_motion(tracks, known, measurements, view, classes):
+    """Motion of the frame since the previous image, and its covariance (3, 3), if one motion explains two thirds of the
+    known people (n,); None otherwise. `tracks` are predicted to the image.
+    """
+    tracks = tracks[np.flatnonzero(known)[:MOST]]
     innovations, inverses = _innovations(tracks[:, None], measurements)
     allowed = np.linalg.norm(innovations, axis=2) < LARGEST_M
     allowed &= classes.group[tracks['class_number']][:, None] == classes.group[measurements['class_number']]
@@ -78,6 +64,13 @@ def _estimate(tracks, measurements, view, classes):
         motion, covariance = _least_squares(innovations[rows, columns], inverses[rows, columns], jacobians[rows])
         motions = motion[None]
     return (motion, covariance) if motion.dot(np.linalg.solve(covariance, motion)) > SIGNIFICANT else None
+
+
+def move(tracks, motion, covariance, view):
+    """Apply a motion of the frame and its covariance to tracks, in place."""
+    jacobians = _jacobians(tracks['mean'][:, :2], view)
+    tracks['mean'][:, :2] += jacobians.dot(motion)
+    tracks['covariance'][:, :2, :2] += jacobians @ covariance @ jacobians.transpose(0, 2, 1)
 
 
 def _motions_of_one(innovations, jacobians):

@@ -44,6 +44,11 @@ class CameraVisibility(NamedTuple):
     fits: Optional[bool]
 
 
+def recent_others(cameras, camera, stamp_ns):
+    """The CameraVisibility of each camera but `camera` that is not ignored in an image with this stamp."""
+    return [other for name, other in cameras.items() if name != camera and stamp_ns - other.stamp_ns <= RECENT_NS]
+
+
 def learned_range(range_m, distances_m, confirmed, rows):
     """Range after an image with the tracks in `rows` detected at `distances_m` (k,): `DEFAULT_RANGE_M`, or the filtered
     mean distance of the confirmed (n,) ones farther away. Beyond it, detectors miss people often."""
@@ -74,14 +79,13 @@ def mark_missed(tracks, before, rows, cameras, camera, observed_s, detection_pro
     visibility[held] = OCCLUDED
     image.visibility[rows] = visibility
     best = visibility
-    for name, other in cameras.items():
-        if name != camera and image.stamp_ns - other.stamp_ns <= RECENT_NS:
-            # The person may also stay behind what occludes the view of another camera.
-            hidden = (other.visibility[rows] == OCCLUDED) & (missed['status'] == OCCLUDED) & (visibility != VISIBLE)
-            hidden[hidden] = _visibility(missed[hidden], tracks, other) == VISIBLE
-            hidden[hidden] = _visibility(before[hidden], tracks, other) == OCCLUDED
-            held |= hidden
-            best = np.minimum(best, other.visibility[rows])
+    for other in recent_others(cameras, camera, image.stamp_ns):
+        # The person may also stay behind what occludes the view of another camera.
+        hidden = (other.visibility[rows] == OCCLUDED) & (missed['status'] == OCCLUDED) & (visibility != VISIBLE)
+        hidden[hidden] = _visibility(missed[hidden], tracks, other) == VISIBLE
+        hidden[hidden] = _visibility(before[hidden], tracks, other) == OCCLUDED
+        held |= hidden
+        best = np.minimum(best, other.visibility[rows])
     held &= best == OCCLUDED
     missed['mean'][held] = before['mean'][held]
     held &= position_std_of(missed) > BEHIND_M

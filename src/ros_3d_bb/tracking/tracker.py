@@ -18,9 +18,10 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter, noise_scale, track_score
 from ros_3d_bb.tracking.association import associate, unmatched
 from ros_3d_bb.tracking.class_numbers import ClassNumbers
-from ros_3d_bb.tracking.common_motion import common_motion, may_jump, move
+from ros_3d_bb.tracking.common_motion import common_motion, may_jump, most_fit, move
 from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
-from ros_3d_bb.tracking.occlusion import DEFAULT_RANGE_M, SEEN, CameraVisibility, learned_range, mark_missed
+from ros_3d_bb.tracking.occlusion import (DEFAULT_RANGE_M, SEEN, CameraVisibility, learned_range, mark_missed,
+                                          recent_others)
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
 from ros_3d_bb.tracking.track import (TRACK, PredictionParams, duplicates, new_targets, objects_of, position_std_of,
                                       update_matched)
@@ -175,10 +176,10 @@ class Tracker(object):
         measurements = measurements_of(detections, view, period_s, self._noise, classes, detector)
         noise_scale.widen(state.log_noise_scale, measurements)
         rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
-        was_seen = latest.visibility == SEEN if latest else np.zeros(len(tracks), bool)
-        motion, fits = common_motion(tracks, was_seen, measurements, rows, columns, view, classes)
-        if motion is not None and not may_jump(state.cameras, camera, stamp_ns):
-            motion = None
+        known = tracks['confirmed'] & (latest.visibility == SEEN if latest else False)
+        fits, motion = most_fit(tracks, known, measurements, rows, columns), None
+        if fits is False and may_jump(latest, recent_others(state.cameras, camera, stamp_ns)):
+            motion = common_motion(tracks, known, measurements, view, classes)
         if fits is None and latest:
             fits = latest.fits
         if motion is not None:
