@@ -17,13 +17,18 @@ def arrival_clock_ns():
     return int(time.monotonic() * NS)
 
 
+def median_period_ns(stamps_ns):
+    """Median period of a stream that has `stamps_ns`, in order; 0 for less than two stamps."""
+    periods_ns = sorted(later - earlier for earlier, later in zip(stamps_ns, stamps_ns[1:]))
+    return periods_ns[len(periods_ns) // 2] if periods_ns else 0
+
+
 def half_period_of(stamps_ns):
     """Tolerance for the stamps of a stream that is not synchronized with one that has `stamps_ns`, in order.
 
     It is half of the median period and a margin for its variation; at least `SAME_NS`, for stamps that should be equal.
     """
-    periods_ns = sorted(later - earlier for earlier, later in zip(stamps_ns, stamps_ns[1:]))
-    return max(SAME_NS, int(periods_ns[len(periods_ns) // 2] * (0.5 + JITTER))) if periods_ns else SAME_NS
+    return max(SAME_NS, int(median_period_ns(stamps_ns) * (0.5 + JITTER)))
 
 
 class Stamped(NamedTuple):

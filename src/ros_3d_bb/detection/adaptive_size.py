@@ -2,7 +2,7 @@
 import collections
 import statistics
 
-from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.core.time_sync import NS, median_period_ns
 
 SIZES = 320, 416, 512, 640  # longer sides, pixels; multiples of 32
 TARGET_PERIOD_S = 1 / 30.0  # faster cameras do not reduce the size further
@@ -41,7 +41,8 @@ class AdaptiveSize(object):
         self._durations_s.append(duration_s)
         if len(self._durations_s) < WINDOW or len(self._stamps_ns) < WINDOW:
             return False
-        share = statistics.median(self._durations_s) / self._period_s()
+        period_s = max(TARGET_PERIOD_S, median_period_ns(list(self._stamps_ns)) / NS)
+        share = statistics.median(self._durations_s) / period_s
         self._durations_s = []
         is_largest = self._index == len(SIZES) - 1
         has_time = not is_largest and share * (SIZES[self._index + 1] / self.size) ** 2 < FREE_SHARE
@@ -53,8 +54,3 @@ class AdaptiveSize(object):
         else:
             return False
         return True
-
-    def _period_s(self):
-        stamps_ns = list(self._stamps_ns)
-        periods_ns = [later - earlier for earlier, later in zip(stamps_ns, stamps_ns[1:])]
-        return max(TARGET_PERIOD_S, statistics.median(periods_ns) / NS)
