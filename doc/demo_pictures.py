@@ -35,7 +35,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 MARKERS = 'visualization_marker_array'
 FIRST_S, LAST_S = 1.0, 8.0
 EVERY = 2               # of the images, 15 a second
-EXPLAINED = 48          # number of the image that is explained: somebody is hidden
+EXPLAINED = 48          # number of the image that is explained: a person is hidden
 # Namespace, track ID and point of a marker, its explanation, and where that is in the picture.
 EXPLANATIONS = (
     ('cylinder', 1, None, 'cylinder: position,\nwidth and height', (120, 190)),

@@ -79,10 +79,10 @@ def test_single_images_do_not_show_how_long_errors_last():
 
 
 def test_recordings_without_people_are_rejected(run):
-    nobody = run._replace(images=tuple(image._replace(truth=image.truth._replace(
+    without_people = run._replace(images=tuple(image._replace(truth=image.truth._replace(
         status=np.full(12, OUT_OF_VIEW))) for image in run.images))
     with pytest.raises(ValueError, match='no person in the recordings counts'):
-        fit_recordings([nobody], 'made', 'none')
+        fit_recordings([without_people], 'made', 'none')
 
 
 def test_the_command_writes_the_model(tmp_path, monkeypatch, capsys, run):
