@@ -1,4 +1,6 @@
 """What realsense_node publishes of a recording, and of a camera that is disconnected."""
+import contextlib
+
 import numpy as np
 import pytest
 import rospy
@@ -18,8 +20,8 @@ from support.realsense_recordings import (COLOR_CAMERA, START_MS, STEP_MS, SUFFI
 from support.ros import Recorder, diagnostics_of, started, wait_until
 
 FRAMES = 6
-TOPICS = dict({'/tf_static': TFMessage, '/clock': Clock, COLOR: Image, DEPTH: Image},
-              **{topic: CameraInfo for topic in INFO_TOPICS})
+IMAGE_TOPICS = dict({COLOR: Image, DEPTH: Image}, **{topic: CameraInfo for topic in INFO_TOPICS})
+TOPICS = dict({'/tf_static': TFMessage, '/clock': Clock}, **IMAGE_TOPICS)
 
 
 @pytest.fixture(scope='module')
@@ -31,20 +33,23 @@ def recording(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def played(recording):
-    """{topic: messages} of a recording that was played once."""
-    recorders = {topic: Recorder(topic, kind, publisher_expected=False) for topic, kind in TOPICS.items()}
-    process = started('realsense_node', 'file:=' + recording, 'publish_clock:=true', 'real_time:=false',
-                      'wait_for_subscribers:=1')
-    assert process.wait(timeout=60) == 0
-    wait_until(lambda: len(recorders[COLOR].messages) == FRAMES, 'all images')
-    for recorder in recorders.values():
-        recorder.__exit__()
+    """{topic: messages} of a recording that was played once; again if librealsense lost images on a busy machine."""
+    for _attempt in range(3):
+        with contextlib.ExitStack() as stack:
+            recorders = {topic: stack.enter_context(Recorder(topic, kind, publisher_expected=False))
+                         for topic, kind in TOPICS.items()}
+            process = started('realsense_node', 'file:=' + recording, 'publish_clock:=true', 'real_time:=false',
+                              'wait_for_subscribers:=1')
+            output, _none = process.communicate(timeout=60)
+            assert process.returncode == 0, output
+            if all(len(recorders[topic].messages) == FRAMES for topic in IMAGE_TOPICS):
+                break
     return {topic: recorder.messages for topic, recorder in recorders.items()}
 
 
 def test_all_messages_of_a_frame_have_one_stamp(played):
     expected = [(START_MS + number * STEP_MS) / 1000 for number in range(FRAMES)]
-    for topic in set(TOPICS) - {'/tf_static', '/clock'}:
+    for topic in IMAGE_TOPICS:
         headers = [message.header for message in played[topic]]
         np.testing.assert_allclose([header.stamp.to_sec() for header in headers], expected, atol=1e-6)
         assert [header.stamp for header in headers] == [message.header.stamp for message in played[COLOR]]

@@ -16,6 +16,7 @@ from ros_3d_bb.core.time_sync import NS
 
 POLL_MS = 100
 LOST_S = 5.0  # a camera that sends no images for this time is considered lost
+ENDED_S = 0.5  # a recording whose playback has stopped is over after this time without images: some may still be paired
 BODY_FROM_OPTICAL = transform_from((0, 0, 0), OPTICAL_ROTATION)
 EXPOSURE_UNIT_S = 1e-4  # unit of the colour sensor's exposure
 # librealsense uses the same projection for the modified and the inverse Brown-Conrady model.
@@ -126,7 +127,8 @@ class RealSense(object):
             self._last_image_s = now_s
             return self._frame_from(frames)
         if self._playback is not None:
-            self.is_over = self._playback.current_status() == self._rs.playback_status.stopped
+            self.is_over = (self._playback.current_status() == self._rs.playback_status.stopped
+                            and now_s - self._last_image_s > ENDED_S)
         elif now_s - self._last_image_s > LOST_S:
             raise CameraLost('the RealSense has sent no images for %.0f s' % LOST_S)
         return None

@@ -23,6 +23,7 @@ from ros_3d_bb.nodes.common.startup import read_params, run_node, wait_for_subsc
 
 RETRY_S = 2.0
 CLOSING_S = 5.0  # upper limit
+SENDING_S = 1.0  # after the last image of a recording; rospy drops messages that it has not sent before the shutdown
 START_NS = NS  # published on /clock until the first image of a recording sets the time
 
 
@@ -107,6 +108,7 @@ class RealSenseNode(object):
                     links = ()  # /tf_static is latched
         if camera.is_over:
             rospy.loginfo('the recording is over')
+            time.sleep(SENDING_S)
             rospy.signal_shutdown('the recording is over')
 
     def _publish(self, camera, frame, links):
