@@ -45,7 +45,8 @@ class Costmap(object):
 
     def _people_layer(self):
         params = self._params['people_layer']
-        sources = {name: params[name] for name in params['observation_sources'].split()}
+        is_used = 'people_layer' in [plugin['name'] for plugin in self._params['plugins']]
+        sources = {name: params[name] for name in params['observation_sources'].split() if is_used}
         for name, source in sources.items():
             self._arrived[name] = rospy.get_time()
             rospy.Subscriber(source['topic'], PointCloud2, lambda cloud, name=name: self._on_cloud(name, cloud))
