@@ -8,6 +8,7 @@ from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
 
 WIDTH_M = 0.5
 RADIUS_M = WIDTH_M / 2 + COMFORT_M
+ROBOT_RADIUS_M = 0.35
 
 
 def walking(position_m, velocity_mps, stds_m=(0.0, 0.0), moving=True):
@@ -27,7 +28,7 @@ def cost_at(costs, x_m, y_m):
 
 
 def test_certain_predictions_have_the_highest_cost_along_the_way_and_none_beside_it():
-    costs = presence_costs([walking((1.0, -2.0), (0.0, 1.5))], np.eye(4))
+    costs = presence_costs([walking((1.0, -2.0), (0.0, 1.5))], np.eye(4), ROBOT_RADIUS_M)
     assert costs.dtype == np.int8 and costs.shape == (100, 100)
     for y_m in np.arange(-1.95, 1.0, 0.1):
         assert cost_at(costs, 1.0, y_m) == HIGHEST
@@ -37,7 +38,7 @@ def test_certain_predictions_have_the_highest_cost_along_the_way_and_none_beside
 
 def test_costs_follow_the_probability_of_presence():
     """Against the share of samples of the predicted position that cover the cell, where that varies slowly."""
-    costs = presence_costs([walking((2.0, 0.0), (1.0, 0.0), (0.8, 0.8))], np.eye(4))
+    costs = presence_costs([walking((2.0, 0.0), (1.0, 0.0), (0.8, 0.8))], np.eye(4), ROBOT_RADIUS_M)
     offsets = np.random.RandomState(3).normal(scale=0.8, size=(200000, 2))
     for x_m, y_m in ((3.05, 0.05), (3.05, 0.95), (3.05, -1.55)):
         nearest_m = min(4.0, max(2.0, x_m))
@@ -46,14 +47,26 @@ def test_costs_follow_the_probability_of_presence():
 
 
 def test_costs_decrease_as_the_prediction_becomes_uncertain():
-    costs = presence_costs([walking((-2.0, 0.0), (2.0, 0.0), (0.1, 1.5))], np.eye(4))
+    costs = presence_costs([walking((-2.0, 0.0), (2.0, 0.0), (0.1, 1.5))], np.eye(4), ROBOT_RADIUS_M)
     along = [int(cost_at(costs, x_m, 0.05)) for x_m in np.arange(-1.95, 2.0, 0.5)]
     assert along[0] == HIGHEST and along == sorted(along, reverse=True) and along[-1] < HIGHEST / 2
 
 
-def test_standing_people_have_no_cost():
-    assert not presence_costs([walking((1.0, 0.0), (0.0, 0.0), moving=False)], np.eye(4)).any()
-    assert not presence_costs([], np.eye(4)).any()
+def test_standing_people_cost_only_where_they_are():
+    costs = presence_costs([walking((1.5, 0.0), (1.0, 0.0), (0.0, 0.8), moving=False)], np.eye(4), ROBOT_RADIUS_M)
+    assert cost_at(costs, 1.5, 0.0) == HIGHEST
+    assert cost_at(costs, 1.5 + 2 * RADIUS_M, 0.0) == cost_at(costs, 1.5, 2 * RADIUS_M) == 0
+    assert not presence_costs([], np.eye(4), ROBOT_RADIUS_M).any()
+
+
+def test_a_robot_in_the_way_of_a_person_pays_only_for_going_further_into_it():
+    """A person comes towards the robot from ahead; the probability decreases to the sides."""
+    tracks = [walking((2.0, 0.3), (-1.0, 0.0), (0.1, 0.5))]
+    costs = presence_costs(tracks, np.eye(4), ROBOT_RADIUS_M)
+    assert cost_at(costs, 0.0, 0.0) == cost_at(costs, 0.0, -1.0) == cost_at(costs, 0.0, 1.0) == 0
+    assert cost_at(costs, 1.0, 0.3) == HIGHEST
+    two_m_beside = presence_costs(tracks, transform_from((0, 2, 0), (0, 0, 0, 1)), ROBOT_RADIUS_M)
+    assert cost_at(two_m_beside, 0.0, 2.0) > HIGHEST / 2 and cost_at(two_m_beside, 1.0, 2.3) == HIGHEST
 
 
 def test_positions_and_covariances_are_transformed_to_the_robot_frame():
@@ -62,7 +75,7 @@ def test_positions_and_covariances_are_transformed_to_the_robot_frame():
     uncertain = np.diag([1.0, 0.0, 0.0])
     track.covariance[:3, :3] = track.prediction_covariance_m2[:] = uncertain
     robot_from_tracks = np.linalg.inv(transform_from((3, 1, 0), (0, 0, np.sin(np.pi / 4), np.cos(np.pi / 4))))
-    costs = presence_costs([track], robot_from_tracks)
+    costs = presence_costs([track], robot_from_tracks, ROBOT_RADIUS_M)
     assert cost_at(costs, 2.0, 0.0) > 0
     assert cost_at(costs, 2.0, 1.5) > 0 and cost_at(costs, 2.0, -1.5) > 0
     assert cost_at(costs, 3.5, 0.0) == cost_at(costs, 0.5, 0.0) == 0
@@ -70,5 +83,5 @@ def test_positions_and_covariances_are_transformed_to_the_robot_frame():
 
 def test_people_beyond_the_grid_and_at_its_border_do_no_harm():
     for x_m in (-100.0, -5.2, 4.9, 5.2, 100.0):
-        costs = presence_costs([walking((x_m, x_m), (1.0, 0.5), (0.3, 0.8))], np.eye(4))
+        costs = presence_costs([walking((x_m, x_m), (1.0, 0.5), (0.3, 0.8))], np.eye(4), ROBOT_RADIUS_M)
         assert costs.shape == (100, 100) and (costs.any() == (abs(x_m) < 6))

@@ -23,7 +23,7 @@ def test_dwa_drives_in_a_map_with_people_in_the_local_costmap():
     assert parameters[MOVE_BASE + 'base_local_planner'] == 'dwa_local_planner/DWAPlannerROS'
     assert parameters[BRIDGE + 'outputs'] == 'costmap'
     assert layers_of(parameters, 'local_costmap') == [
-        'obstacle_layer', 'people_layer', 'prediction_layer', 'inflation_layer']
+        'obstacle_layer', 'people_layer', 'prediction_layer']
     assert layers_of(parameters, 'global_costmap') == [
         'static_layer', 'obstacle_layer', 'people_layer', 'inflation_layer']
     assert parameters[MOVE_BASE + 'local_costmap/prediction_layer/map_topic'] == 'planner_bridge_node/costs'

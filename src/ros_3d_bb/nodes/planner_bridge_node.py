@@ -45,6 +45,9 @@ class PlannerBridgeParams(NamedTuple):
     clearing_range: float = Param(
         10.0, 'Radius of the ring of points around the robot up to which the costmap is cleared before people are '
         'marked; 0: no ring. At least the raytrace_range of the costmap.', 'm')
+    robot_radius: float = Param(
+        0.35, 'Radius of the robot around the origin of its frame. Costs of people are relative to the highest one in '
+        'this disc, so that a robot in the way of a person leaves it.', 'm', limits=(0.1, 5.0))
 
 
 class ReceivedTracks(NamedTuple):
@@ -104,7 +107,7 @@ class PlannerBridgeNode(object):
     ~points : sensor_msgs/PointCloud2
         `costmap`: current and predicted footprints of people, as points for an obstacle layer.
     ~costs : nav_msgs/OccupancyGrid
-        `costmap`: costs of the predicted positions of walking people around the robot, up to 99 of 100, as the map of a
+        `costmap`: costs of people and their predicted positions around the robot, up to 99 of 100, as the map of a
         StaticLayer of a local costmap. The stamp is 0, for which tf2 takes the latest transform.
     ~clearing_points : sensor_msgs/PointCloud2
         `costmap`: ring of points around the robot up to which the costmap is cleared before people are marked. Not

@@ -1,4 +1,4 @@
-"""Grid of costs around the robot: how likely a walking person will be at a place within the time of the prediction.
+"""Grid of costs around the robot: how likely a person will be at a place within the time of the prediction.
 
 Robot frame, metres.
 """
@@ -10,15 +10,17 @@ from ros_3d_bb.planning.planner_view import position_after
 CELL_M = 0.1
 HALF_SIZE_M = 5.0  # of the grid, whose centre is the robot
 HIGHEST = 99  # of an OccupancyGrid; 100 would be lethal
-RISKY = 0.15  # probability with the highest cost
+RISKY = 0.3  # probability, above that at the robot, with the highest cost
 STEP_S, HORIZON_S = 0.1, 2.0
 COMFORT_M = 0.2  # kept free around the body
 EXTENT = 3.0  # standard deviations up to which costs are computed
 
 
-def presence_costs(tracks, robot_from_tracks):
-    """Costs of the cells around the robot: the largest probability, over the times of the prediction, that a walking
-    person or the comfort zone around the body covers the cell, relative to `RISKY`.
+def presence_costs(tracks, robot_from_tracks, robot_radius_m):
+    """Costs of the cells around the robot: by how much the largest probability, over the times of the prediction, that
+    a person or the comfort zone around the body covers the cell exceeds the probability at the robot, relative to
+    `RISKY`. Places where the robot is less in the way than now have no cost, so that it leaves the way of a person
+    instead of stopping in it.
 
     The probability that a disc of radius r covers a point at the offset d from its expected centre is approximated by
     pi r² N(d; 0, C + r²/4 I), where C is the covariance of the centre: the disc is replaced by a Gaussian with the same
@@ -27,8 +29,10 @@ def presence_costs(tracks, robot_from_tracks):
     Parameters
     ----------
     tracks : list of TrackedObject
-        Those that do not move are left out: their place does not change.
+        Those that do not move are expected to stay.
     robot_from_tracks : numpy.ndarray, (4, 4)
+    robot_radius_m : float
+        Of the disc around the origin in which the highest probability counts as that at the robot.
 
     Returns
     -------
@@ -38,18 +42,19 @@ def presence_costs(tracks, robot_from_tracks):
     count = int(round(2 * HALF_SIZE_M / CELL_M))
     probabilities = np.zeros((count, count))
     for track in tracks:
-        if track.moving:
-            end_s = min(track.prediction_step_s * len(track.prediction_m), HORIZON_S)
-            times_s = np.arange(0, end_s + STEP_S / 2, STEP_S)
-            centers_m = transform_points(robot_from_tracks, position_after(track, times_s))[:, :2]
-            covariances_m2 = _covariances_after(track, times_s, robot_from_tracks[:2, :3])
-            for center_m, covariance_m2 in zip(centers_m, covariances_m2):
-                _raise_to(probabilities, center_m, covariance_m2, track.size_m[0] / 2 + COMFORT_M)
-    return np.rint(HIGHEST * np.minimum(probabilities / RISKY, 1)).astype(np.int8)
+        end_s = min(track.prediction_step_s * len(track.prediction_m), HORIZON_S) if track.moving else 0.0
+        times_s = np.arange(0, end_s + STEP_S / 2, STEP_S)
+        centers_m = transform_points(robot_from_tracks, position_after(track, times_s))[:, :2]
+        covariances_m2 = _covariances_after(track, times_s, robot_from_tracks[:2, :3])
+        for center_m, covariance_m2 in zip(centers_m, covariances_m2):
+            _raise_to(probabilities, center_m, covariance_m2, track.size_m[0] / 2 + COMFORT_M)
+    cells_m = (np.arange(count) + 0.5) * CELL_M - HALF_SIZE_M
+    at_robot = probabilities[np.hypot(cells_m, cells_m[:, np.newaxis]) < robot_radius_m].max()
+    return np.rint(HIGHEST * np.clip((probabilities - at_robot) / RISKY, 0, 1)).astype(np.int8)
 
 
 def _raise_to(probabilities, center_m, covariance_m2, radius_m):
-    """Raise probabilities (n, n) to those of a disc at one time."""
+    """Raise probabilities (n, n) to those of a disc at one time, at most 1."""
     spread_m2 = covariance_m2 + radius_m ** 2 / 4 * np.eye(2)
     extent_m = EXTENT * np.sqrt(np.diag(spread_m2))
     low, high = (np.clip(np.ceil((center_m + side * extent_m + HALF_SIZE_M) / CELL_M - 0.5), 0, len(probabilities))
@@ -58,7 +63,8 @@ def _raise_to(probabilities, center_m, covariance_m2, radius_m):
     (xx, xy), (_xy, yy) = np.linalg.inv(spread_m2)
     squares = xx * x ** 2 + 2 * xy * x * y[:, np.newaxis] + yy * y[:, np.newaxis] ** 2
     window = probabilities[low[1]:high[1], low[0]:high[0]]
-    np.maximum(window, radius_m ** 2 / 2 / np.sqrt(np.linalg.det(spread_m2)) * np.exp(-squares / 2), out=window)
+    covered = radius_m ** 2 / 2 / np.sqrt(np.linalg.det(spread_m2)) * np.exp(-squares / 2)
+    np.maximum(window, np.minimum(covered, 1), out=window)
 
 
 def _covariances_after(track, times_s, robot_from_tracks):

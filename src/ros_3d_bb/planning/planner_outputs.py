@@ -98,7 +98,8 @@ def _costmap_outputs(params):
         return points_to_msg(ring_m.dot(robot_from_tracks[:3, :3].T), header)
 
     def costs(tracks, robot_from_tracks, header):
-        return grid_to_msg(presence_costs(tracks, robot_from_tracks), CELL_M, (-HALF_SIZE_M, -HALF_SIZE_M), header)
+        return grid_to_msg(presence_costs(tracks, robot_from_tracks, params.robot_radius), CELL_M,
+                           (-HALF_SIZE_M, -HALF_SIZE_M), header)
 
     outputs = [Output('~points', PointCloud2, footprints, params.robot_frame, float32=True),
                Output('~costs', OccupancyGrid, costs, params.robot_frame, latest_tf=True)]

@@ -2,8 +2,8 @@
 
 Convention: map frame, metres, radians, seconds. The seed varies positions, speeds and start times of the people.
 
-The robot has two cameras: a person at 1 m/s who meets a robot at 0.8 m/s at a right angle stays at a bearing of 51
-degrees, which a single forward camera of 55 degrees never sees. The tracker of the thesis supports one camera only.
+The robot has three cameras of 55 degrees, which see bearings up to 76 degrees: a person at 1.2 m/s who meets a robot at
+0.8 m/s at a right angle stays at a bearing of 56 degrees. The tracker of the thesis supports one camera only.
 """
 import numpy as np
 
@@ -14,8 +14,8 @@ MEETING_X_M = 4.0
 REACHED_AFTER_S = 5.5  # the undisturbed robot needs this time to MEETING_X_M
 DOOR_M = 1.6  # width of the door
 RATE_HZ = 10.0  # images of each camera
-CAMERAS = [{'name': name, 'mount': [0.17, side * 0.05, 0.20], 'yaw': side * 0.47}
-           for name, side in (('left', 1), ('right', -1))]
+CAMERAS = [{'name': name, 'mount': [0.17, side * 0.05, 0.20], 'yaw': side * 0.85}
+           for name, side in (('left', 1), ('front', 0), ('right', -1))]
 
 
 def standing(random):
