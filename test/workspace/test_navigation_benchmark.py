@@ -24,8 +24,9 @@ def test_modes_differ_in_what_move_base_knows_of_people(mode):
     assert parameters.get('/tracker_node/tracker') == {'ours': 'kalman', 'thesis': 'thesis'}.get(mode)
     assert (['ground_truth', 'ros_3d_bb/tracks'] in nodes['simulator_node'].remap_args) == (mode == 'truth')
     layers = [layer['name'] for layer in parameters['/move_base/local_costmap/plugins']]
-    assert layers == ['static_layer'] + {'depth': ['obstacle_layer', 'inflation_layer'], 'none': ['inflation_layer']}.get(
-        mode, ['people_layer', 'prediction_layer'])
+    assert layers == ['static_layer'] + {
+        'depth': ['obstacle_layer', 'inflation_layer'], 'none': ['inflation_layer']}.get(
+            mode, ['people_layer', 'prediction_layer'])
     assert parameters['/move_base/DWAPlannerROS/sum_scores'] == (mode not in ('depth', 'none'))
     waits_for = [name for name in ('tracks', 'cloud') if parameters['/navigation_trial_node/' + name]]
     assert waits_for == {'depth': ['cloud'], 'none': []}.get(mode, ['tracks'])
