@@ -65,6 +65,8 @@ def test_a_robot_in_the_way_of_a_person_pays_only_for_going_further_into_it():
     costs = presence_costs(tracks, np.eye(4), ROBOT_RADIUS_M)
     assert cost_at(costs, 0.0, 0.0) == cost_at(costs, 0.0, -1.0) == cost_at(costs, 0.0, 1.0) == 0
     assert cost_at(costs, 1.0, 0.3) == HIGHEST
+    behind = walking((-0.6, 0.0), (0.8, 0.0), (0.1, 0.5))  # does not hide the costs of the other person
+    assert cost_at(presence_costs(tracks + [behind], np.eye(4), ROBOT_RADIUS_M), 1.0, 0.3) == HIGHEST
     two_m_beside = presence_costs(tracks, transform_from((0, 2, 0), (0, 0, 0, 1)), ROBOT_RADIUS_M)
     assert cost_at(two_m_beside, 0.0, 2.0) > HIGHEST / 2 and cost_at(two_m_beside, 1.0, 2.3) == HIGHEST
 

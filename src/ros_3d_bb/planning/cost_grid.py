@@ -18,13 +18,9 @@ EXTENT = 3.0  # standard deviations up to which costs are computed
 
 def presence_costs(tracks, robot_from_tracks, robot_radius_m):
     """Costs of the cells around the robot: by how much the largest probability, over the times of the prediction, that
-    a person or the comfort zone around the body covers the cell exceeds the probability at the robot, relative to
-    `RISKY`. Places where the robot is less in the way than now have no cost, so that it leaves the way of a person
-    instead of stopping in it.
-
-    The probability that a disc of radius r covers a point at the offset d from its expected centre is approximated by
-    pi r² N(d; 0, C + r²/4 I), where C is the covariance of the centre: the disc is replaced by a Gaussian with the same
-    area and second moments.
+    a person or the comfort zone around the body covers the cell exceeds that at the robot, relative to `RISKY`; for the
+    person for whom this is most. Places where the robot is less in the way of a person than now have no cost, so that
+    it leaves the way instead of stopping in it.
 
     Parameters
     ----------
@@ -40,17 +36,19 @@ def presence_costs(tracks, robot_from_tracks, robot_radius_m):
         0 to `HIGHEST`. Rows are along y, columns along x; the robot is in the middle.
     """
     count = int(round(2 * HALF_SIZE_M / CELL_M))
-    probabilities = np.zeros((count, count))
+    cells_m = (np.arange(count) + 0.5) * CELL_M - HALF_SIZE_M
+    is_robot = np.hypot(cells_m, cells_m[:, np.newaxis]) < robot_radius_m
+    excesses = np.zeros((count, count))
     for track in tracks:
+        probabilities = np.zeros((count, count))
         end_s = min(track.prediction_step_s * len(track.prediction_m), HORIZON_S) if track.moving else 0.0
         times_s = np.arange(0, end_s + STEP_S / 2, STEP_S)
         centers_m = transform_points(robot_from_tracks, position_after(track, times_s))[:, :2]
         covariances_m2 = _covariances_after(track, times_s, robot_from_tracks[:2, :3])
         for center_m, covariance_m2 in zip(centers_m, covariances_m2):
             _raise_to(probabilities, center_m, covariance_m2, track.size_m[0] / 2 + COMFORT_M)
-    cells_m = (np.arange(count) + 0.5) * CELL_M - HALF_SIZE_M
-    at_robot = probabilities[np.hypot(cells_m, cells_m[:, np.newaxis]) < robot_radius_m].max()
-    return np.rint(HIGHEST * np.clip((probabilities - at_robot) / RISKY, 0, 1)).astype(np.int8)
+        np.maximum(excesses, probabilities - probabilities[is_robot].max(), out=excesses)
+    return np.rint(HIGHEST * np.minimum(excesses / RISKY, 1)).astype(np.int8)
 
 
 def _raise_to(probabilities, center_m, covariance_m2, radius_m):
