@@ -1,4 +1,5 @@
 """Messages, stamps and clock of simulator_node. Needs a master."""
+import contextlib
 import os
 import time
 
@@ -29,9 +30,11 @@ rate: 10.0
 people:
 - {start: [3.0, 0.0]}
 """
-TOPICS = {'camera/color/image_raw': Image, 'camera/aligned_depth_to_color/image_raw': Image,
-          'camera/color/camera_info': CameraInfo, 'camera/aligned_depth_to_color/camera_info': CameraInfo,
-          '/tf': TFMessage, 'ground_truth': TrackedObjectArray}
+COLOR = 'camera/color/image_raw'
+TOPICS = {'camera/aligned_depth_to_color/image_raw': Image, 'camera/color/camera_info': CameraInfo,
+          'camera/aligned_depth_to_color/camera_info': CameraInfo, '/tf': TFMessage, '/clock': Clock,
+          'ground_truth': TrackedObjectArray}
+IMAGE_TOPICS = {COLOR} | set(TOPICS) - {'/tf', '/clock'}
 
 
 @pytest.fixture(scope='module')
@@ -43,15 +46,24 @@ def path(tmp_path_factory):
     return str(path)
 
 
+@contextlib.contextmanager
+def recorded(kinds, *params):
+    """({topic: recorder}, process) of a simulator_node whose scene starts once all recorders are connected."""
+    with contextlib.ExitStack() as stack:
+        recorders = {topic: stack.enter_context(Recorder(topic, kind, publisher_expected=False))
+                     for topic, kind in kinds.items()}
+        process = started('simulator_node', 'publish_clock:=true', 'repeat:=false', 'wait_for_subscribers:=1', *params)
+        wait_until(lambda: all(recorder.is_connected for recorder in recorders.values()), 'all connections')
+        recorders[COLOR] = stack.enter_context(Recorder(COLOR, Image))  # the subscriber that the node waits for
+        yield recorders, process
+
+
 @pytest.fixture(scope='module')
 def round_of_scene(path):
     """{topic: messages} of one round with the clock of the node."""
-    recorders = {topic: Recorder(topic, kind, publisher_expected=False) for topic, kind in TOPICS.items()}
-    recorders['/clock'] = Recorder('/clock', Clock, publisher_expected=False)
-    process = started('simulator_node', 'scenario:=' + path, 'publish_clock:=true', 'repeat:=false',
-                      'wait_for_subscribers:=1')
-    assert process.wait(timeout=60) == 0
-    wait_until(lambda: len(recorders['ground_truth'].messages) == RATE, 'all images')
+    with recorded(TOPICS, 'scenario:=' + path) as (recorders, process):
+        assert process.wait(timeout=60) == 0
+        wait_until(lambda: all(len(recorders[topic].messages) == RATE for topic in IMAGE_TOPICS), 'all images')
     return {topic: recorder.messages for topic, recorder in recorders.items()}
 
 
@@ -59,7 +71,7 @@ def test_all_messages_have_the_stamps_of_the_scene(round_of_scene):
     stamps = [message.header.stamp for message in round_of_scene['ground_truth']]
     assert [(stamp - stamps[0]).to_nsec() for stamp in stamps] == [
         int(round(number / RATE * NS)) for number in range(RATE)]
-    for topic in set(TOPICS) - {'/tf'}:
+    for topic in IMAGE_TOPICS:
         assert [message.header.stamp for message in round_of_scene[topic]] == stamps
     times = [message.clock for message in round_of_scene['/clock']]
     assert times == sorted(times)
@@ -103,11 +115,9 @@ def test_invalid_parameters_are_rejected_at_the_start(path, params, reason):
 
 
 def test_a_supervised_scene_stands_still_until_a_time_limit_and_waits_at_it(path):
-    with Recorder('ground_truth', TrackedObjectArray, publisher_expected=False) as truth, Recorder(
-            '/clock', Clock, publisher_expected=False) as clock, Recorder(
-            'yolo_bounding_box', Int32MultiArray, publisher_expected=False) as boxes:
-        process = started('simulator_node', 'scenario:=' + path, 'publish_clock:=true', 'supervised:=true',
-                          'boxes:=true', 'repeat:=false')
+    kinds = {'ground_truth': TrackedObjectArray, '/clock': Clock, 'yolo_bounding_box': Int32MultiArray}
+    with recorded(kinds, 'scenario:=' + path, 'supervised:=true', 'boxes:=true') as (recorders, process):
+        truth, clock, boxes = (recorders[topic] for topic in kinds)
         limits = publisher('simulator_node/time_limit', Time)
         wait_until(lambda: len(truth.messages) >= 3, 'images of the start')
         assert len(set(message.objects[0].pose.pose.position.y for message in truth.messages)) == 1

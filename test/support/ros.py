@@ -52,8 +52,12 @@ class Recorder(object):
         self._subscriber = rospy.Subscriber(topic, kind, lambda message: self.messages.append(message),
                                             queue_size=1000, buff_size=2 ** 26)
         if publisher_expected:
-            wait_until(lambda: self._subscriber.get_num_connections() > 0, 'a publisher on ' + topic)
+            wait_until(lambda: self.is_connected, 'a publisher on ' + topic)
             time.sleep(0.3)  # the publisher counts a connection a moment later than the subscriber
+
+    @property
+    def is_connected(self):
+        return self._subscriber.get_num_connections() > 0
 
     def __enter__(self):
         return self

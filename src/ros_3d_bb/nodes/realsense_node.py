@@ -19,11 +19,10 @@ from ros_3d_bb.drivers.realsense import (CameraLost, RealSense, RealSenseParams,
                                          optical_frame)
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import is_ending
-from ros_3d_bb.nodes.common.startup import read_params, run_node, wait_for_subscribers
+from ros_3d_bb.nodes.common.startup import SENDING_S, read_params, run_node, wait_for_subscribers
 
 RETRY_S = 2.0
 CLOSING_S = 5.0  # upper limit
-SENDING_S = 1.0  # after the last image of a recording; rospy drops messages that it has not sent before the shutdown
 START_NS = NS  # published on /clock until the first image of a recording sets the time
 
 

@@ -10,6 +10,7 @@ from ros_3d_bb.nodes.common.master import Registration
 
 POLL_S = 0.05
 SETTLING_S = 1.0  # a node that has connected to one topic may still be connecting to the others
+SENDING_S = 1.0  # from the last message to the exit: rospy drops messages that it has not sent before the shutdown
 LONGEST_WAIT_S = 60.0  # after this time, missing subscribers are an error
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # glibc's malloc.h
 LARGEST_BYTES = 32 * 2 ** 20  # limit of glibc

@@ -18,7 +18,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import is_ending
-from ros_3d_bb.nodes.common.startup import read_params, run_node, wait_for_subscribers
+from ros_3d_bb.nodes.common.startup import SENDING_S, read_params, run_node, wait_for_subscribers
 from ros_3d_bb_lab.simulation.ros.driven_robot import QUEUE_SIZE, DrivenRobot, robot_transforms
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import TRUTH_TOPIC, boxes_message, simulated_messages
 from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
@@ -116,7 +116,9 @@ class SimulatorNode(object):
             kinds.update((topic_of(camera, BOXES_TOPIC), Int32MultiArray) for camera in self._simulator.cameras)
         self._pubs = {topic: rospy.Publisher(topic, kind, queue_size=10) for topic, kind in kinds.items()}
         self._tf_pub = rospy.Publisher('/' + TF_TOPIC, TYPES[TF_TOPIC], queue_size=QUEUE_SIZE)
-        self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=10) if self._params.publish_clock else None
+        self._clock_pub = None
+        if self._params.publish_clock:
+            self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=QUEUE_SIZE)
         self._renderer, self._rendering, self._failed = ThreadPoolExecutor(max_workers=1), None, False
         self._robot = DrivenRobot(self._simulator, self._diagnostics) if self._params.drive else None
         self._limit_ns = None
@@ -152,6 +154,7 @@ class SimulatorNode(object):
             self._play(start_ns)
             if not self._params.repeat:
                 rospy.loginfo('the scene is over')
+                time.sleep(SENDING_S)
                 break
             if self._clock_pub is not None:
                 start_ns += int(self._simulator.scenario.duration * NS) + PAUSE_NS
