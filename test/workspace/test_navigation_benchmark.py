@@ -6,7 +6,8 @@ import sys
 
 import pytest
 
-from ros_3d_bb_lab.evaluation.navigation.benchmark import MODES
+from ros_3d_bb_lab.evaluation.navigation import benchmark
+from ros_3d_bb_lab.evaluation.navigation.benchmark import MODES, run_trial
 from support.launching import loaded
 from support.processes import processes_naming
 from support.real_planners import planner_environment
@@ -31,6 +32,18 @@ def test_modes_differ_in_what_move_base_knows_of_people(mode):
     waits_for = [name for name in ('tracks', 'cloud') if parameters['/navigation_trial_node/' + name]]
     assert waits_for == {'depth': ['cloud'], 'none': []}.get(mode, ['tracks'])
     assert parameters['/simulator_node/drive'] and parameters['/simulator_node/supervised']
+
+
+def test_a_recorded_trial_is_not_repeated(tmp_path, monkeypatch):
+    started = []
+    monkeypatch.setattr(benchmark, 'launch', lambda *arguments: started.append(arguments))
+    (tmp_path / 'standing-ours-3.json').write_text('{"collisions": 0}')
+    assert run_trial(('standing', 'ours', 3, str(tmp_path))) == {
+        'scene': 'standing', 'mode': 'ours', 'seed': 3, 'collisions': 0}
+    assert not started
+    with pytest.raises(RuntimeError, match='standing, ours, seed 4: no result'):
+        run_trial(('standing', 'ours', 4, str(tmp_path)))
+    assert len(started) == 1
 
 
 @pytest.mark.slow

@@ -22,18 +22,14 @@ TITLES = ('scene', 'mode', 'runs', 'collisions', 'while driving', 'reached', 'ti
 
 
 def run_trial(task):
-    """Run one trial: (scene, mode, seed, folder for its files).
+    """Run one trial: (scene, mode, seed, folder for its files). It is not repeated if its record is in the folder.
 
     Returns its record as a dictionary, with `scene`, `mode` and `seed`. Raises RuntimeError if there is no record.
     """
     scene, mode, seed, folder = task
     name = os.path.join(folder, '%s-%s-%d' % (scene, mode, seed))
-    with open(name + '.yaml', 'w') as stream:
-        yaml.safe_dump(scenario_of(scene, seed, () if mode == 'thesis' else CAMERAS), stream)
-    arguments = {'scenario': name + '.yaml', 'record': name + '.json', 'mode': mode, 'goal_x': GOAL_M[0],
-                 'goal_y': GOAL_M[1]}
-    with open(name + '.log', 'w') as log:
-        launch('navigation_benchmark.launch', arguments, TRIAL_TIMEOUT_S, log)
+    if not os.path.exists(name + '.json'):
+        _launch_trial(scene, mode, seed, name)
     try:
         with open(name + '.json') as stream:
             return dict(json.load(stream), scene=scene, mode=mode, seed=seed)
@@ -41,6 +37,16 @@ def run_trial(task):
         with open(name + '.log') as stream:
             raise RuntimeError('%s, %s, seed %d: no result. The end of the log:\n%s'
                                % (scene, mode, seed, stream.read()[-3000:]))
+
+
+def _launch_trial(scene, mode, seed, name):
+    """Run a trial, which writes `name`.json."""
+    with open(name + '.yaml', 'w') as stream:
+        yaml.safe_dump(scenario_of(scene, seed, () if mode == 'thesis' else CAMERAS), stream)
+    arguments = {'scenario': name + '.yaml', 'record': name + '.json', 'mode': mode, 'goal_x': GOAL_M[0],
+                 'goal_y': GOAL_M[1]}
+    with open(name + '.log', 'w') as log:
+        launch('navigation_benchmark.launch', arguments, TRIAL_TIMEOUT_S, log)
 
 
 def table(result):
@@ -72,6 +78,8 @@ def main():
                 print('%(scene)s, %(mode)s, seed %(seed)d: %(collisions)d collisions, goal after %(time_to_goal_s)s s, '
                       '%(min_distance_m).2f m, %(stops)d stops' % trials[-1], flush=True)
                 _write(arguments.json, trials)
+            pool.close()  # terminated workers can wait for a lock forever
+            pool.join()
     except KeyboardInterrupt:
         sys.exit(130)
     except (RuntimeError, OSError, subprocess.SubprocessError) as error:
@@ -100,7 +108,7 @@ def _arguments():
     parser.add_argument('--modes', type=_names_of(MODES), default=list(MODES), metavar='A,B',
                         help='some of %s' % ', '.join(MODES))
     parser.add_argument('--jobs', type=int, default=1, metavar='N', help='trials at the same time (default: 1)')
-    parser.add_argument('--logs', metavar='DIR', help='existing folder in which logs and records are kept')
+    parser.add_argument('--logs', metavar='DIR', help='existing folder in which logs and records are kept; recorded trials are not repeated')
     parser.add_argument('--json', metavar='FILE', help='also write the results to this file')
     arguments = parser.parse_args()
     if arguments.runs < 1 or arguments.jobs < 1 or arguments.seed < 0:
