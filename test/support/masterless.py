@@ -23,7 +23,7 @@ class Publisher(object):
     """Keeps and counts the published messages. It has a subscriber, so that every output is computed."""
 
     def __init__(self, topic, kind):
-        self.topic, self.kind, self.count, self.newest = topic, kind, 0, None
+        self.topic, self.kind, self.count, self.newest, self.connections = topic, kind, 0, None, 1
 
     def publish(self, message):
         """Serialize a message, as rospy does."""
@@ -31,7 +31,7 @@ class Publisher(object):
         self.count += 1
 
     def get_num_connections(self):
-        return 1
+        return self.connections
 
 
 class Buffer(tf2_ros.BufferCore):

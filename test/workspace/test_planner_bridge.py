@@ -113,6 +113,14 @@ def test_costs_are_around_the_robot_where_it_is_now():
         assert not np.any(bridge.message(COSTS).data)
 
 
+def test_an_output_without_subscribers_is_not_computed():
+    with bridge_with('costmap') as bridge:
+        bridge._connections.publishers[COSTS].connections = 0
+        bridge.send_tf(START_NS, 'base_link', (0, 0, 0))
+        bridge.send(START_NS, person(1, 2, 0))
+        assert [bridge.count(topic) for topic in (POINTS, COSTS, RING)] == [1, 0, 1]
+
+
 def test_an_output_waits_for_the_transform_of_its_own_frame_only():
     with bridge_with('costmap, people, teb', planner_frame='odom') as bridge:
         bridge.send_tf(START_NS, 'odom', (0, 0, 0))

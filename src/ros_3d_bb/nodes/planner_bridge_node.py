@@ -72,12 +72,14 @@ class PlannerTopic(object):
         self._publisher = rospy.Publisher(output.topic, output.kind, queue_size=2)
 
     def send(self, tracks, stamp_ns, received):
-        """Publish tracks in the output frame; `received` are the ReceivedTracks from which they were predicted."""
-        output = self.output
+        """Publish tracks in the output frame, if there are subscribers; `received` are the ReceivedTracks from which
+        they were predicted."""
+        self.held, output = received, self.output
+        if not self._publisher.get_num_connections():
+            return
         frame_id = output.frame or received.frame_id
         header = Header(stamp=time_from(0 if output.latest_tf else stamp_ns), frame_id=frame_id)
         self._publisher.publish(output.write(tracks, received.transforms[output.frame, output.latest_tf], header))
-        self.held = received
 
     def empty(self, stamp_ns):
         """Publish an empty array in the frame of the last one, if planners need it."""

@@ -108,7 +108,8 @@ def _arguments():
     parser.add_argument('--modes', type=_names_of(MODES), default=list(MODES), metavar='A,B',
                         help='some of %s' % ', '.join(MODES))
     parser.add_argument('--jobs', type=int, default=1, metavar='N', help='trials at the same time (default: 1)')
-    parser.add_argument('--logs', metavar='DIR', help='existing folder in which logs and records are kept; recorded trials are not repeated')
+    parser.add_argument('--logs', metavar='DIR',
+                        help='existing folder in which logs and records are kept; recorded trials are not repeated')
     parser.add_argument('--json', metavar='FILE', help='also write the results to this file')
     arguments = parser.parse_args()
     if arguments.runs < 1 or arguments.jobs < 1 or arguments.seed < 0:
