@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.planning.cost_grid import CELL_M, COMFORT_M, HALF_SIZE_M, HIGHEST, RISKY, presence_costs
+from ros_3d_bb.planning.cost_grid import ACROSS, CELL_M, COMFORT_M, HALF_SIZE_M, HIGHEST, RISKY, presence_costs
 from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
 
 WIDTH_M = 0.5
@@ -38,7 +38,10 @@ def test_certain_predictions_have_the_highest_cost_along_the_way_and_none_beside
 
 def test_costs_follow_the_probability_of_presence():
     """Against the share of samples of the predicted position that cover the cell, where that varies slowly."""
-    costs = presence_costs([walking((2.0, 0.0), (1.0, 0.0), (0.8, 0.8))], np.eye(4), ROBOT_RADIUS_M)
+    track = walking((2.0, 0.0), (1.0, 0.0), (0.8, 0.8))
+    for covariances_m2 in (track.covariance, track.prediction_covariance_m2):
+        covariances_m2[..., 1, 1] /= ACROSS ** 2
+    costs = presence_costs([track], np.eye(4), ROBOT_RADIUS_M)
     offsets = np.random.RandomState(3).normal(scale=0.8, size=(200000, 2))
     for x_m, y_m in ((3.05, 0.05), (3.05, 0.95), (3.05, -1.55)):
         nearest_m = min(4.0, max(2.0, x_m))

@@ -13,6 +13,10 @@ HIGHEST = 99  # of an OccupancyGrid; 100 would be lethal
 RISKY = 0.3  # probability, above that at the robot, with the highest cost
 STEP_S, HORIZON_S = 0.1, 2.0
 COMFORT_M = 0.2  # kept free around the body
+# Share of the standard deviation across the walking direction that counts: later images will reduce it. A robot that
+# does not expect this finds no free way past a person who comes straight on, and stops in the way (Trautman and Krause
+# 2010, the freezing robot problem).
+ACROSS = 0.5
 EXTENT = 3.0  # standard deviations up to which costs are computed
 CENTERS_M = (np.arange(int(round(2 * HALF_SIZE_M / CELL_M))) + 0.5) * CELL_M - HALF_SIZE_M  # of the cells, in x and y
 
@@ -24,8 +28,8 @@ def presence_costs(tracks, robot_from_tracks, robot_radius_m):
     so that it leaves the way instead of stopping in it.
 
     The probability that a disc of radius r covers a point at the offset d from its expected centre is approximated by
-    pi r² N(d; 0, C + r²/4 I), where C is the covariance of the centre: the disc is replaced by a Gaussian with the same
-    area and second moments.
+    pi r² N(d; 0, C + r²/4 I), where C is the covariance of the centre, narrowed by `ACROSS`: the disc is replaced by a
+    Gaussian with the same area and second moments.
 
     Parameters
     ----------
@@ -69,7 +73,8 @@ def _raise_to(probabilities, center_m, covariance_m2, radius_m):
 
 
 def _covariances_after(track, times_s, robot_from_tracks):
-    """Covariances (k, 2, 2) of the position of a track after times (k,) in the robot frame; 0 if unknown."""
+    """Covariances (k, 2, 2) of the position of a track after times (k,) in the robot frame, 0 if unknown; narrowed by
+    `ACROSS` if the track moves."""
     if track.covariance is None or track.prediction_covariance_m2 is None:
         return np.zeros((len(times_s), 2, 2))
     known = np.concatenate((track.covariance[np.newaxis, :3, :3], track.prediction_covariance_m2))
@@ -77,4 +82,6 @@ def _covariances_after(track, times_s, robot_from_tracks):
     before = np.minimum(steps.astype(int), len(known) - 2)
     share = (steps - before)[:, np.newaxis, np.newaxis]
     covariances_m2 = (1 - share) * known[before] + share * known[before + 1]
-    return robot_from_tracks @ covariances_m2 @ robot_from_tracks.T
+    x, y = track.moving * track.velocity_mps[:2] / max(np.hypot(*track.velocity_mps[:2]), 1e-9)
+    from_tracks = robot_from_tracks - (1 - ACROSS) * np.outer(robot_from_tracks.dot((-y, x, 0)), (-y, x, 0))
+    return from_tracks @ covariances_m2 @ from_tracks.T
