@@ -131,6 +131,8 @@ class NavigationTrialNode(object):
         self._goal_pub.publish(goal_message(self._params, time_from(start_ns)))
         self._pace.start(start_ns, ['commands'] + ['tracks'] * self._params.tracks + ['cloud'] * self._params.cloud)
         time_to_goal_s = self._drive(start_ns)
+        if rospy.is_shutdown():
+            return  # interrupted: there is no result
         result = {'time_to_goal_s': time_to_goal_s, 'collisions': self._collisions,
                   'collisions_driving': self._driving_collisions, 'min_distance_m': min(self._clearances_m),
                   'stops': stops(self._speeds_mps), 'late': self._pace.late}
