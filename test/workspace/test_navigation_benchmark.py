@@ -6,7 +6,6 @@ import sys
 
 import pytest
 
-from ros_3d_bb_lab.evaluation.navigation import benchmark
 from ros_3d_bb_lab.evaluation.navigation.benchmark import MODES, run_trial
 from support.launching import loaded
 from support.processes import processes_naming
@@ -36,7 +35,8 @@ def test_modes_differ_in_what_move_base_knows_of_people(mode):
 
 def test_a_recorded_trial_is_not_repeated(tmp_path, monkeypatch):
     started = []
-    monkeypatch.setattr(benchmark, 'launch', lambda *arguments: started.append(arguments))
+    monkeypatch.setattr('ros_3d_bb_lab.evaluation.navigation.benchmark.launch',
+                        lambda *arguments: started.append(arguments))
     (tmp_path / 'standing-ours-3.json').write_text('{"collisions": 0}')
     assert run_trial(('standing', 'ours', 3, str(tmp_path))) == {
         'scene': 'standing', 'mode': 'ours', 'seed': 3, 'collisions': 0}

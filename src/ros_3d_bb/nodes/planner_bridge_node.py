@@ -74,9 +74,10 @@ class PlannerTopic(object):
     def send(self, tracks, stamp_ns, received):
         """Publish tracks in the output frame, if there are subscribers; `received` are the ReceivedTracks from which
         they were predicted."""
-        self.held, output = received, self.output
+        self.held = received
         if not self._publisher.get_num_connections():
             return
+        output = self.output
         frame_id = output.frame or received.frame_id
         header = Header(stamp=time_from(0 if output.latest_tf else stamp_ns), frame_id=frame_id)
         self._publisher.publish(output.write(tracks, received.transforms[output.frame, output.latest_tf], header))

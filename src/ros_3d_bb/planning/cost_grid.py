@@ -5,7 +5,7 @@ Robot frame, metres.
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.planning.planner_view import position_after
+from ros_3d_bb.planning.planner_view import position_after, walking_velocity
 
 CELL_M = 0.1
 HALF_SIZE_M = 5.0  # of the grid, whose centre is the robot
@@ -82,6 +82,7 @@ def _covariances_after(track, times_s, robot_from_tracks):
     before = np.minimum(steps.astype(int), len(known) - 2)
     share = (steps - before)[:, np.newaxis, np.newaxis]
     covariances_m2 = (1 - share) * known[before] + share * known[before + 1]
-    x, y = track.moving * track.velocity_mps[:2] / max(np.hypot(*track.velocity_mps[:2]), 1e-9)
-    from_tracks = robot_from_tracks - (1 - ACROSS) * np.outer(robot_from_tracks.dot((-y, x, 0)), (-y, x, 0))
-    return from_tracks @ covariances_m2 @ from_tracks.T
+    x, y, _z = walking_velocity(track)
+    across = np.array([-y, x, 0]) / max(np.hypot(x, y), 1e-9)
+    narrowed = robot_from_tracks @ (np.eye(3) - (1 - ACROSS) * np.outer(across, across))
+    return narrowed @ covariances_m2 @ narrowed.T

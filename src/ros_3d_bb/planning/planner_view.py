@@ -49,7 +49,7 @@ def with_class_widths(tracks, classes):
             ((track, classes.of(track.label).length) for track in tracks)]
 
 
-def _walking_velocity(track):
+def walking_velocity(track):
     """Velocity (3,), m/s; zero for a track that does not move: it is noise that planners would extrapolate."""
     return track.velocity_mps if track.moving else np.zeros(3)
 
@@ -64,14 +64,14 @@ def position_after(track, ahead_s):
     times_s = track.prediction_step_s * np.arange(len(track.prediction_m) + 1)
     known_m = np.vstack((track.position_m, track.prediction_m))
     position_m = np.stack([np.interp(ahead_s, times_s, axis_m) for axis_m in known_m.T], axis=-1)
-    return position_m + np.maximum(ahead_s - times_s[-1], 0)[..., np.newaxis] * _walking_velocity(track)
+    return position_m + np.maximum(ahead_s - times_s[-1], 0)[..., np.newaxis] * walking_velocity(track)
 
 
 def predicted_to(tracks, ahead_s):
     """Predict tracks `ahead_s` seconds ahead, see `position_after`; the result has no predictions, and no velocity
     where a track does not move.
     """
-    return [track._replace(position_m=position_after(track, ahead_s), velocity_mps=_walking_velocity(track),
+    return [track._replace(position_m=position_after(track, ahead_s), velocity_mps=walking_velocity(track),
                            prediction_m=np.empty((0, 3)), prediction_covariance_m2=None) for track in tracks]
 
 
