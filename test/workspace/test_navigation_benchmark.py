@@ -58,7 +58,8 @@ def test_a_robot_that_knows_nothing_of_people_drives_into_the_one_in_its_way(tmp
         found = json.load(stream)
     row = found['scenes']['standing']['none']
     assert found['all']['none'] == row
-    assert (row['runs'], row['collisions'], row['collisions_driving'], row['reached'], row['stops']) == (1, 1, 1, 0, 1)
+    assert (row['runs'], row['collisions'], row['collisions_driving'], row['reached']) == (1, 1, 1, 0)
+    assert row['stops'] >= 1
     assert row['time_to_goal_s'] is None and -0.03 < row['min_distance_m'] < 0.03
     assert processes_naming(str(logs)) == 0
 
