@@ -2,7 +2,6 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb_lab.evaluation.tracking.benchmark import prediction_table
 from ros_3d_bb_lab.evaluation.tracking.prediction_benchmark import predictions
 from ros_3d_bb_lab.evaluation.tracking.trajectories import Sequence, pedestrian_of
@@ -21,7 +20,7 @@ def walk(steps, speed_mps=1.2, stops_at=None):
 
 
 def test_a_straight_walk_is_predicted_exactly_by_a_constant_velocity():
-    scores = predictions(Tracker, [recording('straight', walk(20))])
+    scores = predictions([recording('straight', walk(20))])
     assert scores['straight']['cv_fde_2s_m'] == pytest.approx(0, abs=1e-9)
     assert scores['straight']['ours_fde_2s_m'] < 0.1 and scores['straight']['ours_coverage_95_2s'] == 1.0
     assert scores['mean'] == scores['straight']
@@ -29,13 +28,13 @@ def test_a_straight_walk_is_predicted_exactly_by_a_constant_velocity():
 
 def test_a_person_who_stops_is_predicted_too_far():
     """The only position with 8 steps and a known future is the last one of the walk, 2 s before the end."""
-    scores = predictions(Tracker, [recording('stop', walk(13, stops_at=7 * PERIOD_S))])['stop']
+    scores = predictions([recording('stop', walk(13, stops_at=7 * PERIOD_S))])['stop']
     assert scores['cv_fde_2s_m'] == pytest.approx(1.2 * 2)
     assert 1.8 < scores['ours_fde_2s_m'] < 2.5 and scores['ours_coverage_95_2s'] == 0.0
 
 
 def test_short_recordings_have_no_scores_and_do_not_count_in_the_mean():
-    scores = predictions(Tracker, [recording('short', walk(12)), recording('long', walk(20))])
+    scores = predictions([recording('short', walk(12)), recording('long', walk(20))])
     assert scores['short'] == dict.fromkeys(scores['short'])
     assert scores['mean'] == scores['long']
     lines = prediction_table(scores)
@@ -43,5 +42,5 @@ def test_short_recordings_have_no_scores_and_do_not_count_in_the_mean():
 
 
 def test_the_mean_weights_each_recording_equally():
-    scores = predictions(Tracker, [recording('a', walk(40)), recording('b', walk(13, stops_at=7 * PERIOD_S))])
+    scores = predictions([recording('a', walk(40)), recording('b', walk(13, stops_at=7 * PERIOD_S))])
     assert scores['mean']['cv_fde_2s_m'] == pytest.approx(1.2)

@@ -12,10 +12,10 @@ import math
 
 import numpy as np
 
-GAIN = 0.1  # change of the logarithm of the variance by a pair of innovations, relative to their correlation
+GAIN = 0.2  # change of the logarithm of the variance by a pair of innovations, relative to their correlation
 LARGEST = 3.0  # correlations are limited to this multiple of the expected squared innovation
 SETTLED_HITS = 3  # innovations of newer tracks show their unknown velocity
-MIN_LOG_SCALE, MAX_LOG_SCALE = 2 * math.log(0.1), 2 * math.log(2)  # a tenth to twice the standard deviation
+MIN_LOG_SCALE, MAX_LOG_SCALE = 2 * math.log(0.05), 2 * math.log(2)  # a twentieth to twice the standard deviation
 
 
 def widen(log_scale, measurements):
@@ -53,6 +53,13 @@ def _scale(log_factor, measurements):
         measurements['noise_m2'] *= np.where(measurements['noise_assumed'], math.exp(log_factor), 1)[:, None, None]
 
 
-def lasting_std(log_scale, assumed_m, least_m):
-    """Standard deviation of lasting errors: what the learned noise leaves of `assumed_m`, at least `least_m`."""
-    return math.sqrt(max(least_m ** 2, assumed_m ** 2 * (1 - math.exp(log_scale))))
+def learned_prediction(log_scale, assumed_m, params):
+    """PredictionParams `params` for a learned scale of the variance, of which `assumed_m` is the standard deviation.
+
+    What a scale below 1 leaves of it are lasting errors, and slow velocities are less noisy.
+    """
+    if log_scale >= 0:
+        return params
+    scale = math.exp(log_scale)
+    lasting_m = math.sqrt(max(params.position_bias ** 2, assumed_m ** 2 * (1 - scale)))
+    return params._replace(position_bias=lasting_m, standing_speed=params.standing_speed * math.sqrt(scale))

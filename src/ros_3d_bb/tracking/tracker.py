@@ -150,14 +150,12 @@ class Tracker(object):
 
     def objects(self):
         """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image."""
-        state, params, prediction = self._buffer.state, self._params, self._prediction
+        state, params = self._buffer.state, self._params
         tracks = state.tracks.take(np.argsort(state.tracks['id']))
         published = tracks['log_odds'] >= track_score.MIN_TRACK_SCORE
         published &= position_std_of(tracks) < params.max_position_std
         published |= tracks['status'] == VISIBLE
-        if state.log_noise_scale < 0:
-            prediction = prediction._replace(position_bias=noise_scale.lasting_std(
-                state.log_noise_scale, self._noise.noise_unknown, prediction.position_bias))
+        prediction = noise_scale.learned_prediction(state.log_noise_scale, self._noise.noise_unknown, self._prediction)
         return objects_of(tracks.compress(tracks['confirmed'] & published), prediction, self._classes)
 
     def _step(self, state, image, observed_s, assign_id):

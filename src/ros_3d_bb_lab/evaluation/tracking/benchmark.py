@@ -175,7 +175,7 @@ def bench(arguments):
     for contestant in contestants:
         trackers[contestant.name]['cpu_ms'] = {str(people): cpu_ms(contestant.make, people) for people in PEOPLE}
     print('\n'.join(table(trackers)))
-    prediction = predictions(Tracker, sequences)
+    prediction = predictions(sequences)
     print('\n'.join(prediction_table(prediction)))
     return {'sequences': names, 'recorded': bool(arguments.data), 'seed': arguments.seed,
             'repetitions': arguments.repetitions, 'seconds': arguments.seconds, 'trackers': trackers,
