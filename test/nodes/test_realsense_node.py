@@ -81,6 +81,16 @@ def test_the_frames_of_the_camera_are_published_once_and_form_a_tree(played):
     np.testing.assert_allclose(ahead, (1, 0, 0), atol=1e-12)
 
 
+def test_a_repeated_recording_starts_again(recording):
+    with Recorder(COLOR, Image, publisher_expected=False) as color:
+        process = started('realsense_node', 'file:=' + recording, 'repeat:=true', 'real_time:=false')
+        color.wait_for(2 * FRAMES + 1)
+        process.terminate()
+        assert process.wait(timeout=30) == 0
+    stamps = [message.header.stamp.to_sec() for message in color.messages]
+    assert max(np.diff(stamps)) > 0 > min(np.diff(stamps)) and len(set(stamps)) <= FRAMES
+
+
 @pytest.mark.parametrize('param, reason', [('file:=/nowhere.bag', '/nowhere.bag'), ('filters:=median', "has 'median'")])
 def test_a_node_that_cannot_start_exits_with_the_reason(recording, param, reason):
     process = started('realsense_node', param)

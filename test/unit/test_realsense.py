@@ -78,11 +78,6 @@ def test_points_of_colour_and_depth_agree_in_the_published_frames(played):
     np.testing.assert_allclose(links['front_color_frame'][1][:3, 3], (z, -x, -y), atol=1e-6)
 
 
-def test_a_repeated_recording_starts_again(recording):
-    stamps = [frame.stamp_ns for frame in play(recording, 2 * FRAMES + 1, repeat=True)[1]]
-    assert len(stamps) == 2 * FRAMES + 1 and len(set(stamps)) == FRAMES and stamps[FRAMES] == stamps[0]
-
-
 @pytest.mark.parametrize('filters', [['spatial'], ['disparity', 'spatial'], ['decimation'],
                                      ['disparity', 'spatial', 'temporal', 'hole_filling']])
 def test_filtered_depth_is_correct_and_aligned(recording, played, filters):

@@ -44,7 +44,6 @@ class RealSenseParams(NamedTuple):
     real_time: bool = Param(
         True, 'Whether a recording is played at the speed at which it was recorded, without the images for which the '
         'machine is too slow. Else it is played as fast as it can be read.')
-    repeat: bool = Param(False)
 
 
 class RgbdFrame(NamedTuple):
@@ -82,7 +81,7 @@ class RealSense(object):
 
     `camera` is the Camera of the colour stream and of the aligned depth; `link_from_color` (4, 4) transforms between
     the body frames, x forward and z up, of the colour and the depth camera (the `_link`); `is_over` is whether a
-    recording that is not repeated has ended.
+    recording has ended.
 
     Raises CameraLost if no such camera is connected, and ValueError if the recording cannot be played.
     """
@@ -226,7 +225,8 @@ def rgb_of(pixels, format_name):
 def _config(rs, params):
     config = rs.config()
     if params.file:
-        config.enable_device_from_file(params.file, params.repeat)  # enables all streams in the file
+        # Enables all streams in the file. Not repeated: librealsense may crash if it is stopped while it restarts.
+        config.enable_device_from_file(params.file, repeat_playback=False)
         return config
     if params.serial:
         config.enable_device(params.serial)

@@ -31,6 +31,7 @@ class RealSenseNodeParams(NamedTuple):
     """Parameters of realsense_node, except those of the camera."""
 
     frame_prefix: str = Param('camera')
+    repeat: bool = Param(False)
     publish_clock: bool = Param(
         False, 'Whether this node publishes the time of a recording on /clock.', section=SET_BY_LAUNCH)
     wait_for_subscribers: int = WAIT_FOR_SUBSCRIBERS
@@ -76,7 +77,7 @@ class RealSenseNode(object):
             self._worker.join(CLOSING_S)
 
     def _run(self):
-        """Read the camera until shutdown, reconnecting whenever it is lost.
+        """Read the camera until shutdown, reconnecting whenever it is lost, and repeat a recording.
 
         This runs in a worker thread because rospy publishes from any thread except the main one.
         """
@@ -105,7 +106,7 @@ class RealSenseNode(object):
                 if frame is not None:
                     self._publish(camera, frame, links)
                     links = ()  # /tf_static is latched
-        if camera.is_over:
+        if camera.is_over and not self._params.repeat:
             rospy.loginfo('the recording is over')
             time.sleep(SENDING_S)
             rospy.signal_shutdown('the recording is over')
