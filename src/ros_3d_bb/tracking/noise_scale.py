@@ -54,9 +54,9 @@ def _scale(log_factor, measurements):
 
 
 def learned_prediction(log_scale, assumed_m, params):
-    """PredictionParams `params` for a learned scale of the variance, of which `assumed_m` is the standard deviation.
+    """Adapt PredictionParams to a learned scale of the variance `assumed_m`².
 
-    What a scale below 1 leaves of it are lasting errors, and slow velocities are less noisy.
+    If the scale is below 1, the rest of the variance is that of lasting errors, and slow velocities are less noisy.
     """
     if log_scale >= 0:
         return params
