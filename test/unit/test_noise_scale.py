@@ -58,3 +58,15 @@ def test_the_learned_noise_outlives_the_tracks():
     learned, new = ([other.update(100 * NS + number * NS // 5, [Detection(np.array([3, 0.1 * number, 0.85]), SIZE_M)],
                                   VIEW) for number in range(4)][-1] for other in (tracker, Tracker()))
     assert velocity_sigma_mps(learned) < 0.8 * velocity_sigma_mps(new)
+
+
+def test_slow_velocities_are_trusted_if_the_errors_are_small():
+    tracker = Tracker()
+    walk(tracker, 0.005, turns=0.8)
+    tracker.reset()
+    shares = []
+    for other in (tracker, Tracker()):
+        track, = [other.update(100 * NS + number * NS // 5, [Detection(np.array([3, 0.04 * number, 0.85]), SIZE_M)],
+                               VIEW) for number in range(20)][-1]
+        shares.append((track.prediction_m[-1] - track.position_m)[1] / (2 * track.velocity_mps[1]))
+    assert shares[0] > 0.95 and shares[1] < 0.75
