@@ -100,7 +100,7 @@ def test_without_publish_clock_stamps_are_the_time_of_the_machine(path):
     stamps = [message.header.stamp.to_sec() for message in truth.messages]
     assert began - 1 < stamps[0] < began + 15
     assert stamps == sorted(stamps)
-    assert max(np.diff(stamps)) > 3  # the pause between rounds
+    assert 3 < max(np.diff(stamps)) < 15  # the pause between rounds is 3 s; a busy machine renders slowly
     assert stamps[-1] < time.time()
 
 
