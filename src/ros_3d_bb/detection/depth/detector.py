@@ -11,7 +11,7 @@ from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.detection.depth.ground_plane import FittedFloor, check_upright
 from ros_3d_bb.detection.depth.person_classifier import (BEST_HOG, PersonHog, PersonWindow, person_score, pyramid_of,
                                                          shape_features_of)
-from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_person_clusters, grid_of
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_person_clusters, grid_of, quantile_of
 
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
 SURE_SCORE = 0.95  # further scales are not evaluated from this score on
@@ -104,7 +104,7 @@ def box_of(blob, shape, grid, camera, floor):
     rows, columns = blob.mask.shape
     x1, y1, x2, y2 = (edge * grid.step for edge in (blob.column, blob.row, blob.column + columns, blob.row + rows))
     if shape.bottom_m < 0.4:
-        lowest_m = np.median(blob.window(grid.depth_m)[-3:][blob.mask[-3:]])
+        lowest_m = quantile_of(blob.window(grid.depth_m)[-3:][blob.mask[-3:]], 0.5)
         y2 = max(y2, floor.row(camera, (x1 + x2) / 2.0, lowest_m))
     return x1, y1, min(x2, camera.width), min(y2, camera.height)
 

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from ros_3d_bb.detection.depth.person_clusters import quantile_of
+
 WINDOW_PX = (64, 128)
 PERSON_PX = 96  # height of the person in the detector's window
 SHIFT_PX = 8  # the window is also evaluated this far to each side, above and below
@@ -69,9 +71,9 @@ def shape_features_of(mask, ahead_m, thickness_m):
         rise_m = _above_column_medians(ahead_m[:, columns], cells)
         rows = _above_column_medians(np.arange(len(mask), dtype=float)[:, None], cells)
         slope = rise_m.dot(rows) / max(rows.dot(rows), 1)  # of a wall in the image of a tilted camera
-        relief_m = np.percentile(np.abs(rise_m - slope * rows), 80)
-    noise_m = 0.01 + STEREO_NOISE_PER_M * np.median(ahead_m[mask]) ** 2
-    return np.array([max(mask.mean(), 0.5), np.clip(relief_m / noise_m, 0.8, 2.0), thickness_m])
+        relief_m = quantile_of(np.abs(rise_m - slope * rows), 0.8)
+    noise_m = 0.01 + STEREO_NOISE_PER_M * quantile_of(ahead_m[mask], 0.5) ** 2
+    return np.array([max(mask.mean(), 0.5), min(max(relief_m / noise_m, 0.8), 2.0), thickness_m])
 
 
 def _above_column_medians(values, mask):

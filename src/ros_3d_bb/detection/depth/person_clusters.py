@@ -111,11 +111,9 @@ def grid_of(depth, camera, floor, params):
 
 
 def find_person_clusters(grid, camera, params):
-    """Yield (Blob, Shape) of the blobs of human size."""
-    for blob in _merge_stacked(_split_blobs(grid, camera, params), grid, camera, params):
-        shape = shape_of(blob, grid, camera)
-        if _is_human(shape, params):
-            yield blob, shape
+    """Return (Blob, Shape) of each blob of human size."""
+    clusters = _merge_stacked(_split_blobs(grid, camera, params), grid, camera, params)
+    return [(blob, shape) for blob, shape in clusters if _is_human(shape, params)]
 
 
 def _foreground_cells(grid, params):
@@ -147,6 +145,11 @@ def shape_of(blob, grid, camera):
                  blob.column == 0 or blob.column + columns >= grid.depth_m.shape[1])
 
 
+def quantile_of(values, share):
+    """Quantile of values (n,). np.quantile gives the same in seven times the time."""
+    return np.interp(share * (len(values) - 1), np.arange(len(values)), np.sort(values))
+
+
 def _is_human(shape, params):
     cut = 0.6 if shape.cut_side else 1.0
     visible_m = params.min_visible_cut if shape.cut_top else params.min_visible
@@ -166,7 +169,7 @@ def _connected(cells, row=0, column=0):
 
 
 def _split_blobs(grid, camera, params):
-    """Foreground blobs; those that have two heads or are too large for one person are split."""
+    """Foreground blobs and their shapes; blobs that have two heads or are too large for one person are split."""
     to_split = [(blob, 0) for blob in _connected(_foreground_cells(grid, params))]
     parts = []
     while to_split:
@@ -179,7 +182,7 @@ def _split_blobs(grid, camera, params):
         if pieces and splits < 4:
             to_split.extend((piece, splits + 1) for piece in pieces)
         elif not too_large:
-            parts.append(blob)
+            parts.append((blob, shape))
     return parts
 
 
@@ -218,16 +221,17 @@ def _split_between_heads(blob, grid):
 
 def _merge_stacked(parts, grid, camera, params):
     """Merge parts at one depth and above each other, such as a person behind the arm of another person."""
-    remaining = [(part, shape_of(part, grid, camera)) for part in sorted(parts, key=lambda part: -part.mask.size)]
+    remaining = sorted(parts, key=lambda part: -part[0].mask.size)
     merged = []
     while remaining:
-        blob, shape = remaining.pop(0)
+        part, shape = remaining.pop(0)
+        blob = part
         for i in range(len(remaining) - 1, -1, -1):
             other, other_shape = remaining[i]
             if _are_stacked(blob, shape, other, other_shape, params):
                 blob = _union(blob, other)
                 del remaining[i]
-        merged.append(blob)
+        merged.append((blob, shape if blob is part else shape_of(blob, grid, camera)))
     return merged
 
 
