@@ -5,7 +5,7 @@ Robot frame, metres.
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.planning.planner_view import position_after, walking_velocity
+from ros_3d_bb.planning.planner_view import covariances_after, position_after, walking_velocity
 
 CELL_M = 0.1
 HALF_SIZE_M = 5.0  # of the grid, whose centre is the robot
@@ -51,7 +51,8 @@ def presence_costs(tracks, robot_from_tracks, robot_radius_m):
         end_s = min(track.prediction_step_s * len(track.prediction_m), HORIZON_S) if track.moving else 0.0
         times_s = np.arange(0, end_s + STEP_S / 2, STEP_S)
         centers_m = transform_points(robot_from_tracks, position_after(track, times_s))[:, :2]
-        covariances_m2 = _covariances_after(track, times_s, robot_from_tracks[:2, :3])
+        narrowed = robot_from_tracks[:2, :3] @ _narrowing(walking_velocity(track))
+        covariances_m2 = narrowed @ covariances_after(track, times_s) @ narrowed.T
         for center_m, covariance_m2 in zip(centers_m, covariances_m2):
             _raise_to(probabilities, center_m, covariance_m2, track.size_m[0] / 2 + COMFORT_M)
         np.minimum(probabilities, 1, out=probabilities)
@@ -72,17 +73,8 @@ def _raise_to(probabilities, center_m, covariance_m2, radius_m):
     np.maximum(window, radius_m ** 2 / 2 / np.sqrt(np.linalg.det(spread_m2)) * np.exp(-squares / 2), out=window)
 
 
-def _covariances_after(track, times_s, robot_from_tracks):
-    """Covariances (k, 2, 2) of the position of a track after times (k,) in the robot frame, 0 if unknown; narrowed by
-    `ACROSS` if the track moves."""
-    if track.covariance is None or track.prediction_covariance_m2 is None:
-        return np.zeros((len(times_s), 2, 2))
-    known = np.concatenate((track.covariance[np.newaxis, :3, :3], track.prediction_covariance_m2))
-    steps = np.minimum(times_s / track.prediction_step_s, len(known) - 1)
-    before = np.minimum(steps.astype(int), len(known) - 2)
-    share = (steps - before)[:, np.newaxis, np.newaxis]
-    covariances_m2 = (1 - share) * known[before] + share * known[before + 1]
-    x, y, _z = walking_velocity(track)
+def _narrowing(velocity_mps):
+    """Matrix (3, 3) that scales offsets across a velocity (3,) by `ACROSS`; the identity if it is zero."""
+    x, y, _z = velocity_mps
     across = np.array([-y, x, 0]) / max(np.hypot(x, y), 1e-9)
-    narrowed = robot_from_tracks @ (np.eye(3) - (1 - ACROSS) * np.outer(across, across))
-    return narrowed @ covariances_m2 @ narrowed.T
+    return np.eye(3) - (1 - ACROSS) * np.outer(across, across)

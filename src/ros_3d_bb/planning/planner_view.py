@@ -61,10 +61,25 @@ def position_after(track, ahead_s):
     velocity.
     """
     ahead_s = np.asarray(ahead_s, float)
-    times_s = track.prediction_step_s * np.arange(len(track.prediction_m) + 1)
     known_m = np.vstack((track.position_m, track.prediction_m))
-    position_m = np.stack([np.interp(ahead_s, times_s, axis_m) for axis_m in known_m.T], axis=-1)
-    return position_m + np.maximum(ahead_s - times_s[-1], 0)[..., np.newaxis] * walking_velocity(track)
+    beyond_s = np.maximum(ahead_s - track.prediction_step_s * len(track.prediction_m), 0)
+    return (_interpolated(known_m, track.prediction_step_s, ahead_s)
+            + beyond_s[..., np.newaxis] * walking_velocity(track))
+
+
+def covariances_after(track, ahead_s):
+    """Covariances (n, 3, 3) of the positions of a track `ahead_s` (n,) seconds after its stamp, m², interpolated
+    linearly; 0 if unknown. Beyond the last one they stay the same.
+    """
+    if track.covariance is None or track.prediction_covariance_m2 is None:
+        return np.zeros((len(ahead_s), 3, 3))
+    known_m2 = np.concatenate((track.covariance[np.newaxis, :3, :3], track.prediction_covariance_m2))
+    return _interpolated(known_m2.reshape(-1, 9), track.prediction_step_s, ahead_s).reshape(-1, 3, 3)
+
+
+def _interpolated(rows, step_s, times_s):
+    """Interpolate rows (k, n) at intervals of `step_s` linearly to times (...). Returns an array (..., n)."""
+    return np.stack([np.interp(times_s, step_s * np.arange(len(rows)), column) for column in rows.T], axis=-1)
 
 
 def predicted_to(tracks, ahead_s):
@@ -99,7 +114,8 @@ def footprint_points(tracks, ahead_s, spacing_m):
     later_s = np.linspace(0, ahead_s, int(np.ceil(ahead_s / SWATH_STEP_S)) + 1)[1:]
     points = [np.empty((0, 3))]
     for track in tracks:
-        std_m = _position_std_after(track, np.append(0, later_s))
+        covariances_m2 = covariances_after(track, np.append(0, later_s))
+        std_m = np.sqrt(np.maximum(covariances_m2[:, 0, 0], covariances_m2[:, 1, 1]))
         if track.moving and track.status == OUT_OF_VIEW and std_m[0] >= MAX_STD_UNSEEN_M:
             continue
         disc = disc_points(track.size_m[0] / 2, spacing_m)
@@ -107,17 +123,6 @@ def footprint_points(tracks, ahead_s, spacing_m):
         centers_m = np.vstack((track.position_m + levels_m, position_after(track, later_s[std_m[1:] < MAX_STD_M])))
         points.append((centers_m[:, np.newaxis] + disc).reshape(-1, 3))
     return np.concatenate(points)
-
-
-def _position_std_after(track, ahead_s):
-    """Standard deviations (n,) of the position, the larger ones of x and y, `ahead_s` (n,) seconds after the stamp,
-    metres; 0 if unknown.
-    """
-    if track.covariance is None or track.prediction_covariance_m2 is None:
-        return np.zeros(len(ahead_s))
-    covariances_m2 = np.concatenate((track.covariance[np.newaxis, :3, :3], track.prediction_covariance_m2))
-    std_m = np.sqrt(np.maximum(covariances_m2[:, 0, 0], covariances_m2[:, 1, 1]))
-    return np.interp(ahead_s, track.prediction_step_s * np.arange(len(std_m)), std_m)
 
 
 def disc_points(radius_m, spacing_m):
