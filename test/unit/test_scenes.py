@@ -15,8 +15,8 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
-from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, exact_detector, main, result_of,
-                                                      score_tracks, yolov5_detector)
+from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, detections_without_scores,
+                                                      exact_detector, main, result_of, score_tracks, yolov5_detector)
 from ros_3d_bb_lab.evaluation.scenes import Step, detect_in_scene, run_scene, score_detections
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, PersonTruth, Poses, SimulatedFrame, Simulator
@@ -37,7 +37,8 @@ OTHERS_EVERY = {'depth': 10, 'yolov5': 20}  # scenes in which only detections ar
 @pytest.fixture(scope='module')
 def yolov5():
     if not DATA:
-        return lambda frame: [person.box_px for person in frame.people if person.visible > 0.3]
+        return lambda frame: detections_without_scores([person.box_px for person in frame.people
+                                                        if person.visible > 0.3])
     return yolov5_detector(os.path.join(DATA, 'weights', 'yolov5n.pt'))
 
 
@@ -94,7 +95,7 @@ def test_exact_boxes_have_a_reproducible_jitter(approach):
     jitters_px = []
     for number in range(0, 285, 19):
         frame = approach.frame(number)
-        boxes, again = (exact_detector(approach)(frame) for _time in range(2))
+        boxes, again = (exact_detector(approach)(frame).boxes for _time in range(2))
         assert boxes.tolist() == again.tolist() and boxes.shape == (1, 4)
         assert (boxes >= 0).all() and (boxes <= [640, 480] * 2).all() and (boxes == np.rint(boxes)).all()
         inside = (np.array(frame.people[0].box_px) > 4) & (np.array(frame.people[0].box_px) < [636, 476] * 2)

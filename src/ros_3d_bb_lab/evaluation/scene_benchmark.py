@@ -7,6 +7,7 @@ import sys
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
 from ros_3d_bb.estimation.error_model import read_error_model
@@ -34,7 +35,7 @@ def depth_detector(simulator):
     """Weight-free detector for `run_scene`. It receives the floor plane that tf provides on a robot."""
     detector = DepthPeople()
     return lambda frame: detector.detect(frame.color, DepthImage(frame.depth_mm, 0.001), simulator.camera,
-                                         floor_from_transform(np.linalg.inv(frame.poses.map_from_camera))).boxes
+                                         floor_from_transform(np.linalg.inv(frame.poses.map_from_camera)))
 
 
 def yolov5_detector(weights):
@@ -42,12 +43,17 @@ def yolov5_detector(weights):
     from ros_3d_bb.detection.network_detector import NetworkDetector
     from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch (slow)
     detector = NetworkDetector(open_runtime(weights, RuntimeParams(device='cpu')))
-    return lambda frame: detector.detect(frame.color).boxes
+    return lambda frame: detector.detect(frame.color)
 
 
 def exact_detector(simulator):
-    """Detector for `run_scene` that returns the boxes of `jittered_boxes`."""
-    return lambda frame: jittered_boxes(frame, simulator.camera, simulator.scenario.seed)
+    """Detector for `run_scene` that returns the boxes of `jittered_boxes`, without scores."""
+    return lambda frame: detections_without_scores(jittered_boxes(frame, simulator.camera, simulator.scenario.seed))
+
+
+def detections_without_scores(boxes):
+    """Detections of people whose scores are unknown."""
+    return Detections(np.array(boxes, float).reshape(-1, 4), np.zeros(len(boxes)), np.zeros(len(boxes), int))
 
 
 def score_tracks(steps, camera):

@@ -33,18 +33,18 @@ class Step(NamedTuple):
 def detect_in_scene(simulator, detect, every=1, error_model=None):
     """Render a scene and detect the people in it, image by image.
 
-    `detect` is called with a SimulatedFrame and returns 2D boxes (n, 4). Every `every`-th image is used. An error model
-    corrects the 3D boxes and provides their covariance, as in bbox3d_node. Yields a
-    Step without tracks, and the inputs of a tracker: its detections and the CameraView.
+    `detect` is called with a SimulatedFrame and returns `boxes.Detections`. Every `every`-th image is used. An error
+    model corrects the 3D boxes and provides their covariance, as in bbox3d_node. Yields a Step without tracks, and the
+    inputs of a tracker: its detections and the CameraView.
     """
     for number in range(0, simulator.frame_count, every):
         frame = simulator.frame(number)
-        boxes = np.asarray(detect(frame), float).reshape(-1, 4)
+        detected = detect(frame)
         depth = DepthImage(frame.depth_mm, 0.001)
         stamp_ns = int(round(frame.time_s * NS))
         people = [track for track in simulator.true_tracks(frame, stamp_ns) if track.label == PERSON]
-        step = Step(frame._replace(color=None, depth_mm=None), boxes, Moment(stamp_ns, people, []))
-        detections = _detections(depth, boxes, simulator.camera, frame.poses.map_from_camera, error_model)
+        step = Step(frame._replace(color=None, depth_mm=None), detected.boxes, Moment(stamp_ns, people, []))
+        detections = _detections(depth, detected, simulator.camera, frame.poses.map_from_camera, error_model)
         view = CameraView(frame.poses.map_from_camera, simulator.camera, frame.camera,
                           functools.partial(depths_towards, simulator.camera, depth))
         yield step, detections, view
@@ -59,12 +59,15 @@ def run_scene(simulator, detect, every=1, error_model=None):
     return steps
 
 
-def _detections(depth, boxes, camera, map_from_camera, error_model):
-    """Convert 2D boxes to detections in the map, as bbox3d_node and tracker_node do."""
-    rects_px = [tuple(rect) for rect in np.rint(boxes).astype(int).tolist() if rect[0] < rect[2] and rect[1] < rect[3]]
-    estimated = estimate_boxes(depth, rects_px, camera, estimator_named('foreground'),
+def _detections(depth, detected, camera, map_from_camera, error_model):
+    """Convert 2D detections to detections in the map, as bbox3d_node and tracker_node do."""
+    rects_px = np.rint(detected.boxes).astype(int)
+    usable = (rects_px[:, :2] < rects_px[:, 2:]).all(axis=1)
+    estimated = estimate_boxes(depth, list(map(tuple, rects_px[usable].tolist())), camera,
+                               estimator_named('foreground'),
                                level_from_camera=level_rotation(map_from_camera[2, :3]))
-    found = corrected_boxes([box for box in estimated if box is not None], error_model)
+    found = corrected_boxes([box._replace(score=score) for box, score in zip(estimated, detected.scores[usable])
+                             if box is not None], error_model)
     return detections_from_boxes(dict(enumerate(found)), map_from_camera)
 
 
