@@ -2,6 +2,7 @@
 
 Without the archives in ROS_3D_BB_DATA, replicas of them run (`support.replica_nodes`).
 """
+import itertools
 import os
 import signal
 import subprocess
@@ -22,6 +23,9 @@ LETHAL, STANDING_MPS = 100, 0.01
 STOP_S = 1.0  # after a fault the robot must stand within this time
 STARTING_S = 30.0  # for a killed node to be back
 STANDING = np.array([[6.0, 1.8], [5.0, -2.0]])
+CORNERS = np.array([[9.0, 0.0], [9.0, 9.0], [0.0, 9.0], [0.0, 0.0]])
+NEAR_M = 2.5  # from a corner, at which the robot gets the next one as its goal
+UNDISTURBED_S = float(os.environ.get('ROS_3D_BB_DRIVE_S', 5))
 
 
 def two_people(seconds):
@@ -54,11 +58,16 @@ def drives(robot):
     """The robot drives towards a goal far ahead, beside two people."""
     robot.people, robot.sees = lambda _seconds: STANDING + [robot.place_m[0], 0], True
     robot.is_faulty = False
-    goal = PoseStamped(header=header_at(robot.now_ns, 'map'))
-    goal.pose.position.x, goal.pose.orientation.w = robot.place_m[0] + 9.0, 1.0
-    robot.goal.publish(goal)
+    send_goal(robot, [robot.place_m[0] + 9.0, 0.0])
     until(robot, lambda: robot.velocity > 0.2, 20.0)
     return robot
+
+
+def send_goal(robot, place_m):
+    goal = PoseStamped(header=header_at(robot.now_ns, 'map'))
+    goal.pose.position.x, goal.pose.position.y = place_m
+    goal.pose.orientation.w = 1.0
+    robot.goal.publish(goal)
 
 
 def until(robot, condition, limit_s):
@@ -110,11 +119,17 @@ def test_visible_people_are_lethal_in_the_local_costmap_and_leave_no_trail(robot
 
 @pytest.mark.parametrize('people_m', [np.zeros((0, 2)), STANDING])
 def test_the_robot_does_not_stop_without_a_fault_whether_or_not_somebody_is_in_view(drives, people_m):
-    ahead_m = drives.place_m[0]
-    drives.people = lambda _seconds: people_m + [ahead_m, 0]
-    for _step in range(50):
+    """It drives around a square for ROS_3D_BB_DRIVE_S seconds."""
+    origin_m = np.array([drives.place_m[0], 0.0])
+    corners = itertools.cycle(origin_m + CORNERS)
+    corner_m = next(corners)
+    drives.people = lambda _seconds: people_m + origin_m
+    for _step in range(int(10 * UNDISTURBED_S)):
         drives.advance(0.1)
         assert drives.velocity > STANDING_MPS
+        if np.linalg.norm(drives.place_m - corner_m) < NEAR_M:
+            corner_m = next(corners)
+            send_goal(drives, corner_m)
 
 
 def test_the_robot_stops_when_the_camera_stops_and_drives_on(drives):
