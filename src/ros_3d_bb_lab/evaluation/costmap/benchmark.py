@@ -10,7 +10,7 @@ import os
 import sys
 import tempfile
 import time
-from typing import NamedTuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 import rospy
@@ -30,7 +30,7 @@ from ros_3d_bb_lab.evaluation.costmap.costmap_score import Costmap, Sighting, sc
 from ros_3d_bb_lab.evaluation.costmap.picture import draw_costmap
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, describe_machine, scenario_path
 from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
-from ros_3d_bb_lab.evaluation.scene_benchmark import RANGE_M, depth_detector
+from ros_3d_bb_lab.evaluation.scene_benchmark import RANGE_M, depth_detector, yolov5_detector
 from ros_3d_bb_lab.evaluation.scenes import run_scene
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -59,31 +59,32 @@ LAUNCH = """<launch>
 
 
 class Scene(NamedTuple):
-    """A tracked scene: its name, the Simulator, and a Step per image (`scenes.Step`)."""
+    """A tracked scene: its name, the Simulator, a Step per image (`scenes.Step`), and the range of the detector."""
 
     name: str
     simulator: Simulator
     steps: list
+    range_m: Tuple[float, float]
 
 
-def tracked_scene(name):
-    """Render and track a scene, given by the name of its scenario."""
+def tracked_scene(name, yolov5=None):
+    """Render and track a scene, given by the name of its scenario, with the depth detector or the one given."""
     simulator = Simulator(read_scenario(scenario_path(name)))
-    return Scene(name, simulator, run_scene(simulator, depth_detector(simulator), 1,
-                                            read_error_model(SIMULATED_ERROR_MODEL)))
+    steps = run_scene(simulator, yolov5 or depth_detector(simulator), 1, read_error_model(SIMULATED_ERROR_MODEL))
+    return Scene(name, simulator, steps, RANGE_M['yolov5' if yolov5 else 'depth'])
 
 
 def sightings_of(scene):
     """What each image of a scene shows within the range of the detector, as a list of Sighting."""
-    return [Sighting(step.frame.time_s, np.array([_is_visible(person, step.frame) for person in step.moment.truth]),
+    return [Sighting(step.frame.time_s,
+                     np.array([_is_visible(person, step.frame, scene.range_m) for person in step.moment.truth]),
                      np.reshape([track.position_m[:2] for track in step.moment.tracks], (-1, 2)))
             for step in scene.steps]
 
 
-def _is_visible(person, frame):
-    nearest_m, farthest_m = RANGE_M['depth']
+def _is_visible(person, frame, range_m):
     depth_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), person.position_m)[2]
-    return person.status == VISIBLE and nearest_m <= depth_m <= farthest_m
+    return person.status == VISIBLE and range_m[0] <= depth_m <= range_m[1]
 
 
 class Player(object):
@@ -166,7 +167,11 @@ def main():
     arguments = _arguments()
     print(describe_machine())
     print(COLUMNS % HEADINGS, flush=True)
-    scenes = [tracked_scene(name) for name in arguments.scenes.split(',')]
+    try:
+        yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
+        scenes = [tracked_scene(name, yolov5) for name in arguments.scenes.split(',')]
+    except (ValueError, OSError, argparse.ArgumentTypeError) as error:
+        sys.exit('./run bench costmap: %s' % error)
     results = {}
     with running_nodes():
         rospy.init_node('costmap_benchmark', disable_signals=True)
@@ -200,6 +205,7 @@ def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench costmap', description=__doc__)
     parser.add_argument('--scenes', default=','.join(SCENES),
                         help='names in config/scenarios or files, separated by commas (default: %(default)s)')
+    parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, people are detected in depth')
     parser.add_argument('--speed', type=float, default=1.0,
                         help='speed of time; less than 1 on a busy machine (default: 1)')
     parser.add_argument('--picture', metavar='FILE', help='image of the first scene to write')
