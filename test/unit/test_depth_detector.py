@@ -186,6 +186,18 @@ def test_a_fitted_floor_is_dropped_once_the_floor_is_known():
         (depth, None), (hidden, None), (hidden, room.floor), (hidden, None))] == [True, True, True, False]
 
 
+def test_the_hog_score_of_a_person_is_used_for_two_more_images():
+    """Then it is evaluated again, here in a blank image, and it is at another place."""
+    room, elsewhere = Room(), Room()
+    room.person(-0.8, 3)
+    elsewhere.person(0.8, 3)
+    (color, depth), far, blank = room.images(), elsewhere.images()[1], np.full((480, 640, 3), 130, np.uint8)
+    detector = DepthPeople()
+    counts = [len(detector.detect(image, seen, CAMERA, room.floor).boxes) for image, seen in (
+        (blank, depth), (color, depth), (blank, depth), (blank, depth), (blank, depth), (color, depth), (blank, far))]
+    assert counts == [0, 1, 1, 1, 0, 1, 0]
+
+
 @pytest.mark.parametrize('image,depth,named', [
     ((240, 320), (240, 320), 'depth .*320 x 240.*camera 640 x 480'),
     ((240, 320), (480, 640), 'colour .*320 x 240.*depth image 640 x 480')])

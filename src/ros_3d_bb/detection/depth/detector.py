@@ -3,6 +3,7 @@
 Points above the floor are clustered. A cluster of human size is classified as a person by its shape in depth and by
 OpenCV's HOG people detector.
 """
+import math
 from typing import NamedTuple, Tuple
 
 import numpy as np
@@ -14,16 +15,22 @@ from ros_3d_bb.detection.depth.person_classifier import (BEST_HOG, PersonHog, Pe
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_person_clusters, grid_of, quantile_of
 
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
-SURE_SCORE = 0.95  # further scales are not evaluated from this score on
+SURE_SCORE = 0.95  # no further HOG scores are evaluated from this score on
+MAX_HOG_AGE = 2  # number of further images for which the HOG score of a person is used
 MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person
 
 
 class DepthDetection(NamedTuple):
-    """A detected person: box (x1, y1, x2, y2), score 0..1, and position to the right and ahead of the camera."""
+    """A detected person: box (x1, y1, x2, y2), score 0..1, and position to the right and ahead of the camera.
+
+    The HOG score is that of `hog_age` images ago.
+    """
 
     box: Tuple[float, float, float, float]
     score: float
     position_m: Tuple[float, float]
+    hog: float
+    hog_age: int
 
 
 class DepthPeople(object):
@@ -35,6 +42,7 @@ class DepthPeople(object):
     def __init__(self, params=DepthPeopleParams()):
         self.reconfigure(params)
         self._hog, self._fitted_floor = PersonHog(), FittedFloor()
+        self._last_people = []  # DepthDetections in the last image
 
     def reconfigure(self, params):
         """Change the DepthPeopleParams. If two contradict each other, raise ValueError and keep the old ones."""
@@ -72,15 +80,26 @@ class DepthPeople(object):
             features = shape_features_of(blob.mask, blob.window(grid.ahead_m), shape.thickness_m)
             if person_score(features, BEST_HOG, shape.cut_top) < self._params.min_score:
                 continue  # rejected by its shape alone: HOG cannot raise the score enough
-            for hog in self._hog.scores(pyramid, person_window_of(blob, shape, grid, camera, floor)):
+            box = box_of(blob, shape, grid, camera, floor)
+            position_m = ((box[0] + box[2]) / 2.0 - camera.cx) / camera.fx * shape.depth_m, shape.depth_m
+            window = person_window_of(blob, shape, grid, camera, floor)
+            for hog, hog_age in self._hog_scores(pyramid, window, position_m):
                 score = person_score(features, hog, shape.cut_top)
                 if score >= SURE_SCORE:
                     break
             if score >= self._params.min_score:
-                box = box_of(blob, shape, grid, camera, floor)
-                x_m = ((box[0] + box[2]) / 2.0 - camera.cx) / camera.fx * shape.depth_m
-                people.append(DepthDetection(box, score, (x_m, shape.depth_m)))
+                people.append(DepthDetection(box, score, position_m, hog, hog_age))
+        self._last_people = people
         return _merged_detections(people)
+
+    def _hog_scores(self, pyramid, window, position_m):
+        """Yield HOG scores and their ages: that of a person at the same place in the last image, then new ones."""
+        for person in self._last_people:
+            if person.hog_age < MAX_HOG_AGE and _distance_m(person.position_m, position_m) < MIN_DISTANCE_M:
+                yield person.hog, person.hog_age + 1
+                break
+        for hog in self._hog.scores(pyramid, window):
+            yield hog, 0
 
 
 def person_window_of(blob, shape, grid, camera, floor):
@@ -109,6 +128,10 @@ def box_of(blob, shape, grid, camera, floor):
     return x1, y1, min(x2, camera.width), min(y2, camera.height)
 
 
+def _distance_m(one_m, other_m):
+    return math.hypot(one_m[0] - other_m[0], one_m[1] - other_m[1])
+
+
 def _merged_detections(people):
     """Merge parts of one person, closer together than MIN_DISTANCE_M, and convert DepthDetections to Detections.
 
@@ -117,7 +140,7 @@ def _merged_detections(people):
     merged = []
     for part in sorted(people, key=lambda person: -np.subtract(person.box[2:], person.box[:2]).prod()):
         for index, person in enumerate(merged):
-            if np.hypot(*np.subtract(person.position_m, part.position_m)) < MIN_DISTANCE_M:
+            if _distance_m(person.position_m, part.position_m) < MIN_DISTANCE_M:
                 box = np.hstack((np.minimum(person.box[:2], part.box[:2]), np.maximum(person.box[2:], part.box[2:])))
                 merged[index] = person._replace(box=box, score=max(person.score, part.score))
                 break
