@@ -30,13 +30,16 @@ def bag(tmp_path_factory):
 
 @pytest.fixture
 def benchmark(tmp_path):
-    """Starts the benchmark as a separate process; the command lines of its nodes contain the log folder `tmp_path`."""
+    """Starts the benchmark as a separate process; the command lines of its nodes contain the log folder `tmp_path`.
+
+    The process handles SIGINT even if this one ignores it, as the background jobs of a script do.
+    """
     environment = dict(os.environ, ROS_HOSTNAME='localhost', ROS_LOG_DIR=str(tmp_path))
 
     def start(*arguments):
         return subprocess.Popen([sys.executable, '-m', 'ros_3d_bb_lab.evaluation', 'latency'] + list(arguments),
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True,
-                                env=environment)
+                                env=environment, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     return start
 
 
