@@ -67,9 +67,9 @@ class Scene(NamedTuple):
     range_m: Tuple[float, float]
 
 
-def tracked_scene(name, yolov5=None):
-    """Render and track a scene, given by the name of its scenario, with the depth detector or the one given."""
-    simulator = Simulator(read_scenario(scenario_path(name)))
+def tracked_scene(name, path, yolov5=None):
+    """Render and track the scenario in a file with the depth detector or the one given."""
+    simulator = Simulator(read_scenario(path))
     steps = run_scene(simulator, yolov5 or depth_detector(simulator), 1, read_error_model(SIMULATED_ERROR_MODEL))
     return Scene(name, simulator, steps, RANGE_M['yolov5' if yolov5 else 'depth'])
 
@@ -169,8 +169,8 @@ def main():
     print(COLUMNS % HEADINGS, flush=True)
     try:
         yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
-        scenes = [tracked_scene(name, yolov5) for name in arguments.scenes.split(',')]
-    except (ValueError, OSError, argparse.ArgumentTypeError) as error:
+        scenes = [tracked_scene(name, path, yolov5) for name, path in arguments.scenes.items()]
+    except (ValueError, OSError) as error:
         sys.exit('./run bench costmap: %s' % error)
     results = {}
     with running_nodes():
@@ -203,7 +203,7 @@ def running_nodes():
 
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench costmap', description=__doc__)
-    parser.add_argument('--scenes', default=','.join(SCENES),
+    parser.add_argument('--scenes', type=_scenario_paths, default=','.join(SCENES), metavar='A,B',
                         help='names in config/scenarios or files, separated by commas (default: %(default)s)')
     parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, people are detected in depth')
     parser.add_argument('--speed', type=float, default=1.0,
@@ -212,3 +212,7 @@ def _arguments():
     parser.add_argument('--at', type=float, default=5.0, metavar='S', help='time of the picture (default: 5)')
     parser.add_argument('--json', metavar='FILE', help='file to which the results are also written')
     return parser.parse_args()
+
+
+def _scenario_paths(names):
+    return {name: scenario_path(name) for name in names.split(',')}
