@@ -56,11 +56,8 @@ def outputs_of(head, boxes, scores, input_hw, strides=(8, 16, 32), bins=8):
 
 def distributions(distances, bins):
     """Values before the softmax, (n, 4 * bins), of distributions whose expected values are distances (n, 4)."""
-    low = np.clip(np.floor(distances), 0, bins - 2).astype(int)
-    weights = np.full(distances.shape + (bins,), 1e-9)
-    np.put_along_axis(weights, low[..., None], np.clip(low + 1 - distances, 1e-9, 1)[..., None], axis=-1)
-    np.put_along_axis(weights, low[..., None] + 1, np.clip(distances - low, 1e-9, 1)[..., None], axis=-1)
-    return np.log(weights).reshape(len(distances), -1)
+    offsets = np.clip(distances, 0, bins - 1)[..., None] - np.arange(bins)
+    return np.log(np.clip(1 - np.abs(offsets), 1e-9, 1)).reshape(len(distances), -1)
 
 
 def write_layers(path):

@@ -3,13 +3,12 @@ import os
 
 import numpy as np
 import pytest
-from matplotlib import pyplot
 
 from conftest import DATA
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scenario_scores, scores_of, table
-from ros_3d_bb_lab.evaluation.accuracy_figure import draw, draw_errors
+from ros_3d_bb_lab.evaluation.accuracy_figure import draw, draw_errors, pyplot  # selects the backend
 from ros_3d_bb_lab.evaluation.scenes import position_errors_m
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.simulation.scenario import read_scenario

@@ -151,7 +151,7 @@ def test_the_grid_of_the_foreground_covers_the_visible_part(x1, y1, width, heigh
     for ticks, most, low, high in ((samples.columns, GRID_COLUMNS, max(x1, 0), min(x1 + width, 64)),
                                    (samples.rows, GRID_ROWS, max(y1, 0), min(y1 + height, 48))):
         assert len(ticks) == 0 if low >= high else (most / 2 <= len(ticks) <= most or len(ticks) == high - low)
-        stride = np.diff(ticks).max(initial=1)
+        stride = max(np.diff(ticks), default=1)
         assert len(ticks) == 0 or (low <= ticks[0] < low + stride and high - stride <= ticks[-1] < high)
 
 

@@ -54,6 +54,7 @@ def test_models_with_the_same_file_name_are_named_by_their_path():
     assert set(benchmark.named(['a/x.onnx', 'b/x.onnx'])) == {'a/x.onnx', 'b/x.onnx'}
 
 
+@pytest.mark.needs('onnxruntime')
 def test_any_number_of_models_is_compared_on_simulated_people(tmp_path, monkeypatch, capsys):
     paths, results = [str(tmp_path / name) for name in ('nothing.onnx', 'corner.onnx')], str(tmp_path / 'results.json')
     for path, score in zip(paths, (0.1, 0.9)):

@@ -91,7 +91,7 @@ def imports_of(module, root=SOURCE, at_the_top=False):
     with open(os.path.join(root, *module.split('.')) + '.py') as stream:
         tree = ast.parse(stream.read())
     if at_the_top:
-        tree = ast.Module([node for node in tree.body if isinstance(node, (ast.Import, ast.ImportFrom))], [])
+        tree.body = [node for node in tree.body if isinstance(node, (ast.Import, ast.ImportFrom))]
     names = [name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names]
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom):

@@ -37,7 +37,7 @@ def test_heads_are_recognised_and_decoded(head, names):
 @pytest.mark.parametrize('input_hw', [(320, 320), (416, 416), (256, 480)])
 def test_grids_of_sizes_that_are_no_multiples_of_the_largest_stride(head, input_hw):
     strides = STRIDES.get(head, (8, 16, 32))
-    outputs = outputs_of(head, BOXES, np.pad(SCORES, ((0, 0), (0, 77))), input_hw, strides)
+    outputs = outputs_of(head, BOXES, np.pad(SCORES, ((0, 0), (0, 77)), 'constant'), input_hw, strides)
     layout = layout_of(outputs, input_hw, {})
     assert (layout.head, layout.classes, layout.strides) == (head, 80, strides)
     np.testing.assert_allclose(detections_in(outputs, layout, input_hw).boxes, BOXES, atol=1e-3)
@@ -45,7 +45,7 @@ def test_grids_of_sizes_that_are_no_multiples_of_the_largest_stride(head, input_
 
 @pytest.mark.parametrize('bins', [8, 11, 17])
 def test_distributions_of_other_lengths(bins):
-    outputs = outputs_of('nanodet', BOXES, np.pad(SCORES, ((0, 0), (0, 77))), HW, bins=bins)
+    outputs = outputs_of('nanodet', BOXES, np.pad(SCORES, ((0, 0), (0, 77)), 'constant'), HW, bins=bins)
     layout = layout_of(outputs, HW, {})
     assert (layout.head, layout.classes) == ('nanodet', 80)
     np.testing.assert_allclose(detections_in(outputs, layout).boxes, BOXES, atol=1e-3)

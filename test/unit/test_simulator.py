@@ -163,7 +163,7 @@ def test_the_status_of_people_outside_the_image_is_out_of_view(start, is_in_view
     simulator = Simulator(scene(Person(start)), CAMERA)
     frame = simulator.frame(0)
     person, (track,) = frame.people[0], simulator.true_tracks(frame, START_NS)
-    assert (person.visible, person.hidden) == pytest.approx((is_in_view, 0), abs=.03)
+    assert (person.visible, person.hidden) == pytest.approx((float(is_in_view), 0), abs=.03)
     assert (track.status, track.moving) == (VISIBLE if is_in_view else OUT_OF_VIEW, False)
     assert (person.box_px is not None) == is_in_view
     np.testing.assert_allclose(track.prediction_m, [track.position_m] * 8)

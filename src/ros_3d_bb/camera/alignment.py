@@ -110,7 +110,8 @@ def _depth_edges(depth):
     before = np.maximum.accumulate(np.where(measured, columns, 0), axis=1)
     after = np.minimum.accumulate(np.where(measured, columns, columns[-1])[:, ::-1], axis=1)[:, ::-1]
     depth_m = np.where(measured, depth_m, 0)
-    filled_m = np.maximum(np.take_along_axis(depth_m, before, 1), np.take_along_axis(depth_m, after, 1))
+    lines = np.arange(len(depth_m))[:, None]
+    filled_m = np.maximum(depth_m[lines, before], depth_m[lines, after])
     left_m, right_m = filled_m[:, :-2 * SIDE_PX], filled_m[:, 2 * SIDE_PX:]
     near_m = np.minimum(left_m, right_m)
     is_jump = (np.abs(left_m - right_m) > MIN_JUMP * near_m) & (near_m > JUMPS_M[0]) & (near_m < JUMPS_M[1])

@@ -150,10 +150,11 @@ def _rvl_numbers(data):
     ends = np.flatnonzero(nibbles < 8)
     starts = np.concatenate([[0], ends[:-1] + 1])[:ends.size]
     lengths = ends - starts + 1
-    if lengths.max(initial=0) > MAX_NIBBLES:
+    longest = lengths.max() if lengths.size else 0
+    if longest > MAX_NIBBLES:
         raise ValueError('its RVL is damaged')
     numbers = (nibbles[starts] & 7).astype(np.int64)
-    for digit in range(1, lengths.max(initial=0)):
+    for digit in range(1, longest):
         longer = np.flatnonzero(lengths > digit)
         numbers[longer] |= (nibbles[starts[longer] + digit] & 7).astype(np.int64) << (3 * digit)
     return numbers

@@ -30,7 +30,7 @@ class SortedDistances(object):
         # All boxes in one increasing sequence, so that one search finds the ranks in all of them. Limits that are less
         # than 0 or more than `UNKNOWN_MM` are not in the range of another box.
         self._offsets_mm = 3 * UNKNOWN_MM * np.arange(boxes)
-        self._keys = (np.sort(distances_mm, axis=1, kind='stable') + self._offsets_mm[:, None]).ravel()
+        self._keys = (np.sort(distances_mm, axis=1, kind='mergesort') + self._offsets_mm[:, None]).ravel()
         self.count = self.ranks(np.full(boxes, UNKNOWN_MM))
 
     def ranks(self, limits_mm):

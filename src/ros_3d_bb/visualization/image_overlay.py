@@ -63,6 +63,6 @@ def depth_to_grey(depth, farthest_m):
 def colorize_depth(grey):
     """Convert the output of `depth_to_grey` to colours: near is yellow, far is dark blue, no depth is black."""
     import cv2
-    colors = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_VIRIDIS)[..., ::-1])
+    colors = np.ascontiguousarray(cv2.applyColorMap(grey, cv2.COLORMAP_PARULA)[..., ::-1])
     colors[grey == 0] = 0
     return colors

@@ -85,9 +85,10 @@ def compare(session, detectors):
             found = detect(*images)
             spent_ms = 1e3 * (time.process_time() - start_s)
             if number >= len(warm_up):
-                table = np.array([iou(box, found) for box in recorded]).reshape(len(recorded), len(found))
-                overlaps[name].extend(table.max(axis=1, initial=0).tolist())
-                false_boxes[name].append(int((table.max(axis=0, initial=0) < FOUND_IOU).sum()))
+                table = np.zeros((len(recorded), len(found) + 1))  # the last column: no box
+                table[:, :-1] = [iou(box, found) for box in recorded]
+                overlaps[name].extend(table.max(axis=1).tolist())
+                false_boxes[name].append(int((table[:, :-1].max(axis=0) < FOUND_IOU).sum()))
                 times_ms[name].append(spent_ms)
     return {'frames': len(frames), 'boxes': sum(len(frame.boxes_px) for frame in frames), 'detectors': {
         name: {'found': int(np.sum(np.array(overlaps[name]) >= FOUND_IOU)),

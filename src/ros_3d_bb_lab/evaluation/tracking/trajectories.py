@@ -116,8 +116,8 @@ def _smoothed(times_s, points_m):
         return points_m
     steps = np.diff(times_s)
     inner = len(steps) - 1
-    differences = csc_matrix(diags([1 / steps[:-1], -1 / steps[:-1] - 1 / steps[1:], 1 / steps[1:]], [0, -1, -2],
-                                   shape=(inner + 2, inner)))
+    differences = diags([1 / steps[:-1], -1 / steps[:-1] - 1 / steps[1:], 1 / steps[1:]], [0, -1, -2],
+                        shape=(inner + 2, inner), format='csr')
     bending = diags([steps[1:-1] / 6, (steps[:-1] + steps[1:]) / 3, steps[1:-1] / 6], [-1, 0, 1])
     accelerations = spsolve(csc_matrix(bending + SMOOTHING * differences.T.dot(differences)),
                             differences.T.dot(points_m))
