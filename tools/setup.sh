@@ -40,8 +40,14 @@ set_up_python() {
 }
 
 setup() {
-  set_up_system
-  set_up_python
+  if [ -n "${platform:-}" ]; then
+    apt_packages+=("${platform_packages[@]}")
+    set_up_system
+    set_up_platform
+  else
+    set_up_system
+    set_up_python
+  fi
 }
 
 link_into_workspace() {
@@ -55,7 +61,7 @@ build() {
   link_into_workspace
   catkin_make --directory "$workspace" -DPYTHON_EXECUTABLE="$venv/bin/python3" > "$workspace/build.log" 2>&1 || {
     cat "$workspace/build.log"; say "the build failed; its log is above"; exit 1; }
-  ln -sfn "$workspace" "$cache/workspace"  # of the checkout that was built last
+  [ -n "${platform:-}" ] || ln -sfn "$workspace" "$cache/workspace"  # of the checkout that was built last
   set +u; . "$workspace/devel/setup.bash"; set -u
   export ROS_LOG_DIR=${ROS_LOG_DIR:-$workspace/log}
 }

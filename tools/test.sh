@@ -1,5 +1,7 @@
 # ./run test: all tests, or some of them. Sourced by ./run.
 
+pytest_options=()
+
 run_tests() {
   case ${1:-} in
     '') run_all_tests ;;
@@ -8,7 +10,8 @@ run_tests() {
       [ $# -eq 1 ] || fail "test --fast takes no further arguments, not '$2'"
       setup
       cd "$here"
-      "$venv/bin/python3" -m pytest -q -n 2 --dist loadfile -m 'not slow' test/unit ;;
+      "$venv/bin/python3" -m pytest -q -n 2 --dist loadfile -m 'not slow' "${pytest_options[@]}" test/unit ;;
+    --platform) test_on_platform "${@:2}" ;;
     *) run_some_tests "$@" ;;
   esac
 }
@@ -27,6 +30,20 @@ run_all_tests() {
   echo "$totals"
   echo "$totals" | awk '/^Summary:/ { printf "%d passed, %d failed\n", $2 - $4 - $6, $4 + $6 }'
   return $status
+}
+
+test_on_platform() {  # NAME [--python PATH] [--fast | -k EXPR | PATH ...]
+  local name=${1:-}
+  [ $# -eq 0 ] || shift
+  if [ "${1:-}" = --python ]; then
+    [ $# -gt 1 ] || fail "--python needs the path of a Python"
+    use_platform "$name" "$2"
+    shift 2
+  else
+    use_platform "$name"
+  fi
+  pytest_options=(--leave-out)
+  if [ "${1:-}" = --fast ]; then run_tests "$@"; else run_some_tests "$@"; fi
 }
 
 # Test files and folders by pytest, .test files by rostest; without any, the unit and workspace tests with -k EXPR.
@@ -56,6 +73,7 @@ run_some_tests() {
       *) by_pytest+=("$path") ;;
     esac
   done
-  [ ${#by_pytest[@]} -eq 0 ] || "$venv/bin/python3" -m pytest -q "${by_pytest[@]}" "${expression[@]}" || status=$?
+  [ ${#by_pytest[@]} -eq 0 ] || "$venv/bin/python3" -m pytest -q "${pytest_options[@]}" "${by_pytest[@]}" "${expression[@]}" ||
+    status=$?
   return $status
 }
