@@ -111,6 +111,7 @@ def assert_same_detections(detections, expected):
         assert difference.min() <= 0.5 and abs(expected[nearest, 4] - score) <= 1e-3
 
 
+@pytest.mark.needs('onnxruntime.tools.offline_tuning')  # ONNX Runtime 1.14 supports opset 18
 def test_detections_are_those_of_ultralytics(reference):
     network = TiesAs(reference.path, 1)
     detector = NetworkDetector(network, DetectionParams(classes=list(range(80))))
@@ -223,7 +224,7 @@ def test_inputs_that_are_not_a_color_image_are_rejected(tmp_path, shape, element
 
 
 @pytest.mark.parametrize('metadata, reason', [
-    ({'names': '["a"'}, 'names|closed'), ({'names': '3'}, 'names'), ({'stride': '0'}, 'stride'),
+    ({'names': '["a"'}, 'names'), ({'names': '3'}, 'names'), ({'stride': '0'}, 'stride'),
     ({'names': '[' * 100000}, 'a.onnx'), ({'task': 'classify'}, 'classify')])
 def test_metadata_that_cannot_be_used_is_rejected(tmp_path, metadata, reason):
     path = write_constant_network(tmp_path / 'a.onnx', outputs_of('yolov8', BOXES, SCORES, HW), metadata=metadata)

@@ -22,8 +22,8 @@ from support.recordings import write_recording
 DEMO_AND_TESTS = claimed('./run demo\n./run test')
 BUILD = claimed('./run build')
 DEMO = claimed('./run demo weights:=')
-INSTALL = claimed('cd ~/catkin_ws/src && git clone')
-WEIGHTS, RUNTIMES = claimed('cd && wget '), claimed('pip3 install torch')
+INSTALL, WEIGHTS = claimed('sudo apt install ros-noetic-ros-base'), claimed('cd && wget ')
+RUNTIMES_ON_MELODIC = claimed("python3 -m pip install --upgrade 'pip<22'")
 DESCRIPTION = claimed('echo "source $HOME')
 UPSTART = claimed('cd ~/catkin_ws/src && catkin_create_pkg')
 OTHER_COMPUTER = claimed('#!/bin/bash\nsource /opt/ros')
@@ -102,13 +102,17 @@ def test_build_prints_the_short_path(reader, clone):
 
 def test_a_robot_is_set_up(reader):
     """All commands in order; the stand-ins log what they are asked for."""
-    for block in (INSTALL, WEIGHTS, RUNTIMES, DESCRIPTION, UPSTART):
+    (reader.etc / 'setup.bash').touch()
+    first_nodes = reader.types(INSTALL, replaced=[('roslaunch', 'roslaunch --nodes')])
+    reader.types(RUNTIMES_ON_MELODIC, replaced=[('python3 -m pip', 'pip3')])
+    for block in (WEIGHTS, DESCRIPTION, UPSTART):
         reader.types(block)
+    assert {'/simulator_node', '/depth_detector_node', '/tracker_node'} <= set(first_nodes.split())
     logged = reader.log.read_text().splitlines()
     assert os.path.exists(str(reader.home / 'catkin_ws' / 'src' / 'ros_3d_bb' / 'package.xml'))
     for command in ('git clone URL ros_3d_bb', 'rosdep install --from-paths src --ignore-src', 'catkin_make',
-                    'pip3 install torch onnxruntime', 'systemctl restart ros', 'systemctl daemon-reload',
-                    'systemctl start people'):
+                    'pip3 install torch onnxruntime<1.11 numpy<1.18', 'pip3 install torch onnxruntime<1.11 numpy<1.17',
+                    'systemctl restart ros', 'systemctl daemon-reload', 'systemctl start people'):
         assert command in logged
     assert [line for line in logged if line.startswith('wget https://github.com/ultralytics/yolov5/releases')]
     assert '/yolov5_node' in logged and '/camera_mount' in logged  # robot_upstart could load the launch file

@@ -17,7 +17,8 @@ from ros_3d_bb.detection.onnx.model_settings import MAX_STRIDE, ModelSettings, r
 from ros_3d_bb.detection.onnx.session import EXTRA_BYTES, check_content, limited_memory, session_of
 from ros_3d_bb.detection.weights import MAX_CLASSES, WeightsError, class_names
 
-INSTALL = 'ONNX Runtime is not installed; install it with "pip3 install onnxruntime"'
+INSTALL = ('ONNX Runtime is not installed; install it with "pip3 install onnxruntime" ("onnxruntime<1.11" on Ubuntu 18.04 '
+           'and 20.04, see doc/installing.md)')
 DTYPES = {'tensor(float)': np.float32, 'tensor(float16)': np.float16, 'tensor(uint8)': np.uint8}
 MAX_OUTPUT_BYTES = 2 ** 28
 MAX_METADATA = 10 ** 6  # characters
@@ -139,7 +140,10 @@ def _names(metadata):
         return []
     if len(text) > MAX_METADATA:
         raise ValueError('its names are longer than %d characters' % MAX_METADATA)
-    names = ast.literal_eval(text)  # executes no code
+    try:
+        names = ast.literal_eval(text)  # executes no code
+    except SyntaxError as error:
+        raise ValueError('its names cannot be read (%s)' % error)
     count = len(names) if isinstance(names, (dict, list, tuple)) else 0
     if not 0 < count <= MAX_CLASSES:
         raise ValueError('its names are not those of 1 to %d classes' % MAX_CLASSES)
