@@ -37,8 +37,12 @@ def pytest_configure(config):
 
 
 def pytest_report_header(config):
-    data = 'ROS_3D_BB_DATA: %s' % (DATA or 'not set; the tests use generated data')
-    return [data] + ['deselected: tests of ' + ', '.join(sorted(left_out(config)))] * bool(left_out(config))
+    return 'ROS_3D_BB_DATA: %s' % (DATA or 'not set; the tests use generated data')
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    if left_out(config):
+        terminalreporter.write_line('left out: tests that need %s, not installed' % ', '.join(sorted(left_out(config))))
 
 
 def pytest_ignore_collect(path, config):

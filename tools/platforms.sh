@@ -9,14 +9,14 @@ platform_packages=(libroslz4-dev libtf2-dev)  # against which two extensions are
 # such as numpy, are of Debian's Python and Debian's versions.
 ros_modules=(
   actionlib actionlib_msgs catkin diagnostic_msgs diagnostic_updater dynamic_reconfigure gencpp genlisp genmsg genpy
-  geometry_msgs message_filters nav_msgs rosbag rosclean roscpp rosgraph rosgraph_msgs roslaunch roslib rosmaster rosmsg
-  rosnode rosparam rospy rosservice rostest rostopic rosunit sensor_msgs std_msgs std_srvs tf2_msgs tf2_ros
-  visualization_msgs)
+  geometry_msgs message_filters move_base_msgs nav_msgs rosbag rosclean roscpp rosgraph rosgraph_msgs roslaunch roslib
+  rosmaster rosmsg rosnode rosparam rospy rosservice rostest rostopic rosunit sensor_msgs std_msgs std_srvs tf2_msgs
+  tf2_ros visualization_msgs)
 debian_python=/usr/lib/python3/dist-packages
 
 use_platform() {  # NAME [PYTHON]
-  local version=${platform_python[$1]:-}
-  [ -n "$version" ] || fail "unknown platform '$1'; one of ${!platform_python[*]} expected"
+  local version=${platform_python[${1:-none}]:-}
+  [ -n "$version" ] || fail "test --platform '$1' is unknown; one of ${!platform_python[*]} expected"
   platform=$1 venv=$cache/$1 workspace=$workspace-$1
   if [ $# -gt 1 ]; then
     is_python "$2" "$version" || fail "--python: '$2' is not Python $version, the version of $1"

@@ -22,7 +22,8 @@ def test_help_starts_nothing(arguments):
 
 
 @pytest.mark.parametrize('arguments', [
-    ('tset',), ('test', '--quick'), ('test', '--fast', 'x'), ('test', 'missing.py'), ('test', '-k'), ('build', 'x'),
+    ('tset',), ('test', '--quick'), ('test', '--fast', 'x'), ('test', '--platform'), ('test', '--platform', 'kinetic'),
+    ('test', '--platform', 'noetic', '--python'), ('test', '--platform', 'noetic', '--python', '/bin/false'), ('test', 'missing.py'), ('test', '-k'), ('build', 'x'),
     ('setup', 'x'), ('pictures', 'missing'),
     ('lint', '--all'), ('demo', '--fast'), ('demo', 'missing'), ('demo', 'rate:=fast'),
     ('demo', 'weights:=missing.pt')])
@@ -39,3 +40,10 @@ def test_unit_tests_need_no_workspace():
                                 os.path.dirname(os.path.abspath(__file__))], env=environment, stdout=subprocess.PIPE,
                                universal_newlines=True)
     assert collected.returncode == 0, collected.stdout[-2000:]
+
+
+def test_no_two_test_files_have_the_same_name():
+    """Otherwise pytest cannot run the unit tests and those of the workspace together, as `./run test -k` does."""
+    folder = os.path.join(os.path.dirname(RUN), 'test')
+    assert not set(os.listdir(os.path.join(folder, 'unit'))) & set(os.listdir(os.path.join(folder, 'workspace'))) - {
+        '__pycache__', '__init__.py'}
