@@ -174,8 +174,9 @@ class MeasurementList(QtWidgets.QWidget):
         table.setModel(self._filter)
         table.setSelectionBehavior(QtWidgets.QTableView.SelectRows)
         table.setSelectionMode(QtWidgets.QTableView.ExtendedSelection)
+        # The order of the session, until the user selects a column. Qt 5.10 does not sort by a column of -1 later.
+        table.horizontalHeader().setSortIndicator(-1, Qt.AscendingOrder)
         table.setSortingEnabled(True)
-        table.sortByColumn(-1, Qt.AscendingOrder)  # the order of the session
         table.setTabKeyNavigation(False)
         table.setShowGrid(False)
         table.setWordWrap(False)
