@@ -14,6 +14,7 @@ from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
+REAL_WEIGHTS = pytest.mark.needs(*['torch'] * bool(DATA))
 SCENARIOS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
 PLACES = np.repeat([(0.0, 1.0), (0.5, 2.0), (-1.0, 3.0)], 4, axis=0)
 
@@ -61,6 +62,7 @@ def result(tmp_path_factory):
 
 
 @pytest.mark.slow
+@REAL_WEIGHTS
 def test_positions_are_accurate(result):
     """Leave-one-position-out; the limits for the simulation are wider than those for the real measurements."""
     ours, thesis = result['ours'], result['thesis']
@@ -94,6 +96,7 @@ def test_scores_of_scenes():
 
 
 @pytest.mark.slow
+@REAL_WEIGHTS
 def test_the_keys_of_the_result_and_its_table(result):
     assert {'frames', 'positions', 'calibration', 'thesis_calibration', 'ours', 'thesis', 'recorded',
             'per_frame'} == set(result)

@@ -103,7 +103,7 @@ def test_covariances_hold_for_any_support():
         covariance_m2 = corrected.covariance_m2[np.ix_([0, 2], [0, 2])]
         distances.append(error_m.dot(np.linalg.solve(covariance_m2, error_m)))
         supports.append(box.support)
-    third = np.digitize(supports, np.quantile(supports, [1 / 3, 2 / 3]))
+    third = np.digitize(supports, np.percentile(supports, [100 / 3, 200 / 3]))
     coverage = [np.mean(np.array(distances)[third == number] < CHI_SQUARE_95) for number in range(3)]
     assert all(0.88 <= share < 1 for share in coverage), coverage
 

@@ -21,6 +21,7 @@ from ros_3d_bb_lab.evaluation.scenes import Step, detect_in_scene, run_scene, sc
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, PersonTruth, Poses, SimulatedFrame, Simulator
 
+REAL_WEIGHTS = pytest.mark.needs(*['torch'] * bool(DATA))
 CAMERA_M = (0.0, 0.0, 1.0)
 SIZE_M, BOX_PX = np.array([0.5, 0.5, 1.7]), (200, 0, 400, 480)
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
@@ -57,6 +58,7 @@ def runs(yolov5):
 @pytest.mark.slow
 @pytest.mark.parametrize('detector', ['yolov5', 'depth'])
 @pytest.mark.parametrize('name', THESIS_SCENES)
+@REAL_WEIGHTS
 def test_everybody_in_the_thesis_scenes_keeps_one_id(runs, name, detector):
     """Each person is visible for a second; tracks are published from the fourth detection on."""
     result = score([step.moment for step in runs[detector, name]])
@@ -69,6 +71,7 @@ def test_everybody_in_the_thesis_scenes_keeps_one_id(runs, name, detector):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('detector,recall,false_rate', [('yolov5', 0.95, 0.05), ('depth', 0.90, 0.05)])
+@REAL_WEIGHTS
 def test_recall_and_false_positives_of_detectors(runs, detector, recall, false_rate):
     """At least 80 % of each person is visible, at 2 to 8 m (YOLOv5) or 2 to 6 m (weight-free)."""
     scores = [score_detections(runs[detector, name], *RANGE_M[detector]) for name in SCENES]
@@ -80,6 +83,7 @@ def test_recall_and_false_positives_of_detectors(runs, detector, recall, false_r
 
 
 @pytest.mark.slow
+@REAL_WEIGHTS
 def test_an_empty_room_has_scores(runs):
     result = result_of(runs['depth', 'empty_room.yaml'], 'depth')
     assert result['false_boxes'] <= 0.05

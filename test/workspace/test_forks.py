@@ -20,6 +20,7 @@ def job():
         return yaml.safe_load(stream)['jobs']['ros']
 
 
+@pytest.mark.needs('check_jsonschema')
 def test_workflows_conform_to_the_schema_of_github():
     subprocess.check_call([sys.executable, '-m', 'check_jsonschema', '--builtin-schema', 'vendor.github-workflows',
                            WORKFLOW, SITE_WORKFLOW])

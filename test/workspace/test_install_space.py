@@ -35,8 +35,9 @@ def built(tmp_path_factory, *options, **environment):
     """Build and install a copy of the sources with cmake. Returns the deleted source and build folders."""
     source, build = str(tmp_path_factory.mktemp('source') / 'ros_3d_bb'), str(tmp_path_factory.mktemp('build'))
     shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns('.git', '__pycache__'))
-    for command in (['cmake', source, '-DPYTHON_EXECUTABLE=' + sys.executable] + list(options),
-                    ['make', '-j2', 'install']):
+    layout = 'ON' if sys.base_prefix == '/usr' else 'OFF'  # of Debian's own Python
+    for command in (['cmake', source, '-DPYTHON_EXECUTABLE=' + sys.executable, '-DSETUPTOOLS_DEB_LAYOUT=' + layout]
+                    + list(options), ['make', '-j2', 'install']):
         result = subprocess.run(command, cwd=build, env=dict(os.environ, **environment), stdout=subprocess.PIPE,
                                 stderr=subprocess.STDOUT)
         assert result.returncode == 0, result.stdout.decode()

@@ -65,7 +65,8 @@ def test_pages_and_parameter_files_are_up_to_date(path):
         assert stream.read() == PAGES[path], 'outdated; write it with ./run doc'
 
 
-@pytest.mark.parametrize('name', sorted(NODES))
+@pytest.mark.parametrize('name', [pytest.param(name, marks=pytest.mark.needs('pyrealsense2'))
+                                  if name == 'realsense_node' else name for name in sorted(NODES)])
 def test_a_node_connects_to_the_topics_and_services_of_its_docstring(name):
     with connected(name) as (node, connections), mock.patch('rospy.ServiceProxy') as proxy:
         for section, found in (('Subscribes', connections.subscribers), ('Publishes', connections.publishers)):

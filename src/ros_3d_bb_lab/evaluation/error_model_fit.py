@@ -63,11 +63,11 @@ def data_of(measured_m, truth_m, groups=None):
         raise ValueError('a measurement is not finite')
     if not (truth_m[:, 1] > 0).all():
         raise ValueError('true z is %g m; more than 0 expected' % truth_m[:, 1].min())
-    positions, position = np.unique(truth_m, axis=0, return_inverse=True)
     for axis, name in enumerate('xz'):
-        if len(np.unique(positions[:, axis])) < 3:
+        if len(np.unique(truth_m[:, axis])) < 3:
             raise ValueError('measurements at %d different %s; at least 3 expected'
-                             % (len(np.unique(positions[:, axis])), name))
+                             % (len(np.unique(truth_m[:, axis])), name))
+    _positions, position = np.unique(truth_m, axis=0, return_inverse=True)
     if groups is not None:
         _groups, position = np.unique(groups, return_inverse=True)
     return Data(measured_m, truth_m, position.reshape(-1))
