@@ -21,8 +21,8 @@ def missing_requirements():
     names = set()
     for name in ('requirements.txt', 'requirements_no_deps.txt'):
         with open(os.path.join(TEST, name)) as stream:
-            names.update(re.findall(r'^([\w-]+)', stream.read(), re.MULTILINE))
-    return set(filter(is_missing, names))
+            names.update(re.findall(r'^(?!pytest)([\w-]+)', stream.read(), re.MULTILINE))
+    return set(filter(is_missing, (name.replace('-', '_') for name in names)))
 
 
 def imports_when_loaded(path):
@@ -42,8 +42,8 @@ def imports_when_loaded(path):
 
 
 def misses_something(item):
-    """Whether a module or program is missing that a test needs: `@pytest.mark.needs('module')`, or torch for the fixture
-    `weights`, also as part of others such as `reader`.
+    """Whether a module or program is missing that a test needs: `@pytest.mark.needs('module')`, or torch for the
+    fixture `weights`, also as part of others such as `reader`.
     """
     names = [name for mark in item.iter_markers('needs') for name in mark.args]
     names += ['torch'] * ('weights' in getattr(item, 'fixturenames', ()))

@@ -23,10 +23,9 @@ def test_help_starts_nothing(arguments):
 
 @pytest.mark.parametrize('arguments', [
     ('tset',), ('test', '--quick'), ('test', '--fast', 'x'), ('test', '--platform'), ('test', '--platform', 'kinetic'),
-    ('test', '--platform', 'noetic', '--python'), ('test', '--platform', 'noetic', '--python', '/bin/false'), ('test', 'missing.py'), ('test', '-k'), ('build', 'x'),
-    ('setup', 'x'), ('pictures', 'missing'),
-    ('lint', '--all'), ('demo', '--fast'), ('demo', 'missing'), ('demo', 'rate:=fast'),
-    ('demo', 'weights:=missing.pt')])
+    ('test', '--platform', 'noetic', '--python'), ('test', '--platform', 'noetic', '--python', '/bin/false'),
+    ('test', 'missing.py'), ('test', '-k'), ('build', 'x'), ('setup', 'x'), ('pictures', 'missing'), ('lint', '--all'),
+    ('demo', '--fast'), ('demo', 'missing'), ('demo', 'rate:=fast'), ('demo', 'weights:=missing.pt')])
 def test_unknown_arguments_are_errors(arguments):
     status, printed, errors = run(*arguments)
     assert status == 2 and not printed and arguments[-1].split(':=')[-1] in errors
@@ -37,8 +36,8 @@ def test_unit_tests_need_no_workspace():
     """`./run test --fast` runs them without a build: they import neither messages nor a master."""
     environment = {name: value for name, value in os.environ.items() if name not in ('PYTHONPATH', 'CMAKE_PREFIX_PATH')}
     collected = subprocess.run([sys.executable, '-m', 'pytest', '-q', '--collect-only', '--leave-out', '-p',
-                                'no:cacheprovider', os.path.dirname(os.path.abspath(__file__))], env=environment, stdout=subprocess.PIPE,
-                               universal_newlines=True)
+                                'no:cacheprovider', os.path.dirname(os.path.abspath(__file__))], env=environment,
+                               stdout=subprocess.PIPE, universal_newlines=True)
     assert collected.returncode == 0, collected.stdout[-2000:]
 
 

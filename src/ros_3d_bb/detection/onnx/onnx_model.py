@@ -17,8 +17,8 @@ from ros_3d_bb.detection.onnx.model_settings import MAX_STRIDE, ModelSettings, r
 from ros_3d_bb.detection.onnx.session import EXTRA_BYTES, check_content, limited_memory, session_of
 from ros_3d_bb.detection.weights import MAX_CLASSES, WeightsError, class_names
 
-INSTALL = ('ONNX Runtime is not installed; install it with "pip3 install onnxruntime" ("onnxruntime<1.11" on Ubuntu 18.04 '
-           'and 20.04, see doc/installing.md)')
+INSTALL = ('ONNX Runtime is not installed; install it with "pip3 install onnxruntime" ("onnxruntime<1.11" on Ubuntu '
+           '18.04 and 20.04, see doc/installing.md)')
 DTYPES = {'tensor(float)': np.float32, 'tensor(float16)': np.float16, 'tensor(uint8)': np.uint8}
 MAX_OUTPUT_BYTES = 2 ** 28
 MAX_METADATA = 10 ** 6  # characters
