@@ -1,4 +1,6 @@
 """Costs of predicted positions around the robot, against the probability of presence."""
+from unittest import mock
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,35 @@ def test_costs_follow_the_probability_of_presence():
         nearest_m = min(4.0, max(2.0, x_m))
         expected = (np.hypot(*(offsets + [nearest_m - x_m, -y_m]).T) < RADIUS_M).mean()
         assert cost_at(costs, x_m, y_m) / float(HIGHEST) * RISKY == pytest.approx(expected, abs=0.02)
+
+
+def test_the_most_probable_time_of_the_prediction_counts():
+    """Against the formula, one cell and one time after the other; all times of a person are one array operation."""
+    track = walking((3.0, 1.0), (0.5, 1.0), (0.1, 0.9))
+    with mock.patch('numpy.linalg.inv', wraps=np.linalg.inv) as inv:
+        costs = presence_costs([track], np.eye(4), ROBOT_RADIUS_M)
+    assert inv.call_count == 1
+
+    narrowing = np.eye(2) - (1 - ACROSS) * np.outer([-2, 1], [-2, 1]) / 5
+    times_s = np.arange(21) * 0.1
+    variances_m2 = np.interp(times_s, 0.25 * np.arange(9), np.linspace(0.1, 0.9, 9) ** 2)
+    spreads_m2 = [variance_m2 * narrowing @ narrowing + RADIUS_M ** 2 / 4 * np.eye(2) for variance_m2 in variances_m2]
+    for x_m, y_m in ((3.05, 1.05), (3.95, 2.55), (4.55, 3.15), (4.05, 3.95), (4.85, 4.75)):
+        offsets_m = [(x_m - 3.0 - 0.5 * time_s, y_m - 1.0 - time_s) for time_s in times_s]
+        probability = max(RADIUS_M ** 2 / 2 / np.sqrt(np.linalg.det(spread_m2))
+                          * np.exp(-np.dot(offset_m, np.linalg.solve(spread_m2, offset_m)) / 2)
+                          for offset_m, spread_m2 in zip(offsets_m, spreads_m2))
+        assert cost_at(costs, x_m, y_m) == np.rint(HIGHEST * min(probability / RISKY, 1))
+
+
+@pytest.mark.filterwarnings('ignore:invalid value')
+@pytest.mark.parametrize('variance_m2', [np.nan, np.inf, -1.0])
+def test_an_invalid_covariance_hides_neither_other_times_nor_other_people(variance_m2):
+    track, other = walking((2.0, 1.0), (1.0, 0.0), (0.1, 0.5)), walking((2.0, 1.5), (1.0, 0.0), (0.1, 0.5))
+    track.prediction_covariance_m2[5] = variance_m2 * np.ones((3, 3))
+    costs = presence_costs([track, other], np.eye(4), ROBOT_RADIUS_M)
+    assert cost_at(costs, 2.0, 1.0) == cost_at(costs, 2.0, 1.5) == HIGHEST
+    assert (costs >= presence_costs([other], np.eye(4), ROBOT_RADIUS_M)).all()
 
 
 def test_costs_decrease_as_the_prediction_becomes_uncertain():

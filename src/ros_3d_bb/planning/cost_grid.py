@@ -47,30 +47,49 @@ def presence_costs(tracks, robot_from_tracks, robot_radius_m):
     is_robot = np.hypot(CENTERS_M, CENTERS_M[:, np.newaxis]) < robot_radius_m
     excesses = np.zeros(is_robot.shape)
     for track in tracks:
-        probabilities = np.zeros(is_robot.shape)
-        end_s = min(track.prediction_step_s * len(track.prediction_m), HORIZON_S) if track.moving else 0.0
-        times_s = np.arange(0, end_s + STEP_S / 2, STEP_S)
-        centers_m = transform_points(robot_from_tracks, position_after(track, times_s))[:, :2]
-        narrowed = robot_from_tracks[:2, :3] @ _narrowing(walking_velocity(track))
-        covariances_m2 = narrowed @ covariances_after(track, times_s) @ narrowed.T
-        for center_m, covariance_m2 in zip(centers_m, covariances_m2):
-            _raise_to(probabilities, center_m, covariance_m2, track.size_m[0] / 2 + COMFORT_M)
-        np.minimum(probabilities, 1, out=probabilities)
-        np.maximum(excesses, probabilities - probabilities[is_robot].max(), out=excesses)
+        cells, probabilities = _presence_of(track, robot_from_tracks)
+        at_robot = probabilities[is_robot[cells]].max(initial=0)
+        excesses[cells] = np.maximum(excesses[cells], probabilities - at_robot)
     return np.rint(HIGHEST * np.minimum(excesses / RISKY, 1)).astype(np.int8)
 
 
-def _raise_to(probabilities, center_m, covariance_m2, radius_m):
-    """Raise probabilities (n, n) to the approximated ones of a disc at one time, which may be more than 1."""
-    spread_m2 = covariance_m2 + radius_m ** 2 / 4 * np.eye(2)
-    extent_m = EXTENT * np.sqrt(np.diag(spread_m2))
-    low, high = (np.clip(np.ceil((center_m + side * extent_m + HALF_SIZE_M) / CELL_M - 0.5), 0, len(probabilities))
-                 .astype(int) for side in (-1, 1))
-    x, y = (CENTERS_M[low[axis]:high[axis]] - center_m[axis] for axis in (0, 1))
-    (xx, xy), (_xy, yy) = np.linalg.inv(spread_m2)
-    squares = xx * x ** 2 + 2 * xy * x * y[:, np.newaxis] + yy * y[:, np.newaxis] ** 2
-    window = probabilities[low[1]:high[1], low[0]:high[0]]
-    np.maximum(window, radius_m ** 2 / 2 / np.sqrt(np.linalg.det(spread_m2)) * np.exp(-squares / 2), out=window)
+def _presence_of(track, robot_from_tracks):
+    """Index of the cells that a person may cover, and the largest probability of that over the times."""
+    end_s = min(track.prediction_step_s * len(track.prediction_m), HORIZON_S) if track.moving else 0.0
+    times_s = np.arange(0, end_s + STEP_S / 2, STEP_S)
+    centers_m = transform_points(robot_from_tracks, position_after(track, times_s))[:, :2]
+    narrowed = robot_from_tracks[:2, :3] @ _narrowing(walking_velocity(track))
+    covariances_m2 = narrowed @ covariances_after(track, times_s) @ narrowed.T
+    return _largest_presence(centers_m, covariances_m2, track.size_m[0] / 2 + COMFORT_M)
+
+
+def _largest_presence(centers_m, covariances_m2, radius_m):
+    """Largest probability over k times that a disc covers a cell, see `presence_costs`.
+
+    The centres are (k, 2), their covariances (k, 2, 2). Returns an index of the cells that are within `EXTENT` of the
+    centre along x and along y at any time, and their probabilities (rows, columns). The logarithms of all times are one
+    array (k, rows, columns), of which only the largest are exponentiated.
+    """
+    spreads_m2 = covariances_m2 + radius_m ** 2 / 4 * np.eye(2)
+    precisions = np.linalg.inv(spreads_m2)
+    log_peaks = np.log(radius_m ** 2 / 2) - np.log(np.linalg.det(spreads_m2)) / 2
+
+    offsets_m = CENTERS_M - centers_m[:, :, np.newaxis]  # (k, 2, n), along x and y
+    is_near = np.abs(offsets_m) <= EXTENT * np.sqrt(_diagonals(spreads_m2))
+    along = np.where(is_near, -_diagonals(precisions) * offsets_m ** 2 / 2, -np.inf)
+    along[:, 0] += log_peaks[:, np.newaxis]
+
+    columns, rows = (np.flatnonzero(near) for near in is_near.any(axis=0))
+    x, along_x = (each[:, 0, columns][:, np.newaxis] for each in (offsets_m, along))
+    y, along_y = (each[:, 1, rows][:, :, np.newaxis] for each in (offsets_m, along))
+    logs = along_x + along_y - precisions[:, :1, 1:] * y * x
+    largest = np.fmax.reduce(logs, axis=0)  # ignores NaN, from times with an invalid covariance
+    return np.ix_(rows, columns), np.minimum(np.exp(largest), 1)
+
+
+def _diagonals(matrices):
+    """Diagonals (k, 2, 1) of matrices (k, 2, 2)."""
+    return np.diagonal(matrices, axis1=1, axis2=2)[:, :, np.newaxis]
 
 
 def _narrowing(velocity_mps):
