@@ -17,7 +17,7 @@ from ros_3d_bb.detection.onnx.onnx_model import INSTALL
 from ros_3d_bb.detection.onnx.session import session_of
 from ros_3d_bb.detection.yolov5.checkpoint import unreadable
 from ros_3d_bb.detection.yolov5.onnx_writer import metadata_entry
-from ros_3d_bb.detection.yolov5.predictions import Backend, decode_heads
+from ros_3d_bb.detection.yolov5.predictions import Backend, decode_heads, reference_image
 
 VERSION = 1  # of the cached files; increase it when network.py or onnx_export.py change their content
 # Maximum difference between ONNX Runtime and torch. Measured with yolov5n: 3e-4 px, 1e-6.
@@ -53,11 +53,6 @@ class ExportedRuntime(Backend):
     def __call__(self, image, min_objectness):
         heads = self._session.run(None, {'image': np.ascontiguousarray(image)[None]})
         return decode_heads(heads, self._anchors_px, self._strides, min_objectness)
-
-
-def reference_image(stride):
-    """Noise image, 2 strides high and 3 strides wide, for the comparison of backends."""
-    return np.random.RandomState(0).randint(0, 256, (2 * stride, 3 * stride, 3)).astype(np.uint8)
 
 
 def open_exported(path, folder, threads, warn):

@@ -10,8 +10,8 @@ import numpy as np
 from torch import nn
 
 from ros_3d_bb.detection.yolov5 import network as yolov5
-from ros_3d_bb.detection.yolov5.onnx_backend import reference_image
 from ros_3d_bb.detection.yolov5.onnx_writer import FLOAT, UINT8, Graph
+from ros_3d_bb.detection.yolov5.predictions import reference_image
 from ros_3d_bb.detection.yolov5.torch_backend import network_of, run
 
 

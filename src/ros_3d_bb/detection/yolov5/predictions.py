@@ -28,6 +28,11 @@ def check_stride(stride):
     return int(stride)
 
 
+def reference_image(stride):
+    """Noise image, 2 strides high and 3 strides wide, for the comparison of backends."""
+    return np.random.RandomState(0).randint(0, 256, (2 * stride, 3 * stride, 3)).astype(np.uint8)
+
+
 def predictions(output):
     """Predictions (rows, 5 + classes) of the only image in an output (1, rows, 5 + classes), else ValueError."""
     if len(output.shape) != 3 or output.shape[0] != 1 or output.shape[2] < 6:
