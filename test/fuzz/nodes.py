@@ -89,7 +89,7 @@ def fuzz_node(name, seed, count, deadline_s=float('inf')):
                         print('%s, seed %d: after %d messages, on %s' % (name, seed, sent, topic))
                         raise
                     sent += 1
-                for timer in connections.timers:
+                for _period_s, timer in connections.timers:
                     timer(None)
             now_ns = _check_valid(name, node, connections, now_ns)
             if name in BALANCES:

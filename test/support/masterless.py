@@ -53,7 +53,8 @@ class Connections(object):
 
     def __init__(self):
         self.publishers, self.subscribers = {}, {}  # by topic
-        self.services, self.buffers, self.timers = {}, [], []  # types by name, tf buffers, and callbacks
+        self.services, self.buffers = {}, []  # types by name, and tf buffers
+        self.timers = []  # (period in seconds, callback)
         self.now = genpy.Time(1)
 
     def send(self, topic, message):
@@ -81,7 +82,7 @@ def masterless(params=()):
     replaced = {
         'rospy.Publisher': connections._publisher, 'rospy.Subscriber': connections._subscriber,
         'rospy.Service': lambda name, kind, _handler: connections.services.update({name: kind}),
-        'rospy.Timer': lambda _period, callback, **_options: connections.timers.append(callback),
+        'rospy.Timer': lambda period, callback, **_options: connections.timers.append((period.to_sec(), callback)),
         'rospy.on_shutdown': mock.Mock(), 'rospy.set_param': mock.Mock(),
         'rospy.get_param': lambda name, default=None: dict(params) if name == '~' else default,
         'rospy.resolve_name': lambda name: '/' + name, 'rospy.is_shutdown': lambda: False,

@@ -5,6 +5,7 @@ from unittest import mock
 
 import numpy as np
 import pytest
+import rospy
 from geometry_msgs.msg import TransformStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -39,7 +40,16 @@ class Bridge(object):
         self.now_ns, self._connections.now = now_ns, time_from(now_ns)
 
     def tick(self):
-        for timer in self._connections.timers:
+        for _period_s, timer in self._connections.timers:
+            timer(None)
+
+    def wait(self, duration_s):
+        """Let time pass, in which each timer is called once per period."""
+        began_ns = self.now_ns
+        due = [(number * period_s, timer) for period_s, timer in self._connections.timers
+               for number in range(1, int(duration_s / period_s + 1e-9) + 1)]
+        for passed_s, timer in sorted(due, key=lambda each: each[0]):
+            self.set_time(began_ns + int(passed_s * NS))
             timer(None)
 
     def send_tf(self, stamp_ns, child, translation):
@@ -167,6 +177,37 @@ def test_a_jump_of_the_clock_empties_every_output_until_the_next_tracks(jump_s):
             bridge.send_tf(bridge.now_ns, 'base_link', (0, 0, 0))
             bridge.send(bridge.now_ns, person(1, 2, 0))
         assert len(bridge.newest(POINTS)[1]) and len(bridge.newest(PEOPLE)[1]) == 1
+
+
+@pytest.mark.parametrize('resend_period', [0.05, 0.1, 8.0])
+def test_the_timeout_does_not_wait_for_the_resend_period(resend_period):
+    with bridge_with('people', resend_period=resend_period) as bridge:
+        bridge.send(START_NS, person(1, 2, 0))
+        bridge.wait(0.9)
+        assert len(bridge.newest(PEOPLE)[1]) == 1
+        bridge.wait(0.3)
+        assert len(bridge.newest(PEOPLE)[1]) == 0
+
+
+def test_outputs_are_resent_once_per_resend_period():
+    with bridge_with('people', resend_period=0.5, timeout=2.0) as bridge:
+        bridge.send(START_NS, person(1, 2, 0))
+        bridge.wait(1.8)
+        assert bridge.count(PEOPLE) == 4 and bridge.newest(PEOPLE)[1][0].position.x == pytest.approx(2 + 1.5)
+
+
+def test_the_empty_arrays_of_the_shutdown_are_the_last_messages():
+    """A callback may be running then, and rospy calls more of them until it has closed the connections."""
+    with bridge_with('people, costmap') as bridge:
+        bridge.send_tf(START_NS, 'base_link', (0, 0, 0))
+        bridge.send(START_NS, person(1, 2, 0))
+        (on_shutdown,), _options = rospy.on_shutdown.call_args
+        on_shutdown()
+        bridge.send(START_NS, person(1, 2, 0))
+        bridge.wait(0.3)
+        assert len(bridge.newest(POINTS)[1]) == len(bridge.newest(PEOPLE)[1]) == 0
+        assert not np.any(bridge.message(COSTS).data)
+        assert [bridge.count(topic) for topic in (POINTS, COSTS, RING, PEOPLE)] == [2, 2, 1, 2]
 
 
 @pytest.mark.parametrize('planner_frame, counted', [('', True), ('odom', False)])

@@ -18,6 +18,7 @@ from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.planning.planner_outputs import outputs_from
 from ros_3d_bb.planning.planner_view import SAME_FRAME, predicted_to, rounding_m, usable_tracks, with_class_widths
 
+CHECK_PERIOD_S = 0.1  # between checks of ~timeout, whatever ~resend_period is; chosen: a tenth of the default timeout
 MAX_ROUNDING_M = 0.005  # largest rounding error of a coordinate: a tenth of a typical costmap cell
 
 
@@ -29,8 +30,9 @@ class PlannerBridgeParams(NamedTuple):
     planner_frame: str = Param('')
     robot_frame: str = Param('base_link')
     timeout: float = Param(
-        1.0, 'Tracks that are older than this on arrival are rejected. After this time without tracks all outputs are '
-        'emptied, once. More than the pipeline takes from image to tracks.', 's', limits=(0.001, LARGEST))
+        1.0, 'Tracks that are older than this on arrival are rejected. After this time without tracks, '
+        'and at most 0.1 s later, all outputs are emptied, once. More than the pipeline takes from image to tracks.',
+        's', limits=(0.001, LARGEST))
     resend_period: float = Param(
         0.1, 'After this time without new tracks, outputs that planners take for the present are predicted to now and '
         'sent again.', 's', limits=(0.001, LARGEST))
@@ -138,7 +140,8 @@ class PlannerBridgeNode(object):
         self._diagnostics.show('tf age', self._transforms.age)
         rospy.on_shutdown(self._empty_all)
         subscribe(TRACKS_TOPIC, TrackedObjectArray, self._on_tracks, 2)
-        self._timer = rospy.Timer(rospy.Duration.from_sec(self._params.resend_period), self._on_timer, reset=True)
+        self._timers = [rospy.Timer(rospy.Duration.from_sec(period_s), on_timer, reset=True) for period_s, on_timer in
+                        ((CHECK_PERIOD_S, self._empty_outdated), (self._params.resend_period, self._resend))]
 
     def _on_tracks(self, message):
         with self._diagnostics.receiving('tracks'):
@@ -196,25 +199,37 @@ class PlannerBridgeNode(object):
                                    % (output.topic, error_m))
         topic.send(tracks, stamp_ns, received)
 
-    def _on_timer(self, _event):
-        """Republish the outputs that planners interpret as current, and empty the outdated ones."""
+    def _empty_outdated(self, _event):
+        """Empty the outputs whose tracks are older than ~timeout."""
         with self._diagnostics.rejecting('outputs'), self._lock:
             now_ns = _now_ns()
             for topic in self._topics:
-                if topic.held is None:
-                    continue
-                if not 0 <= now_ns - topic.held.arrival_ns <= self._params.timeout * NS:
+                if topic.held is not None and not self._is_valid(topic.held, now_ns):
                     self._diagnostics.warn('outputs emptied', 'no valid tracks for %g s: %s %s until the next ones '
                                            'arrive' % (self._params.timeout, topic.output.topic,
                                                        'is emptied' if topic.output.is_emptied else 'is silent'))
                     topic.empty(now_ns)
-                elif topic.output.to_now and now_ns - self._received.arrival_ns >= self._params.resend_period * NS:
+
+    def _resend(self, _event):
+        """Publish the outputs that planners interpret as current again, if there are no new tracks."""
+        with self._diagnostics.rejecting('outputs'), self._lock:
+            now_ns = _now_ns()
+            for topic in self._topics:
+                if (topic.output.to_now and topic.held is not None and self._is_valid(topic.held, now_ns)
+                        and now_ns - self._received.arrival_ns >= self._params.resend_period * NS):
                     self._send(topic, now_ns)
 
+    def _is_valid(self, received, now_ns):
+        return 0 <= now_ns - received.arrival_ns <= self._params.timeout * NS
+
     def _empty_all(self):
-        """Publish empty arrays at shutdown, so that planners do not keep the last tracks."""
+        """Publish empty arrays at shutdown, so that planners do not keep the last tracks.
+
+        They are the last messages: callbacks that are running, or are called later, find no topics.
+        """
         with self._lock:
-            for topic in self._topics:
+            topics, self._topics = self._topics, []
+            for topic in topics:
                 if topic.held is not None:
                     topic.empty(_now_ns())
 
