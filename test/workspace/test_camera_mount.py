@@ -2,6 +2,7 @@
 import numpy as np
 import pytest
 import rosbag
+import roslaunch
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
@@ -94,7 +95,8 @@ def test_height_tilt_and_rotation_replace_tf(recorded, upright, tmp_path, turns)
 @pytest.mark.parametrize('options, complaint', [
     ('--target-frame camera_color_optical_frame', 'is an optical frame'),
     ('--camera-height -1', 'more than 0'), ('--camera-height 1 --camera-tilt 2', 'less than pi / 2 rad'),
-    ('--camera-height 1 --cameras a,b', 'a single camera only'), ('--image-rotation 45', 'invalid choice')])
+    ('--camera-height 1 --cameras a,b', 'a single camera only'), ('--camera-tilt 0.1', 'without --camera-height'),
+    ('--image-rotation 45', 'invalid choice')])
 def test_unusable_mounts_are_rejected(recorded, tmp_path, capfd, options, complaint):
     recorded(tmp_path / 'in.bag', with_tf=False)
     with pytest.raises(SystemExit) as error:
@@ -161,6 +163,21 @@ def test_the_pose_of_a_realsense_is_that_of_its_root():
     pose, parent, child = pose_in(nodes['camera_pose'].args.split())
     assert (parent, child, pose[2, 3]) == ('map', 'camera_link', 1.2) and 'camera_optical_frame' not in nodes
     assert parameters['/tracker_node/target_frame'] == parameters['/bbox3d_node/floor_frame'] == 'map'
+
+
+@pytest.mark.parametrize('launch_file, given, named', [
+    ('pipeline.launch', ['cameras:=front,rear', 'camera_height:=1.2'], ['cameras', 'camera_height']),
+    ('pipeline.launch', ['cameras:=front', 'camera_height:=1.2'], ['cameras', 'camera_height']),
+    ('playback.launch', ['bag:=/b.bag', 'cameras:=front,rear', 'camera_height:=1.2'], ['cameras', 'camera_height']),
+    ('jackal.launch', ['driver:=none', 'cameras:=front,rear', 'camera_height:=1.2'], ['cameras', 'camera_height']),
+    ('pipeline.launch', ['cameras:=front,rear', 'frame_id:=optical'], ['cameras', 'frame_id']),
+    ('pipeline.launch', ['camera_tilt:=0.1'], ['camera_height', 'camera_tilt']),
+    ('measure.launch', ['session:=/s', 'camera_root:=camera_link'], ['camera_height', 'camera_root'])])
+def test_launch_arguments_that_contradict_each_other_are_refused(launch_file, given, named):
+    with pytest.raises(roslaunch.RLException) as error:
+        loaded(launch_file, 'detector:=depth', *given)
+    sentence = str(error.value).split('Arg xml')[0]
+    assert all(name in sentence for name in named + ['expected'])
 
 
 @pytest.mark.parametrize('launch_file, more', [

@@ -102,6 +102,8 @@ def _with_camera(settings, given):
         for node in IMAGE_NODES:
             settings = with_params(settings, node, image_rotation=given.image_rotation)
     if given.camera_height is None:
+        if given.camera_tilt:
+            raise ValueError('--camera-tilt is given without --camera-height; both expected, or neither')
         return settings
     tracker = settings.tracker[0]
     if tracker.cameras:
