@@ -172,10 +172,14 @@ def test_the_pose_of_a_realsense_is_that_of_its_root():
     ('jackal.launch', ['driver:=none', 'cameras:=front,rear', 'camera_height:=1.2'], ['cameras', 'camera_height']),
     ('pipeline.launch', ['cameras:=front,rear', 'frame_id:=optical'], ['cameras', 'frame_id']),
     ('pipeline.launch', ['camera_tilt:=0.1'], ['camera_height', 'camera_tilt']),
-    ('measure.launch', ['session:=/s', 'camera_root:=camera_link'], ['camera_height', 'camera_root'])])
-def test_launch_arguments_that_contradict_each_other_are_refused(launch_file, given, named):
+    ('measure.launch', ['session:=/s', 'camera_root:=camera_link'], ['camera_height', 'camera_root']),
+    ('pipeline.launch', ['detector:=yolo5'], ['detector', 'yolo5']),
+    ('pipeline.launch', ['cameras:=front,rear', 'detector:=yolo5'], ['detector', 'yolo5']),
+    ('jackal.launch', ['driver:=realsense'], ['driver', 'realsense2_camera', 'pyrealsense2']),
+    ('realsense.launch', ['file:=/a.bag', 'driver:=realsense2_camera'], ['file', 'driver', 'pyrealsense2'])])
+def test_unusable_launch_arguments_are_refused(launch_file, given, named):
     with pytest.raises(roslaunch.RLException) as error:
-        loaded(launch_file, 'detector:=depth', *given)
+        loaded(launch_file, *given)
     sentence = str(error.value).split('Arg xml')[0]
     assert all(name in sentence for name in named + ['expected'])
 
