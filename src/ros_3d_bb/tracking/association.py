@@ -8,7 +8,7 @@ from ros_3d_bb.tracking import kalman_filter
 RECENT_NS = 7 * NS // 10  # tracks matched less than this ago are associated before the others
 UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection
 HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height: the camera tilts during driving
-HIDDEN_FEET_COST = 8.0  # cost of a box whose top matches but whose height does not: its lower part is occluded
+HIDDEN_FEET_COST = 4.0  # cost of a box whose top matches but whose height does not: its lower part is occluded
 
 
 def associate(tracks, measurements, stamp_ns, params, classes):
@@ -25,7 +25,7 @@ def associate(tracks, measurements, stamp_ns, params, classes):
     determinant = noise_m2[:, 0, 0] * noise_m2[:, 1, 1] - noise_m2[:, 0, 1] * noise_m2[:, 1, 0]
     largest_density = 1 / (2 * np.pi * np.sqrt(determinant))
     density = np.minimum(params.new_target_density, UNSURE_SHARE * largest_density)
-    cost[cost >= -2 * np.log(2 * np.pi * density)] = np.inf
+    cost[cost >= -np.log(density)] = np.inf
     cost[classes.group[tracks['class_number']][:, None] != classes.group[measurements['class_number']]] = np.inf
     is_missed = stamp_ns - tracks['last_ns'] >= RECENT_NS
     priority = np.where(tracks['confirmed'], is_missed.astype(int), 2)
@@ -39,7 +39,7 @@ def associate(tracks, measurements, stamp_ns, params, classes):
 
 
 def _height_cost(tracks, measurements, sigma_m):
-    """Association cost (n, m) of the height differences, as a negative log likelihood.
+    """Association cost (n, m) of the height differences: their negative log likelihood, 0 for the same height.
 
     The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track. The
     tops of the heads are then compared if both are known; otherwise the cost is 0. Where the height is known, the cost

@@ -20,9 +20,9 @@ def predict(mean, covariance, elapsed_s, density):
 
 
 def negative_log_likelihood(mean, covariance, measurements, params):
-    """-2 log(2 pi p) (n, m), where p is the density of each measurement given each object, per m²."""
+    """-log p (n, m), where p is the density of each measurement given each object, per m²."""
     (inlier, outlier), _innovation, _inverse = _fit(mean[:, None], covariance[:, None], measurements, params)
-    return -2 * np.logaddexp(inlier, outlier)
+    return np.log(2 * np.pi) - np.logaddexp(inlier, outlier)
 
 
 def update(mean, covariance, measurements, params):
@@ -41,8 +41,8 @@ def update(mean, covariance, measurements, params):
 
 
 def _fit(mean, covariance, measurements, params):
-    """Log likelihoods, innovations (x, y) and inverse innovation covariances (xx, xy, yy). The first axis of each is
-    that of the components of the mixture, the inliers and the outliers.
+    """Log likelihoods plus log(2 pi), innovations (x, y) and inverse innovation covariances (xx, xy, yy). The first
+    axis of each is that of the components of the mixture, the inliers and the outliers.
 
     Computed element by element, because numpy is several times slower on stacks of 2x2 matrices.
     """

@@ -56,8 +56,8 @@ class TrackerParams(NamedTuple):
     duplicate_distance: float = Param(
         0.35, 'No track starts closer than this to a recently matched one.', 'm', live=(0, 1), section=ASSOCIATION)
     height_sigma: float = Param(
-        0.06, "Standard deviation of the height of a person's boxes.", 'm', limits=(1e-6, LARGEST), live=(0.01, 0.5),
-        section=ASSOCIATION)
+        0.085, 'Standard deviation of the difference between the heights of a box and of the track of its person.',
+        'm', limits=(1e-6, LARGEST), live=(0.02, 0.5), section=ASSOCIATION)
     confirmation_probability: float = Param(
         0.92, 'A track is published as soon as it is an object with this probability, by the scores of its boxes and '
         'the time for which they fit.', limits=(0.5, 0.98), live=(0.5, 0.98))
