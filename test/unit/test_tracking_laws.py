@@ -6,14 +6,19 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera, transform_from, transform_points
+from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.tracker import Tracker
+from ros_3d_bb.tracking.measurement_model import NoiseParams
+from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
+from ros_3d_bb.tracking.track import PredictionParams
+from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import VISIBLE, CameraView, Detection
 from support.cylinders import mounted
 
 CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)
 START_NS, PERIOD_NS = 1000 * NS, NS // 30
 SEEDS = st.integers(0, 2 ** 32 - 1)
+KALMAN = TrackerParams, NoiseParams, PredictionParams
 
 
 def any_covariance(random):
@@ -39,6 +44,30 @@ def test_covariances_of_tracks_are_positive_definite_whatever_boxes_come(seed):
             tracker.update(stamp_ns, detections, view)
             covariances = tracker._buffer.state.tracks['covariance']
             assert np.isfinite(covariances).all() and (np.linalg.eigvalsh(covariances) > 0).all()
+
+
+def ends_of_sliders():
+    """Each live parameter of each tracker, at both ends of its slider."""
+    for make, kinds in ((Tracker, KALMAN), (ThesisTracker, (ThesisTrackerParams,))):
+        for name, param in ((name, kind.PARAMS[name]) for kind in kinds for name in kind._fields):
+            for value in param.live:
+                yield pytest.param(make, kinds, {name: value}, id='%s-%s-%g' % (make.__name__, name, value))
+
+
+@pytest.mark.parametrize('changed_at', [0, 20])
+@pytest.mark.parametrize('make,kinds,given_params', ends_of_sliders())
+def test_a_person_who_is_always_detected_has_one_id_at_the_ends_of_all_sliders(make, kinds, given_params, changed_at):
+    """The person walks in a slight curve. The parameter is changed before the first image, or after 2 s."""
+    random, tracker, published = np.random.RandomState(0), make(), []
+    view = CameraView(mounted(1.0), CAMERA)
+    for image in range(60):
+        if image == changed_at:
+            tracker.reconfigure(*params_from(given_params, *kinds))
+        x_m, y_m, height_m = (5 - 0.06 * image, 0.3 * np.sin(0.12 * image), 1.7) + random.normal(0, 0.03, 3)
+        person = Detection(np.array([x_m, y_m, height_m / 2]), np.array([0.5, 0.5, height_m]), np.eye(3) * 0.04 ** 2,
+                           score=0.97)
+        published.append([track.id for track in tracker.update(START_NS + 3 * image * PERIOD_NS, [person], view)])
+    assert published[10:] == [[1]] * 50
 
 
 @settings(max_examples=5, deadline=None)

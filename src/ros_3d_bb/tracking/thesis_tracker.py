@@ -25,8 +25,8 @@ class ThesisTrackerParams(NamedTuple):
         0.2, 'Weight of the newest velocity in the average: higher reacts faster and is noisier. The default is that '
         "of the thesis' package.", limits=(1e-6, 1), live=(0.01, 1))
     disappearance_limit: float = Param(
-        1.0, "A track that is not matched for this long is deleted; 30 frames in the thesis' package.", 's',
-        live=(0, 10))
+        1.0, "A track that is not matched for longer than this is deleted, with 0 in the first image without a match; "
+        "30 frames in the thesis' package.", 's', live=(0, 10))
     prediction_time: float = PREDICTION_TIME
     prediction_step: float = PREDICTION_STEP
     moving_speed: float = MOVING_SPEED
@@ -65,8 +65,10 @@ class ThesisTracker(object):
         than the previous one.
         """
         params, elapsed_ns = self._params, self._advance(stamp_ns)
+        limit_ns = params.disappearance_limit * NS
+        # The limit may be less than the image period: tracks matched in the previous image can be matched in any case.
         tracks = [(track._replace(detection=NOT_DETECTED), unseen_ns + elapsed_ns) for track, unseen_ns in self._tracks
-                  if unseen_ns + elapsed_ns <= params.disappearance_limit * NS]
+                  if not unseen_ns or unseen_ns + elapsed_ns <= limit_ns]
         pairs = []
         if tracks and detections:
             distances_m = plane_distances([track.position_m for track, _unseen_ns in tracks],
@@ -77,6 +79,7 @@ class ThesisTracker(object):
             pairs = [pair for pair in match_greedily(distances_m) if np.isfinite(distances_m[pair])]
         for row, column in pairs:
             tracks[row] = self._matched(tracks[row][0], stamp_ns, detections[column]), 0
+        tracks = [(track, unseen_ns) for track, unseen_ns in tracks if unseen_ns <= limit_ns]
         matched = set(column for _row, column in pairs)
         for column, detection in enumerate(detections):
             if column not in matched:

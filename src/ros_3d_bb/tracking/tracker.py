@@ -39,8 +39,8 @@ class TrackerParams(NamedTuple):
     """Parameters of the Kalman tracker."""
 
     acceleration: float = Param(
-        0.08, 'How much the velocity of a walking person varies: density of a white acceleration.', 'm²/s³',
-        live=(0, 2), section=MOTION)
+        0.08, 'How much the velocity of a walking person varies: density of a white acceleration. With 0, people who '
+        'turn get a new ID.', 'm²/s³', live=(0.01, 2), section=MOTION)
     initial_speed: float = Param(
         0.8, 'Speed of a new target: standard deviation along each axis.', 'm/s', live=(0, 3), section=MOTION)
     outlier_share: float = Param(
@@ -62,9 +62,9 @@ class TrackerParams(NamedTuple):
         0.92, 'A track is published as soon as it is an object with this probability, by the scores of its boxes and '
         'the time for which they fit.', limits=(0.5, 0.98), live=(0.5, 0.98))
     even_score: float = Param(
-        0.27, 'Score of the detector at which half of the boxes show an object. Boxes with much lower scores can '
-        'continue a track, but do not start one. Boxes without a score count as if it were 0.5.', limits=(0.01, 0.99),
-        live=(0.05, 0.95))
+        0.27, 'Score of the detector at which half of the boxes show an object. Boxes with lower scores continue a '
+        'track, but seldom start one. Boxes without a score count as if it were 0.5: they start none if this is 0.6 or '
+        'more.', limits=(0.01, 0.99), live=(0.05, 0.95))
     max_position_std: float = Param(
         0.5, 'An undetected track stays published up to this standard deviation of its position.', 'm', live=(0, 2))
     max_age: float = Param(4.0, 'A person who reappears within this time keeps the track ID.', 's', live=(0, 30))
@@ -200,7 +200,8 @@ class Tracker(object):
 
         # Tentative tracks are kept for a short time only.
         max_unseen_s = np.where(tracks['confirmed'], params.max_age, TENTATIVE_TIMEOUT_S)
-        kept = (tracks['unseen_s'] < max_unseen_s) & (position_std_of(tracks) < MAX_POSITION_STD_M)
+        kept = (tracks['unseen_s'] == 0) | (tracks['unseen_s'] < max_unseen_s)
+        kept &= position_std_of(tracks) < MAX_POSITION_STD_M
         kept &= ~duplicates(tracks, stamp_ns, classes)
         tracks, unmatched_columns = tracks.compress(kept), unmatched(len(detections), columns)
         new = tracks[:0]
