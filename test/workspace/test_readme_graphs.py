@@ -131,7 +131,8 @@ def test_planner_points_diagnostics_and_live_parameters(reader, camera_bag):
             reader.types(block, **master)
         printed = subprocess.check_output(['rosparam', 'get', '/tracker_node'], env=graph.environment)
     parameters = yaml.safe_load(printed)
-    assert [parameters[name] for name in ('prediction_time', 'confirmation_probability', 'max_age')] == [3.0, 0.95, 8.0]
+    changed = [parameters[name] for name in ('prediction_time', 'confirmation_probability', 'max_position_std')]
+    assert changed == [3.0, 0.95, 0.8]
 
 
 def test_simulation_and_doctor(reader):

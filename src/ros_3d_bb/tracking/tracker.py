@@ -67,7 +67,10 @@ class TrackerParams(NamedTuple):
         'more.', limits=(0.01, 0.99), live=(0.05, 0.95))
     max_position_std: float = Param(
         0.5, 'An undetected track stays published up to this standard deviation of its position.', 'm', live=(0, 2))
-    max_age: float = Param(4.0, 'A person who reappears within this time keeps the track ID.', 's', live=(0, 30))
+    max_age: float = Param(
+        4.0, 'A person who is not detected for longer than this gets a new track ID. So does one who reappears where a '
+        'new target is more likely: with the default parameters after 3 s, except for people who stop behind an '
+        'occluder. With 0, every missed person gets a new ID.', 's', live=(0, 30))
     moving_speed: float = MOVING_SPEED
 
 
