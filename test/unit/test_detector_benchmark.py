@@ -71,8 +71,23 @@ def test_any_number_of_models_is_compared_on_simulated_people(tmp_path, monkeypa
     assert 'corner.onnx' in capsys.readouterr().out
 
 
+@pytest.mark.needs('onnxruntime')
+def test_the_best_confidence_separates_people_from_false_boxes(session, tmp_path):
+    """The network finds the first person of each image with 0.605, and one false box with 0.395."""
+    frame = session.frames[0]
+    session = session._replace(frames=[frame._replace(detections=frame.detections[:1])])
+    width, height = session.camera.width, session.camera.height
+    boxes = np.vstack((frame.boxes_px[:1], [(0, 0, 8, 8)])).astype(float)
+    scores = np.pad([[0.605], [0.395]], ((0, 0), (0, 79)), mode='constant')
+    path = write_constant_network(tmp_path / 'a.onnx', outputs_of('end-to-end', boxes, scores, (height, width)),
+                                  (1, 3, height, width))
+    network, = benchmark.open_networks([path], 0.25).values()
+    assert benchmark.best_confidence(session, network) == (0.5, 1)
+
+
 @pytest.mark.parametrize('options, complaint', [
-    (['--every', '0'], 'every is 0'), (['--data', '/nowhere'], 'nowhere'), (['--weights', '/no.onnx'], 'no.onnx')])
+    (['--every', '0'], 'every is 0'), (['--data', '/nowhere'], 'nowhere'), (['--weights', '/no.onnx'], 'no.onnx'),
+    (['--confidence', '2'], 'confidence is 2')])
 def test_invalid_options_are_named(options, complaint, monkeypatch, capsys, folder):
     monkeypatch.setattr(sys, 'argv', ['detector', '--data', folder] + options)
     with pytest.raises(SystemExit) as raised:

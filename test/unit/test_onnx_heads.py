@@ -91,7 +91,7 @@ def test_networks_that_suppress_are_known_by_their_metadata():
     (dict(metadata={'task': 'classify'}), "'classify'"), (dict(names=['a', 'b']), '2 names for its 3 classes'),
     (dict(head='yolox'), 'cells of strides'), (dict(outputs=[np.zeros((1, 3, 252))]), '-1 classes'),
     (dict(head='nanodet', outputs=[np.ones((1, 252, 35)) * 7], names=NAMES * 2), '35 columns'),
-    (dict(head='nanodet', outputs=[np.ones((1, 300, 35))], strides=[8]), 'cells of strides')])
+    (dict(head='nanodet', outputs=[np.ones((1, 300, 35))], strides=[8]), '192 cells')])
 def test_outputs_that_do_not_fit_are_rejected(given, reason):
     outputs = outputs_of('yolov8', BOXES, SCORES, HW)
     with pytest.raises(ValueError, match=reason):

@@ -8,6 +8,7 @@ import pytest
 from ros_3d_bb.core.labels import COCO
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
+from ros_3d_bb.detection.onnx.heads import HEADS, P3, P6
 from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
 from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5 import backends
@@ -147,6 +148,32 @@ def test_small_networks_run_in_one_thread_by_default(tmp_path, monkeypatch, requ
     assert 'threads: %d' % expected in backends.open_runtime(path, params).description
 
 
+@pytest.mark.parametrize('head', HEADS)
+@pytest.mark.parametrize('count', [0, 1, 100])
+def test_every_head_with_any_number_of_people(tmp_path, head, count):
+    """The node warms networks up with a black image, in which there is no candidate."""
+    columns, rows = np.meshgrid(np.arange(10) * 40.0, np.arange(10) * 40.0)
+    boxes = np.column_stack((columns.ravel(), rows.ravel(), columns.ravel() + 30, rows.ravel() + 38))
+    scores = np.zeros((100, 80))
+    scores[:count, 0] = 0.9
+    strides = P6 if head in ('nanodet-plus', 'picodet') else P3
+    outputs = outputs_of(head, boxes, scores, (416, 416), strides)
+    path = write_constant_network(tmp_path / 'a.onnx', outputs, (1, 3, 416, 416))
+    (tmp_path / 'a.yaml').write_text('{head: %s, resize: stretch}' % head)
+    detector = backends.open_detector(path, running=backends.RuntimeParams(device='cpu'))
+    found = detector.detect(np.zeros((416, 416, 3), np.uint8))
+    np.testing.assert_allclose(found.boxes, boxes[:count], atol=1e-3)
+
+
+@pytest.mark.parametrize('head', ['yolov8', 'yolox', 'nanodet', 'nanodet-plus', 'picodet'])
+def test_outputs_without_a_batch_axis(tmp_path, head):
+    outputs = outputs_of(head, BOXES, SCORES, HW, P6 if head in ('nanodet-plus', 'picodet') else P3)
+    network = OnnxModel(write_constant_network(tmp_path / 'a.onnx', [output[0] for output in outputs]), 1)
+    assert network.description.endswith('head: ' + head)
+    found = network.candidates(np.zeros(HW + (3,), np.uint8), 0.25)
+    np.testing.assert_allclose(found.boxes[np.argsort(-found.scores)], BOXES, atol=1e-3)
+
+
 COLOR = (3, 200, 5)
 
 
@@ -190,7 +217,10 @@ def test_the_yaml_file_gives_head_names_and_resizing(tmp_path):
     ('mean: [1, 2]', 'mean is .*three'), ('std: [1, 0, 1]', 'greater than 0'), ('std: [.nan, 1, 1]', 'three numbers'),
     ('strides: [8, 1.5]', 'strides'), ('names: [a, no]', 'quotes'), ('head: yolo', "'yolo'"), ('padding: 300', '300'),
     ('padding: ' + '9' * 400, 'padding is 1.79'),
-    ('- a', 'keys and values'), ('a: [', 'parsing'), ('a: &x [1]\nb: *x', 'alias'), ('1: 2', 'keys and values'),
+    ('std: [0.225, 0.224, 0.229]', 'units.*57.375'), ('mean: [0.4, 0.45, 0]', 'units.*102.0'),
+    ('strides: [8, 16]', 'strides.*240 cells'), ('keep_ratio: true', 'resize'), ('reg_max: 7', 'bins'),
+    ('input_size: 416', 'size'), ('- a', 'keys and values'), ('a: [', 'parsing'), ('a: &x [1]\nb: *x', 'alias'),
+    ('1: 2', 'keys and values'),
     ('names: [a, b]', '2 names for its 3 classes'), ('#' * 1000001, 'larger'), ('head: nanodet', 'cells|columns')])
 def test_yaml_files_that_cannot_be_used_are_rejected(tmp_path, text, reason):
     path = write_constant_network(tmp_path / 'model.onnx', outputs_of('yolov8', BOXES, SCORES, HW))

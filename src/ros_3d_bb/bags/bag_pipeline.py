@@ -14,8 +14,9 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KI
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.detection.yolov5.backends import open_detector
 from ros_3d_bb.pipeline.depth_registration import RAW
-from ros_3d_bb.pipeline.detection_stage import CameraRotation, detect_in_color, opened_yolov5
+from ros_3d_bb.pipeline.detection_stage import CameraRotation, detect_in_color
 from ros_3d_bb.pipeline.offline_pipeline import (DEPTH_INFO_TOPIC, INFO_TOPIC, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA,
                                                  Pipeline, Settings)
 
@@ -47,7 +48,7 @@ class BagRun(object):
         self._detector = None
         if settings.detector == 'yolov5':
             params, detection, running = settings.yolov5
-            self._detector = opened_yolov5(params.weights, detection, running,
+            self._detector = open_detector(params.weights, detection, running,
                                            lambda line: events.note('remarks of the detector', line))
             self._rotations = {camera: CameraRotation(params, self._transforms) for camera in settings.cameras}
         for camera in settings.cameras:

@@ -8,14 +8,14 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC
 from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.detection.adaptive_size import AdaptiveSize
 from ros_3d_bb.detection.network_detector import DetectionParams
-from ros_3d_bb.detection.yolov5.backends import RuntimeParams
+from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
-from ros_3d_bb.pipeline.detection_stage import CameraRotation, Yolov5NodeParams, detect_in_color, opened_yolov5
+from ros_3d_bb.pipeline.detection_stage import CameraRotation, Yolov5NodeParams, detect_in_color
 
 
 class Yolov5Node(object):
@@ -38,7 +38,7 @@ class Yolov5Node(object):
 
     def __init__(self):
         params, detection, running = given = read_params(Yolov5NodeParams, DetectionParams, RuntimeParams)
-        self._detector = opened_yolov5(params.weights, detection, running, rospy.logwarn)
+        self._detector = open_detector(params.weights, detection, running, rospy.logwarn)
         self._params, self._sizes = detection, AdaptiveSize()
         self._diagnostics = Diagnostics()
         self._diagnostics.show('image size', lambda: '%d pixels' % self._detector.input_px)

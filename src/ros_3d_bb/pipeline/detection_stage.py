@@ -1,8 +1,6 @@
 """Detection stage: 2D bounding boxes from image messages, shared by the detector nodes and process_bag."""
-import os
 from typing import NamedTuple
 
-import numpy as np
 import tf2_ros
 
 from ros_3d_bb.camera.camera_model import transform_from
@@ -16,8 +14,6 @@ from ros_3d_bb.core.params import (DEPTH, DEPTH_SCALE, ENABLED, IMAGE_ROTATION, 
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
-from ros_3d_bb.detection.network_detector import NetworkDetector
-from ros_3d_bb.detection.yolov5.backends import open_runtime
 from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
 
 CACHE_NS = NS  # how long images wait for each other
@@ -50,31 +46,6 @@ class DepthDetectorParams(NamedTuple):
     stamp_tolerance: float = STAMP_TOLERANCE
     enabled: bool = ENABLED
     publish_empty: bool = PUBLISH_EMPTY
-
-
-def opened_yolov5(weights, detection, running, warn):
-    """Return a `network_detector.NetworkDetector`.
-
-    Parameters
-    ----------
-    weights : str
-        Path of the checkpoint or exported network.
-    detection : network_detector.DetectionParams
-    running : backends.RuntimeParams
-    warn : callable
-        Called with the text of each warning.
-
-    Raises
-    ------
-    ValueError
-        If no weights are given or the network cannot be used.
-    """
-    if not weights:
-        raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
-                         'checkpoint such as yolov5n.pt, or of an ONNX file of another detector')
-    detector = NetworkDetector(open_runtime(os.path.abspath(os.path.expanduser(weights)), running, warn), detection)
-    detector.detect(np.zeros((480, 640, 3), np.uint8))  # the first detection takes several times as long as others
-    return detector
 
 
 def detect_in_color(detector, message, turns=0):

@@ -2,7 +2,8 @@
 
 Any number of models, of any format, and the detector without weights (`depth`) process each image in turn, so that
 other load on the machine affects all of them equally and the ratios of their times remain valid. Times are CPU times
-from the image to the boxes, with one thread.
+from the image to the boxes, with one thread. Scores differ between families of networks, so the confidence with the
+highest F1 score is given for each network.
 """
 import argparse
 import json
@@ -16,32 +17,38 @@ import numpy as np
 
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.detector import DepthPeople
-from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
+from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 
-FOUND_IOU, CONFIDENCE = 0.5, 0.25
+FOUND_IOU = 0.5
+CONFIDENCES = np.arange(5, 100) / 100.0  # among which the best one is searched
 WARM_UPS = 3  # images that are not timed
 DEPTH = 'depth'  # the row of the detector without weights
 SIMULATED = (2.0, 3.0, 4.0), (-0.25, 0.0, 0.25), 1  # arguments of write_simulated_session
-COLUMNS = '%-28s %6s %11s %12s %8s %7s'
-HEADINGS = ('detector', 'found', 'median IoU', 'false boxes', 'CPU ms', 'ratio')
+COLUMNS = '%-28s %6s %11s %12s %8s %7s %16s'
+HEADINGS = ('detector', 'found', 'median IoU', 'false boxes', 'CPU ms', 'ratio', 'best confidence')
 
 
-def network_detector(path):
-    """Function that returns the boxes (n, 4) of the people in a color image, for a model file.
+def open_networks(paths, confidence):
+    """Open model files as the nodes do. Returns the NetworkDetectors by the names of the files.
 
-    Raises ValueError if the file cannot be used, or has no class `person`.
+    Raises ValueError if a file cannot be used, or has no class `person`.
     """
-    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch (slow)
-    network = open_runtime(path, RuntimeParams(device='cpu', threads=1))
-    detector = NetworkDetector(network, DetectionParams(confidence=CONFIDENCE))
-    return lambda color, _depth: detector.detect(color).boxes
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector  # may import torch (slow)
+    running = RuntimeParams(device='cpu', threads=1)
+    return {name: open_detector(path, DetectionParams(confidence=confidence), running)
+            for name, path in named(paths).items()}
+
+
+def boxes_of(network):
+    """Function of a color and a depth image that returns the boxes (n, 4) of a NetworkDetector."""
+    return lambda color, _depth: network.detect(color).boxes
 
 
 def depth_detector(camera):
-    """As `network_detector`, for the detector without weights. It fits the floor to the depth images."""
+    """As `boxes_of`, for the detector without weights. It fits the floor to the depth images."""
     people = DepthPeople()
 
     def detect(color, depth):
@@ -72,9 +79,7 @@ def compare(session, detectors):
     ValueError
         If there is no image with a box.
     """
-    frames = [frame for frame in session.frames if frame.boxes_px]
-    if not frames:
-        raise ValueError('the session has no images with 2D boxes')
+    frames = annotated_frames(session)
     overlaps, false_boxes, times_ms = ({name: [] for name in detectors} for _result in range(3))
     warm_up = frames[:WARM_UPS]
     for number, frame in enumerate(warm_up + frames):
@@ -96,6 +101,37 @@ def compare(session, detectors):
                'cpu_ms': float(np.median(times_ms[name]))} for name in detectors}}
 
 
+def annotated_frames(session):
+    """Frames of a session that have 2D boxes. Raises ValueError if there is none."""
+    frames = [frame for frame in session.frames if frame.boxes_px]
+    if not frames:
+        raise ValueError('the session has no images with 2D boxes')
+    return frames
+
+
+def best_confidence(session, network):
+    """Confidence of a NetworkDetector with the highest F1 score on the recorded boxes of a session, and that score.
+
+    Suppression keeps the best boxes, so the detections above a confidence are
+    those of a lower confidence with a score above it.
+    """
+    network = network.with_params(DetectionParams(confidence=CONFIDENCES[0]))
+    found, false = [], []  # scores of the best detection of each recorded box, and of detections of no recorded box
+    for frame in annotated_frames(session):
+        detections = network.detect(read_color(frame, session.camera))
+        overlaps = np.array([iou(box, detections.boxes) for box in np.array(frame.boxes_px, float)])
+        is_match = overlaps >= FOUND_IOU
+        found.extend((is_match * detections.scores).max(axis=1, initial=0))
+        false.extend(detections.scores[~is_match.any(axis=0)])
+    found, false = np.array(found), np.array(false)
+    hits = (found > CONFIDENCES[:, None]).sum(axis=1)
+    false_boxes = (false > CONFIDENCES[:, None]).sum(axis=1)
+    f1 = 2.0 * hits / (hits + false_boxes + len(found))
+    best = np.flatnonzero(f1 == f1.max())
+    best = best[len(best) // 2]  # of several, the middle one is the farthest from a change of the counts
+    return float(CONFIDENCES[best]), float(f1[best])
+
+
 def named(paths):
     """File names by which models are distinguished, or their paths if two have the same name: {name: path}."""
     names = [os.path.basename(path) for path in paths]
@@ -108,7 +144,9 @@ def table(result):
     first_ms = next(iter(rows.values()))['cpu_ms']
     return [COLUMNS % HEADINGS] + [
         COLUMNS % (name, row['found'], '%.3f' % row['median_iou'], row['false_boxes'], '%.1f' % row['cpu_ms'],
-                   '%.2f' % (row['cpu_ms'] / first_ms)) for name, row in rows.items()]
+                   '%.2f' % (row['cpu_ms'] / first_ms),
+                   '%.2f (F1 %.3f)' % (row['best_confidence'], row['best_f1']) if 'best_f1' in row else '-')
+        for name, row in rows.items()]
 
 
 def main():
@@ -119,9 +157,13 @@ def main():
         with tempfile.TemporaryDirectory() as folder:
             session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
             session = session._replace(frames=session.frames[::arguments.every])
-            detectors = {name: network_detector(path) for name, path in named(arguments.weights).items()}
+            networks = open_networks(arguments.weights, arguments.confidence)
+            detectors = {name: boxes_of(network) for name, network in networks.items()}
             detectors[DEPTH] = depth_detector(session.camera)
             result = dict(compare(session, detectors), machine=describe_machine())
+            for name, network in networks.items():
+                row = result['detectors'][name]
+                row['best_confidence'], row['best_f1'] = best_confidence(session, network)
         if arguments.json:
             with open(arguments.json, 'w') as stream:
                 json.dump(result, stream, indent=1)
@@ -139,8 +181,12 @@ def _arguments():
     parser.add_argument('--data', default=data and os.path.join(data, 'data', 'thesis'), metavar='DIR',
                         help='measurement session (default: $ROS_3D_BB_DATA/data/thesis, or simulated)')
     parser.add_argument('--every', type=int, default=1, metavar='N', help='use every Nth image (default: 1)')
+    parser.add_argument('--confidence', type=float, default=DetectionParams().confidence, metavar='P',
+                        help='smallest score of a detection of a network (default: %(default)s)')
     parser.add_argument('--json', metavar='FILE', help='also write the results to FILE')
     arguments = parser.parse_args()
     if arguments.every < 1:
         parser.error('--every is %d; at least 1 expected' % arguments.every)
+    if not 0 <= arguments.confidence <= 1:
+        parser.error('--confidence is %g; 0 to 1 expected' % arguments.confidence)
     return arguments

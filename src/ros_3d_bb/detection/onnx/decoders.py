@@ -113,6 +113,6 @@ def _sigmoid(values):
 
 def _expected_bins(distributions):
     """Expected values (n, 4) of distributions (n, 4 * bins), whose softmax is the probability of each bin."""
-    bins = distributions.reshape(len(distributions), 4, -1)
+    bins = distributions.reshape(len(distributions), 4, distributions.shape[1] // 4)  # -1 is ambiguous without rows
     weights = np.exp(bins - bins.max(axis=2, keepdims=True))
     return (weights * np.arange(bins.shape[2], dtype=np.float32)).sum(axis=2) / weights.sum(axis=2)

@@ -85,6 +85,10 @@ def layout_of(outputs, input_hw, metadata, head='', strides=(), names=()):
     if not shapes or len(shapes[0]) != 3 or shapes[0][0] != 1:
         raise ValueError('its first output is not (1, n, m)')
     grid = next((grid for grid in grids if _matches(shapes[0], cell_count(input_hw, grid))), ())
+    if strides and not grid:
+        raise ValueError('strides in the YAML file is %s, a grid of %d cells, which the %d x %d values of its first '
+                         'output do not fit; without this key, strides are recognised' % (
+                             list(strides), cell_count(input_hw, strides), shapes[0][1], shapes[0][2]))
     head = head or _head_of(outputs[0], input_hw, grid, metadata)
     if HEADS[head].strides and not (grid and shapes[0][1] == cell_count(input_hw, grid)):
         raise ValueError('its first output has %d rows, which are not the cells of strides %s; the key strides in the '

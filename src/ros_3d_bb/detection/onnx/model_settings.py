@@ -16,6 +16,11 @@ from ros_3d_bb.detection.weights import MAX_CLASSES, MAX_NAME, WeightsError
 
 MAX_BYTES = 10 ** 6
 MAX_STRIDE = 1024
+# Keys of the configuration files of NanoDet, PicoDet and ultralytics, and what replaces them here.
+FOREIGN_KEYS = {
+    'keep_ratio': 'resize gives this: center or corner if the aspect ratio is kept, stretch otherwise',
+    'reg_max': 'the number of bins is read from the outputs', 'input_size': 'the size is read from the ONNX file',
+    'imgsz': 'the size is read from the ONNX file'}
 
 
 @parameters()
@@ -26,8 +31,9 @@ class ModelSettings(NamedTuple):
     names: list = Param((), 'Names of the classes, in order. Default: those in the ONNX file, else COCO.')
     strides: list = Param((), 'Strides of the grid of the head, in order. Default: recognised, or of the head.')
     color: str = Param('', 'Order of the channels of the input. Default: of the head.', choices=('', 'rgb', 'bgr'))
-    mean: list = Param((), 'Subtracted from the channels (0..255), in the order of color. Default: of the head.')
-    std: list = Param((), 'By which the channels are then divided. Default: of the head.')
+    mean: list = Param((), 'Subtracted from the channels, in units of 0..255, in the order of color. Default: of '
+                       'the head.')
+    std: list = Param((), 'By which the channels are then divided, in units of 0..255. Default: of the head.')
     resize: str = Param('', 'How an image becomes the input. center: scaled and padded on two sides, corner: padded at '
                         'the right and at the bottom, stretch: not padded. Default: of the head.',
                         choices=('',) + RESIZE_MODES)
@@ -59,6 +65,8 @@ def settings_from(content):
     if not isinstance(content, dict) or not all(isinstance(key, str) for key in content):
         raise ValueError('keys and values expected, such as "resize: stretch"; keys: %s'
                          % ', '.join(ModelSettings._fields))
+    for key in sorted(set(content) & set(FOREIGN_KEYS)):
+        raise ValueError('%s is not a key of this file: %s; remove it' % (key, FOREIGN_KEYS[key]))
     settings, = params_from(content, ModelSettings)
     for key in ('mean', 'std'):
         values = getattr(settings, key)
@@ -66,6 +74,11 @@ def settings_from(content):
             raise ValueError('%s is %.100r; three numbers expected' % (key, values))
     if not all(value > 1e-6 for value in settings.std):
         raise ValueError('std is %.100r; numbers greater than 0 expected' % (settings.std,))
+    for key in ('mean', 'std'):
+        values = getattr(settings, key)
+        if any(values) and max(map(abs, values)) < 1:
+            raise ValueError('%s is %.100r, which is in units of 0..1; units of 0..255 expected: %s' % (
+                key, values, [round(255.0 * value, 3) for value in values]))
     if len(settings.strides) > 8 or not all(type(value) is int and 1 <= value <= MAX_STRIDE
                                             for value in settings.strides):
         raise ValueError('strides is %.100r; whole numbers expected, such as [8, 16, 32]' % (settings.strides,))

@@ -86,6 +86,7 @@ class OnnxModel(object):
         if self._channels_last:
             batch = np.ascontiguousarray(batch.transpose(0, 2, 3, 1))
         outputs = self._session.run(None, {self._input: batch})
+        outputs = [output[None] if output.ndim == 2 else output for output in outputs]  # exports without a batch axis
         if sum(output.nbytes for output in outputs) > MAX_OUTPUT_BYTES:
             raise ValueError('its outputs are larger than %d MB' % (MAX_OUTPUT_BYTES // 2 ** 20))
         return outputs

@@ -9,7 +9,10 @@ import re
 import warnings
 from typing import NamedTuple
 
+import numpy as np
+
 from ros_3d_bb.core.params import Param, check, parameters
+from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
 from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
 from ros_3d_bb.detection.onnx.session import gpus_are_supported
 from ros_3d_bb.detection.weights import WeightsError
@@ -38,6 +41,31 @@ class RuntimeParams(NamedTuple):
         '', 'Folder for checkpoints exported to ONNX (four bytes for each weight), named by the SHA-256 of the '
         'checkpoint. It is created if missing and may be deleted at any time. Empty: ~/.cache/ros_3d_bb/onnx, or '
         'below XDG_CACHE_HOME or ROS_3D_BB_CACHE where set.')
+
+
+def open_detector(weights, detection=DetectionParams(), running=RuntimeParams(), warn=warnings.warn):
+    """Open a network as the nodes do, and return it as a `network_detector.NetworkDetector`.
+
+    Parameters
+    ----------
+    weights : str
+        Path of the checkpoint or exported network.
+    detection : network_detector.DetectionParams
+    running : RuntimeParams
+    warn : callable
+        Called with the text of each warning.
+
+    Raises
+    ------
+    ValueError
+        If no weights are given or the network cannot be used.
+    """
+    if not weights:
+        raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
+                         'checkpoint such as yolov5n.pt, or of an ONNX file of another detector')
+    detector = NetworkDetector(open_runtime(os.path.abspath(os.path.expanduser(weights)), running, warn), detection)
+    detector.detect(np.zeros((480, 640, 3), np.uint8))  # the first detection takes several times as long as others
+    return detector
 
 
 def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
