@@ -47,6 +47,12 @@ def test_unknown_distances_are_not_counted():
     assert nearest_dominant_layers(row_mm, np.ones((1, 4)), ordered).tolist() == [2000]
 
 
+def test_unknown_distances_are_no_layer_beside_a_box_with_a_larger_range():
+    rows_mm = np.array([[500, 64000, 64000, 64000], [2000, UNKNOWN_MM, UNKNOWN_MM, UNKNOWN_MM]], np.uint16)
+    layers_mm = nearest_dominant_layers(rows_mm, np.ones((2, 4)), SortedDistances(rows_mm))
+    assert layers_mm.tolist() == [64000, 2000]
+
+
 @given(ROWS, st.integers(0, 100))
 def test_layers_are_in_the_range_of_the_distances_in_any_order(rows_mm, seed):
     even = np.ones(rows_mm.shape)

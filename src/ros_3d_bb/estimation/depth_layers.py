@@ -64,7 +64,8 @@ def nearest_dominant_layers(distances_mm, weights, ordered):
     """
     nearest_mm, farthest_mm = ordered.at(0), ordered.at(ordered.count - 1)
     bins = int((farthest_mm - nearest_mm).max()) // BIN_MM + 1
-    numbers = np.minimum((distances_mm - nearest_mm.astype(np.uint16)[:, None]) // BIN_MM, bins)  # the last: unknown
+    numbers = (distances_mm - nearest_mm.astype(np.uint16)[:, None]) // BIN_MM
+    numbers[distances_mm == UNKNOWN_MM] = bins  # dropped below
     rows = np.arange(len(distances_mm))
     numbers = numbers + ((bins + 1) * rows)[:, None]
     histograms = np.bincount(numbers.ravel(), weights.ravel(), (bins + 1) * len(rows)).reshape(len(rows), -1)[:, :-1]
