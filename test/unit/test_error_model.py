@@ -179,6 +179,10 @@ def test_boxes_are_corrected_and_get_their_covariance():
         assert result.size_m is box.size_m
         np.testing.assert_allclose(result.center_m, MODEL.corrected(given_box.center_m))
         np.testing.assert_allclose(result.covariance_m2, MODEL.covariance(result.center_m))
+    behind = box._replace(center_m=np.array([0.1, 0.9, -0.2]))  # of a person right before a tilted camera
+    first, second = corrected_boxes([box, behind], MODEL)
+    np.testing.assert_allclose(first.center_m, MODEL.corrected(box.center_m))
+    assert second.center_m.tolist() == [0.1, 0.9, -0.2] and np.linalg.eigvalsh(second.covariance_m2).min() > 0
     uncalibrated, = corrected_boxes([box])
     assert uncalibrated.center_m.tolist() == box.center_m.tolist()
     np.testing.assert_allclose(uncalibrated.covariance_m2, 0.01 * np.eye(3))

@@ -179,7 +179,8 @@ def corrected_boxes(boxes, model=None, gap_s=0.0):
     centers_m = np.array([box.center_m for box in boxes])
     covariances_m2 = UNCALIBRATED_SIGMA_M ** 2 * np.eye(3)
     if model is not None:
-        centers_m = model.corrected(centers_m)
+        ahead = centers_m[:, 2] > 0  # the axis of a very near person may be behind the image plane of a tilted camera
+        centers_m[ahead] = model.corrected(centers_m[ahead])
         covariances_m2 = model.covariance(centers_m)
     unsupported = np.array([max(0.0, WELL_SUPPORTED - box.support) for box in boxes])
     truncated = np.array([box.truncated for box in boxes])
