@@ -195,7 +195,8 @@ class _SampledImage(object):
         self._slices, camera = _grid_slices(first, stride, count), geometry.camera
         flat_px = _without_distortion(rects_px, camera)
         self._slopes_down = _slopes_down(flat_px, geometry)
-        rows, columns = (first[:, axis, None] + stride[:, axis, None] * np.arange(size)  # also beyond `count`
+        last = np.maximum(count - 1, 0)[..., None]  # repeated to the size of the grid: there may be no rays beyond
+        rows, columns = (first[:, axis, None] + stride[:, axis, None] * np.minimum(np.arange(size), last[:, axis])
                          for axis, size in enumerate((GRID_ROWS, GRID_COLUMNS)))
         depth_m = _grid_depths(depth, self._slices, count)
         x, y = (along.astype(np.float32) for along in camera.rays(columns[:, None, :], rows[:, :, None]))
