@@ -51,13 +51,16 @@ class Yolov5Node(object):
         ReconfigureServer(given, self._reconfigure)
 
     def _reconfigure(self, _params, detection, _running):
-        self._params = detection
-        self._set_params()
+        self._set_params(detection)
 
-    def _set_params(self):
-        """Use the parameters from the next image on, with the adaptive size if it is wanted."""
-        size = self._params.image_size or self._sizes.size
-        self._detector = self._detector.with_params(self._params._replace(image_size=size))
+    def _set_params(self, detection):
+        """Use DetectionParams from the next image on, with the adaptive size if it is wanted.
+
+        Raises ValueError, without any change, if one is invalid.
+        """
+        size = detection.image_size or self._sizes.size
+        self._detector = self._detector.with_params(detection._replace(image_size=size))
+        self._params = detection
 
     def _on_image(self, message):
         with self._diagnostics.receiving('colour images'):
@@ -69,7 +72,7 @@ class Yolov5Node(object):
         result = detect_in_color(self._detector, message, self._rotation.turns(message.header.frame_id))
         is_adaptive = not self._params.image_size and not self._detector.has_fixed_size
         if is_adaptive and self._sizes.add_detection(time.monotonic() - start_s):
-            self._set_params()
+            self._set_params(self._params)
             self._diagnostics.note('changes of the image size', 'detecting in images of %d pixels from now on, to keep '
                                    'up with the camera (~image_size 0)' % self._sizes.size)
         self._diagnostics.count('images processed')
