@@ -55,13 +55,20 @@ link_into_workspace() {
   ln -sfn "$here" "$workspace/src/ros_3d_bb"
 }
 
+# The path in the documentation leads to the workspace of the checkout that was built last.
+link_common_path() {
+  local last; last=$(readlink "$cache/workspace" || true)
+  [ "${last:-$workspace}" = "$workspace" ] || say "$cache/workspace was $last, and is now $workspace, of this checkout"
+  ln -sfn "$workspace" "$cache/workspace"
+}
+
 build() {
   setup
   say "building in $workspace"
   link_into_workspace
   catkin_make --directory "$workspace" -DPYTHON_EXECUTABLE="$venv/bin/python3" > "$workspace/build.log" 2>&1 || {
     cat "$workspace/build.log"; say "the build failed; its log is above"; exit 1; }
-  [ -n "${platform:-}" ] || ln -sfn "$workspace" "$cache/workspace"  # of the checkout that was built last
+  [ -n "${platform:-}" ] || link_common_path
   set +u; . "$workspace/devel/setup.bash"; set -u
   export ROS_LOG_DIR=${ROS_LOG_DIR:-$workspace/log}
 }
