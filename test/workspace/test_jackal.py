@@ -1,17 +1,26 @@
-"""Camera in the description of a Jackal, and nodes of jackal.launch and desk.launch, without packages of Jackal."""
+"""Camera in the description of a Jackal, nodes of jackal.launch and desk.launch, and names in the packages of a Jackal.
+
+The packages come from an archive in ROS_3D_BB_DATA; without it, excerpts of them are used.
+"""
 import os
+import re
+import tarfile
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pytest
+import roslaunch
 import xacro
+import yaml
 
+from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
 from support.launching import ROOT, dumped, given_to_stand_ins, loaded, write
 from support.urdf import base_from
 
 CAMERA = os.path.join(ROOT, 'urdf', 'jackal_d435i.urdf.xacro')
-# Mounting links of a Jackal, and the hook for extensions of the description. Source:
-# github.com/jackal/jackal, jackal_description/urdf/jackal.urdf.xacro (commit 9978ac0).
+ARCHIVE = os.path.join(os.environ.get('ROS_3D_BB_DATA', ''), 'gazebo', 'jackal.tar.xz')
+# Excerpts of the packages: mounting links, the hook for extensions of the description, and names. Source:
+# github.com/jackal/jackal (commit c6ab6ca), jackal_description, jackal_control and jackal_navigation.
 JACKAL = """<robot name="jackal" xmlns:xacro="http://www.ros.org/wiki/xacro">
   <link name="base_link"/> <link name="chassis_link"/> <link name="mid_mount"/> <link name="front_mount"/>
   <joint name="base_link_joint" type="fixed"><parent link="base_link"/><child link="chassis_link"/></joint>
@@ -21,20 +30,91 @@ JACKAL = """<robot name="jackal" xmlns:xacro="http://www.ros.org/wiki/xacro">
   <joint name="front_mount_joint" type="fixed">
     <origin xyz="0.120 0 0"/><parent link="mid_mount"/><child link="front_mount"/>
   </joint>
+  <xacro:property name="footprint_vertical_offset" value="-0.0655"/>
   <xacro:include filename="$(optenv JACKAL_URDF_EXTRAS empty.urdf)"/>
 </robot>"""
+EXCERPTS = {
+    'jackal_description/urdf/jackal.urdf.xacro': JACKAL,
+    'jackal_control/config/robot_localization.yaml': '{odom_frame: odom, base_link_frame: base_link, frequency: 50}',
+    'jackal_control/config/twist_mux.yaml': 'topics: [{name: external, topic: cmd_vel, timeout: 0.5}]',
+    'jackal_navigation/params/costmap_common_params.yaml': """{obstacles_layer: {scan: {topic: front/scan}},
+        footprint: [[-0.21, -0.165], [-0.21, 0.165], [0.21, 0.165], [0.21, -0.165]]}""",
+    'jackal_navigation/launch/include/move_base.launch':
+        '<launch><node name="move_base"><remap from="odom" to="odometry/filtered"/></node></launch>',
+    'jackal_navigation/launch/amcl_demo.launch':
+        """<launch><arg name="scan_topic" default="$(eval optenv('JACKAL_LASER_TOPIC', 'front/scan'))"/></launch>"""}
+
+
+@pytest.fixture(scope='module')
+def packages(tmp_path_factory):
+    """Folder of the packages of a Jackal."""
+    folder = tmp_path_factory.mktemp('packages')
+    if os.path.exists(ARCHIVE):
+        with tarfile.open(ARCHIVE) as archive:
+            archive.extractall(str(folder))
+        for path in folder.glob('jackal/**/*.xacro'):
+            text = re.sub(r'<xacro:include filename="\$\(find (?!jackal_).*?/>', '', path.read_text())  # lasers
+            # xacro of PyPI finds packages of ROS 2 only.
+            path.write_text(re.sub(r'\$\(find (\w+)\)', r'%s/jackal/\1' % folder, text))
+        return folder / 'jackal'
+    for name, content in EXCERPTS.items():
+        write(folder / name, content)
+    return folder
 
 
 @pytest.fixture
-def jackal(tmp_path, monkeypatch):
+def jackal(packages, monkeypatch):
     """Description of a Jackal with the camera, as a function of environment variables."""
-    write(tmp_path / 'jackal.urdf.xacro', JACKAL)
+    path = packages / 'jackal_description' / 'urdf' / 'jackal.urdf.xacro'
 
     def described(**variables):
         for name, value in dict(variables, JACKAL_URDF_EXTRAS=CAMERA).items():
             monkeypatch.setenv(name, value)
-        return ElementTree.fromstring(xacro.process_file(str(tmp_path / 'jackal.urdf.xacro')).toxml())
+        return ElementTree.fromstring(xacro.process_file(str(path)).toxml())
     return described
+
+
+def test_names_and_sizes_are_those_of_the_packages_of_a_jackal(packages):
+    def content(name):
+        return yaml.safe_load((packages / name).read_text())
+    parameters, nodes = loaded('navigation.launch')
+    localization = content('jackal_control/config/robot_localization.yaml')
+    assert localization['odom_frame'] == parameters['/move_base/local_costmap/global_frame']
+    assert localization['base_link_frame'] == parameters['/move_base/local_costmap/robot_base_frame']
+
+    remaps = dict(nodes['move_base'].remap_args)
+    external, = (entry for entry in content('jackal_control/config/twist_mux.yaml')['topics']
+                 if entry['name'] == 'external')
+    assert remaps['cmd_vel'] == external['topic']
+    assert 1 / parameters['/move_base/controller_frequency'] < external['timeout']
+    move_base = ElementTree.parse(str(packages / 'jackal_navigation/launch/include/move_base.launch'))
+    odom, = (remap.get('to') for remap in move_base.iter('remap') if remap.get('from') == 'odom')
+    assert parameters['/move_base/DWAPlannerROS/odom_topic'] == odom
+
+    costmap = content('jackal_navigation/params/costmap_common_params.yaml')
+    scan = costmap['obstacles_layer']['scan']['topic']
+    assert parameters['/move_base/local_costmap/obstacle_layer/scan/topic'] == scan
+    chassis, footprint = np.abs(costmap['footprint']), np.abs(parameters['/move_base/local_costmap/footprint'])
+    assert (footprint >= chassis).all()  # with wheels and fenders
+
+    description = ElementTree.parse(str(packages / 'jackal_description/urdf/jackal.urdf.xacro'))
+    offset, = (float(entry.get('value')) for entry in description.iter() if entry.get('name') ==
+               'footprint_vertical_offset')
+    assert abs(DepthDetectorParams().floor_height - offset) < 1e-3
+
+
+@pytest.mark.parametrize('topic', [None, 'rear/scan'])
+def test_the_scan_is_the_topic_of_the_laser_of_the_jackal(packages, monkeypatch, topic):
+    launch_file = ElementTree.parse(str(packages / 'jackal_navigation/launch/amcl_demo.launch'))
+    expected, = (arg.get('default') for arg in launch_file.getroot().findall('arg')
+                 if arg.get('name') == 'scan_topic')
+    monkeypatch.delenv('JACKAL_LASER_TOPIC', raising=False)
+    if topic:
+        monkeypatch.setenv('JACKAL_LASER_TOPIC', topic)
+    parameters, _nodes = loaded('navigation.launch')
+    for costmap in ('local', 'global'):
+        assert (parameters['/move_base/%s_costmap/obstacle_layer/scan/topic' % costmap]
+                == roslaunch.substitution_args.resolve_args(expected))
 
 
 def test_the_camera_is_at_the_position_in_the_thesis(jackal):
