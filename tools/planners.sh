@@ -20,7 +20,7 @@ cmake_modules() {
 make_planners() {  # FOLDER
   mkdir "$1/src"
   cd "$1/src"
-  for archive in "$archives"/*.tar.xz; do tar -xf "$archive"; done
+  for archive in "${planner_sources[@]}"; do tar -xf "$archive"; done
   patch -s -p1 < "$archives/patches.diff"
   cmake_modules
   touch costmap_converter/CATKIN_IGNORE vision_msgs/CATKIN_IGNORE
@@ -34,7 +34,9 @@ make_planners() {  # FOLDER
 build_planners() {
   archives=${ROS_3D_BB_DATA:-}/planners
   [ -d "$archives" ] || return 0
-  local hash; hash=$(cat "$archives"/*.tar.xz "$archives/patches.diff" | sha1sum | cut -c1-8)
+  # NAME_COMMIT; other archives may lie beside them.
+  planner_sources=("$archives"/{navigation,navigation_layers,people,costmap_converter,vision_msgs}_[0-9a-f]*.tar.xz)
+  local hash; hash=$(cat "${planner_sources[@]}" "$archives/patches.diff" | sha1sum | cut -c1-8)
   planners=$cache/planners-$hash
   mkdir -p "$planners"
   (
