@@ -51,7 +51,7 @@ class Network(Backend):
 
 
 def _yolov5(source):
-    with mock.patch('ros_3d_bb.pipeline.detection_stage.open_runtime', lambda *_given: Network(source)):
+    with mock.patch('ros_3d_bb.detection.yolov5.backends.open_runtime', lambda *_given: Network(source)):
         return Yolov5Node()
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.out_of_sequence import LATEST_NS, MOST_KEPT, MOST_SKIPPED
+from ros_3d_bb.tracking.out_of_sequence import LATEST_NS, MAX_WAIT_NS, MOST_KEPT, MOST_SKIPPED
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, Detection
 from support.cylinders import mounted
@@ -153,7 +153,8 @@ def test_the_memory_of_skipped_images_is_limited(is_any_tracked):
         tracker.skip(START_NS + number * PERIOD_NS, 'frame_%06d' % number)
         if is_any_tracked:
             tracker.update(START_NS + number * PERIOD_NS, [], FRONT)
-    assert len(tracker._buffer._skipped) <= (20 if is_any_tracked else MOST_SKIPPED)
+    assert len(tracker._buffer._skipped) <= (
+        30 * (LATEST_NS + MAX_WAIT_NS) // NS + 2 if is_any_tracked else MOST_SKIPPED)
 
 
 @pytest.mark.parametrize('rate_hz', [0.8, 1.5])
@@ -222,6 +223,31 @@ def test_neither_does_it_where_images_have_no_answer(arrivals, pause_s, cameras,
     shuffled = play_them(arrivals)
     assert ids(shuffled.objects()) == ids(in_time.objects())
     assert shuffled._buffer.state.tracks.tobytes() == in_time._buffer.state.tracks.tobytes()
+
+
+@pytest.mark.parametrize('late_images', [(1,), (3,), (9,), (14,), (3, 6, 9), (4, 9, 14)])
+def test_late_cameras_are_replayed_in_batches(monkeypatch, late_images):
+    """An image is processed less than three times on average; before, up to ten times."""
+    steps, step = [], Tracker._step
+    monkeypatch.setattr(Tracker, '_step', lambda *given: steps.append(None) or step(*given))
+    views = [FRONT] + [looking(number, 'late %d' % number) for number in range(len(late_images))]
+    lates = dict(zip([view.camera for view in views], (0,) + late_images))
+    images = images_of(2, lambda _time_s: None, views=views)
+    images.sort(key=lambda image: image[0] + lates[image[2].camera] * PERIOD_NS)
+    play(Tracker(), images)
+    assert len(steps) <= 3 * len(images)
+
+
+@pytest.mark.parametrize('pause_s', [0.1, 0.5, 3.0])
+def test_late_images_that_wait_are_replayed_before_a_pause(pause_s):
+    images = images_of(1.0, standing(IN_BOTH))
+    late, after = images[-25], (images[-1][0] + int(pause_s * NS), shown(FRONT, around(IN_BOTH)), FRONT)
+    in_order, one_late = Tracker(), Tracker()
+    play(in_order, images + [after])
+    play(one_late, images[:-25] + images[-24:] + [late, after])
+    for one, other in zip(in_order.objects(), one_late.objects()):
+        assert one.id == other.id
+        np.testing.assert_array_equal(one.covariance, other.covariance)
 
 
 @pytest.mark.slow

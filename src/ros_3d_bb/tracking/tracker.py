@@ -136,7 +136,8 @@ class Tracker(object):
         Returns
         -------
         list of TrackedObject
-            Ordered by ID, at the stamp of the newest image.
+            Ordered by ID, at the stamp of the newest image. They may not include the detections of images that are
+            several images late yet (`out_of_sequence`).
 
         Raises
         ------
@@ -144,7 +145,7 @@ class Tracker(object):
             If the image is too late or a duplicate; the tracks are unchanged.
         """
         self._buffer.insert(DetectedImage(stamp_ns, tuple(detections), view))
-        return self.objects()
+        return self._published()
 
     @property
     def common_motions(self):
@@ -152,7 +153,11 @@ class Tracker(object):
         return self._buffer.state.common_motions
 
     def objects(self):
-        """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image."""
+        """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image; with all images."""
+        self._buffer.replay()
+        return self._published()
+
+    def _published(self):
         state, params = self._buffer.state, self._params
         tracks = state.tracks.take(np.argsort(state.tracks['id']))
         published = tracks['log_odds'] >= track_score.MIN_TRACK_SCORE
