@@ -399,6 +399,24 @@ def test_people_keep_their_ids_when_the_odometry_jumps(jump_m, angle, rate_hz):
     np.testing.assert_allclose(speeds_mps, turned(CROWD_MPS, angle), atol=0.25)
 
 
+@pytest.mark.parametrize('rate_hz', [5, 7.5])
+def test_the_velocities_of_people_who_turn_together_follow_the_turn(rate_hz):
+    """Three people side by side turn right within half a second, at 4 m/s2: the motion is not that of the frame."""
+    def places(time_s):
+        turned_s = min(max(time_s - 2, 0), 0.5)
+        first = np.array([4.0 + 1.4 * (turned_s ** 2 + max(time_s - 2.5, 0)),
+                          1.4 * (min(time_s, 2) + turned_s - turned_s ** 2) - 3])
+        return first + 0.8 * np.arange(3)[:, None] * (1, 0)
+
+    def detections(time_s):
+        return [at(*place) for place in places(time_s) + random.normal(0, 0.03, (3, 2))]
+    random, tracker = np.random.RandomState(0), Tracker()
+    objects = play(tracker, 4.5, detections, rate_hz, view=CameraView(mounted(1), None))[-1]
+    assert len(objects) == 3 and tracker.common_motions <= 1
+    for track in objects:
+        np.testing.assert_allclose(track.velocity_mps[:2], (1.4, 0), atol=0.4)
+
+
 def test_people_who_move_differently_do_not_move_the_frame():
     """Two of five jump by 0.5 m; the others, and a sixth one who is not detected in that image, do not."""
     jumps_m = np.array([(0, 0.5), (0, 0.5), (0, 0), (0, 0), (0, 0)])

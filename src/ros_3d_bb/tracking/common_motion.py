@@ -3,8 +3,13 @@
 A motion (3,) is a translation in the plane and a rotation about the camera, (x, y, angle), metres and radians. Each
 pair of a track and a measurement votes for the motions that explain it alone (as in RANSAC, Fischler and Bolles 1981).
 The best one is refined by least squares, weighted with the covariances of the innovations.
+
+A pose jumps once. A motion that people's own acceleration explains, or that goes on, is that of people who turn or stop
+together, and is left to the filter.
 """
 import numpy as np
+
+from ros_3d_bb.core.time_sync import NS
 
 # Squared Mahalanobis distances of innovations below which 90 % and 99 % lie (chi-square, 2 degrees of freedom).
 USUAL, GATE = 4.6, 9.2
@@ -12,6 +17,8 @@ SIGNIFICANT = 25.0  # squared Mahalanobis distance of a motion: 1 of 60000 is la
 FEWEST = 3  # people: two may turn or stop together
 MOST = 12  # people who vote, to limit the computing time
 LEAST_M, LARGEST_M = 0.1, 1.0  # of the jump of a person: less is left to the filter, more may be another person
+SETTLED_NS = NS  # people must have fitted for this long before a jump; chosen: the duration of a turn
+PEOPLE_MPS2 = 4.0  # upper bound of the acceleration of people; chosen: they stop and turn with 3 to 4 m/s2
 PRIOR_STD = np.array([0.5, 0.5, 0.1])  # of a jump; keeps the fit of people in one direction well-conditioned
 FITS = 3  # the pairs are selected and the motion is fitted this many times
 
@@ -45,9 +52,11 @@ def most_fit(tracks, known, measurements, rows, columns):
     return 2 * (near + np.count_nonzero(distances2 < USUAL)) >= people
 
 
-def common_motion(tracks, known, measurements, view, classes):
-    """Motion of the frame since the previous image, and its covariance (3, 3), if one motion explains two thirds of the
-    known people (n,); None otherwise. `tracks` are predicted to the image.
+def common_motion(tracks, known, measurements, view, classes, period_s):
+    """Motion of the frame since the previous image, `period_s` before, and its covariance (3, 3).
+
+    None unless one motion explains two thirds of the known people (n,), and their own acceleration does not. `tracks`
+    are predicted to the image.
     """
     tracks = tracks[np.flatnonzero(known)[:MOST]]
     innovations, inverses = _innovations(tracks[:, None], measurements)
@@ -63,7 +72,9 @@ def common_motion(tracks, known, measurements, view, classes):
             return None
         motion, covariance = _least_squares(innovations[rows, columns], inverses[rows, columns], jacobians[rows])
         motions = motion[None]
-    return (motion, covariance) if motion.dot(np.linalg.solve(covariance, motion)) > SIGNIFICANT else None
+    moved_m = np.linalg.norm(jacobians[rows].dot(motion), axis=1).mean()
+    is_significant = motion.dot(np.linalg.solve(covariance, motion)) > SIGNIFICANT
+    return (motion, covariance) if is_significant and moved_m > LEAST_M + PEOPLE_MPS2 * period_s ** 2 / 2 else None
 
 
 def move(tracks, motion, covariance, view):

@@ -7,7 +7,7 @@ the camera jumped, and all tracks are moved (`common_motion`). Undetected people
 tracks stay published for a short time if a camera should detect them, and for longer if a person or an object occludes
 them (`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep their track ID.
 """
-from typing import NamedTuple
+from typing import NamedTuple, Optional
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter, noise_scale, track_score
 from ros_3d_bb.tracking.association import associate, unmatched
 from ros_3d_bb.tracking.class_numbers import ClassNumbers
-from ros_3d_bb.tracking.common_motion import common_motion, may_jump, most_fit, move
+from ros_3d_bb.tracking.common_motion import SETTLED_NS, common_motion, may_jump, most_fit, move
 from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
 from ros_3d_bb.tracking.occlusion import (DEFAULT_RANGE_M, SEEN, CameraVisibility, learned_range, mark_missed,
                                           recent_others)
@@ -76,13 +76,15 @@ class TrackerParams(NamedTuple):
 
 class _State(NamedTuple):
     """State of the tracker after an image: the tracks, the stamp of the latest image, the `CameraVisibility` of the
-    latest image of each camera, the number of images with a common motion, and the learned `noise_scale`.
+    latest image of each camera, the number of images with a common motion, the stamp of the latest image that most
+    people did not fit (None without), and the learned `noise_scale`.
     """
 
     tracks: np.ndarray
     now_ns: int
     cameras: dict
     common_motions: int
+    misfit_ns: Optional[int]
     log_noise_scale: float
 
 
@@ -107,7 +109,7 @@ class Tracker(object):
         self._start(last_id)
 
     def _start(self, last_id, log_noise_scale=0.0):
-        state = _State(np.zeros(0, TRACK), None, {}, 0, log_noise_scale)
+        state = _State(np.zeros(0, TRACK), None, {}, 0, None, log_noise_scale)
         self._buffer = OutOfSequenceBuffer(self._step, state, last_id)
 
     def reconfigure(self, params, noise, prediction):
@@ -184,8 +186,10 @@ class Tracker(object):
         rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
         known = tracks['confirmed'] & (latest.visibility == SEEN if latest else False)
         fits, motion = most_fit(tracks, known, measurements, rows, columns), None
-        if fits is False and may_jump(latest, recent_others(state.cameras, camera, stamp_ns)):
-            motion = common_motion(tracks, known, measurements, view, classes)
+        is_settled = state.misfit_ns is None or stamp_ns - state.misfit_ns > SETTLED_NS
+        if fits is False and is_settled and may_jump(latest, recent_others(state.cameras, camera, stamp_ns)):
+            motion = common_motion(tracks, known, measurements, view, classes, period_s)
+        misfit_ns = stamp_ns if fits is False else state.misfit_ns
         if fits is None and latest:
             fits = latest.fits
         if motion is not None:
@@ -221,5 +225,5 @@ class Tracker(object):
             for name, seen in cameras.items():
                 added = np.full(len(new), SEEN if name == camera else OUT_OF_VIEW)
                 cameras[name] = seen._replace(visibility=np.concatenate((seen.visibility[kept], added)))
-        return _State(tracks, stamp_ns, cameras, state.common_motions + (motion is not None),
+        return _State(tracks, stamp_ns, cameras, state.common_motions + (motion is not None), misfit_ns,
                       log_noise_scale), matches
