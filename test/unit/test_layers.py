@@ -34,7 +34,7 @@ ALLOWED = {
         'camera conversions core detection detection.depth detection.yolov5 estimation tracking visualization',
         'genpy sensor_msgs std_msgs tf2_msgs tf2_ros'),
     'ros_3d_bb.bags': (
-        'camera conversions core pipeline sessions',
+        'camera conversions core detection.yolov5 pipeline sessions',
         'genpy rosbag sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
     'ros_3d_bb.diagnosis': ('bags camera conversions core msg', 'genpy sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
     'ros_3d_bb.nodes.common': (

@@ -48,7 +48,7 @@ def presence_costs(tracks, robot_from_tracks, robot_radius_m):
     excesses = np.zeros(is_robot.shape)
     for track in tracks:
         cells, probabilities = _presence_of(track, robot_from_tracks)
-        at_robot = probabilities[is_robot[cells]].max(initial=0)
+        at_robot = np.append(probabilities[is_robot[cells]], 0).max()
         excesses[cells] = np.maximum(excesses[cells], probabilities - at_robot)
     return np.rint(HIGHEST * np.minimum(excesses / RISKY, 1)).astype(np.int8)
 

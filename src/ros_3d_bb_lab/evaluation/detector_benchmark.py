@@ -121,7 +121,7 @@ def best_confidence(session, network):
         detections = network.detect(read_color(frame, session.camera))
         overlaps = np.array([iou(box, detections.boxes) for box in np.array(frame.boxes_px, float)])
         is_match = overlaps >= FOUND_IOU
-        found.extend((is_match * detections.scores).max(axis=1, initial=0))
+        found.extend(detections.scores[row].max() if row.any() else 0 for row in is_match)
         false.extend(detections.scores[~is_match.any(axis=0)])
     found, false = np.array(found), np.array(false)
     hits = (found > CONFIDENCES[:, None]).sum(axis=1)
