@@ -9,7 +9,8 @@ from unittest import mock
 
 import genpy
 import rosbag
-import tf2_ros
+
+from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 
 
 def on_the_wire(message):
@@ -32,12 +33,6 @@ class Publisher(object):
 
     def get_num_connections(self):
         return self.connections
-
-
-class Buffer(tf2_ros.BufferCore):
-    """tf2's buffer with transforms that a test sets; lookups do not wait, which would need a clock."""
-
-    lookup_transform = tf2_ros.BufferCore.lookup_transform_core
 
 
 def immediate_worker(work, _on_error):
@@ -70,8 +65,8 @@ class Connections(object):
         self.subscribers[topic] = mock.Mock(topic=topic, kind=kind, callback=callback)
         return self.subscribers[topic]
 
-    def _buffer(self, **_options):
-        self.buffers.append(Buffer())
+    def _buffer(self):
+        self.buffers.append(TransformBuffer())
         return self.buffers[-1]
 
 
@@ -88,7 +83,7 @@ def masterless(params=()):
         'rospy.resolve_name': lambda name: '/' + name, 'rospy.is_shutdown': lambda: False,
         'rospy.get_rostime': lambda: connections.now, 'rospy.rostime.get_rostime': lambda: connections.now,
         'rospy.logwarn_throttle': lambda _period_s, text, *arguments: text % arguments,
-        'tf2_ros.Buffer': connections._buffer,
+        'ros_3d_bb.nodes.common.tf_lookup.TransformBuffer': connections._buffer,
         'diagnostic_updater.Updater': mock.Mock(),
         'ros_3d_bb.nodes.common.detector_output.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.tracker_node.NewestWorker': immediate_worker,

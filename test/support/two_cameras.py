@@ -20,16 +20,13 @@ class Transforms(object):
     """Lookup fails for the frames and stamps in `missing`. `while_waiting[frame]` is called in the next lookup."""
 
     def __init__(self):
-        self.missing, self.while_waiting, self.jumps = set(), {}, 0
+        self.missing, self.while_waiting = set(), {}
 
     def lookup(self, _target, source, stamp):
         self.while_waiting.pop(source, lambda: None)()
         if {source, stamp.to_nsec()} & self.missing:
             raise tf2_ros.LookupException('no such frame')
         return transform_from((0, 0, 1), OPTICAL_ROTATION)
-
-    def go_back(self):
-        self.jumps += 1
 
 
 class Result(NamedTuple):

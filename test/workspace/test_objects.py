@@ -26,8 +26,7 @@ def run():
     pipeline = Pipeline(settings, EventCounter(), transforms)
     for stamp_ns, messages in scenario_images(read_scenario(scenario_path('objects')), with_boxes=True):
         outputs, of_topic = [], dict(messages)
-        transforms.ahead(of_topic['tf'])
-        transforms.passed(of_topic['tf'])
+        transforms.add(of_topic['tf'])
         for topic, message in messages:
             if topic in settings.inputs and topic != 'tf':
                 outputs += pipeline.take(topic, message, stamp_ns)

@@ -11,6 +11,7 @@ import genpy.dynamic
 import numpy as np
 import pytest
 import rosbag
+import tf2_ros
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import Image
 from tf2_msgs.msg import TFMessage
@@ -213,18 +214,32 @@ def test_transforms_may_be_later_than_the_image_by_tf_timeout(scene, tmp_path):
         assert ('no transform' not in events.counts) == is_known
 
 
+def transform_message(stamp_s, child):
+    transform = TransformStamped(child_frame_id=child)
+    transform.header.frame_id, transform.header.stamp = 'map', time_from(int(stamp_s * NS))
+    transform.transform.rotation.w = 1.0
+    return TFMessage([transform])
+
+
+@pytest.mark.parametrize('lag_s', [1.5, 20])
+def test_transforms_of_another_frame_with_old_stamps_change_nothing(lag_s):
+    """Also after a lookup that failed: the frame `base` remains available at all stamps of its last 10 s."""
+    transforms = BagTransforms()
+    for number in range(100):
+        for stamp_s, child in ((100 + number / 10, 'base'), (100 + number / 10, 'gps'),
+                               (100 + number / 10 - lag_s, 'gps')):
+            transforms.add(transform_message(stamp_s, child))
+        with pytest.raises(tf2_ros.TransformException):
+            transforms.lookup('map', 'base', time_from(int((100.1 + number / 10) * NS)))
+    for number in range(99):
+        transforms.lookup('map', 'base', time_from(int((100.05 + number / 10) * NS)))
+
+
 def test_static_transforms_are_kept_after_a_jump():
     transforms = BagTransforms()
-
-    def message(stamp_s, child):
-        transform = TransformStamped(child_frame_id=child)
-        transform.header.frame_id, transform.header.stamp = 'map', time_from(stamp_s * NS)
-        transform.transform.rotation.w = 1.0
-        return TFMessage([transform])
-    transforms.set_static(message(0, 'mast'))
-    for tf in (message(100, 'base'), message(5, 'base'), message(6, 'base')):
-        transforms.ahead(tf)
-        transforms.passed(tf)
+    transforms.add_static(transform_message(0, 'mast'))
+    for tf in (transform_message(100, 'base'), transform_message(5, 'base'), transform_message(6, 'base')):
+        transforms.add(tf)
     assert np.array_equal(transforms.lookup('map', 'base', time_from(11 * NS // 2)), np.eye(4))
     assert np.array_equal(transforms.lookup('map', 'mast', time_from(5 * NS)), np.eye(4))
 

@@ -64,7 +64,7 @@ def test_lookups_of_other_cameras_succeed_while_a_fault_is_explained(transforms,
     assert why_not(transforms, 'front') == 'gone' and len(looked) == 1
 
 
-def test_a_transform_of_the_future_blocks_its_frame_for_one_lookup():
+def test_a_transform_of_the_future_blocks_no_lookup():
     with masterless() as connections:
         transforms, missed = Transforms(wait_s=0.0), []
         for number in range(50):
@@ -77,4 +77,4 @@ def test_a_transform_of_the_future_blocks_its_frame_for_one_lookup():
                     transforms.lookup('map', camera, stamp)
                 except tf2_ros.TransformException:
                     missed.append((number, camera))
-    assert missed == [(20, 'rear')]
+    assert missed == []

@@ -44,7 +44,7 @@ def test_an_image_ahead_without_a_result_changes_neither_stamps_nor_tracks(rig, 
         rig.send(stamp_ns + 9 * NS // 10 + 1, count=2000)
     result = rig.send(stamp_ns + PERIOD_NS)
     assert result.header.stamp == time_from(stamp_ns + PERIOD_NS) and ids(result) == before
-    assert not rig.transforms.jumps
+    assert 'jumps back in time' not in rig.events.counts
 
 
 def test_a_backward_jump_in_time_is_handled_once(rig):
@@ -52,7 +52,7 @@ def test_a_backward_jump_in_time_is_handled_once(rig):
     rig.transforms.missing.add(stamp_ns - 20 * NS)
     assert rig.send(stamp_ns - 20 * NS) is None
     assert rig.send(stamp_ns - 19 * NS).tracks == []
-    assert rig.transforms.jumps == 1 and rig.events.counts['jumps back in time'] == 1
+    assert rig.events.counts['jumps back in time'] == 1
     assert rig.send(stamp_ns - 19 * NS + PERIOD_NS).header.stamp < time_from(stamp_ns)
 
 

@@ -26,11 +26,13 @@ UNUSED = None, ''  # topic and camera of messages that the nodes do not use
 
 
 class Waiting(NamedTuple):
-    """A message that was read ahead of its processing, and what was begun: deserialization, and a detection in it."""
+    """A message that was read ahead of its processing; for an image of the detector also deserialized, with the
+    detection that was begun in it.
+    """
 
     raw: Raw
-    message: Any
-    search: Optional[Future]
+    image: Any = None
+    search: Optional[Future] = None
 
 
 class BagRun(object):
@@ -39,18 +41,21 @@ class BagRun(object):
     def __init__(self, reader, settings, events):
         self._reader, self._settings, self._events = reader, settings, events
         needed = BOXES_TOPIC if settings.detector == 'none' else COLOR_TOPIC
+        self._ahead_ns = int(settings.tracker[0].tf_timeout * NS)
         self._topics = {settings.name(topic): (topic, '') for topic in (TF_TOPIC, STATIC_TOPIC)}
         for camera in settings.cameras:
             for topic in settings.inputs - {TF_TOPIC, STATIC_TOPIC}:
                 self._topics[settings.name(topic, camera)] = topic, camera
-        self._transforms = BagTransforms()
+        # As in the nodes, the detector has a buffer of its own, because it is ahead of the other stages.
+        self._transforms, self._detector_transforms = BagTransforms(), BagTransforms()
+        self._unread_tf = collections.deque()  # (time_ns, message) of tf that is not in the buffer yet
         self._pipeline = Pipeline(settings, events, self._transforms)
         self._detector = None
         if settings.detector == 'yolov5':
             params, detection, running = settings.yolov5
             self._detector = open_detector(params.weights, detection, running,
                                            lambda line: events.note('remarks of the detector', line))
-            self._rotations = {camera: CameraRotation(params, self._transforms) for camera in settings.cameras}
+            self._rotations = {camera: CameraRotation(params, self._detector_transforms) for camera in settings.cameras}
         for camera in settings.cameras:
             reader.check_topic(settings.name(needed, camera), *INPUTS[needed])
 
@@ -58,15 +63,26 @@ class BagRun(object):
         """Yield (Raw, [(topic, message), ...]): each message of the bag with the messages published by the nodes."""
         static = self._settings.name(STATIC_TOPIC)
         for raw in self._reader.messages([static]):
-            with self._events.rejecting('transforms'):
-                self._transforms.set_static(message_in(raw, TFMessage))
+            self._add_static(raw)
         if self._settings.camera_pose is not None:
             self._set_camera_pose(*self._settings.camera_pose)
         self._read_depth_cameras()
         with ThreadPoolExecutor(self._settings.searches) as pool:
             for waiting in self._ahead(pool):
+                self._add_transforms(waiting.raw.time.to_nsec() + self._ahead_ns)
                 yield waiting.raw, self._handled(waiting)
         self._pipeline.end()
+
+    def _add_static(self, raw):
+        with self._events.rejecting('transforms'):
+            message = message_in(raw, TFMessage)
+            self._transforms.add_static(message)
+            self._detector_transforms.add_static(message)
+
+    def _add_transforms(self, until_ns):
+        """Add the transforms that were recorded until a time."""
+        while self._unread_tf and self._unread_tf[0][0] <= until_ns:
+            self._transforms.add(self._unread_tf.popleft()[1])
 
     def _set_camera_pose(self, height_m, tilt_rad):
         """Set the pose of the camera, whose frame is that of its first message unless a parameter replaces it.
@@ -75,8 +91,7 @@ class BagRun(object):
         """
         tf_topic, ends_ns = self._settings.name(TF_TOPIC), self._reader.span_ns[0] + DRIVER_TF_NS
         for raw in itertools.takewhile(lambda raw: raw.time.to_nsec() < ends_ns, self._reader.messages([tf_topic])):
-            with self._events.rejecting('transforms'):
-                self._transforms.set_static(message_in(raw, TFMessage))
+            self._add_static(raw)
         params = self._settings.bbox3d[0]
         pose = mounted_camera(height_m, tilt_rad, turns_for(params.image_rotation, None))
         topic = INFO_TOPIC if params.depth == RAW else DEPTH_TOPIC  # whose frame is that of the 3D boxes
@@ -85,7 +100,8 @@ class BagRun(object):
                 frame_id = params.frame_id or message_in(raw, *INPUTS[topic]).header.frame_id
             except ValueError:  # reported when the message is processed
                 continue
-            self._transforms.set_pose(self._settings.tracker[0].target_frame, frame_id, pose)
+            for transforms in (self._transforms, self._detector_transforms):
+                transforms.set_pose(self._settings.tracker[0].target_frame, frame_id, pose)
             return
 
     def _read_depth_cameras(self):
@@ -98,13 +114,12 @@ class BagRun(object):
 
     def _ahead(self, pool):
         """Yield the messages with a delay, to read transforms within ~tf_timeout and images for the detector ahead."""
-        ahead_ns = int(self._settings.tracker[0].tf_timeout * NS)
         queue, size, searches = collections.deque(), 0, 0
         for raw in self._reader.messages():
             queue.append(self._begun(raw, pool))
             size, searches = size + len(raw.data), searches + (queue[-1].search is not None)
             while queue and (size > MAX_WAITING_BYTES or (
-                    raw.time.to_nsec() - queue[0].raw.time.to_nsec() >= ahead_ns
+                    raw.time.to_nsec() - queue[0].raw.time.to_nsec() > self._ahead_ns
                     and (self._detector is None or searches > 2 * self._settings.searches))):
                 waiting = queue.popleft()
                 size, searches = size - len(waiting.raw.data), searches - (waiting.search is not None)
@@ -113,37 +128,34 @@ class BagRun(object):
             yield queue.popleft()
 
     def _begun(self, raw, pool):
-        """Start the work that can be done ahead of a message's processing: add transforms, submit detections."""
+        """Start the work that can be done ahead of a message's processing: read transforms, submit detections."""
         topic, camera = self._topics.get(raw.topic, UNUSED)
-        message = search = None
         if topic == TF_TOPIC:
             with self._events.rejecting('transforms'):
                 message = message_in(raw, TFMessage)
-                self._transforms.ahead(message)
+                self._detector_transforms.add(message)
+                self._unread_tf.append((raw.time.to_nsec(), message))
         elif topic == COLOR_TOPIC and self._detector is not None:
             with self._events.rejecting('images'):
-                message = message_in(raw, *IMAGE_KINDS)
-                turns = self._rotations[camera].turns(message.header.frame_id)
-                search = pool.submit(detect_in_color, self._detector, message, turns)
-        return Waiting(raw, message, search)
+                image = message_in(raw, *IMAGE_KINDS)
+                turns = self._rotations[camera].turns(image.header.frame_id)
+                return Waiting(raw, image, pool.submit(detect_in_color, self._detector, image, turns))
+        return Waiting(raw)
 
     def _handled(self, waiting):
         """Process a message and return the messages that the nodes would publish, [(topic, message), ...]."""
-        raw, message, search = waiting
+        raw, image, search = waiting
         topic, camera = self._topics.get(raw.topic, UNUSED)
         if topic in (None, STATIC_TOPIC):
             return []
         now_ns = raw.time.to_nsec()
         self._events.count('messages on %s' % raw.topic)
-        if topic == TF_TOPIC:
-            if message is not None:
-                self._transforms.passed(message)
-        elif search is not None:
+        if search is not None:
             with self._pipeline.searching():
                 _image, detections = search.result()
                 self._events.count('images processed')
-                return self._pipeline.found(message.header, detections, self._detector.names, now_ns, camera)
-        elif topic != COLOR_TOPIC or self._detector is None:
+                return self._pipeline.found(image.header, detections, self._detector.names, now_ns, camera)
+        elif topic != TF_TOPIC and (topic != COLOR_TOPIC or self._detector is None):
             with self._events.rejecting('messages on %s' % raw.topic):
                 return self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), now_ns, camera)
         return []

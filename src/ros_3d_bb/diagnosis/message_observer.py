@@ -127,10 +127,10 @@ def _read(reader, observed, depth_info, transforms):
     """Read the first seconds of a bag. Messages that have another type or are damaged are ignored."""
     for raw in reader.messages(['/' + STATIC_TOPIC]):
         with contextlib.suppress(ValueError):
-            transforms.set_static(message_in(raw, TFMessage))
+            transforms.add_static(message_in(raw, TFMessage))
     takers = {one.topic: (one.take, [get_message_class(kind) for kind in one.role.kinds]) for one in observed.values()}
     takers[depth_info.topic] = depth_info.take, [CameraInfo]
-    takers['/' + TF_TOPIC] = lambda message, _time_ns: transforms.ahead(message), [TFMessage]
+    takers['/' + TF_TOPIC] = lambda message, _time_ns: transforms.add(message), [TFMessage]
     begin_ns = None
     for raw in reader.messages(sorted(takers)):
         time_ns = raw.time.to_nsec()

@@ -6,6 +6,7 @@ from yaml import YAMLError
 from ros_3d_bb.camera.alignment import is_optical
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
+from ros_3d_bb.pipeline.transform_buffer import path_to_root
 
 NAMED = 8  # frames listed in a sentence
 ROBOT_FRAMES = 'odom', 'base_link'  # roots of the tree of a robot without localisation (REP 105)
@@ -30,13 +31,6 @@ def links_in(text):
             for frame, entry in entries.items()}
 
 
-def _path_to_root(links, frame):
-    path = [frame]
-    while path[-1] in links and links[path[-1]].parent not in path:
-        path.append(links[path[-1]].parent)
-    return path
-
-
 def why_missing(links, target, source, stamp_s):
     """Explain why there is no transform from the camera's frame `source` to the fixed frame `target` of the tracks.
 
@@ -53,7 +47,8 @@ def why_missing(links, target, source, stamp_s):
         return ('tf has no frame %s; its frames: %s%s' % (source, ', '.join(frames[:NAMED]), more),
                 'publish the pose of the camera: %s; or, if it has another name in tf, such as %s: frame_id:=%s'
                 % ((_publisher_command('base_link', source),) + 2 * (nearest_name(source, frames),)))
-    up, down = _path_to_root(links, source), _path_to_root(links, target)
+    parents = {frame: link.parent for frame, link in links.items()}
+    up, down = path_to_root(parents, source), path_to_root(parents, target)
     if target not in frames and is_optical(up[-1]):
         return 'tf has no frame %s; the tree of the camera is %s' % (target, ' < '.join(up)), pose_fix(up[-1])
     if target not in frames:

@@ -159,8 +159,6 @@ class PlannerBridgeNode(object):
         if abs(now_ns - stamp_ns) > self._params.timeout * NS:
             raise ValueError('their stamp is %.3f s before the clock, more than ~timeout (%g s); a bag needs '
                              'use_sim_time' % ((now_ns - stamp_ns) / NS, self._params.timeout))
-        if self._received is not None and stamp_ns < self._received.stamp_ns:
-            self._transforms.go_back()
         tracks, faults = usable_tracks(tracks_from_msg(message))
         self._diagnostics.count_dropped('tracks', faults)
         return ReceivedTracks(stamp_ns, now_ns, message.header.frame_id, with_class_widths(tracks, self._classes),

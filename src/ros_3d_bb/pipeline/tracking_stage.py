@@ -69,7 +69,7 @@ class TrackingStage(object):
     events : event_counter.EventCounter
     transforms
         Its `lookup(target_frame, source_frame, stamp)` returns target_from_source (4, 4) or raises
-        tf2_ros.TransformException; `go_back()` is called after a backward jump in time.
+        tf2_ros.TransformException.
     on_tracks : callable
         Called with the tracks (list of `types.TrackedObject`) after each image and their header, which has the newest
         stamp and the fixed frame. `lock` is held meanwhile.
@@ -204,7 +204,7 @@ class TrackingStage(object):
 
     def _accept(self, stamp_ns, now_ns, camera):
         """Whether the stamp of boxes is consistent with those of the other cameras. Handles backward jumps in time, as
-        when a bag is looped or rewound: tracks and transforms are discarded."""
+        when a bag is looped or rewound: tracks are discarded."""
         newest_ns = self._clocks.newest_ns or stamp_ns
         trusted = self._clocks.accept(stamp_ns, now_ns, camera)
         if trusted is not None:
@@ -213,10 +213,9 @@ class TrackingStage(object):
                               'camera agrees or ends'
                               % (camera, stamp_ns / NS, (stamp_ns - newest_ns) / NS, trusted))
         elif self._clocks.is_jump_back(stamp_ns, now_ns, camera):
-            self._events.note('jumps back in time', 'time jumped back from %.3f to %.3f: earlier tracks and transforms '
-                              'are discarded' % (newest_ns / NS, stamp_ns / NS))
+            self._events.note('jumps back in time', 'time jumped back from %.3f to %.3f: earlier tracks are discarded'
+                              % (newest_ns / NS, stamp_ns / NS))
             self._tracker.reset()
-            self._transforms.go_back()
             self._clocks.restart()
             self._jumps += 1
         return trusted is None

@@ -5,37 +5,25 @@ import time
 import rospy
 import tf2_ros
 
-from ros_3d_bb.conversions.perception_msgs import check_transforms, transform_from_msg
+from ros_3d_bb.conversions.perception_msgs import check_transforms
 from ros_3d_bb.diagnosis.tf_tree import links_in, why_missing
+from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 
 LONGEST_WAIT_S = 0.05  # without new transforms; bounds the delay of a shutdown
 EXPLAINED_S = 2.0  # between two searches of the whole tree for a pair of frames, as each costs as much as some images
-CACHE_S = 10.0  # the tf2 buffer rejects transforms that are older than the newest one of their frame by more
 REQUESTED_S = 10.0  # time for which the age of a pair of frames is shown after its last lookup
 
 
 class _Listener(tf2_ros.TransformListener):
-    """Receive transforms and notify the threads that wait for them.
-
-    `has_rejected` becomes true if tf2 rejects a transform as too old compared with the newest of its frame.
-    """
+    """Receive transforms and notify the threads that wait for them."""
 
     def __init__(self, buffer):
         self.news = threading.Condition()
-        self.clear()
         tf2_ros.TransformListener.__init__(self, buffer, tcp_nodelay=True)
-
-    def clear(self):
-        """Reset the state after the buffer was cleared."""
-        self.has_rejected, self._newest_s = False, {}  # by child frame
 
     def callback(self, data):
         """Process a message of /tf."""
-        if self._add(tf2_ros.TransformListener.callback, data):
-            for transform in data.transforms:
-                stamp_s, child = transform.header.stamp.to_sec(), transform.child_frame_id
-                newest_s = self._newest_s[child] = max(stamp_s, self._newest_s.get(child, stamp_s))
-                self.has_rejected |= stamp_s < newest_s - CACHE_S
+        self._add(tf2_ros.TransformListener.callback, data)
 
     def static_callback(self, data):
         """Process a message of /tf_static."""
@@ -46,11 +34,10 @@ class _Listener(tf2_ros.TransformListener):
             check_transforms(data)
         except ValueError as error:
             rospy.logwarn_throttle(5.0, 'transforms rejected: %s; waiting for the next' % error)
-            return False
+            return
         add(self, data)
         with self.news:
             self.news.notify_all()
-        return True
 
 
 class Transforms(object):
@@ -58,8 +45,7 @@ class Transforms(object):
 
     def __init__(self, wait_s):
         self._wait_s = wait_s
-        self._buffer = tf2_ros.Buffer(debug=False)
-        self._from_before = False
+        self._buffer = TransformBuffer()
         self._listener = _Listener(self._buffer)
         self._requested, self._explanations = {}, {}  # by (target, source): time; (sentence, time)
 
@@ -75,32 +61,17 @@ class Transforms(object):
         with self._listener.news:
             while True:
                 try:
-                    transform = self._buffer.lookup_transform_core(frames[0], frames[1], stamp)
-                    self._from_before = False
-                    return transform_from_msg(transform)
+                    return self._buffer.lookup(*frames, stamp)
                 except tf2_ros.TransformException as error:
                     left_s, fault = deadline_s - time.monotonic(), error
                 if left_s <= 0 or rospy.is_shutdown():
                     break
                 self._listener.news.wait(min(left_s, LONGEST_WAIT_S))
-        explained = type(fault)(self._explanation(frames, stamp) or str(fault))
-        if self._from_before or self._listener.has_rejected:
-            self._buffer.clear()
-            self._listener.clear()
-            self._from_before = False
-        raise explained
+        raise type(fault)(self._explanation(frames, stamp) or str(fault))
 
     def close(self):
         """Unsubscribe from tf."""
         self._listener.unregister()
-
-    def go_back(self):
-        """Handle a backward jump in time: the buffer is cleared if the next lookup fails.
-
-        Transforms from before the jump may prevent new ones from entering the buffer. With /clock, tf2 discards them
-        itself, and clearing the buffer at once would lose the new ones.
-        """
-        self._from_before = True
 
     def age(self):
         """Return the age of the newest transform of each recently requested pair of frames, as text."""

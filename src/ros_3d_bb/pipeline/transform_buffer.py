@@ -1,0 +1,87 @@
+"""tf2 buffer that accepts transforms again after a backward jump in time."""
+import collections
+
+import tf2_ros
+
+from ros_3d_bb.conversions.perception_msgs import transform_from_msg
+
+CACHE_S = 10.0  # tf2 rejects transforms that are older than the newest one of their frame by more
+MOST_RECENT = 1000  # recent transforms that are kept; chosen: some seconds of /tf of a Jackal, some megabytes
+
+
+def path_to_root(parents, frame):
+    """The frame and its ancestors, the root last; `parents` is {frame: parent}."""
+    path = [frame]
+    while path[-1] in parents and parents[path[-1]] not in path:
+        path.append(parents[path[-1]])
+    return path
+
+
+class TransformBuffer(tf2_ros.BufferCore):
+    """tf2 buffer for `lookup` at the stamps of images.
+
+    After a backward jump in time, or one transform with a stamp in the future, tf2 rejects the transforms of a frame.
+    If a lookup at their time fails because of this, the buffer is cleared, except for static transforms, and the recent
+    transforms up to that time are added again. Rejected transforms of other frames, or of another time than that of the
+    lookup, have no effect, as in tf2.
+    """
+
+    def __init__(self):
+        tf2_ros.BufferCore.__init__(self)
+        self._parents = {}
+        self._start()
+
+    def _start(self):
+        self._newest_s, self._rejected_before_s = {}, {}  # by child frame
+        self._recent = collections.deque(maxlen=MOST_RECENT)  # (transform, authority), also rejected ones
+
+    def set_transform(self, transform, authority):
+        """Add a TransformStamped."""
+        child, stamp_s = _child_of(transform), transform.header.stamp.to_sec()
+        newest_s = self._newest_s[child] = max(stamp_s, self._newest_s.get(child, stamp_s))
+        if stamp_s < newest_s - CACHE_S:
+            self._rejected_before_s[child] = newest_s - CACHE_S
+        self._recent.append((transform, authority))
+        self._parents[child] = transform.header.frame_id.lstrip('/')
+        tf2_ros.BufferCore.set_transform(self, transform, authority)
+
+    def set_transform_static(self, transform, authority):
+        """Add a TransformStamped of tf_static."""
+        self._parents[_child_of(transform)] = transform.header.frame_id.lstrip('/')
+        tf2_ros.BufferCore.set_transform_static(self, transform, authority)
+
+    def clear(self):
+        """Remove all transforms except static ones."""
+        tf2_ros.BufferCore.clear(self)
+        self._start()
+
+    def lookup(self, target_frame, source_frame, stamp):
+        """Look up `target_from_source`, a 4x4 matrix, at a stamp. Raises tf2_ros.TransformException."""
+        target, source = target_frame.lstrip('/'), source_frame.lstrip('/')
+        try:
+            return transform_from_msg(self.lookup_transform_core(target, source, stamp))
+        except tf2_ros.TransformException:
+            if not self._is_blocked(target, source, stamp.to_sec()):
+                raise
+        self._clear_after(stamp.to_sec() + CACHE_S)
+        return transform_from_msg(self.lookup_transform_core(target, source, stamp))
+
+    def root_of(self, frame):
+        """The root of the tree of a frame."""
+        return path_to_root(self._parents, frame.lstrip('/'))[-1]
+
+    def _is_blocked(self, target, source, stamp_s):
+        """Whether transforms at a stamp were rejected of a frame between two others. A stamp of 0 means the latest."""
+        between = set(path_to_root(self._parents, target)) ^ set(path_to_root(self._parents, source))
+        return any(0 < stamp_s < self._rejected_before_s.get(frame, 0) for frame in between)
+
+    def _clear_after(self, stamp_s):
+        recent = list(self._recent)  # a copy, as another thread may add transforms
+        self.clear()
+        for transform, authority in recent:
+            if transform.header.stamp.to_sec() <= stamp_s:
+                self.set_transform(transform, authority)
+
+
+def _child_of(transform):
+    return transform.child_frame_id.lstrip('/')
