@@ -123,6 +123,16 @@ def test_a_camera_that_stops_sending_is_lost(recording, monkeypatch):
     camera.close()
 
 
+def test_a_recording_is_no_longer_read_once_it_is_closed(recording):
+    """Otherwise librealsense may crash when it deletes the device. Whether its thread is reading is chance."""
+    for _attempt in range(10):
+        camera = RealSense(RealSenseParams(file=recording))
+        while camera.read() is None:
+            pass
+        camera.close()
+        assert camera._playback.current_status() == rs.playback_status.stopped
+
+
 def test_a_missing_camera_is_lost():
     with pytest.raises(CameraLost, match='123 .*640 x 480 .*30 Hz'):
         RealSense(RealSenseParams(serial='123'))

@@ -136,6 +136,10 @@ class RealSense(object):
         """Stop the camera or the recording."""
         try:
             self._pipeline.stop()
+            if self._playback is not None:
+                # stop() returns while the playback's thread may still read an image, which accesses freed memory if
+                # the device is deleted meanwhile. pause() waits for this thread.
+                self._playback.pause()
         except RuntimeError:
             pass  # the camera is already disconnected
 
