@@ -132,7 +132,7 @@ def test_parameters_are_live_only_in_nodes_with_a_reconfigure_server(name):
     (path, node.name) for node in NODES.values() for path in node_pages.config_paths(node)))
 def test_parameter_files_are_read_as_the_defaults(path, node):
     kinds = node_pages.parameter_types(NODES[node].node_class)
-    with open(inside(path)) as stream:
+    with open(inside(path), encoding='ascii') as stream:  # roslaunch reads it with the encoding of the locale
         given = yaml.safe_load(stream)
     assert given and [kind._asdict() for kind in params_from(given, *kinds)] == [
         {key: list(value) if key in given and isinstance(value, tuple) else value

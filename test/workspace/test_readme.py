@@ -60,6 +60,7 @@ def topics_of_nodes(*sections):
             for section in sections for entry in node.sections.get(section, ())}
 
 
+@pytest.mark.needs('pyrealsense2')
 def test_every_block_of_code_is_run():
     for name in ('tools', 'graphs', 'campaign', 'cameras', 'container'):
         importlib.import_module('test_readme_' + name)  # they claim their blocks

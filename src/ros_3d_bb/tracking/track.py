@@ -46,7 +46,7 @@ class PredictionParams(NamedTuple):
     prediction_time: float = PREDICTION_TIME
     prediction_step: float = PREDICTION_STEP
     prediction_acceleration: float = Param(
-        0.03, 'How much more people turn than the filter models: density of a white acceleration.', 'm²/s³',
+        0.03, 'How much more people turn than the filter models: density of a white acceleration.', 'm^2/s^3',
         live=(0, 1))
     standing_speed: float = Param(
         0.15, 'A velocity much lower than this is not extrapolated: it is mostly noise.', 'm/s', live=(0, 1))

@@ -40,7 +40,7 @@ class TrackerParams(NamedTuple):
 
     acceleration: float = Param(
         0.08, 'How much the velocity of a walking person varies: density of a white acceleration. With 0, people who '
-        'turn get a new ID.', 'm²/s³', live=(0.01, 2), section=MOTION)
+        'turn get a new ID.', 'm^2/s^3', live=(0.01, 2), section=MOTION)
     initial_speed: float = Param(
         0.8, 'Speed of a new target: standard deviation along each axis.', 'm/s', live=(0, 3), section=MOTION)
     outlier_share: float = Param(
@@ -52,7 +52,7 @@ class TrackerParams(NamedTuple):
         0.3, 'How far behind the person their depth is: standard deviation.', 'm', live=(0, 2), section=BOX_ERRORS)
     new_target_density: float = Param(
         0.12, 'Density of new targets and false detections. A box that no track explains better than this starts a '
-        'new track.', '1/m²', limits=(1e-9, LARGEST), live=(0.001, 1), section=ASSOCIATION)
+        'new track.', '1/m^2', limits=(1e-9, LARGEST), live=(0.001, 1), section=ASSOCIATION)
     duplicate_distance: float = Param(
         0.35, 'No track starts closer than this to a recently matched one.', 'm', live=(0, 1), section=ASSOCIATION)
     height_sigma: float = Param(
