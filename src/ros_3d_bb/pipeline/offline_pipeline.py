@@ -28,6 +28,7 @@ INPUTS = {COLOR_TOPIC: IMAGE_KINDS, DEPTH_TOPIC: IMAGE_KINDS, INFO_TOPIC: (Camer
           STATIC_TOPIC: (TFMessage,)}
 OUTPUTS_OF_CAMERA, OUTPUTS = (BOXES_TOPIC, BOXES3D_TOPIC), (TRACKS_TOPIC, MARKERS_TOPIC)
 DETECTORS = 'yolov5', 'depth', 'none'
+TRACKED = 'images with tracks'  # event
 
 
 class Settings(NamedTuple):
@@ -172,5 +173,6 @@ class Pipeline(object):
 
     def _on_tracks(self, tracks, header):
         """Output tracks and markers, as tracker_node does."""
+        self._events.count_all({TRACKED: 1} if tracks else {})
         self._outputs += [(TRACKS_TOPIC, tracks_to_msg(tracks, header)),
                           (MARKERS_TOPIC, self._markers.write(tracks, header))]
