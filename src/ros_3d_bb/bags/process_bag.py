@@ -106,8 +106,9 @@ def _with_camera(settings, given):
         for node in IMAGE_NODES:
             settings = with_params(settings, node, image_rotation=given.image_rotation)
     if given.camera_height is None:
-        if given.camera_tilt:
-            raise ValueError('--camera-tilt is given without --camera-height; both expected, or neither')
+        for option, value in (('--camera-tilt', given.camera_tilt), ('--camera-roll', given.camera_roll)):
+            if value:
+                raise ValueError('%s is given without --camera-height; both expected, or neither' % option)
         return settings
     tracker = settings.tracker[0]
     if tracker.cameras:
@@ -115,10 +116,13 @@ def _with_camera(settings, given):
     if not (0 < given.camera_height < HIGHEST_M and abs(given.camera_tilt) < math.pi / 2):
         raise ValueError('--camera-height is %g and --camera-tilt %g; more than 0 and less than %g m, and less than '
                          'pi / 2 rad expected' % (given.camera_height, given.camera_tilt, HIGHEST_M))
+    if not abs(given.camera_roll) < math.pi / 4:
+        raise ValueError('--camera-roll is %g; less than pi / 4 rad expected, and --image-rotation for quarter turns'
+                         % given.camera_roll)
     for node in IMAGE_NODES:
         settings = with_params(settings, node, floor_frame=tracker.target_frame)
     settings = with_params(settings, 'depth', floor_height=0.0)
-    return settings._replace(camera_pose=(given.camera_height, given.camera_tilt))
+    return settings._replace(camera_pose=(given.camera_height, given.camera_tilt, given.camera_roll))
 
 
 def with_params(settings, node, **changed):
@@ -286,6 +290,8 @@ def _parser():
                         'above the floor, which is z = 0 of the target frame, metres')
     parser.add_argument('--camera-tilt', type=float, default=0.0, metavar='RAD', help='with --camera-height, pitch of '
                         'the camera, radians; positive: it looks down (default: 0)')
+    parser.add_argument('--camera-roll', type=float, default=0.0, metavar='RAD', help='with --camera-height, roll of '
+                        'the camera, radians; positive: its right side is lower (default: 0)')
     parser.add_argument('--image-rotation', choices=IMAGE_ROTATION.choices, help='clockwise rotation that makes the '
                         'images upright, degrees (default: auto, from tf)')
     parser.add_argument('--cameras', metavar='NAMES', help='namespaces of several cameras, separated by commas (front, '

@@ -35,7 +35,7 @@ class Settings(NamedTuple):
     """Settings for processing bags: detector, parameters of each node, topics, concurrent searches, and compression.
 
     `names` maps topics of the nodes to topics of the bag; `keep` lists the topics to copy (None: all). `camera_pose` is
-    the height, metres, and the tilt, radians, of a camera without tf (see `image_rotation.mounted_camera`).
+    the height, metres, tilt and roll, radians, of a camera without tf (see `image_rotation.mounted_camera`).
     """
 
     detector: str = 'yolov5'
@@ -47,7 +47,7 @@ class Settings(NamedTuple):
     keep: Optional[Tuple[str, ...]] = None
     searches: int = 1
     compression: str = 'lz4'
-    camera_pose: Optional[Tuple[float, float]] = None
+    camera_pose: Optional[Tuple[float, float, float]] = None
 
     @property
     def inputs(self):

@@ -58,7 +58,8 @@ def read_recording(bag):
             by_stamp = truth if topic == '/' + TRUTH_TOPIC else tracks
             by_stamp[stamp_of(message)] = message
     if not tracks:
-        reason = ('but 3D boxes: probably tf lacks the pose of the camera; rosrun ros_3d_bb doctor checks it' if topics_of_cameras(bag, BOXES3D_TOPIC) else
+        reason = ('but 3D boxes: probably tf lacks the pose of the camera; rosrun ros_3d_bb doctor checks it'
+                  if topics_of_cameras(bag, BOXES3D_TOPIC) else
                   'a recorded run of simulation.launch, or a result of process_bag expected')
         raise ValueError('the bag has no messages on /%s; %s' % (TRACKS_TOPIC, reason))
     frames = set(message.header.frame_id for by_stamp in (truth, tracks) for message in by_stamp.values())
