@@ -14,7 +14,8 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_writer import write_bag
-from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
+from ros_3d_bb.camera.image_rotation import turned_image
+from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.nodes.bbox3d_node import DepthCameraCheck
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver
 from ros_3d_bb.nodes.doctor import bag_findings, machine_findings, tracked_cameras
@@ -151,11 +152,45 @@ def test_next_commands_lead_from_a_bag_with_other_names_to_a_picture_of_its_trac
     assert 'scene_report' in next_command_in('rosrun ros_3d_bb doctor tracked.bag', tmp_path)
 
 
-def test_the_next_command_asks_for_the_pose_of_a_camera_alone(bag, tmp_path):
-    def alone(topic, message):
-        return ('/another/tf' if topic == '/tf' else topic), message
-    command = next_command_in('rosrun ros_3d_bb doctor ' + changed(bag, tmp_path, alone), tmp_path)
-    assert '--camera-height HEIGHT --camera-tilt TILT' in command and '--remap' not in command
+def alone(topic, message):
+    return ('/another/tf' if topic == '/tf' else topic), message
+
+
+def test_the_next_command_has_the_pose_of_a_camera_alone_from_the_floor(tmp_path):
+    scene = dict(SCENE, robot={'mount': [0.0, 0.0, 1.2 - 0.065], 'pitch': 0.2})
+    write_bag(scenario_images(scenario_from(scene)), str(tmp_path / 'scene.bag'))
+    path = changed(str(tmp_path / 'scene.bag'), tmp_path, alone)
+    command = next_command_in('rosrun ros_3d_bb doctor ' + path, tmp_path)
+    words = command.split()
+    height_m, tilt_rad = (float(words[words.index(option) + 1]) for option in ('--camera-height', '--camera-tilt'))
+    assert abs(height_m - 1.2) < 0.05 and abs(tilt_rad - 0.2) < np.radians(1) and '--remap' not in command
+    assert '--camera-roll' not in command and '--image-rotation' not in command
+
+
+def test_the_next_command_asks_for_the_pose_of_a_camera_without_visible_floor(bag, tmp_path):
+    def of_a_wall(topic, message):
+        if topic == DEPTH:
+            fill_image(message, np.full((480, 640), 2000, np.uint16), '16UC1')
+        return alone(topic, message)
+    command = next_command_in('rosrun ros_3d_bb doctor ' + changed(bag, tmp_path, of_a_wall), tmp_path)
+    assert '--camera-height HEIGHT --camera-tilt TILT' in command
+
+
+@pytest.mark.parametrize('turns', [1, 2, 3])
+def test_a_rotated_camera_alone_is_recognised_by_its_people(bag, tmp_path, turns):
+    def rotated(topic, message):
+        if topic == DEPTH:
+            fill_image(message, turned_image(imgmsg_to_depth(message).values, -turns % 4), '16UC1')
+        elif topic == '/camera/color/image_raw':
+            fill_image(message, turned_image(imgmsg_to_rgb(message), -turns % 4), 'rgb8')
+        elif topic in (INFO, DEPTH_INFO) and turns != 2:
+            message.width, message.height = message.height, message.width
+            message.K = [message.K[4], 0, message.K[5], 0, message.K[0], message.K[2], 0, 0, 1]
+        return alone(topic, message)
+    path = changed(bag, tmp_path, rotated)
+    option = 'image_rotation:=%d (process_bag' % (90 * turns)
+    assert [option in fault.fix for fault in faults_in(path) if fault.subject == 'image rotation'] == [True]
+    assert '--image-rotation %d ' % (90 * turns) in next_command_in('rosrun ros_3d_bb doctor ' + path, tmp_path)
 
 
 @pytest.mark.parametrize('change', [metres, other_intrinsics, empty_info])

@@ -4,7 +4,7 @@ from shlex import quote
 from ros_3d_bb.diagnosis.checks import COLOR, IMAGES, TRACKS
 from ros_3d_bb.diagnosis.topic_faults import other_topic
 
-POSE = ' --camera-height HEIGHT --camera-tilt TILT'
+MIN_ROLL_RAD = 0.02  # smaller ones are within the error of the fitted floor
 
 
 def next_command(bag, seen, found):
@@ -24,13 +24,24 @@ def next_command(bag, seen, found):
         return ('rosrun ros_3d_bb doctor %s%s' % (quote(bag), _remappings(dict(names, **others))),
                 'checks the topics that probably are the missing ones')
     faults = set(finding.subject for finding in found if finding.fault)
-    if missing or faults - {'transforms'}:
+    if missing or faults - {'transforms', 'image rotation'}:
         return '', ''
+    pose, hint = _pose(seen.mount) if faults else ('', '')
     command = 'rosrun ros_3d_bb process_bag %s tracked.bag --detector depth%s%s && %s' % (
-        quote(bag), _remappings(names, ' --remap '), POSE if faults else '', report % 'tracked.bag')
-    return command, 'tracks people and draws them' + (
-        '; fill in the height of the camera above the floor, metres, and its tilt, radians, positive if it looks down'
-        if faults else '')
+        quote(bag), _remappings(names, ' --remap '), pose, report % 'tracked.bag')
+    return command, 'tracks people and draws them' + hint
+
+
+def _pose(mount):
+    """Return the options for the pose of a camera without tf, from its CameraMount or None, and a hint."""
+    turned = ' --image-rotation %d' % (90 * mount.turns) if mount is not None and mount.turns else ''
+    if mount is None or mount.height_m is None:
+        return (' --camera-height HEIGHT --camera-tilt TILT' + turned,
+                '; fill in the height of the camera above the floor, metres, and its tilt, radians, positive if it '
+                'looks down')
+    roll = ' --camera-roll %.2f' % mount.roll_rad if abs(mount.roll_rad) > MIN_ROLL_RAD else ''
+    return (' --camera-height %.2f --camera-tilt %.2f%s%s' % (mount.height_m, mount.tilt_rad, roll, turned),
+            '; height and tilt are those of the floor in the depth images: correct them if they are known')
 
 
 def _remappings(names, separator=' '):
