@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import rosbag
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Transform, TransformStamped
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
@@ -44,8 +45,8 @@ def changed(bag, folder, change):
     return path
 
 
-def found_in(path, camera='', target_frame=''):
-    return bag_findings(argparse.Namespace(bag=str(path), camera=camera, target_frame=target_frame))[0]
+def found_in(path, camera='', target_frame='', depth='aligned'):
+    return bag_findings(argparse.Namespace(bag=str(path), camera=camera, target_frame=target_frame, depth=depth))[0]
 
 
 def faults_in(path, **options):
@@ -193,7 +194,53 @@ def test_a_rotated_camera_alone_is_recognised_by_its_people(bag, tmp_path, turns
     assert '--image-rotation %d ' % (90 * turns) in next_command_in('rosrun ros_3d_bb doctor ' + path, tmp_path)
 
 
-@pytest.mark.parametrize('change', [metres, other_intrinsics, empty_info])
+RAW, RAW_INFO = '/front/depth/image_rect_raw', '/front/depth/camera_info'
+
+
+def raw_only(topic, message):
+    """Depth in the frame of a depth camera, 5 cm beside colour, on topics of its own."""
+    if topic in (DEPTH, DEPTH_INFO):
+        message.header.frame_id = 'camera_depth_optical_frame'
+        return (RAW if topic == DEPTH else RAW_INFO), message
+    if topic == '/tf':
+        link = TransformStamped(message.transforms[0].header, 'camera_depth_optical_frame', Transform())
+        link.header = Header(stamp=link.header.stamp, frame_id='camera_color_optical_frame')
+        link.transform.translation.x, link.transform.rotation.w = 0.05, 1.0
+        message.transforms.append(link)
+    return topic, message
+
+
+def raw_in_place(topic, message):
+    name, message = raw_only(topic, message)
+    return {RAW: DEPTH, RAW_INFO: DEPTH_INFO}.get(name, name), message
+
+
+@pytest.mark.parametrize('change, subject, topic', [(raw_only, 'depth images', RAW),
+                                                    (raw_in_place, 'alignment', DEPTH)])
+def test_raw_depth_is_not_taken_for_aligned_depth_and_leads_to_tracks(bag, tmp_path, change, subject, topic):
+    path = changed(bag, tmp_path, change)
+    fault = faults_in(path)[0]
+    assert fault.subject == subject and 'camera_depth:=' not in fault.fix and 'depth:=raw' in fault.fix
+    again = next_command_in('rosrun ros_3d_bb doctor ' + path, tmp_path)
+    assert 'doctor' in again and '--depth raw' in again and 'camera/depth/image_rect_raw:=' + topic in again
+    process = next_command_in(again, tmp_path)
+    assert '--detector depth --depth raw' in process and '--camera-height' not in process
+    assert next_command_in(process, tmp_path) == '' and (tmp_path / 'tracked.png').exists()
+
+
+def test_raw_depth_needs_the_transform_between_the_cameras(bag, tmp_path, monkeypatch):
+    def without_link(topic, message):
+        topic, message = raw_only(topic, message)
+        if topic == '/tf':
+            message.transforms.pop()
+        return topic, message
+    monkeypatch.setattr(sys, 'argv', ['doctor', 'camera/depth/image_rect_raw:=' + RAW,
+                                      'camera/depth/camera_info:=' + RAW_INFO])
+    fault, = faults_in(changed(bag, tmp_path, without_link), depth='raw')
+    assert 'tf has no transform from camera_depth_optical_frame to camera_color_optical_frame' in fault.fault
+
+
+@pytest.mark.parametrize('change', [metres, beside, empty_info])
 def test_there_is_no_next_command_before_a_fault_is_fixed(bag, tmp_path, change):
     assert next_command_in('rosrun ros_3d_bb doctor ' + changed(bag, tmp_path, change), tmp_path) == ''
 
