@@ -90,6 +90,13 @@ def test_a_map_without_tracks_has_a_reason(tmp_path, dropped, reason):
     assert reason in summary and ('no tracks: ' in summary) == bool(reason)
 
 
+def test_a_bag_without_images_has_a_map_only(tmp_path):
+    write_bag(((stamp_ns, [pair for pair in messages if pair[0] in (TRACKS_TOPIC, BOXES_TOPIC)])
+               for stamp_ns, messages in images_with_tracks('map')), str(tmp_path / 'tracked.bag'))
+    assert 'number of tracks: 1' in write_report(str(tmp_path / 'tracked.bag'), str(tmp_path / 'tracked.png'))[-1]
+    assert (tmp_path / 'tracked.png').exists()
+
+
 @pytest.mark.parametrize('picture', ['no_such_folder/report.png', 'report.xyz'])
 def test_an_image_that_cannot_be_written_is_an_error(bag, tmp_path, picture):
     with pytest.raises((OSError, ValueError)):

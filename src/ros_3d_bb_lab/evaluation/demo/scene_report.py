@@ -119,7 +119,7 @@ def panels_of(bag, recording, color_topic='', count=PANELS):
     wanted = set(stamps[pick] for pick in np.linspace(0, len(stamps) - 1, count + 2)[1:-1].astype(int))
     panels = []
     topics = [color_topic] if color_topic else topics_of_cameras(bag, COLOR_TOPIC)
-    for _topic, message, _time in bag.read_messages(topics):
+    for _topic, message, _time in bag.read_messages(topics) if topics else ():  # rosbag reads all topics for []
         stamp_ns = message.header.stamp.to_nsec()
         if stamp_ns in wanted:
             boxes = recording.boxes.get(stamp_ns, np.zeros((0, 4), int))
