@@ -32,7 +32,9 @@ def run_node(name, node_class, run=lambda _node: rospy.spin()):
     try:
         node = node_class()
     except ValueError as error:
-        place = 'launch argument %s_params:=FILE' % name[:-len('_node')]
+        # the nodes of the pipeline have this launch argument, those of ros_3d_bb_lab do not
+        is_ours = node_class.__module__.startswith('ros_3d_bb.')
+        place = 'launch argument %s_params:=FILE' % name[:-len('_node')] if is_ours else ''
         rospy.logfatal('%s cannot start: %s', rospy.get_name(), with_places(str(error), lambda _name: place))
         sys.exit(1)
     run(node)
