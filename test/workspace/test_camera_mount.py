@@ -18,6 +18,7 @@ from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, t
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, Yolov5NodeParams, detect_in_color
+from ros_3d_bb_lab.simulation.mesh import rotation
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.launching import loaded
@@ -92,10 +93,45 @@ def test_height_tilt_and_rotation_replace_tf(recorded, upright, tmp_path, turns)
     np.testing.assert_allclose(positions_and_sizes(found), positions_and_sizes(upright), atol=0.01)
 
 
+class RolledSimulator(Simulator):
+    """Its camera is rolled by `roll_rad`; positive: its right side is lower."""
+
+    roll_rad = 0.0
+
+    def poses(self, state, camera=0):
+        poses, rolled = super().poses(state, camera), np.eye(4)
+        rolled[:3, :3] = rotation(2, self.roll_rad)
+        return poses._replace(base_from_camera=poses.base_from_camera.dot(rolled))
+
+
+def rolled_images(roll_rad):
+    simulator = RolledSimulator(scenario_from(SCENE))
+    simulator.roll_rad = roll_rad
+    for number in range(simulator.frame_count):
+        frame = simulator.frame(number)
+        stamp_ns = START_NS + int(frame.time_s * NS)
+        header = Header(stamp=time_from(stamp_ns), frame_id=FRAME)
+        taken = CameraFrame(header, simulator.camera, frame.color, DepthImage(frame.depth_mm, 0.001), [])
+        yield stamp_ns, list(image_messages_of(taken))
+
+
+@pytest.mark.parametrize('roll_rad', [-0.21, 0.21])
+def test_a_rolled_camera_without_tf_needs_its_roll(upright, tmp_path, roll_rad):
+    write_bag(rolled_images(roll_rad), str(tmp_path / 'in.bag'))
+    pose = '--camera-height', str(HEIGHT_M), '--camera-tilt', str(TILT_RAD)
+    rolled = positions_and_sizes(processed(tmp_path, *pose, '--camera-roll', str(roll_rad))[0])
+    expected = positions_and_sizes(upright)
+    np.testing.assert_allclose(rolled[..., :3], expected[..., :3], atol=0.06)
+    level = processed(tmp_path, *pose)[0]['/ros_3d_bb/tracks'][-1]
+    errors_m = [np.abs(track.position_m - expected[-1, :, :3]).max(axis=1).min() for track in tracks_from_msg(level)]
+    assert len(errors_m) < 2 or max(errors_m) > 0.1
+
+
 @pytest.mark.parametrize('options, complaint', [
     ('--target-frame camera_color_optical_frame', 'is an optical frame'),
     ('--camera-height -1', 'more than 0'), ('--camera-height 1 --camera-tilt 2', 'less than pi / 2 rad'),
     ('--camera-height 1 --cameras a,b', 'a single camera only'), ('--camera-tilt 0.1', 'without --camera-height'),
+    ('--camera-roll 0.1', 'without --camera-height'), ('--camera-height 1 --camera-roll 1.6', 'less than pi / 4 rad'),
     ('--image-rotation 45', 'invalid choice')])
 def test_unusable_mounts_are_rejected(recorded, tmp_path, capfd, options, complaint):
     recorded(tmp_path / 'in.bag', with_tf=False)
@@ -141,12 +177,12 @@ def pose_in(arguments):
 @pytest.mark.parametrize('degrees', ['auto', '0', '90', '180', '270'])
 def test_launch_arguments_publish_the_pose_of_a_camera_alone(degrees):
     parameters, nodes = loaded('pipeline.launch', 'detector:=depth', 'camera_height:=1.2', 'camera_tilt:=0.1',
-                               'image_rotation:=' + degrees, 'frame_id:=optical')
+                               'camera_roll:=0.2', 'image_rotation:=' + degrees, 'frame_id:=optical')
     mount, parent, child = pose_in(nodes['camera_pose'].args.split())
     optical, child_parent, camera = pose_in(nodes['camera_optical_frame'].args.split())
     assert (parent, child, camera) == ('map', child_parent, 'optical')
     turns = 0 if degrees == 'auto' else int(degrees) // 90
-    np.testing.assert_allclose(mount.dot(optical), mounted_camera(1.2, 0.1, turns), atol=1e-6)
+    np.testing.assert_allclose(mount.dot(optical), mounted_camera(1.2, 0.1, turns, 0.2), atol=1e-6)
     assert parameters['/bbox3d_node/floor_frame'] == parameters['/depth_detector_node/floor_frame'] == 'map'
     assert parameters['/depth_detector_node/floor_height'] == 0
     assert parameters['/bbox3d_node/image_rotation'] == degrees
@@ -172,6 +208,7 @@ def test_the_pose_of_a_realsense_is_that_of_its_root():
     ('jackal.launch', ['driver:=none', 'cameras:=front,rear', 'camera_height:=1.2'], ['cameras', 'camera_height']),
     ('pipeline.launch', ['cameras:=front,rear', 'frame_id:=optical'], ['cameras', 'frame_id']),
     ('pipeline.launch', ['camera_tilt:=0.1'], ['camera_height', 'camera_tilt']),
+    ('pipeline.launch', ['camera_roll:=0.1'], ['camera_height', 'camera_roll']),
     ('measure.launch', ['session:=/s', 'camera_root:=camera_link'], ['camera_height', 'camera_root']),
     ('pipeline.launch', ['detector:=yolo5'], ['detector', 'yolo5']),
     ('pipeline.launch', ['cameras:=front,rear', 'detector:=yolo5'], ['detector', 'yolo5']),

@@ -85,6 +85,8 @@ CASES = [
     (sound(color=image_seen('yuv422', fault="has encoding 'yuv422'")), 'colour encoding', 'yuv422',
      'rgb8'),
     (with_stream(DEPTH, stamps_ns=(), lag_s=None), 'stamps', 'no stamp (zero)', 'set it to the time'),
+    (with_stream(DEPTH, stamps_ns=STAMPS[:40]), 'stamps', '10 of 50 messages', 'set it to the time'),
+    (with_stream(COLOR, stamps_ns=moved(STAMPS, 2.0 ** 31)), 'stamps', 'the year 2038', 'clock'),
     (with_stream(DEPTH, lag_s=9e6), 'stamps', '104.2 days before ROS time', 'use_sim_time true'),
     (with_stream(DEPTH, lag_s=-9.0), 'stamps', '9.0 s after ROS time', 'chrony'),
     (exact(with_stream(COLOR, stamps_ns=moved(STAMPS, 0.05))), 'pairs', 'only 0 %', 'stamp_tolerance'),

@@ -14,9 +14,22 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.nodes.bbox3d_node import SampleImages
-from ros_3d_bb.nodes.common import master, subscribers
+from ros_3d_bb.nodes.common import master, startup, subscribers
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
 from support.ros import wait_until
+
+
+@pytest.mark.parametrize('module, place', [
+    ('ros_3d_bb.nodes.bbox3d_node', ' (~stride: launch argument bbox3d_params:=FILE)'), ('ros_3d_bb_lab.node', '')])
+def test_a_node_that_cannot_start_names_the_launch_argument(module, place):
+    def node():
+        raise ValueError('parameter ~stride is 0')
+    node.__module__ = module
+    with mock.patch.multiple(rospy, init_node=mock.DEFAULT, logfatal=mock.DEFAULT, get_name=lambda: '/bbox3d_node') \
+            as mocked, mock.patch.object(startup, 'Registration'), pytest.raises(SystemExit):
+        startup.run_node('bbox3d_node', node)
+    text, *values = mocked['logfatal'].call_args[0]
+    assert text % tuple(values) == '/bbox3d_node cannot start: parameter ~stride is 0' + place
 
 
 def test_a_request_to_a_master_that_hangs_ends(monkeypatch):

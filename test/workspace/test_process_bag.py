@@ -20,10 +20,11 @@ from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError, BagReader
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import session_images, write_bag
-from ros_3d_bb.bags.process_bag import main, with_params
+from ros_3d_bb.bags.process_bag import main, option_of, with_params
 from ros_3d_bb.conversions.camera_msgs import START_NS
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, tracks_from_msg
 from ros_3d_bb.core.object_classes import PERSON_CLASS
+from ros_3d_bb.core.params import with_places
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
@@ -143,7 +144,7 @@ def test_without_transforms_there_are_no_tracks_and_the_summary_names_the_cause(
     rewritten(scene, tmp_path / 'in.bag', lambda topic, *rest: None if topic == '/tf' else (topic,) + rest)
     result = run_tool(tmp_path / 'in.bag', tmp_path / 'out.bag', '--detector', 'depth')
     assert result.returncode == 0 and '15  no transform' in result.stdout
-    assert 'no transform from camera_color_optical_frame to map' in result.stdout
+    assert result.stdout.splitlines()[-1].startswith('no tracks: no transform from camera_color_optical_frame to map')
     found = messages_in(tmp_path / 'out.bag')
     assert '/ros_3d_bb/tracks' not in found and len(found['/ros_3d_bb/bb_3d']) == 15
 
@@ -284,7 +285,27 @@ def test_parameter_files_are_checked(tmp_path, capsys, text, complaint):
     (tmp_path / 'tracker.yaml').write_text(text + '\n')
     with pytest.raises(SystemExit) as error:
         main(['a.bag', 'b.bag', '--detector', 'depth', '--tracker-params', str(tmp_path / 'tracker.yaml')])
-    assert error.value.code == 2 and complaint in capsys.readouterr().err
+    printed = capsys.readouterr().err
+    assert error.value.code == 2 and complaint in printed and 'error: --tracker-params: ' in printed
+
+
+@pytest.mark.parametrize('name, option', [
+    ('stamp_tolerance', '--depth-params or --bbox3d-params or --tracker-params FILE'),
+    ('cache_length', '--bbox3d-params FILE'), ('target_frame', '--target-frame'), ('enable', '')])
+def test_a_message_names_the_option_of_a_parameter(name, option):
+    sentence = 'set ~%s: 1' % name
+    assert with_places(sentence, option_of) == sentence + (' (~%s: %s)' % (name, option) if option else '')
+
+
+def test_the_last_line_says_that_no_people_were_detected(scene, tmp_path):
+    def in_an_empty_room(topic, message, time):
+        if topic == '/camera/aligned_depth_to_color/image_raw':
+            message.data = bytes(len(message.data))
+        return topic, message, time
+    rewritten(scene, tmp_path / 'in.bag', in_an_empty_room)
+    result = run_tool(tmp_path / 'in.bag', tmp_path / 'out.bag', '--detector', 'depth')
+    last = result.stdout.splitlines()[-1]
+    assert result.returncode == 0 and last.startswith('no tracks: no people were detected'), result.stdout
 
 
 def test_parameter_files_of_the_nodes_are_used(scene, tmp_path):

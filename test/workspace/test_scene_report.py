@@ -75,6 +75,28 @@ def test_without_ground_truth_the_tracks_are_listed(tmp_path):
     assert (tmp_path / 'tracked.png').exists()
 
 
+@pytest.mark.parametrize('dropped, reason', [
+    ((), ''), ((TRACKS_TOPIC,), 'none of which was tracked'),
+    ((TRACKS_TOPIC, BOXES_TOPIC), 'no people were detected')])
+def test_a_map_without_tracks_has_a_reason(tmp_path, dropped, reason):
+    def images():
+        for stamp_ns, messages in images_with_tracks('map'):
+            empty = tracks_to_msg([], Header(stamp=time_from(stamp_ns), frame_id='map'))
+            kept = [(topic, empty if topic == TRACKS_TOPIC and dropped else message) for topic, message in messages
+                    if topic != 'ground_truth' and (topic == TRACKS_TOPIC or topic not in dropped)]
+            yield stamp_ns, kept
+    write_bag(images(), str(tmp_path / 'tracked.bag'))
+    summary = write_report(str(tmp_path / 'tracked.bag'), str(tmp_path / 'tracked.png'))[-1]
+    assert reason in summary and ('no tracks: ' in summary) == bool(reason)
+
+
+def test_a_bag_without_images_has_a_map_only(tmp_path):
+    write_bag(((stamp_ns, [pair for pair in messages if pair[0] in (TRACKS_TOPIC, BOXES_TOPIC)])
+               for stamp_ns, messages in images_with_tracks('map')), str(tmp_path / 'tracked.bag'))
+    assert 'number of tracks: 1' in write_report(str(tmp_path / 'tracked.bag'), str(tmp_path / 'tracked.png'))[-1]
+    assert (tmp_path / 'tracked.png').exists()
+
+
 @pytest.mark.parametrize('picture', ['no_such_folder/report.png', 'report.xyz'])
 def test_an_image_that_cannot_be_written_is_an_error(bag, tmp_path, picture):
     with pytest.raises((OSError, ValueError)):
@@ -83,6 +105,7 @@ def test_an_image_that_cannot_be_written_is_an_error(bag, tmp_path, picture):
 
 @pytest.mark.parametrize('make, reason', [
     (lambda path: write_bag(scenario_images(scenario_from(SCENE)), path), 'no messages on /ros_3d_bb/tracks'),
+    (lambda path: write_bag([(START_NS, [('ros_3d_bb/bb_3d', Header())])], path), 'but 3D boxes: probably tf lacks'),
     (lambda path: write_bag(images_with_tracks('odom'), path), 'frames map, odom'),
     (lambda path: open(path, 'w').write('not a bag'), ''), (lambda _path: None, 'No such file')])
 def test_unusable_bags_are_rejected(tmp_path, monkeypatch, make, reason):

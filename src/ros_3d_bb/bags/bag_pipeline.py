@@ -84,7 +84,7 @@ class BagRun(object):
         while self._unread_tf and self._unread_tf[0][0] <= until_ns:
             self._transforms.add(self._unread_tf.popleft()[1])
 
-    def _set_camera_pose(self, height_m, tilt_rad):
+    def _set_camera_pose(self, height_m, tilt_rad, roll_rad):
         """Set the pose of the camera, whose frame is that of its first message unless a parameter replaces it.
 
         The other frames of the bag are those of the driver, which do not move, even if it publishes them on tf.
@@ -93,7 +93,7 @@ class BagRun(object):
         for raw in itertools.takewhile(lambda raw: raw.time.to_nsec() < ends_ns, self._reader.messages([tf_topic])):
             self._add_static(raw)
         params = self._settings.bbox3d[0]
-        pose = mounted_camera(height_m, tilt_rad, turns_for(params.image_rotation, None))
+        pose = mounted_camera(height_m, tilt_rad, turns_for(params.image_rotation, None), roll_rad)
         topic = INFO_TOPIC if params.depth == RAW else DEPTH_TOPIC  # whose frame is that of the 3D boxes
         for raw in self._reader.messages([self._settings.name(topic)]):
             try:

@@ -17,9 +17,9 @@ from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.bags.bag_writer import remove_partial
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS
 from ros_3d_bb.core.error_text import cause
-from ros_3d_bb.core.params import IMAGE_ROTATION, params_from
+from ros_3d_bb.core.params import IMAGE_ROTATION, params_from, with_places
 from ros_3d_bb.core.yaml_loader import load_yaml
-from ros_3d_bb.pipeline.offline_pipeline import DETECTORS, Settings
+from ros_3d_bb.pipeline.offline_pipeline import DETECTORS, TRACKED, Settings
 
 POLL_S, BAR = 0.2, 40
 GIB = 2 ** 30
@@ -27,6 +27,7 @@ HIGHEST_M = 100.0
 IMAGE_NODES = 'yolov5', 'depth', 'bbox3d'
 FILES = (('--yolov5-params', 'yolov5'), ('--depth-params', 'depth'), ('--bbox3d-params', 'bbox3d'),
          ('--tracker-params', 'tracker'))
+OPTIONS = 'weights', 'error_model', 'target_frame', 'cameras', 'depth', 'image_rotation'  # parameters with an option
 
 
 class Job(NamedTuple):
@@ -80,7 +81,10 @@ def _settings_from(given):
                                    keep=None if given.keep is None else tuple(t.lstrip('/') for t in given.keep))
     for option, node in FILES:
         path = getattr(given, option[2:].replace('-', '_'))
-        settings = settings._replace(**{node: read_params(path, getattr(settings, node))})
+        try:
+            settings = settings._replace(**{node: read_params(path, getattr(settings, node))})
+        except (ValueError, OSError, yaml.YAMLError) as error:
+            raise ValueError('%s: %s' % (option, error))
     cameras = given.cameras and [camera.strip() for camera in given.cameras.split(',')]
     for node, name, value in (('yolov5', 'weights', given.weights), ('bbox3d', 'error_model', given.error_model),
                               ('tracker', 'error_model', given.error_model),
@@ -102,8 +106,9 @@ def _with_camera(settings, given):
         for node in IMAGE_NODES:
             settings = with_params(settings, node, image_rotation=given.image_rotation)
     if given.camera_height is None:
-        if given.camera_tilt:
-            raise ValueError('--camera-tilt is given without --camera-height; both expected, or neither')
+        for option, value in (('--camera-tilt', given.camera_tilt), ('--camera-roll', given.camera_roll)):
+            if value:
+                raise ValueError('%s is given without --camera-height; both expected, or neither' % option)
         return settings
     tracker = settings.tracker[0]
     if tracker.cameras:
@@ -111,10 +116,13 @@ def _with_camera(settings, given):
     if not (0 < given.camera_height < HIGHEST_M and abs(given.camera_tilt) < math.pi / 2):
         raise ValueError('--camera-height is %g and --camera-tilt %g; more than 0 and less than %g m, and less than '
                          'pi / 2 rad expected' % (given.camera_height, given.camera_tilt, HIGHEST_M))
+    if not abs(given.camera_roll) < math.pi / 4:
+        raise ValueError('--camera-roll is %g; less than pi / 4 rad expected, and --image-rotation for quarter turns'
+                         % given.camera_roll)
     for node in IMAGE_NODES:
         settings = with_params(settings, node, floor_frame=tracker.target_frame)
     settings = with_params(settings, 'depth', floor_height=0.0)
-    return settings._replace(camera_pose=(given.camera_height, given.camera_tilt))
+    return settings._replace(camera_pose=(given.camera_height, given.camera_tilt, given.camera_roll))
 
 
 def with_params(settings, node, **changed):
@@ -219,13 +227,36 @@ def _reason(job, error):
     if isinstance(error, MemoryError):
         return '%s: more than %.1f GiB of memory (--memory)' % (job.source, job.memory / GIB)
     if isinstance(error, (ValueError, OSError)):
-        return '%s: %s' % (job.source, error)
+        return '%s: %s' % (job.source, with_places(str(error), option_of))
     return '%s: %s: %s' % (job.source, type(error).__name__, cause(error))
 
 
+def option_of(name):
+    """Return the option that sets a parameter of a node; empty if no node has it."""
+    if name in OPTIONS:
+        return '--' + name.replace('_', '-')
+    files = [option for option, node in FILES if any(name in part._fields for part in getattr(Settings(), node))]
+    return ' or '.join(files) + ' FILE' if files else ''
+
+
 def _summary(events):
-    return ['  %7d  %s%s' % (count, event, '. The first: %s' % events.sentences[event]
-                             if event in events.sentences else '') for event, count in events.counts.items()]
+    lines = ['  %7d  %s%s' % (count, event, '. The first: %s' % with_places(events.sentences[event], option_of)
+                              if event in events.sentences else '') for event, count in events.counts.items()]
+    return lines + ([] if events.counts.get(TRACKED) else ['no tracks: ' + _why_no_tracks(events)])
+
+
+def _why_no_tracks(events):
+    """Return the likely cause if no track was written, as a sentence."""
+    counts = events.counts
+    if counts.get('images tracked') and counts.get('boxes estimated'):
+        return 'none of %d 3D boxes was confirmed by later images' % counts['boxes estimated']
+    if not counts.get('images tracked') and events.sentences:
+        event = max(events.sentences, key=lambda each: (counts[each], each))
+        return with_places(events.sentences[event], option_of)
+    if counts.get('boxes without depth'):
+        return 'none of %d 2D boxes has depth' % counts['boxes without depth']
+    return ('no people were detected; rosrun ros_3d_bb doctor BAG checks the images and the orientation of the camera '
+            '(--image-rotation)')
 
 
 def _names(remaps):
@@ -259,6 +290,8 @@ def _parser():
                         'above the floor, which is z = 0 of the target frame, metres')
     parser.add_argument('--camera-tilt', type=float, default=0.0, metavar='RAD', help='with --camera-height, pitch of '
                         'the camera, radians; positive: it looks down (default: 0)')
+    parser.add_argument('--camera-roll', type=float, default=0.0, metavar='RAD', help='with --camera-height, roll of '
+                        'the camera, radians; positive: its right side is lower (default: 0)')
     parser.add_argument('--image-rotation', choices=IMAGE_ROTATION.choices, help='clockwise rotation that makes the '
                         'images upright, degrees (default: auto, from tf)')
     parser.add_argument('--cameras', metavar='NAMES', help='namespaces of several cameras, separated by commas (front, '

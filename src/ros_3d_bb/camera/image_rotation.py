@@ -50,7 +50,7 @@ def turned_rotation(turns):
     return np.linalg.matrix_power(TURNED_FROM_CAMERA, turns)
 
 
-def mounted_camera(height_m, tilt_rad, turns):
+def mounted_camera(height_m, tilt_rad, turns, roll_rad=0.0):
     """Pose (4, 4) of the optical frame of a camera that looks along x, above the origin of a frame whose z points up.
 
     Parameters
@@ -60,9 +60,12 @@ def mounted_camera(height_m, tilt_rad, turns):
         Pitch; positive: the camera looks down (REP 103).
     turns : int
         The camera is rolled so that this number of quarter turns makes its images upright.
+    roll_rad : float
+        Roll in addition to `turns`; positive: its right side is lower (REP 103).
     """
     pitched = transform_from((0, 0, height_m), (0, np.sin(tilt_rad / 2), 0, np.cos(tilt_rad / 2)))
-    pose = pitched.dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
+    rolled = transform_from((0, 0, 0), (np.sin(roll_rad / 2), 0, 0, np.cos(roll_rad / 2)))
+    pose = pitched.dot(rolled).dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
     pose[:3, :3] = pose[:3, :3].dot(turned_rotation(turns))
     return pose
 

@@ -1,5 +1,6 @@
 """Parameters of a node: their schema, and conversion of the parameter server's values to validated NamedTuples."""
 import difflib
+import re
 import sys
 from collections import OrderedDict
 from typing import Any, NamedTuple, Tuple, Union
@@ -114,6 +115,16 @@ def check(params):
             if word not in param.choices:
                 raise ValueError('parameter ~%s has %r; did you mean %s? Known: %s' % (
                     name, word, nearest_name(str(word), param.choices), ', '.join(param.choices)))
+
+
+def with_places(sentence, place_of):
+    """Append to a sentence where the parameters that it names (~stride) are set.
+
+    `place_of` returns the option or launch argument for the name of a parameter; empty if there is none.
+    """
+    names = sorted(set(re.findall(r'~([a-z]\w*)', sentence)))
+    places = ['~%s: %s' % (name, place_of(name)) for name in names if place_of(name)]
+    return sentence + (' (%s)' % '; '.join(places) if places else '')
 
 
 def _converted(name, value, kind):

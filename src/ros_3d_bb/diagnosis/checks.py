@@ -4,15 +4,17 @@ A check yields its findings, both faults and facts, and none if its input is mis
 their unit is not checked.
 """
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault, size_fault, target_frame_fault
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
-from ros_3d_bb.diagnosis.observations import IMAGE, Finding, Role
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, LATEST_NS, TRACKS_TOPIC
+from ros_3d_bb.diagnosis.observations import IMAGE, KEPT, Finding, Role
 from ros_3d_bb.diagnosis.tf_tree import pose_fix, why_missing
 from ros_3d_bb.diagnosis.topic_faults import (LATE_S, MIN_PAIRED, MIN_RATE_HZ, NO_CLOCK, clock_fault, paired_share,
                                               silence_fault, span)
+from ros_3d_bb.pipeline.transform_buffer import path_to_root
 
 COLOR, DEPTH, INFO, BOXES2D, BOXES3D, TRACKS = 'color', 'depth', 'info', 'boxes2d', 'boxes3d', 'tracks'
 IMAGES = COLOR, DEPTH, INFO
+UNSTAMPED_FIX = 'their publisher must set it to the time at which the image was taken'
 CAMERA = 'the camera (roslaunch ros_3d_bb realsense.launch)'
 CAMERA_SILENT = 'is the camera plugged in, the bag still playing (not paused), the network fast enough for images?'
 DETECTOR_SILENT = ('is the detector paused (call its service ~enable with true), still loading its weights, or '
@@ -37,8 +39,8 @@ def role_named(name, kind):
 
 def findings(seen):
     """Run all checks of an `Observations`. Returns a list of Finding."""
-    checks = (_clock, _images, _camera, _alignment, _encodings, _stamps, _pairs_of_images, _transforms, _pairs_of_boxes,
-              _results)
+    checks = (_clock, _images, _camera, _alignment, _encodings, _stamps, _pairs_of_images, _transforms, _mount,
+              _pairs_of_boxes, _results)
     found = [finding for check in checks for finding in check(seen)]
     return found + list(_nodes(seen, any(finding.fault for finding in found)))
 
@@ -62,7 +64,12 @@ def _images(seen):
         title, fact = stream.role.title, '%s, %.1f Hz' % (stream.topic, stream.rate_hz)
         if not stream.count:
             used = [other.topic for other in seen.streams.values() if other.count]
-            yield Finding(title, '', *silence_fault(stream, seen.topics, used, seen.seconds, seen.is_bag))
+            used += () if seen.depth_is_raw else seen.raw_topics
+            fault, fix = silence_fault(stream, seen.topics, used, seen.seconds, seen.is_bag)
+            if key == DEPTH and seen.raw_topics and not seen.depth_is_raw:
+                fix += '; raw depth, on %s, is registered with depth:=raw (process_bag and doctor: --depth raw)' % (
+                    ', '.join(seen.raw_topics))
+            yield Finding(title, '', fault, fix)
         elif key != INFO and 0 < stream.rate_hz < MIN_RATE_HZ:
             yield Finding(title, fact, 'only %.1f Hz on %s' % (stream.rate_hz, stream.topic),
                           'use USB 3, a wired network, or a lower resolution or rate (realsense.launch fps:=15)')
@@ -87,7 +94,7 @@ def _alignment(seen):
     if seen.depth is None or seen.color_info is None or seen.color_info.fault:
         return
     if seen.depth_is_raw:
-        yield Finding('alignment', 'raw depth, which the nodes register to colour')
+        yield Finding('alignment', 'raw depth, which the nodes register to colour', *_registration_fault(seen))
         return
     depth, camera = seen.depth.message, seen.color_info.converted
     fault = size_fault(camera, depth.width, depth.height) if depth.width else ''  # _encodings reports an empty image
@@ -95,6 +102,20 @@ def _alignment(seen):
         fault = intrinsics_fault(camera, seen.depth_info.converted)
     fault = fault or frames_fault(seen.color_info.message.header.frame_id, depth.header.frame_id) or seen.edges_fault
     yield Finding('alignment', 'depth has the pixels and the frame of colour', fault, ALIGN)
+
+
+def _registration_fault(seen):
+    """Return why raw depth in a bag cannot be registered, and the fix; empty if it can."""
+    if not seen.is_bag:
+        return ()
+    if seen.depth_info is None:
+        return ('there is no camera_info of the depth camera', 'record it, or remap %s to it' % DEPTH_TOPICS['raw'][1])
+    color, depth = (one.message.header.frame_id.lstrip('/') for one in (seen.color_info, seen.depth))
+    parents = {frame: link.parent for frame, link in seen.tf.links.items()} if seen.tf is not None else {}
+    if path_to_root(parents, color)[-1] != path_to_root(parents, depth)[-1]:
+        return ('tf has no transform from %s to %s, with which raw depth is registered' % (depth, color),
+                'record /tf_static of the camera driver (publish_tf:=true)')
+    return ()
 
 
 def _encodings(seen):
@@ -115,7 +136,16 @@ def _stamps(seen):
             continue
         if not stream.stamps_ns:
             yield Finding('stamps', '', 'the messages on %s have no stamp (zero)' % stream.topic,
-                          'their publisher must set it to the time at which the image was taken')
+                          UNSTAMPED_FIX)
+            return
+        missing = min(stream.count, KEPT) - len(stream.stamps_ns)
+        if missing:
+            yield Finding('stamps', '', '%d of %d messages on %s have no stamp (zero) and are rejected'
+                          % (missing, missing + len(stream.stamps_ns), stream.topic), UNSTAMPED_FIX)
+            return
+        if max(stream.stamps_ns) >= LATEST_NS:
+            yield Finding('stamps', '', 'the messages on %s have stamps of the year 2038 or later, which are rejected'
+                          % stream.topic, 'correct the clock of their publisher')
             return
         fault, fix = _stamp_fault(seen, stream)
         if fault:
@@ -160,6 +190,20 @@ def _transforms(seen):
         yield Finding('transforms', '', fault, fix or 'inspect the tree with rosrun tf view_frames')
     else:
         yield Finding('transforms', '%s to %s is available at the stamp of the image' % (source, target))
+
+
+def _mount(seen):
+    """Report how a camera without the pose in tf is mounted, and whether its images must be rotated."""
+    mount = seen.mount
+    if mount is None:
+        return
+    if mount.turns:
+        yield Finding('image rotation', '', '%d people are found in %d images, and %d if they are turned clockwise by '
+                      '%d degrees' % (mount.people[0], mount.images, mount.people[mount.turns], 90 * mount.turns),
+                      'pass image_rotation:=%d (process_bag: --image-rotation %d)' % (2 * (90 * mount.turns,)))
+    if mount.height_m is not None:
+        yield Finding('floor', 'the camera is %.2f m above it, tilted by %.2f rad and rolled by %.2f rad; fitted to '
+                      'the depth images' % (mount.height_m, mount.tilt_rad, mount.roll_rad))
 
 
 def _pairs_of_boxes(seen):

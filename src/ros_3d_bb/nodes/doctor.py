@@ -11,6 +11,7 @@ import rosgraph
 import rospy
 
 from ros_3d_bb.bags.bag_reader import BagError
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.diagnosis.message_observer import observe_bag
@@ -58,7 +59,7 @@ def bag_findings(arguments):
         wanted = name_for(arguments.camera, topic)
         return '/' + names.get(wanted, wanted).lstrip('/')
     try:
-        seen = observe_bag(arguments.bag, name_of, arguments.target_frame or 'map')
+        seen = observe_bag(arguments.bag, name_of, arguments.target_frame or 'map', arguments.depth)
     except BagError as error:
         return [Finding('bag', '', str(error), 'rosbag info %s lists its content' % arguments.bag)], '', ''
     found = findings(seen)
@@ -145,6 +146,9 @@ def _parser():
                         help='repeat the checks for this time while there are faults (default: 0)')
     parser.add_argument('--camera', default='', metavar='NAME',
                         help='namespace of the camera (default: the first one of tracker_node; none for a bag)')
+    parser.add_argument('--depth', choices=DEPTH_TOPICS, default='aligned', help='for a bag: raw if its depth images '
+                        'are not aligned to colour and are to be registered (default: aligned; in a graph, that of '
+                        'bbox3d_node)')
     parser.add_argument('--target-frame', default='', metavar='FRAME',
                         help='fixed frame of the tracks (default: that of tracker_node; map for a bag)')
     return parser

@@ -28,13 +28,14 @@ INPUTS = {COLOR_TOPIC: IMAGE_KINDS, DEPTH_TOPIC: IMAGE_KINDS, INFO_TOPIC: (Camer
           STATIC_TOPIC: (TFMessage,)}
 OUTPUTS_OF_CAMERA, OUTPUTS = (BOXES_TOPIC, BOXES3D_TOPIC), (TRACKS_TOPIC, MARKERS_TOPIC)
 DETECTORS = 'yolov5', 'depth', 'none'
+TRACKED = 'images with tracks'  # event
 
 
 class Settings(NamedTuple):
     """Settings for processing bags: detector, parameters of each node, topics, concurrent searches, and compression.
 
     `names` maps topics of the nodes to topics of the bag; `keep` lists the topics to copy (None: all). `camera_pose` is
-    the height, metres, and the tilt, radians, of a camera without tf (see `image_rotation.mounted_camera`).
+    the height, metres, tilt and roll, radians, of a camera without tf (see `image_rotation.mounted_camera`).
     """
 
     detector: str = 'yolov5'
@@ -46,7 +47,7 @@ class Settings(NamedTuple):
     keep: Optional[Tuple[str, ...]] = None
     searches: int = 1
     compression: str = 'lz4'
-    camera_pose: Optional[Tuple[float, float]] = None
+    camera_pose: Optional[Tuple[float, float, float]] = None
 
     @property
     def inputs(self):
@@ -172,5 +173,6 @@ class Pipeline(object):
 
     def _on_tracks(self, tracks, header):
         """Output tracks and markers, as tracker_node does."""
+        self._events.count_all({TRACKED: 1} if tracks else {})
         self._outputs += [(TRACKS_TOPIC, tracks_to_msg(tracks, header)),
                           (MARKERS_TOPIC, self._markers.write(tracks, header))]

@@ -5,7 +5,7 @@ import time
 
 import rospy
 
-from ros_3d_bb.core.params import params_from
+from ros_3d_bb.core.params import params_from, with_places
 from ros_3d_bb.nodes.common.master import Registration
 
 POLL_S = 0.05
@@ -32,7 +32,10 @@ def run_node(name, node_class, run=lambda _node: rospy.spin()):
     try:
         node = node_class()
     except ValueError as error:
-        rospy.logfatal('%s cannot start: %s', rospy.get_name(), error)
+        # the nodes of the pipeline have this launch argument, those of ros_3d_bb_lab do not
+        is_ours = node_class.__module__.startswith('ros_3d_bb.')
+        place = 'launch argument %s_params:=FILE' % name[:-len('_node')] if is_ours else ''
+        rospy.logfatal('%s cannot start: %s', rospy.get_name(), with_places(str(error), lambda _name: place))
         sys.exit(1)
     run(node)
     return node

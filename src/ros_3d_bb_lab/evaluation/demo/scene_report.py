@@ -13,7 +13,7 @@ import rosbag
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import (BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg, stamp_of,
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg, stamp_of,
                                                    tracks_from_msg, transform_from_msg)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE
@@ -58,8 +58,10 @@ def read_recording(bag):
             by_stamp = truth if topic == '/' + TRUTH_TOPIC else tracks
             by_stamp[stamp_of(message)] = message
     if not tracks:
-        raise ValueError('the bag has no messages on /%s; a recorded run of simulation.launch, or a result of '
-                         'process_bag expected' % TRACKS_TOPIC)
+        reason = ('but 3D boxes: probably tf lacks the pose of the camera; rosrun ros_3d_bb doctor checks it'
+                  if topics_of_cameras(bag, BOXES3D_TOPIC) else
+                  'a recorded run of simulation.launch, or a result of process_bag expected')
+        raise ValueError('the bag has no messages on /%s; %s' % (TRACKS_TOPIC, reason))
     frames = set(message.header.frame_id for by_stamp in (truth, tracks) for message in by_stamp.values())
     if len(frames) > 1:
         raise ValueError('truth and tracks have the frames %s; one frame expected' % ', '.join(sorted(frames)))
@@ -117,13 +119,23 @@ def panels_of(bag, recording, color_topic='', count=PANELS):
     wanted = set(stamps[pick] for pick in np.linspace(0, len(stamps) - 1, count + 2)[1:-1].astype(int))
     panels = []
     topics = [color_topic] if color_topic else topics_of_cameras(bag, COLOR_TOPIC)
-    for _topic, message, _time in bag.read_messages(topics):
+    for _topic, message, _time in bag.read_messages(topics) if topics else ():  # rosbag reads all topics for []
         stamp_ns = message.header.stamp.to_nsec()
         if stamp_ns in wanted:
             boxes = recording.boxes.get(stamp_ns, np.zeros((0, 4), int))
             panel = draw_boxes(imgmsg_to_rgb(message).copy(), boxes, [''] * len(boxes))
             panels.append(draw_caption(panel, '%.1f s' % ((stamp_ns - recording.moments[0].stamp_ns) / NS)))
     return panels
+
+
+def why_empty(recording):
+    """Return why the map of a recording shows no tracks, as a sentence; empty if it shows some."""
+    if any(track.status == VISIBLE for moment in recording.moments for track in moment.tracks):
+        return ''
+    count = sum(map(len, recording.boxes.values()))
+    if not count:
+        return 'no tracks: no people were detected (no 2D boxes in the bag)'
+    return 'no tracks: %d 2D boxes, none of which was tracked: without depth, or in too few images' % count
 
 
 def draw_scene(path, panels, people, tracks, robot, lines):
@@ -170,7 +182,8 @@ def write_report(bag_path, picture_path, color_topic=''):
         recording = read_recording(bag)
         header, rows, summary = (table(score(recording.moments)) if recording.has_truth
                                  else table_of_tracks(recording.moments))
-        summary = '%s; %d of %d images answered' % (summary, recording.answered, len(recording.moments))
+        summary = '; '.join(filter(None, (summary, '%d of %d images answered' % (
+            recording.answered, len(recording.moments)), why_empty(recording))))
         lines = lines_of(header, rows) + [summary]
         people, tracks = paths_of(recording)
         draw_scene(picture_path, panels_of(bag, recording, color_topic), people, tracks, recording.robot, lines)
