@@ -19,10 +19,11 @@ CHI_SQUARE_95 = 5.991  # 2 degrees of freedom
 pytestmark = pytest.mark.slow
 
 
-def simulator_of(people, height_m, tilt_deg=0, seconds=0.2, rate=5.0, seed=0):
+def simulator_of(people, height_m, tilt_deg=0, seconds=0.2, rate=5.0, seed=0, furniture=(), wall_m=14.0):
     robot = {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': np.radians(tilt_deg)}
+    room = {'bounds': [-4.0, wall_m, -7.0, 7.0], 'height': 4.0, 'furniture': list(furniture)}
     return Simulator(scenario_from({'duration': seconds, 'rate': rate, 'seed': seed, 'robot': robot, 'people': people,
-                                    'room': {'bounds': [-4.0, 14.0, -7.0, 7.0], 'height': 4.0}}))
+                                    'room': room}))
 
 
 def overlapping_people(count, nearest_m, farthest_m, random):
@@ -78,6 +79,70 @@ def test_positions_of_overlapping_people_below_a_tilted_camera(tilt_deg, median_
     assert np.median(errors_m) < median_m and errors_m.max() < 0.4
     level_errors_m = plane_errors_m(estimates(scenes, knows_tilt=False)[0])
     assert np.median(level_errors_m) > 1.5 * np.median(errors_m)
+
+
+def level_boxes(simulator, rects_px, labels=None):
+    """The Box3D of each rectangle in the first image of a level camera, or None."""
+    return estimate_boxes(DepthImage(simulator.frame(0).depth_mm, 0.001), rects_px, simulator.camera,
+                          estimator_named('foreground'), labels=labels)
+
+
+def depths_m(simulator):
+    """True depths of the people in the first image."""
+    frame = simulator.frame(0)
+    return [transform_points(np.linalg.inv(frame.poses.map_from_camera), person.position_m)[2]
+            for person in frame.people]
+
+
+@pytest.mark.parametrize('height_m', [0.27, 1.2])
+@pytest.mark.parametrize('ahead_m', [2.0, 3.0, 4.0])
+@pytest.mark.parametrize('wider,lower_edge', [(0, 1), (0, 0.5), (0.15, 1)], ids=['same', 'upper half', 'wider'])
+def test_a_second_box_of_a_person_is_no_person_on_the_wall(height_m, ahead_m, wider, lower_edge):
+    simulator = simulator_of([{'start': [ahead_m, 0.2], 'facing': 2.6, 'height': 1.75}], height_m, wall_m=6.0)
+    x1, y1, x2, y2 = first_px = np.rint(simulator.frame(0).people[0].box_px).astype(int).tolist()
+    more_px = int(wider * (x2 - x1))
+    second_px = x1 - more_px, y1, x2 + more_px, y1 + int(lower_edge * (y2 - y1))
+    found = [box for box in level_boxes(simulator, [tuple(first_px), second_px]) if box is not None]
+    assert found and all(abs(box.center_m[2] - depths_m(simulator)[0]) < 0.3 for box in found)
+
+
+@pytest.mark.parametrize('height_m,adult_m,gap_m', [
+    (0.27, 5.0, 0.3), (0.27, 5.0, 0.5), (1.2, 2.5, 0.3), (1.2, 3.5, 0.8)])
+def test_a_child_before_an_adult(height_m, adult_m, gap_m):
+    simulator = simulator_of([{'start': [adult_m - gap_m, 0.05], 'facing': 3.1, 'height': 1.1},
+                              {'start': [adult_m, 0.0], 'facing': 3.1, 'height': 1.8}], height_m)
+    random, child_m, frame = np.random.RandomState(0), depths_m(simulator)[0], simulator.frame(0)
+    for _draw in range(20):
+        _people, rects_px = detected_boxes(frame, simulator.camera, random, 0)
+        child = level_boxes(simulator, rects_px)[0]
+        assert abs(child.center_m[2] - child_m) < 0.25
+
+
+@pytest.mark.parametrize('height_m,counter_m,near_m,far_m', [
+    (0.6, 0.5, 2.0, 3.0), (1.2, 0.9, 2.0, 5.0), (1.2, 0.9, 2.6, 4.0)])
+def test_a_person_behind_a_counter_before_another_one(height_m, counter_m, near_m, far_m):
+    simulator = simulator_of([{'start': [near_m, 0.0], 'facing': 3.1, 'height': 1.7},
+                              {'start': [far_m, 0.1 * far_m], 'facing': 3.1, 'height': 1.8}], height_m,
+                             furniture=[{'at': [near_m - 0.55, -0.35], 'size': [0.6, 1.2, counter_m]}])
+    boxes = level_boxes(simulator, [tuple(person.box_px) for person in simulator.frame(0).people])
+    assert [box.center_m[2] for box in boxes] == pytest.approx(depths_m(simulator), abs=0.2)
+
+
+@pytest.mark.parametrize('height_m', [0.27, 0.9, 1.3])
+@pytest.mark.parametrize('ahead_m', [2.0, 3.5])
+def test_a_person_on_a_couch(height_m, ahead_m):
+    couch = [{'at': [ahead_m + 0.35, 0.0], 'size': [0.2, 1.9, 0.85]},
+             {'at': [ahead_m, 0.75], 'size': [0.8, 0.4, 0.6]}, {'at': [ahead_m, -0.75], 'size': [0.8, 0.4, 0.6]}]
+    simulator = simulator_of([{'start': [ahead_m, 0.0], 'facing': 3.14, 'height': 1.75, 'crouch': 0.7}], height_m,
+                             furniture=couch)
+    corners_m = np.array([(ahead_m + x, y, z) for x in (-0.4, 0.45) for y in (-0.95, 0.95) for z in (0, 0.85)])
+    frame = simulator.frame(0)
+    corners_px = simulator.camera.project(transform_points(np.linalg.inv(frame.poses.map_from_camera), corners_m))
+    couch_px = np.clip(np.hstack((corners_px.min(axis=0), corners_px.max(axis=0))), 0, [640, 480] * 2).astype(int)
+    rects_px = [tuple(frame.people[0].box_px), tuple(couch_px.tolist())]
+    alone, = level_boxes(simulator, rects_px[:1], ['person'])
+    person, _couch = level_boxes(simulator, rects_px, ['person', 'couch'])
+    assert person.center_m == pytest.approx(alone.center_m, abs=0.1)
 
 
 def test_heights_below_a_tilted_camera():

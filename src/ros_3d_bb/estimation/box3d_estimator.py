@@ -31,6 +31,14 @@ LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the person's l
 LEAST_WIDTH_M = 0.05
 # Chosen so that no person behind the dog of config/scenarios/objects.yaml is taken for the dog.
 UPPER_SHARE, LOWER_WEIGHT = 0.55, 0.35
+SAME_LAYER_M = 0.25  # largest difference of the layers of parts of one body
+CLEARLY_NEARER_M = 0.1
+CLEARLY_LOWER = 0.02  # share of the image height
+LEAST_BESIDE = 0.25  # minimum share of a rectangle beside another one that shows a layer of its own
+CONTAINED = 0.8  # minimum share of a second rectangle of an object in the first one
+FILLED = 0.4  # minimum share of both sides of a rectangle that background behind an object fills
+MANY = 200  # from this number of rectangles on, those that few others occlude are foremost, too: for speed
+MOST_TIES = 256  # pairs of rectangles whose layers beside each other are determined at once: more than in a crowd
 LEVEL = np.eye(3)  # of a camera that is held level
 MAX_TILT_RAD, MAX_ROLL_RAD = np.radians(65), np.radians(45)
 LEAST_AHEAD = 0.05  # lower bound of the horizontal part of a ray
@@ -159,8 +167,9 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     of the layer, and behind its mean depth by the distance of its class. If the image border truncates the object, it
     is completed to the usual size of its class. All of this is done in the level frame.
 
-    In the rectangles of nearer objects (see `front_to_back`) with plausible boxes, pixels that are not behind them are
-    masked. Rectangles are therefore estimated in groups, each after those in front of it.
+    In the rectangles of nearer objects with plausible boxes, pixels that are not behind them are masked. Rectangles are
+    therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
+    largest gets a box: what remains in the others is background, which continues beyond their left and right sides.
 
     Parameters
     ----------
@@ -174,15 +183,13 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     -------
     list of Box3D or None
         None if less than `LEAST_MEASURED` of the samples have a valid depth and a viewing ray, if the layer contains
-        less than `LEAST_SUPPORT` of those with depth, or if the rectangle cannot be undistorted.
+        less than `LEAST_SUPPORT` of those with depth, if the rectangle cannot be undistorted, or if it is a second one
+        of the same object.
     """
     image = _SampledImage(depth, rects_px, geometry, kinds)
     boxes = [None] * len(rects_px)
-    occluders, pending = _occluders(rects_px, geometry.camera), np.ones(len(rects_px), bool)
-    while pending.any():
-        group = np.flatnonzero(pending & ~occluders[:, pending].any(axis=1))
-        pending[group] = False
-        for number, box in image.estimates(group, occluders):
+    while image.pending.any():
+        for number, box in image.estimates(image.foremost()):
             boxes[number] = box
     return boxes
 
@@ -215,19 +222,78 @@ class _SampledImage(object):
         self._usable = self._measured >= np.maximum(LEAST_MEASURED * count.prod(axis=1), 1)
         self._usable &= np.isfinite(flat_px).all(axis=1)
         self._weights = _weights(columns, rects_px, count[:, 0])
-        self._occluding_mm = [0] * len(rects_px)  # depth up to which plausible boxes mask the samples of others
+        self._counts = count
+        self._area_px, self._shared_px = _areas(rects_px)
+        self._lowest_px = np.minimum(rects_px[:, 3], camera.height * (1 - CUT_ROWS))
+        self._clearly_lower_px = CLEARLY_LOWER * camera.height
+        groups = [kind.group for kind in kinds]
+        self._alike = np.array([[group is not None and group == other for other in groups] for group in groups])
+        self.pending = self._usable.copy()  # without an estimate yet
+        self._changed = self._usable.copy()  # since the layer was determined
+        self._layer_m = np.zeros(len(rects_px))
+        # Layers of rectangles beside each other one, or of the whole rectangles where there is no layer beside it
+        self._beside_m = np.zeros(self._shared_px.shape)
+        self._is_beside = np.zeros(self._shared_px.shape, bool)
+        self._repeats = np.zeros(len(rects_px), bool)  # may be of the object of a larger rectangle
 
-    def estimates(self, group, occluders):
-        """Pairs (number, Box3D) of the rectangles in `group` (k,) that have a box, after those of their `occluders`
-        (n, n).
+    def foremost(self):
+        """Numbers of the pending rectangles that no pending rectangle of a nearer object overlaps.
+
+        The nearer of two objects is the one with the nearer layer. A layer that both rectangles show belongs to the one
+        that shows it beside the other one, too. If that does not decide, of two objects of one kind the nearer one is
+        clearly lower in the image, has a clearly nearer layer or is larger, in this order; of different kinds, it is
+        the smaller one, as a person on a couch.
         """
+        pending = np.flatnonzero(self.pending)
+        pairs = np.ix_(pending, pending)
+        overlap, alike, area_px = self._shared_px[pairs] > 0, self._alike[pairs], self._area_px[pending]
+        self._determine_layers(pending, overlap)
+        farther_m = self._beside_m[pairs] - self._beside_m[pairs].T
+        lower_px = self._lowest_px[pending] - self._lowest_px[pending][:, None]
+        larger = np.where(area_px == area_px[:, None], pending < pending[:, None], area_px > area_px[:, None])
+        tied = np.abs(farther_m) < SAME_LAYER_M
+        nearer = np.where(np.abs(farther_m) < CLEARLY_NEARER_M, larger, farther_m > 0)
+        nearer = np.where(np.abs(lower_px) > self._clearly_lower_px, lower_px > 0, nearer)
+        nearer = overlap & np.where(tied, np.where(alike, nearer, ~larger), farther_m > 0)
+        contained = self._shared_px[pairs] >= CONTAINED * area_px[:, None]
+        self._repeats[pending] |= (tied & alike & nearer & contained).any(axis=1)
+        in_front = np.count_nonzero(nearer, axis=1)
+        if in_front.all():  # three or more occlude each other in a circle
+            return pending[[np.lexsort((-area_px, -self._lowest_px[pending]))[0]]]
+        return pending[in_front <= len(pending) // MANY]
+
+    def _determine_layers(self, pending, overlap):
+        """Determine the layers of pending rectangles (k,) that `overlap` (k, k), if they or the others have changed."""
+        changed = self._changed[pending] & overlap.any(axis=1)
+        if not changed.any():
+            return
+        numbers, pairs = pending[changed], np.ix_(pending, pending)
+        self._layer_m[numbers] = self._layers(self._ahead_mm[numbers], numbers) / 1000
+        self._changed[numbers] = False
+        layers_m = self._layer_m[pending]
+        overlap = overlap & (changed | changed[:, None])
+        self._beside_m[pairs] = np.where(overlap, layers_m[:, None], self._beside_m[pairs])
+        self._is_beside[pairs] &= ~overlap
+        tied = overlap & (np.abs(layers_m - layers_m[:, None]) < SAME_LAYER_M)
+        tied &= self._shared_px[pairs] <= (1 - LEAST_BESIDE) * self._area_px[pending][:, None]
+        first, second = pending[np.argwhere(tied)[:MOST_TIES].T]
+        beside_mm = self._ahead_mm[first]
+        for samples_mm, number, other in zip(beside_mm, first.tolist(), second.tolist()):
+            self._mask(samples_mm, number, other, UNKNOWN_MM)
+        seen = (beside_mm < UNKNOWN_MM).any(axis=1)
+        if seen.any():
+            self._beside_m[first[seen], second[seen]] = self._layers(beside_mm[seen], first[seen]) / 1000
+            self._is_beside[first[seen], second[seen]] = True
+
+    def _layers(self, ahead_mm, numbers):
+        """Layers (k,) of samples (k, samples) of the rectangles with the given numbers (k,), millimetres."""
+        return nearest_dominant_layers(ahead_mm, self._weights[numbers], SortedDistances(ahead_mm))
+
+    def estimates(self, group):
+        """Pairs (number, Box3D) of the rectangles in `group` (k,) that have a box; what these occlude is masked."""
+        self.pending[group] = False
         ahead_mm = self._ahead_mm[group]
-        for member, occluder in np.argwhere(occluders[group]).tolist():
-            self._mask(ahead_mm[member].reshape(GRID_ROWS, GRID_COLUMNS), group[member], occluder)
         ordered = SortedDistances(ahead_mm)
-        usable = self._usable[group] & (ordered.count > 0)
-        if not usable.all():
-            return self.estimates(group[usable], occluders) if usable.any() else []
         layers_mm = nearest_dominant_layers(ahead_mm, self._weights[group], ordered)
         first, end = ordered.within(layers_mm, BODY_HALF_DEPTH_MM)
         supports = (end - first) / self._measured[group]
@@ -236,11 +302,31 @@ class _SampledImage(object):
         layers_m = ordered.means(first + tenth, end - tenth) / 1000
         nearest_mm, farthest_mm = (ordered.at(rank).astype(np.uint16)[:, None] for rank in (first, end - 1))
         top_m, bottom_m = layers_m * self._slopes_down[:, group]
-        left_m, right_m = self._edges(group, (ahead_mm >= nearest_mm) & (ahead_mm <= farthest_mm), bottom_m)
-        values = zip(group.tolist(), supports.tolist(), layers_m.tolist(), left_m.tolist(), right_m.tolist(),
-                     top_m.tolist(), bottom_m.tolist())
-        return [(number, self._box(number, support, *extents_m)) for number, support, *extents_m in values
-                if support >= LEAST_SUPPORT]
+        on_body = (ahead_mm >= nearest_mm) & (ahead_mm <= farthest_mm)
+        left_m, right_m = self._edges(group, on_body, bottom_m)
+        valid = (supports >= LEAST_SUPPORT) & ~(self._repeats[group] & self._fills_sides(group, on_body))
+        values = zip(valid.tolist(), group.tolist(), supports.tolist(), layers_m.tolist(), left_m.tolist(),
+                     right_m.tolist(), top_m.tolist(), bottom_m.tolist())
+        return [(number, self._box(number, support, *extents_m)) for is_valid, number, support, *extents_m in values
+                if is_valid]
+
+    def _mask_behind(self, number, farthest_mm):
+        """Mask what is not farther than `farthest_mm` in the pending rectangles that overlap an estimated one."""
+        for other in np.flatnonzero(self.pending & (self._shared_px[number] > 0)).tolist():
+            layer_m = self._beside_m[other, number]
+            is_farther = layer_m - self._beside_m[number, other] >= SAME_LAYER_M and (
+                self._is_beside[other, number] or not self._alike[other, number])
+            own_mm = 1000 * layer_m - BODY_HALF_DEPTH_MM if is_farther else UNKNOWN_MM  # from there on, its own body
+            self._mask(self._ahead_mm[other], other, number, min(farthest_mm, own_mm))
+            self._changed[other] = True
+            self.pending[other] = (self._ahead_mm[other] < UNKNOWN_MM).any()
+
+    def _fills_sides(self, group, on_body):
+        """Whether the samples (k, samples) `on_body` fill at least `FILLED` of both sides of rectangles."""
+        on_body, members = on_body.reshape(-1, GRID_ROWS, GRID_COLUMNS), np.arange(len(group))
+        rows, columns = self._counts[group].T
+        return np.all([np.count_nonzero(on_body[members, :, column], axis=1) >= FILLED * rows
+                       for column in (0, columns - 1)], axis=0)
 
     def _edges(self, group, on_body, bottom_m):
         """Left and right edges (2, k) of the bodies whose samples are given (k, samples), metres."""
@@ -251,17 +337,14 @@ class _SampledImage(object):
         across_mm = np.where(on_body, self._across_mm[group], np.uint16(UNKNOWN_MM))
         return np.array(edges(SortedDistances(across_mm))) / 1000 - MIDDLE_M
 
-    def _mask(self, grid_mm, number, occluder):
-        """Mask the samples of a rectangle (rows, columns) that are in the rectangle of an occluder and not behind it.
-
-        What is nearer than its body is masked as well: parts of it may be far in front of its layer.
-        """
+    def _mask(self, samples_mm, number, occluder, limit_mm):
+        """Mask the samples of a rectangle that are in the rectangle of an occluder and not farther than `limit_mm`."""
         left, top, right, bottom = self._rects_px[occluder]
         rows, columns = self._slices[number]
         rows = slice(_rank(rows, top), _rank(rows, bottom))
         columns = slice(_rank(columns, left), _rank(columns, right))
-        part = grid_mm[rows, columns]
-        part[part <= self._occluding_mm[occluder]] = UNKNOWN_MM
+        part = samples_mm.reshape(GRID_ROWS, GRID_COLUMNS)[rows, columns]
+        part[part <= limit_mm] = UNKNOWN_MM
 
     def _box(self, number, support, layer_m, left_m, right_m, top_m, bottom_m):
         rect_px, kind = self._rects_px[number], self._kinds[number]
@@ -274,8 +357,18 @@ class _SampledImage(object):
         center_m = self._geometry.level_from_camera.T.dot(surface_m * (1 + behind_m / layer_m))
         box = Box3D(center_m, np.array([width_m, bottom_m - top_m, width_m]), rect_px, support, cut)
         if box.is_plausible:
-            self._occluding_mm[number] = int(1000 * (layer_m + behind_m)) + BODY_HALF_DEPTH_MM
+            self._mask_behind(number, int(1000 * (layer_m + behind_m)) + BODY_HALF_DEPTH_MM)
         return box
+
+
+def _areas(rects_px):
+    """Areas (n,) of rectangles (n, 4), and those that they share with each other one (n, n; diagonal: 0), pixels."""
+    x1, y1, x2, y2 = rects_px.T
+    shared_px = (np.maximum(np.minimum(x2, x2[:, None]) - np.maximum(x1, x1[:, None]), 0)
+                 * np.maximum(np.minimum(y2, y2[:, None]) - np.maximum(y1, y1[:, None]), 0))
+    area_px = shared_px.diagonal().copy()
+    np.fill_diagonal(shared_px, 0)
+    return area_px, shared_px
 
 
 def _grids(rects_px, shape):
@@ -367,14 +460,6 @@ def _without_distortion(rects_px, camera):
     return np.stack((flat_px[:, 0, 0], flat_px[:, 1, 1], flat_px[:, 2, 0], flat_px[:, 3, 1]), axis=1)
 
 
-def _occluders(rects_px, camera):
-    """Which rectangles (n, n) overlap each rectangle and are of nearer objects."""
-    x1, y1, x2, y2 = np.array(rects_px, np.int64).T
-    overlap = (x1 < x2[:, None]) & (x2 > x1[:, None]) & (y1 < y2[:, None]) & (y2 > y1[:, None])
-    order = np.argsort(front_to_back(rects_px, camera))
-    return overlap & (order < order[:, None])
-
-
 def complete_truncated_extent(low, high, cut_low, cut_high, usual):
     """Extend low..high of a body that the image border truncates at one end to at least the usual extent."""
     missing = max(0.0, usual - (high - low))
@@ -446,13 +531,6 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_f
         if implausible is not None and not box.is_plausible:
             implausible.append(box)
     return boxes
-
-
-def front_to_back(rects_px, camera):
-    """Indices of rectangles, nearest person first: nearer people stand lower in the image, and appear wider."""
-    left, _top, right, bottom = np.reshape(rects_px, (-1, 4)).T
-    lowest = np.minimum(bottom, camera.height * (1 - CUT_ROWS))
-    return np.lexsort((left - right, -lowest)).tolist()
 
 
 def check_rect(rect_px):
