@@ -34,6 +34,7 @@ UPPER_SHARE, LOWER_WEIGHT = 0.55, 0.35
 SAME_LAYER_M = 0.25  # largest difference of the layers of parts of one body
 CLEARLY_NEARER_M = 0.1
 CLEARLY_LOWER = 0.02  # share of the image height
+LEAST_SIZE = 0.65  # minimum share of its usual size that an object appears to have at its layer
 LEAST_BESIDE = 0.25  # minimum share of a rectangle beside another one that shows a layer of its own
 CONTAINED = 0.8  # minimum share of a second rectangle of an object in the first one
 FILLED = 0.4  # minimum share of both sides of a rectangle that background behind an object fills
@@ -226,6 +227,11 @@ class _SampledImage(object):
         self._area_px, self._shared_px = _areas(rects_px)
         self._lowest_px = np.minimum(rects_px[:, 3], camera.height * (1 - CUT_ROWS))
         self._clearly_lower_px = CLEARLY_LOWER * camera.height
+        self._truncated = [truncated_edges(rect_px, geometry.area_px) for rect_px in self._rects_px]
+        extent_px = np.maximum(rects_px[:, 2:] - rects_px[:, :2], 1).max(axis=1)
+        usual_m = np.array([0 if any(edges) else max(kind.width, kind.height)
+                            for edges, kind in zip(self._truncated, kinds)])
+        self._nearest_m = LEAST_SIZE * usual_m * camera.fy / extent_px  # nearer objects would be unusually small
         groups = [kind.group for kind in kinds]
         self._alike = np.array([[group is not None and group == other for other in groups] for group in groups])
         self.pending = self._usable.copy()  # without an estimate yet
@@ -241,8 +247,9 @@ class _SampledImage(object):
 
         The nearer of two objects is the one with the nearer layer. A layer that both rectangles show belongs to the one
         that shows it beside the other one, too. If that does not decide, of two objects of one kind the nearer one is
-        clearly lower in the image, has a clearly nearer layer or is larger, in this order; of different kinds, it is
-        the smaller one, as a person on a couch.
+        clearly lower in the image, has a clearly nearer layer or is larger, in this order. Of different kinds, it is
+        the one that is not too small for the layer, which may be another object's; otherwise the one that appears
+        smaller, as a person on a couch.
         """
         pending = np.flatnonzero(self.pending)
         pairs = np.ix_(pending, pending)
@@ -252,9 +259,11 @@ class _SampledImage(object):
         lower_px = self._lowest_px[pending] - self._lowest_px[pending][:, None]
         larger = np.where(area_px == area_px[:, None], pending < pending[:, None], area_px > area_px[:, None])
         tied = np.abs(farther_m) < SAME_LAYER_M
+        small = self._layer_m[pending] < self._nearest_m[pending]
+        unlike_nearer = np.where(small == small[:, None], ~larger, small[:, None])
         nearer = np.where(np.abs(farther_m) < CLEARLY_NEARER_M, larger, farther_m > 0)
         nearer = np.where(np.abs(lower_px) > self._clearly_lower_px, lower_px > 0, nearer)
-        nearer = overlap & np.where(tied, np.where(alike, nearer, ~larger), farther_m > 0)
+        nearer = overlap & np.where(tied, np.where(alike, nearer, unlike_nearer), farther_m > 0)
         contained = self._shared_px[pairs] >= CONTAINED * area_px[:, None]
         self._repeats[pending] |= (tied & alike & nearer & contained).any(axis=1)
         in_front = np.count_nonzero(nearer, axis=1)
@@ -348,7 +357,7 @@ class _SampledImage(object):
 
     def _box(self, number, support, layer_m, left_m, right_m, top_m, bottom_m):
         rect_px, kind = self._rects_px[number], self._kinds[number]
-        cut_left, cut_top, cut_right, cut_bottom = cut = truncated_edges(rect_px, self._geometry.area_px)
+        cut_left, cut_top, cut_right, cut_bottom = cut = self._truncated[number]
         left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, kind.width)
         top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, kind.height)
         surface_m = np.array([(left_m + right_m) / 2, (top_m + bottom_m) / 2, layer_m])
