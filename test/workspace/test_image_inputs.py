@@ -148,4 +148,4 @@ def test_the_doctor_reports_an_undecodable_image(scene, tmp_path, monkeypatch, f
 
 
 def found_in(path):
-    return bag_findings(argparse.Namespace(bag=path, camera='', target_frame=''))[0]
+    return bag_findings(argparse.Namespace(bag=path, camera='', target_frame='', depth='aligned'))[0]

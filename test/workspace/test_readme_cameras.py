@@ -240,7 +240,7 @@ def test_the_doctor_misses_only_the_pose_of_the_camera(name, tmp_path, monkeypat
     write_stream(driver, str(tmp_path / 'in.bag'))
     ours = COLOR_TOPIC, INFO_TOPICS[0], DEPTH_TOPICS['aligned'][0]
     monkeypatch.setattr('sys.argv', ['doctor'] + ['%s:=%s' % pair for pair in zip(ours, driver.topics)])
-    given = argparse.Namespace(bag=str(tmp_path / 'in.bag'), camera='', target_frame='')
+    given = argparse.Namespace(bag=str(tmp_path / 'in.bag'), camera='', target_frame='', depth='aligned')
     fault, = [finding for finding in bag_findings(given)[0] if finding.fault]
     assert fault.subject == 'transforms' and ('camera_height:=1.2' in fault.fix or name == 'zed2')
 
