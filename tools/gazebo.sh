@@ -3,11 +3,11 @@
 # Sourced by ./run.
 
 gazebo_packages=(
-  gazebo libgazebo-dev libbondcpp-dev libcamera-info-manager-dev libcv-bridge-dev libdiagnostic-updater-dev
-  libeigen3-dev libgeographic-dev libimage-transport-dev libnodelet-dev
-  libnodeletlib-dev libpolled-camera-dev
+  gazebo libbondcpp-dev libcamera-info-manager-dev libcv-bridge-dev libdiagnostic-updater-dev libeigen3-dev
+  libgazebo-dev libgeographic-dev libimage-transport-dev libnodelet-dev libnodeletlib-dev libpolled-camera-dev
   libtf2-eigen-dev libtf2-geometry-msgs-dev libtf2-ros-dev libtinyxml-dev libtrajectory-msgs-dev liburdf-dev
-  libyaml-cpp-dev python3-trajectory-msgs ros-actionlib-msgs ros-cmake-modules ros-robot-state-publisher ros-trajectory-msgs topic-tools)
+  libyaml-cpp-dev python3-lxml python3-tf python3-trajectory-msgs ros-actionlib-msgs ros-cmake-modules
+  ros-robot-state-publisher ros-trajectory-msgs topic-tools)
 
 gazebo_targets=(
   gazebo_ros_api_plugin gazebo_ros_paths_plugin gazebo_msgs_generate_messages_py gazebo_ros_gencfg
@@ -65,19 +65,55 @@ make_gazebo() {  # FOLDER
   ln -s libgazebo_ros_imu.so "$1/devel/lib/libhector_gazebo_ros_imu.so"
 }
 
+# Debian 12 has no Gazebo 11.
+has_gazebo() { [ -d /opt/ros ] || grep -qs VERSION_CODENAME=bullseye /etc/os-release; }
+
+# Builds what is needed for gazebo.launch, and sets up its environment.
 build_gazebo() {
-  local archives=${ROS_3D_BB_DATA:-}/gazebo
-  [ -d "$archives" ] || return 0
-  gazebo_sources=("$archives"/*.tar.xz)
-  local hash; hash=$(cat "${gazebo_sources[@]}" "$here/tools/gazebo.sh" | sha1sum | cut -c1-8)
-  gazebo=$cache/gazebo-$hash
+  local archives=''
+  if [ -d "${ROS_3D_BB_DATA:-}/gazebo" ] && [ ! -d /opt/ros ]; then archives=yes apt_packages+=("${gazebo_packages[@]}"); fi
+  build
+  set +u
+  [ -z "$archives" ] || { build_gazebo_archives && . "$gazebo/devel/setup.bash" --extend; }
+  build_planners
+  [ -z "${planners:-}" ] || . "$planners/devel/setup.bash" --extend
+  set -u
+  rospack find jackal_gazebo > /dev/null 2>&1 || fail "jackal_gazebo is not installed: on ROS Noetic, install \
+ros-noetic-jackal-simulator; on Debian, set ROS_3D_BB_DATA to a folder with the archives in gazebo/ (doc/simulation.md)"
+}
+
+build_gazebo_archives() {
+  gazebo_sources=("$ROS_3D_BB_DATA"/gazebo/*.tar.xz)
+  local hash
+  hash=$({ cat "${gazebo_sources[@]}"; declare -f make_gazebo stand_in_sources; declare -p gazebo_targets; } | sha1sum)
+  gazebo=$cache/gazebo-${hash:0:8}
   mkdir -p "$gazebo"
   (
     flock 9
     [ -f "$gazebo/built" ] && exit
-    say "building the Gazebo packages in $gazebo, once"
+    say "building the packages for Gazebo in $gazebo, once"
     rm -rf "$gazebo"/{src,build,devel}
     if make_gazebo "$gazebo" > "$gazebo/build.log" 2>&1; then touch "$gazebo/built"
-    else tail -n 50 "$gazebo/build.log"; say "the Gazebo packages were not built; their log is above"; exit 1; fi
+    else tail -n 50 "$gazebo/build.log"; say "the packages for Gazebo were not built; their log is above"; exit 1; fi
   ) 9> "$gazebo/lock" >&2
+}
+
+# A screen that is not shown, which cameras of Gazebo need as well.
+without_screen() { xvfb-run -a -s '-screen 0 640x480x24' "$@"; }
+
+gazebo() {  # [NAME:=VALUE ...]
+  if ! has_gazebo; then
+    set_up_root
+    in_root "$here/run" gazebo "$@"
+    return
+  fi
+  build_gazebo
+  choose_master
+  local command=(roslaunch -p "${ROS_MASTER_URI##*:}" ros_3d_bb gazebo.launch detector:=depth)
+  if [ -n "${DISPLAY:-}" ]; then
+    "${command[@]}" "$@"
+  else
+    say "no screen (DISPLAY is not set): without the windows of Gazebo and RViz"
+    without_screen "${command[@]}" gui:=false rviz:=false "$@"
+  fi
 }

@@ -67,7 +67,12 @@ run_some_tests() {
   done
   [ ${#paths[@]} -gt 0 ] || paths=("$here/test/unit" "$here/test/workspace")
   apt_packages+=(chromium)
-  build
+  if [[ "${paths[*]}" = *"$here/test/gazebo"* ]]; then
+    has_gazebo || fail "this machine has no Gazebo 11: ./run test --platform bullseye test/gazebo"
+    build_gazebo
+  else
+    build
+  fi
   cd "$here"
   local status=0 by_pytest=()
   for path in "${paths[@]}"; do
@@ -76,6 +81,7 @@ run_some_tests() {
         [ ${#expression[@]} -eq 0 ] || fail "-k does not apply to '$path', which runs as a whole"
         rostest --text "$path" || status=$? ;;
       "$here"/test/nodes*) fail "'$path' needs a master: test its .test file" ;;
+      "$here"/test/gazebo*) without_screen "$venv/bin/python3" -m pytest -q "$path" "${expression[@]}" || status=$? ;;
       *) by_pytest+=("$path") ;;
     esac
   done

@@ -16,7 +16,8 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
 from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, detections_without_scores,
-                                                      exact_detector, main, result_of, score_tracks, yolov5_detector)
+                                                      exact_detector, main, result_of, score_tracks, scored_people,
+                                                      yolov5_detector)
 from ros_3d_bb_lab.evaluation.scenes import Step, detect_in_scene, run_scene, score_detections
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, PersonTruth, Poses, SimulatedFrame, Simulator
@@ -179,7 +180,8 @@ def step(number, people, tracks):
 
 def scored(images):
     """The score of images, each (people, tracks)."""
-    return score_tracks([step(number, *image) for number, image in enumerate(images)], D435I_COLOR)
+    steps = [step(number, *image) for number, image in enumerate(images)]
+    return score_tracks([(scored_people(step, D435I_COLOR), step.moment.tracks) for step in steps])
 
 
 def test_errors_of_velocity_and_prediction_are_those_in_the_plane():
@@ -188,6 +190,8 @@ def test_errors_of_velocity_and_prediction_are_those_in_the_plane():
     assert result['track_ids'] == 1 and result['not_visible'] == 0
     assert result['velocity_rmse_mps'] == pytest.approx(0.3)
     assert result['prediction_1s_m'] == pytest.approx(np.hypot(0.3, 0.1))
+    two_s = score_tracks([([track_of(someone, someone.id)], [track_of(someone, off_mps=(0.3, 0.0, 0.0))])], (2.0,))
+    assert two_s['prediction_2s_m'] == pytest.approx(0.6)
 
 
 def test_images_without_a_visible_track_count_after_the_first_match():

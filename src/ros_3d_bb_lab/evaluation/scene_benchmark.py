@@ -83,7 +83,7 @@ def score_tracks(images, horizons_s=(1.0,)):
     return scores
 
 
-def _scored_people(step, camera):
+def scored_people(step, camera):
     """Return the people whose body axis is in the image, at `NEAREST_M` or more from the camera.
 
     `clear_mot` scores people of whose body an image shows a minimum share. A person directly in front of the camera
@@ -123,7 +123,7 @@ def result_of(steps, detector, camera=D435I_COLOR):
               'id_switches': sum(person.switches for person in tracked.people),
               'rmse_m': _rms([person.rmse_m for person in followed]),
               'worst_m': max([person.worst_m for person in followed], default=None)}
-    result.update(score_tracks([(_scored_people(step, camera), step.moment.tracks) for step in steps]))
+    result.update(score_tracks([(scored_people(step, camera), step.moment.tracks) for step in steps]))
     return result
 
 

@@ -31,8 +31,8 @@ def world_of(scenario, start_s=0.0):
     for number, (size_m, center_m, yaw, color) in enumerate(_boxes(scenario.room)):
         _add_box(link, 'box_%d' % number, size_m, center_m, yaw, color)
     for number, person in enumerate(scenario.people, 1):
-        _add_actor(world, PERSON_NAME + str(number), person_motion(person, HEIGHT_M, scenario.duration), scenario.duration,
-                   start_s)
+        motion = person_motion(person, HEIGHT_M, scenario.duration)
+        _add_actor(world, PERSON_NAME + str(number), motion, scenario.duration, start_s)
     return ElementTree.tostring(sdf, encoding='unicode')
 
 

@@ -44,6 +44,7 @@ def record_scene(scenario, folder):
                  'detector': 'none'}
     port = free_port()
     environment = dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % port)
+    os.environ['GAZEBO_MASTER_URI'] = 'http://localhost:%d' % free_port()  # the last Gazebo may still be ending
     with open(log_path, 'w') as log, running_roslaunch(
             ['ros_3d_bb', 'gazebo.launch'] + ['%s:=%s' % item for item in arguments.items()], port, log):
         _wait_for_robot(environment)

@@ -1,0 +1,89 @@
+"""gazebo.launch with the real Gazebo, the Jackal, its controllers and its EKF, without windows.
+
+Time is simulated: a slow computer needs longer, but sees the same.
+"""
+import contextlib
+import subprocess
+
+import numpy as np
+import pytest
+import rospy
+import tf2_ros
+from gazebo_msgs.msg import ModelStates
+from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import CameraInfo, Image
+
+from ros_3d_bb.conversions.perception_msgs import transform_from_msg
+from ros_3d_bb.msg import TrackedObjectArray
+from support.processes import end, processes_naming
+from support.ros import Recorder, wait_until
+
+FPS = 10
+PATIENCE_S = 600.0  # wall-clock time
+ROBOT = 'jackal'
+
+
+class World(object):
+    """True positions of the people and of the robot, and the topics of the robot."""
+
+    def __init__(self):
+        self.fps, self.truth = FPS, []  # (time in s, {name: (2,)})
+        rospy.Subscriber('gazebo/model_states', ModelStates, self._on_states, queue_size=1, buff_size=2 ** 20)
+        self.color = Recorder('camera/color/image_raw', Image, publisher_expected=False)
+        self.depth = Recorder('camera/aligned_depth_to_color/image_raw', Image, publisher_expected=False)
+        self.info = Recorder('camera/color/camera_info', CameraInfo, publisher_expected=False)
+        self.tracks = Recorder('ros_3d_bb/tracks', TrackedObjectArray, publisher_expected=False)
+        self.goal = rospy.Publisher('move_base_simple/goal', PoseStamped, queue_size=1)
+        self.transforms = tf2_ros.Buffer()
+        self._listener = tf2_ros.TransformListener(self.transforms)
+
+    def _on_states(self, message):
+        """Positions of the people and of the robot."""
+        self.truth.append((rospy.get_time(), {
+            name: np.array([pose.position.x, pose.position.y]) for name, pose in zip(message.name, message.pose)
+            if name not in ('floor', 'room')}))
+
+    def positions_at(self, time_s, name):
+        """True position (2,) at a time."""
+        times_s, poses = zip(*self.truth)
+        return poses[min(np.searchsorted(times_s, time_s), len(poses) - 1)][name]
+
+    def wait_for(self, condition, what):
+        """Wait until a condition is true."""
+        wait_until(condition, what, PATIENCE_S)
+
+    def pass_s(self, seconds):
+        """Let simulated time pass."""
+        end_s = rospy.get_time() + seconds
+        self.wait_for(lambda: rospy.get_time() >= end_s, '%g s of simulated time' % seconds)
+
+    def is_at(self, place_m):
+        """Whether the robot has arrived at a place (2,)."""
+        return np.hypot(*(self.truth[-1][1][ROBOT] - place_m)) < 0.5
+
+    def transform(self, target, source):
+        """Newest transform (4, 4)."""
+        return transform_from_msg(self.transforms.lookup_transform(target, source, rospy.Time(0)))
+
+
+@pytest.fixture(scope='session')
+def start(weights):
+    """Function that starts gazebo.launch with arguments, and returns a context with its World."""
+    master = subprocess.Popen(['roscore'])
+    subprocess.check_call('until rosparam set use_sim_time true; do sleep 1; done', shell=True)
+    rospy.init_node('test_gazebo')
+
+    @contextlib.contextmanager
+    def started(*arguments):
+        nodes = subprocess.Popen(['roslaunch', 'ros_3d_bb', 'gazebo.launch', 'gui:=false', 'rviz:=false',
+                                  'lockstep:=true', 'weights:=' + weights, 'fps:=%d' % FPS] + list(arguments))
+        world = World()
+        try:
+            wait_until(lambda: nodes.poll() is not None or world.tracks.messages, 'tracks', PATIENCE_S)
+            assert nodes.poll() is None, 'roslaunch has exited'
+            yield world
+        finally:
+            end(nodes)
+            wait_until(lambda: not processes_naming('libgazebo_ros_api_plugin'), 'the end of Gazebo', PATIENCE_S)
+    yield started
+    end(master)

@@ -1,0 +1,59 @@
+"""Camera, tf and tracks of the Jackal among the people of worlds/people.world."""
+import numpy as np
+import pytest
+import rospy
+
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
+from ros_3d_bb.conversions.perception_msgs import stamp_of
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.msg import TrackedObject
+
+PEOPLE = 'front', 'near', 'far', 'standing'
+ROUND_S = 16.0  # the longest round of a person
+NEAR_M, ERROR_M = 0.5, 0.2
+
+
+@pytest.fixture(scope='module')
+def people(start):
+    """The world of the package."""
+    with start() as world:
+        yield world
+
+
+def test_images_have_the_frame_size_encoding_and_rate_of_the_robot(people):
+    for recorder, encoding in ((people.color, 'rgb8'), (people.depth, '32FC1')):
+        recorder.emptied()
+        first, second = recorder.wait_for(2, 600)
+        assert (first.header.frame_id, first.encoding) == ('camera_color_optical_frame', encoding)
+        assert (first.width, first.height) == (640, 480)
+        assert (second.header.stamp - first.header.stamp).to_sec() == pytest.approx(1 / people.fps, abs=0.01)
+    assert set(map(stamp_of, people.color.messages)) & set(map(stamp_of, people.info.messages))
+    np.testing.assert_allclose(np.reshape(people.info.messages[-1].K, (3, 3)),
+                               [[614.7, 0, 319.5], [0, 614.7, 239.5], [0, 0, 1]], atol=0.1)
+
+
+def test_tf_has_the_frames_of_the_robot_with_the_camera_of_the_thesis(people):
+    people.wait_for(lambda: people.transforms.can_transform('odom', 'base_link', rospy.Time(0)), 'the EKF')
+    assert np.linalg.norm(people.transform('odom', 'base_link')[:2, 3]) < 0.05  # it stands
+    np.testing.assert_allclose(people.transform('base_link', 'camera_color_optical_frame'),
+                               transform_from((0.17, 0, 0.20), OPTICAL_ROTATION), atol=1e-6)
+    frames = people.transforms.all_frames_as_yaml()
+    assert all(name in frames for name in ('chassis_link', 'imu_link', 'front_mount', 'front_left_wheel_link'))
+
+
+def test_each_person_is_tracked_at_the_true_position(people):
+    people.tracks.emptied()
+    people.pass_s(ROUND_S)
+    errors_m = {name: [] for name in PEOPLE}
+    for message in people.tracks.messages:
+        assert message.header.frame_id == 'odom'
+        for track in message.objects:
+            position = track.pose.pose.position
+            for name in PEOPLE if track.status == TrackedObject.VISIBLE else ():
+                error_m = np.hypot(*(people.positions_at(stamp_of(message) / NS, name) - [position.x, position.y]))
+                if error_m < NEAR_M:
+                    errors_m[name].append(error_m)
+    print({name: (len(errors), np.sqrt(np.mean(np.square(errors)))) for name, errors in errors_m.items() if errors})
+    for name, errors in errors_m.items():
+        assert len(errors) > 0.3 * ROUND_S * people.fps, name  # hidden and out of view at times
+        assert np.sqrt(np.mean(np.square(errors))) < ERROR_M, name
