@@ -3,6 +3,8 @@
 pytest_options=()
 
 run_tests() {
+  # Its newest ONNX Runtime and torch lack what some tests need; the report names it.
+  ! is_debian_11 || pytest_options=(--leave-out)
   case ${1:-} in
     '') run_all_tests ;;
     -h|--help) help ;;
