@@ -76,7 +76,7 @@ run_some_tests() {
     case $path in
       "$here"/test/nodes/*.test)
         [ ${#expression[@]} -eq 0 ] || fail "-k does not apply to '$path', which runs as a whole"
-        rostest --text "$path" || status=$? ;;
+        rostest "$path" || status=$? ;;
       "$here"/test/nodes*) fail "'$path' needs a master: test its .test file" ;;
       *) by_pytest+=("$path") ;;
     esac
