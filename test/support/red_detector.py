@@ -24,6 +24,6 @@ def extent(occupied):
 def write_red_detector(path, size=640):
     """Write it as YOLOv5's export does: with its shape, stride and names in config.txt. Returns the path."""
     config = {'shape': [1, 3, size, size], 'stride': 32, 'names': ['person'] + ['thing %d' % n for n in range(1, 80)]}
-    # Traced: torch 1.7 cannot script with Python 3.9.
-    torch.jit.trace(RedDetector(), torch.zeros(1, 3, 64, 96)).save(path, _extra_files={'config.txt': json.dumps(config)})
+    traced = torch.jit.trace(RedDetector(), torch.zeros(1, 3, 64, 96))  # torch 1.7 cannot script with Python 3.9
+    traced.save(path, _extra_files={'config.txt': json.dumps(config)})
     return path
