@@ -20,7 +20,7 @@ def properties(monkeypatch):
 
 
 @pytest.mark.parametrize('toolkit, shown, closed', [
-    ('GTK, OpenCV 4.5.1', {VISIBLE: -1, AUTOSIZE: 0}, {VISIBLE: -1, AUTOSIZE: -1}),
+    ('GTK, OpenCV 4.2.0 and 4.5.1', {VISIBLE: -1, AUTOSIZE: 0}, {VISIBLE: -1, AUTOSIZE: -1}),
     ('Qt, OpenCV 4.6.0', {VISIBLE: 1, AUTOSIZE: 0}, {VISIBLE: 0, AUTOSIZE: 0})])
 def test_a_window_is_closed_when_its_user_closes_it(properties, toolkit, shown, closed):
     window = cv_window.Window('test')

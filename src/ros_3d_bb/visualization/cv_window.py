@@ -29,7 +29,7 @@ class Window(object):
         if self._size_px is None:
             return False
         visible = cv2.getWindowProperty(self._title, cv2.WND_PROP_VISIBLE)
-        if visible < 0:  # also of open windows with GTK, in OpenCV 4.5.1 and earlier
+        if visible < 0:  # also of open windows with GTK, in OpenCV 4.2 and 4.5.1
             return cv2.getWindowProperty(self._title, cv2.WND_PROP_AUTOSIZE) < 0
         return visible < 1
 
