@@ -14,12 +14,13 @@ settings.register_profile('repeatable', derandomize=True, database=None, deadlin
 settings.load_profile('repeatable')
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)
-from support.missing import imports_when_loaded, misses_something, missing_requirements  # noqa: E402 (needs the path)
+from support.missing import imports_when_loaded, missing_for, missing_requirements  # noqa: E402 (needs the path)
 if importlib.util.find_spec('ros_3d_bb') is None:  # no workspace is sourced; unit tests need none
     sys.path.insert(0, os.path.join(os.path.dirname(HERE), 'src'))
 if importlib.util.find_spec('ros_3d_bb_annotator') is None:
     sys.path.insert(0, os.path.join(os.path.dirname(HERE), 'annotator'))
 DATA = os.environ.get('ROS_3D_BB_DATA', '')
+MISSED = set()  # what tests that were left out need
 
 
 def pytest_addoption(parser):
@@ -41,8 +42,9 @@ def pytest_report_header(config):
 
 
 def pytest_terminal_summary(terminalreporter, config):
-    if left_out(config):
-        terminalreporter.write_line('left out: tests that need %s, not installed' % ', '.join(sorted(left_out(config))))
+    names = left_out(config) | MISSED
+    if names:
+        terminalreporter.write_line('left out: tests that need %s, not installed' % ', '.join(sorted(names)))
 
 
 def pytest_ignore_collect(path, config):
@@ -51,9 +53,20 @@ def pytest_ignore_collect(path, config):
 
 
 def pytest_collection_modifyitems(config, items):
-    gone = [item for item in items if config.getoption('--leave-out') and misses_something(item)]
+    gone = [item for item in items if config.getoption('--leave-out') and missing_for(item)]
+    MISSED.update(*map(missing_for, gone))
     config.hook.pytest_deselected(items=gone)
     items[:] = [item for item in items if item not in gone]
+
+
+def pytest_sessionfinish(session):
+    if hasattr(session.config, 'workeroutput'):  # a worker process of pytest-xdist
+        session.config.workeroutput['missed'] = sorted(MISSED)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node):
+    MISSED.update(getattr(node, 'workeroutput', {}).get('missed', ()))
 
 
 @pytest.fixture(scope='session', autouse=True)

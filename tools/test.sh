@@ -3,6 +3,8 @@
 pytest_options=()
 
 run_tests() {
+  # Its newest ONNX Runtime and torch lack what some tests need; the report names it.
+  ! is_debian_11 || pytest_options=(--leave-out)
   case ${1:-} in
     '') run_all_tests ;;
     -h|--help) help ;;
@@ -79,7 +81,7 @@ run_some_tests() {
     case $path in
       "$here"/test/nodes/*.test)
         [ ${#expression[@]} -eq 0 ] || fail "-k does not apply to '$path', which runs as a whole"
-        rostest --text "$path" || status=$? ;;
+        rostest "$path" || status=$? ;;
       "$here"/test/nodes*) fail "'$path' needs a master: test its .test file" ;;
       "$here"/test/gazebo*) without_screen "$venv/bin/python3" -m pytest -q "$path" "${expression[@]}" || status=$? ;;
       *) by_pytest+=("$path") ;;

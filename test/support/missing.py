@@ -41,10 +41,10 @@ def imports_when_loaded(path):
     return found
 
 
-def misses_something(item):
-    """Whether a module or program is missing that a test needs: `@pytest.mark.needs('module')`, or torch for the
-    fixture `weights`, also as part of others such as `reader`.
+def missing_for(item):
+    """Modules and programs that a test needs and that are missing: those of `@pytest.mark.needs('module')`, and torch
+    for the fixture `weights`, also as part of others such as `reader`.
     """
     names = [name for mark in item.iter_markers('needs') for name in mark.args]
     names += ['torch'] * ('weights' in getattr(item, 'fixturenames', ()))
-    return any(is_missing(name) and shutil.which(name) is None for name in names)
+    return set(name for name in names if is_missing(name) and shutil.which(name) is None)

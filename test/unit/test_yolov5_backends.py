@@ -13,7 +13,7 @@ from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime, phy
 from ros_3d_bb.detection.onnx.decoders import decode_rows
 from ros_3d_bb.detection.onnx.session import session_of
 from ros_3d_bb.detection.yolov5.torch_backend import TorchRuntime
-from support.checkpoints import random_network, write_checkpoint
+from support.checkpoints import random_network, supported, write_checkpoint
 from support.layouts import layout
 from support.official_reference import made
 from support.red_detector import write_red_detector
@@ -45,8 +45,8 @@ def exported_onnx(path, network, hw, metadata, dynamic=False):
     """Write a network as YOLOv5's export does: one output, stride and names in the metadata."""
     import onnx
     axes = {'images': {2: 'height', 3: 'width'}, 'output0': {1: 'rows'}} if dynamic else None
-    torch.onnx.export(network, torch.zeros((1, 3) + hw), path, opset_version=13, dynamo=False, input_names=['images'],
-                      output_names=['output0'], dynamic_axes=axes)
+    torch.onnx.export(network, torch.zeros((1, 3) + hw), path, opset_version=12, input_names=['images'],
+                      output_names=['output0'], dynamic_axes=axes, **supported(torch.onnx.export, dynamo=False))
     model = onnx.load(path)
     for key, value in metadata.items():
         entry = model.metadata_props.add()
@@ -167,7 +167,7 @@ def test_exports_that_cannot_be_run_are_rejected(tmp_path, suffix, kind):
         with open(path, 'wb') as stream:
             stream.write(b'nonsense')
     elif kind == 'other' and suffix == 'torchscript':
-        torch.jit.script(Mean()).save(path)
+        torch.jit.trace(Mean(), torch.zeros(1, 3, 64, 64)).save(path)
     elif kind == 'other':
         exported_onnx(path, Mean(), (64, 64), {})
     with pytest.raises(WeightsError, match=path):

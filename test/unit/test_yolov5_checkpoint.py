@@ -15,7 +15,7 @@ from ros_3d_bb.detection.weights import WeightsError, class_names
 from ros_3d_bb.detection.yolov5 import checkpoint
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
 from ros_3d_bb.detection.yolov5.checkpoint import EXPECTED, read_checkpoint
-from support.checkpoints import official_classes, write_checkpoint
+from support.checkpoints import official_classes, supported, write_checkpoint
 from support.layouts import layout
 from support.red_detector import write_red_detector
 
@@ -68,7 +68,7 @@ def change(path, content, edit):
     """Write a checkpoint after an edit of its objects, which are instances of the official classes."""
     write(path, content)
     with official_classes():
-        objects = torch.load(path, weights_only=False)
+        objects = torch.load(path, **supported(torch.load, weights_only=False))
         edit(objects)
         torch.save(objects, path)
 

@@ -25,7 +25,13 @@ class Window(object):
 
     @property
     def is_closed(self):
-        return self._size_px is not None and cv2.getWindowProperty(self._title, cv2.WND_PROP_VISIBLE) < 1
+        """Whether the user closed the window."""
+        if self._size_px is None:
+            return False
+        visible = cv2.getWindowProperty(self._title, cv2.WND_PROP_VISIBLE)
+        if visible < 0:  # also of open windows with GTK, in OpenCV 4.2 and 4.5.1
+            return cv2.getWindowProperty(self._title, cv2.WND_PROP_AUTOSIZE) < 0
+        return visible < 1
 
     def show(self, picture):
         """Show an RGB image and resize the window to its size."""
