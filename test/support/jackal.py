@@ -49,7 +49,8 @@ ACCESSORY = """<xacro:if value="$(optenv %s 0)"><link name="%s">%s</link><joint 
     <origin xyz="%s"/><parent link="%s"/><child link="%s"/>
   </joint></xacro:if>"""
 MESH = '<visual><geometry><mesh filename="package://jackal_description/meshes/%s"/></geometry></visual>'
-SCAN_TOPIC = """<launch><arg name="scan_topic" default="$(eval optenv('JACKAL_LASER_TOPIC', 'front/scan'))"/></launch>"""
+SCAN_TOPIC = '''<launch>
+  <arg name="scan_topic" default="$(eval optenv('JACKAL_LASER_TOPIC', 'front/scan'))"/></launch>'''
 EXCERPTS = {
     'jackal_control/config/robot_localization.yaml':
         '{odom_frame: odom, base_link_frame: base_link, world_frame: odom, frequency: 50}',
