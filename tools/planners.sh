@@ -6,14 +6,14 @@ planner_packages=(
   libmove-base-msgs-dev libnav-msgs-dev libstd-srvs-dev libtf-dev libtf2-sensor-msgs-dev libtinyxml2-dev
   libvisualization-msgs-dev pluginlib-dev python3-actionlib ros-map-msgs ros-nav-msgs)
 
-# A stand-in for a package that Debian lacks.
-cmake_modules() {
-  mkdir cmake_modules
-  echo '<package format="2"><name>cmake_modules</name><version>0.0.0</version><description>empty</description>
-    <maintainer email="nobody@example.com">nobody</maintainer><license>BSD</license>
-    <buildtool_depend>catkin</buildtool_depend></package>' > cmake_modules/package.xml
-  printf '%s\n' 'cmake_minimum_required(VERSION 3.0.2)' 'project(cmake_modules)' 'find_package(catkin REQUIRED)' \
-    'catkin_package()' > cmake_modules/CMakeLists.txt
+# A stand-in for a package that Debian lacks, in the current folder.
+stand_in_package() {  # NAME
+  mkdir "$1"
+  echo "<package format=\"2\"><name>$1</name><version>0.0.0</version><description>empty</description>
+    <maintainer email=\"nobody@example.com\">nobody</maintainer><license>BSD</license>
+    <buildtool_depend>catkin</buildtool_depend></package>" > "$1/package.xml"
+  printf '%s\n' 'cmake_minimum_required(VERSION 3.0.2)' "project($1)" 'find_package(catkin REQUIRED)' \
+    'catkin_package()' > "$1/CMakeLists.txt"
 }
 
 # A unity build of the needed targets takes 2.5 instead of 16 minutes of CPU time.
@@ -22,7 +22,7 @@ make_planners() {  # FOLDER
   cd "$1/src"
   for archive in "${planner_sources[@]}"; do tar -xf "$archive"; done
   patch -s -p1 < "$archives/patches.diff"
-  cmake_modules
+  stand_in_package cmake_modules
   touch costmap_converter/CATKIN_IGNORE vision_msgs/CATKIN_IGNORE
   unset CMAKE_PREFIX_PATH PYTHONPATH ROS_PACKAGE_PATH  # they must not depend on the workspace of this checkout
   export ROS_LANG_DISABLE=genlisp

@@ -16,7 +16,7 @@ debian_python=/usr/lib/python3/dist-packages
 
 use_platform() {  # NAME [PYTHON]
   local version=${platform_python[${1:-none}]:-}
-  [ -n "$version" ] || fail "test --platform '$1' is unknown; one of ${!platform_python[*]} expected"
+  [ -n "$version" ] || fail "test --platform '$1' is unknown; one of bullseye ${!platform_python[*]} expected"
   platform=$1 venv=$cache/$1 workspace=$workspace-$1
   if [ $# -gt 1 ]; then
     is_python "$2" "$version" || fail "--python: '$2' is not Python $version, the version of $1"

@@ -18,6 +18,7 @@ set_up_system() {
     return
   fi
   local missing=()
+  ! grep -qs VERSION_CODENAME=bullseye /etc/os-release || apt_packages+=(python3-torch)  # PyPI has only one with CUDA
   [ ! -d "${ROS_3D_BB_DATA:-}/planners" ] || apt_packages+=("${planner_packages[@]}")
   for package in "${apt_packages[@]}"; do
     dpkg-query -W -f '${Status}' "$package" 2> /dev/null | grep -q 'ok installed' || missing+=("$package")
@@ -25,7 +26,7 @@ set_up_system() {
   [ ${#missing[@]} -eq 0 ] && return
   local sudo=; [ "$(id -u)" -eq 0 ] || sudo=sudo
   say "installing ${#missing[@]} Debian packages: ${missing[*]}"
-  $sudo apt-get update -q
+  $sudo apt-get update -q || { say "the package archive cannot be reached, and packages are missing"; exit 77; }
   $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends "${missing[@]}"
 }
 

@@ -35,6 +35,12 @@ run_all_tests() {
 test_on_platform() {  # NAME [--python PATH] [--fast | -k EXPR | PATH ...]
   local name=${1:-}
   [ $# -eq 0 ] || shift
+  if [ "$name" = bullseye ]; then
+    [ "${1:-}" != --python ] || fail "--python does not apply to bullseye, which has Python 3.9: '${2:-}'"
+    set_up_root
+    in_root "$here/run" test "$@"
+    return
+  fi
   if [ "${1:-}" = --python ]; then
     [ $# -gt 1 ] || fail "--python needs the path of a Python"
     use_platform "$name" "$2"

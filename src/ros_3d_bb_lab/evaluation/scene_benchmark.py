@@ -24,7 +24,6 @@ RANGE_M = {'yolov5': (2.0, 8.0), 'depth': (2.0, 6.0), 'exact': (0.5, 8.0)}  # ev
 EVERY = {'yolov5': 2, 'depth': 2, 'exact': 1}  # every n-th image is used
 NEAREST_M = 0.5  # minimum distance from the camera in the plane
 HELD_M = 0.5  # maximum distance between a person and a matching track
-HORIZON_S = 1.0  # evaluated prediction horizon
 ROUNDING_M = 1e-6
 COLUMNS = '%-20s %-8s %6s %6s %6s %8s %7s %7s %4s %11s %9s %9s'
 HEADINGS = ('scene', 'detector', 'images', 'recall', 'false', 'switches', 'RMSE', 'worst', 'IDs', 'not visible',
@@ -56,22 +55,18 @@ def detections_without_scores(boxes):
     return Detections(np.array(boxes, float).reshape(-1, 4), np.zeros(len(boxes)), np.zeros(len(boxes), int))
 
 
-def score_tracks(steps, camera):
-    """Compare the VISIBLE tracks of a scene with the people in the image at `NEAREST_M` or more from the camera.
+def score_tracks(images, horizons_s=(1.0,)):
+    """Compare the VISIBLE tracks of a scene with people.
 
-    `track_ids` is the number of IDs of VISIBLE tracks near people; `not_visible` counts, summed over people, the images
-    after the first match in which a person has no VISIBLE track; the RMS errors of the velocity and of the position
-    predicted for `HORIZON_S` are in the plane, None if no track was matched.
-
-    People whose body axis is in the image are scored. `clear_mot` scores people of whose body an image shows a minimum
-    share. A person directly in front of the camera fills the image and shows less than that, but is the most important
-    one for a robot.
+    `images` is a list of (people, tracks), both lists of TrackedObject. `track_ids` is the number of IDs of VISIBLE
+    tracks near people; `not_visible` counts, summed over people, the images after the first match in which a person has
+    no VISIBLE track; the RMS errors of the velocity and of the positions predicted for each of `horizons_s` are in the
+    plane, None if no track was matched.
     """
-    track_ids, not_visible, velocity_errors, prediction_errors = set(), 0, [], []
+    track_ids, not_visible, velocity_errors, prediction_errors = set(), 0, [], {time_s: [] for time_s in horizons_s}
     followed, matcher = set(), ClearMatcher(HELD_M)
-    for step in steps:
-        people = _scored_people(step, camera)
-        tracks = [track for track in step.moment.tracks if track.status == VISIBLE]
+    for people, all_tracks in images:
+        tracks = [track for track in all_tracks if track.status == VISIBLE]
         near_m = plane_distances([person.position_m for person in people] or np.zeros((0, 3)),
                                  [track.position_m for track in tracks] or np.zeros((0, 3))) <= HELD_M
         track_ids.update(track.id for track, near in zip(tracks, near_m.T) if near.any())
@@ -79,23 +74,30 @@ def score_tracks(steps, camera):
         for person, track in matcher.match(people, tracks):
             followed.add(person.id)
             velocity_errors.append(_distance(track.velocity_mps, person.velocity_mps))
-            predicted_m, true_m = _predicted_m(track), _predicted_m(person)
-            if predicted_m is not None and true_m is not None:
-                prediction_errors.append(_distance(predicted_m, true_m))
-    return {'track_ids': len(track_ids), 'not_visible': not_visible, 'velocity_rmse_mps': _rms(velocity_errors),
-            'prediction_1s_m': _rms(prediction_errors)}
+            for time_s, errors in prediction_errors.items():
+                predicted_m, true_m = _predicted_m(track, time_s), _predicted_m(person, time_s)
+                if predicted_m is not None and true_m is not None:
+                    errors.append(_distance(predicted_m, true_m))
+    scores = {'track_ids': len(track_ids), 'not_visible': not_visible, 'velocity_rmse_mps': _rms(velocity_errors)}
+    scores.update({'prediction_%gs_m' % time_s: _rms(errors) for time_s, errors in prediction_errors.items()})
+    return scores
 
 
 def _scored_people(step, camera):
+    """Return the people whose body axis is in the image, at `NEAREST_M` or more from the camera.
+
+    `clear_mot` scores people of whose body an image shows a minimum share. A person directly in front of the camera
+    fills the image and shows less than that, but is the most important one for a robot.
+    """
     map_from_camera = step.frame.poses.map_from_camera
     shown = set(person.id for person in step.frame.people if is_in_image(person, map_from_camera, camera)
                 and _distance(person.position_m, map_from_camera[:3, 3]) >= NEAREST_M - ROUNDING_M)
     return [person for person in step.moment.truth if person.id in shown]
 
 
-def _predicted_m(track):
-    """Predicted position (3,) of a track after `HORIZON_S`; None if the prediction is shorter."""
-    number = int(round(HORIZON_S / track.prediction_step_s)) - 1 if len(track.prediction_m) else 0
+def _predicted_m(track, time_s):
+    """Predicted position (3,) of a track after a time; None if the prediction is shorter."""
+    number = int(round(time_s / track.prediction_step_s)) - 1 if len(track.prediction_m) else 0
     return track.prediction_m[number] if number < len(track.prediction_m) else None
 
 
@@ -121,7 +123,7 @@ def result_of(steps, detector, camera=D435I_COLOR):
               'id_switches': sum(person.switches for person in tracked.people),
               'rmse_m': _rms([person.rmse_m for person in followed]),
               'worst_m': max([person.worst_m for person in followed], default=None)}
-    result.update(score_tracks(steps, camera))
+    result.update(score_tracks([(_scored_people(step, camera), step.moment.tracks) for step in steps]))
     return result
 
 

@@ -1,0 +1,4 @@
+"""Benchmark of the pipeline on scenes in Gazebo, with a Jackal and its D435i, against the true positions of Gazebo.
+
+May import: bags, camera, conversions, core, msg, tracking, lab.evaluation, lab.simulation.
+"""

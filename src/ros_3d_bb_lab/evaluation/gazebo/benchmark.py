@@ -1,0 +1,166 @@
+"""Scenes in Gazebo, with the camera of a standing Jackal: our estimator and tracker beside those of the thesis."""
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+import rosbag
+
+from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, STATIC_TOPIC, TF_TOPIC
+from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, stamp_of, tracks_from_msg
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.types import VISIBLE, CameraView
+from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
+from ros_3d_bb_lab.evaluation.defaults import describe_machine, scenario_path, scenario_paths
+from ros_3d_bb_lab.evaluation.gazebo.people_truth import PREDICTION_S, PeopleTruth
+from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
+from ros_3d_bb_lab.evaluation.scene_benchmark import score_tracks
+from ros_3d_bb_lab.simulation.gazebo_world import world_of
+from ros_3d_bb_lab.simulation.scenario import read_scenario
+
+WORLD_FRAME = 'odom'  # of a robot that starts at the origin of the world and stands
+STATES_TOPIC = 'gazebo/model_states'
+START_S = 4.0  # simulated time at which people begin to move
+TIMEOUT_S = 600.0
+TRACKERS = {'ours': {}, 'thesis': {'bbox3d': {'estimator': 'median'}, 'tracker': {'tracker': 'thesis'}}}
+COLUMNS = '%-22s %-7s %6s %7s %8s %8s %8s %8s %9s %9s'
+TITLES = ('scene', 'tracker', 'images', 'rate', 'tracked', 'switches', 'position', 'velocity', '1 s ahead', '2 s ahead')
+
+
+def record_scene(scenario, folder):
+    """Run a scenario in Gazebo. Returns the path of the bag with images, tf and model states.
+
+    Raises RuntimeError with the end of the log if nothing was recorded.
+    """
+    world, bag, log_path = (os.path.join(folder, name) for name in ('scene.world', 'scene.bag', 'launch.log'))
+    with open(world, 'w') as stream:
+        stream.write(world_of(scenario, START_S))
+    arguments = {'world': world, 'gui': 'false', 'rviz': 'false', 'paused': 'true', 'lockstep': 'true',
+                 'detector': 'none'}
+    port = free_port()
+    environment = dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % port)
+    with open(log_path, 'w') as log, running_roslaunch(
+            ['ros_3d_bb', 'gazebo.launch'] + ['%s:=%s' % item for item in arguments.items()], port, log):
+        _wait_for_robot(environment)
+        duration_s = START_S + scenario.duration + PREDICTION_S
+        topics = [COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS[0], TF_TOPIC, STATIC_TOPIC, STATES_TOPIC]
+        recording = subprocess.Popen(['rosbag', 'record', '--lz4', '-b', '0', '--duration=%g' % duration_s, '-O', bag]
+                                     + topics, env=environment, stdout=log, stderr=log)
+        subprocess.check_call(['rosservice', 'call', 'gazebo/unpause_physics'], env=environment, stdout=log)
+        recording.wait(TIMEOUT_S)
+    if not os.path.exists(bag):
+        with open(log_path) as stream:
+            raise RuntimeError('nothing was recorded; the end of the log:\n' + stream.read()[-3000:])
+    return bag
+
+
+def _wait_for_robot(environment):
+    """Wait until the description of the robot is in the world, which is paused."""
+    command = ['bash', '-c', 'until rostopic list 2> /dev/null | grep -q %s; do sleep 1; done' % DEPTH_TOPIC]
+    subprocess.check_call(command, env=environment, timeout=TIMEOUT_S)
+
+
+def run_pipeline(bag, target, tracker, detector):
+    """Run the pipeline on a recorded scene. `detector` is a list of options of process_bag."""
+    command = ['rosrun', 'ros_3d_bb', 'process_bag', bag, target, '--target-frame', WORLD_FRAME, '--keep'] + detector
+    for node, params in TRACKERS[tracker].items():
+        path = '%s.%s.yaml' % (target, node)
+        with open(path, 'w') as stream:
+            json.dump(params, stream)
+        command += ['--%s-params' % node, path]
+    subprocess.check_call(command)
+
+
+def moments_in(scene_bag, tracks_bag, start_ns):
+    """Moment (`clear_mot`) of each image from `start_ns` on. Only visible people are truth."""
+    transforms, states, images = BagTransforms(), [], []
+    with rosbag.Bag(scene_bag) as bag:
+        for topic, message, time in bag.read_messages(
+                ['/' + name for name in (TF_TOPIC, STATIC_TOPIC, STATES_TOPIC, INFO_TOPICS[0])]):
+            if topic == '/' + STATES_TOPIC:
+                states.append((time.to_sec(), message))
+            elif topic == '/' + INFO_TOPICS[0]:
+                images.append(message.header)
+            else:
+                (transforms.add if topic == '/' + TF_TOPIC else transforms.add_static)(message)
+    with rosbag.Bag(tracks_bag) as bag:
+        tracks = {stamp_of(message): tracks_from_msg(message)
+                  for _topic, message, _time in bag.read_messages(['/' + TRACKS_TOPIC])}
+    truth, moments = PeopleTruth(states), []
+    for header in images:
+        stamp_ns = header.stamp.to_nsec()
+        if start_ns <= stamp_ns:
+            view = CameraView(transforms.lookup(WORLD_FRAME, header.frame_id, stamp_ns))
+            people = [person for person in truth.tracks_at(stamp_ns, view) if person.status == VISIBLE]
+            moments.append(Moment(stamp_ns, people, tracks.get(stamp_ns, [])))
+    return moments
+
+
+def result_of(moments):
+    """Scores of a tracker in a scene as a dictionary: lengths in metres, the rate in Hz, `tracked` a share 0..1."""
+    tracked = score(moments)
+    errors_m = [(person.rmse_m, person.followed * person.visible_s) for person in tracked.people if person.ids]
+    seconds = (moments[-1].stamp_ns - moments[0].stamp_ns) / NS
+    result = {'images': len(moments), 'rate_hz': (len(moments) - 1) / seconds,
+              'tracked': float(np.average([person.followed for person in tracked.people],
+                                          weights=[person.visible_s for person in tracked.people])),
+              'id_switches': sum(person.switches for person in tracked.people),
+              'false_share': tracked.false_share,
+              'rmse_m': float(np.sqrt(np.average([rmse_m ** 2 for rmse_m, _weight in errors_m],
+                                                 weights=[weight for _rmse_m, weight in errors_m])))}
+    result.update(score_tracks([(moment.truth, moment.tracks) for moment in moments], (1.0, PREDICTION_S)))
+    return result
+
+
+def main():
+    """Run the command `./run bench gazebo`."""
+    arguments = _parser().parse_args()
+    detector = (['--detector', 'yolov5', '--weights', os.path.abspath(arguments.weights)] if arguments.weights
+                else ['--detector', 'depth'])
+    print(describe_machine(), flush=True)
+    print(COLUMNS % TITLES)
+    results = []
+    try:
+        for path in arguments.scenarios:
+            results += _run(path, detector, arguments.bags)
+        if arguments.json:
+            with open(arguments.json, 'w') as stream:
+                json.dump({'machine': describe_machine(), 'detector': detector[1], 'scenes': results}, stream, indent=1)
+    except (RuntimeError, ValueError, OSError, subprocess.SubprocessError) as error:
+        sys.exit('./run bench gazebo: %s' % error)
+
+
+def _parser():
+    parser = argparse.ArgumentParser(prog='./run bench gazebo', description=__doc__)
+    parser.add_argument('scenarios', nargs='*', type=scenario_path, metavar='SCENARIO', default=scenario_paths('thesis_*'),
+                        help='names in config/scenarios or files (default: thesis_*)')
+    parser.add_argument('--weights', metavar='FILE', help='network of yolov5_node; without it, depth_detector_node')
+    parser.add_argument('--bags', metavar='DIR', help='existing folder in which the bags are kept; those in it are used')
+    parser.add_argument('--json', metavar='FILE', help='also write the scores to FILE')
+    return parser
+
+
+def _run(path, detector, bags):
+    name, results = os.path.basename(path).replace('.yaml', ''), []
+    with tempfile.TemporaryDirectory() as folder:
+        kept = os.path.join(bags or folder, name + '.bag')
+        if not os.path.exists(kept):
+            shutil.move(record_scene(read_scenario(path), folder), kept)
+        for tracker in TRACKERS:
+            target = os.path.join(folder, tracker + '.bag')
+            run_pipeline(kept, target, tracker, detector)
+            results.append(dict(result_of(moments_in(kept, target, int(START_S * NS))), scene=name, tracker=tracker))
+            _print_row(results[-1])
+    return results
+
+
+def _print_row(result):
+    meters = ['-' if result[key] is None else '%.3f' % result[key]
+              for key in ('rmse_m', 'velocity_rmse_mps', 'prediction_1s_m', 'prediction_2s_m')]
+    print(COLUMNS % tuple([result['scene'], result['tracker'], result['images'], '%.1f Hz' % result['rate_hz'],
+                           '%.1f %%' % (100 * result['tracked']), result['id_switches']] + meters), flush=True)
