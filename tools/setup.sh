@@ -74,5 +74,6 @@ build() {
     cat "$workspace/build.log"; say "the build failed; its log is above"; exit 1; }
   [ -n "${platform:-}" ] || link_common_path
   set +u; . "$workspace/devel/setup.bash"; set -u
+  [ -z "${platform:-}" ] || export ROS_PACKAGE_PATH=$ROS_PACKAGE_PATH:/usr/share  # Debian's rospkg searches it by default
   export ROS_LOG_DIR=${ROS_LOG_DIR:-$workspace/log}
 }

@@ -53,6 +53,7 @@ def test_sources_of_the_image_exist():
     assert os.access(os.path.join(ROOT, os.path.relpath(entrypoint, workdir)), os.X_OK)
 
 
+@pytest.mark.needs('check_jsonschema')
 def test_the_compose_file_conforms_to_its_schema():
     subprocess.check_call([sys.executable, '-m', 'check_jsonschema', '--builtin-schema', 'vendor.compose-spec',
                            COMPOSE])

@@ -25,6 +25,7 @@ def site(tmp_path_factory):
     return folder / 'html'
 
 
+@pytest.mark.needs('sphinx')
 def test_the_site_has_every_page_and_formulas_without_scripts(site):
     for path in DOC_PAGES:
         assert (site / 'doc' / (path[:-len('.md')] + '.html')).exists()
@@ -35,7 +36,7 @@ def test_the_site_has_every_page_and_formulas_without_scripts(site):
     assert not re.search(r'<(script|link|img)[^>]+(src|href)="(https?:)?//', text)
 
 
-@pytest.mark.needs('chromium')
+@pytest.mark.needs('chromium', 'sphinx')
 def test_pages_work_in_a_browser_on_a_small_screen(site):
     """No message on the console, no broken link or picture, no page wider than the screen, and the search answers."""
     pages = sorted(str(path.relative_to(site)) for path in site.glob('**/*.html'))

@@ -28,7 +28,8 @@ class DepthImage(NamedTuple):
     def at(self, u, v):
         """Return the depth, metres, at the pixels in columns u and rows v (arrays of int), and whether it is valid."""
         depth_m = self.values[v, u].astype(float) * self.scale_m
-        return depth_m, (depth_m > 0) & (depth_m <= FARTHEST_M)
+        with np.errstate(invalid='ignore'):  # nan, of which the numpy of Ubuntu 20.04 warns
+            return depth_m, (depth_m > 0) & (depth_m <= FARTHEST_M)
 
     def measured_area(self):
         """Rectangle (x1, y1, x2, y2) of the image without its black border, where registration leaves no depth.

@@ -215,7 +215,8 @@ class _SampledImage(object):
             to_x, to_y, to_z = geometry.level_from_camera[axis].tolist()
             return ((to_x * x + (to_y * y + to_z)) * depth_m).reshape(len(depth_m), -1)
         ahead_m = along_axis(2)
-        known = (ahead_m > 0) & (ahead_m <= FARTHEST_LAYER_M)  # nan: the distortion model has no ray for every pixel
+        with np.errstate(invalid='ignore'):  # nan: the distortion model has no ray for every pixel
+            known = (ahead_m > 0) & (ahead_m <= FARTHEST_LAYER_M)
         self._ahead_mm = millimetres(ahead_m, known)
         self._across_mm = millimetres(np.clip(along_axis(0) + MIDDLE_M, 0, 2 * MIDDLE_M), known)
         self._down_m = along_axis(1) if geometry.level_from_camera[1, 2] > LOOKS_DOWN else None

@@ -55,7 +55,8 @@ def depth_to_grey(depth, farthest_m):
     Depth from 0 to `farthest_m` is mapped to 255 to 1; 0 means no depth.
     """
     depth_m = depth.values.astype(np.float32) * np.float32(depth.scale_m)
-    valid = np.isfinite(depth_m) & (depth_m > 0)
+    with np.errstate(invalid='ignore'):  # nan
+        valid = np.isfinite(depth_m) & (depth_m > 0)
     grey = 255 - 254 * np.clip(np.where(valid, depth_m, 0) / farthest_m, 0, 1)
     return np.where(valid, grey, 0).astype(np.uint8)
 

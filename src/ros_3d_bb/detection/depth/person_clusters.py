@@ -100,7 +100,8 @@ def grid_of(depth, camera, floor, params):
     step = max(1, int(round(params.cell_angle * camera.fx)))
     values = depth.part(slice(step // 2, None, step), slice(step // 2, None, step))
     depth_m = values.astype(np.float32) * np.float32(depth.scale_m)
-    depth_m[~((depth_m > params.min_depth) & (depth_m < 100))] = 0
+    with np.errstate(invalid='ignore'):  # nan
+        depth_m[~((depth_m > params.min_depth) & (depth_m < 100))] = 0
     rows, columns = np.arange(depth_m.shape[0])[:, None], np.arange(depth_m.shape[1])
     x = (columns * step + step // 2 - camera.cx) / camera.fx
     y = (rows * step + step // 2 - camera.cy) / camera.fy
