@@ -27,7 +27,7 @@ class World(object):
     """True positions of the people and of the robot, and the topics of the robot."""
 
     def __init__(self):
-        self.fps, self.truth = FPS, []  # (time in s, {name: (2,)})
+        self.fps, self.truth = FPS, []  # (time in s, {name: (2,)}, yaw of the robot)
         rospy.Subscriber('gazebo/model_states', ModelStates, self._on_states, queue_size=1, buff_size=2 ** 20)
         self.color = Recorder('camera/color/image_raw', Image, publisher_expected=False)
         self.depth = Recorder('camera/aligned_depth_to_color/image_raw', Image, publisher_expected=False)
@@ -38,14 +38,16 @@ class World(object):
         self._listener = tf2_ros.TransformListener(self.transforms)
 
     def _on_states(self, message):
-        """Positions of the people and of the robot."""
-        self.truth.append((rospy.get_time(), {
-            name: np.array([pose.position.x, pose.position.y]) for name, pose in zip(message.name, message.pose)
-            if name not in ('floor', 'room')}))
+        """Positions of the people and of the robot, and the yaw of the robot."""
+        models = {name: np.array([pose.position.x, pose.position.y]) for name, pose in zip(message.name, message.pose)
+                  if name not in ('floor', 'room')}
+        if ROBOT in models:
+            turned = message.pose[message.name.index(ROBOT)].orientation
+            self.truth.append((rospy.get_time(), models, 2 * np.arctan2(turned.z, turned.w)))
 
     def positions_at(self, time_s, name):
         """True position (2,) at a time."""
-        times_s, poses = zip(*self.truth)
+        times_s, poses, _yaws = zip(*self.truth)
         return poses[min(np.searchsorted(times_s, time_s), len(poses) - 1)][name]
 
     def wait_for(self, condition, what):
