@@ -13,7 +13,8 @@ from ros_3d_bb_lab.simulation.motion import person_motion
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 
 SCENARIO = scenario_from({
-    'duration': 6.0, 'room': {'bounds': [-1, 8, -3, 3], 'furniture': [{'at': [4, 1], 'size': [0.5, 0.4, 1.7], 'yaw': 0.3}]},
+    'duration': 6.0,
+    'room': {'bounds': [-1, 8, -3, 3], 'furniture': [{'at': [4, 1], 'size': [0.5, 0.4, 1.7], 'yaw': 0.3}]},
     'people': [{'start': [3, -1], 'facing': 1.0, 'moves': [{'wait': 1.0}, {'to': [3, 1], 'speed': 1.1}]},
                {'start': [5, 0]}]})
 AHEAD = CameraView(np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0.27], [0, 0, 0, 1.0]]))  # looks along x
@@ -58,7 +59,8 @@ def states(paths, times_s):
         return SimpleNamespace(position=SimpleNamespace(x=x, y=y))
     for time_s in times_s:
         names = ['room'] + [PERSON_NAME + str(number + 1) for number in range(len(paths))] + ['jackal']
-        yield time_s, SimpleNamespace(name=names, pose=[pose(0, 0)] + [pose(*path(time_s)) for path in paths] + [pose(9, 9)])
+        people = [pose(*path(time_s)) for path in paths]
+        yield time_s, SimpleNamespace(name=names, pose=[pose(0, 0)] + people + [pose(9, 9)])
 
 
 def test_true_tracks_have_position_velocity_and_future_positions():

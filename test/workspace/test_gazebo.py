@@ -1,4 +1,4 @@
-"""Gazebo simulation without Gazebo: camera, people, and arguments of the launch file."""
+"""Gazebo simulation without Gazebo: camera, people, and arguments of the launch file. Those in test/gazebo run it."""
 import os
 import xml.etree.ElementTree as ElementTree
 from itertools import combinations
@@ -16,7 +16,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 CAMERA = os.path.join(ROOT, 'urdf', 'd435i.urdf.xacro')
 CAMERA_POSITION = (0.17, 0.0, 0.20)  # in base_link, thesis 3.5.1
 FX, WIDTH, HEIGHT = 614.686, 640, 480  # camera_info of the D435i of the thesis
-OWN_ARGUMENTS = {'world', 'gui', 'x', 'y', 'yaw'}
+OWN_ARGUMENTS = {'world', 'gui', 'x', 'y', 'yaw', 'fps', 'paused', 'lockstep', 'joystick', 'navigation'}
 
 
 def default_of(launch_file):
@@ -165,7 +165,16 @@ def test_the_launch_file_starts_gazebo_the_robot_with_the_camera_and_the_pipelin
     parameters = dumped('gazebo.launch', tmp_path, 'weights:=/some/yolov5n.pt', 'gui:=false', 'y:=-1.5', 'yaw:=0.3')
     given = given_to_stand_ins(parameters)
     assert os.path.samefile(given.pop('world_name'), os.path.join(ROOT, 'worlds', 'people.world'))
-    assert given == {'gui': 'false', 'x': '0.0', 'y': '-1.5', 'yaw': '0.3', 'z': '0.1'}
+    assert given == {'gui': 'false', 'x': '0.0', 'y': '-1.5', 'yaw': '0.3', 'z': '0.1', 'joystick': 'false',
+                     'paused': 'false'}
     assert 'camera_color_optical_frame' in parameters['/robot_description']
     assert parameters['/yolov5_node/weights'] == '/some/yolov5n.pt'
     assert parameters['/tracker_node/target_frame'] == 'odom'
+
+
+def test_the_launch_file_passes_the_rate_to_the_camera_and_lockstep_to_gazebo(tmp_path):
+    stand_in_gazebo(tmp_path)
+    parameters = dumped('gazebo.launch', tmp_path, 'detector:=depth', 'fps:=12', 'lockstep:=true', 'navigation:=true')
+    assert '<update_rate>12</update_rate>' in parameters['/robot_description']
+    assert given_to_stand_ins(parameters)['extra_gazebo_args'] == '--lockstep'
+    assert parameters['/move_base/global_costmap/global_frame'] == 'odom'

@@ -50,7 +50,7 @@ def record_scene(scenario, folder):
             ['ros_3d_bb', 'gazebo.launch'] + ['%s:=%s' % item for item in arguments.items()], port, log):
         _wait_for_robot(environment)
         duration_s = START_S + scenario.duration + PREDICTION_S
-        topics = [COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS[0], TF_TOPIC, STATIC_TOPIC, STATES_TOPIC]
+        topics = ['/' + name for name in (COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS[0], TF_TOPIC, STATIC_TOPIC, STATES_TOPIC)]
         recording = subprocess.Popen(['rosbag', 'record', '--lz4', '-b', '0', '--duration=%g' % duration_s, '-O', bag]
                                      + topics, env=environment, stdout=log, stderr=log)
         subprocess.check_call(['rosservice', 'call', 'gazebo/unpause_physics'], env=environment, stdout=log)
@@ -63,7 +63,7 @@ def record_scene(scenario, folder):
 
 def _wait_for_robot(environment):
     """Wait until the description of the robot is in the world, which is paused."""
-    command = ['bash', '-c', 'until rostopic list 2> /dev/null | grep -q %s; do sleep 1; done' % DEPTH_TOPIC]
+    command = ['bash', '-c', 'until rostopic list -p 2> /dev/null | grep -q %s; do sleep 1; done' % DEPTH_TOPIC]
     subprocess.check_call(command, env=environment, timeout=TIMEOUT_S)
 
 
@@ -143,7 +143,7 @@ def _parser():
                         default=scenario_paths('thesis_*'),
                         help='names in config/scenarios or files (default: thesis_*)')
     parser.add_argument('--weights', metavar='FILE', help='network of yolov5_node; without it, depth_detector_node')
-    parser.add_argument('--bags', metavar='DIR', help='existing folder in which the bags are kept; those in it are used')
+    parser.add_argument('--bags', metavar='DIR', help='existing folder for the recorded bags; those in it are used')
     parser.add_argument('--json', metavar='FILE', help='also write the scores to FILE')
     return parser
 
