@@ -5,7 +5,8 @@ import pytest
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d_estimator import LEVEL, estimate_boxes, estimator_named, level_rotation
+from ros_3d_bb.estimation.box3d import LEVEL
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, detections_from_boxes

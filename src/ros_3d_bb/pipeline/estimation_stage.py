@@ -18,7 +18,8 @@ from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param,
                                    parameters)
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
-from ros_3d_bb.estimation.box3d_estimator import LEVEL, check_rect, estimate_boxes, estimator_named, level_rotation
+from ros_3d_bb.estimation.box3d import LEVEL
+from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, error_model_of_param
 from ros_3d_bb.estimation.scale_check import ScaleCheck
 from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
