@@ -117,13 +117,18 @@ class RectSamples(object):
         return np.array(edges(SortedDistances(across_mm))) / 1000 - MIDDLE_M
 
     def mask(self, samples_mm, number, occluder, limit_mm):
-        """Mask the samples of a rectangle that are in the rectangle of an occluder and not farther than `limit_mm`."""
+        """Mask the samples of a rectangle that are in the rectangle of an occluder and not farther than `limit_mm`.
+
+        Returns whether there are any.
+        """
         left, top, right, bottom = self._rect_lists_px[occluder]
         rows, columns = self._slices[number]
         rows = slice(_rank(rows, top), _rank(rows, bottom))
         columns = slice(_rank(columns, left), _rank(columns, right))
         part = samples_mm.reshape(GRID_ROWS, GRID_COLUMNS)[rows, columns]
-        part[part <= limit_mm] = UNKNOWN_MM
+        masked = part <= limit_mm
+        part[masked] = UNKNOWN_MM
+        return masked.any()
 
 
 def grids(rects_px, shape):

@@ -47,7 +47,7 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     image = _Image(depth, rects_px, geometry, kinds)
     boxes = [None] * len(rects_px)
     while image.overlaps.pending.any():
-        for number, box in image.estimates(image.overlaps.foremost()):
+        for number, box in image.estimates(image.overlaps.take_foremost()):
             boxes[number] = box
     return boxes
 
@@ -69,7 +69,6 @@ class _Image(object):
 
     def estimates(self, group):
         """Pairs (number, Box3D) of the rectangles in `group` (k,) that have a box; what these occlude is masked."""
-        self.overlaps.pending[group] = False
         ahead_mm = self._samples.ahead_mm[group]
         ordered = SortedDistances(ahead_mm)
         layers_mm = self._samples.layers(group, ahead_mm, ordered)
