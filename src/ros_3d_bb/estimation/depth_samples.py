@@ -100,6 +100,15 @@ class RectSamples(object):
         self.measured = np.count_nonzero(known, axis=1)
         self._weights = _weights(columns, rects_px, self.counts[:, 0])
 
+    def measured_weights(self, numbers):
+        """Share (k,) of the weight of all samples of rectangles that those with depth have; 0.5 if they are half of the
+        samples, but more or less where depth is measured in the middle, or at the sides.
+        """
+        rows, columns = self.counts[numbers].T[..., None, None]
+        in_grid = (np.arange(GRID_ROWS)[:, None] < rows) & (np.arange(GRID_COLUMNS) < columns)
+        weights = self._weights[numbers] * in_grid.reshape(len(numbers), -1)
+        return (weights * (self.ahead_mm[numbers] < UNKNOWN_MM)).sum(axis=1) / weights.sum(axis=1)
+
     def layers(self, numbers, ahead_mm=None, ordered=None):
         """Distance (k,) of the nearest dominant layer in rectangles, whole millimetres; by default in all samples that
         are not masked.

@@ -6,11 +6,14 @@ import numpy as np
 
 from ros_3d_bb.estimation.box3d import (Box3D, complete_truncated_extent, slopes_down, truncated_edges,
                                         without_distortion)
-from ros_3d_bb.estimation.depth_layers import BODY_HALF_DEPTH_MM, SortedDistances
+from ros_3d_bb.estimation.depth_layers import BODY_HALF_DEPTH_MM, UNKNOWN_MM, SortedDistances
 from ros_3d_bb.estimation.depth_samples import GRID_COLUMNS, GRID_ROWS, RectSamples
 from ros_3d_bb.estimation.overlaps import Overlaps
 
 LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate; a lidar gives twice as many
+# Where a person is too near for the depth camera, depth is known beside the person only: in less than the first share
+# of the samples, and the weight of these is less than the second share of that of as many samples anywhere.
+HARDLY_MEASURED, MEASURED_BESIDE = 0.5, 0.65
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the person's layer for an estimate
 LEAST_WIDTH_M = 0.05
 FILLED = 0.4  # minimum share of both sides of a rectangle that background behind an object fills
@@ -40,9 +43,9 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     Returns
     -------
     list of Box3D or None
-        None if less than `LEAST_MEASURED` of the samples have a valid depth and a viewing ray, if the layer contains
-        less than `LEAST_SUPPORT` of those with depth, if the rectangle cannot be undistorted, or if it is a second one
-        of the same object.
+        None if less than `LEAST_MEASURED` of the samples have a valid depth and a viewing ray, or these are beside an
+        object without depth, if the layer contains less than `LEAST_SUPPORT` of those with depth, if the rectangle
+        cannot be undistorted, or if it is a second one of the same object.
     """
     image = _Image(depth, rects_px, geometry, kinds)
     boxes = [None] * len(rects_px)
@@ -63,8 +66,13 @@ class _Image(object):
         self._slopes_down = slopes_down(flat_px, geometry)
         self._truncated = [truncated_edges(rect_px, geometry.area_px) for rect_px in self._rects_px]
         self._samples = samples = RectSamples(depth, rects_px, geometry)
-        usable = samples.measured >= np.maximum(LEAST_MEASURED * samples.counts.prod(axis=1), 1)
+        count = samples.counts.prod(axis=1)
+        usable = samples.measured >= np.maximum(LEAST_MEASURED * count, 1)
         usable &= np.isfinite(flat_px).all(axis=1)
+        sparse = np.flatnonzero(usable & (samples.measured < HARDLY_MEASURED * count))
+        if sparse.size:
+            beside = samples.measured_weights(sparse) < MEASURED_BESIDE * samples.measured[sparse] / count[sparse]
+            usable[sparse[beside]] = False
         self.overlaps = Overlaps(samples, usable, geometry.camera, kinds, self._truncated)
 
     def estimates(self, group):
@@ -88,10 +96,10 @@ class _Image(object):
                 if is_valid]
 
     def _fills_sides(self, group, on_body):
-        """Whether the samples (k, samples) `on_body` fill at least `FILLED` of both sides of rectangles."""
-        on_body, members = on_body.reshape(-1, GRID_ROWS, GRID_COLUMNS), np.arange(len(group))
+        """Whether the samples (k, samples) `on_body`, or masked ones, fill at least `FILLED` of both sides."""
+        beside = ((self._samples.ahead_mm[group] < UNKNOWN_MM) & ~on_body).reshape(-1, GRID_ROWS, GRID_COLUMNS)
         rows, columns = self._samples.counts[group].T
-        return np.all([np.count_nonzero(on_body[members, :, column], axis=1) >= FILLED * rows
+        return np.all([np.count_nonzero(beside[np.arange(len(group)), :, column], axis=1) <= (1 - FILLED) * rows
                        for column in (0, columns - 1)], axis=0)
 
     def _box(self, number, support, layer_m, left_m, right_m, top_m, bottom_m):
@@ -104,6 +112,6 @@ class _Image(object):
         behind_m = kind.axis_behind(width_m)
         center_m = self._camera_from_level.dot(surface_m * (1 + behind_m / layer_m))
         box = Box3D(center_m, np.array([width_m, bottom_m - top_m, width_m]), rect_px, support, cut)
-        if box.is_plausible:
+        if box.is_plausible(kind.largest_m):
             self.overlaps.mask_behind(number, int(1000 * (layer_m + behind_m)) + BODY_HALF_DEPTH_MM)
         return box
