@@ -89,7 +89,7 @@ class _Image(object):
         top_m, bottom_m = layers_m * self._slopes_down[:, group]
         on_body = (ahead_mm >= nearest_mm) & (ahead_mm <= farthest_mm)
         left_m, right_m = self._samples.edges(group, on_body, bottom_m)
-        valid = (supports >= LEAST_SUPPORT) & ~(self.overlaps.repeats[group] & self._fills_sides(group, on_body))
+        valid = (supports >= LEAST_SUPPORT) & ~(self.overlaps.repeats(group) & self._fills_sides(group, on_body))
         values = zip(valid.tolist(), group.tolist(), supports.tolist(), layers_m.tolist(), left_m.tolist(),
                      right_m.tolist(), top_m.tolist(), bottom_m.tolist())
         return [(number, self._box(number, support, *extents_m)) for is_valid, number, support, *extents_m in values
