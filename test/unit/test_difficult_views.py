@@ -131,6 +131,19 @@ def test_a_person_too_near_for_the_depth_camera_is_not_on_the_wall(ahead_m, near
                           estimator_named('foreground')) == [None]
 
 
+@pytest.mark.parametrize('border_px,truncated', [((75, 75), True), ((75, 0), False), ((75, 60), False)])
+def test_a_person_at_the_border_of_a_smaller_field_of_view_of_depth(border_px, truncated):
+    left, right = border_px
+    simulator = simulator_of([{'start': [2.8, 1.0], 'facing': 3.1, 'height': 1.75}], 1.0)
+    frame = simulator.frame(0)
+    depth_mm = frame.depth_mm.copy()
+    depth_mm[:, :left] = depth_mm[:, 640 - right:] = 0
+    box, = estimate_boxes(DepthImage(depth_mm, 0.001), [frame.people[0].box_px], simulator.camera,
+                          estimator_named('foreground'))
+    assert box.truncated_edges == (truncated, False, False, False)
+    assert abs(box.center_m[2] - 2.8) < 0.1 and (abs(box.center_m[0] + 1.0) < 0.05) == truncated
+
+
 @pytest.mark.parametrize('height_m,adult_m,gap_m', [
     (0.27, 5.0, 0.3), (0.27, 5.0, 0.5), (1.2, 2.5, 0.3), (1.2, 3.5, 0.8)])
 def test_a_child_before_an_adult(height_m, adult_m, gap_m):
