@@ -143,6 +143,23 @@ def test_a_person_at_the_border_of_a_smaller_field_of_view_of_depth(border_px, t
     assert box.truncated_edges[0] == truncated and abs(box.center_m[2] - 2.8) < 0.1 and (abs(box.center_m[0] + 1.0) < 0.05) == truncated
 
 
+@pytest.mark.parametrize('facing', [3.14, 2.2])
+@pytest.mark.parametrize('posture,tall_m', [
+    (dict(lift_l=1.57), 1.7), (dict(lift_r=1.57), 1.7), (dict(lift_l=1.57, lift_r=1.57), 1.7), (dict(lift_l=2.9), 1.7),
+    (dict(lift_l=2.9, lift_r=2.9), 1.7), (dict(reach=1.4), 1.7), (dict(bend=0.7), 1.6)],
+    ids=['left arm out', 'right arm out', 'both out', 'left arm up', 'both up', 'reaching', 'bent'])
+def test_limbs_do_not_move_the_axis_or_make_people_taller(posture, tall_m, facing):
+    simulator = simulator_of([{'start': [4.2, 0.2], 'facing': facing, 'height': 1.7}], 0.9)
+    state = simulator.state_at(0)
+    people = [person._replace(posture=person.posture._replace(**posture)) for person in state.people]
+    frame = simulator.frame(0, state._replace(people=people))
+    box, = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [frame.people[0].box_px], simulator.camera,
+                          estimator_named('foreground'))
+    truth_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), frame.people[0].position_m)
+    assert box.center_m[[0, 2]] == pytest.approx(truth_m[[0, 2]], abs=0.08)
+    assert box.size_m[1] == pytest.approx(tall_m, abs=0.08)
+
+
 @pytest.mark.parametrize('height_m,adult_m,gap_m', [
     (0.27, 5.0, 0.3), (0.27, 5.0, 0.5), (1.2, 2.5, 0.3), (1.2, 3.5, 0.8)])
 def test_a_child_before_an_adult(height_m, adult_m, gap_m):
