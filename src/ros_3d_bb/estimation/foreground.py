@@ -28,8 +28,8 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     Background beside and between the limbs may fill most of a rectangle, but it is farther away. Flying pixels are too
     sparse to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges
     of the layer, or of the torso of a person who is wide, and behind its mean depth by the distance of its class. Arms
-    above the head of a tall person are not part of the height. If the image border truncates the object, it is completed
-    to the usual size of its class. All of this is done in the level frame.
+    above the head of a tall person are not part of the height. If the image border truncates the object, it is
+    completed to the usual size of its class. All of this is done in the level frame.
 
     In the rectangles of nearer objects with plausible boxes, pixels that are not behind them are masked. Rectangles are
     therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
