@@ -12,7 +12,7 @@ GRID_ROWS, GRID_COLUMNS = 48, 32
 # Chosen so that no person behind the dog of config/scenarios/objects.yaml is taken for the dog.
 UPPER_SHARE, LOWER_WEIGHT = 0.55, 0.35
 TORSO_SHARE = 0.6  # minimum number of samples in a column of the torso, relative to the column with most
-ARM_ROWS, HEAD_SHARE = 2, 0.4  # minimum number of rows of raised arms, and width of a head relative to the torso
+HEAD_SHARE = 0.4  # minimum width of a head relative to the torso
 MIDDLE_M = 32.0  # of the lateral positions that fit into 16 bits of millimetres
 LOOKS_DOWN, FEET_M = np.sin(np.radians(10)), 0.3  # a camera with more tilt sees the floor beside the feet, this high
 
@@ -137,7 +137,7 @@ class RectSamples(object):
         on_body = on_body.reshape(-1, GRID_ROWS, GRID_COLUMNS)
         widths = np.count_nonzero(on_body & in_torso[:, None], axis=2)
         head = np.argmax(widths >= HEAD_SHARE * np.count_nonzero(in_torso, axis=1)[:, None], axis=1)
-        is_arm = head - np.argmax(on_body.any(axis=2), axis=1) >= ARM_ROWS
+        is_arm = np.argmax(on_body.any(axis=2), axis=1) < head
         return np.where(is_arm, head, 0) / self.counts[numbers, 0]
 
     def mask(self, samples_mm, number, occluder, limit_mm):

@@ -17,6 +17,7 @@ LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate
 HARDLY_MEASURED, MEASURED_BESIDE = 0.5, 0.65
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the person's layer for an estimate
 LEAST_WIDTH_M = 0.05
+TALL, LEAST_ARMS_M = 1.12, 0.15  # minimum height of a person with raised arms; that of the arms above the head
 WIDE = 1.05  # minimum width of a person whose torso is narrower, relative to the usual width
 FILLED = 0.4  # minimum share of both sides of a rectangle that background behind an object fills
 
@@ -69,7 +70,7 @@ class _Image(object):
         self._slopes_down = slopes_down(flat_px, geometry)
         self._truncated = [truncated_edges(rect_px, geometry.area_px) for rect_px in self._rects_px]
         # People who are wider, or taller, may have arms that are held out, or up
-        self._wide_m, self._tall_m = np.array([(WIDE * kind.width, kind.height) if kind.group == PERSON
+        self._wide_m, self._tall_m = np.array([(WIDE * kind.width, TALL * kind.height) if kind.group == PERSON
                                                else (np.inf, np.inf) for kind in kinds]).T
         self._samples = samples = RectSamples(depth, rects_px, geometry)
         count = samples.counts.prod(axis=1)
@@ -117,7 +118,8 @@ class _Image(object):
         is_tall = bottom_m - top_m > self._tall_m[group]
         if is_tall.any():
             share = self._samples.arms_above_head(group[is_tall], on_body[is_tall])
-            top_m[is_tall] += share * (bottom_m - top_m)[is_tall]
+            arms_m = share * (bottom_m - top_m)[is_tall]
+            top_m[is_tall] += np.where(arms_m > LEAST_ARMS_M, arms_m, 0)
 
     def _fills_sides(self, group, on_body):
         """Whether the samples (k, samples) `on_body`, or masked ones, fill at least `FILLED` of both sides."""
