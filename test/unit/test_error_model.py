@@ -8,7 +8,7 @@ import yaml
 from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.core.detector_model import DetectorModel
-from ros_3d_bb.estimation.box3d_estimator import Box3D
+from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.estimation.error_model import (STEEPEST_BIAS, Scores, Spread, XBias, checked, corrected_boxes,
                                               read_error_model, write_error_model)
 from support.error_models import MODEL

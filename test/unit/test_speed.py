@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d_estimator import Box3D
+from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.types import Detection

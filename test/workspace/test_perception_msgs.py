@@ -13,7 +13,7 @@ from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_
                                                    boxes3d_to_msg, camera_from_msg, stamp_of, time_from,
                                                    tracks_from_msg, tracks_to_msg, usable_boxes3d, with_stamp)
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d_estimator import Box3D
+from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject as Track, detections_from_boxes

@@ -13,7 +13,7 @@ from ros_3d_bb.camera.camera_model import Camera, transform_from
 from ros_3d_bb.core.labels import PERSON, label_fault, score_fault, usable_label
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d_estimator import Box3D
+from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.tracking.types import TrackedObject
 
@@ -200,7 +200,7 @@ def transform_from_msg(message):
 
 
 def boxes3d_to_msg(boxes, header, camera):
-    """Convert 3D boxes (`box3d_estimator.Box3D`) to BoundingBox3DArray. Inverse of `boxes3d_from_msg`."""
+    """Convert 3D boxes (`box3d.Box3D`) to BoundingBox3DArray. Inverse of `boxes3d_from_msg`."""
     array = BoundingBox3DArray(header=header)
     for box in boxes:
         score, support = np.float32([box.score, box.support]).tolist()  # as received, so that process_bag does the same
@@ -221,7 +221,7 @@ def boxes3d_to_msg(boxes, header, camera):
 
 
 def boxes3d_from_msg(message):
-    """Convert a BoundingBox3DArray to a tuple of `box3d_estimator.Box3D`. Inverse of `boxes3d_to_msg`."""
+    """Convert a BoundingBox3DArray to a tuple of `box3d.Box3D`. Inverse of `boxes3d_to_msg`."""
     return tuple(map(_box3d_from_msg, message.boxes))
 
 
@@ -239,7 +239,7 @@ def _box3d_from_msg(box):
 def usable_boxes3d(message):
     """Convert the 3D boxes of a BoundingBox3DArray that can be tracked.
 
-    Returns {index in the message: `box3d_estimator.Box3D`}, and a sentence about the fault of each other box. Raises
+    Returns {index in the message: `box3d.Box3D`}, and a sentence about the fault of each other box. Raises
     ValueError if there are too many boxes.
     """
     if len(message.boxes) > MAX_BOXES:
@@ -257,7 +257,7 @@ def usable_boxes3d(message):
 
 def _box3d_fault(box, position_covariance):
     """Describe what is wrong with a Box3D from a message, '' if it can be tracked."""
-    if not box.is_plausible:
+    if not box.is_plausible():
         return ('centre (%g, %g, %g) and size (%g, %g); finite numbers and sizes of more than 0 and less than %g m '
                 'expected' % (tuple(box.center_m) + tuple(box.size_m[:2]) + (LARGEST_M,)))
     if not _is_covariance(position_covariance):

@@ -168,7 +168,7 @@ class ErrorModel(NamedTuple):
 
 
 def corrected_boxes(boxes, model=None, gap_s=0.0):
-    """Correct the bias of 3D boxes (`box3d_estimator.Box3D`) and set their covariance.
+    """Correct the bias of 3D boxes (`box3d.Box3D`) and set their covariance.
 
     Boxes with little support or at the image border are less certain than those to which an error model is fitted.
     Without a model, positions are not corrected, and their standard deviation is `UNCALIBRATED_SIGMA_M`. `gap_s` is the

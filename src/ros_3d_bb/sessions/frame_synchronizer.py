@@ -6,7 +6,7 @@ import numpy as np
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import MessageCache, StampSynchronizer
-from ros_3d_bb.estimation.box3d_estimator import Box3D
+from ros_3d_bb.estimation.box3d import Box3D
 
 
 class ColorImage(NamedTuple):

@@ -30,7 +30,7 @@ class RecordedDetection(NamedTuple):
     """Detected person in an image. Values that are not stored are None.
 
     `box_px` is (x1, y1, x2, y2), `estimate_m` (x, y, z) in the optical frame, `size_m` (width, height). `support` and
-    `truncated` are those of box3d_estimator.Box3D. `by_hand`: a user drew the box. `truth_m` (x, z) and `truth_y_m` are
+    `truncated` are those of box3d.Box3D. `by_hand`: a user drew the box. `truth_m` (x, z) and `truth_y_m` are
     the ground truth of this person, unless it is that of the measurement.
     """
 

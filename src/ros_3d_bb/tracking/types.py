@@ -51,7 +51,7 @@ def detections_from_boxes(boxes, fixed_from_camera, classes=ObjectClasses()):
     Parameters
     ----------
     boxes : dict
-        {index: `box3d_estimator.Box3D`}, where index is `Detection.index`.
+        {index: `box3d.Box3D`}, where index is `Detection.index`.
     fixed_from_camera : numpy.ndarray, (4, 4)
         Pose of the camera's optical frame in the fixed frame.
     classes : object_classes.ObjectClasses

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple, Optional
 import numpy as np
 
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, truncated_edges
+from ros_3d_bb.estimation.box3d import truncated_edges
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import read_error_model, write_error_model
 from ros_3d_bb.sessions.session_reader import annotated_people, read_color, read_depth, read_session
 from ros_3d_bb_lab.evaluation.accuracy_figure import draw

@@ -20,8 +20,9 @@ import numpy as np
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d_estimator import (ImageGeometry, estimate_boxes, estimate_median, estimator_named,
-                                                  sample_depth)
+from ros_3d_bb.estimation.box3d import ImageGeometry
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_median, estimator_named
+from ros_3d_bb.estimation.depth_samples import sample_depth
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple, Tuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, truncated_edges
+from ros_3d_bb.estimation.box3d import truncated_edges
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.sessions.plausibility import likely_errors, outlier_of
 from ros_3d_bb.sessions.session_reader import SessionError, annotated_people, read_depth, read_session
 

@@ -1,0 +1,107 @@
+"""3D boxes of objects, and the geometry of the image they are estimated from.
+
+Conventions: a rectangle (x1, y1, x2, y2) contains the pixels x1 <= u < x2, y1 <= v < y2. Positions are in the camera
+optical frame, metres. The level frame of a camera has the same origin, x horizontally to the right, y down and z
+horizontally ahead; `level_from_camera` (3, 3) rotates the optical frame to it.
+"""
+from typing import Any, NamedTuple, Optional, Tuple
+
+import numpy as np
+
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.core.labels import PERSON
+from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
+
+# A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated:
+# detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person
+# who is not truncated there loses little, because only boxes of less than the usual size are completed.
+BORDER_PX, BORDER_SHARE = 4, 0.02
+LEVEL = np.eye(3)  # of a camera that is held level
+LEAST_AHEAD = 0.05  # lower bound of the horizontal part of a ray
+
+
+class ImageGeometry(NamedTuple):
+    """Geometry of one image: its camera, the part of it with depth (see `DepthImage.measured_area`), and the rotation
+    (3, 3) from the optical frame to the level frame (see `level_rotation`).
+    """
+
+    camera: Camera
+    area_px: Tuple[int, int, int, int]
+    level_from_camera: np.ndarray = LEVEL
+
+
+class Box3D(NamedTuple):
+    """An upright cylinder, with quality measures.
+
+    `center_m` (3,) in the camera optical frame and `size_m` (width, height, width) are in metres; `rect_px` is the
+    source rectangle; `support` is the share 0..1 of the samples with depth that belong to its depth layer;
+    `truncated_edges` states whether the left, upper, right and lower edge of the rectangle touch the image border;
+    `covariance_m2` (3, 3) is that of the centre, None if unknown; `label` is the class name, and `score` is that of the
+    rectangle, 0..1, 0 if unknown.
+    """
+
+    center_m: np.ndarray
+    size_m: np.ndarray
+    rect_px: Tuple[int, int, int, int]
+    support: float
+    truncated_edges: Tuple[bool, bool, bool, bool]
+    covariance_m2: Optional[Any] = None
+    label: str = PERSON
+    score: float = 0.0
+
+    @property
+    def truncated(self):
+        """Whether the image border truncates the object."""
+        return any(self.truncated_edges)
+
+    def is_plausible(self, largest_m=LARGEST_M):
+        """Whether the centre is nearer than `FARTHEST_M`, and width and height are between 0 and `largest_m`."""
+        width_m, height_m, _width_m = self.size_m.tolist()
+        return (all([abs(along_m) < FARTHEST_M for along_m in self.center_m.tolist()])
+                and 0 < width_m < largest_m and 0 < height_m < largest_m)
+
+
+def truncated_edges(rect_px, area_px):
+    """Whether the left, upper, right and lower edge of a rectangle touch the border of the area with depth.
+
+    Returns
+    -------
+    (bool, bool, bool, bool)
+    """
+    x1, y1, x2, y2 = rect_px
+    left, top, right, bottom = area_px
+    across_px, down_px = BORDER_PX + BORDER_SHARE * (x2 - x1), BORDER_PX + BORDER_SHARE * (y2 - y1)
+    return (bool(x1 <= left + across_px), bool(y1 <= top + down_px), bool(x2 >= right - across_px),
+            bool(y2 >= bottom - down_px))
+
+
+def complete_truncated_extent(low, high, cut_low, cut_high, usual):
+    """Extend low..high of a body that the image border truncates at one end to at least the usual extent."""
+    missing = max(0.0, usual - (high - low))
+    if cut_low and not cut_high:
+        return low - missing, high
+    return low, high + (missing if cut_high and not cut_low else 0.0)
+
+
+def slopes_down(flat_px, geometry):
+    """y / z in the level frame of the rays through the middles of the upper and of the lower edges, (2, n)."""
+    camera, level_from_camera = geometry.camera, geometry.level_from_camera
+    x = ((flat_px[:, 0] + flat_px[:, 2]) / 2.0 - camera.cx) / camera.fx
+    y = (flat_px[:, 1::2].T - camera.cy) / camera.fy
+    (down_x, down_y, down_z), (ahead_x, ahead_y, ahead_z) = level_from_camera[1:].tolist()
+    return (down_x * x + down_y * y + down_z) / np.maximum(ahead_x * x + ahead_y * y + ahead_z, LEAST_AHEAD)
+
+
+def without_distortion(rects_px, camera):
+    """Undistort rectangles (n, 4) by the midpoints of their edges; nan if a midpoint has no undistorted position.
+
+    Outside the image, where the distortion is unknown, the distortion at the image border is used.
+    """
+    if not camera.distortion_model:
+        return rects_px
+    x1, y1, x2, y2 = rects_px.T
+    x, y = (x1 + x2) / 2.0, (y1 + y2) / 2.0
+    middles = np.stack((x1, y, x, y1, x2, y, x, y2), axis=1).reshape(-1, 4, 2)
+    inside = np.clip(middles, 0, (camera.width, camera.height))
+    flat_px = middles + camera.undistort(inside) - inside
+    return np.stack((flat_px[:, 0, 0], flat_px[:, 1, 1], flat_px[:, 2, 0], flat_px[:, 3, 1]), axis=1)
