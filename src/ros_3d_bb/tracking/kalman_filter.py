@@ -3,14 +3,9 @@
 Convention: a state is (x, y, vx, vy), metres and m/s, in the fixed frame; `mean` is (n, 4), `covariance` (n, 4, 4).
 `measurements` is an array of `measurement_model.MEASUREMENT`, `params` has the `outlier_` fields of
 `tracker.TrackerParams`. If the depth of a box is that of the background, the measurement lies behind the person on the
-viewing ray. The measurement error is therefore a mixture of two Gaussians, one of them shifted along the ray. A box of
-which little has the depth of its position may as well show what is far in front of the person, or behind.
+viewing ray. The measurement error is therefore a mixture of two Gaussians, one of them shifted along the ray.
 """
 import numpy as np
-
-# Support below which a box is doubtful. Without any support, the share of outliers is multiplied by the second value,
-# up to the third one, and their standard deviation along the ray is larger by the last value.
-DOUBTFUL_SUPPORT, DOUBTFUL_FACTOR, LARGEST_SHARE, DOUBTFUL_SPREAD_M = 0.3, 5.0, 0.9, 1.0
 
 
 def predict(mean, covariance, elapsed_s, density):
@@ -51,13 +46,10 @@ def _fit(mean, covariance, measurements, params):
 
     Computed element by element, because numpy is several times slower on stacks of 2x2 matrices.
     """
-    components = (2,) + (1,) * (mean.ndim - 2) + (-1,)
-    doubts = np.maximum(1 - measurements['support'] / DOUBTFUL_SUPPORT, 0)
-    outlier_shares = np.minimum(params.outlier_share * (1 + (DOUBTFUL_FACTOR - 1) * doubts),
-                                max(params.outlier_share, LARGEST_SHARE))
-    shares = np.reshape((1 - outlier_shares, outlier_shares), components)
-    offsets_m = np.reshape((0, params.outlier_offset), components)
-    spreads_m = np.reshape((0 * doubts, params.outlier_spread + DOUBTFUL_SPREAD_M * doubts), components)
+    components = (2,) + (1,) * (mean.ndim - 1)
+    shares = np.reshape((1 - params.outlier_share, params.outlier_share), components)
+    offsets_m, spreads_m = (np.reshape((0, outlier_m), components)
+                            for outlier_m in (params.outlier_offset, params.outlier_spread))
     ray_x, ray_y = measurements['ray'][..., 0], measurements['ray'][..., 1]
     x = measurements['position_m'][..., 0] - mean[..., 0] - offsets_m * ray_x
     y = measurements['position_m'][..., 1] - mean[..., 1] - offsets_m * ray_y
