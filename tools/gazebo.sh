@@ -66,7 +66,7 @@ make_gazebo() {  # FOLDER
 }
 
 # Debian 12 has no Gazebo 11.
-has_gazebo() { [ -d /opt/ros ] || grep -qs VERSION_CODENAME=bullseye /etc/os-release; }
+has_gazebo() { [ -d /opt/ros ] || is_debian_11; }
 
 # Builds what is needed for gazebo.launch, and sets up its environment.
 build_gazebo() {

@@ -30,7 +30,12 @@ set_up_system() {
   say "installing ${#missing[@]} Debian packages: ${missing[*]}"
   $sudo apt-get update -q || { say "the package archive cannot be reached, and packages are missing"; exit 77; }
   $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends "${missing[@]}"
+  [ ! -f /etc/made_by_ros_3d_bb ] || mend_root
 }
+
+# ROS of Debian 11 calls Thread.isAlive, which the Python 3.9 of Debian 11 does not have: without it, nodes and roslaunch
+# end with an error. Only in a root file system of ./run.
+mend_root() { sed -i 's/\.isAlive()/.is_alive()/' $(grep -rl '\.isAlive()' "$debian_python"/ros*); }
 
 set_up_python() {
   local wanted; wanted=$(cat "$here"/test/requirements*.txt | sha1sum)

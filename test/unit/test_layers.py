@@ -72,7 +72,7 @@ ALLOWED = {
         'lab.simulation lab.simulation.ros',
         'cv2 nav_msgs rosgraph_msgs rospy std_msgs tf2_msgs'),
     'ros_3d_bb_lab.evaluation.gazebo': (
-        'bags conversions core tracking lab.evaluation lab.simulation', 'rosbag'),
+        'bags conversions core tracking lab.evaluation lab.simulation', 'rosbag tf2_msgs'),
     'ros_3d_bb_lab.evaluation.latency': (
         'bags conversions core msg nodes.common lab.evaluation',
         'rosgraph roslib rospy sensor_msgs std_msgs visualization_msgs'),

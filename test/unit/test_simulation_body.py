@@ -10,7 +10,7 @@ from ros_3d_bb_lab.simulation.gait import (BONES, JOINTS_M, PARENTS, STANCE, TAB
 from ros_3d_bb_lab.simulation.mesh import volume
 from support.meshes import assert_closed
 
-postures = st.builds(Posture, st.floats(-3, 3), st.floats(0, 1), st.floats(0, 1))
+postures = st.tuples(st.floats(-3, 3), st.floats(0, 1), st.floats(0, 1)).map(lambda values: Posture(*values))
 builds = st.tuples(st.floats(1.4, 2.1), st.floats(.9, 1.4), st.floats(0, 1), st.booleans(), st.booleans()).map(
     lambda values: Build(*values))
 

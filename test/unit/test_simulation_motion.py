@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb_lab.simulation.gait import stride_m
+from ros_3d_bb_lab.simulation.gait import Posture, stride_m
 from ros_3d_bb_lab.simulation.motion import SMOOTHING_S, person_motion, robot_motion
 from ros_3d_bb_lab.simulation.scenario import Follow, Move, Person, Robot
 
@@ -132,7 +132,7 @@ def test_the_robot_turns_before_it_drives():
     turning, driving = motion.at(1), motion.at(np.pi + 2)
     assert turning.heading_rad == pytest.approx(.5) and speed_of(turning) == 0
     np.testing.assert_allclose(driving.velocity_mps, (0, .5), atol=1e-9)
-    assert driving.heading_rad == pytest.approx(np.pi / 2) and driving.posture == (0, 0, 0)
+    assert driving.heading_rad == pytest.approx(np.pi / 2) and driving.posture == Posture()
 
 
 def test_a_following_robot_faces_the_person_and_keeps_its_distance_and_limits():

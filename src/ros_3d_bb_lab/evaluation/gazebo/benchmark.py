@@ -9,10 +9,12 @@ import tempfile
 
 import numpy as np
 import rosbag
+from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.bags.bag_reader import BagReader, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, STATIC_TOPIC, TF_TOPIC
-from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, stamp_of, tracks_from_msg
+from ros_3d_bb.conversions.perception_msgs import NEWEST, TRACKS_TOPIC, stamp_of, tracks_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE, CameraView
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
@@ -25,6 +27,7 @@ from ros_3d_bb_lab.simulation.scenario import read_scenario
 
 WORLD_FRAME = 'odom'  # of a robot that starts at the origin of the world and stands
 STATES_TOPIC = 'gazebo/model_states'
+RECORDED = COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS[0], TF_TOPIC, STATIC_TOPIC, STATES_TOPIC
 START_S = 4.0  # simulated time at which people begin to move
 SETTLING_S = 0.5  # Gazebo places people at the origin for a moment when they start
 TIMEOUT_S = 600.0
@@ -50,9 +53,8 @@ def record_scene(scenario, folder):
             ['ros_3d_bb', 'gazebo.launch'] + ['%s:=%s' % item for item in arguments.items()], port, log):
         _wait_for_robot(environment)
         duration_s = START_S + scenario.duration + PREDICTION_S
-        topics = ['/' + name for name in (COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS[0], TF_TOPIC, STATIC_TOPIC, STATES_TOPIC)]
         recording = subprocess.Popen(['rosbag', 'record', '--lz4', '-b', '0', '--duration=%g' % duration_s, '-O', bag]
-                                     + topics, env=environment, stdout=log, stderr=log)
+                                     + ['/' + name for name in RECORDED], env=environment, stdout=log, stderr=log)
         subprocess.check_call(['rosservice', 'call', 'gazebo/unpause_physics'], env=environment, stdout=log)
         recording.wait(TIMEOUT_S)
     if not os.path.exists(bag):
@@ -75,29 +77,29 @@ def run_pipeline(bag, target, tracker, detector):
         with open(path, 'w') as stream:
             json.dump(params, stream)
         command += ['--%s-params' % node, path]
-    subprocess.check_call(command)
+    subprocess.check_call(command, stdout=subprocess.DEVNULL)
 
 
 def moments_in(scene_bag, tracks_bag, start_ns):
     """Moment (`clear_mot`) of each image from `start_ns` on. Only visible people are truth."""
-    transforms, states, images = BagTransforms(), [], []
+    transforms = BagTransforms()
+    with BagReader(scene_bag) as reader:
+        for raw in reader.messages(['/' + TF_TOPIC]):
+            transforms.add(message_in(raw, TFMessage))
+        for raw in reader.messages(['/' + STATIC_TOPIC]):
+            transforms.add_static(message_in(raw, TFMessage))
     with rosbag.Bag(scene_bag) as bag:
-        for topic, message, time in bag.read_messages(
-                ['/' + name for name in (TF_TOPIC, STATIC_TOPIC, STATES_TOPIC, INFO_TOPICS[0])]):
-            if topic == '/' + STATES_TOPIC:
-                states.append((time.to_sec(), message))
-            elif topic == '/' + INFO_TOPICS[0]:
-                images.append(message.header)
-            else:
-                (transforms.add if topic == '/' + TF_TOPIC else transforms.add_static)(message)
+        truth = PeopleTruth((time.to_sec(), message)
+                            for _topic, message, time in bag.read_messages(['/' + STATES_TOPIC]))
+        images = [message.header for _topic, message, _time in bag.read_messages(['/' + INFO_TOPICS[0]])]
     with rosbag.Bag(tracks_bag) as bag:
         tracks = {stamp_of(message): tracks_from_msg(message)
                   for _topic, message, _time in bag.read_messages(['/' + TRACKS_TOPIC])}
-    truth, moments = PeopleTruth(states), []
+    moments = []
+    view = CameraView(transforms.lookup(WORLD_FRAME, images[0].frame_id, NEWEST))  # the robot stands
     for header in images:
         stamp_ns = header.stamp.to_nsec()
         if start_ns <= stamp_ns:
-            view = CameraView(transforms.lookup(WORLD_FRAME, header.frame_id, stamp_ns))
             people = [person for person in truth.tracks_at(stamp_ns, view) if person.status == VISIBLE]
             moments.append(Moment(stamp_ns, people, tracks.get(stamp_ns, [])))
     return moments
