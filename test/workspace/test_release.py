@@ -11,8 +11,8 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 KINDS = ('buildtool_depends', 'build_depends', 'build_export_depends', 'exec_depends', 'test_depends')
 # Python of each release, as for rosdep, bloom and catkin; Debian's own ROS has no name before it is sourced.
 RELEASES = {'melodic': '2', 'noetic': '3', '': '3'}
-# rosdep keys and their packages on Ubuntu, (bionic, focal). Sources: python.yaml and base.yaml of ros/rosdistro, commits
-# 662921b and 8f8e55c.
+# rosdep keys and their packages on Ubuntu, (bionic, focal). Sources: python.yaml and base.yaml of ros/rosdistro,
+# commits 662921b and 8f8e55c.
 UBUNTU = {
     'python3-catkin-pkg-modules': ('python3-catkin-pkg-modules',) * 2,  # of packages.ros.org, the others of Ubuntu
     'python3-empy': ('python3-empy',) * 2,
