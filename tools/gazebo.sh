@@ -40,7 +40,8 @@ stand_in_sources() {
     'catkin_package()' > geographic_msgs/CMakeLists.txt
   # Of ROS 1, whose $(find PACKAGE) searches as rospack does.
   "$venv/bin/pip" install --quiet --disable-pip-version-check --no-deps --target xacro/python xacro==1.13.3
-  printf '%s\n' '#!/bin/sh' 'PYTHONPATH=$(dirname "$0")/python:$PYTHONPATH exec "$(dirname "$0")/python/bin/xacro" "$@"' > xacro/xacro
+  printf '%s\n' '#!/bin/sh' 'here=$(dirname "$0")' \
+    'PYTHONPATH=$here/python:$PYTHONPATH exec "$here/python/bin/xacro" "$@"' > xacro/xacro
   chmod +x xacro/xacro
   # With cmd_vel as the only source of velocities, the multiplexer is a relay.
   printf '%s\n' '#!/bin/sh' 'exec /usr/lib/topic_tools/relay cmd_vel cmd_vel_out "$@"' > twist_mux/twist_mux
@@ -52,7 +53,7 @@ make_gazebo() {  # FOLDER
   cd "$1/src"
   for archive in "${gazebo_sources[@]}"; do tar -xf "$archive"; done
   stand_in_sources
-  rm -r gazebo_ros_pkgs/gazebo_ros_pkgs jackal_simulator/jackal_simulator realsense_gazebo_plugin ros_control/ros_control \
+  rm -rf gazebo_ros_pkgs/gazebo_ros_pkgs jackal_simulator/jackal_simulator realsense_gazebo_plugin ros_control/ros_control \
     ros_control/{combined_robot_hw,combined_robot_hw_tests,controller_manager_tests,rqt_controller_manager} \
     ros_controllers/{forward_command_controller,ros_controllers,velocity_controllers}
   sed -i 's/ros::Time::MIN/ros::Time(0, 1)/' ros_controllers/*/src/*.cpp  # the same value; Debian 11 lacks the name
@@ -71,7 +72,10 @@ has_gazebo() { [ -d /opt/ros ] || is_debian_11; }
 # Builds what is needed for gazebo.launch, and sets up its environment.
 build_gazebo() {
   local archives=''
-  if [ -d "${ROS_3D_BB_DATA:-}/gazebo" ] && [ ! -d /opt/ros ]; then archives=yes apt_packages+=("${gazebo_packages[@]}"); fi
+  if [ -d "${ROS_3D_BB_DATA:-}/gazebo" ] && [ ! -d /opt/ros ]; then
+    archives=yes
+    apt_packages+=("${gazebo_packages[@]}")
+  fi
   build
   set +u
   [ -z "$archives" ] || { build_gazebo_archives && . "$gazebo/devel/setup.bash" --extend; }
@@ -87,15 +91,7 @@ build_gazebo_archives() {
   local hash
   hash=$({ cat "${gazebo_sources[@]}"; declare -f make_gazebo stand_in_sources; declare -p gazebo_targets; } | sha1sum)
   gazebo=$cache/gazebo-${hash:0:8}
-  mkdir -p "$gazebo"
-  (
-    flock 9
-    [ -f "$gazebo/built" ] && exit
-    say "building the packages for Gazebo in $gazebo, once"
-    rm -rf "$gazebo"/{src,build,devel}
-    if make_gazebo "$gazebo" > "$gazebo/build.log" 2>&1; then touch "$gazebo/built"
-    else tail -n 50 "$gazebo/build.log"; say "the packages for Gazebo were not built; their log is above"; exit 1; fi
-  ) 9> "$gazebo/lock" >&2
+  build_once 'packages for Gazebo' "$gazebo" make_gazebo
 }
 
 # A screen that is not shown, which cameras of Gazebo need as well.

@@ -38,13 +38,18 @@ build_planners() {
   planner_sources=("$archives"/{navigation,navigation_layers,people,costmap_converter,vision_msgs}_[0-9a-f]*.tar.xz)
   local hash; hash=$(cat "${planner_sources[@]}" "$archives/patches.diff" | sha1sum | cut -c1-8)
   planners=$cache/planners-$hash
-  mkdir -p "$planners"
+  build_once planners "$planners" make_planners
+}
+
+# Builds sources in a folder, unless they were built there before.
+build_once() {  # NAME FOLDER FUNCTION
+  mkdir -p "$2"
   (
     flock 9
-    [ -f "$planners/built" ] && exit
-    say "building planners in $planners, once"
-    rm -rf "$planners"/{src,build,devel}
-    if make_planners "$planners" > "$planners/build.log" 2>&1; then touch "$planners/built"
-    else tail -n 50 "$planners/build.log"; say "the planners were not built; their log is above"; exit 1; fi
-  ) 9> "$planners/lock" >&2
+    [ -f "$2/built" ] && exit
+    say "building $1 in $2, once"
+    rm -rf "$2"/{src,build,devel}
+    if "$3" "$2" > "$2/build.log" 2>&1; then touch "$2/built"
+    else tail -n 50 "$2/build.log"; say "the $1 were not built; their log is above"; exit 1; fi
+  ) 9> "$2/lock" >&2
 }
