@@ -10,8 +10,8 @@ from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
-from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path
-from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL
+from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
 SCATTER = 0.015  # standard deviation of the edges of detected boxes, relative to the box
@@ -105,60 +105,6 @@ def test_a_second_box_of_a_person_is_no_person_on_the_wall(height_m, ahead_m, wi
     second_px = x1 - more_px, y1, x2 + more_px, y1 + int(lower_edge * (y2 - y1))
     found = [box for box in level_boxes(simulator, [tuple(first_px), second_px]) if box is not None]
     assert found and all(abs(box.center_m[2] - depths_m(simulator)[0]) < 0.3 for box in found)
-
-
-@pytest.mark.parametrize('scene,number,rects_px,numbers', [
-    ('demo', 152, [(99, 54, 174, 276), (342, 0, 495, 288), (311, 35, 402, 274), (312, 45, 383, 174)], [2, 0, 3]),
-    ('crowd_of_12', 200, [(42, 157, 130, 373), (0, 80, 59, 476), (12, 96, 102, 459)], [2, 0])])
-def test_second_boxes_of_yolov5_are_no_people(scene, number, rects_px, numbers):
-    """The last box of each image, with a low score, shows the upper body of a person again, or parts of two."""
-    simulator = Simulator(read_scenario(scenario_path(scene)))
-    frame = simulator.frame(number)
-    boxes = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, simulator.camera, estimator_named('foreground'))
-    people_m = transform_points(np.linalg.inv(frame.poses.map_from_camera),
-                                [person.position_m for person in frame.people])
-    assert boxes[-1] is None
-    for box, person in zip(boxes[:-1], numbers):
-        assert box.center_m[[0, 2]] == pytest.approx(people_m[person][[0, 2]], abs=0.15)
-
-
-@pytest.mark.parametrize('ahead_m,nearest_m', [(0.4, 0.7), (0.6, 0.7), (0.4, 0.5)])
-def test_a_person_too_near_for_the_depth_camera_is_not_on_the_wall(ahead_m, nearest_m):
-    simulator = simulator_of([{'start': [ahead_m, 0.0], 'facing': 3.14, 'height': 1.75}], 1.0, wall_m=4.0)
-    frame = simulator.frame(0)
-    depth_mm = np.where(frame.depth_mm < 1000 * nearest_m, 0, frame.depth_mm)
-    assert estimate_boxes(DepthImage(depth_mm, 0.001), [frame.people[0].box_px], simulator.camera,
-                          estimator_named('foreground')) == [None]
-
-
-@pytest.mark.parametrize('border_px,truncated', [((75, 75), True), ((75, 0), False), ((75, 60), False)])
-def test_a_person_at_the_border_of_a_smaller_field_of_view_of_depth(border_px, truncated):
-    left, right = border_px
-    simulator = simulator_of([{'start': [2.8, 1.0], 'facing': 3.1, 'height': 1.75}], 1.0)
-    frame = simulator.frame(0)
-    depth_mm = frame.depth_mm.copy()
-    depth_mm[:, :left] = depth_mm[:, 640 - right:] = 0
-    box, = estimate_boxes(DepthImage(depth_mm, 0.001), [frame.people[0].box_px], simulator.camera,
-                          estimator_named('foreground'))
-    assert box.truncated_edges[0] == truncated and abs(box.center_m[2] - 2.8) < 0.1
-    assert (abs(box.center_m[0] + 1.0) < 0.05) == truncated
-
-
-@pytest.mark.parametrize('facing', [3.14, 2.2])
-@pytest.mark.parametrize('posture,tall_m', [
-    (dict(lift_l=1.57), 1.7), (dict(lift_r=1.57), 1.7), (dict(lift_l=1.57, lift_r=1.57), 1.7), (dict(lift_l=2.9), 1.7),
-    (dict(lift_l=2.9, lift_r=2.9), 1.7), (dict(reach=1.4), 1.7), (dict(bend=0.7), 1.6)],
-    ids=['left arm out', 'right arm out', 'both out', 'left arm up', 'both up', 'reaching', 'bent'])
-def test_limbs_do_not_move_the_axis_or_make_people_taller(posture, tall_m, facing):
-    simulator = simulator_of([{'start': [4.2, 0.2], 'facing': facing, 'height': 1.7}], 0.9)
-    state = simulator.state_at(0)
-    people = [person._replace(posture=person.posture._replace(**posture)) for person in state.people]
-    frame = simulator.frame(0, state._replace(people=people))
-    box, = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [frame.people[0].box_px], simulator.camera,
-                          estimator_named('foreground'))
-    truth_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), frame.people[0].position_m)
-    assert box.center_m[[0, 2]] == pytest.approx(truth_m[[0, 2]], abs=0.08)
-    assert box.size_m[1] == pytest.approx(tall_m, abs=0.08)
 
 
 @pytest.mark.parametrize('height_m,adult_m,gap_m', [

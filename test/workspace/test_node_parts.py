@@ -13,12 +13,9 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.detection.adaptive_size import AdaptiveSize
-from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
 from ros_3d_bb.nodes.bbox3d_node import SampleImages
 from ros_3d_bb.nodes.common import master, startup, subscribers
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
-from ros_3d_bb.nodes.yolov5_node import Yolov5Node
 from support.ros import wait_until
 
 
@@ -33,17 +30,6 @@ def test_a_node_that_cannot_start_names_the_launch_argument(module, place):
         startup.run_node('bbox3d_node', node)
     text, *values = mocked['logfatal'].call_args[0]
     assert text % tuple(values) == '/bbox3d_node cannot start: parameter ~stride is 0' + place
-
-
-def test_a_rejected_change_of_the_detector_changes_nothing():
-    """The adaptive size uses the parameters again."""
-    network = mock.Mock(names=['person', 'car'], stride=32, input_hw=None, description='')
-    node, params = Yolov5Node.__new__(Yolov5Node), DetectionParams(image_size=0)
-    node._detector, node._params, node._sizes = NetworkDetector(network, params), params, AdaptiveSize()
-    detector = node._detector
-    with pytest.raises(ValueError, match='persn'):
-        node._reconfigure(None, params._replace(classes=['persn'], image_size=320), None)
-    assert node._params is params and node._detector is detector
 
 
 def test_a_request_to_a_master_that_hangs_ends(monkeypatch):

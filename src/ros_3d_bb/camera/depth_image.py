@@ -5,8 +5,6 @@ import numpy as np
 
 FARTHEST_M = 100.0  # beyond the range of any depth camera
 WIDEST_BORDER, BORDER_STEP = 0.05, 12  # of images without depth: share of the image; pixels between samples
-# Both borders of a depth camera with a smaller field of view than colour are wider, and alike. Azure Kinect: 0.12
-WIDEST_BORDERS, ALIKE = 0.15, 0.02
 
 
 class DepthImage(NamedTuple):
@@ -36,8 +34,8 @@ class DepthImage(NamedTuple):
     def measured_area(self):
         """Rectangle (x1, y1, x2, y2) of the image without its black border, where registration leaves no depth.
 
-        A border of more than `WIDEST_BORDER` of the width or height is not due to registration, unless the opposite one
-        is as wide: its background is far away.
+        A border of more than `WIDEST_BORDER` of the width or height is not due to registration: its background is far
+        away.
         """
         height, width = self.values.shape
         left, right = _black_ends((self.values[::BORDER_STEP] > 0).any(axis=0))
@@ -47,6 +45,5 @@ class DepthImage(NamedTuple):
 
 def _black_ends(measured):
     """Number of lines without depth at both ends, given which of the lines (n,) have depth."""
-    ends, lines = (int(measured.argmax()), int(measured[::-1].argmax())), len(measured)
-    are_alike = max(ends) <= WIDEST_BORDERS * lines and max(ends) - min(ends) <= ALIKE * lines
-    return [count if count <= WIDEST_BORDER * lines or are_alike else 0 for count in ends]
+    ends = int(measured.argmax()), int(measured[::-1].argmax())
+    return [count if count <= WIDEST_BORDER * len(measured) else 0 for count in ends]

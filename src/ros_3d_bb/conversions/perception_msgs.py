@@ -257,7 +257,7 @@ def usable_boxes3d(message):
 
 def _box3d_fault(box, position_covariance):
     """Describe what is wrong with a Box3D from a message, '' if it can be tracked."""
-    if not box.is_plausible():
+    if not box.is_plausible:
         return ('centre (%g, %g, %g) and size (%g, %g); finite numbers and sizes of more than 0 and less than %g m '
                 'expected' % (tuple(box.center_m) + tuple(box.size_m[:2]) + (LARGEST_M,)))
     if not _is_covariance(position_covariance):

@@ -2,7 +2,6 @@
 import re
 
 PERSON = 'person'  # class of objects whose class is not given
-PEOPLE = PERSON, 'people', 'pedestrian', 'human'  # names of this class in data sets, in any case
 # Classes of the COCO data set by number, as YOLO and most other detectors name them (80 of the 91 of Lin et al., 2014).
 COCO = (
     'person,bicycle,car,motorcycle,airplane,bus,train,truck,boat,traffic light,fire hydrant,stop sign,parking meter,'
@@ -18,11 +17,6 @@ UNUSABLE = re.compile(r'[^ -~]|[;,]')  # separators of names in an array of 2D b
 def usable_label(name):
     """Replace the characters of a class name that messages cannot carry by underscores, and shorten a long name."""
     return UNUSABLE.sub('_', str(name).strip())[:MAX_LENGTH] or '_'
-
-
-def standard_label(name):
-    """Replace the names of the class of people in other data sets, such as Person or pedestrian."""
-    return PERSON if name.lower() in PEOPLE else name
 
 
 def described(label, text):

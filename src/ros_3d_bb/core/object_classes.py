@@ -12,7 +12,6 @@ from ros_3d_bb.core.yaml_loader import load_yaml
 
 MAX_CLASSES, MAX_IN_GROUP = 200, 8
 LARGEST_FACTOR = 100.0
-TALLEST_PERSON, LARGEST_OBJECT = 1.5, 4.0  # with raised arms, relative to the usual height; times its usual extents
 
 
 class ObjectClass(NamedTuple):
@@ -31,13 +30,6 @@ class ObjectClass(NamedTuple):
     axis: Optional[float] = None
     acceleration: float = 1.0
     initial_speed: float = 1.0
-
-    @property
-    def largest_m(self):
-        """Upper bound of width and height as seen, metres."""
-        if self.group == PERSON:
-            return TALLEST_PERSON * self.height
-        return min(LARGEST_OBJECT * max(self.width, self.height, self.length) or LARGEST_M, LARGEST_M)
 
     def axis_behind(self, seen_m):
         """Distance from the visible surface to the vertical axis of an object that appears `seen_m` wide.

@@ -54,11 +54,12 @@ class Box3D(NamedTuple):
         """Whether the image border truncates the object."""
         return any(self.truncated_edges)
 
-    def is_plausible(self, largest_m=LARGEST_M):
-        """Whether the centre is nearer than `FARTHEST_M`, and width and height are between 0 and `largest_m`."""
+    @property
+    def is_plausible(self):
+        """Whether the centre is nearer than `FARTHEST_M`, and width and height are between 0 and `LARGEST_M`."""
         width_m, height_m, _width_m = self.size_m.tolist()
         return (all([abs(along_m) < FARTHEST_M for along_m in self.center_m.tolist()])
-                and 0 < width_m < largest_m and 0 < height_m < largest_m)
+                and 0 < width_m < LARGEST_M and 0 < height_m < LARGEST_M)
 
 
 def truncated_edges(rect_px, area_px):

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.core.labels import PERSON, standard_label
+from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.estimation.box3d import LEVEL, Box3D, ImageGeometry, truncated_edges, without_distortion
 from ros_3d_bb.estimation.depth_layers import BODY_HALF_DEPTH_MM
@@ -74,7 +74,7 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_f
     camera : camera_model.Camera
     estimator : Estimator
     implausible : list, optional
-        Estimates that are not plausible, or larger than their class can be, are appended.
+        Estimates that are not plausible (see `Box3D.is_plausible`) are appended.
     level_from_camera : numpy.ndarray, (3, 3), optional
         Rotation to the level frame, see `level_rotation`. By default the camera is held level.
     labels : sequence of str, optional
@@ -87,17 +87,15 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_f
     """
     if len(rects_px) == 0:  # most images show no people
         return []
-    labels = list(map(standard_label, labels or [PERSON] * len(rects_px)))
+    labels = labels or [PERSON] * len(rects_px)
     geometry = ImageGeometry(camera, depth.measured_area(), level_from_camera)
-    kinds = list(map(estimator.classes.of, labels))
-    boxes = estimator.estimate(depth, rects_px, geometry, kinds)
+    boxes = estimator.estimate(depth, rects_px, geometry, list(map(estimator.classes.of, labels)))
     for number, box in enumerate(boxes):
         if box is None:
             continue
         box = box._replace(label=labels[number])
-        is_plausible = box.is_plausible(kinds[number].largest_m)
-        boxes[number] = box if is_plausible else None
-        if implausible is not None and not is_plausible:
+        boxes[number] = box if box.is_plausible else None
+        if implausible is not None and not box.is_plausible:
             implausible.append(box)
     return boxes
 

@@ -11,8 +11,6 @@ from ros_3d_bb.estimation.depth_layers import (FARTHEST_LAYER_M, UNKNOWN_MM, Sor
 GRID_ROWS, GRID_COLUMNS = 48, 32
 # Chosen so that no person behind the dog of config/scenarios/objects.yaml is taken for the dog.
 UPPER_SHARE, LOWER_WEIGHT = 0.55, 0.35
-TORSO_SHARE = 0.6  # minimum number of samples in a column of the torso, relative to the column with most
-HEAD_SHARE = 0.4  # minimum width of a head relative to the torso
 MIDDLE_M = 32.0  # of the lateral positions that fit into 16 bits of millimetres
 LOOKS_DOWN, FEET_M = np.sin(np.radians(10)), 0.3  # a camera with more tilt sees the floor beside the feet, this high
 
@@ -103,15 +101,6 @@ class RectSamples(object):
         self.measured = np.count_nonzero(known, axis=1)
         self._weights = _weights(columns, rects_px, self.counts[:, 0])
 
-    def measured_weights(self, numbers):
-        """Share (k,) of the weight of all samples of rectangles that those with depth have; 0.5 if they are half of the
-        samples, but more or less where depth is measured in the middle, or at the sides.
-        """
-        rows, columns = self.counts[numbers].T[..., None, None]
-        in_grid = (np.arange(GRID_ROWS)[:, None] < rows) & (np.arange(GRID_COLUMNS) < columns)
-        weights = self._weights[numbers] * in_grid.reshape(len(numbers), -1)
-        return (weights * (self.ahead_mm[numbers] < UNKNOWN_MM)).sum(axis=1) / weights.sum(axis=1)
-
     def layers(self, numbers, ahead_mm=None, ordered=None):
         """Distance (k,) of the nearest dominant layer in rectangles, whole millimetres; by default in all samples that
         are not masked.
@@ -127,19 +116,6 @@ class RectSamples(object):
             on_body = np.where(above_feet.any(axis=1)[:, None], above_feet, on_body)
         across_mm = np.where(on_body, self._across_mm[numbers], np.uint16(UNKNOWN_MM))
         return np.array(edges(SortedDistances(across_mm))) / 1000 - MIDDLE_M
-
-    def torso_edges(self, numbers, on_body, bottom_m):
-        """As `edges`, of the columns that show much of the body, and not only an arm."""
-        return self.edges(numbers, on_body & np.tile(_torso_columns(on_body), GRID_ROWS), bottom_m)
-
-    def arms_above_head(self, numbers, on_body):
-        """Share (k,) of the rows of rectangles that are above the torso and the head, and show arms."""
-        in_torso = _torso_columns(on_body)
-        on_body = on_body.reshape(-1, GRID_ROWS, GRID_COLUMNS)
-        widths = np.count_nonzero(on_body & in_torso[:, None], axis=2)
-        head = np.argmax(widths >= HEAD_SHARE * np.count_nonzero(in_torso, axis=1)[:, None], axis=1)
-        is_arm = np.argmax(on_body.any(axis=2), axis=1) < head
-        return np.where(is_arm, head, 0) / self.counts[numbers, 0]
 
     def mask(self, samples_mm, number, occluder, limit_mm):
         """Mask the samples of a rectangle that are in the rectangle of an occluder and not farther than `limit_mm`.
@@ -192,12 +168,6 @@ def _weights(columns, rects_px, row_counts):
     across = np.exp(-0.5 * ((columns - (left + right) / 2.0) / ((right - left) / 4.0)) ** 2)
     down = np.where(np.arange(GRID_ROWS) < UPPER_SHARE * row_counts[:, None], 1, LOWER_WEIGHT)
     return (across[:, None] * down[..., None]).reshape(len(columns), -1)
-
-
-def _torso_columns(on_body):
-    """Whether columns of the grid (k, GRID_COLUMNS) show much of bodies with the given samples (k, samples)."""
-    counts = np.count_nonzero(on_body.reshape(-1, GRID_ROWS, GRID_COLUMNS), axis=1)
-    return counts >= TORSO_SHARE * counts.max(axis=1)[:, None]
 
 
 def _rank(pixels, limit):

@@ -4,21 +4,15 @@ Depth layers are layers of z in the level frame, because people stand upright th
 """
 import numpy as np
 
-from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.estimation.box3d import (Box3D, complete_truncated_extent, slopes_down, truncated_edges,
                                         without_distortion)
-from ros_3d_bb.estimation.depth_layers import BODY_HALF_DEPTH_MM, UNKNOWN_MM, SortedDistances
+from ros_3d_bb.estimation.depth_layers import BODY_HALF_DEPTH_MM, SortedDistances
 from ros_3d_bb.estimation.depth_samples import GRID_COLUMNS, GRID_ROWS, RectSamples
 from ros_3d_bb.estimation.overlaps import Overlaps
 
 LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate; a lidar gives twice as many
-# Where a person is too near for the depth camera, depth is known beside the person only: in less than the first share
-# of the samples, and the weight of these is less than the second share of that of as many samples anywhere.
-HARDLY_MEASURED, MEASURED_BESIDE = 0.5, 0.65
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the person's layer for an estimate
 LEAST_WIDTH_M = 0.05
-TALL, LEAST_ARMS_M = 1.12, 0.15  # minimum height of a person with raised arms; that of the arms above the head
-WIDE = 1.05  # minimum width of a person whose torso is narrower, relative to the usual width
 FILLED = 0.4  # minimum share of both sides of a rectangle that background behind an object fills
 
 
@@ -28,9 +22,8 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
 
     Background beside and between the limbs may fill most of a rectangle, but it is farther away. Flying pixels are too
     sparse to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges
-    of the layer, or of the torso of a person who is wide, and behind its mean depth by the distance of its class. Arms
-    above the head of a tall person are not part of the height. If the image border truncates the object, it is
-    completed to the usual size of its class. All of this is done in the level frame.
+    of the layer, and behind its mean depth by the distance of its class. If the image border truncates the object, it
+    is completed to the usual size of its class. All of this is done in the level frame.
 
     In the rectangles of nearer objects with plausible boxes, pixels that are not behind them are masked. Rectangles are
     therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
@@ -47,9 +40,9 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     Returns
     -------
     list of Box3D or None
-        None if less than `LEAST_MEASURED` of the samples have a valid depth and a viewing ray, or these are beside an
-        object without depth, if the layer contains less than `LEAST_SUPPORT` of those with depth, if the rectangle
-        cannot be undistorted, or if it is a second one of the same object.
+        None if less than `LEAST_MEASURED` of the samples have a valid depth and a viewing ray, if the layer contains
+        less than `LEAST_SUPPORT` of those with depth, if the rectangle cannot be undistorted, or if it is a second one
+        of the same object.
     """
     image = _Image(depth, rects_px, geometry, kinds)
     boxes = [None] * len(rects_px)
@@ -69,17 +62,9 @@ class _Image(object):
         flat_px = without_distortion(rects_px, geometry.camera)
         self._slopes_down = slopes_down(flat_px, geometry)
         self._truncated = [truncated_edges(rect_px, geometry.area_px) for rect_px in self._rects_px]
-        # People who are wider, or taller, may have arms that are held out, or up
-        self._wide_m, self._tall_m = np.array([(WIDE * kind.width, TALL * kind.height) if kind.group == PERSON
-                                               else (np.inf, np.inf) for kind in kinds]).T
         self._samples = samples = RectSamples(depth, rects_px, geometry)
-        count = samples.counts.prod(axis=1)
-        usable = samples.measured >= np.maximum(LEAST_MEASURED * count, 1)
+        usable = samples.measured >= np.maximum(LEAST_MEASURED * samples.counts.prod(axis=1), 1)
         usable &= np.isfinite(flat_px).all(axis=1)
-        sparse = np.flatnonzero(usable & (samples.measured < HARDLY_MEASURED * count))
-        if sparse.size:
-            beside = samples.measured_weights(sparse) < MEASURED_BESIDE * samples.measured[sparse] / count[sparse]
-            usable[sparse[beside]] = False
         self.overlaps = Overlaps(samples, usable, geometry.camera, kinds, self._truncated)
 
     def estimates(self, group):
@@ -96,49 +81,29 @@ class _Image(object):
         top_m, bottom_m = layers_m * self._slopes_down[:, group]
         on_body = (ahead_mm >= nearest_mm) & (ahead_mm <= farthest_mm)
         left_m, right_m = self._samples.edges(group, on_body, bottom_m)
-        middle_m = self._middles(group, on_body, left_m, right_m, bottom_m)
-        self._lower_to_head(group, on_body, top_m, bottom_m)
-        valid = (supports >= LEAST_SUPPORT) & ~(self.overlaps.repeats(group) & self._fills_sides(group, on_body))
+        valid = (supports >= LEAST_SUPPORT) & ~(self.overlaps.repeats[group] & self._fills_sides(group, on_body))
         values = zip(valid.tolist(), group.tolist(), supports.tolist(), layers_m.tolist(), left_m.tolist(),
-                     right_m.tolist(), middle_m.tolist(), top_m.tolist(), bottom_m.tolist())
+                     right_m.tolist(), top_m.tolist(), bottom_m.tolist())
         return [(number, self._box(number, support, *extents_m)) for is_valid, number, support, *extents_m in values
                 if is_valid]
 
-    def _middles(self, group, on_body, left_m, right_m, bottom_m):
-        """Lateral positions (k,) of the axes of bodies: of the torso if they are wide, by an arm that is held out."""
-        middle_m = (left_m + right_m) / 2
-        is_wide = right_m - left_m > self._wide_m[group]
-        if is_wide.any():
-            torso_m = self._samples.torso_edges(group[is_wide], on_body[is_wide], bottom_m[is_wide])
-            middle_m[is_wide] = torso_m.mean(axis=0)
-        return middle_m
-
-    def _lower_to_head(self, group, on_body, top_m, bottom_m):
-        """Lower the upper edges (k,) of people who are tall by raised arms only."""
-        is_tall = bottom_m - top_m > self._tall_m[group]
-        if is_tall.any():
-            share = self._samples.arms_above_head(group[is_tall], on_body[is_tall])
-            arms_m = share * (bottom_m - top_m)[is_tall]
-            top_m[is_tall] += np.where(arms_m > LEAST_ARMS_M, arms_m, 0)
-
     def _fills_sides(self, group, on_body):
-        """Whether the samples (k, samples) `on_body`, or masked ones, fill at least `FILLED` of both sides."""
-        beside = ((self._samples.ahead_mm[group] < UNKNOWN_MM) & ~on_body).reshape(-1, GRID_ROWS, GRID_COLUMNS)
+        """Whether the samples (k, samples) `on_body` fill at least `FILLED` of both sides of rectangles."""
+        on_body, members = on_body.reshape(-1, GRID_ROWS, GRID_COLUMNS), np.arange(len(group))
         rows, columns = self._samples.counts[group].T
-        return np.all([np.count_nonzero(beside[np.arange(len(group)), :, column], axis=1) <= (1 - FILLED) * rows
+        return np.all([np.count_nonzero(on_body[members, :, column], axis=1) >= FILLED * rows
                        for column in (0, columns - 1)], axis=0)
 
-    def _box(self, number, support, layer_m, left_m, right_m, middle_m, top_m, bottom_m):
+    def _box(self, number, support, layer_m, left_m, right_m, top_m, bottom_m):
         rect_px, kind = self._rects_px[number], self._kinds[number]
         cut_left, cut_top, cut_right, cut_bottom = cut = self._truncated[number]
-        middle_m -= (left_m + right_m) / 2
         left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, kind.width)
         top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, kind.height)
-        surface_m = np.array([(left_m + right_m) / 2 + middle_m, (top_m + bottom_m) / 2, layer_m])
+        surface_m = np.array([(left_m + right_m) / 2, (top_m + bottom_m) / 2, layer_m])
         width_m = max(right_m - left_m, LEAST_WIDTH_M)
         behind_m = kind.axis_behind(width_m)
         center_m = self._camera_from_level.dot(surface_m * (1 + behind_m / layer_m))
         box = Box3D(center_m, np.array([width_m, bottom_m - top_m, width_m]), rect_px, support, cut)
-        if box.is_plausible(kind.largest_m):
+        if box.is_plausible:
             self.overlaps.mask_behind(number, int(1000 * (layer_m + behind_m)) + BODY_HALF_DEPTH_MM)
         return box

@@ -50,9 +50,7 @@ class Overlaps(object):
         self._is_beside = np.zeros(self._shared_px.shape, bool)
         self._nearer = np.zeros(self._shared_px.shape, bool)  # whether the second of two rectangles is nearer
         self._in_front = np.zeros(len(rects_px), int)  # number of pending rectangles that are nearer
-        # Whether the first of two rectangles may show the object of the second, larger one again
-        self._repeats = np.zeros(self._shared_px.shape, bool)
-        self._has_box = np.zeros(len(rects_px), bool)
+        self.repeats = np.zeros(len(rects_px), bool)  # may be of the object of a larger rectangle
 
     def take_foremost(self):
         """Take the pending rectangles that no pending rectangle of a nearer object overlaps. Returns their numbers.
@@ -126,15 +124,10 @@ class Overlaps(object):
         nearer = np.where(np.abs(lower_px) > self._clearly_lower_px, lower_px > 0, nearer)
         nearer = overlap & np.where(tied, np.where(alike, nearer, unlike_nearer), farther_m > 0)
         self._nearer[pairs] = nearer
-        self._repeats[pairs] |= tied & alike & nearer & (shared_px >= CONTAINED * area_px)
-
-    def repeats(self, numbers):
-        """Whether rectangles (k,) may show the object of a larger one that has a box."""
-        return (self._repeats[numbers] & self._has_box).any(axis=1)
+        self.repeats[numbers] |= (tied & alike & nearer & (shared_px >= CONTAINED * area_px)).any(axis=1)
 
     def mask_behind(self, number, farthest_mm):
         """Mask what is not farther than `farthest_mm` in the pending rectangles that overlap an estimated one."""
-        self._has_box[number] = True
         for other in np.flatnonzero(self.pending & self._overlap[number]).tolist():
             layer_m = self._beside_m[other, number]
             is_farther = layer_m - self._beside_m[number, other] >= SAME_LAYER_M and (

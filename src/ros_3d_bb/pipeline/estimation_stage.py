@@ -13,7 +13,7 @@ from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import (NEWEST, boxes2d_from_msg, camera_from_msg, stamp_if_any,
                                                    stamp_of, time_from)
-from ros_3d_bb.core.labels import PERSON
+from ros_3d_bb.core.limits import LARGEST_M
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param,
                                    parameters)
@@ -26,7 +26,6 @@ from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
 
 UNSTAMPED = '2D boxes without a stamp'  # event, reported once
 TILT_UNKNOWN = 'tilt of the camera unknown'
-UNLISTED = 'classes of unknown size'
 
 
 @parameters()
@@ -153,10 +152,8 @@ class EstimationStage(object):
         for box in _as_received(implausible, turns, camera):
             self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
                               '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
-                              % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2],
-                                                self._classes.of(box.label).largest_m)))
+                              % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
         self._check_scale(boxes3d + implausible, raw.scale_m)
-        self._check_classes(boxes3d)
         counts = {'boxes estimated': len(boxes3d),
                   'boxes without depth': len(estimates) - len(boxes3d) - len(implausible)}
         boxes3d = corrected_boxes(boxes3d, self._error_model, gap_s)
@@ -183,15 +180,8 @@ class EstimationStage(object):
         factor = self._scale_check.factor(boxes3d)
         if factor is not None:
             self._events.warn('depth of a wrong scale', 'people of impossible height: depth must be multiplied by %g; '
-                              'set ~depth_scale: %g (now %g); people are missing, or at wrong positions, until then'
+                              'set ~depth_scale: %g (now %g); positions and sizes are wrong until then'
                               % (factor, factor * scale_m, scale_m))
-
-    def _check_classes(self, boxes3d):
-        """Report classes without a usual size, such as a misspelled one."""
-        unlisted = sorted(set(box.label for box in boxes3d) - set(self._classes.listed))
-        if unlisted and UNLISTED not in self._events.counts:
-            self._events.note(UNLISTED, 'the usual size of the class %s is unknown (~classes_file); its positions are '
-                              'less accurate. People have the class %s' % (', '.join(unlisted), PERSON))
 
     def _up(self, frame_id):
         """Return the unit vector that points up in the optical frame, as a tuple; None if tf does not contain it.

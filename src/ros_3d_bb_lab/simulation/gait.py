@@ -37,15 +37,11 @@ CROUCH = np.radians([105, 130, 25, 20])
 
 
 class Posture(NamedTuple):
-    """Posture while walking, standing or crouching. Angles of limbs are in radians, from those of a standing body."""
+    """Posture while walking, standing or crouching."""
 
     phase: float = 0.0   # of the gait, in cycles since left heel strike
     swing: float = 0.0   # 0 (standing) to 1 (walking)
     crouch: float = 0.0  # 0 to 1
-    lift_l: float = 0.0  # of the arms: sideways, upwards with pi
-    lift_r: float = 0.0
-    reach: float = 0.0   # of both arms: ahead
-    bend: float = 0.0    # of the chest: ahead
 
 
 def bone_transforms(posture):
@@ -81,17 +77,17 @@ def _joint_turns(posture):
     swing, crouch = posture.swing, posture.crouch
     twist = .10 * swing * np.cos(2 * np.pi * posture.phase)
     turns = {'pelvis': rotation(Z, -twist),
-             'chest': rotation(Z, 1.2 * twist).dot(rotation(Y, .03 * swing + CROUCH[3] * crouch + posture.bend)),
+             'chest': rotation(Z, 1.2 * twist).dot(rotation(Y, .03 * swing + CROUCH[3] * crouch)),
              'head': rotation(Z, -.3 * twist).dot(rotation(Y, -.7 * CROUCH[3] * crouch))}
-    for side, offset, sign, lift in (('_l', 0, 1, posture.lift_l), ('_r', .5, -1, posture.lift_r)):
+    for side, offset, sign in (('_l', 0, 1), ('_r', .5, -1)):
         phase = (posture.phase + offset) % 1
         hip, knee, ankle = (swing * (1 - crouch) * np.interp(phase, CYCLE, curve) + crouch * bend
                             for curve, bend in zip((HIP, KNEE, ANKLE), CROUCH))
         turns['thigh' + side] = rotation(Y, -hip).dot(rotation(X, -.03 * sign))
         turns['shin' + side] = rotation(Y, knee)
         turns['foot' + side] = rotation(Y, -ankle)
-        arm = ARM_SWING * swing * np.cos(2 * np.pi * phase) - .5 * crouch - posture.reach
-        turns['arm' + side] = rotation(Y, arm).dot(rotation(X, (.03 + lift) * sign))
+        arm = ARM_SWING * swing * np.cos(2 * np.pi * phase) - .5 * crouch
+        turns['arm' + side] = rotation(Y, arm).dot(rotation(X, .03 * sign))
         elbow = ELBOW * (1 + swing * max(0, np.sin(2 * np.pi * phase)))
         turns['forearm' + side] = rotation(Y, -elbow - .8 * crouch)
     return turns
