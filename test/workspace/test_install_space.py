@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from ros_3d_bb_lab.evaluation.launching import free_port
-from support.launching import RS_CAMERA_ARGUMENTS, stand_in_launch_file, write
+from support.launching import GAZEBO_ARGUMENTS, RS_CAMERA_ARGUMENTS, stand_in_launch_file, write
 from support.small_session import write_small_session
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -111,8 +111,8 @@ def loaded(installed, tmp_path_factory):
     """Nodes and parameters of each launch file, with stand-ins for packages that not every machine has."""
     packages = tmp_path_factory.mktemp('packages')
     stand_in_launch_file(packages, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS)
-    stand_in_launch_file(packages, 'gazebo_ros/launch/empty_world.launch', ('world_name', 'gui'))
-    stand_in_launch_file(packages, 'jackal_gazebo/launch/spawn_jackal.launch', ('x', 'y', 'z', 'yaw'))
+    for name, arguments in GAZEBO_ARGUMENTS.items():
+        stand_in_launch_file(packages, name, arguments)
     for name in ('jackal_description', 'xacro'):
         write(packages / name / 'package.xml', '<package format="2"><name>%s</name></package>' % name)
     write(packages / 'xacro' / 'xacro', '#!/bin/sh\necho "$JACKAL_URDF_EXTRAS"\n')
