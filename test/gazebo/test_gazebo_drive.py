@@ -1,4 +1,6 @@
-"""A drive with the real move_base among people. They do not avoid the robot, which sees 27 degrees to each side."""
+"""A drive with the real move_base past people: one stands in the way, two come towards the robot, one crosses behind the
+goal. People in Gazebo do not avoid the robot, which sees 27 degrees to each side, so none crosses its way.
+"""
 import numpy as np
 import rospy
 from geometry_msgs.msg import PoseStamped
@@ -15,10 +17,10 @@ START_S, DRIVE_S = 30.0, 40.0  # simulated time at which people start, and for t
 SETTLING_S = 0.2  # Gazebo places people at the origin for a moment when they start
 GOAL_M = 7.5, 0.0
 DRIVE = scenario_from({'duration': DRIVE_S, 'room': {'bounds': [-3, 11, -4, 4]}, 'people': [
-    {'start': [4.0, 0.1], 'facing': 3.1},
-    {'start': [9.5, 0.9], 'facing': 3.1, 'moves': [{'to': [-2, 0.9], 'speed': 1.0}]},
-    {'start': [7.5, -1.0], 'facing': 3.1, 'moves': [{'to': [-2, -1.0], 'speed': 0.7}]},
-    {'start': [6.0, 2.2], 'facing': -1.6, 'moves': [{'to': [6.0, -3], 'speed': 0.5}]}]})
+    {'start': [4.0, 0.3], 'facing': 3.1},
+    {'start': [9.5, 1.5], 'facing': 3.1, 'moves': [{'to': [-2, 1.5], 'speed': 1.0}]},
+    {'start': [7.5, -1.5], 'facing': 3.1, 'moves': [{'to': [-2, -1.5], 'speed': 0.7}]},
+    {'start': [9.3, 2.2], 'facing': -1.6, 'moves': [{'to': [9.3, -3], 'speed': 0.5}]}]})
 
 
 def clearance_m(models, yaw):
