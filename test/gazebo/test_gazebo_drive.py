@@ -1,5 +1,5 @@
-"""A drive with the real move_base past people: one stands in the way, two come towards the robot, one crosses behind the
-goal. People in Gazebo do not avoid the robot, which sees 27 degrees to each side, so none crosses its way.
+"""A drive with the real move_base past people: one stands in the way, two come towards the robot, one crosses behind
+the goal. People in Gazebo do not avoid the robot, which sees 27 degrees to each side, so none crosses its way.
 """
 import numpy as np
 import rospy
