@@ -39,7 +39,7 @@ BALANCES = {
     'yolov5_node': Balance('colour images', 'images processed', (
         'images rejected', 'images skipped for a newer one', 'images while paused', 'detections failed')),
     'depth_detector_node': Balance('colour images', 'images processed', (
-        'colour images rejected', 'colour images without depth', 'colour images of a time before', 'images rejected',
+        'colour images rejected', 'colour images from before a time jump', 'images rejected',
         'images skipped for a newer one', 'images without floor', 'images while paused', 'detections failed')),
     'bbox3d_node': Balance('2D boxes', 'images estimated', ('2D boxes rejected', '2D boxes from before a time jump')),
     'tracker_node': Balance('3D boxes', 'images tracked', (

@@ -12,7 +12,7 @@ from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.bags.process_bag import with_params
 from ros_3d_bb.conversions.perception_msgs import stamp_of
-from ros_3d_bb.pipeline.offline_pipeline import Settings
+from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.demo.scene_report import panels_of, read_recording
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images

@@ -7,13 +7,15 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg, boxes3d_to_msg, time_from, usable_boxes3d
+from ros_3d_bb.conversions.perception_msgs import (boxes2d_to_msg, boxes3d_to_msg, camera_from_msg, time_from,
+                                                   usable_boxes3d)
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
+from ros_3d_bb.pipeline.rgbd_source import RgbdSource
 
 HEADER = Header(stamp=time_from(1000 * NS), frame_id='camera')
-INTRINSICS = [614.7, 0, 319.2, 0, 614.8, 242.1, 0, 0, 1]
+CAMERA_INFO = CameraInfo(header=HEADER, width=640, height=480, K=[614.7, 0, 319.2, 0, 614.8, 242.1, 0, 0, 1])
 PERSON_PX, PERSON_M = (60, 150, 160, 460), 3.0
 NEAR_PX = (230, 0, 640, 480)  # directly in front of the camera, too near for depth: the wall behind is measured
 MODELS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'error_models')
@@ -44,36 +46,43 @@ class Tilting(object):
         return camera_from_floor
 
 
+class Estimation(object):
+    """A source with one camera_info, and the estimation stage; `boxes3d` has the results of all frames."""
+
+    def __init__(self, params, events, transforms=None):
+        self.stage, self.boxes3d = EstimationStage(params, events), []
+        self._source = RgbdSource(params, events, self._on_match, transforms)
+        self._source.add_camera_info(CAMERA_INFO, 0)
+
+    def _on_match(self, boxes2d, *messages):
+        self.boxes3d += self.stage.estimate(self._source.frame(boxes2d, *messages), boxes2d)
+
+    def add_depth(self, depth, header=HEADER, encoding='32FC1'):
+        self._source.add_depth(fill_image(Image(header=header), depth, encoding), 0)
+
+    def add_boxes(self, rects_px, labels=None, scores=None, header=HEADER):
+        self._source.add_boxes(boxes2d_to_msg(np.array(rects_px), header, labels, scores), 0)
+
+
 def test_each_image_has_the_tilt_of_the_camera_at_its_time():
     ups = (0, -1, 0), (0, -1, 0), (0, -np.cos(0.4), np.sin(0.4)), (0, -1, 0)
-    lengths_m = []
-
-    def on_frame(*frame):
-        _header, _depth, (box,) = stage.estimate(*frame)
-        lengths_m.append(box.center_m[2])
-    stage = EstimationStage(Bbox3dParams(), EventCounter(), on_frame, Tilting(ups))
-    stage.add_camera_info(CameraInfo(header=HEADER, width=640, height=480, K=INTRINSICS), 0)
-    stage.add_depth(fill_image(Image(header=HEADER), scene(6.0), '32FC1'), 0)
+    run = Estimation(Bbox3dParams(), EventCounter(), Tilting(ups))
+    run.add_depth(scene(6.0))
     for _image in ups:
-        stage.add_boxes(boxes2d_to_msg(np.array([PERSON_PX]), HEADER), 0)
+        run.add_boxes([PERSON_PX])
+    lengths_m = [box.center_m[2] for box in run.boxes3d]
     assert lengths_m[0] == lengths_m[1] == lengths_m[3] != lengths_m[2]
 
 
 def estimate(depth_m, rects_px, events, estimator='foreground', labels=None, scores=None, **params):
     """The 3D boxes of an image. All of them can be tracked, and their regions are inside the image."""
-    results = []
-
-    def on_frame(boxes2d, depth_msg, camera):
-        header, _depth, boxes3d = stage.estimate(boxes2d, depth_msg, camera)
-        message = boxes3d_to_msg(boxes3d, header, camera)
-        assert not usable_boxes3d(message)[1]
-        assert all(box.roi.x_offset + box.roi.width <= 640 for box in message.boxes)
-        results.extend(boxes3d)
-    stage = EstimationStage(Bbox3dParams(estimator=estimator, **params), events, on_frame)
-    stage.add_camera_info(CameraInfo(header=HEADER, width=640, height=480, K=INTRINSICS), 0)
-    stage.add_depth(fill_image(Image(header=HEADER), depth_m, '32FC1'), 0)
-    stage.add_boxes(boxes2d_to_msg(np.array(rects_px), HEADER, labels, scores), 0)
-    return results
+    run = Estimation(Bbox3dParams(estimator=estimator, **params), events)
+    run.add_depth(depth_m)
+    run.add_boxes(rects_px, labels, scores)
+    message = boxes3d_to_msg(run.boxes3d, HEADER, camera_from_msg(CAMERA_INFO))
+    assert not usable_boxes3d(message)[1]
+    assert all(box.roi.x_offset + box.roi.width <= 640 for box in message.boxes)
+    return run.boxes3d
 
 
 @pytest.mark.parametrize('estimator', ['foreground', 'median'])
@@ -104,22 +113,17 @@ def test_rectangles_with_extreme_or_reversed_edges(events):
 @pytest.mark.parametrize('units_per_m,depth_scale,reported', [(5000, 0.0, '0.0002'), (1000, 0.0, None),
                                                               (5000, 0.0002, None)])
 def test_depth_of_a_wrong_scale_is_reported_with_the_correct_one(units_per_m, depth_scale, reported, events):
-    results = []
-
-    def on_frame(boxes2d, depth_msg, camera):
-        results.extend(stage.estimate(boxes2d, depth_msg, camera)[2])
-    stage = EstimationStage(Bbox3dParams(depth_scale=depth_scale), events, on_frame)
-    stage.add_camera_info(CameraInfo(header=HEADER, width=640, height=480, K=INTRINSICS), 0)
+    run = Estimation(Bbox3dParams(depth_scale=depth_scale), events)
     for number in range(30):
         header = Header(stamp=time_from((1000 + number) * NS), frame_id='camera')
         values = (scene(wall_m=5.0) * units_per_m).astype(np.uint16)
-        stage.add_depth(fill_image(Image(header=header), values, '16UC1'), 0)
-        stage.add_boxes(boxes2d_to_msg(np.array([PERSON_PX]), header), 0)
-    assert len(results) > 25 and events.counts.get('depth of a wrong scale', 0) == (reported is not None)
+        run.add_depth(values, header, '16UC1')
+        run.add_boxes([PERSON_PX], header=header)
+    assert len(run.boxes3d) > 25 and events.counts.get('depth of a wrong scale', 0) == (reported is not None)
     if reported:
         assert 'depth_scale: %s ' % reported in events.sentences['depth of a wrong scale']
     else:
-        assert results[0].center_m[2] == pytest.approx(PERSON_M, abs=0.1)
+        assert run.boxes3d[0].center_m[2] == pytest.approx(PERSON_M, abs=0.1)
 
 
 def params(model, estimator):
@@ -130,18 +134,18 @@ def params(model, estimator):
                                                    ('simulated_d435i', 'foreground', 'median'),
                                                    ('thesis', 'median', 'foreground')])
 def test_an_error_model_is_rejected_for_another_estimator(model, estimator, other):
-    stage = EstimationStage(params(model, estimator), EventCounter(), None)
+    stage = EstimationStage(params(model, estimator), EventCounter())
     sample = stage.sample
     with pytest.raises(ValueError, match='is for the estimator %s, not %s' % (estimator, other)):
         stage.reconfigure(params(model, other))
     assert stage.sample is sample
     with pytest.raises(ValueError, match='is for the estimator %s, not %s' % (estimator, other)):
-        EstimationStage(params(model, other), EventCounter(), None)
+        EstimationStage(params(model, other), EventCounter())
 
 
 def test_a_missing_error_model_is_named():
     with pytest.raises(ValueError, match='nowhere.yaml.*absolute path expected'):
-        EstimationStage(params('nowhere', 'median'), EventCounter(), None)
+        EstimationStage(params('nowhere', 'median'), EventCounter())
 
 
 def test_classes_and_scores_stay_with_their_boxes(events):
@@ -162,21 +166,15 @@ def test_another_table_of_classes_is_used(tmp_path, events):
         box, = estimate(scene(wall_m=5.0), [PERSON_PX], events, labels=[label], classes_file=str(path))
         assert box.center_m[2] == pytest.approx(PERSON_M + behind_m, abs=1e-3)
     with pytest.raises(ValueError, match='nowhere.yaml'):
-        EstimationStage(Bbox3dParams(classes_file='/nowhere.yaml'), events, None)
+        EstimationStage(Bbox3dParams(classes_file='/nowhere.yaml'), events)
 
 
 def test_only_heights_of_people_tell_the_scale_of_depth(events):
     """Toys of 0.3 m are possible, people of 0.3 m are not."""
-    results = []
-
-    def on_frame(boxes2d, depth_msg, camera):
-        results.extend(stage.estimate(boxes2d, depth_msg, camera)[2])
-    stage = EstimationStage(Bbox3dParams(), events, on_frame)
-    stage.add_camera_info(CameraInfo(header=HEADER, width=640, height=480, K=INTRINSICS), 0)
+    run = Estimation(Bbox3dParams(), events)
     for number in range(60):
         header = Header(stamp=time_from((1000 + number) * NS), frame_id='camera')
-        stage.add_depth(fill_image(Image(header=header), scene(wall_m=5.0, person_m=0.6), '32FC1'), 0)
-        label = 'toy' if number < 30 else 'person'
-        stage.add_boxes(boxes2d_to_msg(np.array([PERSON_PX]), header, [label]), 0)
+        run.add_depth(scene(wall_m=5.0, person_m=0.6), header)
+        run.add_boxes([PERSON_PX], ['toy' if number < 30 else 'person'], header=header)
         assert ('depth of a wrong scale' in events.counts) <= (number >= 30)
-    assert len(results) >= 59 and events.counts['depth of a wrong scale'] == 1
+    assert len(run.boxes3d) >= 59 and events.counts['depth of a wrong scale'] == 1

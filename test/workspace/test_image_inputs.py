@@ -16,7 +16,7 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, info_of_
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg
 from ros_3d_bb.nodes.doctor import bag_findings
-from ros_3d_bb.pipeline.offline_pipeline import Settings
+from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.compressed import compressed_fields, rewritten

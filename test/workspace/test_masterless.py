@@ -9,7 +9,7 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
-from ros_3d_bb.pipeline.offline_pipeline import Settings
+from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.compressed import compressed_fields, rewritten

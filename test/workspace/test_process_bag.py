@@ -26,7 +26,7 @@ from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, t
 from ros_3d_bb.core.object_classes import PERSON_CLASS
 from ros_3d_bb.core.params import with_places
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.pipeline.offline_pipeline import Settings
+from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
@@ -186,7 +186,7 @@ def test_images_that_are_far_apart_need_the_tolerance_that_the_message_names(tmp
 def test_without_depth_every_image_is_counted(scene, tmp_path):
     rewritten(scene, tmp_path / 'in.bag', lambda topic, *rest: None if 'aligned' in topic else (topic,) + rest)
     events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
-    assert events.counts['colour images without depth'] == 15
+    assert events.counts['colour images rejected'] == 15
 
 
 def test_tracks_have_new_ids_after_a_jump_back_in_time(scene, tmp_path):

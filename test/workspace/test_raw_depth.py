@@ -21,7 +21,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
-from ros_3d_bb.pipeline.offline_pipeline import Settings
+from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator

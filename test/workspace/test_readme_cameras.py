@@ -214,7 +214,7 @@ def test_people_are_tracked_with_the_topics_of_a_recipe(name, tmp_path, capfd):
     with pytest.raises(SystemExit) as ended:
         main([str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), '--detector', 'depth', '--camera-height',
               str(HEIGHT_M), '--camera-tilt', str(TILT_RAD), '--depth', recipe.get('depth', 'aligned')] + options)
-    assert not ended.value.code and 'colour images without depth' not in capfd.readouterr().out
+    assert not ended.value.code and 'colour images rejected' not in capfd.readouterr().out
     tracks = positions_in(tmp_path / 'out.bag', '/ros_3d_bb/tracks')
     assert len(tracks) == IMAGES
     expected_m = np.array([person['start'] for person in PEOPLE])

@@ -17,8 +17,8 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.yolov5.backends import open_detector
 from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, detect_in_color
-from ros_3d_bb.pipeline.offline_pipeline import (DEPTH_INFO_TOPIC, INFO_TOPIC, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA,
-                                                 Pipeline, Settings)
+from ros_3d_bb.pipeline.people_pipeline import (DEPTH_INFO_TOPIC, INFO_TOPIC, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA,
+                                                CollectedResults, PeoplePipeline, Settings)
 
 MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
 DRIVER_TF_NS = NS  # within this time from its start, a bag contains each frame of a camera driver
@@ -49,7 +49,8 @@ class BagRun(object):
         # As in the nodes, the detector has a buffer of its own, because it is ahead of the other stages.
         self._transforms, self._detector_transforms = BagTransforms(), BagTransforms()
         self._unread_tf = collections.deque()  # (time_ns, message) of tf that is not in the buffer yet
-        self._pipeline = Pipeline(settings, events, self._transforms)
+        self._results = CollectedResults(settings.tracker[1], events)
+        self._pipeline = PeoplePipeline(settings, events, self._transforms, self._results)
         self._detector = None
         if settings.detector == 'yolov5':
             params, detection, running = settings.yolov5
@@ -70,7 +71,8 @@ class BagRun(object):
         with ThreadPoolExecutor(self._settings.searches) as pool:
             for waiting in self._ahead(pool):
                 self._add_transforms(waiting.raw.time.to_nsec() + self._ahead_ns)
-                yield waiting.raw, self._handled(waiting)
+                self._process(waiting)
+                yield waiting.raw, self._results.take()
         self._pipeline.end()
 
     def _add_static(self, raw):
@@ -142,23 +144,22 @@ class BagRun(object):
                 return Waiting(raw, image, pool.submit(detect_in_color, self._detector, image, turns))
         return Waiting(raw)
 
-    def _handled(self, waiting):
-        """Process a message and return the messages that the nodes would publish, [(topic, message), ...]."""
+    def _process(self, waiting):
+        """Process a message."""
         raw, image, search = waiting
         topic, camera = self._topics.get(raw.topic, UNUSED)
         if topic in (None, STATIC_TOPIC):
-            return []
+            return
         now_ns = raw.time.to_nsec()
         self._events.count('messages on %s' % raw.topic)
         if search is not None:
-            with self._pipeline.searching():
-                _image, detections = search.result()
+            with self._pipeline.detecting():
+                pixels, detections = search.result()
                 self._events.count('images processed')
-                return self._pipeline.found(image.header, detections, self._detector.names, now_ns, camera)
+                self._pipeline.add_detections(image.header, pixels, detections, self._detector.names, now_ns, camera)
         elif topic != TF_TOPIC and (topic != COLOR_TOPIC or self._detector is None):
             with self._events.rejecting('messages on %s' % raw.topic):
-                return self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), now_ns, camera)
-        return []
+                self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), now_ns, camera)
 
 
 def process_bag(source, target, settings=Settings(), progress=lambda share: None):

@@ -19,7 +19,7 @@ from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.params import IMAGE_ROTATION, params_from, with_places
 from ros_3d_bb.core.yaml_loader import load_yaml
-from ros_3d_bb.pipeline.offline_pipeline import DETECTORS, TRACKED, Settings
+from ros_3d_bb.pipeline.people_pipeline import DETECTORS, TRACKED, Settings
 
 POLL_S, BAR = 0.2, 40
 GIB = 2 ** 30

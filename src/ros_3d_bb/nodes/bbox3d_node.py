@@ -3,14 +3,14 @@ import threading
 
 import rospy
 from sensor_msgs.msg import CameraInfo, Image
-from std_msgs.msg import Int32MultiArray
+from std_msgs.msg import Header, Int32MultiArray
 
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault
 from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS,
                                                info_of_images, info_topic_beside, uncompressed)
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg, camera_from_msg,
-                                                   stamp_of)
+                                                   stamp_of, time_from)
 from ros_3d_bb.core.labels import described
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.time_sync import NS, MessageCache, arrival_clock_ns
@@ -23,6 +23,7 @@ from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscrib
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
+from ros_3d_bb.pipeline.rgbd_source import RgbdSource
 from ros_3d_bb.visualization.image_overlay import depth_to_grey, draw_boxes, draw_samples
 
 
@@ -59,10 +60,11 @@ class Bbox3dNode(object):
         self._diagnostics = Diagnostics()
         depth_topic, is_raw = DEPTH_TOPICS[params.depth][0], params.depth == RAW
         depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
-        self._stage = EstimationStage(params, self._diagnostics, self._on_frame,
-                                      Transforms(wait_s=0) if params.floor_frame or is_raw else None,
-                                      (rospy.resolve_name(depth_topic), depth_info_topic,
-                                       rospy.resolve_name(INFO_TOPICS[0])))
+        self._stage = EstimationStage(params, self._diagnostics)
+        self._source = RgbdSource(params, self._diagnostics, self._on_match,
+                                  Transforms(wait_s=0) if params.floor_frame or is_raw else None,
+                                  (rospy.resolve_name(depth_topic), depth_info_topic,
+                                   rospy.resolve_name(INFO_TOPICS[0])), params.cache_length, params.assumed_delay)
         self._lock = threading.Lock()
         self._boxes_pub = rospy.Publisher(BOXES3D_TOPIC, BoundingBox3DArray, queue_size=10)
         self._images = SampleImages(int(params.cache_length * NS), self._stage.sample, params.depth_image_range,
@@ -82,35 +84,38 @@ class Bbox3dNode(object):
     def _reconfigure(self, params):
         with self._lock:
             self._stage.reconfigure(params)
+            self._source.assumed_delay_s = params.assumed_delay
             self._images.reconfigure(self._stage.sample, params.depth_image_range)
 
     def _on_depth_camera_info(self, message):
         with self._diagnostics.receiving('camera_info of depth'), self._lock:
-            self._stage.add_depth_camera_info(message)
+            self._source.add_depth_camera_info(message)
 
     def _on_camera_info(self, message):
         if self._alignment is not None:
             self._alignment.color = message
         with self._diagnostics.receiving('camera_info'), self._lock:
-            self._stage.add_camera_info(message, arrival_clock_ns())
+            self._source.add_camera_info(message, arrival_clock_ns())
 
     def _on_depth(self, message):
         if self._alignment is not None:
             self._alignment.depth_frame = message.header.frame_id
         with self._diagnostics.receiving('depth images'), self._lock:
-            self._stage.add_depth(message, arrival_clock_ns())
+            self._source.add_depth(message, arrival_clock_ns())
 
     def _on_boxes(self, message):
         with self._diagnostics.receiving('2D boxes'), self._lock:
-            self._stage.add_boxes(message, arrival_clock_ns())
+            self._source.add_boxes(message, arrival_clock_ns())
 
-    def _on_frame(self, boxes2d, depth_msg, camera):
+    def _on_match(self, boxes2d, depth_msg, camera):
         """Publish the 3D boxes of one image, once its 2D boxes, depth image and camera model have arrived."""
         with self._diagnostics.rejecting('2D boxes'):
-            header, depth, boxes3d = self._stage.estimate(boxes2d, depth_msg, camera)
+            frame = self._source.frame(boxes2d, depth_msg, camera)
+            boxes3d = self._stage.estimate(frame, boxes2d)
+            header = Header(stamp=time_from(frame.stamp_ns), frame_id=frame.frame_id)
             self._boxes_pub.publish(boxes3d_to_msg(boxes3d, header, camera))
             self._diagnostics.record_latency(header.stamp)
-            self._images.publish(header, depth, boxes3d)
+            self._images.publish(header, frame.received_depth, boxes3d)
 
 
 class DepthCameraCheck(object):

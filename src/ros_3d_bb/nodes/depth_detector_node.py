@@ -15,7 +15,8 @@ from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.depth_registration import RAW
-from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams, RgbdDetectionStage
+from ros_3d_bb.pipeline.detection_stage import DepthDetectionStage, DepthDetectorParams
+from ros_3d_bb.pipeline.rgbd_source import RgbdSource
 
 
 class DepthDetectorNode(object):
@@ -49,9 +50,11 @@ class DepthDetectorNode(object):
         if transforms is not None:
             self._diagnostics.show('tf age', transforms.age)
         self._lock, self._detecting = threading.Lock(), threading.Lock()
-        self._worker = DetectorWorker(params, self._diagnostics, self._detect, RgbdDetectionStage.names)
-        self._stage = RgbdDetectionStage(params, people, self._diagnostics, self._worker.offer, transforms,
-                                         depth_info_topic)
+        self._stage = DepthDetectionStage(params, people, self._diagnostics)
+        self._worker = DetectorWorker(params, self._diagnostics, self._detect, self._stage.names)
+        self._source = RgbdSource(params, self._diagnostics, self._worker.offer, transforms,
+                                  (rospy.resolve_name(depth_topic), depth_info_topic,
+                                   rospy.resolve_name(INFO_TOPICS[0])))
         subscribe_camera_info(INFO_TOPICS[0], COLOR_INFO_IMAGES[params.depth], self._on_camera_info)
         if is_raw:
             subscribe_camera_info(depth_info_topic, depth_topic, self._on_depth_camera_info, 1)
@@ -65,23 +68,25 @@ class DepthDetectorNode(object):
 
     def _on_camera_info(self, message):
         with self._diagnostics.receiving('camera_info'), self._lock:
-            self._stage.add_camera_info(message, arrival_clock_ns())
+            self._source.add_camera_info(message, arrival_clock_ns())
 
     def _on_depth_camera_info(self, message):
         with self._diagnostics.receiving('camera_info of depth'), self._lock:
-            self._stage.add_depth_camera_info(message)
+            self._source.add_depth_camera_info(message)
 
     def _on_depth(self, message):
         with self._diagnostics.receiving('depth images'), self._lock:
-            self._stage.add_depth(message, arrival_clock_ns())
+            self._source.add_depth(message, arrival_clock_ns())
 
     def _on_color(self, message):
         with self._diagnostics.receiving('colour images'), self._lock:
-            self._stage.add_color(message, arrival_clock_ns())
+            self._source.add_color(message, arrival_clock_ns())
 
-    def _detect(self, color_msg, depth_msg, camera):
+    def _detect(self, *messages):
         with self._detecting:
-            return self._stage.detect(color_msg, depth_msg, camera)
+            frame = self._source.frame(*messages)
+            detections = self._stage.detect(frame)
+        return None if detections is None else (frame.received_color, detections)
 
 
 def main():

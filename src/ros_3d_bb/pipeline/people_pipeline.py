@@ -1,0 +1,256 @@
+"""Detection, estimation and tracking in one process, for process_bag and people_node."""
+import contextlib
+import functools
+import threading
+from typing import NamedTuple, Optional, Tuple
+
+from sensor_msgs.msg import CameraInfo
+from std_msgs.msg import Header, Int32MultiArray
+from tf2_msgs.msg import TFMessage
+
+from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, IMAGE_KINDS,
+                                               INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, info_of_images, topic_of,
+                                               uncompressed)
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, Boxes2D, boxes2d_from_msg,
+                                                   boxes3d_to_msg, detections2d_to_msg, time_from, tracks_to_msg)
+from ros_3d_bb.core.error_text import cause
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from ros_3d_bb.detection.network_detector import DetectionParams
+from ros_3d_bb.detection.yolov5.backends import RuntimeParams
+from ros_3d_bb.pipeline.depth_registration import RAW
+from ros_3d_bb.pipeline.detection_stage import DepthDetectionStage, DepthDetectorParams, Yolov5NodeParams
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
+from ros_3d_bb.pipeline.rgbd_source import RgbdSource
+from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
+from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
+
+INFO_TOPIC, DEPTH_INFO_TOPIC = INFO_TOPICS
+INPUTS = {COLOR_TOPIC: IMAGE_KINDS, DEPTH_TOPIC: IMAGE_KINDS, INFO_TOPIC: (CameraInfo,),
+          DEPTH_INFO_TOPIC: (CameraInfo,), BOXES_TOPIC: (Int32MultiArray,), TF_TOPIC: (TFMessage,),
+          STATIC_TOPIC: (TFMessage,)}
+OUTPUTS_OF_CAMERA, OUTPUTS = (BOXES_TOPIC, BOXES3D_TOPIC), (TRACKS_TOPIC, MARKERS_TOPIC)
+DETECTORS = 'yolov5', 'depth', 'none'
+TRACKED = 'images with tracks'  # event
+
+
+class Settings(NamedTuple):
+    """Detector, parameters of each node, and topics; for bags also concurrent searches and compression.
+
+    `names` maps topics of the nodes to those used; `keep` lists the topics to copy (None: all). `camera_pose` is the
+    height, metres, tilt and roll, radians, of a camera without tf (see `image_rotation.mounted_camera`).
+    """
+
+    detector: str = 'yolov5'
+    yolov5: tuple = (Yolov5NodeParams(), DetectionParams(), RuntimeParams(device='cpu', threads=1))
+    depth: tuple = (DepthDetectorParams(), DepthPeopleParams())
+    bbox3d: tuple = (Bbox3dParams(),)
+    tracker: tuple = (TrackerNodeParams(), MarkerParams()) + tuple(kind() for kind in TRACKING_PARAMS)
+    names: dict = {}
+    keep: Optional[Tuple[str, ...]] = None
+    searches: int = 1
+    compression: str = 'lz4'
+    camera_pose: Optional[Tuple[float, float, float]] = None
+
+    @property
+    def inputs(self):
+        """The topics of `INPUTS` that are used."""
+        unused = {COLOR_TOPIC if self.detector == 'none' else BOXES_TOPIC}
+        if self.bbox3d[0].depth != RAW:
+            unused.add(DEPTH_INFO_TOPIC)
+        return set(INPUTS) - unused
+
+    @property
+    def cameras(self):
+        """Namespaces of the cameras; '' for a single camera."""
+        return tuple(self.tracker[0].cameras) or ('',)
+
+    def name(self, topic, camera=''):
+        """Return the name that is used for a topic of a camera's nodes."""
+        if topic in (DEPTH_TOPIC, DEPTH_INFO_TOPIC):
+            topic = DEPTH_TOPICS[self.bbox3d[0].depth][topic == DEPTH_INFO_TOPIC]
+        topic = topic_of(camera, topic)
+        return '/' + self.names.get(topic, topic).lstrip('/')
+
+    @property
+    def publish_empty(self):
+        """Whether the detector publishes an array without boxes."""
+        return (self.depth if self.detector == 'depth' else self.yolov5)[0].publish_empty
+
+    def source(self, camera, events, on_match, transforms):
+        """Return the RgbdSource of a camera, for both detection and estimation.
+
+        Raises ValueError if their parameters contradict each other.
+        """
+        params = self.bbox3d[0]
+        for name in DepthDetectorParams._fields if self.detector == 'depth' else ():
+            if getattr(params, name, None) != getattr(self.depth[0], name) and name in params._fields:
+                raise ValueError('parameter ~%s is %r for depth_detector_node and %r for bbox3d_node; equal values '
+                                 'expected, because both use the same images'
+                                 % (name, getattr(self.depth[0], name), getattr(params, name)))
+        topics = [self.name(topic, camera) for topic in (DEPTH_TOPIC, DEPTH_INFO_TOPIC, INFO_TOPIC)]
+        return RgbdSource(params, events, on_match, transforms, topics, params.cache_length, params.assumed_delay)
+
+
+class CollectedResults(object):
+    """Collects the messages that the nodes would publish."""
+
+    def __init__(self, marker_params, events):
+        self._markers, self._events, self._messages = MarkerWriter(marker_params), events, []
+
+    def take(self):
+        """Return [(topic, message), ...] since the last call."""
+        messages, self._messages = self._messages, []
+        return messages
+
+    def on_boxes2d(self, camera, message, _image, _detections, _names):
+        """Add an Int32MultiArray, given the image as received, and the Detections of classes with these names."""
+        self._messages.append((topic_of(camera, BOXES_TOPIC), message))
+
+    def on_boxes3d(self, camera, message, _frame, _boxes3d):
+        """Add a BoundingBox3DArray, given its RgbdFrame and Box3Ds."""
+        self._messages.append((topic_of(camera, BOXES3D_TOPIC), message))
+
+    def on_tracks(self, tracks, header):
+        """Add tracks (`types.TrackedObject`) and their markers."""
+        self._events.count_all({TRACKED: 1} if tracks else {})
+        self._messages += [(TRACKS_TOPIC, tracks_to_msg(tracks, header)),
+                           (MARKERS_TOPIC, self._markers.write(tracks, header))]
+
+
+class PeoplePipeline(object):
+    """The three stages in one process: detection and estimation of each camera, and tracking.
+
+    Networks detect without depth and are therefore outside: their detections are passed to `add_detections`. The methods
+    are thread-safe.
+
+    Parameters
+    ----------
+    settings : Settings
+    events : event_counter.EventCounter
+    transforms
+        As for `tracking_stage.TrackingStage`.
+    results
+        Receives the results, by the methods of `CollectedResults` whose names begin with `on_`.
+    last_id : int
+        The IDs of tracks are greater.
+    offer : callable, optional
+        Called with the arguments of `detect` when they are complete. By default, `detect` is called.
+
+    Attributes
+    ----------
+    tracking_stage : tracking_stage.TrackingStage
+    estimation_stages, detection_stages : dict
+        By camera; there are detection stages for the detector depth only.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is invalid.
+    """
+
+    def __init__(self, settings, events, transforms, results, last_id=0, offer=None):
+        self._settings, self._events, self._results = settings, events, results
+        self._offer = offer or self.detect
+        tracker_params, _marker_params, *tracking = settings.tracker
+        self.tracking_stage = TrackingStage(tracker_params, tracking, events, transforms, results.on_tracks, last_id)
+        self.estimation_stages, self.detection_stages, self._sources = {}, {}, {}
+        for camera in settings.cameras:
+            self.estimation_stages[camera] = EstimationStage(settings.bbox3d[0], events)
+            if settings.detector == 'depth':
+                self.detection_stages[camera] = DepthDetectionStage(*settings.depth, events)
+            self._sources[camera] = settings.source(camera, events, functools.partial(self._on_match, camera), transforms)
+        self._lock, self._processing = threading.Lock(), threading.RLock()
+        self._matches, self._now_ns = [], 0  # complete 2D boxes; arrival time of the message that is being processed
+
+    def take(self, topic, message, now_ns, camera=''):
+        """Process a message on one of the `INPUTS` except tf, which arrived at `now_ns`. Raises ValueError."""
+        source, tracking_stage = self._sources[camera], self.tracking_stage
+        if topic in INFO_TOPICS:
+            images = COLOR_INFO_IMAGES[self._settings.bbox3d[0].depth] if topic == INFO_TOPIC else DEPTH_TOPIC
+            message = info_of_images(message, self._settings.name(images, camera))
+        if topic == INFO_TOPIC:
+            if tracking_stage.uses_camera_info:
+                tracking_stage.add_camera_info(message, camera)
+            self._add(source.add_camera_info, message, now_ns)
+        elif topic == DEPTH_INFO_TOPIC:
+            if tracking_stage.uses_depth:
+                tracking_stage.add_depth_camera_info(message, camera)
+            source.add_depth_camera_info(message)
+        elif topic == DEPTH_TOPIC:
+            message = uncompressed(message)  # once for all stages
+            if tracking_stage.uses_depth:
+                tracking_stage.add_depth(message, now_ns, camera)
+            self._add(source.add_depth, message, now_ns)
+        elif topic == COLOR_TOPIC:
+            self._add(source.add_color, message, now_ns)
+        else:
+            self._add(source.add_boxes, message, now_ns)
+
+    def detect(self, camera, *messages):
+        """Detect people in the matched images of a camera, the arguments of `RgbdSource.frame`, and track them."""
+        with self.detecting():
+            frame = self._sources[camera].frame(*messages)
+            detections = self.detection_stages[camera].detect(frame)
+            if detections is None:
+                return
+            header = messages[0].header
+            message = self._boxes2d(camera, header, frame.received_color, detections, DepthDetectionStage.names)
+            if message is not None:
+                self._events.count('arrays of 2D boxes')
+                self._estimate_and_track(camera, frame, boxes2d_from_msg(message))
+
+    def add_detections(self, header, image, detections, names, now_ns, camera=''):
+        """Process the detections in a received colour image with the given header; `names` are those of the classes."""
+        message = self._boxes2d(camera, header, image, detections, names)
+        if message is not None:
+            self._add(self._sources[camera].add_boxes, message, now_ns)
+
+    @contextlib.contextmanager
+    def detecting(self):
+        """Context manager for the detection in one image. Exceptions are reported and do not stop the pipeline."""
+        try:
+            with self._events.rejecting('images'):
+                yield
+        except Exception as error:  # as in the worker threads of the nodes
+            self._events.warn('detections failed', 'the detector failed: %s; waiting for the next image' % cause(error))
+
+    def end(self):
+        """Report inputs that are still waiting for others. Call at the end of the input."""
+        for source in self._sources.values():
+            source.end()
+
+    def _add(self, add, message, now_ns):
+        """Add a message to a source, and process the 2D boxes that are complete with it."""
+        with self._lock:
+            self._now_ns = now_ns
+            try:
+                add(message, now_ns)
+            finally:
+                matches, self._matches = self._matches, []
+        for camera, boxes2d, depth_msg, camera_model in matches:
+            with self._events.rejecting('2D boxes'):
+                frame = self._sources[camera].frame(boxes2d, depth_msg, camera_model)
+                self._estimate_and_track(camera, frame, boxes2d)
+
+    def _on_match(self, camera, trigger, depth_msg, camera_model):
+        if isinstance(trigger, Boxes2D):
+            self._matches.append((camera, trigger, depth_msg, camera_model))
+        else:
+            self._offer(camera, trigger, depth_msg, camera_model)
+
+    def _boxes2d(self, camera, header, image, detections, names):
+        """Return the message of detections, None if it is not published."""
+        if not len(detections.boxes) and not self._settings.publish_empty:
+            return None
+        message = detections2d_to_msg(detections, names, header)
+        self._results.on_boxes2d(camera, message, image, detections, names)
+        return message
+
+    def _estimate_and_track(self, camera, frame, boxes2d):
+        with self._processing:  # in the order of the images
+            boxes3d = self.estimation_stages[camera].estimate(frame, boxes2d)
+            header = Header(stamp=time_from(frame.stamp_ns), frame_id=frame.frame_id)
+            message = boxes3d_to_msg(boxes3d, header, frame.received_camera)
+            self._results.on_boxes3d(camera, message, frame, boxes3d)
+            with self._events.rejecting('3D boxes'):
+                self.tracking_stage.add_boxes(message, self._now_ns, camera)

@@ -1,0 +1,164 @@
+"""Source of the frames of one RGB-D camera: pairs its messages by stamp, and registers and turns the images."""
+import tf2_ros
+
+from ros_3d_bb.camera.alignment import ALIGN, size_fault
+from ros_3d_bb.camera.rgbd_frame import RgbdFrame, upright_frame
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
+from ros_3d_bb.conversions.perception_msgs import (NEWEST, Boxes2D, boxes2d_from_msg, camera_from_msg, stamp_if_any,
+                                                   stamp_of)
+from ros_3d_bb.core.time_sync import NS, StampSynchronizer
+from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
+
+UNSTAMPED = '2D boxes without a stamp'  # event, reported once
+TILT_UNKNOWN = 'tilt of the camera unknown'  # event, reported once
+
+
+class RgbdSource(object):
+    """Pairs colour images or 2D boxes with the depth image and camera_info of their stamp, and makes frames of them.
+
+    Each `add_` method validates a message, raising ValueError, and adds it with its arrival time (integer nanoseconds,
+    see `time_sync.StampSynchronizer`).
+
+    Parameters
+    ----------
+    params : NamedTuple
+        With ~depth, ~depth_scale, ~stamp_tolerance, ~frame_id, ~floor_frame and ~image_rotation.
+    events : event_counter.EventCounter
+    on_match : callable
+        Called with the arguments of `frame` when the messages of one stamp are complete.
+    transforms
+        As for `tracking_stage.TrackingStage`, for the floor and raw depth; None if neither is used.
+    topics : sequence of str, optional
+        Topics of the depth images, their camera_info and that of colour, for error messages about missing ones.
+    cache_s, assumed_delay_s : float, optional
+        See `StampSynchronizer`; the delay is also an attribute.
+    """
+
+    def __init__(self, params, events, on_match, transforms=None, topics=DEPTH_TOPICS['aligned'] + INFO_TOPICS[:1],
+                 cache_s=1.0, assumed_delay_s=0.0):
+        self._params, self._events, self._transforms = params, events, transforms
+        self._depth_topic, depth_info_topic, self._info_topic = topics
+        self._registration = DepthRegistration(transforms, depth_info_topic) if params.depth == RAW else None
+        self._color_frame, self._cache_s = '', cache_s
+        self._sync = StampSynchronizer(int(cache_s * NS), int(params.stamp_tolerance * NS), int(assumed_delay_s * NS),
+                                       on_match, self._on_lost)
+
+    @property
+    def assumed_delay_s(self):
+        """Latency of the detector, for 2D boxes without a stamp."""
+        return self._sync.assumed_delay_ns / NS
+
+    @assumed_delay_s.setter
+    def assumed_delay_s(self, delay_s):
+        self._sync.assumed_delay_ns = int(delay_s * NS)
+
+    def add_camera_info(self, message, now_ns):
+        """Add a sensor_msgs/CameraInfo of the colour camera."""
+        camera = camera_from_msg(message)
+        self._color_frame = message.header.frame_id
+        self._sync.add_camera(stamp_if_any(message), now_ns, camera)
+
+    def add_depth_camera_info(self, message):
+        """Add a sensor_msgs/CameraInfo of the depth camera, for raw depth."""
+        self._registration.add_camera_info(message)
+
+    def add_depth(self, message, now_ns):
+        """Add a depth image."""
+        self._sync.add_depth(stamp_of(message), now_ns, message)
+
+    def add_color(self, message, now_ns):
+        """Add a colour image."""
+        self._sync.add_boxes(stamp_of(message), now_ns, message)
+
+    def add_boxes(self, message, now_ns):
+        """Add 2D boxes, a std_msgs/Int32MultiArray."""
+        boxes2d = boxes2d_from_msg(message)
+        if boxes2d.stamp_ns is None and UNSTAMPED not in self._events.counts:
+            self._events.note(UNSTAMPED, 'the 2D boxes have no stamp: each array is paired with the depth image that '
+                              'arrived nearest to %.3f s before it (~assumed_delay)' % self.assumed_delay_s)
+        self._events.count('arrays of 2D boxes')
+        self._sync.add_boxes(boxes2d.stamp_ns, now_ns, boxes2d)
+
+    def end(self):
+        """Report what still waits for its depth image. Call at the end of the input."""
+        self._sync.end()
+
+    def frame(self, trigger, depth_msg, camera):
+        """Return the RgbdFrame of matched messages.
+
+        Parameters
+        ----------
+        trigger : sensor_msgs/Image or perception_msgs.Boxes2D
+            The colour image, or the 2D boxes in it; then the frame has no colour.
+        depth_msg : sensor_msgs/Image
+        camera : camera_model.Camera
+
+        Raises
+        ------
+        ValueError
+            If an image cannot be read, or the depth image has another size than the camera or cannot be registered.
+        """
+        received = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
+        depth, frame_id = self._aligned(received, depth_msg.header.frame_id, camera)
+        depth_stamp_ns = depth_msg.header.stamp.to_nsec()
+        if isinstance(trigger, Boxes2D):
+            stamp_ns, color = depth_stamp_ns if trigger.stamp_ns is None else trigger.stamp_ns, None
+        else:
+            stamp_ns, color = trigger.header.stamp.to_nsec(), imgmsg_to_rgb(trigger)
+        frame = RgbdFrame(stamp_ns, depth_stamp_ns, frame_id, camera, depth, received.scale_m, color,
+                          camera_from_floor=self._camera_from_floor(frame_id))
+        return upright_frame(frame, self._params.image_rotation)
+
+    def _aligned(self, depth, depth_frame, camera):
+        """Return a depth image with the pixels of colour, and the frame of the colour camera."""
+        if self._registration is not None:
+            frame_id = self._params.frame_id or self._color_frame
+            return self._registration.register(depth, depth_frame, camera, frame_id), frame_id
+        height, width = depth.shape
+        if (width, height) != (camera.width, camera.height):
+            raise ValueError('%s; depth must be aligned to colour: %s' % (size_fault(camera, width, height), ALIGN))
+        return depth, self._params.frame_id or depth_frame
+
+    def _camera_from_floor(self, frame_id):
+        """Return the transform (4, 4) from ~floor_frame to the optical frame; None if it is unknown.
+
+        The latest transform is used: the camera is fixed to the robot, so no wait for the image stamp is necessary.
+        """
+        if self._transforms is None or not self._params.floor_frame:
+            return None
+        try:
+            return self._transforms.lookup(frame_id, self._params.floor_frame, NEWEST)
+        except tf2_ros.TransformException as error:
+            if TILT_UNKNOWN not in self._events.counts:
+                self._events.note(TILT_UNKNOWN, 'the tilt of the camera is unknown, as there is no transform from %s '
+                                  'to %s: %s; positions are estimated as if it were level, and the detector depth fits '
+                                  'the floor to the depth image (~floor_frame)'
+                                  % (self._params.floor_frame, frame_id, error))
+            return None
+
+    def _on_lost(self, trigger, before_jump):
+        is_boxes = isinstance(trigger, Boxes2D)
+        inputs, stamp_ns = ('2D boxes', trigger.stamp_ns) if is_boxes else ('colour images', stamp_of(trigger))
+        if before_jump:
+            self._events.count('%s from before a time jump' % inputs)
+            return
+        with self._events.rejecting(inputs):
+            raise ValueError(self._why_lost(stamp_ns))
+
+    def _why_lost(self, stamp_ns):
+        """Return an error message that names the missing input and its topic."""
+        newest_ns = self._sync.newest_ns
+        if newest_ns is None:
+            return 'no depth image received on %s' % self._depth_topic
+        if not self._sync.has_camera:
+            return 'no camera_info received on %s' % self._info_topic
+        if stamp_ns is None:
+            return 'no depth image received on %s within %.1f s' % (self._depth_topic, self._cache_s)
+        too_old_s = (newest_ns - stamp_ns) / NS - self._cache_s
+        if too_old_s > 0:
+            return ('no depth image with their stamp %.3f received on %s; the newest has %.3f, and %.1f s are kept '
+                    '(~cache_length): the detector is %.1f s slower than that'
+                    % (stamp_ns / NS, self._depth_topic, newest_ns / NS, self._cache_s, too_old_s))
+        return ('no depth image with their stamp %.3f received on %s: %s'
+                % (stamp_ns / NS, self._depth_topic, self._sync.gap_text(stamp_ns)))
