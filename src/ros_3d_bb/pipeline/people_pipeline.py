@@ -120,8 +120,8 @@ class CollectedResults(object):
 class PeoplePipeline(object):
     """The three stages in one process: detection and estimation of each camera, and tracking.
 
-    Networks detect without depth and are therefore outside: their detections are passed to `add_detections`. The methods
-    are thread-safe.
+    Networks detect without depth and are therefore outside: their detections are passed to `add_detections`. The
+    methods are thread-safe.
 
     Parameters
     ----------
@@ -158,7 +158,8 @@ class PeoplePipeline(object):
             self.estimation_stages[camera] = EstimationStage(settings.bbox3d[0], events)
             if settings.detector == 'depth':
                 self.detection_stages[camera] = DepthDetectionStage(*settings.depth, events)
-            self._sources[camera] = settings.source(camera, events, functools.partial(self._on_match, camera), transforms)
+            on_match = functools.partial(self._on_match, camera)
+            self._sources[camera] = settings.source(camera, events, on_match, transforms)
         self._lock, self._processing = threading.Lock(), threading.RLock()
         self._matches, self._now_ns = [], 0  # complete 2D boxes; arrival time of the message that is being processed
 
