@@ -199,6 +199,11 @@ def transform_from_msg(message):
                           (rotation.x, rotation.y, rotation.z, rotation.w))
 
 
+def header_of(frame):
+    """Return the header of the results of an RgbdFrame."""
+    return Header(stamp=time_from(frame.stamp_ns), frame_id=frame.frame_id)
+
+
 def boxes3d_to_msg(boxes, header, camera):
     """Convert 3D boxes (`box3d.Box3D`) to BoundingBox3DArray. Inverse of `boxes3d_from_msg`."""
     array = BoundingBox3DArray(header=header)

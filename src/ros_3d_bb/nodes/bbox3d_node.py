@@ -3,14 +3,14 @@ import threading
 
 import rospy
 from sensor_msgs.msg import CameraInfo, Image
-from std_msgs.msg import Header, Int32MultiArray
+from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault
 from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS,
                                                info_of_images, info_topic_beside, uncompressed)
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg, camera_from_msg,
-                                                   stamp_of, time_from)
+                                                   header_of, stamp_of)
 from ros_3d_bb.core.labels import described
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.time_sync import NS, MessageCache, arrival_clock_ns
@@ -112,10 +112,10 @@ class Bbox3dNode(object):
         with self._diagnostics.rejecting('2D boxes'):
             frame = self._source.frame(boxes2d, depth_msg, camera)
             boxes3d = self._stage.estimate(frame, boxes2d)
-            header = Header(stamp=time_from(frame.stamp_ns), frame_id=frame.frame_id)
-            self._boxes_pub.publish(boxes3d_to_msg(boxes3d, header, camera))
-            self._diagnostics.record_latency(header.stamp)
-            self._images.publish(header, frame.received_depth, boxes3d)
+            message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received_camera)
+            self._boxes_pub.publish(message)
+            self._diagnostics.record_latency(message.header.stamp)
+            self._images.publish(message.header, frame.received_depth, boxes3d)
 
 
 class DepthCameraCheck(object):

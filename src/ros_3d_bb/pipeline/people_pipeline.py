@@ -1,18 +1,17 @@
-"""Detection, estimation and tracking in one process, for process_bag and people_node."""
+"""Detection, estimation and tracking of the messages of a bag, as the nodes do it."""
 import contextlib
 import functools
-import threading
 from typing import NamedTuple, Optional, Tuple
 
 from sensor_msgs.msg import CameraInfo
-from std_msgs.msg import Header, Int32MultiArray
+from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, IMAGE_KINDS,
                                                INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, info_of_images, topic_of,
                                                uncompressed)
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, Boxes2D, boxes2d_from_msg,
-                                                   boxes3d_to_msg, detections2d_to_msg, time_from, tracks_to_msg)
+                                                   boxes3d_to_msg, detections2d_to_msg, header_of, tracks_to_msg)
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.detection.network_detector import DetectionParams
@@ -102,12 +101,12 @@ class CollectedResults(object):
         messages, self._messages = self._messages, []
         return messages
 
-    def on_boxes2d(self, camera, message, _image, _detections, _names):
-        """Add an Int32MultiArray, given the image as received, and the Detections of classes with these names."""
+    def on_boxes2d(self, camera, message):
+        """Add an Int32MultiArray."""
         self._messages.append((topic_of(camera, BOXES_TOPIC), message))
 
-    def on_boxes3d(self, camera, message, _frame, _boxes3d):
-        """Add a BoundingBox3DArray, given its RgbdFrame and Box3Ds."""
+    def on_boxes3d(self, camera, message):
+        """Add a BoundingBox3DArray."""
         self._messages.append((topic_of(camera, BOXES3D_TOPIC), message))
 
     def on_tracks(self, tracks, header):
@@ -118,10 +117,9 @@ class CollectedResults(object):
 
 
 class PeoplePipeline(object):
-    """The three stages in one process: detection and estimation of each camera, and tracking.
+    """The three stages: detection and estimation of each camera, and tracking.
 
-    Networks detect without depth and are therefore outside: their detections are passed to `add_detections`. The
-    methods are thread-safe.
+    Networks detect without depth and are therefore outside: their detections are passed to `add_detections`.
 
     Parameters
     ----------
@@ -131,16 +129,6 @@ class PeoplePipeline(object):
         As for `tracking_stage.TrackingStage`.
     results
         Receives the results, by the methods of `CollectedResults` whose names begin with `on_`.
-    last_id : int
-        The IDs of tracks are greater.
-    offer : callable, optional
-        Called with the arguments of `detect` when they are complete. By default, `detect` is called.
-
-    Attributes
-    ----------
-    tracking_stage : tracking_stage.TrackingStage
-    estimation_stages, detection_stages : dict
-        By camera; there are detection stages for the detector depth only.
 
     Raises
     ------
@@ -148,31 +136,30 @@ class PeoplePipeline(object):
         If a parameter is invalid.
     """
 
-    def __init__(self, settings, events, transforms, results, last_id=0, offer=None):
+    def __init__(self, settings, events, transforms, results):
         self._settings, self._events, self._results = settings, events, results
-        self._offer = offer or self.detect
         tracker_params, _marker_params, *tracking = settings.tracker
-        self.tracking_stage = TrackingStage(tracker_params, tracking, events, transforms, results.on_tracks, last_id)
-        self.estimation_stages, self.detection_stages, self._sources = {}, {}, {}
+        self._tracking_stage = TrackingStage(tracker_params, tracking, events, transforms, results.on_tracks)
+        self._sources, self._detection_stages, self._estimation_stages = {}, {}, {}  # by camera
         for camera in settings.cameras:
-            self.estimation_stages[camera] = EstimationStage(settings.bbox3d[0], events)
-            if settings.detector == 'depth':
-                self.detection_stages[camera] = DepthDetectionStage(*settings.depth, events)
             on_match = functools.partial(self._on_match, camera)
             self._sources[camera] = settings.source(camera, events, on_match, transforms)
-        self._lock, self._processing = threading.Lock(), threading.RLock()
-        self._matches, self._now_ns = [], 0  # complete 2D boxes; arrival time of the message that is being processed
+            self._estimation_stages[camera] = EstimationStage(settings.bbox3d[0], events)
+            if settings.detector == 'depth':
+                self._detection_stages[camera] = DepthDetectionStage(*settings.depth, events)
+        self._now_ns = 0  # time of the message that is being processed
 
     def take(self, topic, message, now_ns, camera=''):
         """Process a message on one of the `INPUTS` except tf, which arrived at `now_ns`. Raises ValueError."""
-        source, tracking_stage = self._sources[camera], self.tracking_stage
+        self._now_ns = now_ns
+        source, tracking_stage = self._sources[camera], self._tracking_stage
         if topic in INFO_TOPICS:
             images = COLOR_INFO_IMAGES[self._settings.bbox3d[0].depth] if topic == INFO_TOPIC else DEPTH_TOPIC
             message = info_of_images(message, self._settings.name(images, camera))
         if topic == INFO_TOPIC:
             if tracking_stage.uses_camera_info:
                 tracking_stage.add_camera_info(message, camera)
-            self._add(source.add_camera_info, message, now_ns)
+            source.add_camera_info(message, now_ns)
         elif topic == DEPTH_INFO_TOPIC:
             if tracking_stage.uses_depth:
                 tracking_stage.add_depth_camera_info(message, camera)
@@ -181,30 +168,18 @@ class PeoplePipeline(object):
             message = uncompressed(message)  # once for all stages
             if tracking_stage.uses_depth:
                 tracking_stage.add_depth(message, now_ns, camera)
-            self._add(source.add_depth, message, now_ns)
+            source.add_depth(message, now_ns)
         elif topic == COLOR_TOPIC:
-            self._add(source.add_color, message, now_ns)
+            source.add_color(message, now_ns)
         else:
-            self._add(source.add_boxes, message, now_ns)
+            source.add_boxes(message, now_ns)
 
-    def detect(self, camera, *messages):
-        """Detect people in the matched images of a camera, the arguments of `RgbdSource.frame`, and track them."""
-        with self.detecting():
-            frame = self._sources[camera].frame(*messages)
-            detections = self.detection_stages[camera].detect(frame)
-            if detections is None:
-                return
-            header = messages[0].header
-            message = self._boxes2d(camera, header, frame.received_color, detections, DepthDetectionStage.names)
-            if message is not None:
-                self._events.count('arrays of 2D boxes')
-                self._estimate_and_track(camera, frame, boxes2d_from_msg(message))
-
-    def add_detections(self, header, image, detections, names, now_ns, camera=''):
-        """Process the detections in a received colour image with the given header; `names` are those of the classes."""
-        message = self._boxes2d(camera, header, image, detections, names)
+    def add_detections(self, header, detections, names, now_ns, camera=''):
+        """Process the Detections in a received colour image with the given header; `names` are those of the classes."""
+        self._now_ns = now_ns
+        message = self._boxes2d(camera, header, detections, names)
         if message is not None:
-            self._add(self._sources[camera].add_boxes, message, now_ns)
+            self._sources[camera].add_boxes(message, now_ns)
 
     @contextlib.contextmanager
     def detecting(self):
@@ -220,38 +195,35 @@ class PeoplePipeline(object):
         for source in self._sources.values():
             source.end()
 
-    def _add(self, add, message, now_ns):
-        """Add a message to a source, and process the 2D boxes that are complete with it."""
-        with self._lock:
-            self._now_ns = now_ns
-            try:
-                add(message, now_ns)
-            finally:
-                matches, self._matches = self._matches, []
-        for camera, boxes2d, depth_msg, camera_model in matches:
-            with self._events.rejecting('2D boxes'):
-                frame = self._sources[camera].frame(boxes2d, depth_msg, camera_model)
-                self._estimate_and_track(camera, frame, boxes2d)
-
-    def _on_match(self, camera, trigger, depth_msg, camera_model):
+    def _on_match(self, camera, trigger, *messages):
         if isinstance(trigger, Boxes2D):
-            self._matches.append((camera, trigger, depth_msg, camera_model))
+            with self._events.rejecting('2D boxes'):
+                self._estimate_and_track(camera, self._sources[camera].frame(trigger, *messages), trigger)
         else:
-            self._offer(camera, trigger, depth_msg, camera_model)
+            with self.detecting():
+                self._detect(camera, trigger.header, self._sources[camera].frame(trigger, *messages))
 
-    def _boxes2d(self, camera, header, image, detections, names):
-        """Return the message of detections, None if it is not published."""
+    def _detect(self, camera, header, frame):
+        """Detect people in a frame, and track them."""
+        detections = self._detection_stages[camera].detect(frame)
+        if detections is None:
+            return
+        message = self._boxes2d(camera, header, detections, DepthDetectionStage.names)
+        if message is not None:
+            self._events.count('arrays of 2D boxes')
+            self._estimate_and_track(camera, frame, boxes2d_from_msg(message))
+
+    def _boxes2d(self, camera, header, detections, names):
+        """Return the message of Detections, None if it is not published."""
         if not len(detections.boxes) and not self._settings.publish_empty:
             return None
         message = detections2d_to_msg(detections, names, header)
-        self._results.on_boxes2d(camera, message, image, detections, names)
+        self._results.on_boxes2d(camera, message)
         return message
 
     def _estimate_and_track(self, camera, frame, boxes2d):
-        with self._processing:  # in the order of the images
-            boxes3d = self.estimation_stages[camera].estimate(frame, boxes2d)
-            header = Header(stamp=time_from(frame.stamp_ns), frame_id=frame.frame_id)
-            message = boxes3d_to_msg(boxes3d, header, frame.received_camera)
-            self._results.on_boxes3d(camera, message, frame, boxes3d)
-            with self._events.rejecting('3D boxes'):
-                self.tracking_stage.add_boxes(message, self._now_ns, camera)
+        boxes3d = self._estimation_stages[camera].estimate(frame, boxes2d)
+        message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received_camera)
+        self._results.on_boxes3d(camera, message)
+        with self._events.rejecting('3D boxes'):
+            self._tracking_stage.add_boxes(message, self._now_ns, camera)
