@@ -62,7 +62,7 @@ class Connections(object):
         return self.publishers[topic]
 
     def _subscriber(self, topic, kind, callback, **_options):
-        self.subscribers[topic] = mock.Mock(topic=topic, kind=kind, callback=callback)
+        self.subscribers[topic] = mock.Mock(topic=topic, kind=kind, callback=callback, resolved_name='/' + topic)
         return self.subscribers[topic]
 
     def _buffer(self):
@@ -79,12 +79,13 @@ def masterless(params=()):
         'rospy.Service': lambda name, kind, _handler: connections.services.update({name: kind}),
         'rospy.Timer': lambda period, callback, **_options: connections.timers.append((period.to_sec(), callback)),
         'rospy.on_shutdown': mock.Mock(), 'rospy.set_param': mock.Mock(),
-        'rospy.get_param': lambda name, default=None: dict(params) if name == '~' else default,
+        'rospy.get_param': lambda name, default=None: (
+            dict(params) if name == '~' else dict(params).get(name.lstrip('~'), default)),
         'rospy.resolve_name': lambda name: '/' + name, 'rospy.is_shutdown': lambda: False,
         'rospy.get_rostime': lambda: connections.now, 'rospy.rostime.get_rostime': lambda: connections.now,
         'rospy.logwarn_throttle': lambda _period_s, text, *arguments: text % arguments,
         'ros_3d_bb.nodes.common.tf_lookup.TransformBuffer': connections._buffer,
-        'diagnostic_updater.Updater': mock.Mock(),
+        'ros_3d_bb.nodes.common.subscribers._inputs': [], 'diagnostic_updater.Updater': mock.Mock(),
         'ros_3d_bb.nodes.common.detector_output.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.tracker_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.bbox3d_node.NewestWorker': immediate_worker,

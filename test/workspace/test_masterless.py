@@ -8,6 +8,7 @@ from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
+from ros_3d_bb.nodes.people_node import PeopleNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
@@ -35,7 +36,8 @@ def bags(request, tmp_path_factory):
 
 @pytest.mark.parametrize('node_class, input_bag, params, topics', [
     (DepthDetectorNode, 0, {}, ['yolo_bounding_box']), (Bbox3dNode, 1, {}, ['ros_3d_bb/bb_3d']),
-    (TrackerNode, 1, {'tf_timeout': 0.0}, ['ros_3d_bb/tracks', 'visualization_marker_array'])])
+    (TrackerNode, 1, {'tf_timeout': 0.0}, ['ros_3d_bb/tracks', 'visualization_marker_array']),
+    (PeopleNode, 0, {'detector': 'depth'}, ['yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'])])
 def test_process_bag_writes_the_messages_that_the_nodes_publish(bags, node_class, input_bag, params, topics):
     found = published(node_class, bags[input_bag], params, topics)
     with rosbag.Bag(bags[1]) as bag:

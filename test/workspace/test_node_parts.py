@@ -45,7 +45,7 @@ def test_a_request_to_a_master_that_hangs_ends(monkeypatch):
 
 def test_a_master_that_hangs_is_queried_once_for_all_silent_inputs():
     """Each failed query takes two seconds, in which nothing is published on /diagnostics."""
-    silent = [subscribers.Input('topic', Image, None) for _input in range(3)]
+    silent = [subscribers.Input('topic', Image) for _input in range(3)]
     for number, each in enumerate(silent):
         each.subscriber = mock.Mock(resolved_name='/topic%d' % number)
     query = mock.Mock(side_effect=socket.timeout('timed out'))

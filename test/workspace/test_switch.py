@@ -7,6 +7,7 @@ from std_srvs.srv import SetBoolRequest
 
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
+from ros_3d_bb.nodes.common.part import Part
 
 
 @pytest.fixture
@@ -28,7 +29,7 @@ def rig(now_s):
     diagnostics, path = EventCounter(), 'ros_3d_bb.nodes.common.detector_output.'
     diagnostics.show, diagnostics.check = mock.Mock(), mock.Mock()
     with mock.patch(path + 'rospy') as rospy, mock.patch(path + 'NewestWorker') as thread:
-        worker = DetectorWorker(SimpleNamespace(enabled=True, publish_empty=True), diagnostics, detect, ())
+        worker = DetectorWorker(SimpleNamespace(enabled=True, publish_empty=True), diagnostics, detect, (), Part())
     yield SimpleNamespace(offer=worker.offer, enable=rospy.Service.call_args[0][2], work=thread.call_args[0][0],
                           state=diagnostics.show.call_args[0][1],
                           faults=lambda: list(diagnostics.check.call_args[0][0]()))

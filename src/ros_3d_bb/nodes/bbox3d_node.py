@@ -17,6 +17,7 @@ from ros_3d_bb.core.time_sync import NS, MessageCache, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import patient_master
+from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
@@ -55,14 +56,15 @@ class Bbox3dNode(object):
         3D boxes in the optical frame of the camera, with the stamp of the image in which they were detected.
     """
 
-    def __init__(self):
-        params, = read_params(Bbox3dParams)
-        self._diagnostics = Diagnostics()
+    def __init__(self, part=Part()):
+        params, = read_params(Bbox3dParams, namespace=part.namespace)
+        self._diagnostics = part.diagnostics or Diagnostics()
+        self._next_stage = part.next_stage
         depth_topic, is_raw = DEPTH_TOPICS[params.depth][0], params.depth == RAW
         depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
         self._stage = EstimationStage(params, self._diagnostics)
-        self._source = RgbdSource(params, self._diagnostics, self._on_match,
-                                  Transforms(wait_s=0) if params.floor_frame or is_raw else None,
+        transforms = (part.transforms or Transforms(wait_s=0)) if params.floor_frame or is_raw else None
+        self._source = RgbdSource(params, self._diagnostics, self._on_match, transforms,
                                   (rospy.resolve_name(depth_topic), depth_info_topic,
                                    rospy.resolve_name(INFO_TOPICS[0])), params.cache_length, params.assumed_delay)
         self._lock = threading.Lock()
@@ -78,8 +80,9 @@ class Bbox3dNode(object):
         # Depth images are cached until their boxes arrive, so the subscriber queues must not drop any.
         subscribe(depth_topic, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe_camera_info(INFO_TOPICS[0], COLOR_INFO_IMAGES[params.depth], self._on_camera_info)
-        subscribe(BOXES_TOPIC, Int32MultiArray, self._on_boxes)
-        self._reconfigure_server = ReconfigureServer([params], self._reconfigure)
+        if part.subscribes:
+            subscribe(BOXES_TOPIC, Int32MultiArray, self.on_boxes)
+        ReconfigureServer([params], self._reconfigure, part.namespace)
 
     def _reconfigure(self, params):
         with self._lock:
@@ -103,7 +106,8 @@ class Bbox3dNode(object):
         with self._diagnostics.receiving('depth images'), self._lock:
             self._source.add_depth(message, arrival_clock_ns())
 
-    def _on_boxes(self, message):
+    def on_boxes(self, message):
+        """Process the 2D boxes of an image."""
         with self._diagnostics.receiving('2D boxes'), self._lock:
             self._source.add_boxes(message, arrival_clock_ns())
 
@@ -114,7 +118,10 @@ class Bbox3dNode(object):
             boxes3d = self._stage.estimate(frame, boxes2d)
             message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received_camera)
             self._boxes_pub.publish(message)
-            self._diagnostics.record_latency(message.header.stamp)
+            if self._next_stage is None:
+                self._diagnostics.record_latency(message.header.stamp)
+            else:
+                self._next_stage(message)
             self._images.publish(message.header, frame.received_depth, boxes3d)
 
 

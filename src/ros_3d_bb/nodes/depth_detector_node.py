@@ -10,6 +10,7 @@ from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
@@ -41,17 +42,17 @@ class DepthDetectorNode(object):
         As /tf.
     """
 
-    def __init__(self):
-        params, people = read_params(DepthDetectorParams, DepthPeopleParams)
-        self._diagnostics = Diagnostics()
+    def __init__(self, part=Part()):
+        params, people = read_params(DepthDetectorParams, DepthPeopleParams, namespace=part.namespace)
+        self._diagnostics = part.diagnostics or Diagnostics()
         depth_topic, is_raw = DEPTH_TOPICS[params.depth][0], params.depth == RAW
         depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
-        transforms = Transforms(wait_s=0) if params.floor_frame or is_raw else None
-        if transforms is not None:
+        transforms = (part.transforms or Transforms(wait_s=0)) if params.floor_frame or is_raw else None
+        if transforms is not None and part.transforms is None:
             self._diagnostics.show('tf age', transforms.age)
         self._lock, self._detecting = threading.Lock(), threading.Lock()
         self._stage = DepthDetectionStage(params, people, self._diagnostics)
-        self._worker = DetectorWorker(params, self._diagnostics, self._detect, self._stage.names)
+        self._worker = DetectorWorker(params, self._diagnostics, self._detect, self._stage.names, part)
         self._source = RgbdSource(params, self._diagnostics, self._worker.offer, transforms,
                                   (rospy.resolve_name(depth_topic), depth_info_topic,
                                    rospy.resolve_name(INFO_TOPICS[0])))
@@ -60,7 +61,7 @@ class DepthDetectorNode(object):
             subscribe_camera_info(depth_info_topic, depth_topic, self._on_depth_camera_info, 1)
         subscribe(depth_topic, Image, self._on_depth, KEPT_AT_ONCE)
         subscribe(COLOR_TOPIC, Image, self._on_color)
-        ReconfigureServer([params, people], self._reconfigure)
+        ReconfigureServer([params, people], self._reconfigure, part.namespace)
 
     def _reconfigure(self, params, people):
         with self._detecting:

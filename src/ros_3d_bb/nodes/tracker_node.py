@@ -13,6 +13,7 @@ from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import on_new_master
+from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
@@ -55,27 +56,29 @@ class TrackerNode(object):
         The tracks as markers for RViz; published only if there are subscribers.
     """
 
-    def __init__(self):
-        params, marker_params, *tracking = given = read_params(TrackerNodeParams, MarkerParams, *TRACKING_PARAMS)
+    def __init__(self, part=Part()):
+        params, marker_params, *tracking = given = read_params(TrackerNodeParams, MarkerParams, *TRACKING_PARAMS,
+                                                               namespace=part.namespace)
         self._markers = MarkerWriter(marker_params)
-        self._diagnostics = Diagnostics()
-        transforms = Transforms(params.tf_timeout)
-        self._diagnostics.show('tf age', transforms.age)
-        self._track_ids = TrackIdReservation(self._diagnostics)
-        self._stage = TrackingStage(params, tracking, self._diagnostics, transforms, self._on_tracks,
+        self._diagnostics = part.diagnostics or Diagnostics()
+        self.transforms = Transforms(params.tf_timeout)
+        self._diagnostics.show('tf age', self.transforms.age)
+        self._track_ids = TrackIdReservation(self._diagnostics, part.namespace)
+        self._stage = TrackingStage(params, tracking, self._diagnostics, self.transforms, self._on_tracks,
                                     self._track_ids.last_id)
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
         for camera in self._stage.cameras:
-            self._subscribe(camera, params.depth)
-        self._reconfigure_server = ReconfigureServer(given, self._reconfigure)
+            self._subscribe(camera, params.depth, part.subscribes)
+        ReconfigureServer(given, self._reconfigure, part.namespace)
 
-    def _subscribe(self, camera, depth):
+    def _subscribe(self, camera, depth, with_boxes):
         depth_topic = topic_of(camera, DEPTH_TOPICS[depth][0])
 
         def of_camera(callback):
             return functools.partial(callback, camera=camera)
-        subscribe(topic_of(camera, BOXES3D_TOPIC), BoundingBox3DArray, of_camera(self._on_boxes))
+        if with_boxes:
+            subscribe(topic_of(camera, BOXES3D_TOPIC), BoundingBox3DArray, of_camera(self.on_boxes))
         if self._stage.uses_camera_info:
             subscribe_camera_info(topic_of(camera, INFO_TOPICS[0]), topic_of(camera, COLOR_INFO_IMAGES[depth]),
                                   of_camera(self._on_camera_info), 1)
@@ -102,7 +105,8 @@ class TrackerNode(object):
         with self._diagnostics.receiving('depth images'):
             self._stage.add_depth(message, arrival_clock_ns(), camera)
 
-    def _on_boxes(self, message, camera):
+    def on_boxes(self, message, camera=''):
+        """Process the 3D boxes of an image."""
         with self._diagnostics.receiving('3D boxes'):
             self._stage.add_boxes(message, arrival_clock_ns(), camera)
 
@@ -127,8 +131,9 @@ class TrackIdReservation(object):
         If the parameter is not a valid ID.
     """
 
-    def __init__(self, diagnostics):
-        self._diagnostics, self._name = diagnostics, rospy.get_name() + '_numbers'
+    def __init__(self, diagnostics, namespace):
+        node = rospy.get_name() if namespace == '~' else rospy.resolve_name(namespace.rstrip('/'))
+        self._diagnostics, self._name = diagnostics, node + '_numbers'
         self.last_id = rospy.get_param(self._name, 0)
         if type(self.last_id) is not int or not 0 <= self.last_id <= LARGEST_PARAM - RESERVED_IDS:
             raise ValueError('parameter %s is %r; the largest track ID so far expected' % (self._name, self.last_id))

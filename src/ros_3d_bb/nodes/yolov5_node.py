@@ -11,6 +11,7 @@ from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import subscribe
@@ -36,19 +37,23 @@ class Yolov5Node(object):
         As /tf.
     """
 
-    def __init__(self):
-        params, detection, running = given = read_params(Yolov5NodeParams, DetectionParams, RuntimeParams)
+    def __init__(self, part=Part()):
+        params, detection, running = given = read_params(Yolov5NodeParams, DetectionParams, RuntimeParams,
+                                                         namespace=part.namespace)
         self._detector = open_detector(params.weights, detection, running, rospy.logwarn)
         self._params, self._sizes = detection, AdaptiveSize()
-        self._diagnostics = Diagnostics()
+        self._diagnostics = part.diagnostics or Diagnostics()
         self._diagnostics.show('image size', lambda: '%d pixels' % self._detector.input_px)
-        transforms = Transforms(wait_s=0)
-        self._rotation = CameraRotation(params, transforms, transforms.close)
-        self._worker = DetectorWorker(params, self._diagnostics, self._detect, self._detector.names)
+        if part.transforms is None:
+            transforms = Transforms(wait_s=0)
+            self._rotation = CameraRotation(params, transforms, transforms.close)
+        else:
+            self._rotation = CameraRotation(params, part.transforms)
+        self._worker = DetectorWorker(params, self._diagnostics, self._detect, self._detector.names, part)
         subscribe(COLOR_TOPIC, Image, self._on_image, 1)
         rospy.loginfo('detecting %s with %s on %s', ', '.join(map(str, detection.classes)), params.weights,
                       self._detector.description)
-        ReconfigureServer(given, self._reconfigure)
+        ReconfigureServer(given, self._reconfigure, part.namespace)
 
     def _reconfigure(self, _params, detection, _running):
         self._set_params(detection)

@@ -18,7 +18,8 @@ class DetectorWorker(object):
     """Detect objects in the newest images, and publish them for bbox3d_node and as an annotated image.
 
     `params` has `enabled` and `publish_empty`. `detect(*images)` is called in a thread of its own. It returns the RGB
-    image and its Detections, or None if there is no result; `names` are the names of the classes.
+    image and its Detections, or None if there is no result; `names` are the names of the classes. `part` is the Part of
+    the detector node.
 
     Publishes
     ---------
@@ -34,10 +35,10 @@ class DetectorWorker(object):
         Enables (true) or pauses (false) the detector.
     """
 
-    def __init__(self, params, diagnostics, detect, names):
+    def __init__(self, params, diagnostics, detect, names, part):
         self._publish_empty, self._diagnostics, self._detect, self._names = (
             params.publish_empty, diagnostics, detect, names)
-        self._enabled = params.enabled
+        self._enabled, self._next_stage = params.enabled, part.next_stage
         self._waits_since_s = None  # arrival of the oldest image since the last completed detection
         self._boxes_pub = rospy.Publisher('yolo_bounding_box', Int32MultiArray, queue_size=10)
         self._image_pub = rospy.Publisher('yolo_result_out', Image, queue_size=1)
@@ -45,7 +46,7 @@ class DetectorWorker(object):
         rospy.on_shutdown(self._worker.stop)
         diagnostics.show('detector', lambda: 'working' if self._enabled else 'paused')
         diagnostics.check(self._faults)
-        rospy.Service('~enable', SetBool, self._on_request)
+        rospy.Service(part.namespace + 'enable', SetBool, self._on_request)
 
     def offer(self, *images):
         """Detect objects in these images, of which the first is the colour image, unless newer ones arrive first."""
@@ -66,13 +67,17 @@ class DetectorWorker(object):
                 result = self._detect(*images)
                 if result is not None:
                     self._publish(images[0].header, *result)
-                    self._diagnostics.record_latency(images[0].header.stamp)
         finally:  # any outcome, such as a rejected image, shows that the detector works
             self._waits_since_s = None
 
     def _publish(self, header, image, detections):
         if len(detections.boxes) or self._publish_empty:
-            self._boxes_pub.publish(detections2d_to_msg(detections, self._names, header))
+            message = detections2d_to_msg(detections, self._names, header)
+            self._boxes_pub.publish(message)
+            if self._next_stage is not None:
+                self._next_stage(message)
+        if self._next_stage is None:
+            self._diagnostics.record_latency(header.stamp)
         if self._image_pub.get_num_connections():
             labels = ['%s %.2f' % (self._names[number], score)
                       for number, score in zip(detections.classes, detections.scores)]

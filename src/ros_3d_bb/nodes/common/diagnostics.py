@@ -135,7 +135,6 @@ class Diagnostics(EventCounter):
 
 def unsubscribed_results():
     """Return the result topics of this node if none of them has subscribers, otherwise an empty list."""
-    reconfigure = rospy.get_name() + '/parameter_'
     results = {topic: publisher for topic, publisher in sorted(get_topic_manager().pubs.items())
-               if topic not in NO_RESULTS and not topic.startswith(reconfigure)}
+               if topic not in NO_RESULTS and '/parameter_' not in topic}
     return [] if any(publisher.has_connections() for publisher in results.values()) else list(results)

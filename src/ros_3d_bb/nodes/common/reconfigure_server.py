@@ -9,6 +9,7 @@ from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
 from ros_3d_bb.core.params import params_from, table_of
 from ros_3d_bb.nodes.common.master import on_new_master
+from ros_3d_bb.nodes.common.startup import stored_params
 
 TYPES = {bool: 'bool', int: 'int', float: 'double', str: 'str', tuple: 'str'}  # the protocol has no lists
 
@@ -21,7 +22,8 @@ class ReconfigureServer(object):
     the current values, because an error would end the thread of rqt_reconfigure.
 
     `params` are all parameters of the node, as returned by `startup.read_params`. `apply` is called with the changed
-    parameters, in the same order. It raises ValueError without changing anything if they are invalid.
+    parameters, in the same order. It raises ValueError without changing anything if they are invalid. `namespace` is
+    that of the node, see `part.Part`.
 
     Publishes
     ---------
@@ -36,17 +38,19 @@ class ReconfigureServer(object):
         Changes the parameters that are marked Live, as used by rqt_reconfigure.
     """
 
-    def __init__(self, params, apply):
+    def __init__(self, params, apply, namespace='~'):
         self._params, self._apply, self._lock = list(params), apply, threading.Lock()
+        self._namespace = namespace
         self._live = live_in(type(each) for each in params)
         description = _description_of(self._live)
         self._groups = get_tree(description)
-        descriptions_pub = rospy.Publisher('~parameter_descriptions', ConfigDescription, queue_size=1, latch=True)
-        self._updates_pub = rospy.Publisher('~parameter_updates', Config, queue_size=1, latch=True)
-        self._store_changes(rospy.get_param('~', {}))
+        descriptions_pub = rospy.Publisher(namespace + 'parameter_descriptions', ConfigDescription, queue_size=1,
+                                           latch=True)
+        self._updates_pub = rospy.Publisher(namespace + 'parameter_updates', Config, queue_size=1, latch=True)
+        self._store_changes(stored_params(namespace))
         descriptions_pub.publish(description)
         self._updates_pub.publish(self._message())
-        rospy.Service('~set_parameters', Reconfigure, self._on_request)
+        rospy.Service(namespace + 'set_parameters', Reconfigure, self._on_request)
         on_new_master(lambda: self._store_changes({}))
 
     def _on_request(self, request):
@@ -80,7 +84,7 @@ class ReconfigureServer(object):
         values = self._values()
         changed = [name for name in self._live if name not in known or known[name] != values[name]]
         for name in changed:
-            rospy.set_param('~' + name, values[name])
+            rospy.set_param(self._namespace + name, values[name])
         return changed
 
     def _message(self):

@@ -16,9 +16,14 @@ M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # glibc's malloc.h
 LARGEST_BYTES = 32 * 2 ** 20  # limit of glibc
 
 
-def read_params(*kinds):
-    """Read the node's private parameters as instances of NamedTuple types. Raises ValueError, see `params_from`."""
-    return params_from(rospy.get_param('~', {}), *kinds)
+def read_params(*kinds, namespace='~'):
+    """Read the parameters of a node as instances of NamedTuple types. Raises ValueError, see `params_from`."""
+    return params_from(stored_params(namespace), *kinds)
+
+
+def stored_params(namespace='~'):
+    """The parameters of a node on the parameter server, as a dict; by default those of the node of this process."""
+    return rospy.get_param(namespace.rstrip('/'), {})
 
 
 def run_node(name, node_class, run=lambda _node: rospy.spin()):

@@ -27,14 +27,14 @@ _inputs, _lock = [], threading.Lock()  # of the process, which is one node
 class Input(object):
     """Statistics of the messages received on a topic of the node."""
 
-    def __init__(self, name, kind, callback):
-        self.name, self._kind, self._callback, self.subscriber = name, kind, callback, None
+    def __init__(self, name, kind):
+        self.name, self._kind, self.callbacks, self.subscriber = name, kind, [], None
         self.count, self.received_s, self._newest = 0, None, None  # `received_s` on time.monotonic()
         self.reported_count = 0  # at the last report of the rate
         self.silence, self.queried_s = '', -QUERY_PERIOD_S  # cause of a silence, and when the master was asked for it
 
     def take(self, message):
-        """Record a message and pass it to the callback."""
+        """Record a message and pass it to the callbacks."""
         if isinstance(message, rospy.AnyMsg):
             message = _image_in(message)
             if message is None:  # the diagnostics report the type of a topic without messages
@@ -44,7 +44,8 @@ class Input(object):
         header = getattr(message, 'header', None)
         if header is not None:
             self._newest = header.stamp, rospy.get_rostime(), time.time()
-        self._callback(message)
+        for callback in list(self.callbacks):
+            callback(message)
 
     def stream(self):
         """Return the statistics as a Stream. Lags are unknown without a stamp, and before the first /clock message."""
@@ -56,17 +57,40 @@ class Input(object):
 
 
 def subscribe(topic, kind, callback, at_once=AT_ONCE):
-    """Create a rospy.Subscriber with TCP_NODELAY, whose messages are recorded, see `inputs`.
+    """Subscribe with TCP_NODELAY to a topic whose messages are recorded, see `inputs`. Returns a Subscription.
 
     Without TCP_NODELAY, the kernel delays small messages by up to 40 ms, until previous ones are acknowledged. With
-    the kind Image, each publisher may send any of `camera_msgs.IMAGE_KINDS`, and the callback receives that type.
+    the kind Image, each publisher may send any of `camera_msgs.IMAGE_KINDS`, and the callback receives that type. A
+    topic that is subscribed already, by another node in this process, is received once.
     """
-    created, is_image = Input(topic, kind, callback), kind is Image
+    name, is_image = rospy.resolve_name(topic), kind is Image
+    with _lock:
+        shared = next((each for each in _inputs if each.callbacks and each.subscriber.resolved_name == name), None)
+        if shared is not None:
+            shared.callbacks.append(callback)
+            return Subscription(shared, callback)
+        created = Input(topic, kind)
+        created.callbacks.append(callback)
     created.subscriber = rospy.Subscriber(topic, rospy.AnyMsg if is_image else kind, created.take, queue_size=at_once,
                                           tcp_nodelay=True, buff_size=IMAGE_BUFFER if is_image else SMALL_BUFFER)
     with _lock:
         _inputs.append(created)
-    return created.subscriber
+    return Subscription(created, callback)
+
+
+class Subscription(object):
+    """One callback of an Input."""
+
+    def __init__(self, of_input, callback):
+        self._input, self._callback = of_input, callback
+
+    def unregister(self):
+        """Remove the callback; the last one unsubscribes from the topic."""
+        with _lock:
+            self._input.callbacks.remove(self._callback)
+            is_last = not self._input.callbacks
+        if is_last:
+            self._input.subscriber.unregister()
 
 
 def subscribe_camera_info(topic, image_topic, callback, at_once=KEPT_AT_ONCE):

@@ -52,12 +52,12 @@ class Transforms(object):
     def lookup(self, target_frame, source_frame, stamp):
         """Look up `target_from_source` (4, 4) at a stamp.
 
-        Raises tf2_ros.TransformException if the transform is not available within the timeout. The message names the
-        frames and the state of tf.
+        Raises tf2_ros.TransformException if the transform is not available within the timeout, which is not waited for
+        at the stamp 0, the latest transform. The message names the frames and the state of tf.
         """
         frames = target_frame.lstrip('/'), source_frame.lstrip('/')
         self._requested[frames] = time.monotonic()
-        deadline_s = time.monotonic() + self._wait_s
+        deadline_s = time.monotonic() + (self._wait_s if stamp else 0)
         with self._listener.news:
             while True:
                 try:
