@@ -98,7 +98,7 @@ def node_of(module_name):
     """The node in a module, with the topics and services of the classes in ros_3d_bb.nodes that it uses."""
     module = importlib.import_module(module_name)
     classes = [value for value in vars(module).values()
-               if inspect.isclass(value) and value.__module__.startswith(('ros_3d_bb.nodes.', module_name))]
+               if inspect.isclass(value) and value.__module__.startswith(('ros_3d_bb.nodes.common.', module_name))]
     node_class, = (kind for kind in classes if kind.__module__ == module.__name__ and kind.__name__.endswith('Node'))
     text, sections = split(node_class)
     for kind in classes:
@@ -213,7 +213,8 @@ def starting(node_name):
 def text_in_launch_file(node_name, parameter):
     """The doc= of the launch argument that sets a parameter; None without one."""
     for launch, element in starting(node_name):
-        for given in element.findall('param'):
+        groups = [group for group in launch.tree.iter('group') if group.get('ns') == node_name]
+        for given in itertools.chain(*(each.findall('param') for each in [element] + groups)):
             argument = re.match(r'^\$\(arg (\w+)\)$', given.get('value', ''))
             if given.get('name') == parameter and argument:
                 text, = (doc for name, _default, doc in launch.arguments if name == argument.group(1))

@@ -18,7 +18,8 @@ def node():
     rospy.init_node('test_pipeline')
 
 
-def test_playback_tracks_the_person_in_the_map(session_folder, weights, tmp_path):
+@pytest.mark.parametrize('single_process', ['false', 'true'])
+def test_playback_tracks_the_person_in_the_map(single_process, session_folder, weights, tmp_path):
     """From the images of a session alone, with the detector.
 
     The person jumps every five images; then a new track is started, which is published from the fourth image on.
@@ -30,7 +31,7 @@ def test_playback_tracks_the_person_in_the_map(session_folder, weights, tmp_path
             Recorder('ros_3d_bb/tracks', TrackedObjectArray, False) as tracks, \
             Recorder('visualization_marker_array', MarkerArray, False) as markers, \
             launched('playback.launch', 'bag:=' + path, 'weights:=' + weights, 'rviz:=false', 'exit_at_end:=true',
-                     'delay:=10') as process:
+                     'single_process:=' + single_process, 'delay:=10') as process:
         process.wait()
     assert len(boxes.messages) > len(frames) / 2
     assert all(message.header.stamp.to_nsec() in frames for message in boxes.messages + tracks.messages)

@@ -9,6 +9,7 @@ import pytest
 
 from fuzz.nodes import TARGETS, send_image
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.nodes.people_node import PeopleNode
 from ros_3d_bb.nodes.realsense_node import RealSenseNode
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import LatencyProbeNode
 from ros_3d_bb_lab.evaluation.latency.replay_node import ReplayNode
@@ -28,7 +29,8 @@ MORE_PARAMS = {'planner_bridge_node': {'outputs': 'costmap, people, teb, mpc, vi
                'simulator_node': {'scenario': SCENARIO, 'publish_clock': True, 'drive': True, 'boxes': True,
                                   'supervised': True}}
 OTHERS = {'realsense_node': RealSenseNode, 'replay_node': ReplayNode, 'simulator_node': SimulatorNode,
-          'latency_probe_node': LatencyProbeNode, 'navigation_trial_node': NavigationTrialNode}
+          'latency_probe_node': LatencyProbeNode, 'navigation_trial_node': NavigationTrialNode,
+          'people_node': PeopleNode}
 OPTIONAL_PACKAGES = 'people_msgs', 'costmap_converter', 'derived_object_msgs', 'vision_msgs'
 
 
@@ -66,7 +68,8 @@ def test_pages_and_parameter_files_are_up_to_date(path):
 
 
 @pytest.mark.parametrize('name', [pytest.param(name, marks=pytest.mark.needs('pyrealsense2'))
-                                  if name == 'realsense_node' else name for name in sorted(NODES)])
+                                  if name == 'realsense_node' else name
+                                  for name in sorted(set(NODES) - {'people_node'})])  # which connects as its parts do
 def test_a_node_connects_to_the_topics_and_services_of_its_docstring(name):
     with connected(name) as (node, connections), mock.patch('rospy.ServiceProxy') as proxy:
         for section, found in (('Subscribes', connections.subscribers), ('Publishes', connections.publishers)):

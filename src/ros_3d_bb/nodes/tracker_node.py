@@ -131,7 +131,7 @@ class TrackIdReservation(object):
         If the parameter is not a valid ID.
     """
 
-    def __init__(self, diagnostics, namespace):
+    def __init__(self, diagnostics, namespace='~'):
         node = rospy.get_name() if namespace == '~' else rospy.resolve_name(namespace.rstrip('/'))
         self._diagnostics, self._name = diagnostics, node + '_numbers'
         self.last_id = rospy.get_param(self._name, 0)
