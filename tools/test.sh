@@ -19,7 +19,6 @@ run_tests() {
 }
 
 run_all_tests() {
-  apt_packages+=(chromium)  # in which a test reads the site
   build
   say "running all tests (data: ${ROS_3D_BB_DATA:-made by the tests})"
   rm -rf "$workspace/build/test_results"
@@ -68,7 +67,6 @@ run_some_tests() {
     shift
   done
   [ ${#paths[@]} -gt 0 ] || paths=("$here/test/unit" "$here/test/workspace")
-  apt_packages+=(chromium)
   if [[ "${paths[*]}" = *"$here/test/gazebo"* ]]; then
     has_gazebo || fail "this machine has no Gazebo 11: ./run test --platform bullseye test/gazebo"
     build_gazebo
