@@ -1,6 +1,5 @@
 """Detectors in ONNX files: agreement with ultralytics, input formats, YAML files beside them, and rejected files."""
 import os
-import resource
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from ros_3d_bb.detection.onnx.heads import HEADS, P3, P6
 from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
 from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5 import backends
-from ros_3d_bb.detection.yolov5.onnx_writer import Graph, metadata_entry
 from ros_3d_bb.sessions.session_reader import read_color, read_session
 from support.onnx_files import FLOAT, FLOAT16, UINT8, outputs_of, write_constant_network, write_mean_network
 
@@ -262,44 +260,9 @@ def test_metadata_that_cannot_be_used_is_rejected(tmp_path, metadata, reason):
         OnnxModel(path, 1)
 
 
-def write_graph(path, kind, inputs=(), **attributes):
-    """Write a network whose output is that of one operator beside the image."""
-    graph = Graph()
-    value = graph.node(kind, [graph.constant(entry) for entry in inputs] or ['images'], **attributes)
-    path.write_bytes(graph.model([('images', FLOAT, (1, 3, 96, 128))], [(value, FLOAT, ('a', 'b', 'c'))], {}))
-    return str(path)
-
-
-def test_a_network_that_would_fill_the_memory_is_rejected(tmp_path):
-    path = write_graph(tmp_path / 'a.onnx', 'ConstantOfShape', [np.array([1, 100000, 100000], np.int64)])
-    limits = resource.getrlimit(resource.RLIMIT_DATA)
-    with pytest.raises(WeightsError, match='a.onnx'):
-        OnnxModel(path, 1)
-    assert resource.getrlimit(resource.RLIMIT_DATA) == limits
-    assert np.ones(300 * 2 ** 20, np.uint8).sum() == 300 * 2 ** 20  # more memory than the limit left
-
-
-def test_networks_that_may_never_end_are_rejected(tmp_path):
-    with pytest.raises(WeightsError, match='operator Loop'):
-        OnnxModel(write_graph(tmp_path / 'a.onnx', 'Loop'), 1)
-
-
-def test_weights_in_other_files_are_not_read(tmp_path):
-    """As in models of more than 2 GB, or in files that name /etc/passwd as weights."""
-    tensor = metadata_entry('location', '/etc/passwd')[2:]  # StringStringEntryProto
-    external = bytes([13 << 3 | 2, len(tensor)]) + tensor
-    graph = bytes([5 << 3 | 2, len(external)]) + external
-    path = tmp_path / 'a.onnx'
-    path.write_bytes(bytes([7 << 3 | 2, len(graph)]) + graph)
-    with pytest.raises(WeightsError, match='another file'):
-        OnnxModel(str(path), 1)
-
-
-@pytest.mark.parametrize('content, reason', [
-    (b'\x3a\xff\x01abc', 'truncated'), (b'\xff' * 20, 'damaged'), (b'\x3b', 'not an ONNX'), (b'\x3a', 'truncated'),
-    (b'', 'a.onnx'), (b'nonsense', 'not an ONNX')])
-def test_damaged_files_are_rejected(tmp_path, content, reason):
+@pytest.mark.parametrize('content', [b'\x3a\xff\x01abc', b'\xff' * 20, b'', b'nonsense'])
+def test_damaged_files_are_rejected(tmp_path, content):
     path = tmp_path / 'a.onnx'
     path.write_bytes(content)
-    with pytest.raises(WeightsError, match=reason):
+    with pytest.raises(WeightsError, match='a.onnx'):
         OnnxModel(str(path), 1)
