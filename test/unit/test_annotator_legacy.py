@@ -1,11 +1,9 @@
 """Old format of the thesis: it can be annotated, lost data are reported, and nothing in it is executed."""
 import os
 
-import numpy as np
 import pytest
 
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
-from ros_3d_bb_annotator.analysis import analyse
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.export import thesis_rows_of
 from ros_3d_bb_annotator.validation import problems_of
@@ -27,13 +25,6 @@ def test_positions_times_and_images_are_read(tmp_path):
     assert document.measurements[2].color_path == document.measurements[3].color_path
 
 
-def test_the_first_campaign_has_no_semicolon_and_no_raw_images(tmp_path):
-    lines = '[(-2, 5, 288), (123, 24, 288)] 18-03-2021-12-34-53', '[(12, 5, 295)] 18-03-2021-12-34-55'
-    document = Document.open(write_old_session(str(tmp_path), lines, ('color', 'depth')))
-    assert [len(measurement.detections) for measurement in document.measurements] == [2, 1]
-    assert document.color(0)[0, 0].tolist() == [200] * 3
-
-
 def test_lost_data_are_reported_and_nothing_is_estimated(tmp_path):
     document = Document.open(write_old_session(str(tmp_path)))
     text = ' '.join(document.notes)
@@ -42,12 +33,6 @@ def test_lost_data_are_reported_and_nothing_is_estimated(tmp_path):
                 lambda index: document.add_box(index, (1, 1, 9, 9))):
         with pytest.raises(SessionError, match='cannot be recovered'):
             use(0)
-
-
-@pytest.mark.parametrize('bits,kind', [(8, np.uint8), (16, np.uint16)])
-def test_stretched_depth_can_be_shown(tmp_path, bits, kind):
-    picture = Document.open(write_old_session(str(tmp_path), bits=bits)).stretched_depth(0)
-    assert picture.dtype == kind and picture.shape == (48, 64) and picture.max() == 2 ** bits - 1
 
 
 def test_truth_is_saved_in_another_file_and_the_text_is_unchanged(tmp_path):
@@ -64,22 +49,6 @@ def test_truth_is_saved_in_another_file_and_the_text_is_unchanged(tmp_path):
     assert all('depth' not in entry for entry in read_json(tmp_path)['frames'])  # it must not be used as distances
     with pytest.raises(SessionError, match="'camera'"):
         read_session(str(tmp_path))
-
-
-@pytest.mark.slow
-def test_the_recorded_positions_are_analysed(tmp_path):
-    random = np.random.RandomState(3)
-    places = [(x, z) for z in (1000, 2000, 3000) for x in (-600, 0, 600)] * 4
-    lines = ['[(%d, 0, %d)];%04d' % (x + random.randint(-9, 10), z + random.randint(-9, 10), number)
-             for number, (x, z) in enumerate(places)]
-    document = Document.open(write_old_session(str(tmp_path), lines, kinds=()))
-    for index, (x_mm, z_mm) in enumerate(places):
-        document.set_truth(index, x_mm / 1000.0, z_mm / 1000.0)
-    analysed = analyse(document)
-    assert analysed.folder == str(tmp_path / 'analysis') and 'error_model.yaml' in os.listdir(analysed.folder)
-    assert analysed.text.startswith('f(z) = ') and len(analysed.figures) == 8
-    with pytest.raises(ValueError, match='recorded'):
-        analyse(document, estimator='foreground')
 
 
 @pytest.mark.parametrize('line', [
@@ -99,12 +68,6 @@ def test_an_invalid_line_is_shown_and_not_executed(tmp_path, monkeypatch, line):
     document.reject(1, 'no measurement')
     assert Document.open(str(tmp_path)).measurements[1].rejected == 'no measurement'
     assert not os.path.exists('run')
-
-
-def test_long_lines_are_parsed_quickly(tmp_path):
-    line = '[' + '(1, 2, 3), ' * 20000 + 'x];now'
-    document = Document.open(write_old_session(str(tmp_path), (LINES[0], line), kinds=()))
-    assert 'line 2' in document.measurements[1].problem
 
 
 @pytest.mark.parametrize('content', [b'', b'\n\n', b'import os\n', b'\xff\xfe\x00'])
