@@ -8,7 +8,6 @@ from conftest import DATA
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scenario_scores, scores_of, table
-from ros_3d_bb_lab.evaluation.accuracy_figure import draw, draw_errors, pyplot  # selects the backend
 from ros_3d_bb_lab.evaluation.scenes import position_errors_m
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -102,15 +101,3 @@ def test_the_keys_of_the_result_and_its_table(result):
             'per_frame'} == set(result)
     assert set(result['per_frame'][0]) == {'id', 'ours', 'thesis', 'truth', 'ours_raw', 'thesis_raw'}
     assert len(table(result)) == 13 and 'rmse_plane_m' in table(result)[3]
-
-
-def test_the_figure_compares_measured_and_predicted_errors(tmp_path):
-    """Errors of 0.1 m with predicted standard deviations of 0.1 m in X and in Z; one frame has no estimate."""
-    truth_m = np.array([[0.0, 1.2], [0.0, 1.2], [0.5, 3.2], [0.5, 3.2]])
-    position_m = np.insert(truth_m + [[0.1, 0.0], [-0.1, 0.0], [0.0, 0.1], [np.nan, np.nan]], 1, 0.0, axis=1)
-    covariances = np.tile(np.diag([0.01, 0.0, 0.01]), (4, 1, 1))
-    draw(tmp_path / 'accuracy.png', truth_m, position_m, covariances)
-    assert (tmp_path / 'accuracy.png').stat().st_size > 5000
-    _figure, axes = pyplot.subplots()
-    draw_errors(axes, truth_m[:3], position_m[:3][:, [0, 2]], covariances[:3][:, [[0], [2]], [0, 2]])
-    assert [round(bar.get_height(), 6) for bar in axes.patches] == [0.1, 0.1] + 2 * [round(np.sqrt(0.02), 6)]

@@ -71,11 +71,6 @@ def test_the_report_contains_all_figures(out):
     assert '>None' not in text and 'nan' not in text and 'src="d' in text and 'href' not in text
 
 
-def test_the_report_is_also_written_as_pdf(out):
-    data = (out / 'report.pdf').read_bytes()
-    assert data.startswith(b'%PDF-') and data.count(b'/Type /Page\n') + data.count(b'/Type /Page ') >= 4
-
-
 def test_the_error_models_can_be_read_and_correct_the_bias(out):
     for name in ('error_model.yaml', 'error_model_thesis_form.yaml'):
         model = read_error_model(out / name)

@@ -65,7 +65,7 @@ def test_people_of_a_crowd_have_the_depth_they_had(session):
         assert jittered[0] >= 0 and jittered[3] <= crowd.camera.height
 
 
-def test_results_and_table_for_each_number_of_people(session, tmp_path):
+def test_results_and_table_for_each_number_of_people(session):
     result = dict(benchmark.speed(session, counts=(1, 5), images=3), detector=[])
     assert result['objects'] == [1, 5] and result['machine'] == describe_machine()
     for name in ('ours', 'thesis'):
@@ -76,8 +76,6 @@ def test_results_and_table_for_each_number_of_people(session, tmp_path):
     assert len(result['ratio']) == 2 and result['growth'][1] == 1
     text = '\n'.join(benchmark.table(result))
     assert '%.2f' % result['thesis']['both_ms'][1] in text and '%.2f' % result['ratio'][0] in text
-    benchmark.draw(result, str(tmp_path / 'speed.png'))
-    assert (tmp_path / 'speed.png').stat().st_size > 5000
 
 
 def test_both_algorithms_detect_and_track_everybody(session):
