@@ -7,7 +7,7 @@ import pytest
 from conftest import DATA
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scenario_scores, scores_of, table
+from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scenario_scores, scores_of
 from ros_3d_bb_lab.evaluation.scenes import position_errors_m
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -92,12 +92,3 @@ def test_scores_of_scenes():
     assert scores['ours']['rmse_plane_m'] < 0.08 < scores['thesis']['worst_m']
     empty = scenario_scores(os.path.join(SCENARIOS, 'empty_room.yaml'), estimator_named('foreground'), every=90)
     assert empty['ours'] == {'boxes': 0, 'missed': 0}
-
-
-@pytest.mark.slow
-@REAL_WEIGHTS
-def test_the_keys_of_the_result_and_its_table(result):
-    assert {'frames', 'positions', 'calibration', 'thesis_calibration', 'ours', 'thesis', 'recorded',
-            'per_frame'} == set(result)
-    assert set(result['per_frame'][0]) == {'id', 'ours', 'thesis', 'truth', 'ours_raw', 'thesis_raw'}
-    assert len(table(result)) == 13 and 'rmse_plane_m' in table(result)[3]

@@ -44,16 +44,6 @@ def test_boxes_found_missed_and_false_are_counted(session):
     assert all(row['cpu_ms'] >= 0 for row in rows.values())
 
 
-def test_a_session_without_boxes_is_rejected(session):
-    with pytest.raises(ValueError, match='no images with 2D boxes'):
-        benchmark.compare(session._replace(frames=[frame._replace(detections=()) for frame in session.frames]), {})
-
-
-def test_models_with_the_same_file_name_are_named_by_their_path():
-    assert benchmark.named(['a/x.onnx', 'b/y.pt']) == {'x.onnx': 'a/x.onnx', 'y.pt': 'b/y.pt'}
-    assert set(benchmark.named(['a/x.onnx', 'b/x.onnx'])) == {'a/x.onnx', 'b/x.onnx'}
-
-
 @pytest.mark.needs('onnxruntime')
 def test_any_number_of_models_is_compared_on_simulated_people(tmp_path, monkeypatch, capsys):
     paths, results = [str(tmp_path / name) for name in ('nothing.onnx', 'corner.onnx')], str(tmp_path / 'results.json')
@@ -69,20 +59,6 @@ def test_any_number_of_models_is_compared_on_simulated_people(tmp_path, monkeypa
     assert [row['false_boxes'] for row in result['detectors'].values()][:2] == [0, 1]
     assert result['detectors']['depth']['found'] == 1
     assert 'corner.onnx' in capsys.readouterr().out
-
-
-@pytest.mark.needs('onnxruntime')
-def test_the_best_confidence_separates_people_from_false_boxes(session, tmp_path):
-    """The network finds the first person of each image with 0.605, and one false box with 0.395."""
-    frame = session.frames[0]
-    session = session._replace(frames=[frame._replace(detections=frame.detections[:1])])
-    width, height = session.camera.width, session.camera.height
-    boxes = np.vstack((frame.boxes_px[:1], [(0, 0, 8, 8)])).astype(float)
-    scores = np.pad([[0.605], [0.395]], ((0, 0), (0, 79)), mode='constant')
-    path = write_constant_network(tmp_path / 'a.onnx', outputs_of('end-to-end', boxes, scores, (height, width)),
-                                  (1, 3, height, width))
-    network, = benchmark.open_networks([path], 0.25).values()
-    assert benchmark.best_confidence(session, network) == (0.5, 1)
 
 
 @pytest.mark.parametrize('options, complaint', [

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb_lab.evaluation.latency.benchmark import TITLES, cases_of, details, row
-from ros_3d_bb_lab.evaluation.latency.latency_result import STAGES, compared_with_limits, latencies, result_of
+from ros_3d_bb_lab.evaluation.latency.latency_result import STAGES, compared_with_limits, result_of
 
 NS = 10 ** 9
 BEGAN_S = 1000.0
@@ -41,42 +41,10 @@ def test_the_usage_of_a_node_is_a_multiple_of_that_of_its_limit():
     assert '5.00 times its limit' in details(result)
 
 
-def test_percentiles_are_those_of_the_answered_images():
-    result = result_of(record_of(list(np.arange(1.0, 101.0)) + [None] * 25))
-    assert (result['p50_ms'], result['p95_ms'], result['p99_ms']) == pytest.approx((50.5, 95.05, 99.01), abs=1e-3)
-    assert result['dropped'] == 25
-    assert (result['input_hz'], result['output_hz']) == pytest.approx((10.0, 8.0))
-
-
-def test_latency_is_that_of_the_first_answer():
-    found = latencies([NS, 2 * NS], [(NS, 1.02), (NS, 1.5), (3 * NS, 3.0)])
-    np.testing.assert_allclose(found, [(1.0, 20.0)], atol=1e-6)
-
-
-def test_images_outside_the_window_are_ignored():
-    record = record_of([5.0] * 100)
-    record['began_s'], record['ended_s'] = BEGAN_S + 2.05, BEGAN_S + 4.05
-    result = result_of(record)
-    assert (result['input_hz'], result['output_hz'], result['dropped']) == pytest.approx((10.0, 10.0, 0))
-
-
 def test_a_growing_queue_increases_the_latency_of_the_last_minute():
     trend = result_of(record_of(list(np.linspace(10, 310, 1800))))['trend']
     assert trend['edge_s'] == 60.0
     assert trend['first']['p50_ms'] == pytest.approx(60, abs=1) and trend['last']['p50_ms'] == pytest.approx(260, abs=1)
-
-
-def test_memory_growth_excludes_the_first_half():
-    usage = {'steady': [(BEGAN_S + s, 0.0, min(100.0 + s, 160.0)) for s in range(300)],
-             'growing': [(BEGAN_S + s, 0.0, 100.0 + s / 30) for s in range(300)]}
-    grew = result_of(record_of([5.0] * 10, usage=usage))['trend']['rss_mb_per_minute']
-    assert (grew['steady'], grew['growing']) == pytest.approx((0.0, 2.0), abs=1e-6)
-
-
-def test_without_any_answer_there_are_no_latencies():
-    result = result_of(record_of([None] * 10))
-    assert (result['p50_ms'], result['p99_ms'], result['output_hz'], result['dropped']) == (None, None, 0, 10)
-    assert '-' in row(dict(result, name='free', load_average=0.0))
 
 
 def test_each_model_file_is_a_case_with_and_without_load():

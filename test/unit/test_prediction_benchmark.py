@@ -2,7 +2,6 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb_lab.evaluation.tracking.benchmark import prediction_table
 from ros_3d_bb_lab.evaluation.tracking.prediction_benchmark import predictions
 from ros_3d_bb_lab.evaluation.tracking.trajectories import Sequence, pedestrian_of
 
@@ -31,16 +30,3 @@ def test_a_person_who_stops_is_predicted_too_far():
     scores = predictions([recording('stop', walk(13, stops_at=7 * PERIOD_S))])['stop']
     assert scores['cv_fde_2s_m'] == pytest.approx(1.2 * 2)
     assert 1.8 < scores['ours_fde_2s_m'] < 2.5 and scores['ours_coverage_95_2s'] == 0.0
-
-
-def test_short_recordings_have_no_scores_and_do_not_count_in_the_mean():
-    scores = predictions([recording('short', walk(12)), recording('long', walk(20))])
-    assert scores['short'] == dict.fromkeys(scores['short'])
-    assert scores['mean'] == scores['long']
-    lines = prediction_table(scores)
-    assert lines[1].split()[-3:] == ['-', '0.000', '0.000'] and len(lines) == 4
-
-
-def test_the_mean_weights_each_recording_equally():
-    scores = predictions([recording('a', walk(40)), recording('b', walk(13, stops_at=7 * PERIOD_S))])
-    assert scores['mean']['cv_fde_2s_m'] == pytest.approx(1.2)

@@ -181,12 +181,3 @@ def test_a_frame_depends_on_seed_number_and_scene_only():
     assert len({depth_mm.tobytes() for depth_mm in series}) == 9
     assert StereoCamera(SMALL, seed=5).measure(inverse_depth, 7).tobytes() != alone.tobytes()
     np.testing.assert_array_equal(inverse_depth, original)
-
-
-def test_noise_of_different_frames_is_independent(d435i):
-    frames = [steps_of(d435i.measure(scene(5), number)) for number in range(8)]
-    errors = [np.where(steps > 0, steps - LEVEL_MM / 5000, 0).ravel() for steps in frames]
-    correlation = np.corrcoef(errors) - np.eye(8)
-    assert np.abs(correlation).max() < 0.1  # 0.02 is the sigma for independent fields with this kernel
-    assert np.std(errors) / STEPS_PER_PX == pytest.approx(np.hypot(0.065, 0.012), rel=0.1)
-    assert abs(np.mean(errors)) / STEPS_PER_PX < 0.005

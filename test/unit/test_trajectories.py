@@ -1,8 +1,6 @@
 """Recordings of pedestrians: reading, smoothing, and errors."""
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from ros_3d_bb_lab.evaluation.tracking.trajectories import (FEWEST_POINTS, LONGEST_GAP_S, made_sequences,
                                                             pedestrian_of, read_sequence, read_sequences)
@@ -18,15 +16,6 @@ def csv_file(folder, rows, header='t_s,id,x_m,y_m', name='plaza.csv'):
 
 def walk(times_s=TIMES_S, person=1):
     return [(time_s, person, 1 + 1.2 * time_s, 2 - 0.5 * time_s) for time_s in times_s]
-
-
-@given(st.floats(-50, 50), st.floats(-2, 2), st.floats(0.1, 1), st.integers(2, 40))
-def test_who_walks_straight_is_not_changed(start_m, speed_mps, period_s, count):
-    times_s = 3 + period_s * np.arange(count)
-    person = pedestrian_of(times_s, np.stack((start_m + speed_mps * times_s, -speed_mps * times_s), axis=1))
-    between_s = np.linspace(person.start_s, person.end_s, 30)
-    assert np.allclose(person.position_m(between_s)[:, 0], start_m + speed_mps * between_s, atol=1e-6)
-    assert np.allclose(person.velocity_mps(between_s), (speed_mps, -speed_mps), atol=1e-6)
 
 
 def test_velocity_is_the_derivative_and_noise_is_smoothed():
@@ -71,12 +60,6 @@ def test_segments_with_enough_points_are_people(tmp_path, rows, header, people):
 def test_invalid_files_are_named(tmp_path, rows, header, message):
     with pytest.raises(ValueError, match='plaza.csv.*' + message):
         read_sequence(csv_file(tmp_path, rows, header))
-
-
-@pytest.mark.parametrize('name,error', [('', ValueError), ('nowhere', OSError)])
-def test_a_folder_without_recordings_is_an_error(tmp_path, name, error):
-    with pytest.raises(error):
-        read_sequences(str(tmp_path / name))
 
 
 def test_made_recordings_are_those_of_their_seed():
