@@ -13,6 +13,10 @@ run_tests() {
       setup
       cd "$here"
       "$venv/bin/python3" -m pytest -q -n 2 --dist loadfile -m 'not slow' "${pytest_options[@]}" test/unit ;;
+    --long)
+      [ $# -eq 1 ] || fail "test --long takes no further arguments, not '$2'"
+      pytest_options+=(--long)
+      run_some_tests "$here/test/workspace" ;;
     --platform) test_on_platform "${@:2}" ;;
     *) run_some_tests "$@" ;;
   esac
@@ -59,7 +63,7 @@ run_some_tests() {
   while [ $# -gt 0 ]; do
     case $1 in
       -k) [ $# -gt 1 ] || fail "-k needs an expression"; expression=(-k "$2"); shift ;;
-      -*) fail "unknown option '$1' of test; --fast, -k EXPR or paths expected" ;;
+      -*) fail "unknown option '$1' of test; --fast, --long, -k EXPR or paths expected" ;;
       *)
         [ -e "${1%%::*}" ] || fail "there is no '$1' to test"
         paths+=("$(realpath "${1%%::*}")${1#"${1%%::*}"}") ;;

@@ -13,7 +13,9 @@ def planner_environment():
     They are built on the first call (`./run planners`, in the cache of ./run).
     """
     environment = {name: value for name, value in os.environ.items() if name != 'ROS_3D_BB_CACHE'}  # see conftest.py
-    setup = subprocess.check_output([os.path.join(ROOT, 'run'), 'planners'], env=environment).decode().split()[-1]
+    printed = subprocess.check_output([os.path.join(ROOT, 'run'), 'planners'], env=environment).decode().split()
+    assert printed, 'ROS_3D_BB_DATA contains no archives of the planners'
+    setup = printed[-1]
     text = subprocess.check_output(['bash', '-c', 'source %s --extend && exec %s -c \'%s\''
                                     % (setup, sys.executable, ENVIRONMENT)]).decode()
     return dict(pair.split('=', 1) for pair in text.split('\0'))
