@@ -1,7 +1,6 @@
 """process_bag: the messages that the nodes would publish, identical bytes for equal input, and broken bags."""
 import filecmp
 import os
-import resource
 import subprocess
 
 import genpy.dynamic
@@ -16,10 +15,9 @@ from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError, BagReader
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import session_images, write_bag
-from ros_3d_bb.bags.process_bag import main, option_of, with_params
+from ros_3d_bb.bags.process_bag import main, with_params
 from ros_3d_bb.conversions.camera_msgs import START_NS
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, tracks_from_msg
-from ros_3d_bb.core.params import with_places
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.pipeline.offline_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
@@ -191,15 +189,6 @@ def test_transforms_of_another_frame_with_old_stamps_change_nothing(lag_s):
         transforms.lookup('map', 'base', time_from(int((100.05 + number / 10) * NS)))
 
 
-def test_static_transforms_are_kept_after_a_jump():
-    transforms = BagTransforms()
-    transforms.add_static(transform_message(0, 'mast'))
-    for tf in (transform_message(100, 'base'), transform_message(5, 'base'), transform_message(6, 'base')):
-        transforms.add(tf)
-    assert np.array_equal(transforms.lookup('map', 'base', time_from(11 * NS // 2)), np.eye(4))
-    assert np.array_equal(transforms.lookup('map', 'mast', time_from(5 * NS)), np.eye(4))
-
-
 @pytest.fixture(scope='module')
 def broken_bags(scene, tmp_path_factory):
     """Bags that cannot be used."""
@@ -244,14 +233,6 @@ def test_parameter_files_are_checked(tmp_path, capsys, text, complaint):
     assert error.value.code == 2 and complaint in printed and 'error: --tracker-params: ' in printed
 
 
-@pytest.mark.parametrize('name, option', [
-    ('stamp_tolerance', '--depth-params or --bbox3d-params or --tracker-params FILE'),
-    ('cache_length', '--bbox3d-params FILE'), ('target_frame', '--target-frame'), ('enable', '')])
-def test_a_message_names_the_option_of_a_parameter(name, option):
-    sentence = 'set ~%s: 1' % name
-    assert with_places(sentence, option_of) == sentence + (' (~%s: %s)' % (name, option) if option else '')
-
-
 def test_parameter_files_of_the_nodes_are_used(scene, tmp_path):
     config = os.path.join(os.path.dirname(__file__), '..', '..', 'config')
     (tmp_path / 'tracker.yaml').write_text('tracker: thesis\ntarget_frame: odom\n')
@@ -260,20 +241,6 @@ def test_parameter_files_of_the_nodes_are_used(scene, tmp_path):
                       '--depth-params', os.path.join(config, 'depth_detector.yaml'))
     assert result.returncode == 0, result.stdout
     assert messages_in(tmp_path / 'out.bag')['/ros_3d_bb/tracks'][-1].header.frame_id == 'odom'
-
-
-def test_a_full_disk_is_named_and_an_older_result_is_kept(scene, tmp_path):
-    """A file size limit of 50 kB acts as a full disk."""
-    target = tmp_path / 'out.bag'
-    target.write_text('an older result')
-    command = ['rosrun', 'ros_3d_bb', 'process_bag', '--detector', 'depth', scene, str(target)]
-    limit = (50000, resource.getrlimit(resource.RLIMIT_FSIZE)[1])
-    result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True,
-                            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit))
-    assert result.returncode == 1 and 'File too large' in result.stdout and 'no bag was written' in result.stdout
-    assert 'Traceback' not in result.stdout
-    assert os.listdir(str(tmp_path)) == ['out.bag'] and target.read_text() == 'an older result'
-    assert run_tool('--detector', 'depth', scene, target).returncode == 0 and messages_in(target)
 
 
 def test_no_code_is_generated_from_the_definitions_in_a_bag(tmp_path, monkeypatch):

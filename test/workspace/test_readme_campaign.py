@@ -1,4 +1,4 @@
-"""Commands of doc/campaign.md: export, analyse and validate. test/nodes/campaign.test measures and annotates."""
+"""Commands of doc/campaign.md: export, analyse and validate. test/nodes/viewer_node.test measures."""
 import os
 
 from support.code_blocks import claimed
