@@ -1,7 +1,6 @@
 """Input of the release tools: package.xml, the changelog, and the Debian package of each key."""
 import os
 
-import yaml
 from catkin_pkg.changelog import Changelog, populate_changelog_from_rst
 from catkin_pkg.package import parse_package
 from catkin_pkg.package_version import get_forthcoming_label, rename_section
@@ -59,15 +58,6 @@ def test_dependencies_of_each_release():
     # of the Python 2 of Melodic
     assert keys['melodic'] - keys['noetic'] == {'python3-empy', 'python3-gnupg', 'python3-pycryptodome'}
     assert 'python3-catkin-pkg-modules' in keys_of(package_for('melodic'), ['buildtool_depends'])
-
-
-def test_every_key_has_its_packages_of_debian_in_the_table():
-    with open(os.path.join(ROOT, '.ci', 'rosdep_debian.yaml')) as stream:
-        table = yaml.safe_load(stream)
-    package = parse_package(os.path.join(ROOT, 'package.xml'))
-    assert set(table) == set(depend.name for kind in KINDS for depend in getattr(package, kind))
-    for key, systems in table.items():
-        assert list(systems) == ['debian'] and systems['debian'], key
 
 
 def test_the_licence_is_a_file_with_its_text():
