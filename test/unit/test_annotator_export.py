@@ -5,7 +5,6 @@ import os
 import pytest
 
 import conftest
-from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.export import THESIS_COLUMNS, export
 from ros_3d_bb_lab.evaluation.noise.tables import read_table
@@ -48,12 +47,3 @@ def test_a_row_contains_box_estimates_and_truth_in_all_axes(document, tmp_path):
     assert [float(row[axis + ' true']) for axis in 'XYZ'] == [-500, 10, 2100.4]
     assert float(row['Z error']) == pytest.approx(1000 * z_m - 2100.4, abs=0.06)
     assert read_table(path, 'Z').truth_m.tolist() == [[-0.5, 2.1004]]
-
-
-def test_an_empty_table_or_an_unwritable_file_raises_an_error(document, tmp_path):
-    with pytest.raises(SessionError, match=str(tmp_path)):
-        export(document, str(tmp_path / 'table.csv'), 'foreground')
-    document.set_truth(0, 0.0, 2.0)
-    with pytest.raises(SessionError, match=str(tmp_path)):
-        export(document, str(tmp_path / 'missing' / 'table.csv'), 'foreground')
-    assert not os.path.exists(str(tmp_path / 'table.csv'))

@@ -162,12 +162,6 @@ def test_no_file_imports_one_that_imports_it(root, package):
     assert len(below) > 5 and cycles_in(below) == []
 
 
-def test_optional_libraries_are_imported_where_they_are_used():
-    for module in MODULES:
-        others, _ours = imports_of(module, at_the_top=True)
-        assert not others & {'norfair', 'trackeval'}, module
-
-
 def test_nodes_import_no_mathematics_and_no_other_node():
     nodes = [module for module in MODULES if module.endswith('_node')]
     for module in MODULES:

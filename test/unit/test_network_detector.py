@@ -96,11 +96,6 @@ def test_suppression_agrees_with_a_naive_implementation(count, limit, max_det, s
     np.testing.assert_array_equal(kept.boxes, detections.boxes[naive_suppression(detections, limit, max_det)])
 
 
-def test_the_number_of_boxes_is_limited_before_suppression():
-    rows = np.tile(np.array([(50, 50, 20, 20, 0.9, 0.9, 0)], np.float32), (40000, 1))
-    assert len(selected(rows, 0.25, [0]).boxes) == 30000
-
-
 @pytest.mark.parametrize('entry,number', [('cat', 1), (1, 1), ('1', 1), ('person', 0)])
 def test_classes_by_name_and_number(entry, number):
     assert class_number(entry, ['person', 'cat']) == number

@@ -12,7 +12,7 @@ import pytest
 from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5 import onnx_backend, onnx_export
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
-from ros_3d_bb.detection.yolov5.onnx_backend import OnnxUnusable, open_exported, with_checksum
+from ros_3d_bb.detection.yolov5.onnx_backend import open_exported, with_checksum
 from ros_3d_bb.detection.yolov5.onnx_export import Exporter, export
 from support.checkpoints import random_network, write_checkpoint
 from support.layouts import layout
@@ -93,22 +93,6 @@ def test_a_full_disk_causes_a_warning_only(cache, monkeypatch):
     monkeypatch.setattr(onnx_backend.os, 'replace', mock.Mock(side_effect=OSError('no space left')))
     assert rows_of(cache.open()).shape[1] == 8
     assert len(cache.warnings) == 1 and list(cache.folder.iterdir()) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('fault', ['not installed', 'wrong'])
-def test_torch_replaces_an_onnx_runtime_that_does_not_work(cache, monkeypatch, fault):
-    if fault == 'not installed':
-        monkeypatch.setitem(sys.modules, 'onnxruntime', None)
-    else:
-        monkeypatch.setattr(onnx_export, 'export', lambda path, digest: with_other_weights(export(path, digest)))
-    params = RuntimeParams(device='cpu', export_folder=str(cache.folder))
-    runtime = open_runtime(cache.checkpoint, params, cache.warnings.append)
-    assert runtime.description.startswith('torch on the CPU') and rows_of(runtime).shape[1] == 8
-    assert len(cache.warnings) == 1 and ('pip3 install onnxruntime' in cache.warnings[0]) == (fault == 'not installed')
-    assert not cache.folder.exists()
-    with pytest.raises(OnnxUnusable):
-        open_runtime(cache.checkpoint, params._replace(runtime='onnxruntime'))
 
 
 @pytest.mark.parametrize('name, named', [

@@ -3,7 +3,6 @@
 Without the weights of ROS_3D_BB_DATA, the true boxes replace those of YOLOv5.
 """
 import glob
-import json
 import os
 
 import numpy as np
@@ -16,7 +15,7 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
 from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, detections_without_scores,
-                                                      exact_detector, main, result_of, score_tracks, scored_people,
+                                                      exact_detector, result_of, score_tracks, scored_people,
                                                       yolov5_detector)
 from ros_3d_bb_lab.evaluation.scenes import Step, detect_in_scene, run_scene, score_detections
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -123,18 +122,6 @@ def test_a_person_approaching_to_half_a_metre_is_one_visible_track(name):
     assert (result['track_ids'], result['not_visible'], result['id_switches']) == (1, 0, 0)
     assert result['rmse_m'] < result['worst_m'] < 0.25
     assert result['velocity_rmse_mps'] < 0.3 and result['prediction_1s_m'] < 0.5
-
-
-@pytest.mark.parametrize('every,images', [([], {'depth': 2, 'exact': 4}), (['--every', '4'], {'depth': 1, 'exact': 1})])
-def test_the_command_writes_a_row_for_each_detector(every, images, tmp_path, monkeypatch):
-    """Without --every, the exact boxes use each image and the detectors every second one."""
-    scene, scores = tmp_path / 'short.yaml', tmp_path / 'scores.json'
-    scene.write_text('duration: 0.25\npeople: [{start: [3.0, 0.0]}]\n')
-    monkeypatch.setattr('sys.argv', ['scenes', str(scene), '--error-model', ERROR_MODEL, '--json', str(scores)] + every)
-    main()
-    rows = json.loads(scores.read_text())['scenes']
-    assert {row['detector']: row['images'] for row in rows} == images
-    assert [row['scene'] for row in rows] == ['short', 'short']
 
 
 def person(number, x_m, y_m=0.0, speed_mps=0.0, hidden=0.0, box_px=BOX_PX):

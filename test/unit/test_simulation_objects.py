@@ -4,16 +4,8 @@ import pytest
 
 from ros_3d_bb_lab.simulation.motion import person_motion
 from ros_3d_bb_lab.simulation.scenario import Move, Person, SceneObject, Scenario, scenario_from
-from ros_3d_bb_lab.simulation.scene_objects import GAP_M, SHAPES, PushedMotion, object_mesh
+from ros_3d_bb_lab.simulation.scene_objects import GAP_M, PushedMotion
 from ros_3d_bb_lab.simulation.simulator import Simulator
-
-
-@pytest.mark.parametrize('label', sorted(SHAPES))
-def test_shapes_stand_on_the_floor_and_are_centred(label):
-    mesh = object_mesh(SceneObject(label, (3.0, 0.0)), np.random.RandomState(0))
-    low_m, high_m = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    assert low_m[2] == 0 and np.abs(low_m[:2] + high_m[:2]).max() < 1e-6
-    assert mesh.faces.max() == len(mesh.vertices) - 1 and len(mesh.colors) == len(mesh.faces)
 
 
 def test_a_pushed_object_is_in_front_of_the_person():

@@ -111,15 +111,6 @@ def test_the_room_may_be_another_file(tmp_path):
         read_scenario(str(path))
 
 
-@pytest.mark.parametrize('content,named', [(b'people: [', 'YAML'), (b'\xff\xfe\xfa: 1', 'YAML'),
-                                           (b'seeed: 1', 'seeed')])
-def test_errors_name_the_file(tmp_path, content, named):
-    path = tmp_path / 'scene.yaml'
-    path.write_bytes(content)
-    with pytest.raises(ValueError, match=r'scene\.yaml.*' + named):
-        read_scenario(str(path))
-
-
 def trajectories(scenario):
     """Times, positions of the people (times, n, 2), and positions of the robot (times, 2)."""
     times_s = np.arange(0, scenario.duration + AFTER_S, 1. / RATE_HZ)

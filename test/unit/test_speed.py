@@ -1,5 +1,4 @@
 """The speed benchmark: its times, its output, and its implementation of the thesis' algorithms."""
-import sys
 
 import numpy as np
 import pytest
@@ -71,28 +70,3 @@ def test_both_algorithms_detect_and_track_everybody(session):
             boxes = algorithm.estimate(crowd.depth, crowd.jittered(random))
             tracks = algorithm.track(image * benchmark.PERIOD_NS, boxes)
         assert len(boxes) >= 5 and len(tracks) >= 4  # two people may stand where one is
-
-
-@pytest.mark.parametrize('options,complaint', [(['--images', '0'], 'images is 0'), (['--data', '/nowhere'], 'nowhere')])
-def test_invalid_options_are_named(options, complaint, monkeypatch, capsys):
-    monkeypatch.setattr(sys, 'argv', ['speed'] + options)
-    with pytest.raises(SystemExit) as raised:
-        benchmark.main()
-    assert complaint in str(raised.value) + capsys.readouterr().err
-
-
-@pytest.fixture
-def checkpoint(tmp_path):
-    from support.checkpoints import write_checkpoint  # imports torch
-    from support.layouts import layout
-    path = str(tmp_path / 'random.pt')
-    write_checkpoint(path, layout('6.0', 'n', 3))
-    return path
-
-
-@pytest.mark.needs('torch')
-def test_no_images_and_unknown_runtimes_are_rejected(checkpoint):
-    with pytest.raises(ValueError, match='no images'):
-        benchmark.detector_speed([], checkpoint)
-    with pytest.raises(ValueError, match="'tensorflow'"):
-        benchmark.detector_speed([np.zeros((64, 64, 3), np.uint8)], checkpoint, runtimes=('tensorflow',))

@@ -11,7 +11,6 @@ from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb_lab.simulation.sensors import StereoCamera, StereoParams
 
 D435I = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)
-SMALL = Camera(160, 120, 153.7, 153.7, 80, 60)
 LEVEL_MM = 610140.  # depth levels are this divided by an integer
 STEPS_PER_PX = 32
 NO_NOISE = StereoParams(noise_px=0, white_noise_px=0, jitter_px=0, hole_share=0)
@@ -168,16 +167,3 @@ def test_without_noise_the_only_error_is_quantisation():
     np.testing.assert_array_equal(depth_mm[in_range], np.rint(LEVEL_MM / np.rint(steps[in_range].astype(np.float32))))
     assert (np.diff(depth_mm[in_range]) >= 0).all()
     assert not depth_mm[(steps < 29.5) | (steps > 126 * STEPS_PER_PX + 0.5)].any()
-
-
-def test_a_frame_depends_on_seed_number_and_scene_only():
-    inverse_depth = plate(1, 5, SMALL, slice(80, 120))
-    original = inverse_depth.copy()
-    alone = StereoCamera(SMALL, seed=4).measure(inverse_depth, 7)
-    camera = StereoCamera(SMALL, seed=4)
-    series = [camera.measure(inverse_depth, number) for number in range(9)]
-    assert alone.dtype == np.uint16 and alone.shape == (120, 160)
-    assert alone.tobytes() == series[7].tobytes() == camera.measure(inverse_depth, 7).tobytes()
-    assert len({depth_mm.tobytes() for depth_mm in series}) == 9
-    assert StereoCamera(SMALL, seed=5).measure(inverse_depth, 7).tobytes() != alone.tobytes()
-    np.testing.assert_array_equal(inverse_depth, original)

@@ -8,7 +8,7 @@ from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
 from ros_3d_bb_lab.evaluation.tracking import robot_motion
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel, half_width, shown, thesis_bias_m
-from ros_3d_bb_lab.evaluation.tracking.detection_generator import DOUBLE, FALSE, DetectablePerson, Detector
+from ros_3d_bb_lab.evaluation.tracking.detection_generator import DetectablePerson, Detector
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING, OdometryModel
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, Models, Timing, simulate
 from ros_3d_bb_lab.evaluation.tracking.trajectories import made_sequences
@@ -168,16 +168,6 @@ def test_depth_errors_are_those_of_the_model_with_outliers_behind(boxes):
     assert sides_m.std() == pytest.approx(np.sqrt(camera.covariance_m2(0.0, 3.0)[0, 0]), rel=0.1)
     near_m = np.array([box.depth_m for box in detected if box.depth_m < 3.1])
     assert 0.4 < np.corrcoef(near_m[:-1], near_m[1:])[0, 1] < 0.8  # half a second for one part, none for the other
-
-
-@pytest.mark.slow
-def test_misses_duplicates_and_false_detections_have_their_shares(boxes):
-    sources = [[box.source for box in found] for found in boxes]
-    assert np.mean([0 not in found for found in sources]) == pytest.approx(0.1, abs=0.02)
-    doubles = sum(found.count(DOUBLE) for found in sources) / float(sum(0 in found for found in sources))
-    assert doubles == pytest.approx(0.02, abs=0.005)
-    # 1 % new ones an image, each for about a tenth of a second, most of them in view
-    assert np.mean([found.count(FALSE) for found in sources]) == pytest.approx(0.035, abs=0.012)
 
 
 def test_the_thesis_bias_goes_on_smoothly_beyond_what_was_measured():

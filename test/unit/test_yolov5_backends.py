@@ -157,16 +157,6 @@ def test_exports_that_cannot_be_run_are_rejected(tmp_path, suffix, kind):
         open_runtime(path)
 
 
-@needs_onnx
-def test_class_names_in_an_export_are_not_executed(tmp_path):
-    path, victim = str(tmp_path / 'model.onnx'), tmp_path / 'touched'
-    assert open_runtime(exported_onnx(path, Mean(True), (64, 64), {'names': '["cat"]'})).names == ['cat']
-    exported_onnx(path, Mean(True), (64, 64), {'names': "__import__('os').system('touch %s')" % victim})
-    with pytest.raises(WeightsError):
-        open_runtime(path)
-    assert not victim.exists()
-
-
 @pytest.mark.parametrize('name, runtime, missing', [
     ('model.pt', 'torch', 'torch'), ('model.torchscript', 'torch', 'torch'), ('model.onnx', 'auto', 'onnxruntime'),
     pytest.param('model.pt', 'onnxruntime', 'torch', marks=needs_onnx)])  # torch exports it
@@ -225,13 +215,6 @@ def test_a_gpu_is_used_by_torch_in_half_precision(monkeypatch, checkpoint):
     assert next(runtime._network.parameters()).dtype == torch.float16
 
 
-@needs_onnx
-def test_onnx_runtime_is_used_if_torch_cannot_use_the_gpu(monkeypatch, checkpoint):
-    monkeypatch.setattr(backends, 'gpu_count', lambda: 1)
-    monkeypatch.setattr(torch.cuda, 'is_available', lambda: False)
-    assert open_runtime(checkpoint).description.startswith('ONNX Runtime')
-
-
 @pytest.mark.slow
 @pytest.mark.needs('torch.export')  # torch 2 supports convolutions in half precision on a CPU
 def test_half_precision_gives_the_same_boxes(official_output):
@@ -244,3 +227,13 @@ def test_half_precision_gives_the_same_boxes(official_output):
         assert output.dtype == np.float32 and likely.any()
         assert np.abs(output - values)[likely, :4].max() <= 1
         assert np.abs(output - values)[likely, 4:].max() <= 0.01
+
+
+@needs_onnx
+def test_class_names_in_an_export_are_not_executed(tmp_path):
+    path, victim = str(tmp_path / 'model.onnx'), tmp_path / 'touched'
+    assert open_runtime(exported_onnx(path, Mean(True), (64, 64), {'names': '["cat"]'})).names == ['cat']
+    exported_onnx(path, Mean(True), (64, 64), {'names': "__import__('os').system('touch %s')" % victim})
+    with pytest.raises(WeightsError):
+        open_runtime(path)
+    assert not victim.exists()
