@@ -74,7 +74,7 @@ ALLOWED = {
         'rosgraph roslib rospy sensor_msgs std_msgs visualization_msgs'),
 }
 QT = {'PyQt5', 'python_qt_binding'}
-SESSION_MODULES = 'command_line', 'document', 'export', 'analysis', 'legacy'  # of the annotator: no windows
+SESSION_MODULES = 'command_line', 'document', 'export', 'analysis'  # of the annotator: no windows
 
 
 def modules_in(root):
