@@ -36,7 +36,9 @@ def _navigation(source):
     for section in source.split('\n## ')[1:]:
         captions.append((section.splitlines()[0], [link.groups() for link in LINK.finditer(section)]))
     names = set(os.path.splitext(name)[0] for name in os.listdir(os.path.join(ROOT, 'doc', 'nodes'))) - {'index'}
-    captions.append(('Nodes', [(name, 'nodes/%s.md' % name) for name in sorted(names)]))
+    captions.append(('Nodes', [('All nodes', 'nodes/index.md')] + [
+        (name, 'nodes/%s.md' % name) for name in sorted(names)]))
+    captions.append(('Launch files', [('Launch files', 'launch_files.md')]))
     return [(caption, ['%s </%s>' % (text, os.path.normpath(os.path.join('doc', path))[:-len('.md')])
                        for text, path in links]) for caption, links in captions]
 

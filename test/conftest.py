@@ -26,6 +26,7 @@ MISSED = set()  # what tests that were left out need
 def pytest_addoption(parser):
     parser.addoption('--leave-out', action='store_true',
                      help='deselect tests that need packages of requirements.txt, or programs, that are not installed')
+    parser.addoption('--long', action='store_true', help='run the tests with the marker long, and only these')
 
 
 def left_out(config):
@@ -55,6 +56,7 @@ def pytest_ignore_collect(path, config):
 def pytest_collection_modifyitems(config, items):
     gone = [item for item in items if config.getoption('--leave-out') and missing_for(item)]
     MISSED.update(*map(missing_for, gone))
+    gone += [item for item in items if bool(item.get_closest_marker('long')) != config.getoption('--long')]
     config.hook.pytest_deselected(items=gone)
     items[:] = [item for item in items if item not in gone]
 

@@ -13,13 +13,16 @@ run_tests() {
       setup
       cd "$here"
       "$venv/bin/python3" -m pytest -q -n 2 --dist loadfile -m 'not slow' "${pytest_options[@]}" test/unit ;;
+    --long)
+      [ $# -eq 1 ] || fail "test --long takes no further arguments, not '$2'"
+      pytest_options+=(--long)
+      run_some_tests "$here/test/workspace" ;;
     --platform) test_on_platform "${@:2}" ;;
     *) run_some_tests "$@" ;;
   esac
 }
 
 run_all_tests() {
-  apt_packages+=(chromium)  # in which a test reads the site
   build
   say "running all tests (data: ${ROS_3D_BB_DATA:-made by the tests})"
   rm -rf "$workspace/build/test_results"
@@ -60,7 +63,7 @@ run_some_tests() {
   while [ $# -gt 0 ]; do
     case $1 in
       -k) [ $# -gt 1 ] || fail "-k needs an expression"; expression=(-k "$2"); shift ;;
-      -*) fail "unknown option '$1' of test; --fast, -k EXPR or paths expected" ;;
+      -*) fail "unknown option '$1' of test; --fast, --long, -k EXPR or paths expected" ;;
       *)
         [ -e "${1%%::*}" ] || fail "there is no '$1' to test"
         paths+=("$(realpath "${1%%::*}")${1#"${1%%::*}"}") ;;
@@ -68,7 +71,6 @@ run_some_tests() {
     shift
   done
   [ ${#paths[@]} -gt 0 ] || paths=("$here/test/unit" "$here/test/workspace")
-  apt_packages+=(chromium)
   if [[ "${paths[*]}" = *"$here/test/gazebo"* ]]; then
     has_gazebo || fail "this machine has no Gazebo 11: ./run test --platform bullseye test/gazebo"
     build_gazebo

@@ -1,37 +1,29 @@
-"""The command `./run fuzz`: invalid input for all parsers, conversions and nodes; prints counts."""
+"""The command `./run fuzz`: invalid messages for all nodes; prints counts."""
 import argparse
 import resource
 import sys
 import time
 
-from fuzz.functions import fuzz_functions
 from fuzz.nodes import TARGETS, fuzz_node
 
 MEMORY = 4 * 2 ** 30  # limit; requests for more are errors
 
 
 def main():
-    """Call functions and callbacks until the first exception other than a rejection."""
+    """Call callbacks until the first exception other than a rejection."""
     parser = argparse.ArgumentParser(prog='./run fuzz', description=__doc__)
     parser.add_argument('--seed', type=int, default=1, help='seed of the input (default: 1)')
     parser.add_argument('--minutes', type=float, help='limit of the duration (default: none)')
-    parser.add_argument('--calls', type=int, default=10 ** 6, help='number for all functions (default: 1000000)')
     parser.add_argument('--messages', type=int, default=10 ** 5, help='number for each node (default: 100000)')
-    parser.add_argument('--only', choices=['functions'] + list(TARGETS), help='run only this part')
+    parser.add_argument('--only', choices=list(TARGETS), help='run only this node')
     given = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, resource.getrlimit(resource.RLIMIT_DATA)[1]))
-    parts = [given.only] if given.only else ['functions'] + list(TARGETS)
+    parts = [given.only] if given.only else list(TARGETS)
     began_s = time.monotonic()
     for number, part in enumerate(parts, 1):
         deadline_s = float('inf') if given.minutes is None else began_s + 60 * given.minutes * number / len(parts)
-        if part == 'functions':
-            counts = fuzz_functions(given.seed, given.calls, deadline_s)
-            for name in counts:
-                print('%-45s %8d calls, %8d rejected' % ((name,) + tuple(counts[name])))
-            print('%-45s %8d calls' % ('functions', sum(calls for calls, _rejected in counts.values())), flush=True)
-        else:
-            sent, cpu_s = fuzz_node(part, given.seed, given.messages, deadline_s)
-            print('%-45s %8d messages, %.1f s of CPU' % (part, sent, cpu_s), flush=True)
+        sent, cpu_s = fuzz_node(part, given.seed, given.messages, deadline_s)
+        print('%-20s %8d messages, %.1f s of CPU' % (part, sent, cpu_s), flush=True)
     print('seed %d: no errors' % given.seed)
 
 

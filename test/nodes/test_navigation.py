@@ -1,7 +1,4 @@
-"""navigation.launch among people, with the real move_base, costmap_2d and social_navigation_layers, on simulated time.
-
-Without the archives in ROS_3D_BB_DATA, replicas of them run (`support.replica_nodes`).
-"""
+"""navigation.launch among people in simulated time, with the real move_base, costmap_2d and social layers."""
 import itertools
 import os
 import signal
@@ -34,9 +31,9 @@ def two_people(seconds):
 
 
 @pytest.fixture(scope='module')
-def robot(tmp_path_factory):
+def robot():
     """The robot without people around it; the nodes run."""
-    environment, _is_real = planner_environment(str(tmp_path_factory.mktemp('packages')))
+    environment = planner_environment()
     rospy.init_node('test_navigation')
     nodes = subprocess.Popen(['roslaunch', os.path.join(ROOT, 'test', 'support', 'navigation.launch')], env=environment)
     driven = DrivenRobot()

@@ -3,14 +3,13 @@ import contextlib
 import os
 import time
 
-import numpy as np
 import pytest
 import rospy
 from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
-from std_msgs.msg import Float32, Int32MultiArray, Time, UInt32
+from std_msgs.msg import Float32, UInt32
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.core.time_sync import NS
@@ -89,21 +88,6 @@ def test_time_and_tf_are_published_every_10_ms_and_at_the_images(round_of_scene)
     assert clock_ns[-len(times_ns):] == times_ns
 
 
-def test_without_publish_clock_stamps_are_the_time_of_the_machine(path):
-    began = time.time()
-    with Recorder('ground_truth', TrackedObjectArray, publisher_expected=False) as truth:
-        process = started('simulator_node', 'scenario:=' + path)
-        wait_until(lambda: len(truth.messages) >= RATE + 2 and (
-            truth.messages[-1].header.stamp - truth.messages[0].header.stamp).to_sec() > 3, 'a second round')
-        process.terminate()
-        process.wait()
-    stamps = [message.header.stamp.to_sec() for message in truth.messages]
-    assert began - 1 < stamps[0] < began + 15
-    assert stamps == sorted(stamps)
-    assert 3 < max(np.diff(stamps)) < 15  # the pause between rounds is 3 s; a busy machine renders slowly
-    assert stamps[-1] < time.time()
-
-
 @pytest.mark.parametrize('params,reason', [
     ((), 'no scenario given'), (('scenario:=/nowhere.yaml',), '/nowhere.yaml'),
     (('scenario:=' + os.devnull, 'speed:=0'), '~speed is 0'), (('scenario:=x', 'speed:=2.0'), 'publish_clock'),
@@ -112,25 +96,6 @@ def test_invalid_parameters_are_rejected_at_the_start(path, params, reason):
     process = started('simulator_node', *params)
     output, _none = process.communicate(timeout=30)
     assert process.returncode == 1 and reason in output and 'Traceback' not in output
-
-
-def test_a_supervised_scene_stands_still_until_a_time_limit_and_waits_at_it(path):
-    kinds = {'ground_truth': TrackedObjectArray, '/clock': Clock, 'yolo_bounding_box': Int32MultiArray}
-    with recorded(kinds, 'scenario:=' + path, 'supervised:=true', 'boxes:=true') as (recorders, process):
-        truth, clock, boxes = (recorders[topic] for topic in kinds)
-        limits = publisher('simulator_node/time_limit', Time)
-        wait_until(lambda: len(truth.messages) >= 3, 'images of the start')
-        assert len(set(message.objects[0].pose.pose.position.y for message in truth.messages)) == 1
-        limit = clock.messages[-1].clock + rospy.Duration(0.7)
-        limits.publish(Time(limit))
-        wait_until(lambda: clock.messages[-1].clock > limit - rospy.Duration(0.02), 'the time limit')
-        time.sleep(0.5)
-        assert clock.messages[-1].clock <= limit
-        limits.publish(Time(limit + rospy.Duration(10)))
-        assert process.wait(timeout=60) == 0
-        wait_until(lambda: truth.messages[-1].objects[0].pose.pose.position.y < 0, 'the end of the scene')
-        wait_until(lambda: len(boxes.messages) == len(truth.messages), 'the boxes of each image')
-        assert len(boxes.messages[0].data) == 4
 
 
 @pytest.fixture

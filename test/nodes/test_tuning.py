@@ -1,6 +1,5 @@
 """Live parameters of running nodes through the client and the command of dynamic_reconfigure, which need a master."""
 import ast
-import subprocess
 
 import pytest
 import rospy
@@ -39,15 +38,6 @@ def current(client):
 
 
 @pytest.fixture
-def tracker(clients):
-    """The tracker's client; its parameters are restored afterwards."""
-    client = clients['tracker_node']
-    values = current(client)
-    yield client
-    client.update_configuration({name: values[name] for name in LIVE['tracker_node']})
-
-
-@pytest.fixture
 def wait_for_line(clients):
     with Recorder('/rosout', Log) as log:
         yield lambda words: wait_until(lambda: any(words in entry.msg for entry in log.messages), words)
@@ -78,14 +68,6 @@ def test_live_parameters_are_offered_and_each_offered_value_is_accepted(clients,
             assert as_text(rospy.get_param('/%s/%s' % (node, name))) == value
 
 
-def test_each_value_is_in_the_group_in_which_rqt_reconfigure_shows_it(tracker):
-    groups = current(tracker)['groups']['groups']
-    sections = {name: param.section for name, param in LIVE['tracker_node'].items()}
-    assert set(groups) == set(sections.values()) and len(groups) > 5
-    assert all(name in groups[section] for name, section in sections.items())
-    assert groups['thesis']['alpha'] == 0.2 and groups['both trackers']['prediction_time'] == 2.0
-
-
 @pytest.mark.parametrize('node, change, words', [
     ('tracker_node', {'max_age': 1.0, 'outlier_share': 1.5, 'marker_history': 9.0},
      'parameter ~outlier_share is 1.5'),
@@ -104,21 +86,3 @@ def test_a_request_with_an_invalid_value_is_rejected_as_a_whole(clients, wait_fo
     assert values == {name: value for name, value in before.items() if name != 'groups'}
     wait_for_line(words)
     assert all(as_text(rospy.get_param('/%s/%s' % (node, name))) == value for name, value in values.items())
-
-
-def test_a_node_without_a_parameter_file_is_reconfigured(clients):
-    client = Client('plain_tracker', timeout=TIMEOUT_S)
-    assert client.update_configuration({'prediction_time': 3.0})['prediction_time'] == 3.0
-    assert isinstance(rospy.get_param('/plain_tracker/marker_namespaces'), list)
-    client.close()
-
-
-def test_the_command_of_dynamic_reconfigure_works(tracker, wait_for_line):
-    def dynparam(*arguments):
-        command = ('rosrun', 'dynamic_reconfigure', 'dynparam') + arguments
-        return subprocess.check_output(command, universal_newlines=True, timeout=TIMEOUT_S)
-    assert dynparam('list').split() == ['/' + node for node in sorted(NODES + ['plain_tracker'])]
-    dynparam('set', '/tracker_node', 'prediction_time', '3.0')
-    wait_for_line('~prediction_time changed from 2.0 to 3.0')
-    assert rospy.get_param('/tracker_node/prediction_time') == 3.0
-    assert "'prediction_time': 3.0" in dynparam('get', '/tracker_node')

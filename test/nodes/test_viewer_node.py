@@ -1,7 +1,6 @@
 """viewer_node on simulated images. Needs a master for five topics, services and a window."""
 import itertools
 import os
-import resource
 import signal
 import subprocess
 from typing import Any, NamedTuple
@@ -10,8 +9,8 @@ import numpy as np
 import pytest
 import rospy
 from rosgraph_msgs.msg import Log
-from sensor_msgs.msg import CameraInfo, Image, Joy
-from std_msgs.msg import Empty, Header, Int32MultiArray
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header, Int32MultiArray
 from std_srvs.srv import SetBool, SetBoolResponse, Trigger
 
 from ros_3d_bb.camera.depth_image import DepthImage
@@ -24,7 +23,6 @@ from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_sessi
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
-from support.processes import pid_of
 from support.ros import Recorder, launched, publisher, wait_until
 from support.screen import press, start_screen
 
@@ -174,34 +172,6 @@ def test_images_without_boxes_are_stored_after_a_warning(rig, folder):
     assert entries(folder)[-1].detections == ()
 
 
-def test_measurements_of_another_camera_are_rejected(rig, folder):
-    rig.send()
-    captured(folder)
-    count = len(entries(folder))
-    rig.send(focal_factor=1.1)
-    wait_until(lambda: 'another camera' in capture().message, 'a rejection')
-    assert len(entries(folder)) == count
-
-
-def test_a_full_disk_is_reported(rig, folder):
-    """The file size limit of the node, 2 kB, acts as a full disk, until it is removed."""
-    sent, pid = rig.send(), pid_of('/viewer_node')
-    unlimited = resource.prlimit(pid, resource.RLIMIT_FSIZE)
-    resource.prlimit(pid, resource.RLIMIT_FSIZE, (2000, unlimited[1]))
-    wait_until(lambda: 'File too large' in capture().message, 'a rejection')
-    resource.prlimit(pid, resource.RLIMIT_FSIZE, unlimited)
-    captured(folder)
-    check_stored(folder, sent, -1)
-
-
-def test_without_a_session_nothing_is_stored():
-    process = subprocess.Popen(['rosrun', 'ros_3d_bb', 'viewer_node', '__name:=other', '_window:=false'])
-    answer = capture('other')
-    process.kill()
-    process.wait()
-    assert not answer.success and 'session:=FOLDER' in answer.message
-
-
 @pytest.mark.parametrize('display', [None, ':9876'])
 def test_without_a_display_the_error_names_the_option(display):
     environment = {name: value for name, value in os.environ.items() if name not in ('DISPLAY', 'WAYLAND_DISPLAY')}
@@ -229,30 +199,6 @@ def window(rig, monkeypatch, tmp_path):
     for started in (process, screen):
         started.kill()
         started.wait()
-
-
-def test_the_timer_is_started_by_topic_and_joystick_and_the_last_measurement_is_deleted(rig, folder):
-    rospy.set_param('viewer_node/label', 'C3')
-    timer, joystick = publisher('viewer_node/timer', Empty), publisher('joy', Joy)
-    wait_until(lambda: timer.get_num_connections() and joystick.get_num_connections(), 'the connections')
-    for start in (lambda: timer.publish(Empty()),
-                  lambda: [joystick.publish(Joy(buttons=[pressed])) for pressed in (1, 1)]):
-        count = len(entries(folder))
-        start()
-
-        def stored():
-            rig.send()
-            rospy.sleep(0.1)
-            return len(entries(folder)) >= count + 2
-        wait_until(stored, 'two measurements')
-        for _image in range(8):
-            rig.send()
-            rospy.sleep(0.1)
-        assert len(entries(folder)) == count + 2 and entries(folder)[-1].label == 'C3'
-    last = entries(folder)[-1]
-    answer = rospy.ServiceProxy('viewer_node/delete_last', Trigger)()
-    assert answer.success and last.id in answer.message
-    assert len(entries(folder)) == count + 1 and not os.path.exists(last.color_path)
 
 
 def test_keys_store_pause_and_quit(rig, window):

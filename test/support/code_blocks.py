@@ -29,7 +29,6 @@ def blocks_in(page):
 
 
 BLOCKS = [block for page in PAGES for block in blocks_in(page)]
-_claimed = []
 
 
 def claimed(beginning, language='bash'):
@@ -37,10 +36,4 @@ def claimed(beginning, language='bash'):
     found = {block.text: block for block in BLOCKS if block.language == language and block.text.startswith(beginning)}
     if len(found) != 1:
         raise LookupError('%d blocks of %s begin with %r; 1 expected' % (len(found), language, beginning))
-    _claimed.extend(found)
     return list(found.values())[0]
-
-
-def unclaimed():
-    """Blocks that no test runs."""
-    return [block for block in BLOCKS if block.text not in _claimed]

@@ -60,23 +60,6 @@ def distributions(distances, bins):
     return np.log(np.clip(1 - np.abs(offsets), 1e-9, 1)).reshape(len(distances), -1)
 
 
-def write_layers(path):
-    """Write a network of the operators of detectors: convolution, pooling, resizing, and a head. Returns the path."""
-    random, graph = np.random.RandomState(0), Graph()
-    x = graph.node('Conv', ['images', graph.constant(random.randn(8, 3, 3, 3).astype(np.float32))], strides=[8, 8],
-                   pads=[1] * 4)
-    y = graph.node('MaxPool', [graph.node('Relu', [x])], kernel_shape=[2, 2], strides=[2, 2])
-    y = graph.node('Resize', [y, '', graph.constant(np.float32([1, 1, 2, 2]))], mode='nearest')
-    x = graph.node('Sigmoid', [graph.node('Concat', [x, y], axis=1)])
-    rows = graph.node('Reshape', [graph.node('Transpose', [x], perm=[0, 2, 3, 1]),
-                                  graph.constant(np.array([1, -1, 16], np.int64))])
-    rows = graph.node('Slice', [rows] + [graph.constant(np.array([value], np.int64)) for value in (0, 6, 2)])
-    with open(str(path), 'wb') as stream:
-        stream.write(graph.model([('images', FLOAT, (1, 3, 64, 96))], [(rows, FLOAT, (1, 'n', 6))],
-                                 {'names': "{0: 'person', 1: 'dog'}", 'stride': '32', 'task': 'detect'}))
-    return str(path)
-
-
 def write_mean_network(path, input_shape=(1, 3, 96, 128), element=FLOAT, channels_last=False, metadata=()):
     """Write a network whose only detection (1, 1, 6) is the mean of the channels of its input, twice. Returns the path.
 

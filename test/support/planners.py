@@ -1,12 +1,10 @@
 """What planners do with the messages of planner_bridge_node: replicas of the behaviour of the sources named at each."""
 import genpy
 import numpy as np
-import tf2_ros
 from geometry_msgs.msg import Point, PoseWithCovariance, Vector3
 
 from ros_3d_bb.msg import TrackedObject
 
-LETHAL, FREE = 254, 0
 CYLINDER, CYLINDER_RADIUS = 3, 1
 
 
@@ -29,12 +27,6 @@ def yaw_of(quaternion):
 def moved(points, transform):
     """Points (n, 3) by a 4x4 matrix."""
     return np.reshape(points, (-1, 3)).dot(transform[:3, :3].T) + transform[:3, 3]
-
-
-def moved_float32(points, transform):
-    """The same as tf2_sensor_msgs moves a cloud: matrix, points and result are float32."""
-    points = np.asarray(points, np.float32).reshape(-1, 3)
-    return points.dot(transform[:3, :3].T.astype(np.float32)) + transform[:3, 3].astype(np.float32)
 
 
 class TebReplica(object):
@@ -91,109 +83,3 @@ class JackalMpcReplica(object):
             self.obstacles[item.id] = (np.array([item.pose.position.x, item.pose.position.y]),
                                        item.shape.dimensions[CYLINDER_RADIUS],
                                        turn.dot([item.twist.linear.x, item.twist.linear.y]))
-
-
-class SocialLayerReplica(object):
-    """social_navigation_layers: social_layer.cpp.
-
-    It keeps the last list. At each update, position, and position plus velocity, are transformed at the stamp of the
-    list (0: the latest transform) without waiting; their difference is the velocity. People for whom there is no
-    transform are dropped.
-
-    Parameters
-    ----------
-    costmap_from : callable
-        The 4x4 matrix from a frame at a stamp to the costmap's frame; raises tf2_ros.TransformException.
-    """
-
-    def __init__(self, costmap_from):
-        self._costmap_from, self._people = costmap_from, None
-
-    def receive(self, people):
-        self._people = people
-
-    def people(self):
-        """(position (3,), velocity (3,)) of each."""
-        if self._people is None:
-            return []
-        try:
-            transform = self._costmap_from(self._people.header.frame_id, self._people.header.stamp)
-        except tf2_ros.TransformException:
-            return []
-        found = []
-        for person in self._people.people:
-            position = np.array([person.position.x, person.position.y, person.position.z])
-            end = position + [person.velocity.x, person.velocity.y, person.velocity.z]
-            start, end = moved([position, end], transform)
-            found.append((start, end - start))
-        return found
-
-
-class ObstacleLayerReplica(object):
-    """costmap_2d's ObstacleLayer and ObservationBuffer with observation_persistence 0.
-
-    Each source keeps its last cloud without the points outside of the heights in the costmap's frame. Clouds are moved
-    there in float32. At an update the rays from the sensor's origin to all points of the clearing clouds are set free,
-    and then the points of the marking clouds that are in range are set lethal. Other cells do not change.
-
-    Parameters
-    ----------
-    costmap_from : callable
-        The 4x4 matrix from a frame at a stamp to the costmap's frame.
-    sources : dict
-        The layer's parameters of each observation source, by its name; what is not given has costmap_2d's default.
-    """
-
-    resolution, cells = 0.05, 200
-    defaults = {'sensor_frame': '', 'marking': True, 'clearing': False, 'obstacle_range': 2.5, 'raytrace_range': 3.0,
-                'min_obstacle_height': 0.0, 'max_obstacle_height': 2.0, 'observation_persistence': 0.0}
-
-    def __init__(self, costmap_from, sources):
-        self._costmap_from, self._clouds = costmap_from, {}
-        self._sources = {name: dict(self.defaults, **given) for name, given in sources.items()}
-        assert all(source['observation_persistence'] == 0 for source in self._sources.values())
-        self.grid = np.full((self.cells, self.cells), FREE, np.uint8)  # [y, x], centre at the costmap's origin
-
-    def receive(self, name, cloud):
-        offsets = {field.name: field.offset for field in cloud.fields}
-        kind = np.dtype({'names': 'xyz', 'formats': ['<f4'] * 3, 'offsets': [offsets[name] for name in 'xyz'],
-                         'itemsize': cloud.point_step})
-        points = np.frombuffer(cloud.data, kind)
-        points = np.column_stack([points[name] for name in 'xyz'])
-        points = moved_float32(points, self._costmap_from(cloud.header.frame_id, cloud.header.stamp))
-        source = self._sources[name]
-        inside = (points[:, 2] >= source['min_obstacle_height']) & (points[:, 2] <= source['max_obstacle_height'])
-        sensor = source['sensor_frame'] or cloud.header.frame_id
-        self._clouds[name] = self._costmap_from(sensor, cloud.header.stamp)[:3, 3], points[inside]
-
-    def update(self):
-        for name, (origin, points) in self._clouds.items():
-            if self._sources[name]['clearing'] and len(points):
-                self._clear(origin, points, self._sources[name]['raytrace_range'])
-        for name, (origin, points) in self._clouds.items():
-            if self._sources[name]['marking']:
-                reach_m = self._sources[name]['obstacle_range']
-                x, y = self._cell(points[np.linalg.norm(points - origin, axis=1) < reach_m])
-                inside = (x >= 0) & (x < self.cells) & (y >= 0) & (y < self.cells)
-                self.grid[y[inside], x[inside]] = LETHAL
-
-    def _cell(self, points):
-        x, y = np.floor(np.asarray(points)[..., :2] / self.resolution).astype(int).T + self.cells // 2
-        return x, y
-
-    def _clear(self, origin, points, range_m):
-        """One cell a step along the longer axis, from the sensor's cell to those of the points, up to the range."""
-        start = np.array(self._cell(origin))
-        ways = np.column_stack(self._cell(points)) - start
-        steps = np.maximum(np.abs(ways).max(axis=1), 1)
-        shares = np.minimum(1.0, range_m / np.maximum(self.resolution * np.linalg.norm(ways, axis=1), 1e-9))
-        numbers = np.arange(steps.max() + 1)
-        lines = np.rint(start + numbers[:, None, None] * (ways / steps[:, None])).astype(int)
-        reached = numbers[:, None] <= (shares * steps).astype(int)
-        cells = lines[reached & ((lines >= 0) & (lines < self.cells)).all(axis=2)]
-        self.grid[cells[:, 1], cells[:, 0]] = FREE
-
-    def lethal(self):
-        """Centres of the lethal cells, (n, 2) metres."""
-        y, x = np.nonzero(self.grid == LETHAL)
-        return (np.column_stack((x, y)) - self.cells // 2 + 0.5) * self.resolution

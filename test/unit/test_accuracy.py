@@ -7,8 +7,7 @@ import pytest
 from conftest import DATA
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scenario_scores, scores_of, table
-from ros_3d_bb_lab.evaluation.accuracy_figure import draw, draw_errors, pyplot  # selects the backend
+from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scenario_scores, scores_of
 from ros_3d_bb_lab.evaluation.scenes import position_errors_m
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -93,24 +92,3 @@ def test_scores_of_scenes():
     assert scores['ours']['rmse_plane_m'] < 0.08 < scores['thesis']['worst_m']
     empty = scenario_scores(os.path.join(SCENARIOS, 'empty_room.yaml'), estimator_named('foreground'), every=90)
     assert empty['ours'] == {'boxes': 0, 'missed': 0}
-
-
-@pytest.mark.slow
-@REAL_WEIGHTS
-def test_the_keys_of_the_result_and_its_table(result):
-    assert {'frames', 'positions', 'calibration', 'thesis_calibration', 'ours', 'thesis', 'recorded',
-            'per_frame'} == set(result)
-    assert set(result['per_frame'][0]) == {'id', 'ours', 'thesis', 'truth', 'ours_raw', 'thesis_raw'}
-    assert len(table(result)) == 13 and 'rmse_plane_m' in table(result)[3]
-
-
-def test_the_figure_compares_measured_and_predicted_errors(tmp_path):
-    """Errors of 0.1 m with predicted standard deviations of 0.1 m in X and in Z; one frame has no estimate."""
-    truth_m = np.array([[0.0, 1.2], [0.0, 1.2], [0.5, 3.2], [0.5, 3.2]])
-    position_m = np.insert(truth_m + [[0.1, 0.0], [-0.1, 0.0], [0.0, 0.1], [np.nan, np.nan]], 1, 0.0, axis=1)
-    covariances = np.tile(np.diag([0.01, 0.0, 0.01]), (4, 1, 1))
-    draw(tmp_path / 'accuracy.png', truth_m, position_m, covariances)
-    assert (tmp_path / 'accuracy.png').stat().st_size > 5000
-    _figure, axes = pyplot.subplots()
-    draw_errors(axes, truth_m[:3], position_m[:3][:, [0, 2]], covariances[:3][:, [[0], [2]], [0, 2]])
-    assert [round(bar.get_height(), 6) for bar in axes.patches] == [0.1, 0.1] + 2 * [round(np.sqrt(0.02), 6)]

@@ -1,5 +1,4 @@
 """Annotation of a session: edits are saved immediately, can be undone, and keep changes by other programs."""
-import json
 import os
 
 import numpy as np
@@ -7,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb.sessions.session_reader import SessionError, annotated_people, read_session
+from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.measurement import Mark
 from support.small_session import (FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json, write_measurement,
@@ -20,7 +19,7 @@ def states(document):
 
 def test_a_new_session_is_read(document):
     first = document.measurements[0]
-    assert states(document) == ['new'] * 4 and document.progress == (0, 4) and document.notes == ()
+    assert states(document) == ['new'] * 4 and document.progress == (0, 4)
     assert (first.id, first.stamp_text, first.label, first.person) == ('m0', '1616161616.000000005', 'by the door', 0)
     assert [detection.box_px for detection in first.detections] == [NEAR_BOX, FAR_BOX]
     assert first.detections[0].size_m.tolist() == [0.533, 1.4] and first.detections[0].support == 0.9
@@ -59,26 +58,6 @@ def test_truth_is_saved_immediately_and_read_by_benchmarks(document, folder):
     assert Document.open(folder).measurements[2].truth_m == (0.1, -0.05, 2.3)
 
 
-@pytest.mark.parametrize('x_m,z_m,y_m', [(0, 0, None), (0, -1, None), (float('nan'), 1, None), (101, 1, None),
-                                         (0, float('inf'), None), (0, 1, 1e3)])
-def test_positions_not_in_front_of_the_camera_are_rejected(document, folder, x_m, z_m, y_m):
-    before = read_json(folder)
-    with pytest.raises(ValueError, match='truth'):
-        document.set_truth(0, x_m, z_m, y_m)
-    assert read_json(folder) == before and not document.can_undo
-
-
-def test_the_truth_of_the_last_annotation_is_copied(document):
-    with pytest.raises(ValueError, match=document.measurements[0].id):
-        document.last_truth(0)
-    document.set_truth(2, 0.1, 2.3, 0.4)
-    document.set_truth(1, 0.2, 2.5)
-    assert document.last_truth(3) == (0.2, None, 2.5)
-    reopened = Document.open(document.folder)  # the order of annotation is unknown: the nearest one before
-    reopened.reject(3, 'blurred')
-    assert reopened.last_truth(3) == (0.1, 0.4, 2.3)
-
-
 def test_rejected_measurements_are_skipped_and_can_be_restored(document, folder):
     document.set_truth(0, 0.1, 2.0)
     document.reject(0, ' arm in front ')
@@ -88,32 +67,6 @@ def test_rejected_measurements_are_skipped_and_can_be_restored(document, folder)
     assert states(document)[0] == 'annotated' and len(read_session(folder).frames) == 4
     with pytest.raises(ValueError, match='reason'):
         document.reject(0, '  ')
-
-
-def test_all_edits_can_be_undone_and_redone(document, folder):
-    def content():
-        return json.dumps(read_json(folder), sort_keys=True)
-    edits = [lambda: document.set_truth(0, 0.1, 2.0), lambda: document.set_truths([1, 3], 0.1, 2.0),
-             lambda: document.reject(1, 'blurred'), lambda: document.choose_person(2, 1),
-             lambda: document.add_box(2, (1, 1, 30, 40)), lambda: document.set_grid([Mark('B2', 0.5, 2.5)]),
-             lambda: document.restore(1), lambda: document.set_truth(0, 0.2, 2.1, 0.3)]
-    contents = [content()]
-    for edit in edits:
-        edit()
-        contents.append(content())
-    assert document.grid == (Mark('B2', 0.5, 2.5),)
-    indices = []
-    for expected in contents[-2::-1]:
-        indices.append(document.undo())
-        assert content() == expected
-    assert indices == [0, 1, None, 2, 2, 1, 1, 0] and not document.can_undo and document.undo() is None
-    for expected in contents[1:]:
-        document.redo()
-        assert content() == expected
-    assert not document.can_redo and document.redo() is None
-    document.undo()
-    document.restore(0)
-    assert not document.can_redo
 
 
 @settings(max_examples=25)
@@ -161,16 +114,6 @@ def test_two_annotators_keep_the_fields_of_each_other(document, folder):
     assert len(read_json(folder)['frames'][0]['detections']) == 3
 
 
-def test_a_moved_measurement_is_found_by_its_id_and_a_removed_one_is_named(document, folder):
-    change_json(folder, lambda content: content['frames'].reverse())
-    document.set_truth(0, 0.1, 2.0)
-    assert [entry['id'] for entry in read_json(folder)['frames'] if 'truth_mm' in entry] == ['m0']
-    document = Document.open(folder)
-    change_json(folder, lambda content: content['frames'].pop(0))
-    with pytest.raises(SessionError, match='m3'):
-        document.reject(0, 'gone')
-
-
 def test_an_edit_that_cannot_be_saved_raises_an_error_and_changes_nothing(document, folder):
     with open(os.path.join(folder, 'frames.json'), 'w') as stream:
         stream.write('{"frames"')
@@ -196,32 +139,6 @@ def test_the_truth_belongs_to_the_nearest_box_unless_one_was_selected(document):
     assert document.measurements[1].truths == {1: (0.72, None, 2.9)}
 
 
-def test_several_people_on_marks_are_all_analysed(document, folder):
-    document.set_truth(0, -0.5, 2.1)
-    document.choose_person(0, 1)
-    document.set_truth(0, 0.7, 3.0)
-    people = list(annotated_people(read_session(folder).frames))
-    assert [(one.person, one.truth_m.tolist()) for one in people] == [(1, [0.7, 3.0]), (0, [-0.5, 2.1])]
-    assert [one.boxes_px for one in people] == [(FAR_BOX, NEAR_BOX), (NEAR_BOX, FAR_BOX)]
-    document.clear_truth(0)
-    reopened = Document.open(folder)
-    assert reopened.measurements[0].truths == {0: (-0.5, None, 2.1)} and states(reopened)[0] == 'annotated'
-    reopened.choose_person(0, 0)
-    assert reopened.measurements[0].truth_m == (-0.5, None, 2.1)
-
-
-def test_a_measurement_without_boxes_has_a_state_of_its_own_and_is_not_done(document, folder):
-    document.delete_box(0)
-    document.set_truth(0, 0.7, 3.0)
-    document.delete_box(0)
-    assert states(document)[0] == 'nobody found' and document.progress == (0, 4)
-    assert states(Document.open(folder))[0] == 'nobody found'
-    with pytest.raises(ValueError, match='no box'):
-        document.delete_box(0)
-    document.add_box(0, NEAR_BOX)
-    assert states(document)[0] == 'new'
-
-
 def test_boxes_are_replaced_and_deleted_with_their_truth(document, folder):
     document.set_truth(0, -0.5, 2.1)
     document.replace_box(0, (11, 5, 25, 44))
@@ -231,13 +148,6 @@ def test_boxes_are_replaced_and_deleted_with_their_truth(document, folder):
     assert [one.box_px for one in opened(folder)[0].detections] == [FAR_BOX] and opened(folder)[0].truths == {}
     document.undo()
     assert opened(folder)[0].truths == {0: (-0.5, None, 2.1)}
-
-
-def test_the_mark_of_a_label_is_found(document, folder):
-    assert document.mark_of(0) is None
-    change_json(folder, lambda content: content['frames'][0].update(label=' a1'))
-    document.refresh()
-    assert document.mark_of(0) == Mark('A1', -0.5, 2.0)
 
 
 def opened(folder):

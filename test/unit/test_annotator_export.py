@@ -5,11 +5,10 @@ import os
 import pytest
 
 import conftest
-from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb_annotator.document import Document
-from ros_3d_bb_annotator.export import THESIS_COLUMNS, export, rows_of
+from ros_3d_bb_annotator.export import THESIS_COLUMNS, export
 from ros_3d_bb_lab.evaluation.noise.tables import read_table
-from support.small_session import NEAR_BOX, change_json
+from support.small_session import NEAR_BOX
 
 
 def read_rows(path):
@@ -48,33 +47,3 @@ def test_a_row_contains_box_estimates_and_truth_in_all_axes(document, tmp_path):
     assert [float(row[axis + ' true']) for axis in 'XYZ'] == [-500, 10, 2100.4]
     assert float(row['Z error']) == pytest.approx(1000 * z_m - 2100.4, abs=0.06)
     assert read_table(path, 'Z').truth_m.tolist() == [[-0.5, 2.1004]]
-
-
-def test_the_form_of_the_thesis_has_integers(document, tmp_path):
-    for index in range(2):
-        document.choose_person(index, index)
-        document.set_truth(index, -0.5, 2.1004)
-    assert export(document, str(tmp_path / 'table.csv'), 'recorded', in_thesis_form=True) == 2
-    assert (tmp_path / 'table.csv').read_text() == (
-        'X measured,X true,Z measured,Z true,X error,X absolute error,Z error,Z absolute error\n'
-        '-466,-500,2000,2100,34,34,-100,100\n700,-500,3000,2100,1200,1200,900,900\n')
-    rows = list(rows_of(document, 'foreground'))
-    assert [row[-1] for row in rows] == ['', 'yes']  # implausible
-
-
-def test_only_annotated_measurements_with_an_estimate_are_exported(document, tmp_path):
-    for index in range(3):
-        document.set_truth(index, 0.0, 2.0)
-    document.reject(1, 'blurred')
-    change_json(str(tmp_path), lambda content: content['frames'][2].update(detections=[]))
-    document.refresh()
-    assert len(list(rows_of(document, 'foreground'))) == 1
-
-
-def test_an_empty_table_or_an_unwritable_file_raises_an_error(document, tmp_path):
-    with pytest.raises(SessionError, match=str(tmp_path)):
-        export(document, str(tmp_path / 'table.csv'), 'foreground')
-    document.set_truth(0, 0.0, 2.0)
-    with pytest.raises(SessionError, match=str(tmp_path)):
-        export(document, str(tmp_path / 'missing' / 'table.csv'), 'foreground')
-    assert not os.path.exists(str(tmp_path / 'table.csv'))

@@ -1,14 +1,12 @@
 """Annotation in the window by key presses and clicks, which are saved in the session."""
-import os
 
-import cv2
 import numpy as np
 import pytest
 
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.measurement import Mark
-from support.small_session import FAR_BOX, NEAR_BOX, change_json
-from support.window import ALT, CONTROL, SHIFT, Qt, QtCore, QtGui, QtWidgets, opened
+from support.small_session import FAR_BOX, NEAR_BOX
+from support.window import CONTROL, SHIFT, Qt, QtCore, QtWidgets, opened
 
 
 def place_in(view, x, y):
@@ -24,15 +22,6 @@ def test_the_error_of_a_typed_truth_is_shown_and_enter_saves_it_and_goes_on(driv
     assert 'X −28 mm, Z +40 mm' in drive.window.last_entry.text()
     drive.press('-0,5 m', Qt.Key_Tab, '2.1m', Qt.Key_Tab, '-30', Qt.Key_Return)
     assert opened(folder)[1].truth_m == (-0.5, -0.03, 2.1) and drive.window.current == 2
-
-
-def test_list_boxes_and_error_show_the_analysed_estimate_and_the_recorded_one_beside_it(drive):
-    text = drive.window.pane.people.item(0).text()
-    assert 'Z 2090 mm' in text.split('recorded')[0] and 'recorded: X −466, Z 2000 mm' in text
-    drive.press('-500', Qt.Key_Tab, '2050', Qt.Key_Return, Qt.Key_PageUp)
-    assert 'Z +40 mm' in drive.window.pane.truth.error_label.text()
-    distance_m = drive.document.errors(0)[2]
-    assert drive.window.list.table.model().index(0, 5).data() == '%.0f' % (1000 * distance_m)
 
 
 @pytest.mark.parametrize('x, z, problem, field', [
@@ -55,17 +44,6 @@ def test_the_unit_can_be_switched(drive, folder):
     drive.press('-0.25', Qt.Key_Tab, '2.1', Qt.Key_Return)  # the unit stays
     assert opened(folder)[1].truth_m == (-0.25, None, 2.1)
     assert drive.window.list.table.model().index(1, 4).data() == '2.100'
-
-
-def test_digits_select_the_person_outside_fields_and_alt_and_a_digit_keeps_the_typed_text(drive, folder):
-    drive.press('-77', (Qt.Key_2, ALT))
-    assert opened(folder)[0].person == 1 and drive.window.pane.truth.fields['x'].text() == '-77'
-    drive.press(Qt.Key_F3, '1')
-    assert opened(folder)[0].person == 0
-    drive.press(Qt.Key_F4, '2')
-    assert opened(folder)[0].person == 0 and drive.window.pane.truth.fields['x'].text() == '2'
-    drive.press(Qt.Key_F3, '7')
-    assert opened(folder)[0].person == 0 and 'no box 7' in drive.window.statusBar().currentMessage()
 
 
 @pytest.mark.parametrize('name', ['color_view', 'depth_view'])
@@ -95,14 +73,6 @@ def test_a_box_is_drawn_with_shift_and_drag_unless_it_is_tiny_or_cancelled(drive
     assert 1.9 < drawn.estimate_m[2] < 2.2
 
 
-def test_a_box_is_drawn_by_the_keyboard(drive, folder):
-    drive.press((Qt.Key_D, CONTROL), Qt.Key_Left, Qt.Key_Left, Qt.Key_Up, Qt.Key_Up, (Qt.Key_Left, CONTROL))
-    drive.press(Qt.Key_Space)
-    drive.press(Qt.Key_Right, Qt.Key_Down, Qt.Key_Down, Qt.Key_Down, Qt.Key_Down, (Qt.Key_Down, CONTROL), Qt.Key_Return)
-    assert opened(folder)[0].detections[2].box_px == (11, 4, 22, 46)
-    assert not drive.window.pane.shared.drawing
-
-
 def test_a_drag_moves_what_both_views_show(drive):
     pane = drive.window.pane
     drive.press(Qt.Key_F3, '+', '+', '+')
@@ -113,15 +83,6 @@ def test_a_drag_moves_what_both_views_show(drive):
     assert (moved - QtCore.QPointF(30, 20)).manhattanLength() < 1 and len(drive.measurement(0).detections) == 2
     drive.press('0')
     assert pane.shared.zoom == 1 and pane.shared.center == (0.5, 0.5)
-
-
-def test_the_readout_contains_pixel_depth_and_position(drive, folder):
-    drive.press(Qt.Key_F3, *[Qt.Key_Left, (Qt.Key_Right, CONTROL)])
-    assert drive.window.pane.readout.text() == (
-        'pixel (23, 24)    depth 2000 mm    X −300 mm  Y 0 mm  Z 2000 mm')
-    cv2.imwrite(os.path.join(folder, 'depth', 'm0.png'), np.zeros((48, 64), np.uint16))
-    drive.press(Qt.Key_F5, Qt.Key_F3, Qt.Key_Left)
-    assert drive.window.pane.readout.text().endswith('no depth')
 
 
 def test_a_click_on_a_mark_sets_the_truth(drive, folder):
@@ -149,43 +110,6 @@ def test_marks_are_edited_in_a_dialog_and_selected_by_the_keyboard(drive, folder
     assert opened(folder)[0].truth_m == (-0.5, None, 2)
     drive.press((Qt.Key_Z, CONTROL), (Qt.Key_Z, CONTROL))
     assert Document.open(folder).grid == (Mark('A1', -0.5, 2.0),)
-
-
-def test_marks_are_pasted_read_from_files_and_generated(drive, folder, tmp_path):
-    (tmp_path / 'marks.csv').write_text('name,x,z\nD1,1 m,2 m\n')
-
-    def edit(dialog):
-        QtGui.QGuiApplication.clipboard().setText('B1\t0\t2000')
-        dialog.paste()
-        dialog.open(str(tmp_path / 'marks.csv'))
-        dialog.x_field.setText('100 200')
-        dialog.z_field.setText('3000')
-        dialog.add_grid()
-        assert 'not unique' in dialog.problem.text()  # the grid has a B1 as well
-        dialog.x_field.setText('100')
-        dialog.remove_current()
-        dialog.table.setCurrentCell(0, 0)
-        dialog.remove_current()
-        dialog.add_grid()
-        dialog.accept()
-    drive.answer(edit, lambda: drive.press((Qt.Key_G, CONTROL)))
-    assert Document.open(folder).grid == (Mark('B1', 0, 2), Mark('D1', 1, 2), Mark('A1', 0.1, 3))
-
-
-def test_invalid_marks_are_rejected(drive, folder):
-    def enter_nonsense(dialog):
-        add_mark(dialog, 'B1', '__import__("os")', '2000')
-        dialog.accept()
-        return dialog.problem.text(), dialog.isVisible()
-    problem, still_there = drive.answer(enter_nonsense, lambda: drive.press((Qt.Key_G, CONTROL)))
-    assert 'Row 2' in problem and "'__import__" in problem and still_there and len(Document.open(folder).grid) == 1
-
-
-def test_same_as_last_copies_the_truth_and_reports_if_there_is_none(drive, folder):
-    drive.press((Qt.Key_L, CONTROL))
-    assert drive.measurement(0).id in drive.window.pane.truth.hint_label.text()
-    drive.press('-500', Qt.Key_Tab, '2100', Qt.Key_Return, (Qt.Key_L, CONTROL), (Qt.Key_L, CONTROL))
-    assert [measurement.truth_m for measurement in opened(folder)] == [(-0.5, None, 2.1)] * 3 + [None]
 
 
 def test_reject_asks_for_a_reason_and_restore_undoes_it(drive, folder):
@@ -223,45 +147,6 @@ def test_an_implausible_position_is_asked_about_and_enter_corrects_it(drive, fol
     assert opened(folder)[0].truth_m == (-0.5, None, 2.1)
 
 
-def test_a_kept_implausible_position_is_marked_and_named_before_the_analysis(drive, folder):
-    for _measurement in range(3):
-        drive.press('-500', Qt.Key_Tab, '2100', Qt.Key_Return)
-    drive.press('-500', Qt.Key_Tab, '210')
-    drive.answer(lambda dialog: buttons_of(dialog)['Enter it anyway'].click(), lambda: drive.press(Qt.Key_Return))
-    shown = drive.window.list.table.model()
-    assert shown.index(3, 2).data() == 'implausible' and shown.index(3, 0).data(Qt.BackgroundRole) is not None
-    assert shown.index(2, 2).data() == 'annotated' and shown.index(2, 0).data(Qt.BackgroundRole) is None
-    drive.press(Qt.Key_PageUp)
-
-    def go_to_it(dialog):
-        text = dialog.findChild(QtWidgets.QListWidget).item(0).text()
-        buttons_of(dialog)['Go to it'].click()
-        return text
-    text = drive.answer(go_to_it, lambda: drive.press((Qt.Key_A, CONTROL | SHIFT)))
-    assert text.startswith('m3 (by the door): ') and 'Z 210 mm' in text and drive.window.current == 3
-    assert Document.open(folder).outliers()[0][0] == 3  # after a restart
-
-
-def test_the_truth_of_several_people_is_entered_in_one_image(drive, folder):
-    drive.press((Qt.Key_T, CONTROL), '720', Qt.Key_Tab, '3000')
-    assert 'Box 2 is the nearest' in drive.window.pane.truth.hint_label.text()
-    drive.press(Qt.Key_Return, (Qt.Key_1, ALT), '-500', Qt.Key_Tab, '2100', Qt.Key_Return)
-    assert opened(folder)[0].truths == {1: (0.72, None, 3.0), 0: (-0.5, None, 2.1)}
-    drive.press((Qt.Key_T, CONTROL | SHIFT))
-    assert opened(folder)[0].truths == {1: (0.72, None, 3.0)} and drive.window.pane.truth.fields['x'].text() == ''
-
-
-def test_a_measurement_without_boxes_has_a_banner_and_digits_after_drawing_go_to_the_truth(folder, window_on):
-    change_json(folder, lambda content: content['frames'][0].update(detections=[]))
-    drive = window_on(folder)
-    assert 'Nobody was found' in drive.window.pane.banner.text() and drive.window.pane.banner.isVisible()
-    assert drive.window.list.table.model().index(0, 2).data() == 'nobody found'
-    view = drive.window.pane.color_view
-    drive.drag(view, place_in(view, 10.5, 4.5), place_in(view, 25.5, 43.5), SHIFT)
-    drive.press('-500', Qt.Key_Tab, '2100', Qt.Key_Return)
-    assert opened(folder)[0].truth_m == (-0.5, None, 2.1) and drive.window.pane.banner.isHidden()
-
-
 def test_boxes_are_moved_resized_and_deleted(drive, folder):
     view = drive.window.pane.color_view
     x1, y1, x2, y2 = NEAR_BOX
@@ -275,18 +160,6 @@ def test_boxes_are_moved_resized_and_deleted(drive, folder):
     assert [one.box_px for one in opened(folder)[0].detections] == [FAR_BOX]
     drive.press((Qt.Key_Z, CONTROL))
     assert len(opened(folder)[0].detections) == 2
-
-
-def test_the_mark_of_a_label_is_offered_and_entered_for_all_of_the_label(folder, window_on):
-    change_json(folder, lambda content: [entry.update(label='A1') for entry in content['frames'][:3]])
-    drive = window_on(folder)
-    truth = drive.window.pane.truth
-    assert truth.fields['z'].text() == '2000' and 'Mark A1' in truth.hint_label.text()
-    assert drive.document.draft(0) == {}
-    drive.press((Qt.Key_L, CONTROL | SHIFT))
-    assert [one.truth_m for one in opened(folder)] == [(-0.5, None, 2.0)] * 3 + [None] and drive.window.current == 3
-    drive.press((Qt.Key_Z, CONTROL))  # in one step
-    assert [one.truth_m for one in opened(folder)] == [None] * 4
 
 
 def test_truth_and_rejection_are_entered_for_all_selected_measurements(drive, folder):
@@ -309,19 +182,6 @@ def test_the_list_is_sorted_and_searched(drive):
     assert table.model().rowCount() == 1
     search.setText('2150')
     assert [table.model().index(row, 0).data() for row in range(table.model().rowCount())] == ['m1']
-
-
-def test_undo_starts_with_typed_text_and_undo_and_redo_show_their_measurement(drive, folder):
-    drive.press('-500', Qt.Key_Tab, '2000', Qt.Key_Return, '-450', Qt.Key_Tab, '2000', Qt.Key_Return)
-    drive.press('7', (Qt.Key_Z, CONTROL))
-    assert drive.window.pane.truth.fields['x'].text() == '' and opened(folder)[1].state == 'annotated'
-    drive.press((Qt.Key_Z, CONTROL), (Qt.Key_Z, CONTROL))
-    assert drive.window.current == 0 and [measurement.state for measurement in opened(folder)] == ['new'] * 4
-    drive.press((Qt.Key_Y, CONTROL))
-    assert opened(folder)[0].truth_m == (-0.5, None, 2.0) and drive.window.pane.truth.fields['x'].text() == '-500'
-    drive.press((Qt.Key_Z, CONTROL | SHIFT))
-    assert opened(folder)[1].truth_m == (-0.45, None, 2.0) and drive.window.current == 1
-    assert not drive.window.actions['redo'].isEnabled()
 
 
 def test_the_list_selects_and_filters_and_going_on_can_be_switched_off(drive):

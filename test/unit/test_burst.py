@@ -1,5 +1,5 @@
 """Countdown and burst of measurements."""
-from ros_3d_bb.sessions.burst import GIVE_UP_S, Burst
+from ros_3d_bb.sessions.burst import Burst
 
 
 def test_a_burst_follows_a_countdown():
@@ -23,15 +23,3 @@ def test_a_burst_can_be_cancelled_and_started_again():
     assert not burst.is_due(6.0)
     burst.toggle(10.0)
     assert burst.is_due(15.0)
-
-
-def test_a_failed_measurement_is_repeated_until_the_burst_gives_up():
-    burst = Burst(0.0, 2, 1.0)
-    burst.toggle(0.0)
-    burst.report(0.0, False)
-    assert burst.is_due(0.1)
-    burst.report(0.1, True)
-    assert not burst.is_due(1.0) and burst.is_due(1.2)
-    burst.report(1.2, False)
-    burst.report(1.2 + GIVE_UP_S + 0.1, False)
-    assert not burst.is_active

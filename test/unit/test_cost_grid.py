@@ -70,27 +70,10 @@ def test_the_most_probable_time_of_the_prediction_counts():
         assert cost_at(costs, x_m, y_m) == np.rint(HIGHEST * min(probability / RISKY, 1))
 
 
-@pytest.mark.filterwarnings('ignore:invalid value')
-@pytest.mark.parametrize('variance_m2', [np.nan, np.inf, -1.0])
-def test_an_invalid_covariance_hides_neither_other_times_nor_other_people(variance_m2):
-    track, other = walking((2.0, 1.0), (1.0, 0.0), (0.1, 0.5)), walking((2.0, 1.5), (1.0, 0.0), (0.1, 0.5))
-    track.prediction_covariance_m2[5] = variance_m2 * np.ones((3, 3))
-    costs = presence_costs([track, other], np.eye(4), ROBOT_RADIUS_M)
-    assert cost_at(costs, 2.0, 1.0) == cost_at(costs, 2.0, 1.5) == HIGHEST
-    assert (costs >= presence_costs([other], np.eye(4), ROBOT_RADIUS_M)).all()
-
-
 def test_costs_decrease_as_the_prediction_becomes_uncertain():
     costs = presence_costs([walking((-2.0, 0.0), (2.0, 0.0), (0.1, 1.5))], np.eye(4), ROBOT_RADIUS_M)
     along = [int(cost_at(costs, x_m, 0.05)) for x_m in np.arange(-1.95, 2.0, 0.5)]
     assert along[0] == HIGHEST and along == sorted(along, reverse=True) and along[-1] < HIGHEST / 2
-
-
-def test_standing_people_cost_only_where_they_are():
-    costs = presence_costs([walking((1.5, 0.0), (1.0, 0.0), (0.0, 0.8), moving=False)], np.eye(4), ROBOT_RADIUS_M)
-    assert cost_at(costs, 1.5, 0.0) == HIGHEST
-    assert cost_at(costs, 1.5 + 2 * RADIUS_M, 0.0) == cost_at(costs, 1.5, 2 * RADIUS_M) == 0
-    assert not presence_costs([], np.eye(4), ROBOT_RADIUS_M).any()
 
 
 def test_a_robot_in_the_way_of_a_person_pays_only_for_going_further_into_it():
@@ -115,9 +98,3 @@ def test_positions_and_covariances_are_transformed_to_the_robot_frame():
     assert cost_at(costs, 2.0, 0.0) > 0
     assert cost_at(costs, 2.0, 1.5) > 0 and cost_at(costs, 2.0, -1.5) > 0
     assert cost_at(costs, 3.5, 0.0) == cost_at(costs, 0.5, 0.0) == 0
-
-
-def test_people_beyond_the_grid_and_at_its_border_do_no_harm():
-    for x_m in (-100.0, -5.2, 4.9, 5.2, 100.0):
-        costs = presence_costs([walking((x_m, x_m), (1.0, 0.5), (0.3, 0.8))], np.eye(4), ROBOT_RADIUS_M)
-        assert costs.shape == (100, 100) and (costs.any() == (abs(x_m) < 6))

@@ -105,13 +105,6 @@ def test_the_box_of_a_person_extends_from_head_to_feet(height_m, x, z, camera, f
     assert 0.7 <= detections.scores[0] <= 1 and detections.classes.tolist() == [0]
 
 
-def test_finds_a_cluster_cut_by_the_side_of_the_image():
-    room = Room()
-    expected = room.visible(room.person(-1.55, 3.0))
-    assert expected[0] == 0
-    assert_boxes(room.cluster_boxes(), expected)
-
-
 @pytest.mark.parametrize('one, other', [((0.0, 3.0), (0.4, 3.5)), ((0.0, 3.0), (0.4, 3.7)), ((0.0, 3.0), (0.4, 4.0)),
                                         ((-0.28, 3.5), (0.28, 3.5))])
 def test_people_who_overlap_in_the_image_are_separated_by_depth_or_between_their_heads(one, other):
@@ -177,15 +170,6 @@ def test_the_last_floor_is_used_if_none_is_visible():
     assert DepthPeople().detect(color, hidden, CAMERA) is None
 
 
-def test_a_fitted_floor_is_dropped_once_the_floor_is_known():
-    room = Room()
-    color, depth = room.images()
-    hidden = DepthImage(np.zeros_like(depth.values), 0.001)
-    detector = DepthPeople()
-    assert [detector.detect(color, image, CAMERA, floor) is not None for image, floor in (
-        (depth, None), (hidden, None), (hidden, room.floor), (hidden, None))] == [True, True, True, False]
-
-
 def test_the_hog_score_of_a_person_is_used_for_two_more_images():
     """Then it is evaluated again, here in a blank image, and it is at another place."""
     room, elsewhere = Room(), Room()
@@ -196,29 +180,6 @@ def test_the_hog_score_of_a_person_is_used_for_two_more_images():
     counts = [len(detector.detect(image, seen, CAMERA, room.floor).boxes) for image, seen in (
         (blank, depth), (color, depth), (blank, depth), (blank, depth), (blank, depth), (color, depth), (blank, far))]
     assert counts == [0, 1, 1, 1, 0, 1, 0]
-
-
-@pytest.mark.parametrize('image,depth,named', [
-    ((240, 320), (240, 320), 'depth .*320 x 240.*camera 640 x 480'),
-    ((240, 320), (480, 640), 'colour .*320 x 240.*depth image 640 x 480')])
-def test_images_and_cameras_of_different_sizes_are_rejected(image, depth, named):
-    with pytest.raises(ValueError, match=named):
-        DepthPeople().detect(np.zeros(image + (3,), np.uint8), DepthImage(np.zeros(depth, np.uint16), 0.001), CAMERA)
-
-
-@pytest.mark.parametrize('normal', [(0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)])
-def test_a_floor_that_is_not_below_the_camera_is_rejected(normal):
-    room = Room()
-    with pytest.raises(ValueError, match=r'\(%.2f, %.2f, %.2f\)' % normal):
-        DepthPeople().detect(*(room.images() + (CAMERA, Floor(np.array(normal), 1.0))))
-
-
-@pytest.mark.parametrize('params, message', [({'min_depth': 7.0}, 'min_depth is 7 and max_depth is 6.5'),
-                                             ({'max_top': 1.0}, 'min_top is 1.25 and max_top is 1'),
-                                             ({'min_camera_height': 4.0}, 'max_camera_height is 3.2')])
-def test_parameters_that_contradict_each_other_are_rejected(params, message):
-    with pytest.raises(ValueError, match=message):
-        DepthPeople(DepthPeopleParams(**params))
 
 
 @pytest.mark.slow

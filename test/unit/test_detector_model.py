@@ -8,14 +8,12 @@ from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_fr
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.error_model import read_error_model
-from ros_3d_bb.tracking.occlusion import DEFAULT_RANGE_M, learned_range
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, CameraView, Detection
+from ros_3d_bb.tracking.types import VISIBLE, CameraView, Detection
 from ros_3d_bb_lab.evaluation.noise import __main__ as command
-from ros_3d_bb_lab.evaluation.noise.recordings import detection_range, fit_recordings, lasting_errors, match_people
+from ros_3d_bb_lab.evaluation.noise.recordings import fit_recordings
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import RecordedRun, with_error_model
 from ros_3d_bb_lab.evaluation.tracking.run_generator import Image, RunTruth
-from support.recordings import write_recording
 
 CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)
 VIEW = CameraView(transform_from((0, 0, 1), OPTICAL_ROTATION), CAMERA)
@@ -67,49 +65,12 @@ def test_the_model_gives_recorded_boxes_covariances(run):
     assert box.covariance_m2[0, 0] == pytest.approx(model.z_sigma.at(box.position_m[0]) ** 2, rel=0.01)
 
 
-def test_a_recording_without_misses_has_no_range(run):
-    people = match_people([run])
-    probability, range_m = detection_range(people.range_m, np.ones(len(people.range_m), bool))
-    assert range_m is None and probability == 0.99
-
-
-def test_single_images_do_not_show_how_long_errors_last():
-    with pytest.raises(ValueError, match='0 pairs of errors of a person within 1.5 s; at least 100 expected'):
-        lasting_errors(np.zeros((50, 2)), np.arange(50), np.arange(50) * NS)
-
-
-def test_recordings_without_people_are_rejected(run):
-    without_people = run._replace(images=tuple(image._replace(truth=image.truth._replace(
-        status=np.full(12, OUT_OF_VIEW))) for image in run.images))
-    with pytest.raises(ValueError, match='no person in the recordings counts'):
-        fit_recordings([without_people], 'made', 'none')
-
-
 def test_the_command_writes_the_model(tmp_path, monkeypatch, capsys, run):
     monkeypatch.setattr(command, 'read_recordings', lambda folder: [run])
     monkeypatch.setattr(sys, 'argv', ['./run noise', '--recordings', 'made', '--out', str(tmp_path / 'out')])
     command.main()
     detector = read_error_model(tmp_path / 'out' / 'error_model.yaml').detector
     assert detector.max_range_m == RANGE_M and 'max_range_m: 12' in capsys.readouterr().out
-
-
-def test_a_recording_of_one_person_is_rejected(tmp_path, monkeypatch):
-    write_recording(tmp_path / 'one')
-    monkeypatch.setattr(sys, 'argv', ['./run noise', '--recordings', str(tmp_path), '--out', str(tmp_path / 'out')])
-    with pytest.raises(SystemExit, match='different x; at least 3 expected'):
-        command.main()
-    assert not (tmp_path / 'out').exists()
-
-
-def test_the_range_is_learned_from_people_farther_away():
-    range_m = DEFAULT_RANGE_M
-    for _image in range(100):
-        range_m = learned_range(range_m, np.array([3.0, 7.0]), np.ones(2, bool), np.array([1, 0]))
-    assert range_m == DEFAULT_RANGE_M
-    for _image in range(100):
-        range_m = learned_range(range_m, np.array([3.0, 12.0, 20.0, 90.0]), np.array([True] * 3 + [False]),
-                                np.array([0, 2, 1, 3]))
-    assert range_m == pytest.approx(16.0, abs=0.1)
 
 
 def leave(detector, distance_m, others_m=()):
@@ -123,12 +84,6 @@ def leave(detector, distance_m, others_m=()):
         if number > 60 and not [track for track in tracks if abs(track.position_m[1]) < 1]:
             return (number - 60) / 30.0
     return np.inf
-
-
-def test_a_person_within_the_learned_range_is_missed():
-    assert leave(DetectorModel(), 12.0, (18.0,)) < 0.5
-    assert leave(DetectorModel(max_range_m=8.0), 12.0, (18.0,)) > 1
-    assert leave(DetectorModel(max_range_m=13.0), 12.0) < 0.5
 
 
 def test_detectors_that_miss_people_often_end_tracks_later():

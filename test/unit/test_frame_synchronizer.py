@@ -46,13 +46,6 @@ def test_the_newest_complete_snapshot_is_kept_while_the_detector_works(delay_2d,
     assert parts_of(snapshots.newest) == (59 - delay_3d,) * 5
 
 
-def test_boxes_of_another_stamp_are_ignored():
-    snapshots = made()
-    send(snapshots, 1, PARTS[:3])
-    snapshots.add_boxes3d(PERIOD + 1, 0, 'other')
-    assert snapshots.newest.boxes3d is None
-
-
 def test_the_newest_images_are_returned_if_their_boxes_do_not_arrive_in_time():
     snapshots = made()
     assert snapshots.is_early
@@ -61,14 +54,6 @@ def test_the_newest_images_are_returned_if_their_boxes_do_not_arrive_in_time():
         assert snapshots.is_early == (number * PERIOD < NS)
         is_recent = 10 <= number and (number - 10) * PERIOD <= NS  # boxes of an older image are not returned
         assert parts_of(snapshots.newest) == ((10,) * 5 if is_recent else (number,) * 3 + (None,) * 2)
-
-
-def test_a_colour_image_without_depth_is_reported():
-    lost = []
-    snapshots = made(lost.append)
-    for number in range(5):
-        send(snapshots, number, [part for part in PARTS if number != 2 or part != 'depth'])
-    assert lost == [2 * PERIOD] and parts_of(snapshots.newest) == (4,) * 5
 
 
 def test_older_messages_are_dropped_when_time_jumps_back():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
+from ros_3d_bb.tracking.types import CameraView
 from ros_3d_bb_lab.evaluation.gazebo.people_truth import PeopleTruth
 from ros_3d_bb_lab.simulation.gazebo_world import HEIGHT_M, PERSON_NAME, world_of
 from ros_3d_bb_lab.simulation.motion import person_motion
@@ -70,15 +70,3 @@ def test_true_tracks_have_position_velocity_and_future_positions():
     np.testing.assert_allclose(track.velocity_mps, [0.5, -1, 0], atol=1e-6)
     np.testing.assert_allclose(track.prediction_m[-1, :2], [6, -3], atol=1e-6)
     assert (track.id, track.moving, track.prediction_step_s * len(track.prediction_m)) == (1, True, 2.0)
-
-
-def test_people_behind_others_and_beside_the_image_are_not_visible():
-    places = (3, 0), (5, 0.1), (5, 1.5), (2, 2), (-3, 0)
-    truth = PeopleTruth(states([lambda _time, place=place: place for place in places], [0.0, 1.0]))
-    assert [track.status for track in truth.tracks_at(NS // 2, AHEAD)] == [VISIBLE, OCCLUDED, VISIBLE, OUT_OF_VIEW,
-                                                                           OUT_OF_VIEW]
-
-
-def test_a_recording_without_model_states_is_rejected():
-    with pytest.raises(ValueError, match='no model states'):
-        PeopleTruth([])

@@ -5,11 +5,8 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera, transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.detection.depth.ground_plane import (MAX_HIGHER, FittedFloor, Floor, check_upright, fit_floor,
-                                                    floor_from_transform)
+from ros_3d_bb.detection.depth.ground_plane import MAX_HIGHER, FittedFloor, Floor, fit_floor, floor_from_transform
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
-from ros_3d_bb_lab.simulation.scenario import scenario_from
-from ros_3d_bb_lab.simulation.simulator import Simulator
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 V, U = np.mgrid[:CAMERA.height, :CAMERA.width]
@@ -70,44 +67,6 @@ def test_a_table_does_not_replace_the_floor_of_earlier_images():
                  for image in [table, floor] + MAX_HIGHER * [table] + [floor] + (MAX_HIGHER + 1) * [table] + [floor]]
     expected_m = [0.5] + (1 + MAX_HIGHER + 1 + MAX_HIGHER) * [1.2] + [0.5, 1.2]
     np.testing.assert_allclose(heights_m, expected_m, atol=0.02)
-
-
-@pytest.mark.parametrize('pitch,height_m,limits', [(0.9, 1.5, {'max_camera_tilt': 0.8}),
-                                                   (0.3, 1.5, {'max_camera_height': 1.4}),
-                                                   (0.9, 0.5, {'min_camera_height': 0.6})])
-def test_limits_of_the_fit(pitch, height_m, limits):
-    depth = image_of(floor_of(pitch, 0, height_m))
-    assert fit_floor(depth, CAMERA) is not None
-    assert fit_floor(depth, CAMERA, DepthPeopleParams(**limits)) is None
-
-
-@pytest.mark.parametrize('tilt_deg,is_valid', [(0, True), (60, True), (-60, True), (70, False)])
-def test_limits_of_a_known_floor(tilt_deg, is_valid):
-    floor = floor_of(np.radians(tilt_deg), 0, 1.0)
-    if is_valid:
-        return check_upright(floor)
-    with pytest.raises(ValueError):
-        check_upright(floor)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('height_m,tilt_deg,ahead_m,size_m,is_visible', [
-    (0.12, 0, 1.5, (0.8, 1.6, 0.45), True), (1.0, 30, 2.2, (0.8, 1.6, 0.75), True),
-    (2.0, 60, 1.7, (0.8, 1.6, 0.75), True), (3.0, 40, 4.0, (0.8, 1.6, 0.75), True),
-    (1.4, 25, 1.55, (2.2, 3.2, 0.75), False), (1.0, 40, 1.45, (2.0, 1.6, 0.5), False)])
-def test_simulated_tables_and_beds(height_m, tilt_deg, ahead_m, size_m, is_visible):
-    """The last two hide nearly the whole floor. Planes that cut them and the walls are not floors either."""
-    simulator = Simulator(scenario_from({
-        'duration': 1.0, 'rate': 1.0, 'robot': {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': np.radians(tilt_deg)},
-        'room': {'bounds': [-2.0, 5.0, -4.0, 4.0], 'height': 4.0,
-                 'furniture': [{'at': [ahead_m, 0.1], 'size': list(size_m)}]}}))
-    frame = simulator.frame(0)
-    floor = fit_floor(DepthImage(frame.depth_mm, 0.001), simulator.camera)
-    assert (floor is not None) == is_visible
-    if is_visible:
-        truth = floor_from_transform(np.linalg.inv(frame.poses.map_from_camera))
-        assert abs(floor.offset_m - truth.offset_m) < 0.03
-        assert floor.normal.dot(truth.normal) > np.cos(np.radians(2))
 
 
 def test_the_result_is_none_without_a_floor():

@@ -37,7 +37,7 @@ ALLOWED = {
         'camera conversions core detection.yolov5 pipeline sessions',
         'genpy rosbag sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
     'ros_3d_bb.diagnosis': (
-        'bags camera conversions core detection.depth msg pipeline',
+        'bags camera conversions core msg pipeline',
         'genpy sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
     'ros_3d_bb.nodes.common': (
         'camera conversions core diagnosis msg pipeline visualization',
@@ -67,10 +67,6 @@ ALLOWED = {
     'ros_3d_bb_lab.evaluation.navigation': (
         'camera conversions core msg nodes.common lab.evaluation lab.simulation',
         'geometry_msgs nav_msgs rospy sensor_msgs std_msgs tf2_msgs yaml'),
-    'ros_3d_bb_lab.evaluation.costmap': (
-        'camera conversions core estimation msg tracking visualization lab.evaluation '
-        'lab.simulation lab.simulation.ros',
-        'cv2 nav_msgs rosgraph_msgs rospy std_msgs tf2_msgs'),
     'ros_3d_bb_lab.evaluation.gazebo': (
         'bags conversions core tracking lab.evaluation lab.simulation', 'rosbag tf2_msgs'),
     'ros_3d_bb_lab.evaluation.latency': (
@@ -78,7 +74,7 @@ ALLOWED = {
         'rosgraph roslib rospy sensor_msgs std_msgs visualization_msgs'),
 }
 QT = {'PyQt5', 'python_qt_binding'}
-SESSION_MODULES = 'command_line', 'document', 'export', 'analysis', 'legacy'  # of the annotator: no windows
+SESSION_MODULES = 'command_line', 'document', 'export', 'analysis'  # of the annotator: no windows
 
 
 def modules_in(root):
@@ -164,12 +160,6 @@ def test_no_file_imports_one_that_imports_it(root, package):
         _others, ours = imports_of(module, root)
         below[package + module] = ours | set(name.rsplit('.', 1)[0] for name in ours)
     assert len(below) > 5 and cycles_in(below) == []
-
-
-def test_optional_libraries_are_imported_where_they_are_used():
-    for module in MODULES:
-        others, _ours = imports_of(module, at_the_top=True)
-        assert not others & {'norfair', 'trackeval'}, module
 
 
 def test_nodes_import_no_mathematics_and_no_other_node():

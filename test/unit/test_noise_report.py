@@ -71,11 +71,6 @@ def test_the_report_contains_all_figures(out):
     assert '>None' not in text and 'nan' not in text and 'src="d' in text and 'href' not in text
 
 
-def test_the_report_is_also_written_as_pdf(out):
-    data = (out / 'report.pdf').read_bytes()
-    assert data.startswith(b'%PDF-') and data.count(b'/Type /Page\n') + data.count(b'/Type /Page ') >= 4
-
-
 def test_the_error_models_can_be_read_and_correct_the_bias(out):
     for name in ('error_model.yaml', 'error_model_thesis_form.yaml'):
         model = read_error_model(out / name)
@@ -120,28 +115,3 @@ def test_what_was_left_out_is_listed_and_does_not_prevent_the_analysis(tmp_path,
     page = (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
     assert 'rejected: not on the mark' in page and 'no ground truth' in page and 'Z 160 mm' in page
     assert summary['z']['max_sigma_m'] < 0.05
-
-
-def test_without_positions_in_both_axes_the_model_has_the_form_of_the_thesis(tmp_path, monkeypatch):
-    z = write_table(tmp_path / 'z.csv', [['', '', row[2], row[3]] for row in rows_of(3)])
-    x = write_table(tmp_path / 'x.csv', [[row[0], row[1], '', ''] for row in rows_of(3)])
-    run(monkeypatch, '--z', z, '--x', x, '--out', tmp_path / 'out')
-    assert read_error_model(tmp_path / 'out' / 'error_model.yaml').cross_validated is None
-    assert 'No cross-validated model: measurements at 0 different x' in (tmp_path / 'out' / 'report.html').read_text(
-        encoding='utf-8')
-
-
-@pytest.mark.parametrize('arguments,reason', [
-    (['--z', 'no.csv', '--x', 'no.csv'], 'no.csv: cannot be read as a table'),
-    (['no_session'], 'no_session: not a measurement session')])
-def test_invalid_input_is_named_and_leaves_no_folder(tmp_path, monkeypatch, arguments, reason):
-    with pytest.raises(SystemExit, match='./run noise: ' + reason):
-        run(monkeypatch, *arguments + ['--out', tmp_path / 'out'])
-    assert not (tmp_path / 'out').exists()
-
-
-@pytest.mark.parametrize('arguments', [[], ['--z', 'z.csv'], ['session', '--z', 'z.csv', '--x', 'x.csv']])
-def test_incomplete_arguments_are_rejected(tmp_path, monkeypatch, capsys, arguments):
-    with pytest.raises(SystemExit):
-        run(monkeypatch, *arguments + ['--out', tmp_path / 'out'])
-    assert 'expected' in capsys.readouterr().err

@@ -3,9 +3,8 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb_lab.evaluation.noise.tables import (MeasurementTable, clusters_of,
-                                                   read_session_measurements, read_table, small_clusters)
-from support.noise_tables import COLUMNS, RANGES_M, SIDES_M, rows_of, write_table
+from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements, read_table
+from support.noise_tables import write_table
 
 
 def test_reads_a_table_in_metres(tmp_path):
@@ -18,13 +17,6 @@ def test_an_axis_that_was_not_measured_may_be_empty_or_missing(tmp_path):
     missing = read_table(write_table(tmp_path / 'missing.csv', [[288, 300]], ['Z measured', ' Z true']), 'Z')
     for table in (empty, missing):
         assert np.isnan(table.truth_m[0, 0]) and table.truth_m[0, 1] == 0.3 and len(table.complete().truth_m) == 0
-
-
-def test_clusters_are_by_true_value(tmp_path):
-    table = read_table(write_table(tmp_path / 'table.csv', rows_of()), 'Z')
-    assert [cluster.truth_m for cluster in clusters_of(table, 'Z')] == pytest.approx(list(RANGES_M))
-    assert [cluster.truth_m for cluster in clusters_of(table, 'X')] == pytest.approx(list(SIDES_M))
-    assert [len(cluster.error_m) for cluster in clusters_of(table, 'Z')] == [6 * len(SIDES_M)] * len(RANGES_M)
 
 
 @pytest.mark.parametrize('row,reason', [
@@ -48,15 +40,6 @@ def test_files_that_are_not_tables_are_rejected(tmp_path, content, reason):
         read_table(str(tmp_path / 'table.csv'), 'Z')
 
 
-@pytest.mark.parametrize('rows,reason', [
-    ([[0, 0, '', '']] * 3, 'there are none'), ([[0, 0, 288, 300]] * 5, 'there are 5 at 0.3 m'),
-    ([[0, 0, 288, 300]] * 5 + [[0, 0, 588, 600]] * 2, 'at least 3 measurements .* there are 5 at 0.3 m, 2 at 0.6 m')])
-def test_too_few_measurements_are_rejected(tmp_path, rows, reason):
-    table = read_table(write_table(tmp_path / 'table.csv', rows, COLUMNS[:4]), 'Z')
-    with pytest.raises(ValueError, match=reason):
-        clusters_of(table, 'Z')
-
-
 @pytest.mark.slow
 def test_a_session_gives_recorded_or_new_estimates(session_folder):
     recorded, median, foreground = (read_session_measurements(session_folder, name)
@@ -65,23 +48,3 @@ def test_a_session_gives_recorded_or_new_estimates(session_folder):
     assert np.abs(recorded.measured_m - median.measured_m).max() < 0.002  # median is the thesis' estimator
     assert np.abs(foreground.measured_m - median.measured_m).max() > 0.01
     assert np.abs(foreground.measured_m[:, 2] - foreground.truth_m[:, 1]).max() < 0.4
-
-
-def test_people_truncated_by_the_image_border_are_marked(session_folder):
-    table = read_session_measurements(session_folder, 'recorded')
-    boxes = [frame.boxes_px[0] for frame in read_session(session_folder).frames]
-    near = [min(left, 640 - right) <= 4 + 0.02 * (right - left) for left, _top, right, _bottom in boxes]
-    assert table.cut.tolist() == near
-    assert not table.whole().cut.any() and len(table.whole().truth_m) >= 65
-
-
-def test_measurements_can_be_selected_by_truncation_and_completeness():
-    x_m = np.array([0, 0, 0, 0, 1, 1, 1, 1.0])
-    table = MeasurementTable('made', np.zeros((8, 3)), np.stack((x_m, x_m), axis=1), np.arange(8) > 5,
-                             tuple('abcdefgh'))
-    assert table.whole().ids == tuple('abcdef')
-    # two measurements at 1 are too few for a cluster
-    assert [len(group.error_m) for group in small_clusters(table.whole(), 'X')] == [2]
-    table = MeasurementTable('made', np.arange(6.0).reshape(2, 3), np.array([[1, np.nan], [1, 2]]),
-                             np.array([False, True]), ('a', 'b'))
-    assert table.complete().measured_m.tolist() == [[3, 4, 5]]

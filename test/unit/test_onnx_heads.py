@@ -33,24 +33,6 @@ def test_heads_are_recognised_and_decoded(head, names):
     assert len(detections_in(outputs, layout, confidence=0.85).boxes) == 1
 
 
-@pytest.mark.parametrize('head', ['nanodet', 'nanodet-plus', 'picodet'])
-@pytest.mark.parametrize('input_hw', [(320, 320), (416, 416), (256, 480)])
-def test_grids_of_sizes_that_are_no_multiples_of_the_largest_stride(head, input_hw):
-    strides = STRIDES.get(head, (8, 16, 32))
-    outputs = outputs_of(head, BOXES, np.pad(SCORES, ((0, 0), (0, 77)), 'constant'), input_hw, strides)
-    layout = layout_of(outputs, input_hw, {})
-    assert (layout.head, layout.classes, layout.strides) == (head, 80, strides)
-    np.testing.assert_allclose(detections_in(outputs, layout, input_hw).boxes, BOXES, atol=1e-3)
-
-
-@pytest.mark.parametrize('bins', [8, 11, 17])
-def test_distributions_of_other_lengths(bins):
-    outputs = outputs_of('nanodet', BOXES, np.pad(SCORES, ((0, 0), (0, 77)), 'constant'), HW, bins=bins)
-    layout = layout_of(outputs, HW, {})
-    assert (layout.head, layout.classes) == ('nanodet', 80)
-    np.testing.assert_allclose(detections_in(outputs, layout).boxes, BOXES, atol=1e-3)
-
-
 def test_distributions_by_stride_in_other_orders_and_as_maps():
     """Scores and distances of a stride in turn, and (1, channels, height, width); scores before the sigmoid."""
     outputs = outputs_of('picodet', BOXES, SCORES, HW, STRIDES['picodet'])
@@ -65,18 +47,6 @@ def test_distributions_by_stride_in_other_orders_and_as_maps():
     found = detections_in(maps, layout)
     np.testing.assert_allclose(found.boxes, BOXES, atol=1e-3)
     np.testing.assert_allclose(found.scores, SCORES.max(axis=1), atol=1e-6)
-
-
-@pytest.mark.parametrize('metadata, coefficients, names', [
-    ({'task': 'segment'}, 32, ()), ({'task': 'segment'}, 32, NAMES), ({'task': 'pose'}, 51, NAMES)])
-def test_columns_of_other_tasks_are_no_classes(metadata, coefficients, names):
-    output, = outputs_of('yolov8', BOXES, SCORES, HW)
-    outputs = [np.concatenate((output, np.full((1, coefficients, output.shape[2]), 5)), axis=1)]
-    if metadata['task'] == 'segment':
-        outputs.append(np.zeros((1, 32, 24, 32)))
-    layout = layout_of(outputs, HW, metadata, names=names)
-    assert layout == ('yolov8', 3, (8, 16, 32), (0,))
-    assert detections_in(outputs, layout).classes.tolist() == [0, 1, 2]
 
 
 def test_networks_that_suppress_are_known_by_their_metadata():

@@ -37,12 +37,6 @@ def test_hog_score_is_positive_only_at_the_person(window):
     assert best(hog, pyramid_of(image), elsewhere) == LOW_SCORE
 
 
-def test_a_window_may_extend_outside_the_image():
-    window = PersonWindow(300, -40, 440)
-    assert best(PersonHog(), pyramid_of(drawing(window)), window) > LOW_SCORE
-    assert best(PersonHog(), pyramid_of(drawing(window)), PersonWindow(-500, 900, 1200)) == LOW_SCORE
-
-
 def test_without_hog_the_error_names_what_to_install(monkeypatch):
     monkeypatch.delattr(cv2, 'HOGDescriptor')
     with pytest.raises(ValueError, match='HOGDescriptor.*python3-opencv'):
@@ -67,16 +61,3 @@ def test_shape_distinguishes_a_person_from_a_cabinet(noise_m, headless):
     assert cabinet[0] == 1 and person[0] < 0.8 and cabinet[1] <= person[1]
     assert person_score(cabinet, BEST_HOG, headless) < person_score(person, BEST_HOG, headless)
     assert person_score(cabinet, BEST_HOG, True) < 0.2 < 0.9 < person_score(person, BEST_HOG, headless)
-
-
-def test_hog_has_more_weight_if_the_head_is_visible():
-    person = shape_features_of(*(cabinet_and_person()[1] + (0.3,)))
-    gains = [person_score(person, 0.5, headless) - person_score(person, LOW_SCORE, headless)
-             for headless in (False, True)]
-    assert gains[0] > gains[1] > 0
-
-
-def test_fill_is_at_least_one_half():
-    mask = np.zeros((60, 20), bool)
-    mask[::6] = mask[:, 0] = mask[:, 19] = True
-    assert mask.mean() < 0.3 and shape_features_of(mask, np.full(mask.shape, 3.0), 0.3)[0] == 0.5

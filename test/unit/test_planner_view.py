@@ -5,9 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.planning.planner_view import (disc_points, footprint_points, in_frame, position_after, predicted_to,
-                                             ring_points, rounding_m, usable_tracks)
-from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, TrackedObject
+from ros_3d_bb.planning.planner_view import footprint_points, in_frame, position_after, predicted_to, usable_tracks
+from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
 
 STEP_S = 0.25
 
@@ -51,21 +50,6 @@ def test_footprints_end_where_the_prediction_is_uncertain():
     assert footprint_points([track], 0.5, 0.05)[:, 0].max() == pytest.approx(2.25 + 0.3 * 1.5)
     certain = track._replace(prediction_covariance_m2=0.3 ** 2 * np.repeat(np.eye(3)[np.newaxis], 8, axis=0))
     assert footprint_points([certain], 0.5, 0.05)[:, 0].max() == pytest.approx(2.25 + 0.5 * 1.5)
-
-
-@pytest.mark.parametrize('moving, std_m, is_marked', [(True, 0.15, True), (True, 0.25, False), (False, 0.45, True)])
-def test_people_out_of_view_are_marked_if_they_stand_or_have_just_left(moving, std_m, is_marked):
-    track = track_at([2, 0, 0.85], [1.5, 0, 0], moving=moving, covariance=std_m ** 2 * np.eye(6))._replace(
-        status=OUT_OF_VIEW, prediction_covariance_m2=0.45 ** 2 * np.repeat(np.eye(3)[np.newaxis], 8, axis=0))
-    assert bool(len(footprint_points([track], 0.5, 0.05))) == is_marked
-
-
-@given(st.floats(0.02, 3), st.floats(0.01, 0.5))
-def test_a_disc_has_its_outline_and_nothing_outside(radius_m, spacing_m):
-    disc, ring = disc_points(radius_m, spacing_m), ring_points(radius_m, spacing_m)
-    assert np.linalg.norm(disc, axis=1).max() == pytest.approx(radius_m)
-    assert np.linalg.norm(ring, axis=1) == pytest.approx(radius_m)
-    assert (np.linalg.norm(ring - np.roll(ring, 1, axis=0), axis=1) <= spacing_m + 1e-9).all()
 
 
 @pytest.mark.parametrize('changed', [{'position_m': np.array([np.nan, 0, 1])}, {'velocity_mps': np.full(3, np.inf)},
@@ -150,9 +134,3 @@ def test_a_change_of_frame_keeps_distances_and_speeds_on_large_maps(track, yaw, 
     np.testing.assert_allclose(there.position_m - here.position_m, expected, rtol=0, atol=1e-6)
     assert np.linalg.norm(here.velocity_mps) == pytest.approx(
         np.linalg.norm(track.velocity_mps) if track.moving else 0, abs=1e-9)
-
-
-def test_rounding_is_a_quarter_of_a_metre_in_utm_coordinates_and_none_near_the_robot():
-    track = track_at([448262.3, 5411933.2, 0.9], [0, 0, 0])
-    assert rounding_m([track], np.eye(4)) == 0.25 and rounding_m([], np.eye(4)) < 1e-6
-    assert rounding_m([track], transform_from((-448260, -5411930, 0), (0, 0, 0, 1))) < 1e-6

@@ -47,12 +47,6 @@ def test_without_odometry_everything_moves_towards_the_camera(tmp_path):
     assert np.allclose(last.truth.future_m[0, 1], (place_m + SPEED_MPS - CAMERA_MPS, 0))
 
 
-def test_every_nth_image_keeps_the_truth_of_all(tmp_path):
-    run, = read_recordings(str(write_recording(tmp_path / 'one')), every=3)
-    assert [image.stamp_ns for image in run.images] == [START_NS + number * 3 * 10 ** 8 for number in range(11)]
-    assert np.allclose(run.images[0].truth.future_m[0, 0], (8 + SPEED_MPS * 0.5, 0))
-
-
 @pytest.mark.parametrize('score,min_score,probability', [('3.32', 3.3, 0.5), ('3.32', 3.4, None),
                                                          ('0.7', 0.5, 0.7), ('0.7', 0.8, None)])
 def test_scores_are_probabilities_or_those_of_pointrcnn(tmp_path, score, min_score, probability):
@@ -73,12 +67,6 @@ def test_false_tracks_count_where_the_recording_is_annotated(tmp_path, place_m, 
     assert run.in_scored_area(run.images[0], []).tolist() == []
 
 
-def test_a_folder_of_recordings_is_read_in_the_order_of_names(tmp_path):
-    for name in 'ba':
-        write_recording(tmp_path / name)
-    assert [run.name for run in read_recordings(str(tmp_path))] == ['a', 'b']
-
-
 @pytest.mark.parametrize('name,content,message', [
     ('camera.json', '{"width": 640}', 'camera.json: not a camera'),
     ('truth.csv', 't_s,id\n', 'truth.csv has the columns t_s,id; t_s,id,x_m'),
@@ -88,11 +76,6 @@ def test_invalid_files_are_named(tmp_path, name, content, message):
     (folder / name).write_text(content)
     with pytest.raises(ValueError, match=message):
         list(read_recordings(str(folder)))
-
-
-def test_a_folder_without_recordings_is_rejected(tmp_path):
-    with pytest.raises(ValueError, match='has no recording'):
-        list(read_recordings(str(tmp_path)))
 
 
 @pytest.mark.needs('norfair', 'trackeval')

@@ -3,7 +3,6 @@
 Without the weights of ROS_3D_BB_DATA, the true boxes replace those of YOLOv5.
 """
 import glob
-import json
 import os
 
 import numpy as np
@@ -16,7 +15,7 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
 from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, detections_without_scores,
-                                                      exact_detector, main, result_of, score_tracks, scored_people,
+                                                      exact_detector, result_of, score_tracks, scored_people,
                                                       yolov5_detector)
 from ros_3d_bb_lab.evaluation.scenes import Step, detect_in_scene, run_scene, score_detections
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -83,29 +82,9 @@ def test_recall_and_false_positives_of_detectors(runs, detector, recall, false_r
     assert false <= false_rate * images
 
 
-@pytest.mark.slow
-@REAL_WEIGHTS
-def test_an_empty_room_has_scores(runs):
-    result = result_of(runs['depth', 'empty_room.yaml'], 'depth')
-    assert result['false_boxes'] <= 0.05
-    assert (result['people'], result['rmse_m'], result['worst_m'], result['recall']) == (0, None, None, 1.0)
-
-
 @pytest.fixture
 def approach():
     return Simulator(read_scenario(os.path.join(FOLDER, 'approach_jackal.yaml')))
-
-
-def test_exact_boxes_have_a_reproducible_jitter(approach):
-    jitters_px = []
-    for number in range(0, 285, 19):
-        frame = approach.frame(number)
-        boxes, again = (exact_detector(approach)(frame).boxes for _time in range(2))
-        assert boxes.tolist() == again.tolist() and boxes.shape == (1, 4)
-        assert (boxes >= 0).all() and (boxes <= [640, 480] * 2).all() and (boxes == np.rint(boxes)).all()
-        inside = (np.array(frame.people[0].box_px) > 4) & (np.array(frame.people[0].box_px) < [636, 476] * 2)
-        jitters_px += list((boxes[0] - frame.people[0].box_px)[inside])
-    assert len(jitters_px) > 25 and 0.7 < np.std(jitters_px) < 1.4 and np.abs(jitters_px).max() <= 4
 
 
 def test_exact_boxes_have_the_covariance_of_the_error_model(approach):
@@ -143,18 +122,6 @@ def test_a_person_approaching_to_half_a_metre_is_one_visible_track(name):
     assert (result['track_ids'], result['not_visible'], result['id_switches']) == (1, 0, 0)
     assert result['rmse_m'] < result['worst_m'] < 0.25
     assert result['velocity_rmse_mps'] < 0.3 and result['prediction_1s_m'] < 0.5
-
-
-@pytest.mark.parametrize('every,images', [([], {'depth': 2, 'exact': 4}), (['--every', '4'], {'depth': 1, 'exact': 1})])
-def test_the_command_writes_a_row_for_each_detector(every, images, tmp_path, monkeypatch):
-    """Without --every, the exact boxes use each image and the detectors every second one."""
-    scene, scores = tmp_path / 'short.yaml', tmp_path / 'scores.json'
-    scene.write_text('duration: 0.25\npeople: [{start: [3.0, 0.0]}]\n')
-    monkeypatch.setattr('sys.argv', ['scenes', str(scene), '--error-model', ERROR_MODEL, '--json', str(scores)] + every)
-    main()
-    rows = json.loads(scores.read_text())['scenes']
-    assert {row['detector']: row['images'] for row in rows} == images
-    assert [row['scene'] for row in rows] == ['short', 'short']
 
 
 def person(number, x_m, y_m=0.0, speed_mps=0.0, hidden=0.0, box_px=BOX_PX):
@@ -209,19 +176,3 @@ def test_images_without_a_visible_track_count_after_the_first_match():
 def test_people_too_near_outside_of_the_image_or_hidden_are_not_scored(then, not_visible):
     first = person(1, 3.0)
     assert scored([([first], [track_of(first)]), ([then], [])])['not_visible'] == not_visible
-
-
-def test_each_id_counts_once():
-    someone, other = person(1, 2.0), person(2, 4.0)
-    first, second = track_of(someone, 5), track_of(someone, 6, off_m=(0.2, 0.0, 0.0))
-    unmatched = track_of(person(3, 7.0), 7)
-    result = scored([([someone, other], [first, track_of(other, 8), unmatched]), ([someone, other], [first, second])])
-    assert result['track_ids'] == 3 and result['not_visible'] == 1
-
-
-def test_errors_without_matches_or_predictions_are_none():
-    someone = person(1, 2.0)
-    assert scored([([someone], [])]) == {
-        'track_ids': 0, 'not_visible': 0, 'velocity_rmse_mps': None, 'prediction_1s_m': None}
-    short = scored([([someone], [track_of(someone, horizon_s=0.5)])])
-    assert short['velocity_rmse_mps'] == 0 and short['prediction_1s_m'] is None

@@ -42,11 +42,6 @@ def test_lens_distortion_is_that_of_plumb_bob_unless_specified(folder, lens, exp
     assert (camera.distortion_model, camera.distortion) == expected
 
 
-def test_colour_is_read_as_rgb(folder):
-    session = read_session(folder)
-    assert read_color(session.frames[0], session.camera)[20, 20].tolist() == [200, 30, 30]
-
-
 def test_sessions_may_store_one_detection_in_the_frame(folder):
     frame = read_frame(folder, detections=None, box=[1, 2, 3, 4], estimate_mm=[1, 2, 3])
     assert frame.boxes_px == ((1, 2, 3, 4),) and frame.estimate_m.tolist() == [0.001, 0.002, 0.003]
@@ -120,10 +115,3 @@ def test_unusable_depth_images_are_named(folder, pixels, named):
     with pytest.raises(SessionError) as error:
         read_depth(session.frames[0], session)
     assert path in str(error.value) and named in str(error.value)
-
-
-def test_grey_colour_images_are_named(folder):
-    session = read_session(folder)
-    cv2.imwrite(session.frames[0].color_path, np.zeros((48, 64), np.uint8))
-    with pytest.raises(SessionError, match=session.frames[0].color_path):
-        read_color(session.frames[0], session.camera)

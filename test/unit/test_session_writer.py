@@ -9,7 +9,6 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
@@ -19,7 +18,7 @@ from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions import session_writer
 from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshot
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb.sessions.session_writer import append, remove, stored_depth
+from ros_3d_bb.sessions.session_writer import append, remove
 from support.small_session import read_json
 
 CAMERA = Camera(64, 48, 60.0, 61.0, 31.5, 23.25, 'plumb_bob', (0.1, -0.2, 0.001, 0.002, 0.03))
@@ -76,16 +75,6 @@ def test_measurements_are_read_back(folder):
         assert (detection.support, detection.truncated, detection.by_hand) == (BOX.support, BOX.truncated, False)
 
 
-@pytest.mark.parametrize('model, distortion', [
-    ('', ()), ('plumb_bob', (0.1, 0, 0, 0, 0)), ('equidistant', (0.0,) * 4), ('inverse_brown_conrady', (0.1,) * 5),
-    ('rational_polynomial', (0.1, -0.2, 0.001, 0.002, 0.03, 0.1, 0.2, 0.3))])
-def test_the_lens_model_is_read_back(folder, model, distortion):
-    camera = CAMERA._replace(distortion_model=model, distortion=distortion)
-    for number in range(2):  # the second one compares the camera with the stored one
-        append(folder, measurement(number, camera=camera))
-    assert read_session(folder).camera == camera
-
-
 def test_the_description_contains_all_fields(folder):
     append(folder, measurement(), 'A1')
     entry, = read_json(folder)['frames']
@@ -94,25 +83,6 @@ def test_the_description_contains_all_fields(folder):
         'depth': 'depth/00001_1616161616_123456789.png', 'stamp': '1616161616.123456789', 'label': 'A1',
         'detections': [{'box': [10, 0, 30, 48], 'estimate_mm': [123.4, -250.0, 2500.0], 'size_mm': [500.0, 1750.0],
                         'support': 0.75, 'truncated': True}]}
-
-
-def test_each_2d_box_is_joined_with_its_3d_box(folder):
-    """The second person has no depth. The first box extends outside the image; the 2D box of its 3D box is clipped."""
-    rects_px = ((-5, 3, 12, 60), (20, 3, 30, 40), (40, 3, 60, 40))
-    boxes = tuple(BOX._replace(rect_px=rect_px, center_m=np.array([0.0, 0.0, z]))
-                  for rect_px, z in (((40, 3, 60, 40), 3.0), ((0, 3, 12, 48), 1.0), ((1, 1, 9, 9), 4.0)))
-    append(folder, measurement(boxes2d=rects_px, boxes3d=boxes))
-    entry, = read_json(folder)['frames']
-    assert [(detection['box'], detection.get('estimate_mm', [None] * 3)[2]) for detection in entry['detections']] == [
-        ([-5, 3, 12, 60], 1000.0), ([20, 3, 30, 40], None), ([40, 3, 60, 40], 3000.0), ([1, 1, 9, 9], 4000.0)]
-
-
-def test_ids_are_ascending_for_equal_images_and_after_measurements_were_removed(folder):
-    ids = [append(folder, measurement(0))[0] for _time in range(2)]
-    with atomic_file.locked_update(folder) as content:
-        del content['frames'][0]
-    ids.append(append(folder, measurement(2, stamp_ns=NS))[0])  # an earlier stamp, as of a bag
-    assert ids == sorted(set(ids)) and len(ids) == 3
 
 
 def test_a_measurement_is_removed_with_its_images_unless_it_is_annotated(folder):
@@ -189,12 +159,6 @@ def test_invalid_measurements_and_those_of_another_camera_are_rejected(folder, c
     assert re.search(named, append_error(folder, measurement(1, **changes)))
 
 
-@pytest.mark.parametrize('text', ['[]', '{"frames": []', '{"frames": 3}', '{"frames": [{"id": 1}], "camera": {}}'])
-def test_invalid_sessions_are_rejected_and_kept(tmp_path, text):
-    (tmp_path / 'frames.json').write_text(text)
-    append_error(str(tmp_path), measurement())
-
-
 @pytest.mark.parametrize('full_at', ['color', 'depth', 'frames.json'])
 def test_a_full_disk_does_not_change_the_session(folder, monkeypatch, full_at):
     append(folder, measurement(0))
@@ -220,9 +184,3 @@ def test_depth_in_metres_is_stored_in_millimetres(folder):
     depth = read_depth(session.frames[0], session)
     assert session.depth_scale_m == 0.001 and depth.values[1, 1] == 2346
     assert depth.values[0, :6].tolist() == [0, 0, 0, 0, 0, 65535]
-
-
-@given(st.lists(st.integers(0, 65535), min_size=1), st.sampled_from(['<u2', '>u2']), st.sampled_from([0.001, 0.00025]))
-def test_integer_depth_is_stored_unchanged(values, kind, scale_m):
-    depth = stored_depth(DepthImage(np.array([values], kind), scale_m))
-    assert depth.values.dtype == np.uint16 and depth.values[0].tolist() == values and depth.scale_m == scale_m

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb_lab.simulation.collision import Rectangle, nearest_wall_points
+from ros_3d_bb_lab.simulation.collision import Rectangle
 from ros_3d_bb_lab.simulation.driving import limited_velocity, measured_velocity, moved
 from ros_3d_bb_lab.simulation.scenario import Drive
 
@@ -27,20 +27,6 @@ def test_velocity_approaches_the_wanted_one_within_the_limits(wanted, after_1_s,
     assert (np.abs(np.diff(velocities, axis=0)) <= np.array([.5, 4]) * .01 + 1e-12).all()
 
 
-@given(coordinates, coordinates, st.floats(-4, 4), st.floats(-2, 2), st.floats(-3, 3))
-@settings(max_examples=50)
-def test_one_step_leads_to_the_same_pose_as_many(x, y, heading, linear, angular):
-    start, velocity = np.array([x, y, heading]), np.array([linear, angular])
-    pose = start
-    for _step in range(50):
-        pose = moved(pose, velocity, .02)
-    np.testing.assert_allclose(moved(start, velocity, 1.0), pose, atol=1e-9)
-
-
-def test_a_quarter_of_a_circle_to_the_left():
-    np.testing.assert_allclose(moved(np.zeros(3), np.array([np.pi / 2, np.pi / 2]), 1.0), (1, 1, np.pi / 2))
-
-
 def test_odometry_drifts_with_the_distance_and_the_angle():
     velocity = np.array([1.0, -.5])
     measured = measured_velocity(velocity, (.1, -.2))
@@ -58,13 +44,6 @@ def test_the_distance_of_a_point_is_that_to_the_nearest_point(rectangle, x, y):
     assert rectangle.signed_distances_m(nearest[None])[0] <= 1e-9
 
 
-def test_the_distance_inside_is_that_to_the_edge_and_negative():
-    rectangle = Rectangle((1.0, 2.0), np.pi / 2, (4.0, 1.0))  # 1 m along x, 4 m along y
-    points = np.array([(1, 2), (1.4, 3), (1, 3.9), (1.5, 2), (2, 2), (1, 5), (4.5, 8)])
-    np.testing.assert_allclose(rectangle.signed_distances_m(points), (-.5, -.1, -.1, 0, .5, 1, 5), atol=1e-9)
-    np.testing.assert_allclose(sorted(map(tuple, rectangle.corners())), [(.5, 0), (.5, 4), (1.5, 0), (1.5, 4)])
-
-
 @given(rectangles, rectangles)
 @settings(max_examples=200)
 def test_overlap_agrees_with_the_points_of_both(one, other):
@@ -77,14 +56,3 @@ def test_overlap_agrees_with_the_points_of_both(one, other):
         assert one.overlaps(other)
     elif distances_m.min() > max(other.size) / 20:  # no corner lies between the points of the grid
         assert not one.overlaps(other)
-
-
-@pytest.mark.parametrize('center, yaw, is_inside', [
-    ((0, 0), 0, True), ((1.6, 0), 0, False), ((1.4, 0), 0, True), ((1.4, 0), np.pi / 4, False), ((0, 9), 0, False)])
-def test_a_rectangle_is_within_a_room_with_all_corners(center, yaw, is_inside):
-    assert Rectangle(center, yaw, (1.0, 1.0)).is_within((-2, 2, -1, 1)) == is_inside
-
-
-def test_nearest_points_of_the_walls():
-    np.testing.assert_array_equal(nearest_wall_points((.5, .2), (-2, 2, -1, 1)),
-                                  [(-2, .2), (2, .2), (.5, -1), (.5, 1)])

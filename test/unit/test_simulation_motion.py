@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb_lab.simulation.gait import Posture, stride_m
-from ros_3d_bb_lab.simulation.motion import SMOOTHING_S, person_motion, robot_motion
+from ros_3d_bb_lab.simulation.motion import person_motion, robot_motion
 from ros_3d_bb_lab.simulation.scenario import Follow, Move, Person, Robot
 
 HEIGHT_M, LONG_S = 1.75, 60.0
@@ -40,18 +39,6 @@ def test_velocity_is_the_derivative_of_position(start, person_moves, time_s):
     np.testing.assert_allclose((after.position_m - before.position_m) / (2 * TINY_S), state.velocity_mps, atol=1e-3)
 
 
-@given(points, moves, times)
-@settings(max_examples=100)
-def test_velocity_heading_and_crouch_are_continuous(start, person_moves, time_s):
-    """The speed is up to 2 m/s; the largest instantaneous turn in the moves is half a turn."""
-    motion, step_s = walker(*person_moves, start=start), .01
-    now, later = motion.at(time_s), motion.at(time_s + step_s)
-    assert np.linalg.norm(later.velocity_mps - now.velocity_mps) <= 4 / SMOOTHING_S * step_s + 1e-9
-    knots_in_between = len(person_moves)
-    assert abs(later.heading_rad - now.heading_rad) <= (np.pi / SMOOTHING_S * (knots_in_between + 1) + 2) * step_s
-    assert abs(later.posture.crouch - now.posture.crouch) <= (knots_in_between + 1) / SMOOTHING_S * step_s + 1e-9
-
-
 @given(points, moves)
 @settings(max_examples=50)
 def test_people_stay_at_the_end_of_their_last_move(start, person_moves):
@@ -63,30 +50,6 @@ def test_people_stay_at_the_end_of_their_last_move(start, person_moves):
         assert speed_of(state) < 1e-9 and state.posture.swing < 1e-9
 
 
-@given(st.floats(.3, 2))
-@settings(max_examples=20)
-def test_each_gait_cycle_covers_one_stride(speed):
-    """Otherwise the feet would slide."""
-    motion = walker(Move(to=(20, 0), speed=speed))
-    start, end = motion.at(2), motion.at(4)
-    assert end.posture.swing == pytest.approx(start.posture.swing)
-    cycles = end.posture.phase - start.posture.phase
-    assert cycles * stride_m(HEIGHT_M, start.posture.swing) == pytest.approx(2 * speed)
-
-
-@given(st.floats(-7, 7), st.floats(-3, 3), st.floats(-3, 3), st.floats(0, 1))
-@settings(max_examples=20)
-def test_people_face_the_direction_of_walking(facing, first, second, share):
-    """On two sections of 3 m, except near the corner."""
-    corner = 3 * np.array([np.cos(first), np.sin(first)])
-    end = corner + 3 * np.array([np.cos(second), np.sin(second)])
-    motion = walker(Move(to=tuple(corner), speed=1.0), Move(to=tuple(end), speed=1.0), facing=facing)
-    for start_s, direction in ((0, first), (3, second)):
-        state = motion.at(start_s + SMOOTHING_S / 2 + share * (3 - SMOOTHING_S))
-        assert angle_between(state.heading_rad, direction) < 1e-9
-        assert angle_between(np.arctan2(*state.velocity_mps[::-1]), direction) < 1e-6
-
-
 def test_repeated_moves_are_periodic():
     person_moves = Move(to=(2, 0), speed=1.0), Move(wait=1.0, crouch=.5), Move(to=(0, 0), speed=.5)
     motion = walker(*person_moves, repeat=True)
@@ -96,43 +59,6 @@ def test_repeated_moves_are_periodic():
         np.testing.assert_allclose(later.velocity_mps, now.velocity_mps, atol=1e-9)
         assert later.posture[1:] == pytest.approx(now.posture[1:], abs=1e-9)
     assert speed_of(motion.at(LONG_S)) > 0 or speed_of(motion.at(LONG_S - 1)) > 0
-
-
-@pytest.mark.parametrize('person_moves', [(), (Move(wait=0.0),), (Move(to=(0.0, 0.0)),)])
-def test_repeated_moves_without_duration_terminate(person_moves):
-    np.testing.assert_array_equal(walker(*person_moves, repeat=True).at(9).position_m, (0, 0))
-
-
-def test_waiting_people_may_turn_and_crouch():
-    motion = walker(Move(wait=2.0), Move(wait=2.0, facing=1.0, crouch=.7), Move(wait=2.0))
-    assert [motion.at(time_s).heading_rad for time_s in (1, 3, 5)] == pytest.approx([0, 1, 1])
-    assert [motion.at(time_s).posture.crouch for time_s in (1, 3, 5)] == pytest.approx([0, .7, 0])
-
-
-def test_facing_and_walking_turn_by_the_smaller_angle():
-    motion = walker(Move(wait=2.0, facing=-3.0), Move(to=(1, 1), speed=1.0), facing=3.0)
-    headings = [motion.at(time_s).heading_rad for time_s in np.arange(0, 1.5, .05)]
-    assert 2.99 < min(headings) and max(headings) == pytest.approx(2 * np.pi - 3)
-    assert angle_between(motion.at(2.7).heading_rad, np.pi / 4) < 1e-9
-
-
-@given(st.floats(-6, 6).filter(lambda angle: abs(angle) > 2), st.floats(.3, 2))
-@settings(max_examples=30)
-def test_the_robot_turns_on_the_spot_at_its_rate(angle, rate):
-    motion = robot_motion(Robot((1.0, 2.0, .5), (Move(wait=1.0), Move(turn=angle, rate=rate))), [], LONG_S)
-    middle_s = 1 + abs(angle) / rate / 2
-    before, after = motion.at(middle_s - .1), motion.at(middle_s + .1)
-    assert (after.heading_rad - before.heading_rad) / .2 == pytest.approx(np.copysign(rate, angle))
-    np.testing.assert_allclose([before.position_m, after.position_m], [(1, 2)] * 2, atol=1e-9)
-    assert motion.at(LONG_S).heading_rad == pytest.approx(.5 + angle)
-
-
-def test_the_robot_turns_before_it_drives():
-    motion = robot_motion(Robot(moves=(Move(to=(0.0, 2.0), speed=.5, rate=.5),)), [], LONG_S)
-    turning, driving = motion.at(1), motion.at(np.pi + 2)
-    assert turning.heading_rad == pytest.approx(.5) and speed_of(turning) == 0
-    np.testing.assert_allclose(driving.velocity_mps, (0, .5), atol=1e-9)
-    assert driving.heading_rad == pytest.approx(np.pi / 2) and driving.posture == Posture()
 
 
 def test_a_following_robot_faces_the_person_and_keeps_its_distance_and_limits():

@@ -2,30 +2,10 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
-from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
-from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL
 from ros_3d_bb_lab.simulation.motion import person_motion
 from ros_3d_bb_lab.simulation.scenario import Move, Person, SceneObject, Scenario, scenario_from
-from ros_3d_bb_lab.simulation.scene_objects import GAP_M, SHAPES, PushedMotion, object_mesh
+from ros_3d_bb_lab.simulation.scene_objects import GAP_M, PushedMotion
 from ros_3d_bb_lab.simulation.simulator import Simulator
-
-
-@pytest.mark.parametrize('label', sorted(SHAPES))
-def test_shapes_stand_on_the_floor_and_are_centred(label):
-    mesh = object_mesh(SceneObject(label, (3.0, 0.0)), np.random.RandomState(0))
-    low_m, high_m = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    assert low_m[2] == 0 and np.abs(low_m[:2] + high_m[:2]).max() < 1e-6
-    assert mesh.faces.max() == len(mesh.vertices) - 1 and len(mesh.colors) == len(mesh.faces)
-
-
-def test_other_objects_are_boxes_with_a_size():
-    crate = SceneObject('crate', (3.0, 0.0), size=(0.3, 0.4, 0.5), color=(9, 8, 7))
-    mesh = object_mesh(crate, np.random.RandomState(0))
-    np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), (0.3, 0.4, 0.5), atol=1e-6)
-    assert mesh.colors[0].tolist() == [9, 8, 7]
 
 
 def test_a_pushed_object_is_in_front_of_the_person():
@@ -60,13 +40,6 @@ def test_the_ground_truth_has_objects_after_people():
     np.testing.assert_allclose(tracks[1].prediction_m[:, :2], [trolley.position_m[:2]] * 8)
 
 
-def test_scenes_without_objects_are_as_before():
-    person = Person((3.0, 0.3))
-    alone, beside = (Simulator(Scenario(duration=0.1, rate=10, people=(person,), objects=objects)).frame(0)
-                     for objects in ((), (SceneObject('chair', (-2.0, 0.0)),)))
-    assert alone.color.tobytes() == beside.color.tobytes() and str(alone.people) == str(beside.people)
-
-
 @pytest.mark.parametrize('entry, reason', [
     ({'start': [3, 0]}, 'label expected, too'), ({'label': 'dog'}, 'either start or pushed_by'),
     ({'label': 'dog', 'start': [3, 0], 'pushed_by': 1}, 'either start or pushed_by'),
@@ -80,22 +53,3 @@ def test_scenes_without_objects_are_as_before():
 def test_invalid_objects_are_rejected(entry, reason):
     with pytest.raises(ValueError, match=reason):
         scenario_from({'people': [{'start': [2, 0]}], 'objects': [entry]})
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('label', sorted(SHAPES))
-def test_positions_of_objects_are_accurate_from_all_sides(label):
-    """Whatever side is seen: RMSE of single images at 3 and 5 m."""
-    model, errors_m = read_error_model(SIMULATED_ERROR_MODEL), []
-    for place in ((3.2, 0.8), (5.0, 0.5)):
-        for heading_deg in range(0, 360, 30):
-            simulator = Simulator(Scenario(duration=0.1, rate=10, objects=(
-                SceneObject(label, place, facing=float(np.radians(heading_deg))),)))
-            frame = simulator.frame(0)
-            truth, = frame.objects
-            boxes = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [truth.box_px], simulator.camera,
-                                   estimator_named('foreground'), labels=[label])
-            (x_m, _y, z_m), = [box.center_m for box in corrected_boxes(boxes, model)]
-            true_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), truth.position_m)
-            errors_m.append(np.hypot(x_m - true_m[0], z_m - true_m[2]))
-    assert np.sqrt(np.mean(np.square(errors_m))) <= 0.08

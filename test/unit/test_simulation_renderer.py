@@ -6,9 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb_lab.simulation import textures
 from ros_3d_bb_lab.simulation.body import Body, Build
-from ros_3d_bb_lab.simulation.sensors import ColorSensor
 from ros_3d_bb_lab.simulation.mesh import Mesh, box
 from ros_3d_bb_lab.simulation.renderer import render
 from ros_3d_bb_lab.simulation.room import FLOOR, RenderedRoom
@@ -83,34 +81,6 @@ def test_depth_of_floor_ceiling_and_walls_agrees_with_ray_casting(room, world_fr
     assert surfaces.max() <= 5
 
 
-@pytest.fixture(scope='module')
-def gradient_room():
-    """Room with a floor and walls whose red and green values grow along the columns and rows of their textures."""
-    def gradient_of(original):
-        def gradient(*arguments):
-            height, width = original(*arguments).shape[:2]
-            u, v = np.meshgrid(np.linspace(0, 255, width), np.linspace(0, 255, height))
-            return np.dstack([u, v, 0 * u]).astype(np.uint8)
-        return gradient
-
-    with pytest.MonkeyPatch.context() as patch:
-        for name in ('floor', 'wall'):
-            patch.setattr(textures, name, gradient_of(getattr(textures, name)))
-        return RenderedRoom(BOUNDS, HEIGHT, np.random.RandomState(0))
-
-
-@given(poses, cameras)
-@settings(max_examples=25)
-def test_textures_of_floor_and_wall_agree_with_ray_casting(gradient_room, world_from_camera, camera):
-    color, inverse_depth, surfaces = gradient_room.draw(camera, world_from_camera)
-    points = world_from_camera[:3, 3] + rays(camera, world_from_camera) / inverse_depth[..., None]
-    x, y, z = (np.interp(points[..., axis], ends, (0, 255))
-               for axis, ends in enumerate((BOUNDS[:2], BOUNDS[2:], (0, HEIGHT))))
-    for surface, right_and_down in ((FLOOR, (x, y)), (2, (255 - y, 255 - z))):
-        pixels = everywhere(surfaces == surface)
-        np.testing.assert_allclose(color[pixels][:, :2], np.dstack(right_and_down)[pixels], atol=4)
-
-
 @given(cameras, st.floats(2, 6), st.floats(-1, 1), st.floats(-3, 3), st.tuples(*[st.floats(.2, 1.5)] * 3))
 @settings(max_examples=25)
 def test_depth_of_a_box_is_that_of_rays(room, camera, x, y, yaw, size):
@@ -153,90 +123,3 @@ def test_objects_identify_the_object_of_each_pixel(room, person):
         mask = rendering.objects == number
         np.testing.assert_array_equal(rendering.color[mask], single.color[mask])
         assert rendering.areas[number - 1] == single.areas[0] >= mask.sum() > 0
-
-
-@given(st.sampled_from(['left', 'right', 'top', 'bottom']), st.floats(.15, .85))
-@settings(max_examples=20)
-def test_inside_is_the_share_in_the_image(room, side, share):
-    """A square plate is cut by one border of the image."""
-    depth, size = 2.0, .8
-    plate = crate((.01, size, size), (depth + .005, 0, 1.2 - size / 2))
-    size_px = size / depth * CAMERA.fx
-    cx, cy = 79.5, 59.5
-    if side in ('left', 'right'):
-        cx = {'left': size_px * (share - .5) - .5, 'right': 159.5 - size_px * (share - .5)}[side]
-    else:
-        cy = {'top': size_px * (share - .5) - .5, 'bottom': 119.5 - size_px * (share - .5)}[side]
-    rendering = draw(room, [plate], CAMERA._replace(cx=cx, cy=cy))
-    assert rendering.inside[0] == pytest.approx(share, abs=.26)  # each face is half of the plate
-    assert rendering.areas[0] == pytest.approx(share * size_px ** 2, abs=1.5 * size_px)  # a column of pixels
-
-
-def test_objects_behind_the_camera_or_outside_the_image_are_not_drawn(room, person):
-    hidden = [person.moved((-1.5, 0, 0), 0), crate((1, 1, 2), (-2, 0, 0)), person.moved((2, 3.5, 0), 0)]
-    rendering, empty = draw(room, hidden), draw(room, [])
-    np.testing.assert_array_equal(rendering.color, empty.color)
-    assert not rendering.objects.any() and rendering.areas == rendering.inside == [0] * 3
-
-
-@given(st.floats(-.3, .4))
-@settings(max_examples=20)
-def test_objects_around_the_camera_give_finite_depth(room, person, x):
-    rendering = draw(room, [person.moved((x, 0, 0), 0), crate((1, 1, 2), (x, 0, 0))])
-    assert np.isfinite(rendering.inverse_depth).all() and rendering.inverse_depth.max() <= 10.01
-    assert all(0 <= inside <= 1 for inside in rendering.inside)
-
-
-@pytest.mark.parametrize('camera', [Camera(1, 1, 30, 30, 0, 0), Camera(3, 50, 40, 40, 1, 25),
-                                    Camera(333, 7, 300, 300, 166, 3)])
-def test_images_of_any_size_can_be_rendered(room, person, camera):
-    rendering = draw(room, [person.moved((2, 0, 0), 0)], camera, shadows=[(2, 0, .3)])
-    assert rendering.color.shape == (camera.height, camera.width, 3) and rendering.objects[camera.height // 2].any()
-
-
-def test_shadows_darken_the_floor_around_the_feet_only(room):
-    lit, shaded = draw(room, []), draw(room, [], shadows=[(4, 0, .3), (-2, 0, .3)])
-    share = shaded.color.sum(axis=2) / lit.color.sum(axis=2, dtype=float)
-    u, v = CAMERA.project((0, 1.2, 4)).round().astype(int)
-    assert .55 < share[v, u] < .9
-    rows, columns = np.nonzero(share < .97)
-    assert np.abs(columns - u).max() < 35 and np.abs(rows - v).max() < 25
-    at_wall = draw(room, [], shadows=[(8.9, 0, .5)])
-    _color, _inverse_depth, surfaces = room.draw(CAMERA, pose((0, 0, 1.2)))
-    assert set(surfaces[(at_wall.color != lit.color).any(axis=2)]) == {FLOOR}
-
-
-def test_objects_are_lit_from_above(room):
-    rendering = draw(room, [crate((1, 1, .5), (4, 0, 0), color=(100, 100, 100))])
-    top, front = rendering.color[88, 75:85].mean(), rendering.color[100, 75:85].mean()
-    assert rendering.objects[88, 80] == rendering.objects[100, 80] == 1 and front * 1.2 < top < 110
-
-
-@pytest.mark.parametrize('height', [1.0, 1.4, 2.4])
-def test_rooms_may_be_low_and_small(height):
-    small_room = RenderedRoom((-1.5, 3.0, -1.0, 6.0), height, np.random.RandomState(0))
-    color, inverse_depth, _surfaces = small_room.draw(CAMERA, pose((0, 0, .5)))
-    assert color.mean() > 50 and inverse_depth.min() >= 1 / 7.
-
-
-GREY = np.full((120, 160, 3), 120, np.uint8)
-
-
-@pytest.mark.parametrize('sigma', [0, 1, 2.2, 5])
-def test_colour_noise_has_the_given_sigma_and_no_bias(sigma):
-    sensor, blur = ColorSensor(CAMERA, 1, sigma), ColorSensor(CAMERA, 1, 0)  # OpenCV 3 blurs 120 to 121
-    noise = np.stack([sensor.capture(GREY, number) for number in range(10)]) - blur.capture(GREY, 0).astype(float)
-    assert noise.std() == pytest.approx(np.hypot(sigma, 12 ** -.5) if sigma else 0, rel=.03)
-    assert abs(noise.mean()) < .1
-    if sigma:  # images are independent
-        assert np.abs(np.corrcoef(noise.reshape(10, -1)) - np.eye(10)).max() < .05
-
-
-def test_the_colour_sensor_blurs_slightly_and_saturates():
-    image = np.zeros((120, 160, 3), np.uint8)
-    image[:, 80:] = 255
-    captured = ColorSensor(CAMERA, 0, 0).capture(image, 0)
-    assert captured[:, :79].max() == 0 and captured[:, 81:].min() == 255
-    assert 10 < captured[60, 79, 0] < 100 and 155 < captured[60, 80, 0] < 245
-    noisy = ColorSensor(CAMERA, 0, 5).capture(image, 0)
-    assert noisy[:, :79].max() < 40 and noisy[:, 81:].min() > 215  # no wrap-around

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
 from ros_3d_bb_lab.simulation.scenario import Furniture, Mount, Move, Person, Robot, Room, Scenario
 from ros_3d_bb_lab.simulation.simulator import PREDICTION_STEP_S, Simulator
 
@@ -52,13 +52,6 @@ def test_a_frame_depends_on_scenario_and_number_only():
     assert different.depth_mm.tobytes() != frames[5].depth_mm.tobytes()
 
 
-@pytest.mark.parametrize('duration,rate,count', [(3, 10, 30), (2.05, 10, 21), (.1, 1, 1), (1, 30, 30)])
-def test_frames_fill_the_duration_at_the_rate(duration, rate, count):
-    simulator = Simulator(scene(duration=duration, rate=rate), Camera(8, 6, 8, 8, 4, 3))
-    assert simulator.frame_count == count
-    assert [simulator.time_s(number) for number in (0, count)] == [0, count / float(rate)]
-
-
 def test_several_cameras_take_turns_at_their_mounts():
     """One faces forward, the other left and down from 2 m above the floor; a person is in front of each."""
     sideways = Mount('side', (0.0, 0.3, 1.9), np.pi / 2, 0.4)
@@ -94,17 +87,6 @@ def test_the_box_encloses_the_pixels_of_the_person(empty_simulator, x, y, facing
     assert (x1, y1, x2) == (columns[0], rows[0], columns[-1] + 1) and 0 <= y2 - rows[-1] - 1 <= 1
 
 
-def test_truth_has_the_position_and_size_of_the_body():
-    simulator = Simulator(scene(Person((5.0, 1.0), height=1.8, girth=1.0), Person((5.0, -1.0), height=1.8, crouch=1.0)),
-                          CAMERA)
-    standing, crouching = simulator.frame(0).people
-    assert standing.size_m[2] == pytest.approx(1.8, abs=.004) and .4 < standing.size_m[0] < .55
-    assert standing.size_m[0] == standing.size_m[1]
-    np.testing.assert_allclose(standing.position_m, (5, 1, standing.size_m[2] / 2), atol=1e-6)
-    assert 1.0 < crouching.size_m[2] < 1.3 and crouching.position_m[2] == crouching.size_m[2] / 2
-    assert (standing.id, crouching.id) == (1, 2)
-
-
 @pytest.mark.slow
 @given(st.floats(-2, 0), st.floats(-1, 1), st.floats(-.3, .3), st.floats(-.2, .1), st.floats(2.5, 6), st.floats(-1, 1))
 @settings(max_examples=12)
@@ -122,27 +104,6 @@ def test_images_agree_with_the_poses(x, y, yaw, pitch, ahead, beside):
     assert frame.depth_mm[int(round(v)), int(round(u))] / 1000. == pytest.approx(point[2], abs=.25)
 
 
-def test_drift_changes_the_pose_in_odom_and_not_in_the_map():
-    robot = Robot((1.0, 0.0, 0.3), (Move(to=(3.0, 1.0), speed=.5),))
-    still, drifting = (Simulator(scene(robot=robot._replace(odometry_drift=drift)), CAMERA).poses_at(2.5)
-                       for drift in ((0, 0, 0), (.02, .01, -.03)))
-    np.testing.assert_allclose(drifting.map_from_camera, still.map_from_camera, atol=1e-12)
-    np.testing.assert_allclose(drifting.map_from_odom[:2, 3], (.05, .025))
-    assert np.abs(drifting.odom_from_base - still.odom_from_base).max() > .03
-    np.testing.assert_array_equal(still.map_from_odom, np.eye(4))
-
-
-def test_the_appearance_is_random_by_the_seed_unless_specified():
-    people = [Person((5, y)) for y in (-1, 0, 1)]
-    builds = {seed: [body.build for body in Simulator(scene(*people, seed=seed), CAMERA).bodies] for seed in (1, 2)}
-    assert builds[1] != builds[2] and len({build.shirt for build in builds[1]}) == 3
-    specified = Person((5, 0), height=1.6, girth=1.2, hips=.5, long_hair=True, short_sleeves=False, skin=(1, 2, 3),
-                       hair=(4, 5, 6), shirt=(7, 8, 9), trousers=(10, 11, 12))
-    build = Simulator(scene(specified), CAMERA).bodies[0].build
-    assert build._replace(shoes=None) == (1.6, 1.2, .5, True, False, (1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12),
-                                          None)
-
-
 def test_a_person_behind_a_pillar_is_occluded(pillar):
     simulator, frames = pillar
     status = [simulator.true_tracks(frame, START_NS)[0].status for frame in frames]
@@ -155,18 +116,6 @@ def test_a_person_behind_a_pillar_is_occluded(pillar):
         person = frame.people[0]
         assert (value == OCCLUDED) == (person.hidden > .75)
         assert person.visible == pytest.approx(1 - person.hidden, abs=.01)  # completely inside the image
-
-
-@pytest.mark.parametrize('start, is_in_view', [
-    ((5.0, 0.5), True), ((4.0, 2.6), False), ((-2.0, 0.0), False), ((1.0, 3.5), False)])
-def test_the_status_of_people_outside_the_image_is_out_of_view(start, is_in_view):
-    simulator = Simulator(scene(Person(start)), CAMERA)
-    frame = simulator.frame(0)
-    person, (track,) = frame.people[0], simulator.true_tracks(frame, START_NS)
-    assert (person.visible, person.hidden) == pytest.approx((float(is_in_view), 0), abs=.03)
-    assert (track.status, track.moving) == (VISIBLE if is_in_view else OUT_OF_VIEW, False)
-    assert (person.box_px is not None) == is_in_view
-    np.testing.assert_allclose(track.prediction_m, [track.position_m] * 8)
 
 
 def test_true_tracks_agree_with_the_frame_and_the_future_positions(pillar):

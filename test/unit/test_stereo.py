@@ -1,20 +1,16 @@
 """Simulated D435i: properties of the depth images, and statistics compared with those of real frames.
 
-The constants below are the statistics of the first two frames at each of the 22 places of the thesis. If ROS_3D_BB_DATA
-is set, a test measures them again. The statistics of simulated frames are always compared with them.
+The constants below are the statistics of the first two frames at each of the 22 places of the thesis.
 """
 from typing import NamedTuple, Tuple
 
 import numpy as np
 import pytest
 
-from conftest import DATA
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.sessions.session_reader import read_depth, read_session
 from ros_3d_bb_lab.simulation.sensors import StereoCamera, StereoParams
 
 D435I = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)
-SMALL = Camera(160, 120, 153.7, 153.7, 80, 60)
 LEVEL_MM = 610140.  # depth levels are this divided by an integer
 STEPS_PER_PX = 32
 NO_NOISE = StereoParams(noise_px=0, white_noise_px=0, jitter_px=0, hole_share=0)
@@ -26,9 +22,6 @@ LAGS_PX = (1, 2, 4, 8)
 RANGES_M = (0.87, 1.53, 2.35, 3.39, 4.69, 6.78, 10.17)
 REAL_SPATIAL_PX = (0.0365, 0.0393, 0.0450, 0.0575, 0.0561, 0.0525)
 REAL_SPATIAL_CORRELATION = (0.896, 0.803, 0.602, 0.197)
-# Sigma of the disparity between frames in the last four ranges (nearer surfaces move), in px.
-REAL_TEMPORAL_PX = (0.0746, 0.0863, 0.0688, 0.0658)
-REAL_TEMPORAL_CORRELATION = (0.927, 0.862, 0.745, 0.517)
 
 
 class Standing(NamedTuple):
@@ -79,32 +72,6 @@ def spatial_statistics(shots):
             np.median(np.hstack(correlations), axis=1))
 
 
-def temporal_statistics(shots):
-    """Difference of consecutive images of a scene, except around the person: sigma by range, correlation by lag."""
-    differences, ranges_m = [], []
-    for before, after in zip(shots, shots[1:]):
-        if before.place != after.place:
-            continue
-        steps = np.stack((steps_of(before.depth_mm), steps_of(after.depth_mm)))
-        still = (steps > 0).all(axis=0) & (np.abs(steps[1] - steps[0]) < 8)
-        x1, y1, x2, y2 = before.rect_px
-        still[max(y1 - 20, 0):y2 + 20, max(x1 - 60, 0):x2 + 30] = False
-        differences.append(np.where(still, steps[1] - steps[0], 0))
-        ranges_m.append(np.where(still, LEVEL_MM / 500 / np.maximum(steps.sum(axis=0), 1), 0))
-    difference, range_m = np.stack(differences), np.stack(ranges_m)
-    to_sigma_px = np.sqrt(np.pi / 2) / np.sqrt(2) / STEPS_PER_PX  # converts the mean absolute difference of two values
-    sigmas = [np.abs(difference[(range_m >= near) & (range_m < far)]).mean() * to_sigma_px
-              for near, far in zip(RANGES_M[2:], RANGES_M[3:])]
-    return sigmas, [_correlation(difference, range_m > 0, lag) for lag in LAGS_PX]
-
-
-def _correlation(values, valid, lag):
-    """Correlation of pixels at a distance of `lag`, mean of x and y direction."""
-    return np.mean([(a * b).sum() / (both.sum() * (values[valid] ** 2).mean()) for a, b, both in (
-        (values[:, lag:], values[:, :-lag], valid[:, lag:] & valid[:, :-lag]),
-        (values[..., lag:], values[..., :-lag], valid[..., lag:] & valid[..., :-lag]))])
-
-
 def shadows(shot):
     """Shadows to the left of the torso (n, 3): width in px, depth of the person and of the wall at its ends in metres.
     """
@@ -117,12 +84,6 @@ def shadows(shot):
         if last + 7 < middle and np.ptp(row[last + 1:middle]) < 500 and wall.size and wall.min() > person.max():
             rows.append((last - first, np.median(person) / 1000, np.median(wall) / 1000))
     return np.array(rows).reshape(-1, 3)
-
-
-def standing_statistics(shots):
-    """`Standing` of the images at one place."""
-    width, person, wall = np.median(np.concatenate([shadows(shot) for shot in shots]), axis=0)
-    return Standing(person, wall, width, np.median([np.mean(shot.depth_mm == 0) for shot in shots]))
 
 
 def scene(depth_m, camera=D435I):
@@ -177,45 +138,11 @@ def shadow_formula_px(near_m, wall_m, fx=D435I.fx):
     return 0.0606 * fx * (1 / near_m - 1 / wall_m) + 4
 
 
-@pytest.mark.slow
-def test_constants_agree_with_the_real_frames(session_folder):
-    """Without the real frames, only the agreement of the constants with the shadow formula is tested."""
-    if not DATA:
-        for standing in REAL_STANDING:
-            assert standing.shadow_px == pytest.approx(shadow_formula_px(standing.person_m, standing.wall_m), abs=3)
-        return
-    session, places = read_session(session_folder), {}
-    for frame in session.frames:
-        places.setdefault(tuple(frame.truth_m), []).append(frame)
-    shots = {place: [Shot(read_depth(frame, session).values, frame.boxes_px[0], place) for frame in frames[:2]]
-             for place, frames in places.items()}
-    all_shots = [shot for pair in shots.values() for shot in pair]
-    for statistics, constants in ((spatial_statistics(all_shots), (REAL_SPATIAL_PX, REAL_SPATIAL_CORRELATION)),
-                                  (temporal_statistics(all_shots), (REAL_TEMPORAL_PX, REAL_TEMPORAL_CORRELATION))):
-        np.testing.assert_allclose(statistics[0], constants[0], rtol=0.01)
-        np.testing.assert_allclose(statistics[1], constants[1], atol=0.001)
-    standing = [standing_statistics(shots[0, z]) for z in (0.9, 1.2, 1.8, 2.4, 2.7)]
-    np.testing.assert_allclose(standing, REAL_STANDING, rtol=0.01)
-
-
 def test_spatial_noise_agrees_with_real_frames(simulated):
     """At a lag of 8 px the residuals of real windows contain unevenness of the room, too."""
     sigmas_px, correlation = spatial_statistics(simulated)
     np.testing.assert_allclose(sigmas_px, REAL_SPATIAL_PX, rtol=.35)
     np.testing.assert_array_less(np.abs(correlation - REAL_SPATIAL_CORRELATION), (0.15, 0.15, 0.15, 0.3))
-
-
-def test_temporal_noise_agrees_with_real_frames(simulated):
-    sigmas_px, correlation = temporal_statistics(simulated)
-    np.testing.assert_allclose(sigmas_px, REAL_TEMPORAL_PX, rtol=.35)
-    np.testing.assert_allclose(correlation, REAL_TEMPORAL_CORRELATION, atol=0.15)
-
-
-@pytest.mark.parametrize('place', range(len(REAL_STANDING)))
-def test_shadow_and_invalid_share_agree_with_real_frames(simulated, place):
-    standing = standing_statistics([shot for shot in simulated if shot.place == place])
-    assert standing.shadow_px == pytest.approx(REAL_STANDING[place].shadow_px, abs=3)
-    assert standing.invalid == pytest.approx(REAL_STANDING[place].invalid, rel=.25)
 
 
 @pytest.mark.parametrize('params', [StereoParams(), NO_NOISE])
@@ -230,13 +157,6 @@ def test_shadow_follows_the_formula(params):
         assert np.mean(depth_mm[:, 300:] == 0) < 0.01
 
 
-@pytest.mark.parametrize('columns, shadow_px', [(slice(8, 40), 8), (slice(0, 30), 0), (slice(0, 160), 0)])
-def test_shadow_ends_at_the_left_border(columns, shadow_px):
-    """Objects at the border cause no shadow, because the imagers have a wider field of view than the colour camera."""
-    depth_mm = StereoCamera(SMALL, params=NO_NOISE).measure(plate(0.5, 5, SMALL, columns), 0)
-    assert not depth_mm[:, :shadow_px].any() and depth_mm[:, shadow_px:].all()
-
-
 def test_without_noise_the_only_error_is_quantisation():
     camera = Camera(8, 2000, 600, 600, 4, 1000)
     depth_m = np.linspace(0.1, 25, 2000)[:, None]
@@ -247,44 +167,3 @@ def test_without_noise_the_only_error_is_quantisation():
     np.testing.assert_array_equal(depth_mm[in_range], np.rint(LEVEL_MM / np.rint(steps[in_range].astype(np.float32))))
     assert (np.diff(depth_mm[in_range]) >= 0).all()
     assert not depth_mm[(steps < 29.5) | (steps > 126 * STEPS_PER_PX + 0.5)].any()
-
-
-@pytest.mark.parametrize('inverse_depth', [0, 1e-3, 10, 1e30, -1, np.inf, np.nan])
-def test_values_out_of_range_give_no_depth(inverse_depth):
-    assert not StereoCamera(SMALL).measure(np.full((120, 160), inverse_depth, np.float32), 0).any()
-
-
-def test_a_frame_depends_on_seed_number_and_scene_only():
-    inverse_depth = plate(1, 5, SMALL, slice(80, 120))
-    original = inverse_depth.copy()
-    alone = StereoCamera(SMALL, seed=4).measure(inverse_depth, 7)
-    camera = StereoCamera(SMALL, seed=4)
-    series = [camera.measure(inverse_depth, number) for number in range(9)]
-    assert alone.dtype == np.uint16 and alone.shape == (120, 160)
-    assert alone.tobytes() == series[7].tobytes() == camera.measure(inverse_depth, 7).tobytes()
-    assert len({depth_mm.tobytes() for depth_mm in series}) == 9
-    assert StereoCamera(SMALL, seed=5).measure(inverse_depth, 7).tobytes() != alone.tobytes()
-    np.testing.assert_array_equal(inverse_depth, original)
-
-
-def test_noise_of_different_frames_is_independent(d435i):
-    frames = [steps_of(d435i.measure(scene(5), number)) for number in range(8)]
-    errors = [np.where(steps > 0, steps - LEVEL_MM / 5000, 0).ravel() for steps in frames]
-    correlation = np.corrcoef(errors) - np.eye(8)
-    assert np.abs(correlation).max() < 0.1  # 0.02 is the sigma for independent fields with this kernel
-    assert np.std(errors) / STEPS_PER_PX == pytest.approx(np.hypot(0.065, 0.012), rel=0.1)
-    assert abs(np.mean(errors)) / STEPS_PER_PX < 0.005
-
-
-def test_silhouettes_are_ragged_and_have_flying_pixels(d435i):
-    depth_mm = d435i.measure(plate(1, 5), 3)
-    right_edge = 300 + (depth_mm[:, 300:] < 3000).sum(axis=1)
-    assert 0.4 < right_edge.std() < 2
-    assert right_edge.mean() == pytest.approx(450, abs=1)
-    assert 0.1 < np.mean((depth_mm[:, 440:460] > 1200) & (depth_mm[:, 440:460] < 4000)) * 20 < 3  # of a row
-
-
-def test_the_share_of_holes_agrees_with_real_frames(d435i):
-    """5e-4 of the pixels away from silhouettes."""
-    share = np.mean([np.mean(d435i.measure(scene(3), number) == 0) for number in range(10)])
-    assert share == pytest.approx(5e-4, rel=.4)

@@ -7,7 +7,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshot
 from ros_3d_bb.visualization.image_overlay import BOX_COLOR, colorize_depth
-from ros_3d_bb.visualization.viewer_layout import RATE_WINDOW_NS, WARNING_INK, FrameRate, box_lines, compose, text_image
+from ros_3d_bb.visualization.viewer_layout import RATE_WINDOW_NS, FrameRate, box_lines, compose
 
 BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75,
             (True,) * 4)
@@ -37,42 +37,9 @@ def test_boxes_are_drawn_in_the_third_panel_only():
         assert not (picture[:240, 320 * panel:320 * (panel + 1)] == BOX_COLOR).all(axis=2).any()
 
 
-def test_2d_boxes_without_a_3d_box_are_drawn_and_others_only_once():
-    lifted = compose(view(), 320, 6.0)
-    np.testing.assert_array_equal(lifted, compose(view(boxes2d=None), 320, 6.0))
-    with_other = compose(view(boxes2d=((100, 40, 200, 160), (-20, 30, 60, 400))), 320, 6.0)
-    assert with_other[100, 640 + 60].tolist() == list(BOX_COLOR) != lifted[100, 640 + 60].tolist()
-
-
-def test_the_range_bar_has_the_colours_of_the_depths():
-    picture = compose(view(depth=DepthImage(np.zeros((240, 320), np.uint16), 0.001)), 320, 6.0)
-    bar = picture[:240, 640 - 15].astype(int)
-    assert bar[-20, 0] > bar[-20, 2] + 100 and bar[20, 2] > bar[20, 0]  # near is yellow, at the bottom; far is blue
-    assert picture[100, 400].tolist() == [0, 0, 0]
-
-
-@pytest.mark.parametrize('depth', [np.full((240, 320), np.nan, np.float32), np.full((240, 320), 2.0, np.float32),
-                                   np.full((240, 320), 700, '>u2')])
-def test_depth_of_any_kind_is_shown(depth):
-    assert compose(view(depth=DepthImage(depth, 1.0 if depth.dtype.kind == 'f' else 0.001)), 320, 6.0).any()
-
-
 def test_positions_are_shown_as_text():
     line, = box_lines((BOX,))
     assert line == '1: x +0.50  y -0.25  z 2.00 m,  0.50 m wide, 1.75 m high, truncated'
-
-
-def test_warnings_are_in_another_colour():
-    plain, warned = (text_image(('line',), warnings, 400).astype(int) for warnings in ((), ('no images',)))
-    has_ink = [(np.abs(picture - WARNING_INK).max(axis=2) < 60).any() for picture in (plain, warned)]
-    assert has_ink == [False, True]
-
-
-@pytest.mark.parametrize('changes', [{'boxes3d': None}, {'boxes3d': None, 'boxes2d': None},
-                                     {'boxes3d': (), 'boxes2d': ()}])
-def test_boxes_may_be_missing_and_many_grow_the_window(changes):
-    few, many = (compose(view(boxes3d=(BOX,) * count), 320, 6.0).shape for count in (1, 30))
-    assert compose(view(**changes), 320, 6.0).shape == few and many[0] > few[0]
 
 
 def test_the_frame_rate_is_that_of_recent_images_and_its_memory_is_limited():
@@ -83,9 +50,3 @@ def test_the_frame_rate_is_that_of_recent_images_and_its_memory_is_limited():
     assert len(rate._arrivals_ns) <= 31 * RATE_WINDOW_NS // NS
     assert rate.at(2999 * NS // 30) == pytest.approx(30.0)
     assert rate.at(110 * NS) == 0
-
-
-def test_objects_other_than_people_are_shown_with_their_class():
-    person, dog = box_lines([BOX, BOX._replace(label='dog', score=0.5)])
-    assert person.startswith('1: ') and dog.startswith('dog 2: ') and dog.endswith('score 0.50, truncated')
-    assert (compose(view(), 640, 6.0) != compose(view(boxes3d=(BOX._replace(label='dog'),)), 640, 6.0)).any()

@@ -9,7 +9,7 @@ import rosbag
 import tf2_ros
 
 from conftest import DATA
-from ros_3d_bb.bags.bag_writer import START_NS, images_in, session_images, session_to_bag, write_bag
+from ros_3d_bb.bags.bag_writer import START_NS, session_images, session_to_bag, write_bag
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
@@ -48,13 +48,6 @@ def messages_in(path):
     return by_topic
 
 
-def test_topics_are_those_of_a_realsense_on_a_robot(messages):
-    assert set(messages) == {'/camera/color/image_raw', '/camera/aligned_depth_to_color/image_raw', '/tf',
-                             '/camera/color/camera_info', '/camera/aligned_depth_to_color/camera_info',
-                             '/yolo_bounding_box'}
-    assert all(len(of_topic) == 7 for of_topic in messages.values())
-
-
 def test_pixels_boxes_and_intrinsics_are_those_of_the_session(session, messages):
     for number, frame in enumerate(session.frames):
         color = messages['/camera/color/image_raw'][number]
@@ -80,14 +73,6 @@ def test_transforms_of_a_session_are_those_of_a_jackal_in_the_map(session, messa
     assert buffer.can_transform_core('odom', 'base_link', stamp)[0]
 
 
-def test_depth_in_other_units_than_millimetres_keeps_its_scale(session, tmp_path):
-    path = str(tmp_path / 'fine.bag')
-    write_bag(session_images(session._replace(depth_scale_m=0.00025, frames=session.frames[:1])), path, 'none')
-    depth = imgmsg_to_depth(messages_in(path)['/camera/aligned_depth_to_color/image_raw'][0])
-    assert depth.scale_m == 1.0
-    np.testing.assert_allclose(depth.values, read_depth(session.frames[0], session).values * 0.00025, rtol=1e-6)
-
-
 @pytest.fixture
 def run_tool(monkeypatch, capsys, tmp_path):
     """Runs a command in the folder of the test; returns its exit status and output."""
@@ -106,13 +91,6 @@ def run_tool(monkeypatch, capsys, tmp_path):
 def test_a_session_is_written_without_boxes_by_default(folder, run_tool):
     assert run_tool(session_to_bag, folder, 'out.bag', '--rate', '15') == (0, 'out.bag: 4 images\n')
     assert '/yolo_bounding_box' not in messages_in('out.bag')
-
-
-@pytest.mark.parametrize('broken', ['depth/m1.png', 'frames.json'])
-def test_an_invalid_session_leaves_no_bag_and_is_named(folder, run_tool, broken):
-    os.remove(os.path.join(folder, broken))
-    status, output = run_tool(session_to_bag, folder, 'out.bag')
-    assert status == 1 and folder in output and not any('out.bag' in name for name in os.listdir(folder))
 
 
 SCENE = {'duration': 0.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}],
@@ -165,28 +143,6 @@ def test_the_transforms_of_a_scene_connect_map_and_camera(scene):
                                    simulator.poses_at(simulator.time_s(number)).map_from_camera, atol=1e-9)
 
 
-def test_the_bag_of_a_scenario_depends_on_the_seed_only(tmp_path, run_tool):
-    (tmp_path / 'scene.yaml').write_text(json.dumps(dict(SCENE, duration=0.2)))
-    for name, seed in (('one', 5), ('two', 5), ('other', 6)):
-        status, output = run_tool(scenario_to_bag, 'scene.yaml', name, '--seed', seed, '--rate', 20)
-        assert status == 0 and ': 4 images' in output
-    one, two, other = (messages_in(name) for name in ('one', 'two', 'other'))
-    assert one == two and one != other
-
-
-def test_the_number_of_images_and_true_boxes_are_optional(tmp_path, run_tool):
-    (tmp_path / 'scene.yaml').write_text(json.dumps(SCENE))
-    status, output = run_tool(scenario_to_bag, 'scene.yaml', 'scene.bag', '--images', 2, '--boxes')
-    assert status == 0 and ': 2 images' in output
-    simulator, messages = Simulator(scenario_from(SCENE)), messages_in('scene.bag')
-    for number, message in enumerate(messages['/yolo_bounding_box']):
-        boxes, (person,) = boxes2d_from_msg(message), simulator.frame(number).people
-        assert boxes.stamp_ns == START_NS + number * NS // 10 and boxes.frame_id == 'camera_color_optical_frame'
-        assert boxes.boxes.tolist() == [list(person.box_px)]
-    assert len(messages['/yolo_bounding_box']) == 2
-    assert run_tool(scenario_to_bag, 'scene.yaml', 'scene.bag', '--images', 0)[0] == 2
-
-
 @pytest.mark.parametrize('text,option,named', [
     (json.dumps(SCENE), ('--rate', '0'), 'rate is 0'), (json.dumps(SCENE), ('--rate', 'nan'), 'rate is nan'),
     (json.dumps(SCENE), ('--seed', '-1'), 'seed is -1'), ('people:\n- {strat: [1, 2]}', (), 'mean start')])
@@ -194,23 +150,6 @@ def test_an_invalid_scenario_leaves_no_bag_and_the_fault_is_named(tmp_path, run_
     (tmp_path / 'scene.yaml').write_text(text)
     status, output = run_tool(scenario_to_bag, 'scene.yaml', 'out.bag', *option)
     assert status == 1 and named in output and os.listdir(str(tmp_path)) == ['scene.yaml']
-
-
-def test_a_bag_is_read_by_image(session, tmp_path):
-    path = str(tmp_path / 'session.bag')
-    write_bag(session_images(session, with_boxes=True), path)
-    topics = {'tf', 'camera/color/image_raw', 'yolo_bounding_box'}
-    images = images_in(path, topics)
-    assert len(images) == len(session.frames)
-    for messages, frame in zip(images, session.frames):
-        assert set(topic for topic, _message in messages) == topics
-        np.testing.assert_array_equal(imgmsg_to_rgb(dict(messages)['camera/color/image_raw']),
-                                      read_color(frame, session.camera))
-    for wrong_path, wrong_topics, named in ((path, {'tf', 'ground_truth'}, 'ground_truth'),
-                                            (path, {'ground_truth'}, 'ground_truth'),
-                                            (str(tmp_path / 'missing.bag'), topics, 'missing.bag')):
-        with pytest.raises(ValueError, match=named):
-            images_in(wrong_path, wrong_topics)
 
 
 def images_of_a_polished_floor():

@@ -18,7 +18,6 @@ from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, t
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, Yolov5NodeParams, detect_in_color
-from ros_3d_bb_lab.simulation.mesh import rotation
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.launching import loaded
@@ -93,40 +92,6 @@ def test_height_tilt_and_rotation_replace_tf(recorded, upright, tmp_path, turns)
     np.testing.assert_allclose(positions_and_sizes(found), positions_and_sizes(upright), atol=0.01)
 
 
-class RolledSimulator(Simulator):
-    """Its camera is rolled by `roll_rad`; positive: its right side is lower."""
-
-    roll_rad = 0.0
-
-    def poses(self, state, camera=0):
-        poses, rolled = super().poses(state, camera), np.eye(4)
-        rolled[:3, :3] = rotation(2, self.roll_rad)
-        return poses._replace(base_from_camera=poses.base_from_camera.dot(rolled))
-
-
-def rolled_images(roll_rad):
-    simulator = RolledSimulator(scenario_from(SCENE))
-    simulator.roll_rad = roll_rad
-    for number in range(simulator.frame_count):
-        frame = simulator.frame(number)
-        stamp_ns = START_NS + int(frame.time_s * NS)
-        header = Header(stamp=time_from(stamp_ns), frame_id=FRAME)
-        taken = CameraFrame(header, simulator.camera, frame.color, DepthImage(frame.depth_mm, 0.001), [])
-        yield stamp_ns, list(image_messages_of(taken))
-
-
-@pytest.mark.parametrize('roll_rad', [-0.21, 0.21])
-def test_a_rolled_camera_without_tf_needs_its_roll(upright, tmp_path, roll_rad):
-    write_bag(rolled_images(roll_rad), str(tmp_path / 'in.bag'))
-    pose = '--camera-height', str(HEIGHT_M), '--camera-tilt', str(TILT_RAD)
-    rolled = positions_and_sizes(processed(tmp_path, *pose, '--camera-roll', str(roll_rad))[0])
-    expected = positions_and_sizes(upright)
-    np.testing.assert_allclose(rolled[..., :3], expected[..., :3], atol=0.06)
-    level = processed(tmp_path, *pose)[0]['/ros_3d_bb/tracks'][-1]
-    errors_m = [np.abs(track.position_m - expected[-1, :, :3]).max(axis=1).min() for track in tracks_from_msg(level)]
-    assert len(errors_m) < 2 or max(errors_m) > 0.1
-
-
 @pytest.mark.parametrize('options, complaint', [
     ('--target-frame camera_color_optical_frame', 'is an optical frame'),
     ('--camera-height -1', 'more than 0'), ('--camera-height 1 --camera-tilt 2', 'less than pi / 2 rad'),
@@ -193,14 +158,6 @@ def test_the_transform_in_the_advice_of_doctor_is_that_of_the_launch_arguments()
     np.testing.assert_allclose(pose, mounted_camera(1.2, 0.1, 0), atol=1e-4)
 
 
-def test_the_pose_of_a_realsense_is_that_of_its_root():
-    parameters, nodes = loaded('measure.launch', 'session:=/s', 'detector:=depth', 'camera:=true',
-                               'driver:=pyrealsense2', 'camera_height:=1.2')
-    pose, parent, child = pose_in(nodes['camera_pose'].args.split())
-    assert (parent, child, pose[2, 3]) == ('map', 'camera_link', 1.2) and 'camera_optical_frame' not in nodes
-    assert parameters['/tracker_node/target_frame'] == parameters['/bbox3d_node/floor_frame'] == 'map'
-
-
 @pytest.mark.parametrize('launch_file, given, named', [
     ('pipeline.launch', ['cameras:=front,rear', 'camera_height:=1.2'], ['cameras', 'camera_height']),
     ('pipeline.launch', ['cameras:=front', 'camera_height:=1.2'], ['cameras', 'camera_height']),
@@ -219,19 +176,3 @@ def test_unusable_launch_arguments_are_refused(launch_file, given, named):
         loaded(launch_file, *given)
     sentence = str(error.value).split('Arg xml')[0]
     assert all(name in sentence for name in named + ['expected'])
-
-
-@pytest.mark.parametrize('launch_file, more', [
-    ('pipeline.launch', []), ('boxes.launch', []), ('playback.launch', ['bag:=/b.bag']), ('simulation.launch', []),
-    ('measure.launch', ['session:=/s']), ('jackal.launch', ['driver:=none']), ('boxes.launch', ['cameras:=a,b'])])
-def test_a_parameter_file_of_one_line_is_loaded_on_top_of_the_defaults(tmp_path, launch_file, more):
-    (tmp_path / 'bbox3d.yaml').write_text('stride: 7\n')
-    (tmp_path / 'depth.yaml').write_text("floor_frame: ''\n")
-    parameters, _nodes = loaded(launch_file, 'detector:=depth', 'bbox3d_params:=%s' % (tmp_path / 'bbox3d.yaml'),
-                                'depth_detector_params:=%s' % (tmp_path / 'depth.yaml'), *more)
-    prefixes = ['/a', '/b'] if 'cameras:=a,b' in more else ['']
-    for prefix in prefixes:
-        assert parameters[prefix + '/bbox3d_node/stride'] == 7
-        assert parameters[prefix + '/bbox3d_node/estimator'] == 'foreground'
-        assert parameters[prefix + '/depth_detector_node/floor_frame'] == ''
-        assert parameters[prefix + '/depth_detector_node/min_score'] == 0.7

@@ -15,11 +15,10 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_writer import write_bag
-from ros_3d_bb.camera.image_rotation import turned_image
-from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
+from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
 from ros_3d_bb.nodes.bbox3d_node import DepthCameraCheck
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver
-from ros_3d_bb.nodes.doctor import bag_findings, machine_findings, tracked_cameras
+from ros_3d_bb.nodes.doctor import bag_findings, machine_findings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.masterless import masterless
@@ -153,47 +152,6 @@ def test_next_commands_lead_from_a_bag_with_other_names_to_a_picture_of_its_trac
     assert 'scene_report' in next_command_in('rosrun ros_3d_bb doctor tracked.bag', tmp_path)
 
 
-def alone(topic, message):
-    return ('/another/tf' if topic == '/tf' else topic), message
-
-
-def test_the_next_command_has_the_pose_of_a_camera_alone_from_the_floor(tmp_path):
-    scene = dict(SCENE, robot={'mount': [0.0, 0.0, 1.2 - 0.065], 'pitch': 0.2})
-    write_bag(scenario_images(scenario_from(scene)), str(tmp_path / 'scene.bag'))
-    path = changed(str(tmp_path / 'scene.bag'), tmp_path, alone)
-    command = next_command_in('rosrun ros_3d_bb doctor ' + path, tmp_path)
-    words = command.split()
-    height_m, tilt_rad = (float(words[words.index(option) + 1]) for option in ('--camera-height', '--camera-tilt'))
-    assert abs(height_m - 1.2) < 0.05 and abs(tilt_rad - 0.2) < np.radians(1) and '--remap' not in command
-    assert '--camera-roll' not in command and '--image-rotation' not in command
-
-
-def test_the_next_command_asks_for_the_pose_of_a_camera_without_visible_floor(bag, tmp_path):
-    def of_a_wall(topic, message):
-        if topic == DEPTH:
-            fill_image(message, np.full((480, 640), 2000, np.uint16), '16UC1')
-        return alone(topic, message)
-    command = next_command_in('rosrun ros_3d_bb doctor ' + changed(bag, tmp_path, of_a_wall), tmp_path)
-    assert '--camera-height HEIGHT --camera-tilt TILT' in command
-
-
-@pytest.mark.parametrize('turns', [1, 2, 3])
-def test_a_rotated_camera_alone_is_recognised_by_its_people(bag, tmp_path, turns):
-    def rotated(topic, message):
-        if topic == DEPTH:
-            fill_image(message, turned_image(imgmsg_to_depth(message).values, -turns % 4), '16UC1')
-        elif topic == '/camera/color/image_raw':
-            fill_image(message, turned_image(imgmsg_to_rgb(message), -turns % 4), 'rgb8')
-        elif topic in (INFO, DEPTH_INFO) and turns != 2:
-            message.width, message.height = message.height, message.width
-            message.K = [message.K[4], 0, message.K[5], 0, message.K[0], message.K[2], 0, 0, 1]
-        return alone(topic, message)
-    path = changed(bag, tmp_path, rotated)
-    option = 'image_rotation:=%d (process_bag' % (90 * turns)
-    assert [option in fault.fix for fault in faults_in(path) if fault.subject == 'image rotation'] == [True]
-    assert '--image-rotation %d ' % (90 * turns) in next_command_in('rosrun ros_3d_bb doctor ' + path, tmp_path)
-
-
 RAW, RAW_INFO = '/front/depth/image_rect_raw', '/front/depth/camera_info'
 
 
@@ -226,18 +184,6 @@ def test_raw_depth_is_not_taken_for_aligned_depth_and_leads_to_tracks(bag, tmp_p
     process = next_command_in(again, tmp_path)
     assert '--detector depth --depth raw' in process and '--camera-height' not in process
     assert next_command_in(process, tmp_path) == '' and (tmp_path / 'tracked.png').exists()
-
-
-def test_raw_depth_needs_the_transform_between_the_cameras(bag, tmp_path, monkeypatch):
-    def without_link(topic, message):
-        topic, message = raw_only(topic, message)
-        if topic == '/tf':
-            message.transforms.pop()
-        return topic, message
-    monkeypatch.setattr(sys, 'argv', ['doctor', 'camera/depth/image_rect_raw:=' + RAW,
-                                      'camera/depth/camera_info:=' + RAW_INFO])
-    fault, = faults_in(changed(bag, tmp_path, without_link), depth='raw')
-    assert 'tf has no transform from camera_depth_optical_frame to camera_color_optical_frame' in fault.fault
 
 
 @pytest.mark.parametrize('change', [metres, beside, empty_info])
@@ -317,26 +263,7 @@ def observed_streams():
         yield observed
 
 
-@pytest.mark.parametrize('camera', ['front', 'rear'])
-def test_one_of_several_cameras_in_a_graph_is_checked(observed_streams, camera):
-    """Independent of the order in which nodes report the names of their topics."""
-    reports = [('robot1/%s/bbox3d_node' % name, {DEPTH[1:]: '/robot1/%s/depth' % name}) for name in ('front', 'rear')]
-    reports.append(('robot1/tracker_node', {name + '/ros_3d_bb/bb_3d': '/boxes/' + name for name in ('front', 'rear')}))
-    topics, _nodes = observed_streams(reports, camera)
-    assert topics['depth'] == '/robot1/%s/depth' % camera
-    assert topics['boxes3d'] == '/boxes/' + camera
-    assert topics['color'] == '/robot1/%s/color/image_raw' % camera
-    assert topics['tracks'] == '/robot1/ros_3d_bb/tracks'
-
-
 def test_robot10_is_not_robot1(observed_streams):
     topics, nodes = observed_streams([('robot10/bbox3d_node', {DEPTH[1:]: '/robot10/depth'}),
                                       ('robot1/bbox3d_node', {})])
     assert nodes == {'robot1/bbox3d_node'} and topics['depth'] == '/robot1' + DEPTH
-
-
-@pytest.mark.parametrize('given, cameras', [('', ['']), ('front, rear', ['front', 'rear']), (['front'], ['front']),
-                                            ({'front': 1}, [''])])
-def test_the_cameras_are_those_of_the_tracker(given, cameras):
-    with mock.patch('rospy.get_param', lambda name, default: given), mock.patch('rospy.resolve_name', str):
-        assert tracked_cameras() == cameras

@@ -1,7 +1,6 @@
 """Gazebo simulation without Gazebo: camera, people, and arguments of the launch file. Those in test/gazebo run it."""
 import os
 import xml.etree.ElementTree as ElementTree
-from itertools import combinations
 
 import numpy as np
 import pytest
@@ -53,15 +52,6 @@ def test_optical_frames_are_at_the_position_in_the_thesis_and_face_forward(robot
                                atol=1e-12)
 
 
-def test_the_housing_of_the_camera_is_behind_its_lenses(robot):
-    link = robot().find("link[@name='camera_link']")
-    for kind in ('visual', 'collision'):
-        body = link.find(kind)
-        size = [float(value) for value in body.find('geometry/box').get('size').split()]
-        assert sorted(size) == [0.025, 0.025, 0.09]
-        assert float(body.find('origin').get('xyz').split()[0]) + size[0] / 2 <= 0
-
-
 def test_gazebo_publishes_the_topics_of_the_pipeline(robot):
     description = robot()
     plugin = description.find('.//plugin')
@@ -85,75 +75,6 @@ def test_the_simulated_camera_has_the_intrinsics_of_the_real_one(robot):
     cutoffs = [float(sensor.findtext('plugin/pointCloudCutoff' + end)) for end in ('', 'Max')]
     near, far = (float(sensor.findtext('camera/clip/' + key)) for key in ('near', 'far'))
     assert near <= cutoffs[0] < cutoffs[1] <= far
-
-
-@pytest.fixture(scope='module')
-def world():
-    return ElementTree.parse(os.path.join(ROOT, 'worlds', 'people.world')).find('world')
-
-
-def waypoints(actor):
-    """Times (n,) in seconds, and (x, y, yaw) (n, 3)."""
-    times_s = [float(point.findtext('time')) for point in actor.iter('waypoint')]
-    poses = [[float(value) for value in point.findtext('pose').split()] for point in actor.iter('waypoint')]
-    assert all(pose[2:5] == [0, 0, 0] for pose in poses)
-    return np.array(times_s), np.array(poses)[:, [0, 1, 5]]
-
-
-def positions(world, times_s):
-    """Positions of the people, {name: (n, 2)}, with linear interpolation between waypoints, which are repeated."""
-    result = {}
-    for actor in world.findall('actor'):
-        known_s, poses = waypoints(actor)
-        result[actor.get('name')] = np.stack([np.interp(times_s % known_s[-1], known_s, poses[:, axis])
-                                              for axis in (0, 1)], axis=-1)
-    return result
-
-
-TIMES_S = np.arange(0, 120, 0.1)
-
-
-def test_people_walk_in_loops_at_constant_speed_and_face_forward(world):
-    assert set(element.text for element in world.iter('filename')) <= {'walk.dae', 'moonwalk.dae', 'stand.dae'}
-    walkers = [actor for actor in world.findall('actor') if actor.findtext('animation/filename') == 'walk.dae']
-    assert len(walkers) == 3
-    for actor in walkers:
-        times_s, poses = waypoints(actor)
-        assert times_s[0] == 0 and (poses[0, :2] == poses[-1, :2]).all()
-        assert abs(poses[-1, 2] - poses[0, 2]) == pytest.approx(2 * np.pi, abs=2e-3)
-        assert np.abs(np.diff(poses[:, 2])).max() < np.pi / 2
-        speed = np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1) / np.diff(times_s)
-        assert speed.min() > 0.5 and speed.max() < 1.0 and np.ptp(speed) < 0.1
-        course = poses[2:, :2] - poses[:-2, :2]
-        facing = np.stack((np.cos(poses[1:-1, 2]), np.sin(poses[1:-1, 2])), axis=-1)
-        assert ((course * facing).sum(axis=1) > 0.9 * np.linalg.norm(course, axis=1)).all()
-
-
-def test_people_keep_their_distance_from_each_other_the_furniture_and_the_robot(world):
-    people = positions(world, TIMES_S)
-    for first, second in combinations(people.values(), 2):
-        assert np.linalg.norm(first - second, axis=1).min() > 0.5
-    boxes = world.findall("model[@name='room']/link/collision")
-    shapes = [[(shape.get('name'), shape.findtext('pose'), shape.findtext('geometry/box/size'))
-               for shape in world.findall("model[@name='room']/link/" + kind)] for kind in ('collision', 'visual')]
-    assert len(boxes) == 8 and shapes[0] == shapes[1]
-    for box in boxes:
-        centre, size = (np.array([float(value) for value in box.findtext(path).split()[:2]])
-                        for path in ('pose', 'geometry/box/size'))
-        for points in people.values():
-            gap = np.maximum(np.abs(points - centre) - size / 2, 0)
-            assert np.linalg.norm(gap, axis=1).min() > 0.4, box.get('name')
-    assert min(np.linalg.norm(points, axis=1).min() for points in people.values()) > 2.0
-
-
-@pytest.mark.parametrize('first, second', [('near', 'far'), ('front', 'near'), ('front', 'far'), ('front', 'standing')])
-def test_people_pass_in_front_of_each_other(world, first, second):
-    """Seen from the camera of a robot at the origin."""
-    points = positions(world, TIMES_S)
-    bearings = [np.arctan2(points[name][:, 1], points[name][:, 0] - CAMERA_POSITION[0]) for name in (first, second)]
-    is_visible = (np.abs(np.tan(bearings)) < WIDTH / 2 / FX).all(axis=0) & (np.cos(bearings) > 0).all(axis=0)
-    is_left = (bearings[0] > bearings[1])[is_visible]
-    assert np.count_nonzero(is_left[1:] != is_left[:-1]) >= 10
 
 
 def test_the_launch_file_passes_only_arguments_of_the_pipeline():

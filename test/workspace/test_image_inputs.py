@@ -1,5 +1,4 @@
 """Compressed, YUV and Bayer images give the positions of plain images in process_bag, and pass the doctor."""
-import argparse
 import subprocess
 import sys
 
@@ -10,12 +9,10 @@ import rosbag
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
-from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, info_of_images, info_topic_beside
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg
-from ros_3d_bb.nodes.doctor import bag_findings
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
@@ -124,28 +121,3 @@ def test_the_tracker_does_not_import_cv2_for_plain_images():
     """It needs 100 MB."""
     code = 'import sys, ros_3d_bb.nodes.tracker_node; sys.exit("cv2" in sys.modules)'
     assert subprocess.call([sys.executable, '-c', code]) == 0
-
-
-def test_compressed_topics_are_suggested_and_pass_the_checks_of_the_doctor(scene, tmp_path, monkeypatch):
-    path = str(tmp_path / 'in.bag')
-    names = rewritten(scene, path, dict(zip((COLOR_TOPIC, DEPTH_TOPIC), STREAMS['jpeg, quantized'])))
-    with pytest.raises(BagError, match='did you mean /%s' % names[COLOR_TOPIC]):
-        process_bag(path, str(tmp_path / 'out.bag'), Settings(detector='depth'))
-    fixes = [finding.fix for finding in found_in(path)]
-    for topic, argument in ((COLOR_TOPIC, 'camera_image'), (DEPTH_TOPIC, 'camera_depth')):
-        assert any('%s:=/%s' % (argument, names[topic]) in fix for fix in fixes), fixes
-    monkeypatch.setattr('sys.argv', ['doctor'] + ['%s:=%s' % pair for pair in names.items()])
-    assert not [finding for finding in found_in(path) if finding.fault]
-
-
-@pytest.mark.parametrize('format_text', ['16UC1; jpeg compressed ', '16UC1; compressedDepth'])
-def test_the_doctor_reports_an_undecodable_image(scene, tmp_path, monkeypatch, format_text):
-    path = str(tmp_path / 'in.bag')
-    names = rewritten(scene, path, {DEPTH_TOPIC: lambda message: CompressedImage(message.header, format_text, b'abc')})
-    monkeypatch.setattr('sys.argv', ['doctor'] + ['%s:=%s' % pair for pair in names.items()])
-    fault, = [finding for finding in found_in(path) if finding.fault]
-    assert fault.subject == 'depth encoding' and format_text in fault.fault
-
-
-def found_in(path):
-    return bag_findings(argparse.Namespace(bag=path, camera='', target_frame='', depth='aligned'))[0]

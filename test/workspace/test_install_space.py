@@ -152,24 +152,3 @@ def test_annotator_and_session_to_bag(installed, tmp_path):
     assert ', 0 problems' in run_in(installed, 'rosrun ros_3d_bb', 'annotator', '--validate', session)
     run_in(installed, 'rosrun ros_3d_bb', 'session_to_bag', session, bag)
     assert bag.exists()
-
-
-def test_a_debian_package_has_files_below_its_prefix_only_and_no_path_of_the_build(tmp_path_factory):
-    """Built as by the rules of bloom."""
-    stage = str(tmp_path_factory.mktemp('stage'))
-    made_in = built(tmp_path_factory, '-DCATKIN_BUILD_BINARY_PACKAGE=1', '-DCMAKE_INSTALL_PREFIX=/opt/ros/noetic',
-                    '-DCMAKE_PREFIX_PATH=/opt/ros/noetic', '-DBUILD_TESTING=OFF', '-DCATKIN_ENABLE_TESTING=OFF',
-                    DESTDIR=stage)
-    paths = files_in(stage)
-    assert all(path.startswith('opt/ros/noetic/') for path in paths)
-    inside = os.path.join(stage, 'opt', 'ros', 'noetic')
-    # the environment of the whole prefix is part of another package
-    assert sorted(os.listdir(inside)) == ['include', 'lib', 'share']
-    for folder in FOLDERS:
-        assert files_in(os.path.join(inside, 'share', 'ros_3d_bb', folder)) == files_in(os.path.join(ROOT, folder))
-    for path in paths:
-        if path.endswith('.pyc'):
-            continue  # Python replaces the path in it when it loads the file
-        with open(os.path.join(stage, path), 'rb') as stream:
-            content = stream.read()
-        assert not [folder for folder in made_in + (stage,) if folder.encode() in content], path

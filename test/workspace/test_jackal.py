@@ -1,9 +1,13 @@
-"""Nodes of jackal.launch and desk.launch."""
+"""Nodes of jackal.launch and desk.launch, and the camera in the description of the robot."""
 import os
+import xml.etree.ElementTree as ElementTree
 
+import numpy as np
 import pytest
+import xacro
 
-from support.launching import ROOT, dumped, given_to_stand_ins, loaded
+from support.launching import JACKAL_TO_BE_EXTENDED, ROOT, dumped, given_to_stand_ins, loaded, write
+from support.urdf import base_from
 
 CAMERA = os.path.join(ROOT, 'urdf', 'jackal_d435i.urdf.xacro')
 
@@ -65,3 +69,30 @@ def test_desk_starts_rviz_or_the_viewer():
                                'detector:=depth')
     assert set(nodes) == {'viewer_node'} and parameters['/viewer_node/session'] == '/some/session'
     assert dict(nodes['viewer_node'].remap_args)['detector/enable'] == 'depth_detector_node/enable'
+
+
+@pytest.fixture
+def jackal(tmp_path, monkeypatch):
+    """The description of a robot that includes the camera as jackal.urdf.xacro does, given environment variables."""
+    write(tmp_path / 'robot.urdf.xacro', JACKAL_TO_BE_EXTENDED)
+
+    def described(**variables):
+        for name, value in dict(variables, JACKAL_URDF_EXTRAS=CAMERA).items():
+            monkeypatch.setenv(name, value)
+        return ElementTree.fromstring(xacro.process_file(str(tmp_path / 'robot.urdf.xacro')).toxml())
+    return described
+
+
+def test_the_camera_is_at_the_position_in_the_thesis_without_the_frames_of_the_driver(jackal):
+    description = jackal()
+    np.testing.assert_allclose(base_from('camera_link', description)[:3, 3], (0.17, 0, 0.20), atol=1e-12)
+    assert [link.get('name') for link in description.findall('link')] == ['base_link', 'camera_link']
+
+
+def test_variables_set_position_tilt_and_mesh(jackal):
+    description = jackal(JACKAL_D435I_OFFSET='0.1 -0.05 0.4', JACKAL_D435I_RPY='0 0.5 0', JACKAL_D435I_MESH='1')
+    base_from_camera = base_from('camera_link', description)
+    np.testing.assert_allclose(base_from_camera[:3, 3], (0.1, -0.05, 0.4))
+    np.testing.assert_allclose(base_from_camera[:3, 0], (np.cos(0.5), 0, -np.sin(0.5)), atol=1e-12)  # tilted down
+    mesh = description.find("link[@name='camera_link']/visual/geometry/mesh")
+    assert mesh.get('filename') == 'package://realsense2_description/meshes/d435.dae'

@@ -1,15 +1,13 @@
 """Markers: content of each kind; they are updated while a track exists, and deleted when it ends."""
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject
-from ros_3d_bb.visualization.markers import HISTORY_POINTS, NAMESPACES, PALETTE, MarkerParams, MarkerWriter
+from ros_3d_bb.visualization.markers import NAMESPACES, PALETTE, MarkerParams, MarkerWriter
 
 ALL = MarkerParams(marker_namespaces=list(NAMESPACES))
 SECOND_NS = 1000 * NS
@@ -103,18 +101,6 @@ def test_the_ellipse_has_the_axes_and_the_direction_of_the_covariance(turn, narr
     assert abs(far.dot([np.cos(turn), np.sin(turn)])) == pytest.approx(1, abs=1e-6)
 
 
-def test_the_prediction_has_an_ellipse_at_each_half_second():
-    """The covariance grows with each step of 0.25 s; the outlines are closed, one after the other."""
-    marker = drawn([track(1, (1.0, 0.0, 0.0), variances=(0.01, 0.01))])['prediction_ellipse', 1]
-    outlines = xyz(marker).reshape(4, -1, 3)
-    assert marker.type == Marker.LINE_LIST
-    for second, steps, outline in zip((0.5, 1.0, 1.5, 2.0), (2, 4, 6, 8), outlines):
-        radii = np.linalg.norm(outline[:, :2] - (2.0 + second, 1.0), axis=1)
-        assert radii == pytest.approx(np.full(len(radii), 0.1 * 2.448 * np.sqrt(steps)), rel=1e-3)
-        assert outline[0] == pytest.approx(outline[-1])
-        assert (outline[1:-1:2] == outline[2::2]).all()
-
-
 def history_of(writer, images, period_s=0.1, start_ns=SECOND_NS, number=1):
     """History after motion along x at 1 m/s, with one image per period."""
     for image in range(images):
@@ -134,24 +120,9 @@ def test_the_history_is_the_path_and_fades_with_age():
     assert set(rgb(color) for color in history.colors) == {PALETTE[0]}
 
 
-@pytest.mark.parametrize('rate, length_s', [(10, 4.0), (30, 4.0), (100, 1.0), (30, 600.0)])
-def test_the_history_is_limited_and_ends_at_the_person(rate, length_s):
-    history = history_of(MarkerWriter(MarkerParams(marker_history=length_s)), 30 * rate, 1.0 / rate)
-    assert len(history.points) <= HISTORY_POINTS + 2
-    assert xyz(history)[-1, 0] == pytest.approx(30 - 1.0 / rate)
-    assert xyz(history)[0, 0] == pytest.approx(max(30 - length_s, 0), abs=0.15)
-
-
 def test_a_history_begins_with_the_second_image_and_has_a_length():
     assert history_of(MarkerWriter(), 1) is None and history_of(MarkerWriter(), 2) is not None
     assert history_of(MarkerWriter(MarkerParams(marker_history=0.0)), 50) is None
-
-
-@pytest.mark.parametrize('start_s, number', [(3, 2), (-100, 1)])
-def test_the_history_restarts_with_another_track_or_when_time_jumps_back(start_s, number):
-    writer = MarkerWriter()
-    history_of(writer, 20)
-    assert len(history_of(writer, 3, start_ns=SECOND_NS + start_s * NS, number=number).points) == 3
 
 
 def test_colors_by_id_differ_from_each_other_and_from_arrows_and_gray_ids():
@@ -162,16 +133,6 @@ def test_colors_by_id_differ_from_each_other_and_from_arrows_and_gray_ids():
     colors = np.array(colors[:10] + [rgb(marker.color) for marker in others])
     distances = np.linalg.norm(colors[:, None] - colors[None], axis=2)
     assert distances[~np.eye(len(colors), dtype=bool)].min() > 0.2
-
-
-@pytest.mark.parametrize('coloring, count', [('status', 3), ('thesis', 1)])
-def test_colors_by_status_and_of_the_thesis_do_not_depend_on_the_id(coloring, count):
-    tracks = [track(number, status=status) for number, status in enumerate((VISIBLE, OCCLUDED, OUT_OF_VIEW, VISIBLE))]
-    markers = drawn(tracks, ALL._replace(marker_color=coloring))
-    colors = [rgb(markers['cylinder', number].color) for number in range(4)]
-    assert len(set(colors)) == count and colors[0] == colors[3]
-    if coloring == 'thesis':
-        assert colors[0][2] == 1.0 and markers['id', 0].color.g > 0.8 and markers['id', 0].color.r < 0.2
 
 
 @pytest.mark.parametrize('status', [OCCLUDED, OUT_OF_VIEW])
@@ -196,36 +157,3 @@ def test_new_parameters_apply_to_the_next_image_and_unused_markers_are_deleted()
     assert sorted(keys(markers)) == [('cylinder', 3), ('history', 3)]
     assert keys(markers, Marker.DELETE) == [('id', 3)]
     assert all(marker.lifetime.to_sec() == 0.5 for marker in markers.markers if marker.action == Marker.ADD)
-
-
-coordinates = st.floats(-1e6, 1e6)
-
-
-def drawn_by_rviz(marker, fixed_from_header):
-    """Points (n, 3) as RViz draws them: the pose is transformed in float64, the points in float32."""
-    pose = marker.pose.position
-    origin = np.float32(fixed_from_header.dot([pose.x, pose.y, pose.z, 1])[:3])
-    points = np.array([(point.x, point.y, point.z) for point in marker.points], np.float32)
-    return origin + points.dot(np.float32(fixed_from_header[:3, :3]).T)
-
-
-@given(coordinates, coordinates, st.lists(st.tuples(st.floats(-2, 2), st.floats(-2, 2)), min_size=2, max_size=6))
-@settings(deadline=None)
-def test_rviz_draws_lines_and_arrows_exactly_on_large_maps(x, y, offsets):
-    """RViz's fixed frame is that of the robot. The reference is the same scene at the map's origin in float64."""
-    robot = np.array([x, y, 0.0])
-    fixed_from_map = np.eye(4)
-    fixed_from_map[:3, 3] = -robot
-    writer, near = MarkerWriter(ALL), MarkerWriter(ALL)
-    place = np.array([2.0, -1.0, 0.9])
-    for image, way in enumerate(offsets):
-        place = place + [way[0], way[1], 0]
-        velocity = (way[0] + 3, way[1], 0.0)
-        now = header(SECOND_NS + image * NS // 2)
-        far_away, expected = (with_markers.write([track(1, velocity, position=origin + place)], now).markers
-                              for with_markers, origin in ((writer, robot), (near, np.zeros(3))))
-    assert [marker.ns for marker in far_away] == [marker.ns for marker in expected]
-    lines = [(marker, same) for marker, same in zip(far_away, expected) if marker.points]
-    assert {marker.ns for marker, _same in lines} == set(NAMESPACES) - {'cylinder', 'id'}
-    for marker, same in lines:
-        np.testing.assert_allclose(drawn_by_rviz(marker, fixed_from_map), xyz(same), rtol=0, atol=1e-4)

@@ -46,9 +46,9 @@ def test_a_recorded_trial_is_not_repeated(tmp_path, monkeypatch):
     assert len(started) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_robot_that_knows_nothing_of_people_drives_into_the_one_in_its_way(tmp_path):
-    environment, _is_real = planner_environment(str(tmp_path / 'packages'))
+    environment = planner_environment()
     results, logs = str(tmp_path / 'results.json'), tmp_path / 'logs'
     logs.mkdir()
     subprocess.check_call([sys.executable, '-m', 'ros_3d_bb_lab.evaluation', 'navigation', '--runs', '1', '--scenes',

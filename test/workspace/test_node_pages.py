@@ -1,4 +1,4 @@
-"""The pages of nodes and launch files agree with the code, and the nodes with their docstrings."""
+"""Nodes agree with their docstrings, and the files in config/ with the code."""
 import contextlib
 import functools
 import os
@@ -17,9 +17,9 @@ from ros_3d_bb_lab.evaluation.navigation.navigation_trial_node import Navigation
 from ros_3d_bb_lab.simulation.ros.simulator_node import SimulatorNode
 from support.masterless import masterless
 from support.planner_definitions import package
-from support.pages import DOC, ROOT, node_pages
+from support.pages import ROOT, node_pages
 
-PAGES = node_pages.pages()
+CONFIG = node_pages.config_files()
 NODES = {node.name: node for node in node_pages.nodes()}
 SCENARIO = os.path.join(ROOT, 'config', 'scenarios', 'empty_room.yaml')
 # Parameters with which nodes connect to all their topics; the other nodes are created as by the fuzzer.
@@ -55,16 +55,15 @@ def documented(name, section):
     return {entry.name: entry.kind for entry in NODES[name].sections.get(section, ()) if entry.name != '/diagnostics'}
 
 
-def test_each_node_has_a_page():
+def test_each_node_has_a_script():
     scripts = set(name for name in os.listdir(os.path.join(ROOT, 'scripts')) if name.endswith('_node'))
-    pages = set(name[:-len('.md')] for name in os.listdir(os.path.join(DOC, 'nodes')))
-    assert set(NODES) == scripts == set(TARGETS) | set(OTHERS) == pages - {'index'}
+    assert set(NODES) == scripts == set(TARGETS) | set(OTHERS)
 
 
-@pytest.mark.parametrize('path', sorted(PAGES))
-def test_pages_and_parameter_files_are_up_to_date(path):
+@pytest.mark.parametrize('path', sorted(CONFIG))
+def test_parameter_files_are_up_to_date(path):
     with open(os.path.join(ROOT, path), encoding='utf-8') as stream:
-        assert stream.read() == PAGES[path], 'outdated; write it with ./run doc'
+        assert stream.read() == CONFIG[path], 'outdated; write it with ./run doc'
 
 
 @pytest.mark.parametrize('name', [pytest.param(name, marks=pytest.mark.needs('pyrealsense2'))

@@ -11,7 +11,6 @@ import pytest
 import yaml
 
 from ros_3d_bb.core.params import check, params_from, table_of
-from ros_3d_bb.visualization.markers import NAMESPACES
 from support.launching import loaded
 from support.pages import ROOT, node_pages
 from support.standard_library import STANDARD_LIBRARY
@@ -161,14 +160,6 @@ def test_launch_files_set_only_parameters_of_the_node(name):
                 *node_pages.parameter_types(node.node_class))
 
 
-@pytest.mark.parametrize('arguments, outputs', [([], None), (['planner:=teb, people', 'planner_frame:=odom'],
-                                                             'teb, people')])
-def test_the_pipeline_starts_the_planner_bridge_on_request(arguments, outputs):
-    parameters, _nodes = loaded('pipeline.launch', 'weights:=yolov5n.pt', *arguments)
-    assert parameters.get('/planner_bridge_node/outputs') == outputs
-    assert parameters.get('/planner_bridge_node/planner_frame') == (outputs and 'odom')
-
-
 @pytest.mark.parametrize('name, variable', [
     ('yolov5', ('OMP_WAIT_POLICY', 'PASSIVE')),  # waiting threads of torch leave the cores to other nodes
     *((name, ('OPENBLAS_NUM_THREADS', '1'))  # small matrices need no second core
@@ -177,25 +168,3 @@ def test_nodes_use_the_cores_that_they_need(name, variable):
     """The libraries read the variables when they are loaded."""
     _parameters, nodes = loaded(name + '.launch', *REQUIRED_ARGUMENTS)
     assert [node.env_args for node in nodes.values()] == [[variable]]
-
-
-def test_rviz_shows_what_the_pipeline_publishes():
-    with open(inside('rviz', 'pipeline.rviz')) as stream:
-        content = yaml.safe_load(stream)
-    topics = [display.get('Image Topic') or display.get('Marker Topic')
-              for display in content['Visualization Manager']['Displays']]
-    published = {'visualization_marker_array', 'camera/color/image_raw', 'yolo_result_out', 'ros_3d_bb/color'}
-    assert set(filter(None, topics)) == published
-    tracks, = (display for display in content['Visualization Manager']['Displays'] if display['Name'] == 'Tracks')
-    assert tracks['Namespaces'] == {namespace: True for namespace in NAMESPACES}
-    assert content['Window Geometry']['QMainWindow State']
-    assert (content['Window Geometry']['Width'], content['Window Geometry']['Height']) == (1280, 800)
-
-
-def test_python_packages_are_all_named_in_setup_py():
-    with open(inside('setup.py')) as stream:
-        text = stream.read()
-    packages = set(os.path.relpath(os.path.dirname(path), inside(root)).replace(os.sep, '.')
-                   for root in ('src', 'annotator')
-                   for path in glob.glob(inside(root, '**', '__init__.py'), recursive=True))
-    assert packages == set(re.findall(r"'(ros_3d_bb[\w.]*)'", text))

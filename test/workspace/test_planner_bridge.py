@@ -123,14 +123,6 @@ def test_costs_are_around_the_robot_where_it_is_now():
         assert not np.any(bridge.message(COSTS).data)
 
 
-def test_an_output_without_subscribers_is_not_computed():
-    with bridge_with('costmap') as bridge:
-        bridge._connections.publishers[COSTS].connections = 0
-        bridge.send_tf(START_NS, 'base_link', (0, 0, 0))
-        bridge.send(START_NS, person(1, 2, 0))
-        assert [bridge.count(topic) for topic in (POINTS, COSTS, RING)] == [1, 0, 1]
-
-
 def test_an_output_waits_for_the_transform_of_its_own_frame_only():
     with bridge_with('costmap, people, teb', planner_frame='odom') as bridge:
         bridge.send_tf(START_NS, 'odom', (0, 0, 0))
@@ -189,13 +181,6 @@ def test_the_timeout_does_not_wait_for_the_resend_period(resend_period):
         assert len(bridge.newest(PEOPLE)[1]) == 0
 
 
-def test_outputs_are_resent_once_per_resend_period():
-    with bridge_with('people', resend_period=0.5, timeout=2.0) as bridge:
-        bridge.send(START_NS, person(1, 2, 0))
-        bridge.wait(1.8)
-        assert bridge.count(PEOPLE) == 4 and bridge.newest(PEOPLE)[1][0].position.x == pytest.approx(2 + 1.5)
-
-
 def test_the_empty_arrays_of_the_shutdown_are_the_last_messages():
     """A callback may be running then, and rospy calls more of them until it has closed the connections."""
     with bridge_with('people, costmap') as bridge:
@@ -208,14 +193,6 @@ def test_the_empty_arrays_of_the_shutdown_are_the_last_messages():
         assert len(bridge.newest(POINTS)[1]) == len(bridge.newest(PEOPLE)[1]) == 0
         assert not np.any(bridge.message(COSTS).data)
         assert [bridge.count(topic) for topic in (POINTS, COSTS, RING, PEOPLE)] == [2, 2, 1, 2]
-
-
-@pytest.mark.parametrize('planner_frame, counted', [('', True), ('odom', False)])
-def test_rounded_coordinates_are_reported_unless_the_planner_frame_is_near(planner_frame, counted):
-    with bridge_with('teb', planner_frame=planner_frame) as bridge:
-        bridge.send_tf(START_NS, 'odom', (448262.0, 5411933.0, 0))
-        bridge.send(START_NS, person(1, 448265.0, 5411934.0))
-        assert ('coordinates rounded' in bridge.counts) == counted and bridge.count(TEB) == 1
 
 
 STEPS = st.lists(st.tuples(st.sampled_from(['tracks', 'tick']), st.floats(-1.5, 1.5), st.floats(-1.5, 1.5)),

@@ -22,7 +22,7 @@ from ros_3d_bb.planning.planner_view import footprint_points, in_frame, predicte
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 from support.masterless import on_the_wire
 from support.planner_definitions import PUBLISHED_MD5, message_class, package
-from support.planners import JackalMpcReplica, ObstacleLayerReplica, SocialLayerReplica, TebReplica
+from support.planners import JackalMpcReplica, TebReplica
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 QUARTER = transform_from((10, 5, 0), (0, 0, np.sqrt(0.5), np.sqrt(0.5)))  # odom_from_map: a quarter turn to the left
@@ -104,14 +104,6 @@ def test_mpc_planner_jackal_receives_everyone_with_radius_and_velocity():
     assert item.shape.dimensions == pytest.approx((1.7, 0.3)) and item.header.stamp == time_from(STAMP_NS)
 
 
-def test_the_social_layer_transforms_position_and_velocity():
-    layer = SocialLayerReplica(lambda frame_id, _stamp: {'map': QUARTER}[frame_id])
-    layer.receive(sent(people_to_msg, 'people_msgs', [walker(3, [1, 2, 0.9], [1.2, 0, 0])]))
-    (position, velocity), = layer.people()
-    np.testing.assert_allclose(position, [8, 6, 0.9])
-    np.testing.assert_allclose(velocity, [0, 1.2, 0], atol=1e-9)
-
-
 @pytest.mark.parametrize('status, tag, reliability', [(VISIBLE, 'visible', 1.0), (OCCLUDED, 'occluded', 0.5),
                                                       (7, 'unknown', 0.5)])
 def test_people_have_an_id_tags_and_reliability(status, tag, reliability):
@@ -155,27 +147,6 @@ def people_layer():
     return {name: layer[name] for name in layer['observation_sources'].split()}
 
 
-LEVEL_ROBOT = transform_from((1, 0, 0), (0, 0, 0.6, 0.8))  # odom_from_base_link: 1 m off the costmap's centre
-
-
-def costmap(sources, odom_from_robot=LEVEL_ROBOT, odom_from_map=QUARTER):
-    """A local costmap around the origin of odom."""
-    frames = {'map': odom_from_map, 'odom': np.eye(4), 'base_link': odom_from_robot}
-    return ObstacleLayerReplica(lambda frame_id, _stamp: frames[frame_id], sources)
-
-
-def show(layer, sources, tracks, odom_from_robot=LEVEL_ROBOT, odom_from_map=QUARTER):
-    """What the bridge publishes for tracks of odom that come in the map, once; the layer is updated."""
-    topics = {output.topic: output for output in outputs_from(PlannerBridgeParams())}
-    in_map = [in_frame([track], np.linalg.inv(odom_from_map))[0]._replace(prediction_m=transform_points(
-        np.linalg.inv(odom_from_map), track.prediction_m)) for track in tracks]
-    robot_from_map = np.linalg.inv(odom_from_robot).dot(odom_from_map)
-    for name, source in sources.items():
-        output = topics[source['topic'].replace('planner_bridge_node/', '~')]
-        layer.receive(name, on_the_wire(output.write(in_map, robot_from_map, header_in(output.frame))))
-    layer.update()
-
-
 UTM = np.linalg.inv(transform_from((448262.3, 5411933.2, 0), (0, 0, 0.6, 0.8)))  # odom_from_map
 
 
@@ -185,27 +156,6 @@ def tilted(roll_deg, pitch_deg, height_m):
     return (transform_from((1, 0, height_m), (0, 0, 0.6, 0.8))
             .dot(transform_from((0, 0, 0), (0, np.sin(pitch), 0, np.cos(pitch))))
             .dot(transform_from((0, 0, 0), (np.sin(roll), 0, 0, np.cos(roll)))))
-
-
-def holes(layer, place):
-    """The number of free cells that lie in the body."""
-    axis_m = (np.arange(layer.cells) - layer.cells // 2 + 0.5) * layer.resolution
-    inside = np.hypot(axis_m - place[0], axis_m[:, None] - place[1]) < 0.3 - layer.resolution
-    return int((layer.grid[inside] == 0).sum())
-
-
-@pytest.mark.parametrize('odom_from_map', [QUARTER, UTM])
-@pytest.mark.parametrize('odom_from_robot', [LEVEL_ROBOT, tilted(0, 12, 0), tilted(-20, 0, 0), tilted(8, -15, 0.6)])
-def test_marks_are_whole_discs_and_cleared_again_on_any_map_however_the_robot_is_tilted(odom_from_map, odom_from_robot):
-    sources = people_layer()
-    layer = costmap(sources, odom_from_robot, odom_from_map)
-    for place in ([4.02, 1.01], [-3.02, -2.01]):  # not on borders of cells
-        show(layer, sources, [walker(1, place + [0.85], [0, 0, 0])], odom_from_robot, odom_from_map)
-        marks = layer.lethal()
-        distances = np.linalg.norm(marks - place, axis=1)
-        assert distances.max() < 0.3 + 0.04 and holes(layer, place) == 0
-    show(layer, sources, [], odom_from_robot, odom_from_map)
-    assert len(layer.lethal()) == 0
 
 
 @given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6), st.floats(-np.pi, np.pi), st.floats(-25, 25), st.floats(-25, 25))

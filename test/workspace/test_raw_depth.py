@@ -2,7 +2,6 @@
 import numpy as np
 import pytest
 import rosbag
-from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
@@ -11,12 +10,9 @@ from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.bags.process_bag import main, with_params
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.camera.image_rotation import turned_boxes, turned_camera, turned_image, turned_rotation
-from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, INFO_TOPICS, START_NS, STATIC_TOPIC, CameraFrame,
-                                               image_messages_of, transform_messages)
-from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg,
-                                                   boxes2d_to_msg, camera_from_msg, time_from)
+from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, START_NS, STATIC_TOPIC, CameraFrame, image_messages_of,
+                                               transform_messages)
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
@@ -25,7 +21,6 @@ from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
-from support.compressed import compressed_fields, rewritten
 from support.launching import loaded
 from support.masterless import published
 
@@ -99,44 +94,6 @@ def test_boxes_from_raw_depth_have_the_position_of_those_from_aligned_depth(bag,
     assert len(messages) == IMAGES and {message.header.frame_id for message in messages} == {COLOR_FRAME}
     assert found_m.shape == expected_m.shape == (IMAGES * len(PEOPLE), 3)
     assert np.linalg.norm(found_m - expected_m, axis=1).max() < 0.01
-
-
-def rotated(turns):
-    """Changes of messages by topic: as of cameras whose images `turns` clockwise quarter turns make upright."""
-    def depth(message):
-        values = np.ascontiguousarray(turned_image(imgmsg_to_depth(message).values, -turns))
-        turned = fill_image(Image(header=message.header), values, '16UC1')
-        return CompressedImage(**compressed_fields(turned, 'compressedDepth'))
-
-    def info(message):
-        camera = turned_camera(camera_from_msg(message), -turns % 4)
-        return next(image_messages_of(CameraFrame(message.header, camera, None, DepthImage(None, 0.001), ())))[1]
-
-    def boxes(message):
-        found = boxes2d_from_msg(message)
-        boxes_px = turned_boxes(found.boxes, -turns % 4, D435I_COLOR.width, D435I_COLOR.height)
-        return boxes2d_to_msg(boxes_px, Header(stamp=time_from(found.stamp_ns)))
-
-    def link(message):
-        offset = message.transforms[0].transform.translation
-        offset.x, offset.y, offset.z = turned_rotation(-turns % 4).dot((offset.x, offset.y, offset.z)).tolist()
-        return message
-    return {RAW_TOPIC: depth, RAW_INFO_TOPIC: info, INFO_TOPICS[0]: info, BOXES_TOPIC: boxes, STATIC_TOPIC: link}
-
-
-@pytest.mark.parametrize('turns', [1, 2])
-def test_cameras_may_be_rotated_and_raw_depth_compressed(bag, tmp_path, turns):
-    """Without a floor frame."""
-    changed = str(tmp_path / 'rotated.bag')
-    raw = settings()._replace(names=rewritten(bag, changed, rotated(turns)))
-    process_bag(bag, str(tmp_path / 'plain'), with_params(settings('aligned'), 'bbox3d', floor_frame=''))
-    process_bag(changed, str(tmp_path / 'raw'),
-                with_params(raw, 'bbox3d', floor_frame='', image_rotation=str(90 * turns)))
-    _messages, expected_m = boxes_in(tmp_path / 'plain')
-    _messages, found_m = boxes_in(tmp_path / 'raw')
-    assert found_m.shape == expected_m.shape == (IMAGES * len(PEOPLE), 3)
-    # Two pixels at 4.8 m: the rotated image has its samples in other columns.
-    assert np.linalg.norm(found_m.dot(turned_rotation(turns).T) - expected_m, axis=1).max() < 0.015
 
 
 def test_the_nodes_publish_the_same(bag, tmp_path):

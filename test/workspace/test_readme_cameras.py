@@ -2,7 +2,6 @@
 
 A person stands 2.5 m, another one 3.6 m before a camera 1.2 m above the floor, which looks down by 0.1 rad.
 """
-import argparse
 import shlex
 from typing import NamedTuple, Tuple
 
@@ -23,7 +22,6 @@ from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPICS, INFO_T
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.nodes.doctor import bag_findings
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.code_blocks import claimed
@@ -118,7 +116,6 @@ DRIVERS = {
         topics=tuple('/stereo_inertial_publisher/' + name for name in ('color/image', 'color/camera_info',
                                                                        'stereo/depth')))}
 RECIPES = {name: claimed(PIPELINE + driver.recipe) for name, driver in DRIVERS.items()}
-OF_A_BAG = claimed('rosrun ros_3d_bb process_bag azure.bag')
 
 
 def arguments_in(block):
@@ -232,24 +229,3 @@ def test_launch_files_use_the_topics_of_a_recipe(name):
                          ('/tracker_node', {INFO_TOPICS[0]: info, depth_topic: depth})):
         remaps = dict(nodes[node.lstrip('/')].remap_args)
         assert {topic: remaps[topic] for topic in topics} == topics
-
-
-@pytest.mark.parametrize('name', sorted(set(DRIVERS) - {'openni2, raw depth'}))
-def test_the_doctor_misses_only_the_pose_of_the_camera(name, tmp_path, monkeypatch):
-    driver = DRIVERS[name]
-    write_stream(driver, str(tmp_path / 'in.bag'))
-    ours = COLOR_TOPIC, INFO_TOPICS[0], DEPTH_TOPICS['aligned'][0]
-    monkeypatch.setattr('sys.argv', ['doctor'] + ['%s:=%s' % pair for pair in zip(ours, driver.topics)])
-    given = argparse.Namespace(bag=str(tmp_path / 'in.bag'), camera='', target_frame='', depth='aligned')
-    fault, = [finding for finding in bag_findings(given)[0] if finding.fault]
-    assert fault.subject == 'transforms' and ('camera_height:=1.2' in fault.fix or name == 'zed2')
-
-
-def test_bags_are_processed_as_described(tmp_path, monkeypatch):
-    write_stream(DRIVERS['azure'], str(tmp_path / 'azure.bag'))
-    monkeypatch.chdir(tmp_path)
-    words = arguments_in(OF_A_BAG)
-    words[words.index('--weights'):words.index('--weights') + 2] = ['--detector', 'depth']
-    with pytest.raises(SystemExit) as ended:
-        main(words)
-    assert not ended.value.code and len(positions_in('tracks.bag', '/ros_3d_bb/tracks')[-1]) == 2

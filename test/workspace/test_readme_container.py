@@ -6,7 +6,6 @@ import os
 import re
 import shlex
 import subprocess
-import sys
 
 import pytest
 import yaml
@@ -53,12 +52,6 @@ def test_sources_of_the_image_exist():
     assert os.access(os.path.join(ROOT, os.path.relpath(entrypoint, workdir)), os.X_OK)
 
 
-@pytest.mark.needs('check_jsonschema')
-def test_the_compose_file_conforms_to_its_schema():
-    subprocess.check_call([sys.executable, '-m', 'check_jsonschema', '--builtin-schema', 'vendor.compose-spec',
-                           COMPOSE])
-
-
 def test_commands_of_the_robot_start_its_nodes(services):
     nodes = {name: launched(VARIABLE.sub(r'\2', service['command'])) for name, service in services.items()}
     assert 'realsense_node' in nodes['camera']
@@ -73,9 +66,3 @@ def test_blocks_of_the_page_name_files_that_exist_and_the_image(block, services,
     assert 'ros_3d_bb' in given or os.path.relpath(COMPOSE, ROOT) in files
     for pipeline in (line[len('PIPELINE='):] for line in given if line.startswith('PIPELINE=')):
         assert 'yolov5_node' in launched(services['pipeline']['command'].split('$')[0] + pipeline)
-
-
-def test_the_page_lists_the_variables_of_the_compose_file():
-    with open(os.path.join(ROOT, 'doc', 'container.md')) as stream, open(COMPOSE) as compose:
-        rows = re.findall(r'^\| `(\w+)` \|', stream.read(), re.MULTILINE)
-        assert set(rows) == set(name for name, _default in VARIABLE.findall(compose.read()))

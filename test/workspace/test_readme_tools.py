@@ -26,9 +26,7 @@ INSTALL, WEIGHTS = claimed('sudo apt install ros-noetic-ros-base'), claimed('cd 
 RUNTIMES_ON_MELODIC = claimed("python3 -m pip install --upgrade 'pip<22'")
 DESCRIPTION = claimed('echo "source $HOME')
 UPSTART = claimed('cd ~/catkin_ws/src && catkin_create_pkg')
-OTHER_COMPUTER = claimed('#!/bin/bash\nsource /opt/ros')
 ARGUMENTS = claimed('roslaunch --ros-args')
-INSTALL_ON_DEBIAN, OWN_TESTS = claimed('sudo apt install build-essential'), claimed('catkin_make -Dros_3d_bb')
 SAMPLE_BAG = claimed('cd && rosrun ros_3d_bb scenario_to_bag')
 RECORD = claimed('rosbag record -O my.bag ')
 PROCESS_BAG = claimed('rosrun ros_3d_bb process_bag some.bag')
@@ -41,7 +39,6 @@ BENCHMARKS = [(claimed('./run bench accuracy --boxes'), ''), (claimed('./run ben
               (claimed('./run bench scenes'), ''), (claimed('./run bench speed\n'), ' --images 1'),
               (claimed('./run bench tracking --seed'), ' --seconds 3 --repetitions 1'),
               (claimed('./run bench latency'), ' --cases free --seconds 2')]
-DETECTOR_SPEED = claimed('./run bench speed --weights')
 DETECTORS = claimed('./run bench detector')
 DETECTIONS = claimed('./run bench tracking --detections')
 YAML = [claimed('max_obstacles:', 'yaml')]
@@ -121,25 +118,6 @@ def test_a_robot_is_set_up(reader):
     assert os.path.exists(description) and '/catkin_ws/devel/setup.bash' in setup
 
 
-def test_own_workspace_installs_builds_and_tests(reader):
-    for block in (INSTALL_ON_DEBIAN, OWN_TESTS):
-        reader.types(block, reader.home / 'catkin_ws')
-    logged = reader.log.read_text()
-    assert 'rosdep update' in logged and 'catkin_make run_tests -j1' in logged
-
-
-def test_the_other_computers_script_runs_its_arguments(reader, tmp_path):
-    script = tmp_path / 'env.sh'
-    (reader.etc / 'setup.bash').touch()
-    (reader.home / 'catkin_ws' / 'devel').mkdir(exist_ok=True)
-    (reader.home / 'catkin_ws' / 'devel' / 'setup.bash').touch()
-    script.write_text(OTHER_COMPUTER.text.replace('/opt/ros/noetic', str(reader.etc)).replace(
-        '/home/administrator', str(reader.home)))
-    script.chmod(0o755)
-    printed = subprocess.check_output([str(script), 'printenv', 'ROS_IP'], env=reader.environment())
-    assert printed == b'192.168.131.20\n'
-
-
 def test_the_arguments_are_listed(reader):
     listed = set(re.findall(r'^\s+(\w+)(?: \(default .*\))?: ', reader.types(ARGUMENTS), re.MULTILINE))
     assert {'detector', 'weights', 'error_model', 'frame_world', 'planner'} <= listed
@@ -177,13 +155,6 @@ def test_sessions_and_scenes_become_bags(reader, clone, data):
 def test_benchmarks_print_a_table(reader, clone, data, block, shortened):
     printed = reader.types(block, clone, appended=shortened, ROS_3D_BB_DATA=data)
     assert len(re.findall(r'\d+\.\d+', printed)) > 5, printed
-
-
-def test_detector_speed_by_runtime(reader, clone, data, official_output):
-    """A checkpoint, because the stand-in export has one runtime only."""
-    printed = reader.types(DETECTOR_SPEED, clone, appended=' --images 1', ROS_3D_BB_DATA=data,
-                           replaced=[('$HOME/yolov5n.pt', official_output[0])])
-    assert 'torch' in printed and 'onnxruntime' in printed
 
 
 def test_detectors_are_compared(reader, clone, data):

@@ -1,8 +1,6 @@
 """Input of the release tools: package.xml, the changelog, and the Debian package of each key."""
 import os
-import re
 
-import yaml
 from catkin_pkg.changelog import Changelog, populate_changelog_from_rst
 from catkin_pkg.package import parse_package
 from catkin_pkg.package_version import get_forthcoming_label, rename_section
@@ -13,27 +11,8 @@ KINDS = ('buildtool_depends', 'build_depends', 'build_export_depends', 'exec_dep
 RELEASES = {'melodic': '2', 'noetic': '3', '': '3'}
 # rosdep keys and their packages on Ubuntu, (bionic, focal). Sources: python.yaml and base.yaml of ros/rosdistro,
 # commits 662921b and 8f8e55c.
-UBUNTU = {
-    'python3-catkin-pkg-modules': ('python3-catkin-pkg-modules',) * 2,  # of packages.ros.org, the others of Ubuntu
-    'python3-empy': ('python3-empy',) * 2,
-    'python3-gnupg': ('python3-gnupg',) * 2,
-    'python3-hypothesis': ('python3-hypothesis',) * 2,
-    'python3-matplotlib': ('python3-matplotlib',) * 2,
-    'python3-numpy': ('python3-numpy',) * 2,
-    'python3-opencv': ('python3-opencv',) * 2,
-    'python3-pycryptodome': ('python3-pycryptodome',) * 2,
-    'python3-pytest': ('python3-pytest',) * 2,
-    'python3-scipy': ('python3-scipy',) * 2,
-    'python3-setuptools': ('python3-setuptools',) * 2,
-    'python3-yaml': ('python3-yaml',) * 2,
-    'xdotool': ('xdotool',) * 2,
-    'xvfb': ('xvfb',) * 2}
 # ROS packages, whose Ubuntu package is ros-DISTRO-NAME: all are part or dependencies of desktop in REP 150 (Melodic and
 # Noetic).
-DESKTOP = set('''
-    catkin diagnostic_msgs diagnostic_updater dynamic_reconfigure genpy geometry_msgs message_generation message_runtime
-    nav_msgs python_qt_binding rosbag rosbash rosgraph rosgraph_msgs roslaunch roslib rospy rosservice rostest rviz
-    sensor_msgs std_msgs std_srvs tf2_msgs tf2_ros visualization_msgs'''.split())
 
 
 def package_for(distro):
@@ -79,32 +58,6 @@ def test_dependencies_of_each_release():
     # of the Python 2 of Melodic
     assert keys['melodic'] - keys['noetic'] == {'python3-empy', 'python3-gnupg', 'python3-pycryptodome'}
     assert 'python3-catkin-pkg-modules' in keys_of(package_for('melodic'), ['buildtool_depends'])
-
-
-def test_every_key_has_its_packages_of_debian_in_the_table():
-    with open(os.path.join(ROOT, '.ci', 'rosdep_debian.yaml')) as stream:
-        table = yaml.safe_load(stream)
-    package = parse_package(os.path.join(ROOT, 'package.xml'))
-    assert set(table) == set(depend.name for kind in KINDS for depend in getattr(package, kind))
-    for key, systems in table.items():
-        assert list(systems) == ['debian'] and systems['debian'], key
-
-
-def test_rosdep_has_ubuntu_packages_for_every_key():
-    keys = keys_of(package_for('melodic')) | keys_of(package_for('noetic'))
-    assert keys == set(UBUNTU) | DESKTOP
-
-
-def test_the_page_of_licences_names_every_dependency_once():
-    with open(os.path.join(ROOT, 'doc', 'licences.md')) as stream:
-        rows = re.findall(r'^\| (`.*?) \| (.+) \|$', stream.read(), re.MULTILINE)
-    named = [name for names, _licence in rows for name in re.findall('`(.*?)`', names)]
-    required = set()
-    for path in ('requirements.txt', 'requirements_no_deps.txt'):
-        with open(os.path.join(ROOT, 'test', path)) as stream:
-            required.update(re.findall(r'^([\w-]+)', stream.read(), re.MULTILINE))
-    package = parse_package(os.path.join(ROOT, 'package.xml'))
-    assert sorted(named) == sorted(required | set(depend.name for kind in KINDS for depend in getattr(package, kind)))
 
 
 def test_the_licence_is_a_file_with_its_text():

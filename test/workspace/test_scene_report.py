@@ -13,8 +13,8 @@ from std_msgs.msg import Header
 from ros_3d_bb.bags.bag_writer import START_NS, write_bag
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg, time_from, tracks_from_msg, tracks_to_msg
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb_lab.evaluation.demo.scene_report import (BOXES_TOPIC, ROBOT_COLOR, SIZE_IN, TRACKS_TOPIC, TRUTH_COLOR,
-                                                        draw_scene, main, paths_of, read_recording, write_report)
+from ros_3d_bb_lab.evaluation.demo.scene_report import (BOXES_TOPIC, ROBOT_COLOR, TRACKS_TOPIC, TRUTH_COLOR, draw_scene,
+                                                        main, paths_of, read_recording, write_report)
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 
@@ -75,28 +75,6 @@ def test_without_ground_truth_the_tracks_are_listed(tmp_path):
     assert (tmp_path / 'tracked.png').exists()
 
 
-@pytest.mark.parametrize('dropped, reason', [
-    ((), ''), ((TRACKS_TOPIC,), 'none of which was tracked'),
-    ((TRACKS_TOPIC, BOXES_TOPIC), 'no people were detected')])
-def test_a_map_without_tracks_has_a_reason(tmp_path, dropped, reason):
-    def images():
-        for stamp_ns, messages in images_with_tracks('map'):
-            empty = tracks_to_msg([], Header(stamp=time_from(stamp_ns), frame_id='map'))
-            kept = [(topic, empty if topic == TRACKS_TOPIC and dropped else message) for topic, message in messages
-                    if topic != 'ground_truth' and (topic == TRACKS_TOPIC or topic not in dropped)]
-            yield stamp_ns, kept
-    write_bag(images(), str(tmp_path / 'tracked.bag'))
-    summary = write_report(str(tmp_path / 'tracked.bag'), str(tmp_path / 'tracked.png'))[-1]
-    assert reason in summary and ('no tracks: ' in summary) == bool(reason)
-
-
-def test_a_bag_without_images_has_a_map_only(tmp_path):
-    write_bag(((stamp_ns, [pair for pair in messages if pair[0] in (TRACKS_TOPIC, BOXES_TOPIC)])
-               for stamp_ns, messages in images_with_tracks('map')), str(tmp_path / 'tracked.bag'))
-    assert 'number of tracks: 1' in write_report(str(tmp_path / 'tracked.bag'), str(tmp_path / 'tracked.png'))[-1]
-    assert (tmp_path / 'tracked.png').exists()
-
-
 @pytest.mark.parametrize('picture', ['no_such_folder/report.png', 'report.xyz'])
 def test_an_image_that_cannot_be_written_is_an_error(bag, tmp_path, picture):
     with pytest.raises((OSError, ValueError)):
@@ -131,11 +109,3 @@ def test_the_top_view_shows_truth_tracks_and_robot(tmp_path):
     image = drawn(tmp_path, [], {1: [(2, 1), (4, 1)]}, {3: [(2, -1), (4, -1)]}, np.array([(0, 0), (1, 0)]), [])
     truth, robot, track = (rows_of(image, color) for color in (TRUTH_COLOR, ROBOT_COLOR, 'C0'))
     assert 0 < truth.mean() < robot.mean() < track.mean()  # y points up
-
-
-def test_images_are_arranged_in_rows_of_three(tmp_path):
-    panels = [np.full((480, 640, 3), 10 * number, np.uint8) for number in range(1, 5)]
-    image = drawn(tmp_path, panels, {}, {}, np.zeros((0, 2)), ['a scene without people'])
-    assert image.shape[1] == 100 * SIZE_IN[0]
-    assert [int(image[100, 250 + 470 * column, 0]) for column in range(3)] == [10, 20, 30]
-    assert 40 in image[:, 250, 0] and 40 not in image[:, 700, 0]

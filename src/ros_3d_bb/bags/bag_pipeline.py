@@ -162,21 +162,19 @@ class BagRun(object):
                 self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), now_ns, camera)
 
 
-def process_bag(source, target, settings=Settings(), progress=lambda share: None):
+def process_bag(source, target, settings=Settings()):
     """Write a bag with the messages of another bag and those that the nodes would publish. Returns an EventCounter.
 
-    `progress` is called after each message with the processed fraction, 0..1. Raises BagError if the source cannot be
-    read, ValueError if a parameter is invalid, and OSError if the target cannot be written; no target remains then.
+    Raises BagError if the source cannot be read, ValueError if a parameter is invalid, and OSError if the target cannot
+    be written; no target remains then.
     """
     events = EventCounter()
     with BagReader(source) as reader, new_bag(target, settings.compression) as bag:
         run, copy = BagRun(reader, settings, events), _copier(bag, settings)
-        start_ns, end_ns = reader.span_ns
         for raw, outputs in run.outputs():
             copy(raw)
             for topic, message in outputs:
                 bag.write(settings.name(topic), message, raw.time)
-            progress((raw.time.to_nsec() - start_ns) / float(max(end_ns - start_ns, 1)))
     return events
 
 

@@ -1,28 +1,20 @@
-"""Command `process_bag`: run the pipeline on one or more bags without a ROS master, in parallel processes."""
+"""Command `process_bag`: run the pipeline on one or more bags without a ROS master."""
 import argparse
 import math
-import multiprocessing
 import os
-import resource
 import sys
-import time
-from multiprocessing.connection import wait
 from typing import NamedTuple
 
 import yaml
 
-import ros_3d_bb
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError
-from ros_3d_bb.bags.bag_writer import remove_partial
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.params import IMAGE_ROTATION, params_from, with_places
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.pipeline.people_pipeline import DETECTORS, TRACKED, Settings
 
-POLL_S, BAR = 0.2, 40
-GIB = 2 ** 30
 HIGHEST_M = 100.0
 IMAGE_NODES = 'yolov5', 'depth', 'bbox3d'
 FILES = (('--yolov5-params', 'yolov5'), ('--depth-params', 'depth'), ('--bbox3d-params', 'bbox3d'),
@@ -31,12 +23,11 @@ OPTIONS = 'weights', 'error_model', 'target_frame', 'cameras', 'depth', 'image_r
 
 
 class Job(NamedTuple):
-    """A bag to be processed: input and output paths, settings, and memory limit in bytes."""
+    """A bag to be processed: input and output paths, and settings."""
 
     source: str
     target: str
     settings: Settings
-    memory: int
 
 
 def main(arguments=None):
@@ -48,9 +39,9 @@ def main(arguments=None):
     except (ValueError, OSError, yaml.YAMLError) as error:
         parser.error(str(error))
     try:
-        failed = _run_jobs(jobs, given.jobs, sys.stderr.isatty())
+        failed = [job for job in jobs if not _process(job)]
     except KeyboardInterrupt:
-        print('process_bag: interrupted; incomplete bags were removed', file=sys.stderr)
+        print('process_bag: interrupted; the incomplete bag was removed', file=sys.stderr)
         sys.exit(130)
     sys.exit(1 if failed else 0)
 
@@ -67,12 +58,12 @@ def _jobs_from(given):
             raise ValueError('the output %s is also an input; choose another output' % target)
         if targets.count(target) > 1:
             raise ValueError('two inputs have the output %s; rename one, or process them separately' % target)
-    if not (given.jobs >= 1 and given.searches >= 0 and given.memory > 0):
-        raise ValueError('--jobs, --searches and --memory: more than 0 expected')
+    if given.searches < 0:
+        raise ValueError('--searches is %d; 0 or more expected' % given.searches)
     settings = _settings_from(given)
     if given.out_dir is not None:
         os.makedirs(given.out_dir, exist_ok=True)
-    return [Job(source, target, settings, int(given.memory * GIB)) for source, target in pairs]
+    return [Job(source, target, settings) for source, target in pairs]
 
 
 def _settings_from(given):
@@ -97,7 +88,7 @@ def _settings_from(given):
     if settings.detector == 'yolov5' and not settings.yolov5[0].weights:
         raise ValueError('--detector yolov5 needs --weights FILE, a checkpoint such as yolov5n.pt; --detector depth '
                          'needs none')
-    return settings._replace(searches=given.searches or max(1, len(os.sched_getaffinity(0)) // given.jobs))
+    return settings._replace(searches=given.searches or len(os.sched_getaffinity(0)))
 
 
 def _with_camera(settings, given):
@@ -147,85 +138,21 @@ def read_params(path, defaults):
                  for part, new in zip(defaults, found))
 
 
-def _run_jobs(jobs, at_once, with_bar):
-    """Process bags, at most `at_once` in parallel, each in a separate process. Print results, and count failed jobs."""
-    context = multiprocessing.get_context('spawn')
-    # In a catkin workspace, the source folder, which lacks the generated messages, precedes the imported package in the
-    # search path.
-    sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(ros_3d_bb.__file__))))
-    todo, running, shares, failed = list(jobs), {}, {}, 0  # running: {connection: (job, process)}
+def _process(job):
+    """Process a bag and print the result. Returns whether it succeeded; an error does not stop the other bags."""
     try:
-        while todo or running:
-            while todo and len(running) < at_once:
-                job = todo.pop(0)
-                news, process = _started(context, job)
-                running[news] = job, process
-            for news in wait(list(running)):
-                job, process = running[news]
-                kind, content = _next_news(news, job, process)
-                shares[job.target] = content if kind == 'share' else 1.0
-                if kind == 'share':
-                    continue
-                del running[news]
-                process.join()
-                failed += kind == 'failed'
-                print(('\r' + 79 * ' ' + '\r' if with_bar else '') + content,
-                      file=sys.stderr if kind == 'failed' else sys.stdout)
-            if with_bar:
-                share = sum(shares.values()) / len(jobs)
-                print('\r[%-*s] %3d %%  %d of %d bags' % (BAR, '#' * int(BAR * share), 100 * share,
-                                                          len(jobs) - len(todo) - len(running), len(jobs)),
-                      end='', file=sys.stderr, flush=True)
-    finally:
-        for _job, process in running.values():
-            process.join()  # the process was interrupted, too, and removes its incomplete bag
-        if with_bar:
-            print(file=sys.stderr)
-    return failed
-
-
-def _started(context, job):
-    news, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_work, args=(job, sender))
-    process.start()
-    sender.close()
-    return news, process
-
-
-def _next_news(news, job, process):
-    """Return ('share', processed fraction), ('done', summary) or ('failed', reason) from the process of a job."""
-    try:
-        return news.recv()
-    except EOFError:  # killed, for example by the kernel when out of memory
-        process.join()
-        remove_partial(job.target)
-        return 'failed', '%s: its process ended with status %s; no bag was written' % (job.source, process.exitcode)
-
-
-def _work(job, sender):
-    resource.setrlimit(resource.RLIMIT_DATA, (job.memory, resource.getrlimit(resource.RLIMIT_DATA)[1]))
-    reported_s = 0.0
-
-    def progress(share):
-        nonlocal reported_s
-        if time.monotonic() - reported_s >= POLL_S:
-            reported_s = time.monotonic()
-            sender.send(('share', share))
-    try:
-        events = process_bag(job.source, job.target, job.settings, progress)
-        sender.send(('done', '\n'.join(['%s:' % job.target] + _summary(events))))
-    except KeyboardInterrupt:
-        pass
-    except Exception as error:  # a failed bag must not stop the others
-        sender.send(('failed', '%s; no bag was written' % _reason(job, error)))
+        events = process_bag(job.source, job.target, job.settings)
+    except Exception as error:  # a damaged bag can raise any exception
+        print('%s; no bag was written' % _reason(job, error), file=sys.stderr, flush=True)
+        return False
+    print('\n'.join(['%s:' % job.target] + _summary(events)), flush=True)
+    return True
 
 
 def _reason(job, error):
     """Return why a job failed, as a sentence that names its bag."""
     if isinstance(error, BagError):
         return str(error)
-    if isinstance(error, MemoryError):
-        return '%s: more than %.1f GiB of memory (--memory)' % (job.source, job.memory / GIB)
     if isinstance(error, (ValueError, OSError)):
         return '%s: %s' % (job.source, with_places(str(error), option_of))
     return '%s: %s: %s' % (job.source, type(error).__name__, cause(error))
@@ -274,7 +201,6 @@ def _parser():
                                      'markers. Equal inputs give identical bytes.')
     parser.add_argument('bags', nargs='+', metavar='BAG', help='IN OUT; or, with --out-dir, the input bags')
     parser.add_argument('--out-dir', metavar='DIR', help='folder of the outputs, which have the names of the inputs')
-    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='number of parallel bags (default: 1)')
     parser.add_argument('--detector', choices=DETECTORS, default='yolov5',
                         help='none: use the 2D boxes in the bag (default: yolov5)')
     parser.add_argument('--weights', metavar='FILE', help='checkpoint or export for yolov5')
@@ -300,7 +226,6 @@ def _parser():
                         help="a topic of the nodes and its name in the bag")
     parser.add_argument('--keep', nargs='*', metavar='TOPIC', help='topics of the input to copy (default: all)')
     parser.add_argument('--searches', type=int, default=0, metavar='N', help='number of images that yolov5 processes '
-                        'in parallel (default: cores / jobs); does not affect the result')
-    parser.add_argument('--memory', type=float, default=8.0, metavar='GIB', help='limit for each bag (default: 8)')
+                        'in parallel (default: the number of cores); does not affect the result')
     parser.add_argument('--compression', choices=('none', 'bz2', 'lz4'), default='lz4', help='default: lz4')
     return parser

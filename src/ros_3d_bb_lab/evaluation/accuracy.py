@@ -17,7 +17,6 @@ from ros_3d_bb.estimation.box3d import truncated_edges
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import read_error_model, write_error_model
 from ros_3d_bb.sessions.session_reader import annotated_people, read_color, read_depth, read_session
-from ros_3d_bb_lab.evaluation.accuracy_figure import draw
 from ros_3d_bb_lab.evaluation.defaults import default_weights, scenario_path
 from ros_3d_bb_lab.evaluation.error_model_fit import coverage, data_of, fit_error_model, held_out
 from ros_3d_bb_lab.evaluation.scenes import position_errors_m
@@ -193,8 +192,6 @@ def main():
         if arguments.json:
             with open(arguments.json, 'w') as stream:
                 json.dump(result, stream, indent=1)
-        if arguments.picture:
-            draw(arguments.picture, truth_of(session), ours.position_m, ours.covariances)
     except (ValueError, OSError) as error:
         sys.exit('./run bench accuracy: %s' % error)
     print('%d frames at %d positions, boxes: %s, estimator: %s, calibration: %s' % (
@@ -229,7 +226,6 @@ def _arguments():
     parser.add_argument('--weights', default=default_weights(), help='checkpoint or export, for --boxes yolov5')
     parser.add_argument('--estimator', default='foreground', metavar='NAME', help='default: foreground')
     parser.add_argument('--json', metavar='FILE', help='also write the scores as JSON')
-    parser.add_argument('--picture', metavar='FILE', help='also draw the positions and the errors by range')
     for name in ('source', 'camera', 'date'):
         parser.add_argument('--' + name, default='', help='stored in the file of --fit')
     arguments = parser.parse_args()

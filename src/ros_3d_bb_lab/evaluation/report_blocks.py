@@ -1,4 +1,4 @@
-"""Parts of a report, which `html_report` and `noise.pdf_report` render."""
+"""Parts of a report, which `html_report` renders."""
 from typing import NamedTuple, Tuple
 
 

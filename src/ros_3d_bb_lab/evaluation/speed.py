@@ -37,8 +37,6 @@ PERIOD_NS = NS // 30
 FIXED_FROM_CAMERA = transform_from((0.0, 0.0, 1.0), OPTICAL_ROTATION)
 AHEAD_S = 2.0  # horizon of the thesis' prediction
 ALGORITHMS, STAGES = ('ours', 'thesis'), ('estimation', 'tracking', 'both')
-CURVES = (('both', 'both', 'tab:green'), ('estimation', '3D boxes', 'tab:blue'),
-          ('tracking', 'tracking and prediction', 'tab:orange'))
 DETECTOR_IMAGES, DETECTOR_WARM_UPS = 40, 2
 COVERED = 0.2  # share of a box that its neighbour covers
 JITTER_PX = 2  # maximum change of the edges of a box between images
@@ -237,34 +235,6 @@ def table(result):
     return lines
 
 
-def draw(result, path):
-    """Plot the mean and the standard deviation of the times, as in Fig. 4.2 of the thesis. The suffix of `path` is that
-    of an image format.
-    """
-    import matplotlib  # slow
-    matplotlib.use('Agg')
-    from matplotlib import pyplot
-    figure, panels = pyplot.subplots(1, 2, sharey=True, figsize=(9, 4))
-    for panel, name, title in zip(panels, ALGORITHMS, ('this package', "the thesis' algorithms")):
-        for stage, label, color in CURVES:
-            mean_ms, sd_ms = (np.array(result[name][stage + suffix]) for suffix in ('_mean_ms', '_sd_ms'))
-            panel.plot(result['objects'], mean_ms, 'o-', markersize=3, color=color, label=label)
-            low_ms = np.maximum(mean_ms - sd_ms, mean_ms / 10)  # positive, for the logarithmic axis
-            panel.fill_between(result['objects'], low_ms, mean_ms + sd_ms, color=color, alpha=0.2, linewidth=0)
-        panel.set(title=title, xlabel='people', xscale='log', yscale='log')
-        panel.set_xticks(result['objects'])
-        panel.set_xticklabels(result['objects'])
-        panel.minorticks_off()
-        panel.yaxis.set_major_formatter(pyplot.FuncFormatter(lambda time_ms, _number: '%g' % time_ms))
-        panel.grid(True, alpha=0.3)
-    panels[0].set_ylabel('CPU time of an image, ms')
-    panels[0].legend(loc='upper left')
-    figure.text(0.5, 0.01, result['machine'], ha='center', fontsize=7, color='gray')
-    figure.tight_layout(rect=(0, 0.03, 1, 1))
-    figure.savefig(path, dpi=120)
-    pyplot.close(figure)
-
-
 def main():
     """Run the command `./run bench speed`."""
     arguments = _arguments()
@@ -278,8 +248,6 @@ def main():
         if arguments.json:
             with open(arguments.json, 'w') as stream:
                 json.dump(result, stream, indent=1)
-        if arguments.picture:
-            draw(result, arguments.picture)
     except (ValueError, OSError) as error:
         sys.exit('./run bench speed: %s' % error)
     print('%s\n%d people of %s, %d images each' % (
@@ -299,7 +267,6 @@ def _arguments():
     parser.add_argument('--seed', type=int, default=0,
                         help='seed of the order of the people and the jitter of their boxes (default: 0)')
     parser.add_argument('--json', metavar='FILE', help='also write the times to FILE')
-    parser.add_argument('--picture', metavar='FILE', help='also plot the times to FILE (png, svg, pdf)')
     arguments = parser.parse_args()
     if arguments.images < 1:
         parser.error('--images is %d; at least 1 expected' % arguments.images)

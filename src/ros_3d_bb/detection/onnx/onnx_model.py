@@ -4,7 +4,6 @@ The head is recognised by the outputs for a grey image (`heads`); a YAML file be
 preprocessing (`model_settings`).
 """
 import ast
-import contextlib
 import functools
 
 import numpy as np
@@ -14,7 +13,7 @@ from ros_3d_bb.detection.batches import BGR, RGB, batch_of
 from ros_3d_bb.detection.network_detector import MAX_INPUT_PX, Resize
 from ros_3d_bb.detection.onnx.heads import HEADS, layout_of
 from ros_3d_bb.detection.onnx.model_settings import MAX_STRIDE, ModelSettings, read_settings
-from ros_3d_bb.detection.onnx.session import EXTRA_BYTES, check_content, limited_memory, session_of
+from ros_3d_bb.detection.onnx.session import session_of
 from ros_3d_bb.detection.weights import MAX_CLASSES, WeightsError, class_names
 
 INSTALL = ('ONNX Runtime is not installed; install it with "pip3 install onnxruntime" ("onnxruntime<1.11" on Ubuntu '
@@ -39,12 +38,8 @@ class OnnxModel(object):
         try:
             with open(path, 'rb') as stream:
                 content = stream.read()
-            check_content(content)
-            # CUDA reserves more address space than there is memory.
-            limit = contextlib.ExitStack() if gpu is not None else limited_memory(EXTRA_BYTES + 4 * len(content))
-            with limit:
-                self._session = session_of(content, threads, gpu)
-                self._configure(settings, self._session.get_modelmeta().custom_metadata_map)
+            self._session = session_of(content, threads, gpu)
+            self._configure(settings, self._session.get_modelmeta().custom_metadata_map)
         except ImportError:
             raise WeightsError('weights %s: %s, or use the .pt checkpoint' % (path, INSTALL))
         except OSError as error:

@@ -49,7 +49,8 @@ def measured(case, arguments, bag, folder):
     record, log = (os.path.join(folder, case.name + suffix) for suffix in ('.json', '.log'))
     options = {'bag': bag, 'record': record, 'detector': case.detector, 'weights': case.weights,
                'image_size': case.image_size, 'seconds': arguments.seconds, 'rate': arguments.rate,
-               'single_process': arguments.single_process, 'limits': arguments.limits, 'warm_up': 8.0 if arguments.limits else 3.0}
+               'single_process': arguments.single_process,
+               'limits': arguments.limits, 'warm_up': 8.0 if arguments.limits else 3.0}
     with cpu_load(int(case.loaded)), open(log, 'w') as stream:
         launch('latency.launch', options, arguments.seconds + 200, stream)
     try:

@@ -31,7 +31,7 @@ def main():
         sys.exit('./run noise: %s' % error)
     print(text_of(analysis))
     print('detector: not measured, default values; --recordings measures it')
-    print('report: %s (and report.pdf)' % (folder / 'report.html'))
+    print('report: %s' % (folder / 'report.html'))
 
 
 def _fit_recordings(arguments, folder):

@@ -7,7 +7,6 @@ from ros_3d_bb_lab.evaluation.html_report import html_report
 from ros_3d_bb_lab.evaluation.noise import theory
 from ros_3d_bb_lab.evaluation.noise.analysis import RMS_FIT_FROM_M, summary_of
 from ros_3d_bb_lab.evaluation.noise.figures import polynomial_text, write_figures
-from ros_3d_bb_lab.evaluation.noise.pdf_report import pdf_report
 from ros_3d_bb_lab.evaluation.noise.statistics import DISTRIBUTIONS, LEAST_TO_TEST
 from ros_3d_bb_lab.evaluation.noise.tables import LEAST_IN_CLUSTER, small_clusters
 from ros_3d_bb_lab.evaluation.report_blocks import Figure, Heading, Paragraph, Table, numbered
@@ -32,7 +31,6 @@ def write_results(folder, analysis, progress=lambda share: None):
                            for block in blocks if not isinstance(block, Figure) or block.name in captions))
     (folder / 'report.html').write_text(html_report(TITLE, blocks, folder), encoding='utf-8')
     progress(0.7)
-    pdf_report(folder / 'report.pdf', TITLE, blocks, folder)
     (folder / 'summary.json').write_text(json.dumps(summary_of(analysis), indent=1), encoding='utf-8')
     for name, model in (('error_model_thesis_form.yaml', analysis.thesis_form),
                         ('error_model.yaml', analysis.model or analysis.thesis_form)):
