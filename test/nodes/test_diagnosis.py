@@ -2,12 +2,14 @@
 because the faults are those of topics, transforms and clocks.
 """
 import argparse
+import contextlib
 import subprocess
 import threading
 import time
 
 import numpy as np
 import pytest
+import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rosgraph_msgs.msg import Log
@@ -176,6 +178,37 @@ def test_a_fault_is_reported_until_it_ends(rig, name):
     assert found in output and fix in output, output
     if name in LASTING:
         rig.wait_until_healthy()
+
+
+@contextlib.contextmanager
+def unpublished(rig, *topics):
+    """Some topics have no publisher within the block."""
+    for topic in topics:
+        rig.pubs.pop(topic).unregister()
+    try:
+        yield
+    finally:
+        rig.pubs.update((topic, rospy.Publisher(topic, KINDS[topic], queue_size=10)) for topic in topics)
+
+
+def test_renamed_topics_and_unreachable_publishers_are_reported(healthy):
+    """Depth is on the topic of another camera, and camera_info is published by a node on a machine with an unknown
+    name. There are no 2D boxes meanwhile, which would be rejected.
+    """
+    ghost, address = rosgraph.Master('/ghost'), 'http://no.such.host.invalid:40000'
+    healthy.log.emptied()
+    other = rospy.Publisher('front/aligned_depth_to_color/image_raw', Image, queue_size=1)
+    unreachable = '/ghost publishes it, but this machine cannot resolve its host name no.such.host.invalid'
+    with unpublished(healthy, BOXES, DEPTH, INFO), contextlib.ExitStack() as at_the_end:
+        at_the_end.callback(other.unregister)
+        at_the_end.callback(ghost.unregisterPublisher, '/' + INFO, address)
+        ghost.registerPublisher('/' + INFO, 'sensor_msgs/CameraInfo', address)
+        output = diagnosed()
+        assert 'no publishers on /' + DEPTH in output
+        assert 'camera_depth:=/front/aligned_depth_to_color/image_raw' in output
+        assert unreachable in output and 'ROS_IP' in output
+        healthy.wait_for_line('bbox3d_node', 'no publishers on /%s; start the camera' % DEPTH)
+        healthy.wait_for_line('bbox3d_node', unreachable)
 
 
 def test_a_missing_clock_is_reported(rig):

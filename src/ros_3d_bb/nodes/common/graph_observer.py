@@ -76,7 +76,7 @@ class GraphObserver(object):
         return _param(topic_of(self._camera, 'bbox3d_node'), name, Bbox3dParams())
 
     def _publishers_of(self, one):
-        return () if one.newest is not None or one.topic not in self._topics else publishers_of(one.topic, False)
+        return () if one.newest is not None or one.topic not in self._topics else publishers_of(one.topic)
 
     def _topic_of(self, name):
         """Return the name of a topic of the nodes in this graph."""

@@ -53,16 +53,16 @@ def published_topics():
     return dict(patient_master().getPublishedTopics('/'))
 
 
-def publishers_of(topic, is_connected):
+def publishers_of(topic):
     """Return a tuple of `Publisher`: the publishers of a topic, with the connection problem of each.
 
-    `is_connected` states whether the subscriber is connected; if so, no problems are searched for. Raises one of
-    `NO_ANSWER` without a master.
+    Problems are also searched for if a subscriber seems to be connected: rospy 1.15 counts ended connections. Raises one
+    of `NO_ANSWER` without a master.
     """
     master = patient_master()
     publishing, _subscribing, _services = master.getSystemState()
     nodes = sorted(node for name, names in publishing if name == topic for node in names)
-    return tuple(Publisher(node, '' if is_connected else _connection_problem(master, node)) for node in nodes)
+    return tuple(Publisher(node, _connection_problem(master, node)) for node in nodes)
 
 
 def _connection_problem(master, node):

@@ -164,6 +164,5 @@ def _cause_of_silence(silent, silent_s):
     """Return a sentence with the cause of the silence of an input. Raises one of `NO_ANSWER`."""
     used = set(other.subscriber.resolved_name for other in inputs() if other.count) | set(get_topic_manager().pubs)
     topics, topic = published_topics(), silent.subscriber.resolved_name
-    publishers = publishers_of(topic, silent.subscriber.get_num_connections() > 0)
-    stream = silent.stream()._replace(published_kind=topics.get(topic, ''), publishers=publishers)
+    stream = silent.stream()._replace(published_kind=topics.get(topic, ''), publishers=publishers_of(topic))
     return '%s; %s' % silence_fault(stream, topics, used, silent_s)
