@@ -23,7 +23,7 @@ from support.processes import killed_and_back, pid_of
 from support.ros import TIMEOUT_S, Recorder, launched, wait_until
 from support.stage import RECOVERY_IMAGES, Stage
 
-NODES = '/depth_detector_node', '/bbox3d_node', '/tracker_node', '/planner_bridge_node'
+NODES = '/people_node', '/planner_bridge_node'
 
 
 def has_master():
@@ -82,9 +82,9 @@ def test_the_master_is_killed_and_restarted(tmp_path, monkeypatch):
             set_label('A2')
             wait_until(lambda: label.from_cache() == 'A2', 'the label that was set')
             diagnostics = running.enter_context(Recorder('/diagnostics', DiagnosticArray))
-            wait_for_reports(diagnostics, 'bbox3d_node', 1)
+            wait_for_reports(diagnostics, 'tracker_node', 1)
             first.send_signal(signal.SIGSTOP)
-            wait_for_reports(diagnostics, 'bbox3d_node', 10)  # after 5 s without images it queries the master
+            wait_for_reports(diagnostics, 'tracker_node', 10)  # after 5 s without images it queries the master
         for _image in range(RECOVERY_IMAGES):
             stage.step()  # without a master
         wait_until(lambda: capture().success, 'a measurement without a master')
@@ -106,7 +106,7 @@ def test_the_master_is_killed_and_restarted(tmp_path, monkeypatch):
             set_label('B1')
             wait_until(lambda: label.from_cache() == 'B1', 'the label that was set in the new master')
             wait_until(lambda: rospy.has_param('/tracker_node_numbers'), 'the reserved IDs in the new master')
-            killed_and_back('/tracker_node', lambda: time.sleep(0.1))
+            killed_and_back('/people_node', lambda: time.sleep(0.1))
             after = stage.recovered('tracker killed after that')
             assert min(after.values()) > max(before.values())
             running.close()

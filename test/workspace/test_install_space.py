@@ -126,7 +126,7 @@ def loaded(installed, tmp_path_factory):
 def test_launch_files_load_and_start_installed_nodes(installed, loaded):
     assert sorted(loaded) == sorted(os.listdir(os.path.join(ROOT, 'launch')))
     started = set(node for nodes, _parameters in loaded.values() for node in nodes if node.startswith('ros_3d_bb/'))
-    assert started == set('ros_3d_bb/' + name for name in NODES) - {'ros_3d_bb/people_node'}  # on request only
+    assert started == set('ros_3d_bb/' + name for name in NODES)
 
 
 def test_files_named_in_launch_files_are_installed(installed, loaded):

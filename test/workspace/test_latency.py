@@ -43,8 +43,8 @@ def benchmark(tmp_path):
 
 def test_results_are_written_and_no_process_remains(bag, benchmark, tmp_path):
     results = str(tmp_path / 'latency.json')
-    process = benchmark('--bag', bag, '--cases', 'free', '--seconds', '5', '--rate', '10', '--limits', '--json',
-                        results)
+    process = benchmark('--bag', bag, '--cases', 'free', '--seconds', '5', '--rate', '10', '--separate', '--limits',
+                        '--json', results)
     printed, _nothing = process.communicate()
     assert process.returncode == 0, printed
     with open(results) as stream:

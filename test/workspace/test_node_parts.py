@@ -74,8 +74,9 @@ def test_3d_boxes_do_not_wait_for_a_master_to_subscribe_colour():
 
 
 def test_the_diagnostics_continue_after_a_failed_report():
-    with mock.patch('diagnostic_updater.Updater') as updater, mock.patch('rospy.logwarn') as log, \
-            mock.patch('ros_3d_bb.nodes.common.diagnostics.PERIOD_S', 0.01):
+    path = 'ros_3d_bb.nodes.common.diagnostics.'
+    with mock.patch(path + 'NodeUpdater') as updater, mock.patch('rospy.logwarn') as log, \
+            mock.patch(path + 'PERIOD_S', 0.01):
         updater.return_value.force_update.side_effect = [ZeroDivisionError('by nothing')] + 1000 * [None]
         Diagnostics()
         wait_until(lambda: updater.return_value.force_update.call_count >= 3, 'another report')

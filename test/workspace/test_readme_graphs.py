@@ -15,7 +15,7 @@ from support.code_blocks import claimed
 TRACKS, BOXES = 'ros_3d_bb/tracks:objects', 'ros_3d_bb/bb_3d:boxes'
 # OpenCV's detector detects people at this distance from a camera at the height of a Jackal's.
 SCENE = {'duration': 1.0, 'rate': 5.0, 'people': [{'start': [4.5, 0.3], 'facing': 3.1}]}
-PIPELINE = {'/yolov5_node', '/bbox3d_node', '/tracker_node'}
+PIPELINE = {'/people_node'}
 LOADED = {  # beginning of a block: nodes that it starts
     'roslaunch ros_3d_bb jackal.launch': PIPELINE | {'/planner_bridge_node', '/camera_mount', '/camera_realsense'},
     'export ROS_MASTER_URI=http://192.168.131.1:11311': {'/rviz'},
@@ -29,8 +29,8 @@ LOADED = {  # beginning of a block: nodes that it starts
     'roslaunch ros_3d_bb realsense.launch file:=': {'/realsense_node'},
     'pip3 install pyrealsense2\n': {'/realsense_node'},
     'roslaunch ros_3d_bb playback.launch': PIPELINE | {'/rviz'},
-    'roslaunch ros_3d_bb measure.launch': {'/viewer_node', '/bbox3d_node', '/camera_realsense'},
-    'roslaunch ros_3d_bb simulation.launch rviz:=false': {'/simulator_node', '/tracker_node'},
+    'roslaunch ros_3d_bb measure.launch': {'/viewer_node', '/people_node', '/camera_realsense'},
+    'roslaunch ros_3d_bb simulation.launch rviz:=false': {'/simulator_node', '/people_node'},
     'roslaunch ros_3d_bb viewer.launch': {'/viewer_node'},
     'roslaunch ros_3d_bb gazebo.launch': PIPELINE | {'/rviz'}}
 LAUNCHES = {beginning: claimed(beginning) for beginning in LOADED}

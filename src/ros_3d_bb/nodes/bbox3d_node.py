@@ -58,7 +58,7 @@ class Bbox3dNode(object):
 
     def __init__(self, part=Part()):
         params, = read_params(Bbox3dParams, namespace=part.namespace)
-        self._diagnostics = part.diagnostics or Diagnostics()
+        self._diagnostics = Diagnostics(part)
         self._next_stage = part.next_stage
         depth_topic, is_raw = DEPTH_TOPICS[params.depth][0], params.depth == RAW
         depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
@@ -118,9 +118,8 @@ class Bbox3dNode(object):
             boxes3d = self._stage.estimate(frame, boxes2d)
             message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received_camera)
             self._boxes_pub.publish(message)
-            if self._next_stage is None:
-                self._diagnostics.record_latency(message.header.stamp)
-            else:
+            self._diagnostics.record_latency(message.header.stamp)
+            if self._next_stage is not None:
                 self._next_stage(message)
             self._images.publish(message.header, frame.received_depth, boxes3d)
 

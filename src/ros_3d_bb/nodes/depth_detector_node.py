@@ -44,7 +44,7 @@ class DepthDetectorNode(object):
 
     def __init__(self, part=Part()):
         params, people = read_params(DepthDetectorParams, DepthPeopleParams, namespace=part.namespace)
-        self._diagnostics = part.diagnostics or Diagnostics()
+        self._diagnostics = Diagnostics(part)
         depth_topic, is_raw = DEPTH_TOPICS[params.depth][0], params.depth == RAW
         depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
         transforms = (part.transforms or Transforms(wait_s=0)) if params.floor_frame or is_raw else None

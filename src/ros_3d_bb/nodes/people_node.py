@@ -3,7 +3,6 @@ from typing import NamedTuple
 
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
-from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
@@ -25,23 +24,21 @@ class PeopleNode(object):
     """Detect, locate and track people in the images of one camera.
 
     The node consists of yolov5_node or depth_detector_node (~detector), bbox3d_node and tracker_node. Each image is
-    received and decoded once, and results are passed on without a connection. The topics are those of these nodes.
-    Parameters and services keep their names, for example bbox3d_node/stride. Their diagnostics are in one status, with
-    the latency of the tracks.
+    received and decoded once, and results are passed on without a connection. Topics, parameters, services and
+    diagnostics are those of these nodes and keep their names, for example bbox3d_node/stride. Inputs of the process are
+    in the status of tracker_node.
     """
 
     def __init__(self):
         params, = read_params(PeopleNodeParams)
-        part = Part(diagnostics=Diagnostics(), subscribes=False)
-        tracker = TrackerNode(part._replace(namespace='tracker_node/'))
-        part = part._replace(transforms=tracker.transforms)
-        bbox3d = Bbox3dNode(part._replace(namespace='bbox3d_node/', next_stage=tracker.on_boxes,
-                                          subscribes=params.detector not in DETECTORS))
+        tracker = TrackerNode(Part('tracker_node/', subscribes=False))
+        bbox3d = Bbox3dNode(Part('bbox3d_node/', tracker.transforms, tracker.on_boxes, monitors=False,
+                                 subscribes=params.detector not in DETECTORS))
         if params.detector in DETECTORS:
             namespace, node = DETECTORS[params.detector]
-            node(part._replace(namespace=namespace, next_stage=bbox3d.on_boxes))
+            node(Part(namespace, tracker.transforms, bbox3d.on_boxes, monitors=False))
 
 
 def main():
     """Run the node."""
-    run_node('people_node', PeopleNode)
+    run_node('people_node', PeopleNode, parts=('tracker_node', 'bbox3d_node', 'yolov5_node', 'depth_detector_node'))

@@ -60,10 +60,10 @@ class TrackerNode(object):
         params, marker_params, *tracking = given = read_params(TrackerNodeParams, MarkerParams, *TRACKING_PARAMS,
                                                                namespace=part.namespace)
         self._markers = MarkerWriter(marker_params)
-        self._diagnostics = part.diagnostics or Diagnostics()
+        self._diagnostics = Diagnostics(part)
         self.transforms = Transforms(params.tf_timeout)
         self._diagnostics.show('tf age', self.transforms.age)
-        self._track_ids = TrackIdReservation(self._diagnostics, part.namespace)
+        self._track_ids = TrackIdReservation(self._diagnostics, part)
         self._stage = TrackingStage(params, tracking, self._diagnostics, self.transforms, self._on_tracks,
                                     self._track_ids.last_id)
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
@@ -131,9 +131,8 @@ class TrackIdReservation(object):
         If the parameter is not a valid ID.
     """
 
-    def __init__(self, diagnostics, namespace='~'):
-        node = rospy.get_name() if namespace == '~' else rospy.resolve_name(namespace.rstrip('/'))
-        self._diagnostics, self._name = diagnostics, node + '_numbers'
+    def __init__(self, diagnostics, part=Part()):
+        self._diagnostics, self._name = diagnostics, part.node_name + '_numbers'
         self.last_id = rospy.get_param(self._name, 0)
         if type(self.last_id) is not int or not 0 <= self.last_id <= LARGEST_PARAM - RESERVED_IDS:
             raise ValueError('parameter %s is %r; the largest track ID so far expected' % (self._name, self.last_id))

@@ -42,7 +42,7 @@ class Yolov5Node(object):
                                                          namespace=part.namespace)
         self._detector = open_detector(params.weights, detection, running, rospy.logwarn)
         self._params, self._sizes = detection, AdaptiveSize()
-        self._diagnostics = part.diagnostics or Diagnostics()
+        self._diagnostics = Diagnostics(part)
         self._diagnostics.show('image size', lambda: '%d pixels' % self._detector.input_px)
         if part.transforms is None:
             transforms = Transforms(wait_s=0)

@@ -74,9 +74,10 @@ class DetectorWorker(object):
         if len(detections.boxes) or self._publish_empty:
             message = detections2d_to_msg(detections, self._names, header)
             self._boxes_pub.publish(message)
+            self._diagnostics.record_latency(header.stamp)
             if self._next_stage is not None:
                 self._next_stage(message)
-        if self._next_stage is None:
+        else:
             self._diagnostics.record_latency(header.stamp)
         if self._image_pub.get_num_connections():
             labels = ['%s %.2f' % (self._names[number], score)

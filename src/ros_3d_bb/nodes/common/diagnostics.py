@@ -5,12 +5,14 @@ import time
 
 import diagnostic_updater
 import rospy
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rospy.topics import get_topic_manager
+from std_msgs.msg import Header
 
 from ros_3d_bb.core.event_counter import MOST_LAGS, EventCounter
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.common.master import is_ending
+from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.subscribers import InputMonitor
 
 PERIOD_S = 1.0
@@ -34,14 +36,17 @@ class Diagnostics(EventCounter):
         Counters of processed and rejected inputs, rates, latency and missing inputs, once per second.
     """
 
-    def __init__(self):
+    def __init__(self, part=Part()):
         super(Diagnostics, self).__init__(clock=rospy.get_rostime)
         self._warning, self._warned_at = '', float('-inf')
         self._logged_at, self._current_events = {}, set()
         self._reported_s = self._subscribed_s = time.monotonic()
-        inputs = InputMonitor()
-        self._shown, self._checks = [inputs.values], [inputs.faults]
-        self._updater = diagnostic_updater.Updater()
+        self._shown, self._checks, self._monitors = [], [], part.monitors
+        if part.monitors:
+            inputs = InputMonitor()
+            self._shown.append(inputs.values)
+            self._checks.append(inputs.faults)
+        self._updater = NodeUpdater(part.node_name)
         self._updater.setHardwareID('none')
         self._updater.add('pipeline', self._report)
         threading.Thread(target=self._run, daemon=True).start()
@@ -105,7 +110,7 @@ class Diagnostics(EventCounter):
 
     def _log_missing_subscribers(self):
         """Log once if the results have no subscribers, and again after subscribers left. This is not a fault."""
-        now_s, topics = time.monotonic(), unsubscribed_results()
+        now_s, topics = time.monotonic(), unsubscribed_results() if self._monitors else []
         if not topics:
             self._subscribed_s = now_s
         elif self._subscribed_s is not None and now_s - self._subscribed_s > UNSUBSCRIBED_S:
@@ -131,6 +136,21 @@ class Diagnostics(EventCounter):
                     self._log('no report', 'the report on /diagnostics failed (%r); trying again' % error,
                               WARNING_LASTS_S)
             time.sleep(PERIOD_S)
+
+
+class NodeUpdater(diagnostic_updater.Updater):
+    """Publishes statuses under the name of a node, which may be one of several in the process."""
+
+    def __init__(self, node_name):
+        super(NodeUpdater, self).__init__()
+        self._node_name = node_name.lstrip('/')
+
+    def publish(self, statuses):
+        """Publish a list of statuses, or one."""
+        statuses = statuses if isinstance(statuses, list) else [statuses]
+        for status in statuses:
+            status.name = '%s: %s' % (self._node_name, status.name)
+        self.publisher.publish(DiagnosticArray(header=Header(stamp=rospy.Time.now()), status=statuses))
 
 
 def unsubscribed_results():

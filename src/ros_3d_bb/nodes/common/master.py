@@ -56,7 +56,7 @@ def published_topics():
 def publishers_of(topic):
     """Return a tuple of `Publisher`: the publishers of a topic, with the connection problem of each.
 
-    Problems are also searched for if a subscriber seems to be connected: rospy 1.15 counts ended connections. Raises one
+    Problems are also searched for if a subscriber seems connected, as rospy 1.15 counts ended connections. Raises one
     of `NO_ANSWER` without a master.
     """
     master = patient_master()
@@ -92,16 +92,16 @@ class Registration(object):
 
     rospy does not do this. Connected nodes continue without a master and after its restart, because messages do not
     pass through it, but nodes that start later would not find them. The registration restores the topics, services and
-    private parameters of the node, and /use_sim_time.
+    private parameters of the node, those of its `parts` (names of nodes), and /use_sim_time.
     """
 
-    def __init__(self):
+    def __init__(self, parts=()):
         # rospy requests this parameter for each log line if it is not set; the logging thread would wait for a master.
         disable_topics = rospy.get_param_cached(DISABLE_TOPICS, False)  # also subscribes to changes of the parameter
         get_param_server_cache().set(DISABLE_TOPICS, disable_topics)
         self._master = patient_master()
-        self._parameters = {name: rospy.get_param(name) for name in (rospy.get_name(), '/use_sim_time')
-                            if rospy.has_param(name)}
+        names = [rospy.get_name(), '/use_sim_time'] + [rospy.resolve_name(part) for part in parts]
+        self._parameters = {name: rospy.get_param(name) for name in names if rospy.has_param(name)}
         self._is_reachable, self._is_registered = True, True
         threading.Thread(target=self._run, daemon=True).start()
 

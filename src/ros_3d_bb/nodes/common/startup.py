@@ -26,14 +26,16 @@ def stored_params(namespace='~'):
     return rospy.get_param(namespace.rstrip('/'), {})
 
 
-def run_node(name, node_class, run=lambda _node: rospy.spin()):
+def run_node(name, node_class, run=lambda _node: rospy.spin(), parts=()):
     """Create a node, `run` it (by default until ROS shuts down) and return it.
+
+    `parts` are the names of the nodes that it consists of, if any.
 
     A ValueError of the constructor is a configuration error: it is logged, and the exit status is 1.
     """
     reuse_freed_memory()
     rospy.init_node(name)
-    Registration()
+    Registration(parts)
     try:
         node = node_class()
     except ValueError as error:

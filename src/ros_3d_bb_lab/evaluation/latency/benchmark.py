@@ -49,7 +49,7 @@ def measured(case, arguments, bag, folder):
     record, log = (os.path.join(folder, case.name + suffix) for suffix in ('.json', '.log'))
     options = {'bag': bag, 'record': record, 'detector': case.detector, 'weights': case.weights,
                'image_size': case.image_size, 'seconds': arguments.seconds, 'rate': arguments.rate,
-               'single_process': arguments.single_process,
+               'single_process': not arguments.separate,
                'limits': arguments.limits, 'warm_up': 8.0 if arguments.limits else 3.0}
     with cpu_load(int(case.loaded)), open(log, 'w') as stream:
         launch('latency.launch', options, arguments.seconds + 200, stream)
@@ -145,11 +145,11 @@ def _arguments():
     parser.add_argument('--limits', action='store_true',
                         help='also give the CPU usage of each node as a multiple of its limit: that of a bare rospy '
                         'node that runs beside it, receives the same messages and publishes messages of the same size')
-    parser.add_argument('--single-process', action='store_true', help='run the nodes in one process, people_node')
+    parser.add_argument('--separate', action='store_true', help='run each node in a process of its own')
     parser.add_argument('--json', metavar='FILE', help='also write the results to this file')
     arguments = parser.parse_args()
-    if arguments.limits and arguments.single_process:
-        parser.error('--limits compares single nodes; expected without --single-process')
+    if arguments.limits and not arguments.separate:
+        parser.error('--limits compares single nodes; expected together with --separate')
     if not (arguments.seconds > 0 and arguments.rate > 0):
         parser.error('--seconds %g, --rate %g: more than 0 expected' % (arguments.seconds, arguments.rate))
     known = {case.name: case for case in cases_of([os.path.abspath(path) for path in arguments.weights])}
