@@ -104,11 +104,10 @@ def test_a_recording_of_one_person_is_rejected(tmp_path, monkeypatch):
 def test_the_range_is_learned_from_people_farther_away():
     range_m = DEFAULT_RANGE_M
     for _image in range(100):
-        range_m = learned_range(range_m, np.array([3.0, 7.0]), np.ones(2, bool), np.array([1, 0]))
+        range_m = learned_range(range_m, [3.0, 7.0])
     assert range_m == DEFAULT_RANGE_M
     for _image in range(100):
-        range_m = learned_range(range_m, np.array([3.0, 12.0, 20.0, 90.0]), np.array([True] * 3 + [False]),
-                                np.array([0, 2, 1, 3]))
+        range_m = learned_range(range_m, [3.0, 12.0, 20.0])
     assert range_m == pytest.approx(16.0, abs=0.1)
 
 

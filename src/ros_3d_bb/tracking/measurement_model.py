@@ -1,28 +1,34 @@
-"""Measurement model: convert the detections of one image to positions, covariances, viewing rays and sizes."""
-from typing import NamedTuple
+"""Measurement model: convert the detections of one image to positions, covariances, viewing rays and sizes.
 
-import numpy as np
+The noise of boxes without a covariance is assumed, and its scale is learned from innovations. The innovations of a
+filter with the right noise are white (Kailath 1968), and their autocorrelation shows what is wrong (Mehra 1970). With
+too much noise, the filter lags behind a person who turns, and successive innovations have the same direction. With too
+little, it follows the errors of the boxes, and they have opposite directions. The variance is lowered or raised
+accordingly. Unlike the size of innovations, their correlation hardly depends on how much people turn.
+"""
+import math
+from typing import NamedTuple, Tuple
 
 from ros_3d_bb.core.params import Param, parameters
-from ros_3d_bb.tracking.types import NEARER_M, wrapped
+from ros_3d_bb.tracking.types import NEARER_M, Detection, floats
 
-# Position (x, y), its covariance and whether that is assumed, the distance from the camera and the unit vector from the
-# camera in the ground plane; extents; height of the centre and its variance; whether the image border truncates the
-# width, and the lower and the upper end; support; number of the class (`class_numbers.ClassNumbers`), score, and
-# `Detection.index`.
-MEASUREMENT = np.dtype([('position_m', float, 2), ('noise_m2', float, (2, 2)), ('noise_assumed', bool),
-                        ('distance_m', float), ('ray', float, 2), ('size_m', float, 3), ('z_m', float), ('z_m2', float),
-                        ('cut_sideways', bool), ('cut_ends', bool, 2), ('support', float), ('class_number', int),
-                        ('score', float), ('detection', int)])
-FLOOR_M = 0.02  # lower bound of the standard deviation of a centre: people sway as they walk
-WIDER_M = 0.04  # people are wider than the usual width, to which the estimator completes truncated boxes
-USUAL_PERIOD_S = 1 / 30.0  # image period assumed for the first image of a camera
-FILTER_MEMORY_S = 0.3273  # of the position, with the default parameters
-PART_M = 0.3  # a truncated box narrower than this shows only a part of the body's width
-MAX_SHIFT_M = 0.2
-CUT_SIGMA_M = 0.08  # additional lateral standard deviation of truncated or partly occluded boxes
+FLOOR_M = 0.02  # lower bound of the standard deviation of a centre; chosen: people sway as they walk
+WIDER_M = 0.04  # chosen: people are wider than the usual width, to which the estimator completes truncated boxes
+USUAL_PERIOD_S = 1 / 30.0  # image period assumed for the first image of a camera; chosen: that of a D435
+# Spectral density of the position noise, m² s. Chosen: with it and the default acceleration, errors of the D435, which
+# last 0.5 s, count as if they lasted 0.15 s, the best value in `./run bench tracking` when that was a parameter.
+NOISE_DENSITY = 0.08 * 0.3273 ** 4
+PART_M = 0.3  # a narrower truncated box shows only a part of the body's width; chosen: less than the usual 0.5 m
+MAX_SHIFT_M = 0.2  # chosen: less than half of the usual width
+CUT_SIGMA_M = 0.08  # additional lateral standard deviation of truncated or partly occluded boxes; chosen
 NEAR_M = 0.01  # the viewing ray of a closer box is undefined; the optical axis is used instead
-TOUCHING_RAD = 0.03  # a nearer box occludes another one if the gap between them is smaller than this
+TOUCHING_RAD = 0.03  # a nearer box occludes another one if the gap between them is smaller than this; chosen
+# Scale of the assumed noise. Chosen; `walk` in test_noise_scale.py has the effect.
+GAIN = 0.2  # change of the logarithm of the variance by a pair of innovations, relative to their correlation
+LARGEST = 3.0  # correlations are limited to this multiple of the expected squared innovation
+SETTLED_HITS = 3  # innovations of newer tracks show their unknown velocity
+MIN_LOG_SCALE, MAX_LOG_SCALE = 2 * math.log(0.05), 2 * math.log(2)  # a twentieth to twice the standard deviation
+TURN = 2 * math.pi
 BOX_ERRORS = 'kalman: errors of boxes (their covariance comes from the error model of bbox3d_node)'
 
 
@@ -34,70 +40,197 @@ class NoiseParams(NamedTuple):
         0.1, 'Standard deviation of boxes without a covariance, lasting errors included.', 'm', live=(0, 1))
 
 
-def measurements_of(detections, view, elapsed_s, params, classes, detector):
-    """Convert the detections of one image to an array of MEASUREMENT; `elapsed_s` is the time since the previous image
-    of the same camera, 0 for the first; `params` are NoiseParams, `classes` ClassNumbers, `detector` a DetectorModel.
+class Kind(NamedTuple):
+    """What the tracker knows about a class: its group, the classes of the group, and `object_classes.ObjectClass`."""
+
+    label: str
+    group: object
+    members: Tuple[str, ...]
+    width_m: float
+    acceleration: float
+    initial_speed: float
+
+
+class Kinds(dict):
+    """Kind by class name. A class that the table `object_classes.ObjectClasses` does not list is a group of its own."""
+
+    def __init__(self, table):
+        groups = {}
+        for label in table.listed:
+            groups.setdefault(table.group_of(label), []).append(label)
+        super(Kinds, self).__init__({label: self._kind(label, table.of(label), table.group_of(label),
+                                                       groups[table.group_of(label)]) for label in table.listed})
+        self._default = table.default
+
+    def __missing__(self, label):
+        return self._kind(label, self._default, (label,), (label,))
+
+    @staticmethod
+    def _kind(label, known, group, members):
+        return Kind(label, group, tuple(members), known.width, known.acceleration, known.initial_speed)
+
+
+class Measurement(NamedTuple):
+    """A detection as the filter uses it.
+
+    Centre; covariance (xx, xy, yy) in the plane and variance of the height; whether the covariance is assumed; extents;
+    distance from the camera and unit vector from the camera in the plane; Kind; the Detection, and its number in the
+    image.
+    """
+
+    x: float
+    y: float
+    z: float
+    xx: float
+    xy: float
+    yy: float
+    zz: float
+    is_assumed: bool
+    size_m: Tuple[float, float, float]
+    distance_m: float
+    ray_x: float
+    ray_y: float
+    kind: Kind
+    detection: Detection
+    number: int
+
+
+class _Sighting(NamedTuple):
+    """Where a detection is: centre and extents, distance from the camera and unit vector from the camera in the plane,
+    bearing, half width as an angle, and distance along the optical axis.
+    """
+
+    position_m: Tuple[float, float, float]
+    size_m: Tuple[float, float, float]
+    distance_m: float
+    ray_x: float
+    ray_y: float
+    bearing: float
+    half_width: float
+    depth_m: float
+
+
+def correlated_images(elapsed_s, detector, acceleration):
+    """Number of images over which position errors are correlated.
+
+    A filter that treats them as independent underestimates its covariance. The lasting part is therefore multiplied by
+    this number, which makes the filter independent of the frame rate. Errors that last much longer than the memory M of
+    the filter shift the track and hardly change its velocity: with the correlation time T, white noise of the density
+    2 T / (1 + w² T²) has the same power at the frequency w = 1 / M. The memory of a steady filter with the density r of
+    the position noise and q of the acceleration is M = (r / q)^(1/4) (Kalata 1984: the tracking index).
+    """
+    time_s = detector.correlation_time_s
+    correlated_s = time_s / (1 + time_s ** 2 * math.sqrt(acceleration / NOISE_DENSITY))
+    return max(1.0, 2 * correlated_s / (elapsed_s or USUAL_PERIOD_S))
+
+
+def measurements_of(detections, view, images, assumed_m, kinds, lasting_m):
+    """Convert the detections of one image to a list of Measurement.
+
+    `images` is the result of `correlated_images`, `assumed_m` the standard deviation of boxes without a covariance, and
+    `lasting_m` that of lasting errors.
 
     If a nearer object partly occludes a detection, or the image border leaves only a part of its width, the centre is
     shifted to half the usual width of the class from the visible edge. The lateral position of such a box is less
     certain.
     """
-    measurements = np.zeros(len(detections), MEASUREMENT)
-    if not len(detections):
-        return measurements
-    (positions_m, sizes_m, covariances_m2, truncated_edges, measurements['support'], labels, measurements['score'],
-     measurements['detection']) = zip(*detections)
-    measurements['class_number'] = numbers = [classes.of(label) for label in labels]
-    positions_m, sizes_m, truncated_edges = np.array(positions_m), np.array(sizes_m), np.array(truncated_edges, bool)
-    unknown_m2 = np.eye(3) * params.noise_unknown ** 2
-    measurements['noise_assumed'] = [known is None for known in covariances_m2]
-    covariances_m2 = np.array([unknown_m2 if known is None else known for known in covariances_m2])
-
-    distances_m, bearings = view.bearings(positions_m)
-    is_near = distances_m < NEAR_M
-    distances_m = np.maximum(distances_m, NEAR_M)
-    rays = (positions_m[:, :2] - view.fixed_from_camera[:2, 3]) / distances_m[:, None]
-    rays[is_near] = view.ahead
-    left_of_rays = np.stack((-rays[:, 1], rays[:, 0]), axis=1)
-
-    hidden = _hidden_side(distances_m, bearings, np.arctan2(sizes_m[:, 0] / 2, distances_m))
-    cut_left, top, cut_right, bottom = truncated_edges.T
-    cut_sideways = cut_left | cut_right
-    cut_side = (cut_left.astype(int) - cut_right) * (sizes_m[:, 0] < PART_M)
-    missing_m = classes.width_m[numbers] + WIDER_M - sizes_m[:, 0]
-    shift_m = np.where(cut_sideways, cut_side, hidden) * np.clip(missing_m / 2, 0, MAX_SHIFT_M)
-
-    measurements['position_m'] = positions_m[:, :2] + shift_m[:, None] * left_of_rays
-    lateral_m2 = (cut_sideways | (hidden != 0)) * CUT_SIGMA_M ** 2
-    for axes, extra_m2 in ((rays, 0), (left_of_rays, lateral_m2)):
-        measurements['noise_m2'] += _noise_along(axes, covariances_m2[:, :2, :2], extra_m2, elapsed_s, detector)
-    measurements['distance_m'], measurements['ray'], measurements['size_m'] = distances_m, rays, sizes_m
-    measurements['z_m'], measurements['z_m2'] = positions_m[:, 2], covariances_m2[:, 2, 2]
-    measurements['cut_sideways'], measurements['cut_ends'] = cut_sideways, np.stack((bottom, top), axis=1)
-    return measurements
+    if not detections:
+        return []
+    camera_m, ahead = view.fixed_from_camera[:2, 3].tolist(), view.ahead.tolist()
+    sightings = [_sighting(detection, camera_m, ahead) for detection in detections]
+    unknown_m2 = ((assumed_m ** 2, 0.0, 0.0), (0.0, assumed_m ** 2, 0.0), (0.0, 0.0, assumed_m ** 2))
+    return [_measurement(detection, number, seen, side, kinds[detection.label], unknown_m2, images, lasting_m ** 2)
+            for number, (detection, seen, side) in enumerate(zip(detections, sightings, _hidden_sides(sightings)))]
 
 
-def _hidden_side(distances_m, bearings, half_widths):
-    """Side on which a nearer detection partly occludes each detection: 1 left, -1 right, 0 neither or both; (n,)."""
-    depths_m = distances_m * np.cos(bearings)
-    to_left = wrapped(bearings[None, :] - bearings[:, None])
-    gaps = np.abs(to_left) - half_widths[None, :] - half_widths[:, None]
-    hides = (depths_m[None, :] < depths_m[:, None] - NEARER_M) & (gaps < TOUCHING_RAD)
-    left, right = (hides & (to_left > 0)).any(axis=1), (hides & (to_left <= 0)).any(axis=1)
-    return left.astype(int) - right
+def _sighting(detection, camera_m, ahead):
+    position_m, size_m = floats(detection.position_m), floats(detection.size_m)
+    x, y = position_m[0] - camera_m[0], position_m[1] - camera_m[1]
+    bearing = math.atan2(ahead[0] * y - ahead[1] * x, x * ahead[0] + y * ahead[1])
+    distance_m = math.hypot(x, y)
+    if distance_m < NEAR_M:
+        distance_m, (ray_x, ray_y) = NEAR_M, ahead
+    else:
+        ray_x, ray_y = x / distance_m, y / distance_m
+    return _Sighting(position_m, size_m, distance_m, ray_x, ray_y, bearing, math.atan2(size_m[0] / 2, distance_m),
+                     distance_m * math.cos(bearing))
 
 
-def _noise_along(axes, covariances_m2, extra_m2, elapsed_s, detector):
-    """Covariances (n, 2, 2) along unit vectors (n, 2), from the single-image covariances.
+def _measurement(detection, number, seen, hidden, kind, unknown_m2, images, lasting_m2):
+    (x, y, z), size_m, distance_m, ray_x, ray_y = seen[:5]
+    is_assumed = detection.covariance_m2 is None
+    covariance_m2 = unknown_m2 if is_assumed else floats(detection.covariance_m2)
+    cut_left, _top, cut_right, _bottom = detection.truncated_edges
+    side = hidden
+    if cut_left or cut_right:
+        side = int(cut_left) - int(cut_right) if size_m[0] < PART_M else 0
+    shift_m = side * min(max((kind.width_m + WIDER_M - size_m[0]) / 2, 0.0), MAX_SHIFT_M)
+    along = _variance_along(covariance_m2, ray_x, ray_y, images, lasting_m2) + FLOOR_M ** 2
+    across = _variance_along(covariance_m2, -ray_y, ray_x, images, lasting_m2) + FLOOR_M ** 2
+    if hidden or cut_left or cut_right:
+        across += CUT_SIGMA_M ** 2
+    return Measurement(
+        x - shift_m * ray_y, y + shift_m * ray_x, z, along * ray_x * ray_x + across * ray_y * ray_y,
+        (along - across) * ray_x * ray_y, along * ray_y * ray_y + across * ray_x * ray_x, covariance_m2[2][2],
+        is_assumed, size_m, distance_m, ray_x, ray_y, kind, detection, number)
 
-    Position errors are correlated from image to image. A filter that treats them as independent underestimates its
-    covariance. The lasting part is therefore multiplied by the number of images over which it is correlated, which
-    makes the filter independent of the frame rate. Errors that last much longer than the memory of the filter shift the
-    track and hardly change its velocity: with the correlation time T, white noise of the density 2 T / (1 + w² T²) has
-    the same power at the frequency w = 1 / `FILTER_MEMORY_S`.
+
+def _variance_along(covariance_m2, x, y, images, lasting_m2):
+    """Variance along a unit vector, with the lasting part counted `images` times."""
+    (xx, xy, _xz), (yx, yy, _yz), _z = covariance_m2
+    variance_m2 = xx * x * x + (xy + yx) * x * y + yy * y * y
+    return variance_m2 + (images - 1) * min(variance_m2, lasting_m2)
+
+
+def _hidden_sides(sightings):
+    """Side on which a nearer detection partly occludes each one: 1 left, -1 right, 0 neither or both; a list of int.
+
+    The neighbours of each are searched in both directions of the bearing, until even the widest one would not touch.
     """
-    correlated_s = detector.correlation_time_s / (1 + (detector.correlation_time_s / FILTER_MEMORY_S) ** 2)
-    images = max(1.0, 2 * correlated_s / (elapsed_s or USUAL_PERIOD_S))
-    variance = ((covariances_m2 @ axes[..., None])[..., 0] * axes).sum(axis=1)
-    variance += (images - 1) * np.minimum(variance, detector.lasting_sigma_m ** 2) + FLOOR_M ** 2 + extra_m2
-    return variance[:, None, None] * axes[:, :, None] * axes[:, None, :]
+    count = len(sightings)
+    if count == 1:
+        return [0]
+    order = sorted(range(count), key=lambda number: sightings[number].bearing)
+    widest = max(seen.half_width for seen in sightings) + TOUCHING_RAD
+    sides = [0] * count
+    for place, number in enumerate(order):
+        own, left, right = sightings[number], False, False
+        for step in (1, -1):
+            for distance in range(1, count):
+                other = sightings[order[(place + step * distance) % count]]
+                to_left = other.bearing - own.bearing
+                to_left -= TURN * round(to_left / TURN)
+                gap = abs(to_left) - own.half_width
+                if gap >= widest:
+                    break
+                if gap - other.half_width < TOUCHING_RAD and other.depth_m < own.depth_m - NEARER_M:
+                    left, right = left or to_left > 0, right or to_left <= 0
+        sides[number] = int(left) - int(right)
+    return sides
+
+
+def scaled(measurements, log_scale):
+    """The measurements with the assumed noise scaled by exp(`log_scale`)."""
+    if not log_scale:
+        return measurements
+    scale = math.exp(log_scale)
+    return [measurement._replace(xx=scale * measurement.xx, xy=scale * measurement.xy, yy=scale * measurement.yy)
+            if measurement.is_assumed else measurement for measurement in measurements]
+
+
+def learned_log_scale(log_scale, matches):
+    """The logarithm of the scale of the assumed variance after an image.
+
+    In the matches (Track, Measurement), the tracks are predicted to the image, and the measurements have the noise for
+    the association, with a scale of 1 or more. Errors that last are not in the innovations. The learned noise is that
+    part of `noise_unknown` which changes from image to image; the rest is added to the published covariances
+    (`track.learned_prediction`).
+    """
+    scale, total = math.exp(min(log_scale, 0)), 0.0
+    for track, measurement in matches:
+        if measurement.is_assumed and track.hits >= SETTLED_HITS:
+            (before_x, before_y), state = track.innovation_m, track.state
+            product = before_x * (measurement.x - state.x) + before_y * (measurement.y - state.y)
+            expected = state.xx + state.yy + scale * (measurement.xx + measurement.yy)
+            total += min(max(product / expected, -LARGEST), LARGEST)
+    return min(max(log_scale - GAIN * total, MIN_LOG_SCALE), MAX_LOG_SCALE)

@@ -1,5 +1,6 @@
 """Input and output types of the trackers. Positions and sizes are in the fixed frame (z up), metres."""
-from typing import Callable, NamedTuple, Optional, Tuple
+import math
+from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -24,7 +25,7 @@ MOVING_SPEED = Param(
 
 
 class Detection(NamedTuple):
-    """One object in one image: centre (3,) and extent (3,), x = y = width, z = height.
+    """One object in one image: centre (3,) and extent (3,), x = y = width, z = height; sequences or arrays of float.
 
     `covariance_m2` (3, 3) is the covariance of the centre, None if unknown. `truncated_edges` states whether the image
     border truncates the object at the left, top, right and bottom, as seen by a camera held upright. `support` is the
@@ -32,9 +33,9 @@ class Detection(NamedTuple):
     detector, 0..1, 0 if unknown, and `index` the index of the object's box among those of the image.
     """
 
-    position_m: np.ndarray
-    size_m: np.ndarray
-    covariance_m2: Optional[np.ndarray] = None
+    position_m: Sequence[float]
+    size_m: Sequence[float]
+    covariance_m2: Optional[Sequence[Sequence[float]]] = None
     truncated_edges: Tuple[bool, bool, bool, bool] = (False, False, False, False)
     support: float = 1.0
     label: str = PERSON
@@ -56,32 +57,37 @@ def detections_from_boxes(boxes, fixed_from_camera, classes=ObjectClasses()):
         Pose of the camera's optical frame in the fixed frame.
     classes : object_classes.ObjectClasses
     """
-    if not boxes:
-        return []
-    rotation, turns = fixed_from_camera[:3, :3], upright_turns(fixed_from_camera)
-    centers_m, extents_m = ([box.center_m for box in boxes.values()], [box.size_m[:2] for box in boxes.values()])
-    if turns % 2:
-        centers_m, extents_m = zip(*[_completed_in_portrait(box, classes.of(box.label)) for box in boxes.values()])
-    positions_m, extents_m = transform_points(fixed_from_camera, centers_m), np.array(extents_m)
-    widths_m, heights_m = extents_m[:, ::-1].T if turns % 2 else extents_m.T
-    unknown_m2 = np.zeros((3, 3))
-    covariances_m2 = rotation.dot([unknown_m2 if box.covariance_m2 is None else box.covariance_m2
-                                   for box in boxes.values()]).transpose(1, 0, 2).dot(rotation.T)
-    sizes_m = np.stack((widths_m, widths_m, heights_m), axis=1)
-    return [Detection(position_m, size_m, None if box.covariance_m2 is None else covariance_m2,
-                      box.truncated_edges[-turns:] + box.truncated_edges[:-turns], box.support or 1.0,  # 0: unknown
-                      box.label, box.score, index)
-            for (index, box), position_m, size_m, covariance_m2 in zip(boxes.items(), positions_m, sizes_m,
-                                                                       covariances_m2)]
+    turns, rows = upright_turns(fixed_from_camera), fixed_from_camera[:3].tolist()
+    detections = []
+    for index, box in boxes.items():
+        (x, y, z), extents_m = floats(box.center_m), floats(box.size_m)
+        width_m, height_m = extents_m[:2]
+        if turns % 2:
+            (x, y, z), (height_m, width_m) = _completed_in_portrait(box, classes.of(box.label))
+        position_m = tuple([of_x * x + of_y * y + of_z * z + shift_m for of_x, of_y, of_z, shift_m in rows])
+        detections.append(Detection(
+            position_m, (width_m, width_m, height_m), _rotated(rows, box.covariance_m2),
+            box.truncated_edges[-turns:] + box.truncated_edges[:-turns], box.support or 1.0,  # 0: unknown
+            box.label, box.score, index))
+    return detections
+
+
+def _rotated(rows, covariance_m2):
+    """The covariance (3, 3) in the frame to which the rows of a transform lead; None if it is None."""
+    if covariance_m2 is None:
+        return None
+    columns = list(zip(*floats(covariance_m2)))
+    half = [[a * of_a + b * of_b + c * of_c for of_a, of_b, of_c in columns] for a, b, c, _shift_m in rows]
+    return [[a * of_a + b * of_b + c * of_c for a, b, c, _shift_m in rows] for of_a, of_b, of_c in half]
 
 
 def _completed_in_portrait(box, kind):
-    """Centre (3,) of a box and its extents along the rows and the columns of an image of a camera in portrait.
+    """Centre of a box and its extents along the rows and the columns of an image of a camera in portrait, lists.
 
     The estimator completes a truncated object as if it stood upright in the image: to the usual width along the rows
     and to the usual height along the columns. In portrait, the two are swapped. The visible end stays in place.
     """
-    center_m, extents_m, cut = np.array(box.center_m, float), np.array(box.size_m[:2], float), box.truncated_edges
+    center_m, extents_m, cut = list(floats(box.center_m)), list(floats(box.size_m))[:2], box.truncated_edges
     was_completed = np.isclose(extents_m[1], kind.height)
     completed_m = max(extents_m[0], kind.height), kind.width if was_completed else extents_m[1]
     for axis, (cut_low, cut_high) in enumerate(zip(cut[:2], cut[2:])):
@@ -90,6 +96,11 @@ def _completed_in_portrait(box, kind):
             center_m[axis] += missing_m / 2 if cut_high else -missing_m / 2
             extents_m[axis] = completed_m[axis]
     return center_m, extents_m
+
+
+def floats(values):
+    """Plain numbers of an array, which are several times as fast as its elements; other sequences as they are."""
+    return values.tolist() if isinstance(values, np.ndarray) else values
 
 
 class CameraView(NamedTuple):
@@ -109,10 +120,11 @@ class CameraView(NamedTuple):
     def ahead(self):
         """Unit vector (2,) of the horizontal direction of the optical axis; of the upper edge of the image for a camera
         that points straight up or down."""
-        ahead = self.fixed_from_camera[:2, 2]
-        if ahead.dot(ahead) < VERTICAL ** 2:
-            ahead = -self.fixed_from_camera[:2, 1]
-        return ahead / np.sqrt(ahead.dot(ahead))
+        (_right, up_x, x), (_right, up_y, y) = self.fixed_from_camera[:2, :3].tolist()
+        if x * x + y * y < VERTICAL ** 2:
+            x, y = -up_x, -up_y
+        length = math.sqrt(x * x + y * y)
+        return np.array((x / length, y / length))
 
     def bearings(self, positions_m):
         """Horizontal distances (n,) of positions (n, 2 or 3) from the camera, metres, and their bearings (n,), radians:
@@ -150,6 +162,49 @@ class TrackedObject(NamedTuple):
     label: str = PERSON
     score: float = 0.0
     detection: int = NOT_DETECTED
+
+
+class TrackerBase(object):
+    """Base class of the trackers of objects from image to image.
+
+    Call `update` with the detections of each image, `skip` for an image whose detections are unusable, and `reset`
+    after a jump in time. The IDs of tracks are greater than `last_id` of the constructor. Tracks never change between
+    the groups of its table of classes, an `object_classes.ObjectClasses`.
+    """
+
+    common_motions = 0  # number of images in which the pose of the camera jumped
+
+    def reconfigure(self, *params):
+        """Change the parameters and keep the tracks; the last ones have `prediction_time` and `prediction_step`. Raises
+        ValueError without any change if one is invalid.
+        """
+        check_steps(params[-1].prediction_time, params[-1].prediction_step)
+        self._params = params
+
+    def update(self, stamp_ns, detections, view):
+        """Update the tracks with the detections of one image.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Stamp of the image, nanoseconds.
+        detections : list of Detection
+        view : CameraView
+
+        Returns
+        -------
+        list of TrackedObject
+            Ordered by ID, at the stamp of the newest image.
+        """
+        raise NotImplementedError
+
+    def skip(self, stamp_ns, camera=''):
+        """Skip an image whose detections are unusable: tracks do not age. Never raises, as the stamp may be wrong."""
+        raise NotImplementedError
+
+    def reset(self):
+        """Delete all tracks, as after a jump in time. IDs are not reused."""
+        raise NotImplementedError
 
 
 def wrapped(angles):
