@@ -8,7 +8,7 @@ from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_fr
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.error_model import read_error_model
-from ros_3d_bb.tracking.occlusion import DEFAULT_RANGE_M, learned_range
+from ros_3d_bb.tracking.measurement_model import DEFAULT_RANGE_M, learned_range
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, CameraView, Detection
 from ros_3d_bb_lab.evaluation.noise import __main__ as command

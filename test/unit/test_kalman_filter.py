@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.tracking.association import position_cost
-from ros_3d_bb.tracking.kalman_filter import log_densities, outlier_model, predict, update
+from ros_3d_bb.tracking.association import position_cost, position_costs
+from ros_3d_bb.tracking.kalman_filter import outlier_model, predict, update
 from ros_3d_bb.tracking.tracker import TrackerParams
 from support.states import covariance_of, mean_of, state_of
 
@@ -89,15 +89,14 @@ def test_a_measurement_behind_the_person_is_an_outlier_and_one_beside_is_not():
 
 def test_the_cost_of_a_position_is_that_of_a_density():
     """p, summed over a fine grid of places, is a probability of 1."""
-    start, step_m = state(spread=0.2), 0.1
-    costs = [position_cost(start, measured_at(x, y), OUTLIERS) for x in np.arange(-3, 4, step_m).tolist()
-             for y in np.arange(-3, 3, step_m).tolist()]
-    assert np.exp(-np.array(costs)).sum() * step_m ** 2 == pytest.approx(1, abs=0.01)
+    step_m = 0.05
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(-3, 4, step_m), np.arange(-3, 3, step_m)))
+    costs = position_costs(x, y, 0.05, 0.0, 0.05, 1.0, 0.0, OUTLIERS)
+    assert np.exp(-costs).sum() * step_m ** 2 == pytest.approx(1, abs=0.01)
 
 
-def test_densities_of_arrays_are_those_of_numbers():
+def test_costs_of_arrays_are_those_of_numbers():
     x, y, xx, yy = np.random.RandomState(3).uniform(0.5, 1, (4, 7))
-    arrays = log_densities(x, y, xx, 0.3, yy, 0.6, 0.8, OUTLIERS, np.log)
-    each = [log_densities(*numbers, ray_x=0.6, ray_y=0.8, outliers=OUTLIERS)
+    each = [position_cost(*numbers, ray_x=0.6, ray_y=0.8, outliers=OUTLIERS)
             for numbers in zip(x.tolist(), y.tolist(), xx.tolist(), [0.3] * 7, yy.tolist())]
-    np.testing.assert_allclose(np.transpose(arrays), each)
+    np.testing.assert_allclose(position_costs(x, y, xx, 0.3, yy, 0.6, 0.8, OUTLIERS), each)

@@ -5,13 +5,13 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.kalman_filter import log_densities
+from ros_3d_bb.tracking.kalman_filter import as_outlier, weighted
 
 RECENT_NS = 7 * NS // 10  # tracks matched less than this ago are associated before the others; chosen
 UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection; chosen
 HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height; chosen: the camera tilts
 HIDDEN_FEET_COST = 4.0  # cost of a box whose top matches but whose height does not; chosen: its legs are occluded
-CROWD = 600  # pairs from which on arrays are faster than numbers; measured with `./run bench speed`
+CROWD = 200  # pairs from which on arrays are faster than numbers; measured with `./run bench speed`
 LOG_TWO_PI = math.log(2 * math.pi)
 
 
@@ -22,76 +22,95 @@ def associate(tracks, measurements, stamp_ns, params, outliers):
     have the same group of classes. `params` are `tracker.TrackerParams`, `outliers` their OutlierModel. Returns a list
     of (Track, Measurement).
     """
-    costs = allowed_costs(tracks, measurements, params, outliers)
-    ranks = {}
-    for row, column in costs:
-        track = tracks[row]
+    matches, ranks, taken = [], {}, set()
+    for pair, cost in allowed_costs(tracks, measurements, params, outliers).items():
+        track = tracks[pair[0]]
         rank = int(stamp_ns - track.last_ns >= RECENT_NS) if track.is_confirmed else 2
-        ranks.setdefault(rank, {})[row, column] = costs[row, column]
-    matches, taken = [], set()
+        ranks.setdefault(rank, {})[pair] = cost
     for rank in sorted(ranks):
-        pairs = _assigned({pair: cost for pair, cost in ranks[rank].items() if pair[1] not in taken})
-        matches += [(tracks[row], measurements[column]) for row, column in pairs]
-        taken.update(column for _row, column in pairs)
+        costs = {pair: cost for pair, cost in ranks[rank].items() if pair[1] not in taken} if taken else ranks[rank]
+        for row, column in costs if len(costs) == 1 else _assigned(costs):
+            matches.append((tracks[row], measurements[column]))
+            taken.add(column)
     return matches
 
 
 def allowed_costs(tracks, measurements, params, outliers):
-    """The costs {(number of the track, number of the measurement): cost} of the pairs within the gate: -log of the
-    density of the measurement given the track, per m², and the cost of their heights."""
-    limits = [_largest_cost(measurement, params.new_target_density) for measurement in measurements]
+    """The costs {(number of the track, number of the measurement): cost} of the allowed pairs: -log of the density of
+    the measurement given the track, per m², and the cost of their heights."""
+    gates = [_gate(measurement, params.new_target_density, outliers) for measurement in measurements]
     is_crowd = len(tracks) * len(measurements) >= CROWD
-    pairs = (_near_pairs_of_crowd if is_crowd else _near_pairs)(tracks, measurements, limits, outliers)
+    pairs = (_likely_pairs_of_crowd if is_crowd else _likely_pairs)(tracks, measurements, gates, outliers)
     costs = {}
     for row, column, cost in pairs:
         track, measurement = tracks[row], measurements[column]
-        if track.kind.group == measurement.kind.group:
-            cost += _height_cost(track, measurement, params.height_sigma)
-            if cost < limits[column]:
-                costs[row, column] = cost
+        cost += _height_cost(track, measurement, params.height_sigma)
+        if cost < gates[column][0] and track.kind.group == measurement.kind.group:
+            costs[row, column] = cost
     return costs
 
 
-def _largest_cost(measurement, new_target_density):
-    """-log of the density of new targets; at least that of a measurement whose own noise makes every density low.
+def _gate(measurement, new_target_density, outliers):
+    """The cost of a new target, and two lengths for a first look: a pair is above this cost from the distance
+    `factor` * sqrt(tr P) + `reach` on, where P is the covariance of the position of the track.
 
-    An uncertain detection fits a new target and a track about equally well; the track takes precedence.
+    The cost of a new target is -log of its density; at least that of a measurement whose own noise makes every density
+    low: an uncertain detection fits a new target and a track about equally well, and the track takes precedence. The
+    density of a Gaussian at the distance d of its mean is at most exp(-d² / (2 tr S)) / (2 pi sqrt(det R)), where R
+    is the noise and S = P + R the covariance of the innovation; the square root of tr S is at most the sum of those of
+    tr P and tr R. Outliers are nearer by their offset, and have a larger R.
     """
     determinant = measurement.xx * measurement.yy - measurement.xy * measurement.xy
-    return -math.log(min(new_target_density, UNSURE_SHARE / (2 * math.pi * math.sqrt(determinant))))
+    limit = -math.log(min(new_target_density, UNSURE_SHARE / (2 * math.pi * math.sqrt(determinant))))
+    factor = math.sqrt(max(2 * (limit - LOG_TWO_PI) - math.log(determinant), 0))
+    reach = factor * math.sqrt(measurement.xx + measurement.yy + outliers.spread_m2) + outliers.offset_m
+    return limit, factor, reach
 
 
-def position_cost(state, measurement, outliers):
-    """-log of the density of a measurement given a State, per m²."""
-    inlier, outlier = log_densities(
-        measurement.x - state.x, measurement.y - state.y, state.xx + measurement.xx, state.xy + measurement.xy,
-        state.yy + measurement.yy, measurement.ray_x, measurement.ray_y, outliers)
+def position_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers):
+    """-log of the density of an innovation (x, y) with the covariance (xx, xy, yy), per m²."""
+    inlier = weighted(x, y, xx, xy, yy, outliers.log_inliers)[0]
+    outlier = weighted(*as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers), log_share=outliers.log_outliers)[0]
     larger, smaller = (inlier, outlier) if inlier > outlier else (outlier, inlier)
     return LOG_TWO_PI - larger - math.log1p(math.exp(smaller - larger))
 
 
-def _near_pairs(tracks, measurements, limits, outliers):
-    """The pairs (row, column, position cost) below the limits."""
+def position_costs(x, y, xx, xy, yy, ray_x, ray_y, outliers):
+    """As `position_cost`, of arrays."""
+    outlier = as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers)
+    return LOG_TWO_PI - np.logaddexp(weighted(x, y, xx, xy, yy, outliers.log_inliers, np.log)[0],
+                                     weighted(*outlier, log_share=outliers.log_outliers, log=np.log)[0])
+
+
+def _likely_pairs(tracks, measurements, gates, outliers):
+    """The pairs (row, column, position cost) with costs below those of new targets."""
     pairs = []
     for row, track in enumerate(tracks):
-        for column, measurement in enumerate(measurements):
-            cost = position_cost(track.state, measurement, outliers)
-            if cost < limits[column]:
-                pairs.append((row, column, cost))
+        x, y, _u, _v, xx, xy, _xu, _xv, yy = track.state[:9]
+        spread = math.sqrt(xx + yy)
+        for column, (measurement, (limit, factor, reach)) in enumerate(zip(measurements, gates)):
+            far, to_x, to_y = factor * spread + reach, measurement.x - x, measurement.y - y
+            if -far < to_x < far and -far < to_y < far:
+                cost = position_cost(to_x, to_y, xx + measurement.xx, xy + measurement.xy, yy + measurement.yy,
+                                     measurement.ray_x, measurement.ray_y, outliers)
+                if cost < limit:
+                    pairs.append((row, column, cost))
     return pairs
 
 
-def _near_pairs_of_crowd(tracks, measurements, limits, outliers):
-    """As `_near_pairs`, by arrays."""
-    x, y, xx, xy, yy = np.array([(state.x, state.y, state.xx, state.xy, state.yy)
-                                 for state in [track.state for track in tracks]]).T[:, :, None]
-    to_x, to_y, noise_xx, noise_xy, noise_yy, ray_x, ray_y = np.array([
+def _likely_pairs_of_crowd(tracks, measurements, gates, outliers):
+    """As `_likely_pairs`, by arrays."""
+    x, y, xx, xy, yy = np.array([track.state for track in tracks]).T[[0, 1, 4, 5, 8]]
+    to_x, to_y, noise_xx, noise_xy, noise_yy, ray_x, ray_y, limits, factors, reaches = np.array([
         (measurement.x, measurement.y, measurement.xx, measurement.xy, measurement.yy, measurement.ray_x,
-         measurement.ray_y) for measurement in measurements]).T
-    costs = LOG_TWO_PI - np.logaddexp(*log_densities(to_x - x, to_y - y, xx + noise_xx, xy + noise_xy, yy + noise_yy,
-                                                     ray_x, ray_y, outliers, np.log))
-    rows, columns = (costs < limits).nonzero()
-    return zip(rows.tolist(), columns.tolist(), costs[rows, columns].tolist())
+         measurement.ray_y) + gate for measurement, gate in zip(measurements, gates)]).T
+    far = reaches + factors * np.sqrt(xx + yy)[:, None]
+    rows, columns = ((np.abs(to_x - x[:, None]) < far) & (np.abs(to_y - y[:, None]) < far)).nonzero()
+    costs = position_costs(to_x[columns] - x[rows], to_y[columns] - y[rows], xx[rows] + noise_xx[columns],
+                           xy[rows] + noise_xy[columns], yy[rows] + noise_yy[columns], ray_x[columns], ray_y[columns],
+                           outliers)
+    is_likely = costs < limits[columns]
+    return zip(rows[is_likely].tolist(), columns[is_likely].tolist(), costs[is_likely].tolist())
 
 
 def _height_cost(track, measurement, sigma_m):

@@ -1,4 +1,5 @@
 """Birth of tracks: detections that start one, and tracks that turn out to be of the object of an older one."""
+import itertools
 import math
 
 from ros_3d_bb.core.time_sync import NS
@@ -41,8 +42,15 @@ def duplicates(tracks, stamp_ns):
     if all(stamp_ns - track.first_ns >= NEW_NS for track in recent):
         return set()
     recent.sort(key=lambda track: track.first_ns)
-    return set(track.id for place, track in enumerate(recent) if stamp_ns - track.first_ns < NEW_NS
-               and any(_are_same(track, older) for older in recent[:place]))
+    found, by_x = set(), sorted(enumerate(recent), key=lambda entry: entry[1].state.x)
+    for number, (age, track) in enumerate(by_x):
+        for other_age, other in itertools.islice(by_x, number + 1, None):
+            if other.state.x - track.state.x >= SAME_PERSON_M:
+                break
+            younger = recent[max(age, other_age)]
+            if stamp_ns - younger.first_ns < NEW_NS and _are_same(track, other):
+                found.add(younger.id)
+    return found
 
 
 def _are_same(track, other):

@@ -65,59 +65,46 @@ def predict(state, elapsed_s, density):
                  uu + velocity, uv, vv + velocity)
 
 
-def log_densities(x, y, xx, xy, yy, ray_x, ray_y, outliers, log=math.log):
-    """Logarithms of the densities of an innovation (x, y) with the covariance (xx, xy, yy), plus log 2 pi, as an inlier
-    and as an outlier, each with its share. `ray_x`, `ray_y` is the viewing direction.
-
-    With `log` = numpy.log, the numbers may be arrays that broadcast.
+def weighted(x, y, xx, xy, yy, log_share, log=math.log):
+    """Logarithm of the density of an innovation z = (x, y) with the covariance S = (xx, xy, yy), times its share and
+    2 pi; S^-1 z; and the determinant of S. With `log` = numpy.log, the numbers may be arrays that broadcast.
     """
     determinant = xx * yy - xy * xy
-    distance2 = (yy * x * x - 2 * xy * x * y + xx * y * y) / determinant
-    inlier = outliers.log_inliers - (distance2 + log(determinant)) / 2
-    x, y = x - outliers.offset_m * ray_x, y - outliers.offset_m * ray_y
-    xx, yy = xx + outliers.spread_m2 * ray_x * ray_x, yy + outliers.spread_m2 * ray_y * ray_y
-    xy = xy + outliers.spread_m2 * ray_x * ray_y
-    determinant = xx * yy - xy * xy
-    distance2 = (yy * x * x - 2 * xy * x * y + xx * y * y) / determinant
-    return inlier, outliers.log_outliers - (distance2 + log(determinant)) / 2
+    a_x, a_y = (yy * x - xy * y) / determinant, (xx * y - xy * x) / determinant
+    return log_share - (x * a_x + y * a_y + log(determinant)) / 2, a_x, a_y, determinant
+
+
+def as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers):
+    """Innovation and its covariance (x, y, xx, xy, yy) of an outlier, given those of an inlier and the viewing
+    direction; the numbers may be arrays."""
+    offset_m, spread_m2 = outliers.offset_m, outliers.spread_m2
+    return (x - offset_m * ray_x, y - offset_m * ray_y, xx + spread_m2 * ray_x * ray_x, xy + spread_m2 * ray_x * ray_y,
+            yy + spread_m2 * ray_y * ray_y)
 
 
 def update(state, measurement, outliers):
-    """The State after a Measurement; the mixture of both components is reduced to one Gaussian."""
-    x, y = measurement.x - state.x, measurement.y - state.y
-    xx, xy, yy = state.xx + measurement.xx, state.xy + measurement.xy, state.yy + measurement.yy
-    ray_x, ray_y, spread_m2 = measurement.ray_x, measurement.ray_y, outliers.spread_m2
-    inlier, outlier = log_densities(x, y, xx, xy, yy, ray_x, ray_y, outliers)
-    share = 1 / (1 + math.exp(min(inlier - outlier, LARGEST_EXPONENT)))  # of the outlier
-    gain_x, gain_y = _gain(state, xx, xy, yy)
-    shift = [of_x * x + of_y * y for of_x, of_y in zip(gain_x, gain_y)]
-    outlier_x, outlier_y = _gain(state, xx + spread_m2 * ray_x * ray_x, xy + spread_m2 * ray_x * ray_y,
-                                 yy + spread_m2 * ray_y * ray_y)
-    x, y = x - outliers.offset_m * ray_x, y - outliers.offset_m * ray_y
-    apart = [of_x * x + of_y * y - own for of_x, of_y, own in zip(outlier_x, outlier_y, shift)]
-    return _mixed(state, share, [own + share * (other - own) for own, other in zip(gain_x, outlier_x)],
-                  [own + share * (other - own) for own, other in zip(gain_y, outlier_y)], shift, apart)
+    """The State after a Measurement; the mixture of both components is reduced to one Gaussian.
 
-
-def _gain(state, xx, xy, yy):
-    """The two columns (4,) of the Kalman gain, for an innovation covariance."""
-    determinant = xx * yy - xy * xy
-    xx, xy, yy = yy / determinant, -xy / determinant, xx / determinant  # the inverse
-    by_x, by_y = (state.xx, state.xy, state.xu, state.xv), (state.xy, state.yy, state.yu, state.yv)
-    return ([xx * of_x + xy * of_y for of_x, of_y in zip(by_x, by_y)],
-            [xy * of_x + yy * of_y for of_x, of_y in zip(by_x, by_y)])
-
-
-def _mixed(state, share, gain_x, gain_y, shift, apart):
-    """The State of the mixture, given the mean gain, the shift by the inlier, and how far apart the means (4,) are."""
+    With the columns C = P H^T of the covariance, component i has the gain C S_i^-1, moves the mean by C a_i, where
+    a_i = S_i^-1 z_i, and the covariance to P - C S_i^-1 C^T. The mixture with the share b of outliers and e = a_1 - a_0
+    moves the mean by C (a_0 + b e), and the covariance to P - C N C^T, where
+    N = (1 - b) S_0^-1 + b S_1^-1 - b (1 - b) e e^T.
+    """
     x, y, u, v, xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = state
-    (x_x, u_x, v_x), (x_y, y_y, u_y, v_y) = (gain_x[0], gain_x[2], gain_x[3]), gain_y
-    y_x, spread, (dx, dy, du, dv) = gain_x[1], share * (1 - share), apart
-    return State(x + shift[0] + share * dx, y + shift[1] + share * dy, u + shift[2] + share * du,
-                 v + shift[3] + share * dv,
-                 xx - x_x * xx - x_y * xy + spread * dx * dx, xy - x_x * xy - x_y * yy + spread * dx * dy,
-                 xu - x_x * xu - x_y * yu + spread * dx * du, xv - x_x * xv - x_y * yv + spread * dx * dv,
-                 yy - y_x * xy - y_y * yy + spread * dy * dy,
-                 yu - y_x * xu - y_y * yu + spread * dy * du, yv - y_x * xv - y_y * yv + spread * dy * dv,
-                 uu - u_x * xu - u_y * yu + spread * du * du, uv - u_x * xv - u_y * yv + spread * du * dv,
-                 vv - v_x * xv - v_y * yv + spread * dv * dv)
+    inlier = measurement.x - x, measurement.y - y, xx + measurement.xx, xy + measurement.xy, yy + measurement.yy
+    outlier = as_outlier(*inlier, ray_x=measurement.ray_x, ray_y=measurement.ray_y, outliers=outliers)
+    log_inlier, a_x, a_y, determinant = weighted(*inlier, log_share=outliers.log_inliers)
+    log_outlier, to_x, to_y, other_determinant = weighted(*outlier, log_share=outliers.log_outliers)
+    share = 1 / (1 + math.exp(min(log_inlier - log_outlier, LARGEST_EXPONENT)))
+    e_x, e_y, both = to_x - a_x, to_y - a_y, share * (1 - share)
+    a_x, a_y = a_x + share * e_x, a_y + share * e_y
+    weight, other_weight = (1 - share) / determinant, share / other_determinant
+    n_xx = weight * inlier[4] + other_weight * outlier[4] - both * e_x * e_x
+    n_xy = -weight * inlier[3] - other_weight * outlier[3] - both * e_x * e_y
+    n_yy = weight * inlier[2] + other_weight * outlier[2] - both * e_y * e_y
+    x_x, x_y, y_x, y_y = n_xx * xx + n_xy * xy, n_xy * xx + n_yy * xy, n_xx * xy + n_xy * yy, n_xy * xy + n_yy * yy
+    u_x, u_y, v_x, v_y = n_xx * xu + n_xy * yu, n_xy * xu + n_yy * yu, n_xx * xv + n_xy * yv, n_xy * xv + n_yy * yv
+    return State(x + xx * a_x + xy * a_y, y + xy * a_x + yy * a_y, u + xu * a_x + yu * a_y, v + xv * a_x + yv * a_y,
+                 xx - x_x * xx - x_y * xy, xy - x_x * xy - x_y * yy, xu - x_x * xu - x_y * yu, xv - x_x * xv - x_y * yv,
+                 yy - y_x * xy - y_y * yy, yu - y_x * xu - y_y * yu, yv - y_x * xv - y_y * yv,
+                 uu - u_x * xu - u_y * yu, uv - u_x * xv - u_y * yv, vv - v_x * xv - v_y * yv)

@@ -9,8 +9,10 @@ accordingly. Unlike the size of innovations, their correlation hardly depends on
 import math
 from typing import NamedTuple, Tuple
 
+import numpy as np
+
 from ros_3d_bb.core.params import Param, parameters
-from ros_3d_bb.tracking.types import NEARER_M, Detection, floats
+from ros_3d_bb.tracking.types import NEARER_M, Detection, wrapped
 
 FLOOR_M = 0.02  # lower bound of the standard deviation of a centre; chosen: people sway as they walk
 WIDER_M = 0.04  # chosen: people are wider than the usual width, to which the estimator completes truncated boxes
@@ -23,12 +25,13 @@ MAX_SHIFT_M = 0.2  # chosen: less than half of the usual width
 CUT_SIGMA_M = 0.08  # additional lateral standard deviation of truncated or partly occluded boxes; chosen
 NEAR_M = 0.01  # the viewing ray of a closer box is undefined; the optical axis is used instead
 TOUCHING_RAD = 0.03  # a nearer box occludes another one if the gap between them is smaller than this; chosen
+DEFAULT_RANGE_M = 8.0  # of a D435 and YOLOv5n; chosen
+RANGE_GAIN = 0.05  # of the filter that learns the range; chosen
 # Scale of the assumed noise. Chosen; `walk` in test_noise_scale.py has the effect.
 GAIN = 0.2  # change of the logarithm of the variance by a pair of innovations, relative to their correlation
 LARGEST = 3.0  # correlations are limited to this multiple of the expected squared innovation
 SETTLED_HITS = 3  # innovations of newer tracks show their unknown velocity
 MIN_LOG_SCALE, MAX_LOG_SCALE = 2 * math.log(0.05), 2 * math.log(2)  # a twentieth to twice the standard deviation
-TURN = 2 * math.pi
 BOX_ERRORS = 'kalman: errors of boxes (their covariance comes from the error model of bbox3d_node)'
 
 
@@ -144,7 +147,7 @@ def measurements_of(detections, view, images, assumed_m, kinds, lasting_m):
 
 
 def _sighting(detection, camera_m, ahead):
-    position_m, size_m = floats(detection.position_m), floats(detection.size_m)
+    position_m, size_m = tuple(map(float, detection.position_m)), tuple(map(float, detection.size_m))
     x, y = position_m[0] - camera_m[0], position_m[1] - camera_m[1]
     bearing = math.atan2(ahead[0] * y - ahead[1] * x, x * ahead[0] + y * ahead[1])
     distance_m = math.hypot(x, y)
@@ -159,63 +162,47 @@ def _sighting(detection, camera_m, ahead):
 def _measurement(detection, number, seen, hidden, kind, unknown_m2, images, lasting_m2):
     (x, y, z), size_m, distance_m, ray_x, ray_y = seen[:5]
     is_assumed = detection.covariance_m2 is None
-    covariance_m2 = unknown_m2 if is_assumed else floats(detection.covariance_m2)
+    (xx, xy, _xz), (yx, yy, _yz), (_zx, _zy, zz) = unknown_m2 if is_assumed else detection.covariance_m2
+    in_plane_m2 = float(xx), float(xy + yx) / 2, float(yy)
     cut_left, _top, cut_right, _bottom = detection.truncated_edges
     side = hidden
     if cut_left or cut_right:
         side = int(cut_left) - int(cut_right) if size_m[0] < PART_M else 0
     shift_m = side * min(max((kind.width_m + WIDER_M - size_m[0]) / 2, 0.0), MAX_SHIFT_M)
-    along = _variance_along(covariance_m2, ray_x, ray_y, images, lasting_m2) + FLOOR_M ** 2
-    across = _variance_along(covariance_m2, -ray_y, ray_x, images, lasting_m2) + FLOOR_M ** 2
+    along = _variance_along(in_plane_m2, ray_x, ray_y, images, lasting_m2) + FLOOR_M ** 2
+    across = _variance_along(in_plane_m2, -ray_y, ray_x, images, lasting_m2) + FLOOR_M ** 2
     if hidden or cut_left or cut_right:
         across += CUT_SIGMA_M ** 2
     return Measurement(
         x - shift_m * ray_y, y + shift_m * ray_x, z, along * ray_x * ray_x + across * ray_y * ray_y,
-        (along - across) * ray_x * ray_y, along * ray_y * ray_y + across * ray_x * ray_x, covariance_m2[2][2],
+        (along - across) * ray_x * ray_y, along * ray_y * ray_y + across * ray_x * ray_x, float(zz),
         is_assumed, size_m, distance_m, ray_x, ray_y, kind, detection, number)
 
 
 def _variance_along(covariance_m2, x, y, images, lasting_m2):
-    """Variance along a unit vector, with the lasting part counted `images` times."""
-    (xx, xy, _xz), (yx, yy, _yz), _z = covariance_m2
-    variance_m2 = xx * x * x + (xy + yx) * x * y + yy * y * y
+    """Variance along a unit vector, given the covariance (xx, xy, yy), with the lasting part counted `images` times."""
+    xx, xy, yy = covariance_m2
+    variance_m2 = xx * x * x + 2 * xy * x * y + yy * y * y
     return variance_m2 + (images - 1) * min(variance_m2, lasting_m2)
 
 
 def _hidden_sides(sightings):
-    """Side on which a nearer detection partly occludes each one: 1 left, -1 right, 0 neither or both; a list of int.
-
-    The neighbours of each are searched in both directions of the bearing, until even the widest one would not touch.
-    """
-    count = len(sightings)
-    if count == 1:
+    """Side on which a nearer detection partly occludes each one: 1 left, -1 right, 0 neither or both; a list of int."""
+    if len(sightings) == 1:
         return [0]
-    order = sorted(range(count), key=lambda number: sightings[number].bearing)
-    widest = max(seen.half_width for seen in sightings) + TOUCHING_RAD
-    sides = [0] * count
-    for place, number in enumerate(order):
-        own, left, right = sightings[number], False, False
-        for step in (1, -1):
-            for distance in range(1, count):
-                other = sightings[order[(place + step * distance) % count]]
-                to_left = other.bearing - own.bearing
-                to_left -= TURN * round(to_left / TURN)
-                gap = abs(to_left) - own.half_width
-                if gap >= widest:
-                    break
-                if gap - other.half_width < TOUCHING_RAD and other.depth_m < own.depth_m - NEARER_M:
-                    left, right = left or to_left > 0, right or to_left <= 0
-        sides[number] = int(left) - int(right)
-    return sides
+    bearings, half_widths, depths_m = np.array([seen[-3:] for seen in sightings]).T
+    to_left = wrapped(bearings - bearings[:, None])
+    gaps = np.abs(to_left) - half_widths - half_widths[:, None]
+    hides = (depths_m < depths_m[:, None] - NEARER_M) & (gaps < TOUCHING_RAD)
+    left, right = (hides & (to_left > 0)).any(axis=1), (hides & (to_left <= 0)).any(axis=1)
+    return (left.astype(int) - right).tolist()
 
 
-def scaled(measurements, log_scale):
-    """The measurements with the assumed noise scaled by exp(`log_scale`)."""
-    if not log_scale:
-        return measurements
-    scale = math.exp(log_scale)
-    return [measurement._replace(xx=scale * measurement.xx, xy=scale * measurement.xy, yy=scale * measurement.yy)
-            if measurement.is_assumed else measurement for measurement in measurements]
+def scaled(measurement, scale):
+    """The measurement with the variances of assumed noise multiplied by `scale`."""
+    if not measurement.is_assumed or scale == 1:
+        return measurement
+    return measurement._replace(xx=scale * measurement.xx, xy=scale * measurement.xy, yy=scale * measurement.yy)
 
 
 def learned_log_scale(log_scale, matches):
@@ -234,3 +221,15 @@ def learned_log_scale(log_scale, matches):
             expected = state.xx + state.yy + scale * (measurement.xx + measurement.yy)
             total += min(max(product / expected, -LARGEST), LARGEST)
     return min(max(log_scale - GAIN * total, MIN_LOG_SCALE), MAX_LOG_SCALE)
+
+
+def learned_range(range_m, matches):
+    """Range of the detector after an image with matches (Track, Measurement): `DEFAULT_RANGE_M`, or the filtered mean
+    distance of the confirmed tracks that are detected farther away. Beyond it, detectors miss people often."""
+    far_m = []
+    for track, measurement in matches:
+        if measurement.distance_m > DEFAULT_RANGE_M and track.is_confirmed:
+            far_m.append(measurement.distance_m)
+    if not far_m:
+        return range_m
+    return range_m + (1 - (1 - RANGE_GAIN) ** len(far_m)) * (sum(far_m) / len(far_m) - range_m)

@@ -27,8 +27,6 @@ STATUS = {VISIBLE: OCCLUDED, OCCLUDED: OCCLUDED, OUT_OF_VIEW: OUT_OF_VIEW, SEEN:
 RECENT_NS = NS  # a camera whose latest image is older is ignored
 BEHIND_M = 0.45  # upper bound of the position's standard deviation of a person who stays behind an occluder
 OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
-DEFAULT_RANGE_M = 8.0  # of a D435 and YOLOv5n
-RANGE_GAIN = 0.05  # of the filter that learns the range
 
 
 class CameraState(NamedTuple):
@@ -47,15 +45,6 @@ def recent_others(cameras, camera, stamp_ns):
             if name != camera and stamp_ns - other.stamp_ns <= RECENT_NS}
 
 
-def learned_range(range_m, distances_m):
-    """Range after an image with confirmed tracks detected at `distances_m`: `DEFAULT_RANGE_M`, or the filtered mean
-    distance of those farther away. Beyond it, detectors miss people often."""
-    far_m = [distance_m for distance_m in distances_m if distance_m > DEFAULT_RANGE_M]
-    if not far_m:
-        return range_m
-    return range_m + (1 - (1 - RANGE_GAIN) ** len(far_m)) * (sum(far_m) / len(far_m) - range_m)
-
-
 def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_probability):
     """Update undetected tracks in place: status, visibility, and the times for which they are unseen and missed.
 
@@ -66,8 +55,6 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
     the tracks after the previous image. `cameras` maps each camera to its CameraState; `camera` is that of the image,
     which accounts for `observed_s` seconds. `detection_probability` is that of a visible person.
     """
-    if not missed:
-        return
     before = {track.id: track for track in before}
     occluding_m = _positions_of([track for track in tracks if track.is_confirmed and track.missed_s < OCCLUDING_S])
     image, others = cameras[camera], recent_others(cameras, camera, cameras[camera].stamp_ns)

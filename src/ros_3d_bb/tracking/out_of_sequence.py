@@ -60,10 +60,12 @@ class OutOfSequenceBuffer(object):
     def insert(self, image):
         """Process an image, or let it wait. Raises ValueError without any change if it is too late or a duplicate."""
         self._check(image.stamp_ns, image.view.camera)
-        is_late = bool(self._history) and image.order < self._history[-1][1].order
+        is_late = bool(self._history) and image.stamp_ns <= self.state.now_ns and (
+            image.order < self._history[-1][1].order)
         if is_late:
             self._add_late(image.order, image)
-        self._replay_if_due(image.stamp_ns)
+        if self._late:
+            self._replay_if_due(image.stamp_ns)
         if not is_late:
             self._process([image])
 
@@ -91,8 +93,6 @@ class OutOfSequenceBuffer(object):
 
     def _replay_if_due(self, stamp_ns):
         """Replay if this is efficient, or if the late images have waited too long at the stamp of the next image."""
-        if not self._late:
-            return
         first = min(order for order, _image in self._late)
         replayed = len(self._late) + sum(image.order > first for _state, image in self._history)
         has_waited = stamp_ns - self._late_since_ns >= MAX_WAIT_NS
@@ -126,15 +126,18 @@ class OutOfSequenceBuffer(object):
         """Process images; `known_id` is the last ID assigned before a rewind, None without a rewind."""
         for image in images:
             self._history.append((self.state, image))
-            self.state, matches = self._step(self.state, image, self._observed_s(*image.order),
-                                             functools.partial(self._assign_id, image.order))
+            order = image.order
+            self.state, matches = self._step(self.state, image, self._observed_s(*order),
+                                             functools.partial(self._assign_id, order))
             if known_id is not None:
-                self._restore_ids(image.order, matches, known_id)
+                self._restore_ids(order, matches, known_id)
         self._forget()
 
     def _observed_s(self, stamp_ns, camera):
         """Time since the previous image, or since a later skipped image of the same camera, seconds."""
         before_ns = stamp_ns if self.state.now_ns is None else self.state.now_ns
+        if not self._skipped:
+            return (stamp_ns - before_ns) / NS
         skipped_ns = [skipped_ns for skipped_ns, other in self._skipped if other == camera and skipped_ns < stamp_ns]
         return (stamp_ns - max(skipped_ns + [before_ns])) / NS
 

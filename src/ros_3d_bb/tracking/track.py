@@ -6,6 +6,7 @@ Tracking Systems, 1999, 6.2). Those of successive images are not independent: de
 therefore counts in proportion to the time since the previous one, and fully after a correlation time: at high image
 rates, the score depends on the time and not on the number of images.
 """
+import functools
 import math
 from typing import NamedTuple
 
@@ -35,6 +36,15 @@ STILL_MOVING = 0.5  # hysteresis: a moving track stops below this share of `movi
 NEVER_NS = -10 ** 18
 SEEN = -1  # visibility of a detected track; ranks before those of undetected ones, VISIBLE, OCCLUDED, OUT_OF_VIEW
 LEAST_SPEED2 = 1e-12  # avoids a division by zero
+# Places among the numbers of a published track, see `_numbers_of`: of x, y, z, their velocities, the velocity of the
+# prediction, and the extents; of the covariance of the first six, and of the two terms of the covariances of x, y, z
+# that are multiplied by the powers 0, 1, 2 of the time of a prediction.
+POSITION, VELOCITY, EXPECTED, SIZE, POSITION_VARIANCES = [0, 1, 14], [2, 3, 16], [17, 18, 16], slice(19, 22), [4, 8]
+COVARIANCE = np.array([[4, 5, 16, 6, 7, 16], [5, 8, 16, 9, 10, 16], [16, 16, 15, 16, 16, 16],
+                       [6, 9, 16, 11, 12, 16], [7, 10, 16, 12, 13, 16], [16] * 6])
+_CROSS, _NOTHING = COVARIANCE[:3, 3:], np.full((3, 3), 16)
+AHEAD = np.reshape((COVARIANCE[:3, :3], _CROSS, COVARIANCE[3:, 3:], _NOTHING, _CROSS.T, _NOTHING), (2, 3, 9))
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])  # a covariance (3, 3) of 1 along x and y
 
 
 @parameters('kalman: how certain predictions are')
@@ -254,27 +264,31 @@ def published(tracks, params):
     """
     if not tracks:
         return []
-    bias_m2, standing2 = params.position_bias ** 2, params.standing_speed ** 2 + LEAST_SPEED2
-    vectors, planar, covariances = [], [], []
-    for track in tracks:
-        x, y, u, v, xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = track.state
-        xx, yy, zz, speed2 = xx + bias_m2, yy + bias_m2, track.z_m2, u * u + v * v
-        share = speed2 / (speed2 + standing2)
-        vectors.append(((x, y, track.z_m), (u, v, 0.0), (share * u, share * v, 0.0), track.size_m))
-        planar.append(((xx, xy, yy), (2 * xu, xv + yu, 2 * yv), (uu, uv, vv)))  # times 1, t, t²
-        covariances.append(((xx, xy, 0.0, xu, xv, 0.0), (xy, yy, 0.0, yu, yv, 0.0), (0.0, 0.0, zz, 0.0, 0.0, 0.0),
-                            (xu, yu, 0.0, uu, uv, 0.0), (xv, yv, 0.0, uv, vv, 0.0), (0.0,) * 6))
-    vectors, covariances = np.array(vectors), np.array(covariances)
-    times_s = prediction_times_s(params.prediction_time, params.prediction_step)
-    predictions_m = vectors[:, :1] + times_s[:, None] * vectors[:, 2:3]
-    ahead_m2 = np.stack((np.ones(len(times_s)), times_s, times_s ** 2), axis=1) @ np.array(planar)
-    turned_m2 = params.prediction_acceleration * times_s ** 3 / 3
-    predictions_m2 = np.zeros((len(tracks), len(times_s), 3, 3))
-    predictions_m2[..., 0, 0], predictions_m2[..., 1, 1] = ahead_m2[..., 0] + turned_m2, ahead_m2[..., 2] + turned_m2
-    predictions_m2[..., 0, 1] = predictions_m2[..., 1, 0] = ahead_m2[..., 1]
-    predictions_m2[..., 2, 2] = covariances[:, 2, 2, None]
+    numbers = np.array([_numbers_of(track, params.standing_speed ** 2 + LEAST_SPEED2) for track in tracks])
+    numbers[:, POSITION_VARIANCES] += params.position_bias ** 2
+    times_s, powers, turned_m2 = _times(params)
+    positions_m, velocities_mps, sizes_m = numbers[:, POSITION], numbers[:, VELOCITY], numbers[:, SIZE]
+    predictions_m = positions_m[:, None] + times_s[:, None] * numbers[:, None, EXPECTED]
+    predictions_m2 = powers @ (numbers[:, AHEAD[0]] + numbers[:, AHEAD[1]]) + turned_m2
     return [TrackedObject(track.id, position_m, size_m, velocity_mps, velocity_mps, track.status, track.is_moving,
                           track.first_ns, track.last_ns, prediction_m, params.prediction_step, covariance,
                           prediction_m2, track.kind.label, track.score, track.detection)
-            for track, (position_m, velocity_mps, _expected, size_m), prediction_m, covariance, prediction_m2
-            in zip(tracks, vectors, predictions_m, covariances, predictions_m2)]
+            for track, position_m, size_m, velocity_mps, prediction_m, covariance, prediction_m2
+            in zip(tracks, positions_m, sizes_m, velocities_mps, predictions_m, numbers[:, COVARIANCE],
+                   predictions_m2.reshape(len(tracks), -1, 3, 3))]
+
+
+def _numbers_of(track, standing2):
+    """The numbers of a track that are published, in the order of `POSITION` and the others below it."""
+    speed2 = track.state.u ** 2 + track.state.v ** 2
+    share = speed2 / (speed2 + standing2)
+    return track.state + (track.z_m, track.z_m2, 0.0, share * track.state.u, share * track.state.v) + track.size_m
+
+
+@functools.lru_cache(maxsize=16)
+def _times(params):
+    """Times of the predictions (steps,), their powers 0 to 2 (steps, 3), and the variances (steps, 9) that turns add.
+    """
+    times_s = prediction_times_s(params.prediction_time, params.prediction_step)
+    turned_m2 = params.prediction_acceleration * times_s ** 3 / 3
+    return times_s, np.stack((times_s ** 0, times_s, times_s ** 2), axis=1), turned_m2[:, None] * LEVEL

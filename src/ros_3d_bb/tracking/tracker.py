@@ -7,25 +7,29 @@ the camera jumped, and all tracks are moved (`common_motion`). Undetected people
 tracks stay published for a short time if a camera should detect them, and for longer if a person or an object occludes
 them (`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep their track ID.
 """
-from typing import NamedTuple, Optional
+import math
+import operator
+from typing import NamedTuple, Optional, Sequence
 
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import associate
-from ros_3d_bb.tracking.birth import duplicates, initiate
-from ros_3d_bb.tracking.common_motion import SETTLED_NS, common_motion, may_jump, most_fit, moved
-from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, Kinds, NoiseParams, correlated_images, learned_log_scale,
-                                                  measurements_of, scaled)
-from ros_3d_bb.tracking.occlusion import DEFAULT_RANGE_M, CameraState, learned_range, mark_missed, recent_others
+from ros_3d_bb.tracking.birth import NEW_NS, duplicates, initiate
+from ros_3d_bb.tracking.common_motion import FEWEST, SETTLED_NS, common_motion, may_jump, most_fit, moved
+from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, Kinds, NoiseParams, correlated_images,
+                                                  learned_log_scale, learned_range, measurements_of, scaled)
+from ros_3d_bb.tracking.occlusion import CameraState, mark_missed, recent_others
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
-from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, SEEN, PredictionParams, learned_prediction, published, rules_of)
+from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, SEEN, PredictionParams, Track, learned_prediction, published,
+                                      rules_of)
 from ros_3d_bb.tracking.types import MOVING_SPEED, VISIBLE, TrackerBase
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped; chosen
 TENTATIVE_TIMEOUT_S = 0.6  # how long a tentative track is kept without a detection; chosen
+BY_ID, FIRST_SEEN = operator.attrgetter('id'), operator.attrgetter('first_ns')
 # Sections of the parameters.
 MOTION, ASSOCIATION = 'kalman: how people move', 'kalman: association of boxes with tracks'
 
@@ -76,23 +80,12 @@ class _State(NamedTuple):
     without), and the learned `measurement_model.learned_log_scale`.
     """
 
-    tracks: tuple
+    tracks: Sequence[Track]
     now_ns: Optional[int]
     cameras: dict
     common_motions: int
     misfit_ns: Optional[int]
     log_noise_scale: float
-
-
-class _Association(NamedTuple):
-    """The tracks, moved if the pose of the camera jumped; the matches [(Track, Measurement)]; whether most people fit
-    without a motion (None if unknown), and whether there was one.
-    """
-
-    tracks: list
-    matches: list
-    fits: Optional[bool]
-    is_moved: bool
 
 
 class Tracker(TrackerBase):
@@ -114,7 +107,7 @@ class Tracker(TrackerBase):
         self._start(last_id)
 
     def _start(self, last_id, log_noise_scale=0.0):
-        self._buffer = OutOfSequenceBuffer(self._step, _State((), None, {}, 0, None, log_noise_scale), last_id)
+        self._buffer = OutOfSequenceBuffer(self._step, _State([], None, {}, 0, None, log_noise_scale), last_id)
 
     def reconfigure(self, params, noise, prediction):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
@@ -151,29 +144,29 @@ class Tracker(TrackerBase):
     def _published(self):
         state, (params, noise, prediction) = self._buffer.state, self._params
         largest_m2 = params.max_position_std ** 2
-        tracks = [track for track in state.tracks if track.is_confirmed and (
-            track.status == VISIBLE
-            or track.log_odds >= MIN_TRACK_SCORE and track.state.position_m2 < largest_m2)]
-        tracks.sort(key=lambda track: track.id)
+        tracks = [track for track in sorted(state.tracks, key=BY_ID) if track.is_confirmed and (
+            track.status == VISIBLE or track.log_odds >= MIN_TRACK_SCORE and track.state.position_m2 < largest_m2)]
         return published(tracks, learned_prediction(state.log_noise_scale, noise.noise_unknown, prediction))
 
     def _step(self, before, image, observed_s, assign_id):
         """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
         tracks = self._predict(before, image.stamp_ns)
         measurements = self._measure(before, image)
-        tracks, matches, fits, is_moved = self._associate(before, tracks, measurements, image)
-        result = [(track.id, track.is_confirmed, measurement.number) for track, measurement in matches]
+        matches, fits, is_moved = self._associate(before, tracks, measurements, image)
+        matched = {track.id: (track.is_confirmed, measurement.number) for track, measurement in matches}
         log_noise_scale = learned_log_scale(before.log_noise_scale, matches)
         self._update_matched(matches, log_noise_scale - max(before.log_noise_scale, 0), image)
         cameras = self._cameras_after(before, image, matches, fits)
-        matched_ids = set(track.id for track, _measurement in matches)
-        mark_missed([track for track in tracks if track.id not in matched_ids], tracks, before.tracks, cameras,
-                    image.view.camera, observed_s, self._detector.detection_probability)
+        missed = [track for track in tracks if track.id not in matched]
+        if missed:
+            mark_missed(missed, tracks, before.tracks, cameras, image.view.camera, observed_s,
+                        self._detector.detection_probability)
         tracks = self._delete(tracks, image.stamp_ns)
-        tracks += self._initiate(tracks, measurements, matches, image, assign_id)
+        if len(matches) < len(measurements):
+            tracks += self._initiate(tracks, measurements, matched, image, assign_id)
         misfit_ns = image.stamp_ns if fits is False else before.misfit_ns
-        return _State(tuple(tracks), image.stamp_ns, cameras, before.common_motions + is_moved, misfit_ns,
-                      log_noise_scale), result
+        return _State(tracks, image.stamp_ns, cameras, before.common_motions + is_moved, misfit_ns,
+                      log_noise_scale), [(track_id,) + match for track_id, match in matched.items()]
 
     def _predict(self, before, stamp_ns):
         """Copies of the tracks, predicted to the image; the next steps change them."""
@@ -188,39 +181,47 @@ class Tracker(TrackerBase):
         images = correlated_images(_period_s(before, image), self._detector, params.acceleration)
         measurements = measurements_of(image.detections, image.view, images, noise.noise_unknown, self._kinds,
                                        self._detector.lasting_sigma_m)
-        return scaled(measurements, max(before.log_noise_scale, 0))
+        if before.log_noise_scale <= 0:
+            return measurements
+        return [scaled(measurement, math.exp(before.log_noise_scale)) for measurement in measurements]
 
     def _associate(self, before, tracks, measurements, image):
-        """Assign measurements to tracks; if the pose of the camera jumped, after moving the tracks."""
-        view, stamp_ns, params = image.view, image.stamp_ns, self._params[0]
-        matches, is_moved = associate(tracks, measurements, stamp_ns, params, self._rules.outliers), False
+        """Assign measurements to tracks; if the pose of the camera jumped, the tracks are moved before.
+
+        Returns the matches [(Track, Measurement)], whether most people fit without a motion (None if unknown), and
+        whether there was one.
+        """
+        view, stamp_ns, params, outliers = image.view, image.stamp_ns, self._params[0], self._rules.outliers
+        matches = associate(tracks, measurements, stamp_ns, params, outliers)
+        if min(len(tracks), len(measurements)) < FEWEST:
+            return matches, None, False
         latest = before.cameras.get(view.camera)
         known = [track for track in tracks if latest and track.is_confirmed
                  and track.visibility.get(view.camera) == SEEN]
         fits = most_fit(known, matches, len(measurements))
         is_settled = before.misfit_ns is None or stamp_ns - before.misfit_ns > SETTLED_NS
         others = recent_others(before.cameras, view.camera, stamp_ns).values()
-        if fits is False and is_settled and may_jump(latest, others):
-            motion = common_motion(known, measurements, view, _period_s(before, image))
-            if motion is not None:
-                for track in tracks:
-                    track.state = moved(track.state, *motion, view=view)
-                matches, is_moved = associate(tracks, measurements, stamp_ns, params, self._rules.outliers), True
-        return _Association(tracks, matches, fits, is_moved)
+        if fits is not False or not is_settled or not may_jump(latest, others):
+            return matches, fits, False
+        motion = common_motion(known, measurements, view, _period_s(before, image))
+        if motion is None:
+            return matches, fits, False
+        for track in tracks:
+            track.state = moved(track.state, *motion, view=view)
+        return associate(tracks, measurements, stamp_ns, params, outliers), fits, True
 
     def _update_matched(self, matches, log_factor, image):
-        """Update the tracks of the matches, with the assumed noise changed by exp(`log_factor`)."""
-        measurements = scaled([measurement for _track, measurement in matches], log_factor)
-        for (track, _measurement), measurement in zip(matches, measurements):
-            track.update(measurement, image.stamp_ns, image.view.camera, self._rules)
+        """Update the tracks of the matches, with the variance of assumed noise multiplied by exp(`log_factor`)."""
+        scale = math.exp(log_factor)
+        for track, measurement in matches:
+            track.update(scaled(measurement, scale), image.stamp_ns, image.view.camera, self._rules)
 
     def _cameras_after(self, before, image, matches, fits):
         """The CameraState of each camera after an image with matches."""
         latest = before.cameras.get(image.view.camera)
         range_m = self._detector.max_range_m
         if range_m is None:
-            range_m = learned_range(latest.range_m if latest else DEFAULT_RANGE_M,
-                                    [measurement.distance_m for track, measurement in matches if track.is_confirmed])
+            range_m = learned_range(latest.range_m if latest else DEFAULT_RANGE_M, matches)
         if fits is None and latest:
             fits = latest.fits
         cameras = {name: known for name, known in before.cameras.items() if image.stamp_ns - known.stamp_ns <= KNOWN_NS}
@@ -229,18 +230,20 @@ class Tracker(TrackerBase):
 
     def _delete(self, tracks, stamp_ns):
         """The tracks that are kept. Tentative ones are kept for a short time only."""
-        max_age_s, duplicate_ids = self._params[0].max_age, duplicates(tracks, stamp_ns)
-        return [track for track in tracks if track.id not in duplicate_ids
-                and (not track.unseen_s
-                     or track.unseen_s < (max_age_s if track.is_confirmed else TENTATIVE_TIMEOUT_S))
-                and track.state.position_m2 < MAX_POSITION_STD_M ** 2]
+        max_age_s, kept, duplicate_ids = self._params[0].max_age, [], ()
+        if tracks and stamp_ns - max(tracks, key=FIRST_SEEN).first_ns < NEW_NS:
+            duplicate_ids = duplicates(tracks, stamp_ns)
+        for track in tracks:
+            limit_s = max_age_s if track.is_confirmed else TENTATIVE_TIMEOUT_S
+            is_recent = not track.unseen_s or track.unseen_s < limit_s
+            if is_recent and track.state.position_m2 < MAX_POSITION_STD_M ** 2 and track.id not in duplicate_ids:
+                kept.append(track)
+        return kept
 
-    def _initiate(self, tracks, measurements, matches, image, assign_id):
-        """The new tracks of the measurements without a match."""
-        matched = set(measurement.number for _track, measurement in matches)
-        if len(matched) == len(measurements):
-            return []
-        unmatched = [measurement for measurement in measurements if measurement.number not in matched]
+    def _initiate(self, tracks, measurements, matched, image, assign_id):
+        """The new tracks of the measurements without a match; `matched` are (_, number) by track."""
+        taken = set(number for _is_confirmed, number in matched.values())
+        unmatched = [measurement for measurement in measurements if measurement.number not in taken]
         return initiate(tracks, unmatched, image.stamp_ns, image.view.camera, self._params[0], self._rules, assign_id)
 
 

@@ -57,28 +57,21 @@ def detections_from_boxes(boxes, fixed_from_camera, classes=ObjectClasses()):
         Pose of the camera's optical frame in the fixed frame.
     classes : object_classes.ObjectClasses
     """
-    turns, rows = upright_turns(fixed_from_camera), fixed_from_camera[:3].tolist()
+    turns, rows, rotation = upright_turns(fixed_from_camera), fixed_from_camera[:3].tolist(), fixed_from_camera[:3, :3]
     detections = []
     for index, box in boxes.items():
-        (x, y, z), extents_m = floats(box.center_m), floats(box.size_m)
-        width_m, height_m = extents_m[:2]
+        (x, y, z), (width_m, height_m) = map(float, box.center_m), map(float, box.size_m[:2])
         if turns % 2:
             (x, y, z), (height_m, width_m) = _completed_in_portrait(box, classes.of(box.label))
         position_m = tuple([of_x * x + of_y * y + of_z * z + shift_m for of_x, of_y, of_z, shift_m in rows])
+        covariance_m2 = box.covariance_m2
+        if covariance_m2 is not None:
+            covariance_m2 = rotation.dot(covariance_m2).dot(rotation.T).tolist()
         detections.append(Detection(
-            position_m, (width_m, width_m, height_m), _rotated(rows, box.covariance_m2),
+            position_m, (width_m, width_m, height_m), covariance_m2,
             box.truncated_edges[-turns:] + box.truncated_edges[:-turns], box.support or 1.0,  # 0: unknown
             box.label, box.score, index))
     return detections
-
-
-def _rotated(rows, covariance_m2):
-    """The covariance (3, 3) in the frame to which the rows of a transform lead; None if it is None."""
-    if covariance_m2 is None:
-        return None
-    columns = list(zip(*floats(covariance_m2)))
-    half = [[a * of_a + b * of_b + c * of_c for of_a, of_b, of_c in columns] for a, b, c, _shift_m in rows]
-    return [[a * of_a + b * of_b + c * of_c for a, b, c, _shift_m in rows] for of_a, of_b, of_c in half]
 
 
 def _completed_in_portrait(box, kind):
@@ -87,7 +80,7 @@ def _completed_in_portrait(box, kind):
     The estimator completes a truncated object as if it stood upright in the image: to the usual width along the rows
     and to the usual height along the columns. In portrait, the two are swapped. The visible end stays in place.
     """
-    center_m, extents_m, cut = list(floats(box.center_m)), list(floats(box.size_m))[:2], box.truncated_edges
+    center_m, extents_m, cut = list(map(float, box.center_m)), list(map(float, box.size_m))[:2], box.truncated_edges
     was_completed = np.isclose(extents_m[1], kind.height)
     completed_m = max(extents_m[0], kind.height), kind.width if was_completed else extents_m[1]
     for axis, (cut_low, cut_high) in enumerate(zip(cut[:2], cut[2:])):
@@ -96,11 +89,6 @@ def _completed_in_portrait(box, kind):
             center_m[axis] += missing_m / 2 if cut_high else -missing_m / 2
             extents_m[axis] = completed_m[axis]
     return center_m, extents_m
-
-
-def floats(values):
-    """Plain numbers of an array, which are several times as fast as its elements; other sequences as they are."""
-    return values.tolist() if isinstance(values, np.ndarray) else values
 
 
 class CameraView(NamedTuple):
