@@ -1,5 +1,6 @@
 """Detector model: from recordings with ground truth to the tracker."""
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -102,12 +103,15 @@ def test_a_recording_of_one_person_is_rejected(tmp_path, monkeypatch):
 
 
 def test_the_range_is_learned_from_people_farther_away():
+    def matches(*distances_m, is_confirmed=True):
+        return [(SimpleNamespace(is_confirmed=is_confirmed), SimpleNamespace(distance_m=distance_m))
+                for distance_m in distances_m]
     range_m = DEFAULT_RANGE_M
     for _image in range(100):
-        range_m = learned_range(range_m, [3.0, 7.0])
+        range_m = learned_range(range_m, matches(3.0, 7.0))
     assert range_m == DEFAULT_RANGE_M
     for _image in range(100):
-        range_m = learned_range(range_m, [3.0, 12.0, 20.0])
+        range_m = learned_range(range_m, matches(3.0, 12.0, 20.0) + matches(90.0, is_confirmed=False))
     assert range_m == pytest.approx(16.0, abs=0.1)
 
 

@@ -29,7 +29,7 @@ def initiate(tracks, unmatched, stamp_ns, camera, params, rules, assign_id):
         if is_likely and detection.support >= STARTING_SUPPORT and not is_duplicate:
             occupied.append((x, y, kind.group))
             new.append(Track(assign_id(measurement.number), measurement, stamp_ns, camera,
-                             params.initial_speed * kind.initial_speed, rules.even_log_odds))
+                             params.initial_speed * kind.known.initial_speed, rules.even_log_odds))
     return new
 
 

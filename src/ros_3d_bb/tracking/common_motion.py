@@ -86,7 +86,8 @@ def common_motion(known, measurements, view, period_s):
 def moved(state, motion, covariance, view):
     """The State after a motion of the frame with a covariance."""
     jacobian = _jacobians([(state.x, state.y)], view)[0]
-    (x, y), ((xx, xy), (_xy, yy)) = jacobian.dot(motion).tolist(), jacobian.dot(covariance).dot(jacobian.T).tolist()
+    (x, y), spread = jacobian.dot(motion).tolist(), jacobian.dot(covariance).dot(jacobian.T)
+    (xx, xy), (_, yy) = spread.tolist()
     return state._replace(x=state.x + x, y=state.y + y, xx=state.xx + xx, xy=state.xy + xy, yy=state.yy + yy)
 
 

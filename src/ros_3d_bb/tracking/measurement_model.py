@@ -11,6 +11,7 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
+from ros_3d_bb.core.object_classes import ObjectClass
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.tracking.types import NEARER_M, Detection, wrapped
 
@@ -18,7 +19,7 @@ FLOOR_M = 0.02  # lower bound of the standard deviation of a centre; chosen: peo
 WIDER_M = 0.04  # chosen: people are wider than the usual width, to which the estimator completes truncated boxes
 USUAL_PERIOD_S = 1 / 30.0  # image period assumed for the first image of a camera; chosen: that of a D435
 # Spectral density of the position noise, m² s. Chosen: with it and the default acceleration, errors of the D435, which
-# last 0.5 s, count as if they lasted 0.15 s, the best value in `./run bench tracking` when that was a parameter.
+# last 0.5 s, count as if they lasted 0.15 s, as before their duration was measured.
 NOISE_DENSITY = 0.08 * 0.3273 ** 4
 PART_M = 0.3  # a narrower truncated box shows only a part of the body's width; chosen: less than the usual 0.5 m
 MAX_SHIFT_M = 0.2  # chosen: less than half of the usual width
@@ -27,7 +28,7 @@ NEAR_M = 0.01  # the viewing ray of a closer box is undefined; the optical axis 
 TOUCHING_RAD = 0.03  # a nearer box occludes another one if the gap between them is smaller than this; chosen
 DEFAULT_RANGE_M = 8.0  # of a D435 and YOLOv5n; chosen
 RANGE_GAIN = 0.05  # of the filter that learns the range; chosen
-# Scale of the assumed noise. Chosen; `walk` in test_noise_scale.py has the effect.
+# Scale of the assumed noise. Chosen; test_noise_scale.py shows the effect.
 GAIN = 0.2  # change of the logarithm of the variance by a pair of innovations, relative to their correlation
 LARGEST = 3.0  # correlations are limited to this multiple of the expected squared innovation
 SETTLED_HITS = 3  # innovations of newer tracks show their unknown velocity
@@ -44,33 +45,26 @@ class NoiseParams(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """What the tracker knows about a class: its group, the classes of the group, and `object_classes.ObjectClass`."""
+    """A class: its name and group, the names of all classes of the group, and `object_classes.ObjectClass`."""
 
     label: str
     group: object
     members: Tuple[str, ...]
-    width_m: float
-    acceleration: float
-    initial_speed: float
+    known: ObjectClass
 
 
 class Kinds(dict):
     """Kind by class name. A class that the table `object_classes.ObjectClasses` does not list is a group of its own."""
 
     def __init__(self, table):
-        groups = {}
-        for label in table.listed:
-            groups.setdefault(table.group_of(label), []).append(label)
-        super(Kinds, self).__init__({label: self._kind(label, table.of(label), table.group_of(label),
-                                                       groups[table.group_of(label)]) for label in table.listed})
+        super(Kinds, self).__init__()
         self._default = table.default
+        for label, known in table.listed.items():
+            members = tuple(other for other in table.listed if table.group_of(other) == table.group_of(label))
+            self[label] = Kind(label, table.group_of(label), members, known)
 
     def __missing__(self, label):
-        return self._kind(label, self._default, (label,), (label,))
-
-    @staticmethod
-    def _kind(label, known, group, members):
-        return Kind(label, group, tuple(members), known.width, known.acceleration, known.initial_speed)
+        return Kind(label, (label,), (label,), self._default)
 
 
 class Measurement(NamedTuple):
@@ -98,29 +92,14 @@ class Measurement(NamedTuple):
     number: int
 
 
-class _Sighting(NamedTuple):
-    """Where a detection is: centre and extents, distance from the camera and unit vector from the camera in the plane,
-    bearing, half width as an angle, and distance along the optical axis.
-    """
-
-    position_m: Tuple[float, float, float]
-    size_m: Tuple[float, float, float]
-    distance_m: float
-    ray_x: float
-    ray_y: float
-    bearing: float
-    half_width: float
-    depth_m: float
-
-
 def correlated_images(elapsed_s, detector, acceleration):
     """Number of images over which position errors are correlated.
 
     A filter that treats them as independent underestimates its covariance. The lasting part is therefore multiplied by
     this number, which makes the filter independent of the frame rate. Errors that last much longer than the memory M of
     the filter shift the track and hardly change its velocity: with the correlation time T, white noise of the density
-    2 T / (1 + w² T²) has the same power at the frequency w = 1 / M. The memory of a steady filter with the density r of
-    the position noise and q of the acceleration is M = (r / q)^(1/4) (Kalata 1984: the tracking index).
+    2 T / (1 + w² T²) has the same power at the frequency w = 1 / M. This is the natural frequency of the steady filter,
+    (q / r)^(1/4), where r is the density of the position noise and q that of the acceleration.
     """
     time_s = detector.correlation_time_s
     correlated_s = time_s / (1 + time_s ** 2 * math.sqrt(acceleration / NOISE_DENSITY))
@@ -140,57 +119,49 @@ def measurements_of(detections, view, images, assumed_m, kinds, lasting_m):
     if not detections:
         return []
     camera_m, ahead = view.fixed_from_camera[:2, 3].tolist(), view.ahead.tolist()
-    sightings = [_sighting(detection, camera_m, ahead) for detection in detections]
     unknown_m2 = ((assumed_m ** 2, 0.0, 0.0), (0.0, assumed_m ** 2, 0.0), (0.0, 0.0, assumed_m ** 2))
-    return [_measurement(detection, number, seen, side, kinds[detection.label], unknown_m2, images, lasting_m ** 2)
-            for number, (detection, seen, side) in enumerate(zip(detections, sightings, _hidden_sides(sightings)))]
+    measurements = []
+    for number, (detection, side) in enumerate(zip(detections, _hidden_sides(detections, view))):
+        kind, (x, y, z) = kinds[detection.label], map(float, detection.position_m)
+        size_m = tuple(map(float, detection.size_m))
+        distance_m, ray_x, ray_y = _direction(x - camera_m[0], y - camera_m[1], ahead)
+        is_assumed = detection.covariance_m2 is None
+        (xx, xy, _xz), (_yx, yy, _yz), (_zx, _zy, zz) = unknown_m2 if is_assumed else detection.covariance_m2
+        along = _variance_along(xx, xy, yy, ray_x, ray_y, images, lasting_m ** 2)
+        across = _variance_along(xx, xy, yy, -ray_y, ray_x, images, lasting_m ** 2)
+        cut_left, _top, cut_right, _bottom = detection.truncated_edges
+        if side or cut_left or cut_right:
+            across += CUT_SIGMA_M ** 2
+        if cut_left or cut_right:
+            side = int(cut_left) - int(cut_right) if size_m[0] < PART_M else 0
+        shift_m = side * min(max((kind.known.width + WIDER_M - size_m[0]) / 2, 0.0), MAX_SHIFT_M)
+        measurements.append(Measurement(
+            x - shift_m * ray_y, y + shift_m * ray_x, z, along * ray_x * ray_x + across * ray_y * ray_y,
+            (along - across) * ray_x * ray_y, along * ray_y * ray_y + across * ray_x * ray_x, float(zz), is_assumed,
+            size_m, distance_m, ray_x, ray_y, kind, detection, number))
+    return measurements
 
 
-def _sighting(detection, camera_m, ahead):
-    position_m, size_m = tuple(map(float, detection.position_m)), tuple(map(float, detection.size_m))
-    x, y = position_m[0] - camera_m[0], position_m[1] - camera_m[1]
-    bearing = math.atan2(ahead[0] * y - ahead[1] * x, x * ahead[0] + y * ahead[1])
+def _direction(x, y, ahead):
+    """Distance and unit vector (x, y) of a place relative to the camera."""
     distance_m = math.hypot(x, y)
-    if distance_m < NEAR_M:
-        distance_m, (ray_x, ray_y) = NEAR_M, ahead
-    else:
-        ray_x, ray_y = x / distance_m, y / distance_m
-    return _Sighting(position_m, size_m, distance_m, ray_x, ray_y, bearing, math.atan2(size_m[0] / 2, distance_m),
-                     distance_m * math.cos(bearing))
+    return (distance_m, x / distance_m, y / distance_m) if distance_m >= NEAR_M else (NEAR_M, *ahead)
 
 
-def _measurement(detection, number, seen, hidden, kind, unknown_m2, images, lasting_m2):
-    (x, y, z), size_m, distance_m, ray_x, ray_y = seen[:5]
-    is_assumed = detection.covariance_m2 is None
-    (xx, xy, _xz), (yx, yy, _yz), (_zx, _zy, zz) = unknown_m2 if is_assumed else detection.covariance_m2
-    in_plane_m2 = float(xx), float(xy + yx) / 2, float(yy)
-    cut_left, _top, cut_right, _bottom = detection.truncated_edges
-    side = hidden
-    if cut_left or cut_right:
-        side = int(cut_left) - int(cut_right) if size_m[0] < PART_M else 0
-    shift_m = side * min(max((kind.width_m + WIDER_M - size_m[0]) / 2, 0.0), MAX_SHIFT_M)
-    along = _variance_along(in_plane_m2, ray_x, ray_y, images, lasting_m2) + FLOOR_M ** 2
-    across = _variance_along(in_plane_m2, -ray_y, ray_x, images, lasting_m2) + FLOOR_M ** 2
-    if hidden or cut_left or cut_right:
-        across += CUT_SIGMA_M ** 2
-    return Measurement(
-        x - shift_m * ray_y, y + shift_m * ray_x, z, along * ray_x * ray_x + across * ray_y * ray_y,
-        (along - across) * ray_x * ray_y, along * ray_y * ray_y + across * ray_x * ray_x, float(zz),
-        is_assumed, size_m, distance_m, ray_x, ray_y, kind, detection, number)
+def _variance_along(xx, xy, yy, x, y, images, lasting_m2):
+    """Variance of a covariance along a unit vector (x, y), with the lasting part counted `images` times."""
+    variance_m2 = float(xx * x * x + 2 * xy * x * y + yy * y * y)
+    return variance_m2 + (images - 1) * min(variance_m2, lasting_m2) + FLOOR_M ** 2
 
 
-def _variance_along(covariance_m2, x, y, images, lasting_m2):
-    """Variance along a unit vector, given the covariance (xx, xy, yy), with the lasting part counted `images` times."""
-    xx, xy, yy = covariance_m2
-    variance_m2 = xx * x * x + 2 * xy * x * y + yy * y * y
-    return variance_m2 + (images - 1) * min(variance_m2, lasting_m2)
-
-
-def _hidden_sides(sightings):
+def _hidden_sides(detections, view):
     """Side on which a nearer detection partly occludes each one: 1 left, -1 right, 0 neither or both; a list of int."""
-    if len(sightings) == 1:
+    if len(detections) == 1:
         return [0]
-    bearings, half_widths, depths_m = np.array([seen[-3:] for seen in sightings]).T
+    distances_m, bearings = view.bearings([detection.position_m for detection in detections])
+    distances_m = np.maximum(distances_m, NEAR_M)
+    half_widths = np.arctan2([detection.size_m[0] / 2 for detection in detections], distances_m)
+    depths_m = distances_m * np.cos(bearings)
     to_left = wrapped(bearings - bearings[:, None])
     gaps = np.abs(to_left) - half_widths - half_widths[:, None]
     hides = (depths_m < depths_m[:, None] - NEARER_M) & (gaps < TOUCHING_RAD)
@@ -226,10 +197,8 @@ def learned_log_scale(log_scale, matches):
 def learned_range(range_m, matches):
     """Range of the detector after an image with matches (Track, Measurement): `DEFAULT_RANGE_M`, or the filtered mean
     distance of the confirmed tracks that are detected farther away. Beyond it, detectors miss people often."""
-    far_m = []
-    for track, measurement in matches:
-        if measurement.distance_m > DEFAULT_RANGE_M and track.is_confirmed:
-            far_m.append(measurement.distance_m)
+    far_m = [measurement.distance_m for track, measurement in matches
+             if measurement.distance_m > DEFAULT_RANGE_M and track.is_confirmed]
     if not far_m:
         return range_m
     return range_m + (1 - (1 - RANGE_GAIN) ** len(far_m)) * (sum(far_m) / len(far_m) - range_m)

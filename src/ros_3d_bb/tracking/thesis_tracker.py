@@ -74,9 +74,11 @@ class ThesisTracker(TrackerBase):
         for column, detection in enumerate(detections):
             if column not in matched:
                 self._last_id += 1
-                tracks.append((TrackedObject(self._last_id, np.array(detection.position_m), np.array(detection.size_m),
-                                             np.zeros(3), np.zeros(3), VISIBLE, False, stamp_ns, stamp_ns, None, None, None, None,
-                                             detection.label, detection.score, detection.index), 0))
+                position_m, size_m = np.array(detection.position_m), np.array(detection.size_m)
+                track = TrackedObject(self._last_id, position_m, size_m, np.zeros(3), np.zeros(3), VISIBLE, False,
+                                      stamp_ns, stamp_ns, None, None, None, None, detection.label, detection.score,
+                                      detection.index)
+                tracks.append((track, 0))
         self._tracks = tracks
         times_s = prediction_times_s(params.prediction_time, params.prediction_step)[:, None]
         return [track._replace(status=OCCLUDED if unseen_ns else VISIBLE, prediction_step_s=params.prediction_step,

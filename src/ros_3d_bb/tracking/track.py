@@ -71,16 +71,15 @@ class Rules(NamedTuple):
     moving_speed: float
     kinds: dict
 
-
-def rules_of(params, kinds):
-    """The Rules of `tracker.TrackerParams`."""
-    return Rules(kalman_filter.outlier_model(params), _logit(params.even_score),
-                 _logit(params.confirmation_probability), params.moving_speed, kinds)
+    @classmethod
+    def of(cls, params, kinds):
+        """The Rules of TrackerParams."""
+        return cls(kalman_filter.outlier_model(params), _logit(params.even_score),
+                   _logit(params.confirmation_probability), params.moving_speed, kinds)
 
 
 class _End(NamedTuple):
-    """Lower or upper end of a body: number of the detections that show it, and stamp of the latest of which the image
-    border truncates it.
+    """Lower or upper end of a body: number of the detections that show it, and stamp of the latest that is truncated.
     """
 
     hits: int
@@ -88,38 +87,15 @@ class _End(NamedTuple):
 
 
 class Track(object):
-    """One object: plain numbers in the fixed frame, metres and nanoseconds.
+    """One object. Plain numbers in the fixed frame, metres, nanoseconds.
 
-    Attributes
-    ----------
-    id : int
-    state : kalman_filter.State
-    z_m, z_m2, size_m
-        Height of the centre and its variance; extents (x, y, z).
-    lower, upper : _End
-    hits : int
-        Number of detections.
-    first_ns, last_ns : int
-        Stamps of the first and of the latest detection.
-    unseen_s, missed_s : float
-        Time since the latest detection, and the part of it during which a detection was expected.
-    status : int
-        VISIBLE, OCCLUDED or OUT_OF_VIEW.
-    visibility : dict
-        In the latest image of each camera: SEEN or a status, see `occlusion`; OUT_OF_VIEW if the camera is missing.
-    log_odds : float
-        The track score.
-    is_confirmed, is_moving : bool
-    kind : measurement_model.Kind
-        The class that has the most `votes` in its group.
-    votes : dict
-        Filtered scores of the classes of the group.
-    score : float
-        Filtered score of the detections.
-    detection : int
-        `Detection.index` in the latest image.
-    innovation_m : (float, float)
-        Of the latest image if its noise is assumed, otherwise 0; see `measurement_model.learned_log_scale`.
+    `state` is a `kalman_filter.State`. `z_m` is the height of the centre and `z_m2` its variance; `size_m` are the
+    extents, and `lower` and `upper` the ends of the body. `hits` counts the detections, of which `first_ns` and
+    `last_ns` are the first and the latest. `unseen_s` is the time since the latest one, `missed_s` the part of it
+    during which a detection was expected. `visibility` is that in the latest image of each camera: SEEN, or as
+    `status`. `log_odds` is the track score. `kind` is the class of the group that has the most of the filtered scores
+    `votes`; `score` is the filtered score of the detections, `detection` the `Detection.index` in the latest image.
+    `innovation_m` is that of the latest image if its noise is assumed, otherwise 0.
     """
 
     def __init__(self, track_id, measurement, stamp_ns, camera, speed_mps, even_log_odds):
@@ -140,7 +116,7 @@ class Track(object):
         """A copy of this track `elapsed_s` later, not detected, given the acceleration density of people."""
         track = Track.__new__(Track)
         track.__dict__.update(self.__dict__)
-        track.state = kalman_filter.predict(self.state, elapsed_s, acceleration * self.kind.acceleration)
+        track.state = kalman_filter.predict(self.state, elapsed_s, acceleration * self.kind.known.acceleration)
         track.detection = NOT_DETECTED
         return track
 

@@ -1,11 +1,12 @@
 """Multi-object tracker: positions, velocities and predictions of people from the 3D boxes of an image sequence.
 
 Each person is tracked by a constant-velocity Kalman filter in the plane (`kalman_filter`). Detections are assigned to
-tracks by maximum total likelihood (`association`). A detection that a new target explains better starts a track, which
-is published once it is likely to be a person (`track_score`). If most people seem to jump in the same way, the pose of
-the camera jumped, and all tracks are moved (`common_motion`). Undetected people are not dropped immediately: their
-tracks stay published for a short time if a camera should detect them, and for longer if a person or an object occludes
-them (`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep their track ID.
+tracks by maximum total likelihood (`association`). A detection that a new target explains better starts a track
+(`birth`), which is published once it is likely to be a person (`track`). If most people seem to jump in the same way,
+the pose of the camera jumped, and all tracks are moved (`common_motion`). Undetected people are not dropped
+immediately: their tracks stay published for a short time if a camera should detect them, and for longer if a person or
+an object occludes them (`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep
+their track ID.
 """
 import math
 import operator
@@ -22,8 +23,8 @@ from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, K
                                                   learned_log_scale, learned_range, measurements_of, scaled)
 from ros_3d_bb.tracking.occlusion import CameraState, mark_missed, recent_others
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
-from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, SEEN, PredictionParams, Track, learned_prediction, published,
-                                      rules_of)
+from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, SEEN, PredictionParams, Rules, Track, learned_prediction,
+                                      published)
 from ros_3d_bb.tracking.types import MOVING_SPEED, VISIBLE, TrackerBase
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
@@ -112,7 +113,7 @@ class Tracker(TrackerBase):
     def reconfigure(self, params, noise, prediction):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
         super(Tracker, self).reconfigure(params, noise, prediction)
-        self._rules = rules_of(params, self._kinds)
+        self._rules = Rules.of(params, self._kinds)
 
     def reset(self):
         """Delete all tracks, as after a jump in time. IDs are not reused, and the learned noise is kept."""

@@ -4,7 +4,7 @@ from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import Camera, transform_points, upright_turns
+from ros_3d_bb.camera.camera_model import Camera, upright_turns
 from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import Param
@@ -153,36 +153,23 @@ class TrackedObject(NamedTuple):
 
 
 class TrackerBase(object):
-    """Base class of the trackers of objects from image to image.
-
-    Call `update` with the detections of each image, `skip` for an image whose detections are unusable, and `reset`
-    after a jump in time. The IDs of tracks are greater than `last_id` of the constructor. Tracks never change between
-    the groups of its table of classes, an `object_classes.ObjectClasses`.
+    """Base class of the trackers. The IDs of tracks are greater than `last_id` of the constructor, and tracks never
+    change between the groups of its table of classes, an `object_classes.ObjectClasses`.
     """
 
     common_motions = 0  # number of images in which the pose of the camera jumped
 
     def reconfigure(self, *params):
-        """Change the parameters and keep the tracks; the last ones have `prediction_time` and `prediction_step`. Raises
+        """Use other parameters and keep the tracks; the last ones have `prediction_time` and `prediction_step`. Raises
         ValueError without any change if one is invalid.
         """
         check_steps(params[-1].prediction_time, params[-1].prediction_step)
         self._params = params
 
     def update(self, stamp_ns, detections, view):
-        """Update the tracks with the detections of one image.
-
-        Parameters
-        ----------
-        stamp_ns : int
-            Stamp of the image, nanoseconds.
-        detections : list of Detection
-        view : CameraView
-
-        Returns
-        -------
-        list of TrackedObject
-            Ordered by ID, at the stamp of the newest image.
+        """Update the tracks with a list of Detection in the image of a CameraView. Returns the tracks as a list of
+        TrackedObject, ordered by ID, at the stamp of the newest image. Raises ValueError without any change if the
+        stamp is unusable.
         """
         raise NotImplementedError
 
