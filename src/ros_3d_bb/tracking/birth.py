@@ -5,20 +5,21 @@ import math
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.track import MIN_TRACK_SCORE, Track, log_odds_of
 
-# Chosen; `./run bench tracking` and `./run bench scenes` have the effect.
+# All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
 RECENTLY_MATCHED_NS = NS // 5  # no track starts near a track that was matched less than this ago
 STARTING_SUPPORT = 0.2  # minimum support of a detection that starts a track: most positions with less are wrong
 NEW_NS = NS  # people pass each other later than that after they were first detected
 SAME_PERSON_M = 0.15  # two people who are both visible cannot be this close to each other
 
 
-def initiate(tracks, unmatched, stamp_ns, camera, params, rules, assign_id):
-    """Start tracks from unmatched measurements, except those with little support or a low score, and duplicate
-    detections of recently matched or new tracks of the same group of classes. Returns the new tracks.
+def initiate(tracks, unmatched, image, params, rules, assign_id):
+    """Start tracks from the unmatched measurements of an image, except those with little support or a low score, and
+    duplicate detections of recently matched or new tracks of the same group of classes. Returns the new tracks.
 
     `params` are `tracker.TrackerParams`, `rules` the `track.Rules`; assign_id(number) returns the ID of the track that
     the detection of this number starts.
     """
+    stamp_ns, camera = image.stamp_ns, image.view.camera
     new, occupied = [], [(track.state.x, track.state.y, track.kind.group) for track in tracks
                          if stamp_ns - track.last_ns < RECENTLY_MATCHED_NS]
     for measurement in unmatched:

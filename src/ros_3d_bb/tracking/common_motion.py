@@ -13,14 +13,14 @@ from ros_3d_bb.core.time_sync import NS
 
 # Squared Mahalanobis distances of innovations below which 90 % and 99 % lie (chi-square, 2 degrees of freedom).
 USUAL, GATE = 4.6, 9.2
-SIGNIFICANT = 25.0  # squared Mahalanobis distance of a motion: 1 of 60000 is larger by chance (3 degrees of freedom)
-FEWEST = 3  # people: two may turn or stop together
-MOST = 12  # people who vote, to limit the computing time
-LEAST_M, LARGEST_M = 0.1, 1.0  # of the jump of a person: less is left to the filter, more may be another person
+SIGNIFICANT = 25.0  # squared Mahalanobis distance of a motion; chosen: 1 of 60000 is larger by chance (3 degrees)
+FEWEST = 3  # people; chosen: two may turn or stop together
+MOST = 12  # people who vote; chosen to limit the computing time
+LEAST_M, LARGEST_M = 0.1, 1.0  # of a jump; chosen: less is left to the filter, more may be another person
 SETTLED_NS = NS  # people must have fitted for this long before a jump; chosen: the duration of a turn
 PEOPLE_MPS2 = 4.0  # upper bound of the acceleration of people; chosen: they stop and turn with 3 to 4 m/s2
-PRIOR_STD = np.array([0.5, 0.5, 0.1])  # of a jump; keeps the fit of people in one direction well-conditioned
-FITS = 3  # the pairs are selected and the motion is fitted this many times
+PRIOR_STD = np.array([0.5, 0.5, 0.1])  # of a jump; chosen: the fit of people in one direction is well-conditioned
+FITS = 3  # the pairs are selected and the motion is fitted this many times; chosen
 
 
 def may_jump(latest, others):

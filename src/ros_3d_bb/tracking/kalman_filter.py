@@ -9,27 +9,14 @@ The algebra of 2x2 and 4x4 matrices is written out, because numpy takes ten time
 import math
 from typing import NamedTuple
 
-NEVER = 1e-12  # lower bound of the share of a component of the mixture, for its logarithm
+LEAST_SHARE = 1e-12  # lower bound of the share of a component of the mixture, for its logarithm
 LARGEST_EXPONENT = 700.0  # of math.exp
 
 
-class State(NamedTuple):
+class State(NamedTuple('State', [(name, float) for name in 'x y u v xx xy xu xv yy yu yv uu uv vv'.split()])):
     """State of the filter: mean (x, y, u, v) and the upper triangle of the covariance; (u, v) is the velocity."""
 
-    x: float
-    y: float
-    u: float
-    v: float
-    xx: float
-    xy: float
-    xu: float
-    xv: float
-    yy: float
-    yu: float
-    yv: float
-    uu: float
-    uv: float
-    vv: float
+    __slots__ = ()
 
     @property
     def position_m2(self):
@@ -48,8 +35,9 @@ class OutlierModel(NamedTuple):
 
 def outlier_model(params):
     """The OutlierModel of `tracker.TrackerParams`."""
-    return OutlierModel(math.log(max(1 - params.outlier_share, NEVER)), math.log(max(params.outlier_share, NEVER)),
-                        params.outlier_offset, params.outlier_spread ** 2)
+    log_inliers, log_outliers = (math.log(max(share, LEAST_SHARE))
+                                 for share in (1 - params.outlier_share, params.outlier_share))
+    return OutlierModel(log_inliers, log_outliers, params.outlier_offset, params.outlier_spread ** 2)
 
 
 def predict(state, elapsed_s, density):

@@ -13,6 +13,7 @@ from ros_3d_bb.tracking.kalman_filter import State
 from ros_3d_bb.tracking.track import SEEN
 from ros_3d_bb.tracking.types import NEARER_M, OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, wrapped
 
+# All are chosen; `./run bench scenes` and `./run bench tracking` show the effect of others.
 EDGE_RAD = 0.04  # people this close to the image border are not detected reliably
 NEAREST_M = 0.45  # neither are people this close to the camera
 LEAST_IN_IMAGE = 0.2  # minimum share of the body axis inside the image for a person to be detected
@@ -166,11 +167,11 @@ def _share_in_image(view, positions_m, heights_m):
     points = centers[:, None] + (AXIS_SAMPLES * heights_m[:, None])[..., None] * rotation[2]
     in_front = points[..., 2] > 0
     points[..., 2][~in_front] = 1  # they have no pixel
-    size = np.array([camera.width, camera.height])
-    half_px = size / 2.0 - EDGE_RAD * np.array([camera.fx, camera.fy])
     with np.errstate(invalid='ignore'):  # nan is outside
-        inside = (np.abs(camera.project(points) - (size - 1) / 2.0) <= half_px).all(axis=-1)
-    return (in_front & inside).mean(axis=1)
+        u, v = np.moveaxis(camera.project(points), -1, 0)
+        inside = np.abs(u - (camera.width - 1) / 2.0) <= camera.width / 2.0 - EDGE_RAD * camera.fx
+        inside &= np.abs(v - (camera.height - 1) / 2.0) <= camera.height / 2.0 - EDGE_RAD * camera.fy
+    return (in_front & inside).sum(axis=1) / len(AXIS_SAMPLES)
 
 
 def _behind_people(distances_m, bearings, others_m, others_bearings):
@@ -181,7 +182,7 @@ def _behind_people(distances_m, bearings, others_m, others_bearings):
 
 def _half_widths(distances_m):
     """Angular half widths of bodies at distances in metres, radians."""
-    return np.arcsin(np.clip(BODY_RADIUS_M / np.maximum(distances_m, 0.01), 0, 1))
+    return np.arcsin(np.minimum(BODY_RADIUS_M / np.maximum(distances_m, 0.01), 1))
 
 
 def _behind_objects(view, positions_m, sizes_m):

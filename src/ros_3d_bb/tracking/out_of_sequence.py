@@ -6,9 +6,9 @@ from typing import NamedTuple
 from ros_3d_bb.core.time_sync import MAX_RATE_HZ, NS
 from ros_3d_bb.tracking.types import CameraView
 
-LATEST_NS = NS // 2  # images that are older than the newest by more than this are rejected
+LATEST_NS = NS // 2  # images that are older than the newest by more than this are rejected; chosen
 MOST_KEPT = LATEST_NS * MAX_RATE_HZ // NS  # maximum number of images in the history, per camera
-MOST_SKIPPED = 1000  # maximum number of skipped images in the history
+MOST_SKIPPED = 1000  # maximum number of skipped images in the history; chosen
 # Late images wait until a replay processes at most this many images for each of them, or until the newest stamp has
 # advanced by MAX_WAIT_NS. Chosen: late cameras then take less than three times the CPU time of the same images in order
 # (test_late_cameras_are_replayed_in_batches), and an image that is late by one or two others does not wait.

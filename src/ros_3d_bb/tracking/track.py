@@ -18,8 +18,7 @@ from ros_3d_bb.tracking import kalman_filter
 from ros_3d_bb.tracking.types import (NOT_DETECTED, PREDICTION_STEP, PREDICTION_TIME, VISIBLE, TrackedObject,
                                       prediction_times_s)
 
-# All are chosen by the benchmarks of doc/benchmarks.md (`./run bench tracking`, `./run bench scenes`), except where a
-# comment says otherwise.
+# All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
 HIT_CORRELATION_S = 0.08  # without scores, four images at 30 Hz or three independent ones confirm a track by default
 MISS_CORRELATION_S = 0.15  # the causes of misses, such as poses and partial occlusion, last longer
 UNKNOWN_SCORE, LARGEST_SCORE = 0.5, 0.9999  # assumed if the score is unknown; upper bound, for its log odds

@@ -164,7 +164,9 @@ class Tracker(TrackerBase):
                         self._detector.detection_probability)
         tracks = self._delete(tracks, image.stamp_ns)
         if len(matches) < len(measurements):
-            tracks += self._initiate(tracks, measurements, matched, image, assign_id)
+            taken = set(number for _is_confirmed, number in matched.values())
+            unmatched = [measurement for measurement in measurements if measurement.number not in taken]
+            tracks += initiate(tracks, unmatched, image, self._params[0], self._rules, assign_id)
         misfit_ns = image.stamp_ns if fits is False else before.misfit_ns
         return _State(tracks, image.stamp_ns, cameras, before.common_motions + is_moved, misfit_ns,
                       log_noise_scale), [(track_id,) + match for track_id, match in matched.items()]
@@ -240,12 +242,6 @@ class Tracker(TrackerBase):
             if is_recent and track.state.position_m2 < MAX_POSITION_STD_M ** 2 and track.id not in duplicate_ids:
                 kept.append(track)
         return kept
-
-    def _initiate(self, tracks, measurements, matched, image, assign_id):
-        """The new tracks of the measurements without a match; `matched` are (_, number) by track."""
-        taken = set(number for _is_confirmed, number in matched.values())
-        unmatched = [measurement for measurement in measurements if measurement.number not in taken]
-        return initiate(tracks, unmatched, image.stamp_ns, image.view.camera, self._params[0], self._rules, assign_id)
 
 
 def _period_s(before, image):

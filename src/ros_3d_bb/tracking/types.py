@@ -11,6 +11,7 @@ from ros_3d_bb.core.params import Param
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
 NOT_DETECTED = -1  # index of the box of an object that was not detected
+# Chosen.
 NEARER_M = 0.25  # an occluding person is at least this much nearer to the camera than an occluded one
 MOST_STEPS = 1000  # maximum number of prediction steps, to limit memory
 VERTICAL = 0.02  # upper bound of the horizontal part of the optical axis of a camera that points straight up or down
