@@ -43,8 +43,8 @@ def most_fit(known, matches, measurement_count):
     if len(known) < FEWEST or measurement_count < FEWEST:
         return None
     known_ids = set(track.id for track in known)
-    return 2 * sum(track.id in known_ids and _fits(track.state, measurement) for track, measurement in matches) >= len(
-        known)
+    fitting = [track for track, measurement in matches if track.id in known_ids and _fits(track.state, measurement)]
+    return 2 * len(fitting) >= len(known)
 
 
 def _fits(state, measurement):

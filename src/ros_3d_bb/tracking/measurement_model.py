@@ -60,8 +60,9 @@ class Kinds(dict):
         super(Kinds, self).__init__()
         self._default = table.default
         for label, known in table.listed.items():
-            members = tuple(other for other in table.listed if table.group_of(other) == table.group_of(label))
-            self[label] = Kind(label, table.group_of(label), members, known)
+            group = table.group_of(label)
+            members = tuple(other for other in table.listed if table.group_of(other) == group)
+            self[label] = Kind(label, group, members, known)
 
     def __missing__(self, label):
         return Kind(label, (label,), (label,), self._default)

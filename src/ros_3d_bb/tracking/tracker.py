@@ -203,8 +203,8 @@ class Tracker(TrackerBase):
                  and track.visibility.get(view.camera) == SEEN]
         fits = most_fit(known, matches, len(measurements))
         is_settled = before.misfit_ns is None or stamp_ns - before.misfit_ns > SETTLED_NS
-        others = recent_others(before.cameras, view.camera, stamp_ns).values()
-        if fits is not False or not is_settled or not may_jump(latest, others):
+        if fits is not False or not is_settled or not may_jump(
+                latest, recent_others(before.cameras, view.camera, stamp_ns).values()):
             return matches, fits, False
         motion = common_motion(known, measurements, view, _period_s(before, image))
         if motion is None:
