@@ -9,7 +9,7 @@ from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.tracking import association
 from ros_3d_bb.tracking.association import allowed_costs, associate
 from ros_3d_bb.tracking.kalman_filter import outlier_model
-from ros_3d_bb.tracking.measurement_model import Kinds, measurements_of
+from ros_3d_bb.tracking.measurement_model import BoxNoise, Kinds, measurements_of
 from ros_3d_bb.tracking.track import Track
 from ros_3d_bb.tracking.tracker import TrackerParams
 from ros_3d_bb.tracking.types import CameraView, Detection
@@ -25,7 +25,7 @@ def measured(random, count):
                                       (0.5, 0.5, random.uniform(1.5, 1.9)),
                                       np.eye(3) * 10 ** random.uniform(-3, -0.4),
                                       label=random.choice(['person', 'person', 'chair'])) for _ in range(count)],
-                           VIEW, random.uniform(1, 5), 0.1, KINDS, 0.035)
+                           VIEW, BoxNoise(0.1, 1.0, 0.035, random.uniform(1, 5)), KINDS)
 
 
 def scene(seed):

@@ -69,8 +69,9 @@ def _gate(measurement, new_target_density, outliers):
 
 def position_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers):
     """-log of the density of an innovation (x, y) with the covariance (xx, xy, yy), per m²."""
-    inlier = weighted(x, y, xx, xy, yy, outliers.log_inliers)[0]
-    outlier = weighted(*as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers), log_share=outliers.log_outliers)[0]
+    inlier, _a_x, _a_y, _determinant = weighted(x, y, xx, xy, yy, outliers.log_inliers)
+    x, y, xx, xy, yy = as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers)
+    outlier, _a_x, _a_y, _determinant = weighted(x, y, xx, xy, yy, outliers.log_outliers)
     larger, smaller = (inlier, outlier) if inlier > outlier else (outlier, inlier)
     return LOG_TWO_PI - larger - math.log1p(math.exp(smaller - larger))
 

@@ -79,17 +79,19 @@ def update(state, measurement, outliers):
     N = (1 - b) S_0^-1 + b S_1^-1 - b (1 - b) e e^T.
     """
     x, y, u, v, xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = state
-    inlier = measurement.x - x, measurement.y - y, xx + measurement.xx, xy + measurement.xy, yy + measurement.yy
-    outlier = as_outlier(*inlier, ray_x=measurement.ray_x, ray_y=measurement.ray_y, outliers=outliers)
-    log_inlier, a_x, a_y, determinant = weighted(*inlier, log_share=outliers.log_inliers)
-    log_outlier, to_x, to_y, other_determinant = weighted(*outlier, log_share=outliers.log_outliers)
+    z_x, z_y, s_xx, s_xy = measurement.x - x, measurement.y - y, xx + measurement.xx, xy + measurement.xy
+    s_yy = yy + measurement.yy
+    far_x, far_y, far_xx, far_xy, far_yy = as_outlier(z_x, z_y, s_xx, s_xy, s_yy, measurement.ray_x, measurement.ray_y,
+                                                      outliers)
+    log_inlier, a_x, a_y, determinant = weighted(z_x, z_y, s_xx, s_xy, s_yy, outliers.log_inliers)
+    log_outlier, to_x, to_y, far_determinant = weighted(far_x, far_y, far_xx, far_xy, far_yy, outliers.log_outliers)
     share = 1 / (1 + math.exp(min(log_inlier - log_outlier, LARGEST_EXPONENT)))
     e_x, e_y, both = to_x - a_x, to_y - a_y, share * (1 - share)
     a_x, a_y = a_x + share * e_x, a_y + share * e_y
-    weight, other_weight = (1 - share) / determinant, share / other_determinant
-    n_xx = weight * inlier[4] + other_weight * outlier[4] - both * e_x * e_x
-    n_xy = -weight * inlier[3] - other_weight * outlier[3] - both * e_x * e_y
-    n_yy = weight * inlier[2] + other_weight * outlier[2] - both * e_y * e_y
+    weight, far_weight = (1 - share) / determinant, share / far_determinant
+    n_xx = weight * s_yy + far_weight * far_yy - both * e_x * e_x
+    n_xy = -weight * s_xy - far_weight * far_xy - both * e_x * e_y
+    n_yy = weight * s_xx + far_weight * far_xx - both * e_y * e_y
     x_x, x_y, y_x, y_y = n_xx * xx + n_xy * xy, n_xy * xx + n_yy * xy, n_xx * xy + n_xy * yy, n_xy * xy + n_yy * yy
     u_x, u_y, v_x, v_y = n_xx * xu + n_xy * yu, n_xy * xu + n_yy * yu, n_xx * xv + n_xy * yv, n_xy * xv + n_yy * yv
     return State(x + xx * a_x + xy * a_y, y + xy * a_x + yy * a_y, u + xu * a_x + yu * a_y, v + xv * a_x + yv * a_y,

@@ -68,6 +68,17 @@ class Kinds(dict):
         return Kind(label, (label,), (label,), self._default)
 
 
+class BoxNoise(NamedTuple):
+    """Noise of the boxes of one image: the standard deviation where it is unknown, and the learned scale of its
+    variance; the standard deviation of lasting errors, and the number of images over which they are correlated.
+    """
+
+    unknown_m: float
+    unknown_scale: float
+    lasting_m: float
+    images: float
+
+
 class Measurement(NamedTuple):
     """A detection as the filter uses it.
 
@@ -107,11 +118,8 @@ def correlated_images(elapsed_s, detector, acceleration):
     return max(1.0, 2 * correlated_s / (elapsed_s or USUAL_PERIOD_S))
 
 
-def measurements_of(detections, view, images, assumed_m, kinds, lasting_m):
-    """Convert the detections of one image to a list of Measurement.
-
-    `images` is the result of `correlated_images`, `assumed_m` the standard deviation of boxes without a covariance, and
-    `lasting_m` that of lasting errors.
+def measurements_of(detections, view, noise, kinds):
+    """Convert the detections of one image to a list of Measurement, given its BoxNoise and the Kinds.
 
     If a nearer object partly occludes a detection, or the image border leaves only a part of its width, the centre is
     shifted to half the usual width of the class from the visible edge. The lateral position of such a box is less
@@ -120,39 +128,45 @@ def measurements_of(detections, view, images, assumed_m, kinds, lasting_m):
     if not detections:
         return []
     camera_m, ahead = view.fixed_from_camera[:2, 3].tolist(), view.ahead.tolist()
-    unknown_m2 = ((assumed_m ** 2, 0.0, 0.0), (0.0, assumed_m ** 2, 0.0), (0.0, 0.0, assumed_m ** 2))
     measurements = []
     for number, (detection, side) in enumerate(zip(detections, _hidden_sides(detections, view))):
-        kind, (x, y, z) = kinds[detection.label], map(float, detection.position_m)
-        size_m = tuple(map(float, detection.size_m))
-        distance_m, ray_x, ray_y = _direction(x - camera_m[0], y - camera_m[1], ahead)
-        is_assumed = detection.covariance_m2 is None
-        (xx, xy, _xz), (_yx, yy, _yz), (_zx, _zy, zz) = unknown_m2 if is_assumed else detection.covariance_m2
-        along = _variance_along(xx, xy, yy, ray_x, ray_y, images, lasting_m ** 2)
-        across = _variance_along(xx, xy, yy, -ray_y, ray_x, images, lasting_m ** 2)
-        cut_left, _top, cut_right, _bottom = detection.truncated_edges
-        if side or cut_left or cut_right:
-            across += CUT_SIGMA_M ** 2
-        if cut_left or cut_right:
-            side = int(cut_left) - int(cut_right) if size_m[0] < PART_M else 0
-        shift_m = side * min(max((kind.known.width + WIDER_M - size_m[0]) / 2, 0.0), MAX_SHIFT_M)
-        measurements.append(Measurement(
-            x - shift_m * ray_y, y + shift_m * ray_x, z, along * ray_x * ray_x + across * ray_y * ray_y,
-            (along - across) * ray_x * ray_y, along * ray_y * ray_y + across * ray_x * ray_x, float(zz), is_assumed,
-            size_m, distance_m, ray_x, ray_y, kind, detection, number))
+        x, y, _z = map(float, detection.position_m)
+        direction = _direction(x - camera_m[0], y - camera_m[1], ahead)
+        measurements.append(_measurement(detection, number, side, kinds[detection.label], direction, noise))
     return measurements
+
+
+def _measurement(detection, number, side, kind, direction, noise):
+    (x, y, z), (_distance_m, ray_x, ray_y) = map(float, detection.position_m), direction
+    size_m, is_assumed, lasting_m2 = tuple(map(float, detection.size_m)), False, noise.lasting_m ** 2
+    if detection.covariance_m2 is None:
+        xx = yy = zz = noise.unknown_m ** 2
+        cross, is_assumed = 0.0, True
+    else:
+        (xx, xy, _xz), (yx, yy, _yz), (_zx, _zy, zz) = detection.covariance_m2
+        cross = xy + yx
+    along = float(xx * ray_x * ray_x + cross * ray_x * ray_y + yy * ray_y * ray_y)
+    across = float(xx * ray_y * ray_y - cross * ray_x * ray_y + yy * ray_x * ray_x)
+    along += (noise.images - 1) * min(along, lasting_m2) + FLOOR_M ** 2
+    across += (noise.images - 1) * min(across, lasting_m2) + FLOOR_M ** 2
+    cut_left, _top, cut_right, _bottom = detection.truncated_edges
+    if side or cut_left or cut_right:
+        across += CUT_SIGMA_M ** 2
+    if is_assumed:
+        along, across = noise.unknown_scale * along, noise.unknown_scale * across
+    if cut_left or cut_right:
+        side = int(cut_left) - int(cut_right) if size_m[0] < PART_M else 0
+    shift_m = side * min(max((kind.known.width + WIDER_M - size_m[0]) / 2, 0.0), MAX_SHIFT_M)
+    return Measurement(
+        x - shift_m * ray_y, y + shift_m * ray_x, z, along * ray_x * ray_x + across * ray_y * ray_y,
+        (along - across) * ray_x * ray_y, along * ray_y * ray_y + across * ray_x * ray_x, float(zz), is_assumed, size_m,
+        *direction, kind=kind, detection=detection, number=number)
 
 
 def _direction(x, y, ahead):
     """Distance and unit vector (x, y) of a place relative to the camera."""
     distance_m = math.hypot(x, y)
     return (distance_m, x / distance_m, y / distance_m) if distance_m >= NEAR_M else (NEAR_M, *ahead)
-
-
-def _variance_along(xx, xy, yy, x, y, images, lasting_m2):
-    """Variance of a covariance along a unit vector (x, y), with the lasting part counted `images` times."""
-    variance_m2 = float(xx * x * x + 2 * xy * x * y + yy * y * y)
-    return variance_m2 + (images - 1) * min(variance_m2, lasting_m2) + FLOOR_M ** 2
 
 
 def _hidden_sides(detections, view):
@@ -174,7 +188,8 @@ def scaled(measurement, scale):
     """The measurement with the variances of assumed noise multiplied by `scale`."""
     if not measurement.is_assumed or scale == 1:
         return measurement
-    return measurement._replace(xx=scale * measurement.xx, xy=scale * measurement.xy, yy=scale * measurement.yy)
+    x, y, z, xx, xy, yy, *others = measurement
+    return Measurement(x, y, z, scale * xx, scale * xy, scale * yy, *others)
 
 
 def learned_log_scale(log_scale, matches):

@@ -28,6 +28,7 @@ HIT = 0.4  # of a detection where a track is expected: little, because false det
 MAX_TRACK_SCORE = 4.0  # earlier evidence is forgotten: an undetected person is published for 0.4 s
 MIN_TRACK_SCORE = -2.0  # with less (12 % probability), tracks do not start, and undetected tracks are not published
 SMOOTHING = 0.1  # weight of the newest detection in size, height and score
+SMOOTHED_HITS = 10  # number of detections from which on their mean has this weight
 CUT_SMOOTHING = 0.02  # the same for boxes that the image border truncates sideways: the head may be outside
 CUT_LASTS_NS = NS // 2  # hysteresis: an end is visible again this long after it was last truncated
 LEAST_HEIGHT_M = 0.1
@@ -194,6 +195,8 @@ class Track(object):
 
 def _end_after(end, is_cut, stamp_ns):
     """The _End after a detection, and whether it moves with the other one."""
+    if not is_cut and end.hits >= SMOOTHED_HITS and end.cut_ns < stamp_ns - CUT_LASTS_NS:
+        return end, False  # further detections make no difference
     cut_ns = stamp_ns if is_cut else end.cut_ns
     was_cut = not is_cut and stamp_ns - cut_ns < CUT_LASTS_NS
     hits = end.hits + (not is_cut and not was_cut)

@@ -19,8 +19,9 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import associate
 from ros_3d_bb.tracking.birth import NEW_NS, duplicates, initiate
 from ros_3d_bb.tracking.common_motion import FEWEST, SETTLED_NS, common_motion, may_jump, most_fit, moved
-from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, Kinds, NoiseParams, correlated_images,
-                                                  learned_log_scale, learned_range, measurements_of, scaled)
+from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, BoxNoise, Kinds, NoiseParams,
+                                                  correlated_images, learned_log_scale, learned_range,
+                                                  measurements_of, scaled)
 from ros_3d_bb.tracking.occlusion import CameraState, mark_missed, recent_others
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
 from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, SEEN, PredictionParams, Rules, Track, learned_prediction,
@@ -182,11 +183,9 @@ class Tracker(TrackerBase):
         separate people from their tracks."""
         params, noise, _prediction = self._params
         images = correlated_images(_period_s(before, image), self._detector, params.acceleration)
-        measurements = measurements_of(image.detections, image.view, images, noise.noise_unknown, self._kinds,
-                                       self._detector.lasting_sigma_m)
-        if before.log_noise_scale <= 0:
-            return measurements
-        return [scaled(measurement, math.exp(before.log_noise_scale)) for measurement in measurements]
+        noise = BoxNoise(noise.noise_unknown, math.exp(max(before.log_noise_scale, 0)), self._detector.lasting_sigma_m,
+                         images)
+        return measurements_of(image.detections, image.view, noise, self._kinds)
 
     def _associate(self, before, tracks, measurements, image):
         """Assign measurements to tracks; if the pose of the camera jumped, the tracks are moved before.
