@@ -137,7 +137,7 @@ def measurements_of(detections, view, noise, kinds):
 
 
 def _measurement(detection, number, side, kind, direction, noise):
-    (x, y, z), (_distance_m, ray_x, ray_y) = map(float, detection.position_m), direction
+    (x, y, z), (ray_x, ray_y) = map(float, detection.position_m), direction[1:]
     size_m, is_assumed, lasting_m2 = tuple(map(float, detection.size_m)), False, noise.lasting_m ** 2
     if detection.covariance_m2 is None:
         xx = yy = zz = noise.unknown_m ** 2
