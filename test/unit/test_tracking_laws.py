@@ -48,6 +48,16 @@ def test_covariances_of_tracks_are_positive_definite_whatever_boxes_come(seed):
                 assert np.isfinite(covariance).all() and (np.linalg.eigvalsh(covariance) > 0).all()
 
 
+@pytest.mark.parametrize('angle', [0, 0.5, np.pi / 4])
+def test_nearly_singular_covariances_do_not_stop_the_tracker(angle):
+    """Messages may have a variance that rounding makes negative, of up to 1e-9 of the largest one."""
+    along, tracker = np.array([np.cos(angle), np.sin(angle), 0]), Tracker()
+    covariance_m2 = 1e7 * np.outer(along, along) - 0.005 * np.eye(3)
+    for number in range(30):
+        detection = Detection(np.append(3 * along[:2], 0.85), np.array([0.5, 0.5, 1.7]), covariance_m2)
+        tracker.update(START_NS + number * NS // 30, [detection], CameraView(mounted(1.0), CAMERA))
+
+
 def ends_of_sliders():
     """Each live parameter of each tracker, at both ends of its slider."""
     for make, kinds in ((Tracker, KALMAN), (ThesisTracker, (ThesisTrackerParams,))):

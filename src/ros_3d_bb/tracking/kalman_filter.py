@@ -4,7 +4,7 @@ Convention: lengths are in metres, times in seconds, in the fixed frame. If the 
 background, the measurement lies behind the person on the viewing ray. The measurement error is therefore a mixture of
 two Gaussians, one of them shifted along the ray.
 
-The algebra of 2x2 and 4x4 matrices is written out, because numpy takes ten times as long for a few numbers.
+The algebra of 2x2 and 4x4 matrices is written out, because numpy takes several times as long for a few numbers.
 """
 import math
 from typing import NamedTuple

@@ -145,8 +145,9 @@ def _measurement(detection, number, side, kind, direction, noise):
     else:
         (xx, xy, _xz), (yx, yy, _yz), (_zx, _zy, zz) = detection.covariance_m2
         cross = xy + yx
-    along = float(xx * ray_x * ray_x + cross * ray_x * ray_y + yy * ray_y * ray_y)
-    across = float(xx * ray_y * ray_y - cross * ray_x * ray_y + yy * ray_x * ray_x)
+    # Rounding may have made the variances of a covariance that is nearly singular negative.
+    along = max(float(xx * ray_x * ray_x + cross * ray_x * ray_y + yy * ray_y * ray_y), 0.0)
+    across = max(float(xx * ray_y * ray_y - cross * ray_x * ray_y + yy * ray_x * ray_x), 0.0)
     along += (noise.images - 1) * min(along, lasting_m2) + FLOOR_M ** 2
     across += (noise.images - 1) * min(across, lasting_m2) + FLOOR_M ** 2
     cut_left, _top, cut_right, _bottom = detection.truncated_edges
