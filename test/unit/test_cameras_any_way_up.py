@@ -63,7 +63,7 @@ def test_a_cut_body_is_completed_the_way_it_stands(height_m, pitch_deg, roll_deg
     detection, = detections_from_boxes({0: box}, map_from_camera)
     _left, top, _right, bottom = detection.truncated_edges
     assert detection.size_m[0] < 0.65
-    assert np.linalg.norm(detection.position_m[:2] - person[:2]) < 0.3
+    assert np.hypot(detection.position_m[0] - person.x_m, detection.position_m[1] - person.y_m) < 0.3
     if not (top and bottom) and x_m > 1:
         assert abs(detection.size_m[2] - person.height_m) < 0.25
         assert abs(detection.position_m[2] - person.height_m / 2) < 0.2

@@ -1,5 +1,6 @@
 """Detector model: from recordings with ground truth to the tracker."""
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_fr
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.error_model import read_error_model
+from ros_3d_bb.tracking.measurement_model import DEFAULT_RANGE_M, learned_range
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import VISIBLE, CameraView, Detection
 from ros_3d_bb_lab.evaluation.noise import __main__ as command
@@ -71,6 +73,19 @@ def test_the_command_writes_the_model(tmp_path, monkeypatch, capsys, run):
     command.main()
     detector = read_error_model(tmp_path / 'out' / 'error_model.yaml').detector
     assert detector.max_range_m == RANGE_M and 'max_range_m: 12' in capsys.readouterr().out
+
+
+def test_the_range_is_learned_from_people_farther_away():
+    def matches(*distances_m, is_confirmed=True):
+        return [(SimpleNamespace(is_confirmed=is_confirmed), SimpleNamespace(distance_m=distance_m))
+                for distance_m in distances_m]
+    range_m = DEFAULT_RANGE_M
+    for _image in range(100):
+        range_m = learned_range(range_m, matches(3.0, 7.0))
+    assert range_m == DEFAULT_RANGE_M
+    for _image in range(100):
+        range_m = learned_range(range_m, matches(3.0, 12.0, 20.0) + matches(90.0, is_confirmed=False))
+    assert range_m == pytest.approx(16.0, abs=0.1)
 
 
 def leave(detector, distance_m, others_m=()):

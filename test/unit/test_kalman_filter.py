@@ -1,74 +1,102 @@
 """The filter's laws: it is a Kalman filter where nothing is an outlier, the same at any frame rate, and not fooled."""
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.tracking.kalman_filter import negative_log_likelihood, predict, update
-from ros_3d_bb.tracking.measurement_model import MEASUREMENT
+from ros_3d_bb.tracking.association import position_cost, position_costs
+from ros_3d_bb.tracking.kalman_filter import outlier_model, predict, update
 from ros_3d_bb.tracking.tracker import TrackerParams
+from support.states import covariance_of, mean_of, state_of
 
-OUTLIERS, NONE = TrackerParams(), TrackerParams(outlier_share=0.0)
+OUTLIERS, NONE = outlier_model(TrackerParams()), outlier_model(TrackerParams(outlier_share=0.0))
 SECONDS = st.floats(0.01, 2)
 
 
-def state(position=(0, 0), velocity=(0, 0), spread=0.3, speed_spread=0.8):
-    return (np.array([tuple(position) + tuple(velocity)], float),
-            np.diag([spread ** 2, spread ** 2, speed_spread ** 2, speed_spread ** 2])[None])
+def state(position=(0, 0), velocity=(0, 0), spread=0.3, speed_spread=0.8, xu=0.0):
+    covariance = np.diag([spread ** 2, spread ** 2, speed_spread ** 2, speed_spread ** 2])
+    covariance[0, 2] = covariance[2, 0] = xu
+    return state_of(tuple(position) + tuple(velocity), covariance)
 
 
-def measured_at(positions_m, sigma=0.1):
-    """Measurements (m,) on viewing rays along x."""
-    measurements = np.zeros(len(positions_m), MEASUREMENT)
-    measurements['position_m'], measurements['noise_m2'] = positions_m, np.eye(2) * sigma ** 2
-    measurements['ray'] = 1.0, 0.0
-    return measurements
+def measured_at(x, y, sigma=0.1, ray=(1.0, 0.0)):
+    """A measurement on a viewing ray, along x by default."""
+    return SimpleNamespace(x=x, y=y, xx=sigma ** 2, xy=0.0, yy=sigma ** 2, ray_x=ray[0], ray_y=ray[1])
 
 
 @given(SECONDS, SECONDS)
 def test_two_steps_are_one(first_s, second_s):
-    mean, covariance = state((1, 2), (0.5, -1))
-    once = predict(mean, covariance, first_s + second_s, 0.08)
-    twice = predict(*predict(mean, covariance, first_s, 0.08), elapsed_s=second_s, density=0.08)
-    for one, other in zip(once, twice):
-        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
+    start = state((1, 2), (0.5, -1))
+    once = predict(start, first_s + second_s, 0.08)
+    twice = predict(predict(start, first_s, 0.08), second_s, 0.08)
+    np.testing.assert_allclose(once, twice, rtol=1e-9, atol=1e-12)
+
+
+@given(SECONDS, st.integers(0, 1000))
+def test_the_prediction_is_that_of_the_textbook(elapsed_s, seed):
+    """F P F^T + Q with matrices."""
+    factors = np.random.RandomState(seed).normal(0, 1, (4, 4))
+    start, step = state_of((1, 2, 0.5, -1), factors.dot(factors.T)), np.eye(4)
+    step[0, 2] = step[1, 3] = elapsed_s
+    white = np.array([[elapsed_s ** 3 / 3, elapsed_s ** 2 / 2], [elapsed_s ** 2 / 2, elapsed_s]])
+    after = predict(start, elapsed_s, 0.08)
+    np.testing.assert_allclose(mean_of(after), step.dot(mean_of(start)))
+    np.testing.assert_allclose(covariance_of(after), step.dot(covariance_of(start)).dot(step.T)
+                               + 0.08 * np.kron(white, np.eye(2)), rtol=1e-9, atol=1e-12)
 
 
 @given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.02, 0.5))
 def test_without_outliers_it_is_the_textbook_filter(x, y, sigma):
-    mean, covariance = state()
-    covariance[0, 0, 2] = covariance[0, 2, 0] = 0.1
-    matrix = np.eye(2, 4)
-    innovation = matrix.dot(covariance[0]).dot(matrix.T) + sigma ** 2 * np.eye(2)
-    gain = covariance[0].dot(matrix.T).dot(np.linalg.inv(innovation))
-    got_mean, got_covariance = update(mean, covariance, measured_at([(x, y)], sigma), NONE)
-    np.testing.assert_allclose(got_mean[0], gain.dot([x, y]), atol=1e-9)
-    np.testing.assert_allclose(got_covariance[0], (np.eye(4) - gain.dot(matrix)).dot(covariance[0]), atol=1e-9)
+    start, matrix = state(xu=0.1), np.eye(2, 4)
+    covariance = covariance_of(start)
+    innovation = matrix.dot(covariance).dot(matrix.T) + sigma ** 2 * np.eye(2)
+    gain = covariance.dot(matrix.T).dot(np.linalg.inv(innovation))
+    after = update(start, measured_at(x, y, sigma), NONE)
+    np.testing.assert_allclose(mean_of(after), gain.dot([x, y]), atol=1e-9)
+    np.testing.assert_allclose(covariance_of(after), (np.eye(4) - gain.dot(matrix)).dot(covariance), atol=1e-9)
+
+
+@given(st.integers(0, 1000))
+def test_the_mixture_has_the_mean_and_the_covariance_of_both_updates(seed):
+    random = np.random.RandomState(seed)
+    factors, angle = random.normal(0, 0.5, (4, 4)), random.uniform(-np.pi, np.pi)
+    mean, covariance, ray = random.normal(0, 1, 4), factors.dot(factors.T), np.array([np.cos(angle), np.sin(angle)])
+    place_m, matrix, means, covariances, densities = random.normal(0, 0.5, 2), np.eye(2, 4), [], [], []
+    for share, offset_m, spread_m in ((0.9, 0.0, 0.0), (0.1, 0.45, 0.3)):
+        innovation = place_m - mean[:2] - offset_m * ray
+        spread = covariance[:2, :2] + 0.1 ** 2 * np.eye(2) + spread_m ** 2 * np.outer(ray, ray)
+        gain = covariance.dot(matrix.T).dot(np.linalg.inv(spread))
+        means.append(mean + gain.dot(innovation))
+        covariances.append(covariance - gain.dot(matrix).dot(covariance))
+        distance2 = innovation.dot(np.linalg.solve(spread, innovation))
+        densities.append(share * np.exp(-distance2 / 2) / np.sqrt(np.linalg.det(spread)))
+    shares, mixed = np.array(densities) / sum(densities), np.average(means, axis=0, weights=densities)
+    spreads = [part + np.outer(own - mixed, own - mixed) for part, own in zip(covariances, means)]
+    after = update(state_of(mean, covariance), measured_at(*place_m, ray=ray), OUTLIERS)
+    np.testing.assert_allclose(mean_of(after), mixed, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(covariance_of(after), np.average(spreads, axis=0, weights=shares), rtol=1e-6, atol=1e-8)
 
 
 def test_a_measurement_behind_the_person_is_an_outlier_and_one_beside_is_not():
     """0.8 m behind is what a background pixel looks like; 0.8 m beside no background explains."""
     sure = state(spread=0.1)
-    behind, _covariance = update(*sure, measurements=measured_at([(0.8, 0.0)]), params=OUTLIERS)
-    beside, _covariance = update(*sure, measurements=measured_at([(0.0, 0.8)]), params=OUTLIERS)
-    plain, _covariance = update(*sure, measurements=measured_at([(0.8, 0.0)]), params=NONE)
-    assert abs(behind[0, 0]) < 0.1 and plain[0, 0] == pytest.approx(0.4, abs=1e-4)
-    assert beside[0, 1] == pytest.approx(0.4, abs=1e-4)
+    behind, beside = update(sure, measured_at(0.8, 0.0), OUTLIERS), update(sure, measured_at(0.0, 0.8), OUTLIERS)
+    plain = update(sure, measured_at(0.8, 0.0), NONE)
+    assert abs(behind.x) < 0.1 and plain.x == pytest.approx(0.4, abs=1e-4)
+    assert beside.y == pytest.approx(0.4, abs=1e-4)
 
 
-def test_likelihood_is_a_density():
+def test_the_cost_of_a_position_is_that_of_a_density():
     """p, summed over a fine grid of places, is a probability of 1."""
-    mean, covariance = state(spread=0.2)
     step_m = 0.05
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(-3, 4, step_m), np.arange(-3, 3, step_m)))
-    cost = negative_log_likelihood(mean, covariance, measured_at(np.column_stack((x, y))), OUTLIERS)
-    assert np.exp(-cost).sum() * step_m ** 2 == pytest.approx(1, abs=0.01)
+    costs = position_costs(x, y, 0.05, 0.0, 0.05, 1.0, 0.0, OUTLIERS)
+    assert np.exp(-costs).sum() * step_m ** 2 == pytest.approx(1, abs=0.01)
 
 
-def test_all_pairs_are_as_likely_as_each_alone():
-    random = np.random.RandomState(3)
-    mean, covariance = random.normal(0, 1, (3, 4)), np.tile(np.eye(4) * 0.1, (3, 1, 1))
-    measurements = measured_at(random.normal(0, 1, (5, 2)))
-    cost = negative_log_likelihood(mean, covariance, measurements, OUTLIERS)
-    assert cost.shape == (3, 5)
-    alone = negative_log_likelihood(mean[1:2], covariance[1:2], measurements[2:3], OUTLIERS)
-    assert cost[1, 2] == pytest.approx(alone[0, 0])
+def test_costs_of_arrays_are_those_of_numbers():
+    x, y, xx, yy = np.random.RandomState(3).uniform(0.5, 1, (4, 7))
+    each = [position_cost(*numbers, ray_x=0.6, ray_y=0.8, outliers=OUTLIERS)
+            for numbers in zip(x.tolist(), y.tolist(), xx.tolist(), [0.3] * 7, yy.tolist())]
+    np.testing.assert_allclose(position_costs(x, y, xx, 0.3, yy, 0.6, 0.8, OUTLIERS), each)

@@ -92,12 +92,12 @@ def test_exact_boxes_have_the_covariance_of_the_error_model(approach):
     model = read_error_model(ERROR_MODEL)
     _step, (before,), _view = next(detect_in_scene(approach, exact_detector(approach)))
     step, (detection,), _view = next(detect_in_scene(approach, exact_detector(approach), error_model=model))
-    assert before.covariance_m2[2, 2] == pytest.approx(0.1 ** 2)
+    assert before.covariance_m2[2][2] == pytest.approx(0.1 ** 2)
     camera_m = step.frame.poses.map_from_camera[:3, 3]
     x_m, y_m, z_m = detection.position_m - camera_m
     expected, = model.covariance(np.array([(-y_m, -z_m, x_m)]))
-    assert detection.covariance_m2[0, 0] == pytest.approx(expected[2, 2] + 0.03 ** 2, rel=0.01)
-    assert detection.covariance_m2[2, 2] == pytest.approx(expected[1, 1])
+    assert detection.covariance_m2[0][0] == pytest.approx(expected[2, 2] + 0.03 ** 2, rel=0.01)
+    assert detection.covariance_m2[2][2] == pytest.approx(expected[1, 1])
 
 
 @pytest.mark.slow

@@ -266,7 +266,7 @@ def test_published_tracks_keep_their_ids_when_a_late_image_shows_another_person(
     play(tracker, 0.3, standing((3, 0), (4, 1.2)), start_s=1.1)
     objects = tracker.update(START_NS + int(1.05 * NS), [at(3, 0), at(2, -1)], VIEW)
     play(tracker, 0.3, standing((3, 0), (4, 1.2), (2, -1)), start_s=1.5)
-    assert ids(tracker.objects()) == [1, 2, 3]
+    assert ids(tracker.tracks()) == [1, 2, 3]
     assert ids(objects) == [1, 2] and objects[1].position_m[0] == pytest.approx(4, abs=0.1)
 
 
@@ -276,7 +276,7 @@ def test_a_duplicate_or_too_late_image_is_rejected_without_any_change(late_s):
     before = play(tracker, 1, standing((3, 0)))[-1]
     with pytest.raises(ValueError, match='stamp'):
         tracker.update(START_NS + int(round((29 / 30 - late_s) * NS)), [at(3, 1)], VIEW)
-    np.testing.assert_array_equal(tracker.objects()[0].covariance, before[0].covariance)
+    np.testing.assert_array_equal(tracker.tracks()[0].covariance, before[0].covariance)
     assert ids(tracker.update(START_NS + NS, [at(3, 0)], VIEW)) == [1]
 
 
@@ -340,7 +340,7 @@ def test_late_images_are_replayed_with_the_new_parameters():
     """Three images late: the track is the same before and after the change."""
     tracker = Tracker()
     play(tracker, 1, standing((3, 0)))
-    number, = ids(tracker.objects())
+    number, = ids(tracker.tracks())
     tracker.reconfigure(TrackerParams(acceleration=0.5), NoiseParams(), PredictionParams())
     assert ids(tracker.update(START_NS + int(0.9 * NS) + 1, [at(3, 0)], VIEW)) == [number]
 

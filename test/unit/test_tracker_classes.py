@@ -3,8 +3,9 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.class_numbers import MAX_UNLISTED, OTHER, ClassNumbers
+from ros_3d_bb.tracking.measurement_model import Kinds
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import NOT_DETECTED, VISIBLE, CameraView, Detection
@@ -105,13 +106,14 @@ def test_classes_that_are_not_listed_are_groups_of_their_own():
     assert [track.label for track in tracks] == ['drone', 'pet', 'dog']
 
 
-def test_the_number_of_class_names_is_limited():
-    classes = ClassNumbers()
-    listed = len(classes.labels)
-    numbers = [classes.of('class %d' % number) for number in range(MAX_UNLISTED + 50)]
-    assert len(classes.labels) == listed + MAX_UNLISTED + 1
-    assert len(set(numbers)) == MAX_UNLISTED + 1 and classes.labels[numbers[-1]] == OTHER
-    assert classes.of(OTHER) == numbers[-1] and classes.of('class 3') == numbers[3]
+def test_class_names_that_are_not_listed_are_not_kept():
+    """Boxes may have any number of them."""
+    table = ObjectClasses()
+    kinds = Kinds(table)
+    listed = len(kinds)
+    assert kinds['pet'].group != kinds['dog'].group == kinds['cat'].group
+    assert kinds['class 3'] == kinds['class 3'] and kinds['class 3'].members == ('class 3',)
+    assert len(kinds) == listed == len(table.listed)
 
 
 def test_furniture_moves_less_than_people():

@@ -1,5 +1,6 @@
 """Conversions between ROS messages and the detections, boxes, tracks and cameras of this package."""
 import functools
+import math
 import re
 from typing import NamedTuple, Optional, Tuple
 
@@ -277,7 +278,7 @@ def _is_covariance(elements_m2):
     It is if the Gaussian elimination of its symmetric part, plus the tolerance, has positive pivots. For single small
     matrices, arithmetic is several times as fast as numpy's eigenvalues.
     """
-    if not all(-FARTHEST_M < element_m2 < FARTHEST_M for element_m2 in elements_m2):
+    if not (math.isfinite(sum(elements_m2)) and max(map(abs, elements_m2)) < FARTHEST_M):
         return False
     xx, xy, xz, yx, yy, yz, zx, zy, zz = elements_m2
     tolerance_m2 = ROUNDING * max(1, max(elements_m2)) / 2
@@ -304,15 +305,24 @@ def _track_to_msg(track):
     _set_position(message.pose.pose, track.position_m.tolist())
     for position_m in track.prediction_m.tolist():
         pose = PoseWithCovariance()
-        _set_position(pose.pose, position_m)
+        point, pose.pose.orientation.w = pose.pose.position, 1.0
+        point.x, point.y, point.z = position_m
         message.prediction.append(pose)
     if track.covariance is not None:
-        message.pose.covariance, message.twist.covariance = _covariances_6x6([track.covariance[:3, :3],
-                                                                              track.covariance[3:, 3:]])
-    if track.prediction_covariance_m2 is not None:
-        for pose, covariance in zip(message.prediction, _covariances_6x6(track.prediction_covariance_m2)):
+        message.pose.covariance, message.twist.covariance, *ahead = _covariances_6x6(track)
+        for pose, covariance in zip(message.prediction, ahead):
             pose.covariance = covariance
     return message
+
+
+def _covariances_6x6(track):
+    """Flattened 6x6 covariances, as in geometry_msgs, of the position, the velocity and the predicted positions of a
+    track; zeros for the rotation: an upright cylinder is rotationally symmetric."""
+    full = np.zeros((2 + len(track.prediction_m), 6, 6))
+    full[0, :3, :3], full[1, :3, :3] = track.covariance[:3, :3], track.covariance[3:, 3:]
+    if track.prediction_covariance_m2 is not None:
+        full[2:, :3, :3] = track.prediction_covariance_m2
+    return full.reshape(-1, 36).tolist()
 
 
 def tracks_from_msg(message):
@@ -336,14 +346,6 @@ def _track_from_msg(track):
                          track.status, track.moving, track.first_seen.to_nsec(), track.last_seen.to_nsec(),
                          prediction_m, track.prediction_step.to_sec(), covariance, prediction_covariance_m2,
                          track.label or PERSON, track.score, track.detection)
-
-
-def _covariances_6x6(covariances):
-    """Flattened 6x6 covariances as in geometry_msgs, with zeros for the rotation: an upright cylinder is rotationally
-    symmetric."""
-    full = np.zeros((len(covariances), 6, 6))
-    full[:, :3, :3] = covariances
-    return full.reshape(-1, 36).tolist()
 
 
 def _covariance_3x3(with_covariance):

@@ -59,8 +59,10 @@ class CameraClocks(object):
             own = alive[name]
             supporters = sum(own.is_near(other, LONGEST_LAG_NS) for other in alive.values())
             return supporters, -own.since_ns, own.stamp_ns - own.arrival_ns
-        trusted = max([name for name in alive if name == camera or self._is_tracked(name, now_ns)], key=rank)
-        is_accepted = clock.is_near(alive[trusted], JUMP_NS)
+        trusted, is_accepted = camera, True
+        if len(alive) > 1:
+            trusted = max([name for name in alive if name == camera or self._is_tracked(name, now_ns)], key=rank)
+            is_accepted = clock.is_near(alive[trusted], JUMP_NS)
         self._clocks[camera] = clock._replace(since_ns=min(clock.since_ns, now_ns) if is_accepted else NEVER)
         return None if is_accepted else trusted
 
@@ -81,6 +83,8 @@ class CameraClocks(object):
 
     def is_jump_back(self, stamp_ns, now_ns, camera):
         """Whether an accepted image is a backward jump in time, and not a camera that lags behind an ended one."""
+        if stamp_ns >= max(self._newest_ns.values(), default=stamp_ns) - JUMP_NS:
+            return False
         ahead = {other: newest_ns for other, newest_ns in self._newest_ns.items() if stamp_ns < newest_ns - JUMP_NS}
         return (camera in ahead or any(self._is_tracked(other, now_ns) for other in ahead)
                 or stamp_ns < max(ahead.values(), default=stamp_ns) - LONGEST_LAG_NS)

@@ -8,7 +8,7 @@ class DetectorModel(NamedTuple):
     Errors up to the standard deviation `lasting_sigma_m` are correlated for `correlation_time_s`; the rest is
     independent in each image. A visible person within `max_range_m` of the camera is detected with
     `detection_probability`; farther people are not expected to be detected. If `max_range_m` is None, the tracker
-    learns it (`occlusion.learned_range`).
+    learns it (`measurement_model.learned_range`).
     """
 
     lasting_sigma_m: float = 0.035

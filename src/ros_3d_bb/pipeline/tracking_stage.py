@@ -104,7 +104,7 @@ class TrackingStage(object):
         self.lock = threading.RLock()
         self._clocks = CameraClocks()
         self._jumps = 0  # number of backward jumps in time
-        self._frames, self._intrinsics = {}, {}  # by camera
+        self._frames, self._usable_frames, self._intrinsics = {}, {}, {}  # by camera
         self._depths = {camera: MessageCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
         self._registrations = {camera: DepthRegistration(transforms, topic_of(camera, DEPTH_TOPICS[RAW][1]))
                                for camera in self.cameras if params.depth == RAW}
@@ -139,9 +139,11 @@ class TrackingStage(object):
         """
         stamp_ns, camera_name = stamp_of(message), camera or message.header.frame_id
         frame_id, target_frame = self._params.camera_frame or message.header.frame_id, self._params.target_frame
-        fault = target_frame_fault(target_frame, frame_id)
-        if fault:
-            raise ValueError('%s (~target_frame); %s' % (fault, POSE))
+        if self._usable_frames.get(camera) != frame_id:
+            fault = target_frame_fault(target_frame, frame_id)
+            if fault:
+                raise ValueError('%s (~target_frame); %s' % (fault, POSE))
+            self._usable_frames[camera] = frame_id
         with self.lock:
             if not self._accept(stamp_ns, now_ns, camera):
                 return
@@ -164,7 +166,8 @@ class TrackingStage(object):
 
     def _track(self, message, stamp_ns, fixed_from_camera, camera, camera_name):
         boxes, faults = usable_boxes3d(message)
-        self._events.count_dropped('3D boxes', faults)
+        if faults:
+            self._events.count_dropped('3D boxes', faults)
         if faults and not boxes:  # differs from an image without people
             self._tracker.skip(stamp_ns, camera_name)
             raise ValueError('none of their %d boxes is valid; tracks are kept as they are' % len(faults))
@@ -184,8 +187,9 @@ class TrackingStage(object):
     def _view(self, header, fixed_from_camera, camera, camera_name):
         """Return the CameraView of boxes with this header, with intrinsics and depth if they are known."""
         intrinsics, depth_at = self._intrinsics.get(camera), None
-        depths = self._depths[camera]
-        entry = depths.nearest(header.stamp.to_nsec(), int(self._params.stamp_tolerance * NS) or depths.half_period_ns)
+        depths, stamp_ns = self._depths[camera], header.stamp.to_nsec()
+        entry = depths.nearest(stamp_ns) or depths.nearest(
+            stamp_ns, int(self._params.stamp_tolerance * NS) or depths.half_period_ns)
         if intrinsics is not None and entry is not None:
             depth_at = self._depth_at(*entry.value, intrinsics, camera, header.frame_id)
         return CameraView(fixed_from_camera, intrinsics, camera_name, depth_at)
@@ -193,7 +197,7 @@ class TrackingStage(object):
     def _depth_at(self, depth, depth_frame, intrinsics, camera, boxes_frame):
         """Return `CameraView.depth_at` for a depth image; None if it cannot be used, which bbox3d_node reports."""
         if camera not in self._registrations:
-            is_aligned = depth.shape == (intrinsics.height, intrinsics.width)
+            is_aligned = depth.values.shape == (intrinsics.height, intrinsics.width)
             return functools.partial(depths_towards, intrinsics, depth) if is_aligned else None
         try:
             geometry = self._registrations[camera].geometry(depth, depth_frame, intrinsics,
@@ -205,16 +209,16 @@ class TrackingStage(object):
     def _accept(self, stamp_ns, now_ns, camera):
         """Whether the stamp of boxes is consistent with those of the other cameras. Handles backward jumps in time, as
         when a bag is looped or rewound: tracks are discarded."""
-        newest_ns = self._clocks.newest_ns or stamp_ns
         trusted = self._clocks.accept(stamp_ns, now_ns, camera)
         if trusted is not None:
+            newest_ns = self._clocks.newest_ns or stamp_ns
             self._events.warn(AHEAD if stamp_ns > newest_ns else BEHIND, 'boxes of %s at %.3f are dropped: their stamp '
                               'is %.3f s from the newest one, and %s has the correct time; they are tracked once that '
                               'camera agrees or ends'
                               % (camera, stamp_ns / NS, (stamp_ns - newest_ns) / NS, trusted))
         elif self._clocks.is_jump_back(stamp_ns, now_ns, camera):
             self._events.note('jumps back in time', 'time jumped back from %.3f to %.3f: earlier tracks are discarded'
-                              % (newest_ns / NS, stamp_ns / NS))
+                              % (self._clocks.newest_ns / NS, stamp_ns / NS))
             self._tracker.reset()
             self._clocks.restart()
             self._jumps += 1

@@ -1,57 +1,149 @@
-"""Data association: assign the detections of an image to tracks."""
+"""Data association: the gate and the costs of pairs of a track and a measurement, and their assignment."""
+import math
+
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking import kalman_filter
+from ros_3d_bb.tracking.kalman_filter import as_outlier, weighted
 
-RECENT_NS = 7 * NS // 10  # tracks matched less than this ago are associated before the others
-UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection
-HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height: the camera tilts during driving
-HIDDEN_FEET_COST = 4.0  # cost of a box whose top matches but whose height does not: its lower part is occluded
+RECENT_NS = 7 * NS // 10  # tracks matched less than this ago are associated before the others; chosen
+UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection; chosen
+HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height; chosen: the camera tilts
+HIDDEN_FEET_COST = 4.0  # cost of a box whose top matches but whose height does not; chosen: its legs are occluded
+CROWD = 200  # pairs from which on arrays are faster than numbers; measured with `./run bench speed`
+LOG_TWO_PI = math.log(2 * math.pi)
 
 
-def associate(tracks, measurements, stamp_ns, params, classes):
-    """Assign measurements to tracks (arrays of TRACK and MEASUREMENT) in a cascade: recently matched, then missed, then
-    tentative tracks. Returns the rows of the tracks and the columns of the measurements of the pairs.
+def associate(tracks, measurements, stamp_ns, params, outliers):
+    """Assign measurements to tracks in a cascade: recently matched, then missed, then tentative tracks.
 
-    A pair is allowed only if the track explains the detection better than a new target does, and both have the same
-    group of classes (ClassNumbers).
+    A pair is allowed only if the track explains the measurement better than a new target does (the gate), and both
+    have the same group of classes. `params` are `tracker.TrackerParams`, `outliers` their OutlierModel. Returns a list
+    of (Track, Measurement).
     """
-    cost = kalman_filter.negative_log_likelihood(tracks['mean'], tracks['covariance'], measurements, params)
-    cost += _height_cost(tracks, measurements, params.height_sigma)
-    # An uncertain detection fits a new target and a track about equally well; the track takes precedence.
-    noise_m2 = measurements['noise_m2']
-    determinant = noise_m2[:, 0, 0] * noise_m2[:, 1, 1] - noise_m2[:, 0, 1] * noise_m2[:, 1, 0]
-    largest_density = 1 / (2 * np.pi * np.sqrt(determinant))
-    density = np.minimum(params.new_target_density, UNSURE_SHARE * largest_density)
-    cost[cost >= -np.log(density)] = np.inf
-    cost[classes.group[tracks['class_number']][:, None] != classes.group[measurements['class_number']]] = np.inf
-    is_missed = stamp_ns - tracks['last_ns'] >= RECENT_NS
-    priority = np.where(tracks['confirmed'], is_missed.astype(int), 2)
-    pairs, free = [np.zeros((2, 0), int)], np.arange(cost.shape[1])
-    for rank in sorted(set(priority.tolist())):
-        candidates = (priority == rank).nonzero()[0]
-        rows, columns = assign(cost[candidates[:, None], free])
-        pairs.append((candidates[rows], free[columns]))
-        free = free[unmatched(len(free), columns)]
-    return np.concatenate(pairs, axis=1)
+    matches, ranks, taken = [], {}, set()
+    for pair, cost in allowed_costs(tracks, measurements, params, outliers).items():
+        track = tracks[pair[0]]
+        rank = int(stamp_ns - track.last_ns >= RECENT_NS) if track.is_confirmed else 2
+        ranks.setdefault(rank, {})[pair] = cost
+    for rank in sorted(ranks):
+        costs = {pair: cost for pair, cost in ranks[rank].items() if pair[1] not in taken} if taken else ranks[rank]
+        for row, column in costs if len(costs) == 1 else _assigned(costs):
+            matches.append((tracks[row], measurements[column]))
+            taken.add(column)
+    return matches
 
 
-def _height_cost(tracks, measurements, sigma_m):
-    """Association cost (n, m) of the height differences: their negative log likelihood, 0 for the same height.
+def allowed_costs(tracks, measurements, params, outliers):
+    """The costs {(number of the track, number of the measurement): cost} of the allowed pairs: -log of the density of
+    the measurement given the track, per m², and the cost of their heights."""
+    gates = [_gate(measurement, params.new_target_density, outliers) for measurement in measurements]
+    is_crowd = len(tracks) * len(measurements) >= CROWD
+    pairs = (_likely_pairs_of_crowd if is_crowd else _likely_pairs)(tracks, measurements, gates, outliers)
+    costs = {}
+    for row, column, cost in pairs:
+        track, measurement = tracks[row], measurements[column]
+        cost += _height_cost(track, measurement, params.height_sigma)
+        if cost < gates[column][0] and track.kind.group == measurement.kind.group:
+            costs[row, column] = cost
+    return costs
+
+
+def _gate(measurement, new_target_density, outliers):
+    """The cost of a new target, and two lengths for a first look: a pair is above this cost from the distance
+    `factor` * sqrt(tr P) + `reach` on, where P is the covariance of the position of the track.
+
+    The cost of a new target is -log of its density; at least that of a measurement whose own noise makes every density
+    low: an uncertain detection fits a new target and a track about equally well, and the track takes precedence. The
+    density of a Gaussian at the distance d of its mean is at most exp(-d² / (2 tr S)) / (2 pi sqrt(det R)), where R
+    is the noise and S = P + R the covariance of the innovation; the square root of tr S is at most the sum of those of
+    tr P and tr R. Outliers are nearer by their offset, and have a larger R.
+    """
+    determinant = measurement.xx * measurement.yy - measurement.xy * measurement.xy
+    limit = -math.log(min(new_target_density, UNSURE_SHARE / (2 * math.pi * math.sqrt(determinant))))
+    factor = math.sqrt(max(2 * (limit - LOG_TWO_PI) - math.log(determinant), 0))
+    reach = factor * math.sqrt(measurement.xx + measurement.yy + outliers.spread_m2) + outliers.offset_m
+    return limit, factor, reach
+
+
+def position_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers):
+    """-log of the density of an innovation (x, y) with the covariance (xx, xy, yy), per m²."""
+    inlier, _a_x, _a_y, _determinant = weighted(x, y, xx, xy, yy, outliers.log_inliers)
+    x, y, xx, xy, yy = as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers)
+    outlier, _a_x, _a_y, _determinant = weighted(x, y, xx, xy, yy, outliers.log_outliers)
+    larger, smaller = (inlier, outlier) if inlier > outlier else (outlier, inlier)
+    return LOG_TWO_PI - larger - math.log1p(math.exp(smaller - larger))
+
+
+def position_costs(x, y, xx, xy, yy, ray_x, ray_y, outliers):
+    """As `position_cost`, of arrays."""
+    outlier = as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers)
+    return LOG_TWO_PI - np.logaddexp(weighted(x, y, xx, xy, yy, outliers.log_inliers, np.log)[0],
+                                     weighted(*outlier, log_share=outliers.log_outliers, log=np.log)[0])
+
+
+def _likely_pairs(tracks, measurements, gates, outliers):
+    """The pairs (row, column, position cost) with costs below those of new targets."""
+    pairs = []
+    for row, track in enumerate(tracks):
+        x, y, _u, _v, xx, xy, _xu, _xv, yy = track.state[:9]
+        spread = math.sqrt(xx + yy)
+        for column, (measurement, (limit, factor, reach)) in enumerate(zip(measurements, gates)):
+            far, to_x, to_y = factor * spread + reach, measurement.x - x, measurement.y - y
+            if -far < to_x < far and -far < to_y < far:
+                cost = position_cost(to_x, to_y, xx + measurement.xx, xy + measurement.xy, yy + measurement.yy,
+                                     measurement.ray_x, measurement.ray_y, outliers)
+                if cost < limit:
+                    pairs.append((row, column, cost))
+    return pairs
+
+
+def _likely_pairs_of_crowd(tracks, measurements, gates, outliers):
+    """As `_likely_pairs`, by arrays."""
+    x, y, xx, xy, yy = np.array([track.state for track in tracks]).T[[0, 1, 4, 5, 8]]
+    to_x, to_y, noise_xx, noise_xy, noise_yy, ray_x, ray_y, limits, factors, reaches = np.array([
+        (measurement.x, measurement.y, measurement.xx, measurement.xy, measurement.yy, measurement.ray_x,
+         measurement.ray_y) + gate for measurement, gate in zip(measurements, gates)]).T
+    far = reaches + factors * np.sqrt(xx + yy)[:, None]
+    rows, columns = ((np.abs(to_x - x[:, None]) < far) & (np.abs(to_y - y[:, None]) < far)).nonzero()
+    costs = position_costs(to_x[columns] - x[rows], to_y[columns] - y[rows], xx[rows] + noise_xx[columns],
+                           xy[rows] + noise_xy[columns], yy[rows] + noise_yy[columns], ray_x[columns], ray_y[columns],
+                           outliers)
+    is_likely = costs < limits[columns]
+    return zip(rows[is_likely].tolist(), columns[is_likely].tolist(), costs[is_likely].tolist())
+
+
+def _height_cost(track, measurement, sigma_m):
+    """Association cost of the height difference: its negative log likelihood, 0 for the same height.
 
     The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track. The
     tops of the heads are then compared if both are known; otherwise the cost is 0. Where the height is known, the cost
     is at most that of the tops plus `HIDDEN_FEET_COST`, because furniture occludes only the lower part of a body.
     """
-    seen, cut = tracks['end_hits'] > 0, measurements['cut_ends']
-    cost = ((tracks['size_m'][:, 2:] - measurements['size_m'][:, 2]) / sigma_m) ** 2 / 2
-    tops_m = tracks['z_m'] + tracks['size_m'][:, 2] / 2, measurements['z_m'] + measurements['size_m'][:, 2] / 2
-    top_cost = ((tops_m[0][:, None] - tops_m[1]) / (HEAD_SIGMAS * sigma_m)) ** 2 / 2
-    top_cost[~(seen[:, 1:] & ~cut[:, 1])] = 0
-    heights_known = seen.all(axis=1)[:, None] & ~cut.any(axis=1)
-    return np.where(heights_known, np.minimum(cost, top_cost + HIDDEN_FEET_COST), top_cost)
+    _left, is_top_cut, _right, is_bottom_cut = measurement.detection.truncated_edges
+    if not track.upper.hits or is_top_cut:
+        return 0.0
+    height_m, seen_m = track.size_m[2], measurement.size_m[2]
+    higher_m = track.z_m + height_m / 2 - measurement.z - seen_m / 2
+    top_cost = (higher_m / (HEAD_SIGMAS * sigma_m)) ** 2 / 2
+    if not track.lower.hits or is_bottom_cut:
+        return top_cost
+    return min(((height_m - seen_m) / sigma_m) ** 2 / 2, top_cost + HIDDEN_FEET_COST)
+
+
+def _assigned(costs):
+    """The maximum number of pairs with the minimum total cost, from {(row, column): cost} of the allowed ones."""
+    if not costs:
+        return []
+    rows, columns = (sorted(set(numbers)) for numbers in zip(*costs))
+    if len(rows) == len(columns) == len(costs):  # no choice
+        return sorted(costs)
+    matrix = np.full((len(rows), len(columns)), np.inf)
+    row_of, column_of = ({number: place for place, number in enumerate(numbers)} for numbers in (rows, columns))
+    for (row, column), cost in costs.items():
+        matrix[row_of[row], column_of[column]] = cost
+    return [(rows[row], columns[column]) for row, column in zip(*(found.tolist() for found in assign(matrix)))]
 
 
 def match_greedily(distances):
@@ -84,10 +176,3 @@ def assign(costs):
     rows, columns = linear_sum_assignment(np.where(allowed, costs, forbidden))
     is_allowed = allowed[rows, columns]
     return rows[is_allowed], columns[is_allowed]
-
-
-def unmatched(count, matched):
-    """Indices (k,) below `count` that are not in `matched`, in increasing order. Faster than np.setdiff1d."""
-    is_unmatched = np.ones(count, bool)
-    is_unmatched[matched] = False
-    return is_unmatched.nonzero()[0]

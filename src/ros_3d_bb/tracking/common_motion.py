@@ -13,19 +13,19 @@ from ros_3d_bb.core.time_sync import NS
 
 # Squared Mahalanobis distances of innovations below which 90 % and 99 % lie (chi-square, 2 degrees of freedom).
 USUAL, GATE = 4.6, 9.2
-SIGNIFICANT = 25.0  # squared Mahalanobis distance of a motion: 1 of 60000 is larger by chance (3 degrees of freedom)
-FEWEST = 3  # people: two may turn or stop together
-MOST = 12  # people who vote, to limit the computing time
-LEAST_M, LARGEST_M = 0.1, 1.0  # of the jump of a person: less is left to the filter, more may be another person
+SIGNIFICANT = 25.0  # squared Mahalanobis distance of a motion; chosen: 1 of 60000 is larger by chance (3 degrees)
+FEWEST = 3  # people; chosen: two may turn or stop together
+MOST = 12  # people who vote; chosen to limit the computing time
+LEAST_M, LARGEST_M = 0.1, 1.0  # of a jump; chosen: less is left to the filter, more may be another person
 SETTLED_NS = NS  # people must have fitted for this long before a jump; chosen: the duration of a turn
 PEOPLE_MPS2 = 4.0  # upper bound of the acceleration of people; chosen: they stop and turn with 3 to 4 m/s2
-PRIOR_STD = np.array([0.5, 0.5, 0.1])  # of a jump; keeps the fit of people in one direction well-conditioned
-FITS = 3  # the pairs are selected and the motion is fitted this many times
+PRIOR_STD = np.array([0.5, 0.5, 0.1])  # of a jump; chosen: the fit of people in one direction is well-conditioned
+FITS = 3  # the pairs are selected and the motion is fitted this many times; chosen
 
 
 def may_jump(latest, others):
-    """Whether people who do not fit an image can show a motion of the frame, by the CameraVisibility of the previous
-    image of the camera, None if it is the first one, and those of the other cameras.
+    """Whether people who do not fit an image can show a motion of the frame, by the CameraState of the previous image
+    of the camera, None if it is the first one, and those of the other cameras.
 
     If the poses of several cameras disagree, people seem to jump from the image of one to that of the other. The people
     must therefore have fitted the images of the camera before, and those of the others.
@@ -33,42 +33,48 @@ def may_jump(latest, others):
     return not others or bool(latest and latest.fits) and all(other.fits is not False for other in others)
 
 
-def most_fit(tracks, known, measurements, rows, columns):
-    """Whether at least half of the known people (n,) fit their measurements without a motion; None for less than
-    `FEWEST` people.
+def most_fit(known, matches, measurement_count):
+    """Whether at least half of the known people fit their measurements without a motion; None for less than `FEWEST`
+    people or measurements.
 
-    `tracks` are predicted to the image. `rows` and `columns` are the pairs of tracks and measurements that were
-    associated without a motion.
+    `known` are confirmed tracks that the camera detected in its previous image, predicted to this one; `matches` are
+    the pairs (Track, Measurement) that were associated without a motion.
     """
-    people = np.count_nonzero(known)
-    if people < FEWEST or len(measurements) < FEWEST:
+    if len(known) < FEWEST or measurement_count < FEWEST:
         return None
-    is_far = (np.abs(tracks['mean'][rows, :2] - measurements['position_m'][columns]) > LEAST_M).any(axis=1)
-    near = np.count_nonzero(known[rows] & ~is_far)
-    if 2 * near >= people:
+    known_ids = set(track.id for track in known)
+    fitting = [track for track, measurement in matches if track.id in known_ids and _fits(track.state, measurement)]
+    return 2 * len(fitting) >= len(known)
+
+
+def _fits(state, measurement):
+    x, y = measurement.x - state.x, measurement.y - state.y
+    if abs(x) <= LEAST_M and abs(y) <= LEAST_M:
         return True
-    far = np.flatnonzero(known[rows] & is_far)
-    distances2 = _distances2(*_innovations(tracks[rows[far]], measurements[columns[far]]))
-    return 2 * (near + np.count_nonzero(distances2 < USUAL)) >= people
+    xx, xy, yy = state.xx + measurement.xx, state.xy + measurement.xy, state.yy + measurement.yy
+    return (yy * x * x - 2 * xy * x * y + xx * y * y) / (xx * yy - xy * xy) < USUAL
 
 
-def common_motion(tracks, known, measurements, view, classes, period_s):
+def common_motion(known, measurements, view, period_s):
     """Motion of the frame since the previous image, `period_s` before, and its covariance (3, 3).
 
-    None unless one motion explains two thirds of the known people (n,), and their own acceleration does not. `tracks`
-    are predicted to the image.
+    None unless one motion explains two thirds of the known people, as of `most_fit`, and their own acceleration does
+    not.
     """
-    tracks = tracks[np.flatnonzero(known)[:MOST]]
-    innovations, inverses = _innovations(tracks[:, None], measurements)
+    known = known[:MOST]
+    states = [track.state for track in known]
+    innovations = np.array([[(to.x - state.x, to.y - state.y) for to in measurements] for state in states])
+    inverses = np.linalg.inv([[((state.xx + to.xx, state.xy + to.xy), (state.xy + to.xy, state.yy + to.yy))
+                               for to in measurements] for state in states])
     allowed = np.linalg.norm(innovations, axis=2) < LARGEST_M
-    allowed &= classes.group[tracks['class_number']][:, None] == classes.group[measurements['class_number']]
+    allowed &= np.array([[track.kind.group == to.kind.group for to in measurements] for track in known])
     if not allowed.any():
         return None
-    jacobians = _jacobians(tracks['mean'][:, :2], view)
+    jacobians = _jacobians([(state.x, state.y) for state in states], view)
     motions = _motions_of_one(innovations, jacobians)[allowed].reshape(-1, 3)
     for _fit in range(FITS):
         rows, columns = _explained(motions, innovations, inverses, jacobians, allowed)
-        if len(set(columns.tolist())) < FEWEST or 3 * len(rows) < 2 * len(tracks):
+        if len(set(columns.tolist())) < FEWEST or 3 * len(rows) < 2 * len(known):
             return None
         motion, covariance = _least_squares(innovations[rows, columns], inverses[rows, columns], jacobians[rows])
         motions = motion[None]
@@ -77,11 +83,12 @@ def common_motion(tracks, known, measurements, view, classes, period_s):
     return (motion, covariance) if is_significant and moved_m > LEAST_M + PEOPLE_MPS2 * period_s ** 2 / 2 else None
 
 
-def move(tracks, motion, covariance, view):
-    """Apply a motion of the frame and its covariance to tracks, in place."""
-    jacobians = _jacobians(tracks['mean'][:, :2], view)
-    tracks['mean'][:, :2] += jacobians.dot(motion)
-    tracks['covariance'][:, :2, :2] += jacobians @ covariance @ jacobians.transpose(0, 2, 1)
+def moved(state, motion, covariance, view):
+    """The State after a motion of the frame with a covariance."""
+    jacobian = _jacobians([(state.x, state.y)], view)[0]
+    (x, y), spread = jacobian.dot(motion).tolist(), jacobian.dot(covariance).dot(jacobian.T)
+    (xx, xy), (_, yy) = spread.tolist()
+    return state._replace(x=state.x + x, y=state.y + y, xx=state.xx + xx, xy=state.xy + xy, yy=state.yy + yy)
 
 
 def _motions_of_one(innovations, jacobians):
@@ -111,17 +118,11 @@ def _least_squares(innovations, inverses, jacobians):
 
 def _jacobians(positions_m, view):
     """Derivatives (n, 2, 3) of positions (n, 2) by a motion."""
-    x_m, y_m = (positions_m - view.fixed_from_camera[:2, 3]).T
+    x_m, y_m = (np.array(positions_m) - view.fixed_from_camera[:2, 3]).T
     jacobians = np.zeros((len(positions_m), 2, 3))
     jacobians[:, [0, 1], [0, 1]] = 1
     jacobians[:, 0, 2], jacobians[:, 1, 2] = -y_m, x_m
     return jacobians
-
-
-def _innovations(tracks, measurements):
-    """Innovations (..., 2) and the inverses (..., 2, 2) of their covariances."""
-    covariances = tracks['covariance'][..., :2, :2] + measurements['noise_m2']
-    return measurements['position_m'] - tracks['mean'][..., :2], np.linalg.inv(covariances)
 
 
 def _distances2(innovations, inverses):

@@ -1,63 +1,100 @@
-"""Constant-velocity Kalman filter in the plane, vectorised over objects, with a model of outliers behind the object.
+"""Constant-velocity Kalman filter in the plane, with a model of outliers behind the object.
 
-Convention: a state is (x, y, vx, vy), metres and m/s, in the fixed frame; `mean` is (n, 4), `covariance` (n, 4, 4).
-`measurements` is an array of `measurement_model.MEASUREMENT`, `params` has the `outlier_` fields of
-`tracker.TrackerParams`. If the depth of a box is that of the background, the measurement lies behind the person on the
-viewing ray. The measurement error is therefore a mixture of two Gaussians, one of them shifted along the ray.
+Convention: lengths are in metres, times in seconds, in the fixed frame. If the depth of a box is that of the
+background, the measurement lies behind the person on the viewing ray. The measurement error is therefore a mixture of
+two Gaussians, one of them shifted along the ray.
+
+The algebra of 2x2 and 4x4 matrices is written out, because numpy takes several times as long for a few numbers.
 """
-import numpy as np
+import math
+from typing import NamedTuple
+
+LEAST_SHARE = 1e-12  # lower bound of the share of a component of the mixture, for its logarithm
+LARGEST_EXPONENT = 700.0  # of math.exp
 
 
-def predict(mean, covariance, elapsed_s, density):
-    """Mean and covariance `elapsed_s` ahead, with white-noise acceleration of `density` m²/s³ (Bar-Shalom et al., 2001,
-    6.2.2), which is a number or an array (n,)."""
-    step = np.eye(4)
-    step[0, 2] = step[1, 3] = elapsed_s
-    position, both = elapsed_s ** 3 / 3, elapsed_s ** 2 / 2
-    white = np.array([[position, 0, both, 0], [0, position, 0, both], [both, 0, elapsed_s, 0], [0, both, 0, elapsed_s]])
-    noise = np.asarray(density)[..., None, None] * white
-    return mean.dot(step.T), step.dot(covariance).transpose(1, 0, 2).dot(step.T) + noise
+class State(NamedTuple('State', [(name, float) for name in 'x y u v xx xy xu xv yy yu yv uu uv vv'.split()])):
+    """State of the filter: mean (x, y, u, v) and the upper triangle of the covariance; (u, v) is the velocity."""
+
+    __slots__ = ()
+
+    @property
+    def position_m2(self):
+        """Variance of the position, the larger one of x and y."""
+        return max(self.xx, self.yy)
 
 
-def negative_log_likelihood(mean, covariance, measurements, params):
-    """-log p (n, m), where p is the density of each measurement given each object, per m²."""
-    (inlier, outlier), _innovation, _inverse = _fit(mean[:, None], covariance[:, None], measurements, params)
-    return np.log(2 * np.pi) - np.logaddexp(inlier, outlier)
+class OutlierModel(NamedTuple):
+    """Logarithms of the shares of inliers and outliers; mean and variance of the shift of outliers along the ray."""
+
+    log_inliers: float
+    log_outliers: float
+    offset_m: float
+    spread_m2: float
 
 
-def update(mean, covariance, measurements, params):
-    """Mean and covariance after one measurement for each state; the mixture is reduced to one Gaussian."""
-    logs, (x, y), (inverse_xx, inverse_xy, inverse_yy) = (
-        [values[..., None] for values in group] for group in _fit(mean, covariance, measurements, params))
-    of_x, of_y = covariance[:, 0], covariance[:, 1]
-    gain_x, gain_y = inverse_xx * of_x + inverse_xy * of_y, inverse_xy * of_x + inverse_yy * of_y
-    means = mean + gain_x * x + gain_y * y
-    covariances = covariance - gain_x[..., None] * of_x[:, None] - gain_y[..., None] * of_y[:, None]
-    share = np.exp(logs[1] - np.logaddexp(*logs))
-    shift = means[1] - means[0]
-    mixed = covariances[0] + share[..., None] * (covariances[1] - covariances[0])
-    mixed += (share * (1 - share) * shift)[:, :, None] * shift[:, None, :]
-    return means[0] + share * shift, (mixed + mixed.transpose(0, 2, 1)) / 2
+def outlier_model(params):
+    """The OutlierModel of `tracker.TrackerParams`."""
+    log_inliers, log_outliers = (math.log(max(share, LEAST_SHARE))
+                                 for share in (1 - params.outlier_share, params.outlier_share))
+    return OutlierModel(log_inliers, log_outliers, params.outlier_offset, params.outlier_spread ** 2)
 
 
-def _fit(mean, covariance, measurements, params):
-    """Log likelihoods plus log(2 pi), innovations (x, y) and inverse innovation covariances (xx, xy, yy). The first
-    axis of each is that of the components of the mixture, the inliers and the outliers.
-
-    Computed element by element, because numpy is several times slower on stacks of 2x2 matrices.
+def predict(state, elapsed_s, density):
+    """The State `elapsed_s` ahead, with white-noise acceleration of `density` m²/s³ (Bar-Shalom et al., 2001, 6.2.2).
     """
-    components = (2,) + (1,) * (mean.ndim - 1)
-    shares = np.reshape((1 - params.outlier_share, params.outlier_share), components)
-    offsets_m, spreads_m = (np.reshape((0, outlier_m), components)
-                            for outlier_m in (params.outlier_offset, params.outlier_spread))
-    ray_x, ray_y = measurements['ray'][..., 0], measurements['ray'][..., 1]
-    x = measurements['position_m'][..., 0] - mean[..., 0] - offsets_m * ray_x
-    y = measurements['position_m'][..., 1] - mean[..., 1] - offsets_m * ray_y
-    noise_m2, spreads_m2 = measurements['noise_m2'], spreads_m ** 2
-    xx = covariance[..., 0, 0] + noise_m2[..., 0, 0] + spreads_m2 * (ray_x * ray_x)
-    xy = covariance[..., 0, 1] + noise_m2[..., 0, 1] + spreads_m2 * (ray_x * ray_y)
-    yy = covariance[..., 1, 1] + noise_m2[..., 1, 1] + spreads_m2 * (ray_y * ray_y)
+    x, y, u, v, xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = state
+    time2 = elapsed_s * elapsed_s
+    position, both, velocity = density * elapsed_s * time2 / 3, density * time2 / 2, density * elapsed_s
+    return State(x + elapsed_s * u, y + elapsed_s * v, u, v,
+                 xx + 2 * elapsed_s * xu + time2 * uu + position, xy + elapsed_s * (xv + yu) + time2 * uv,
+                 xu + elapsed_s * uu + both, xv + elapsed_s * uv,
+                 yy + 2 * elapsed_s * yv + time2 * vv + position, yu + elapsed_s * uv, yv + elapsed_s * vv + both,
+                 uu + velocity, uv, vv + velocity)
+
+
+def weighted(x, y, xx, xy, yy, log_share, log=math.log):
+    """Logarithm of the density of an innovation z = (x, y) with the covariance S = (xx, xy, yy), times its share and
+    2 pi; S^-1 z; and the determinant of S. With `log` = numpy.log, the numbers may be arrays that broadcast.
+    """
     determinant = xx * yy - xy * xy
-    inverse = yy / determinant, -xy / determinant, xx / determinant
-    distance = inverse[0] * x * x + 2 * inverse[1] * x * y + inverse[2] * y * y
-    return np.log(np.maximum(shares, 1e-12)) - (distance + np.log(determinant)) / 2, (x, y), inverse
+    a_x, a_y = (yy * x - xy * y) / determinant, (xx * y - xy * x) / determinant
+    return log_share - (x * a_x + y * a_y + log(determinant)) / 2, a_x, a_y, determinant
+
+
+def as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers):
+    """Innovation and its covariance (x, y, xx, xy, yy) of an outlier, given those of an inlier and the viewing
+    direction; the numbers may be arrays."""
+    offset_m, spread_m2 = outliers.offset_m, outliers.spread_m2
+    return (x - offset_m * ray_x, y - offset_m * ray_y, xx + spread_m2 * ray_x * ray_x, xy + spread_m2 * ray_x * ray_y,
+            yy + spread_m2 * ray_y * ray_y)
+
+
+def update(state, measurement, outliers):
+    """The State after a Measurement; the mixture of both components is reduced to one Gaussian.
+
+    With the columns C = P H^T of the covariance, component i has the gain C S_i^-1, moves the mean by C a_i, where
+    a_i = S_i^-1 z_i, and the covariance to P - C S_i^-1 C^T. The mixture with the share b of outliers and e = a_1 - a_0
+    moves the mean by C (a_0 + b e), and the covariance to P - C N C^T, where
+    N = (1 - b) S_0^-1 + b S_1^-1 - b (1 - b) e e^T.
+    """
+    x, y, u, v, xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = state
+    z_x, z_y, s_xx, s_xy = measurement.x - x, measurement.y - y, xx + measurement.xx, xy + measurement.xy
+    s_yy = yy + measurement.yy
+    far_x, far_y, far_xx, far_xy, far_yy = as_outlier(z_x, z_y, s_xx, s_xy, s_yy, measurement.ray_x, measurement.ray_y,
+                                                      outliers)
+    log_inlier, a_x, a_y, determinant = weighted(z_x, z_y, s_xx, s_xy, s_yy, outliers.log_inliers)
+    log_outlier, to_x, to_y, far_determinant = weighted(far_x, far_y, far_xx, far_xy, far_yy, outliers.log_outliers)
+    share = 1 / (1 + math.exp(min(log_inlier - log_outlier, LARGEST_EXPONENT)))
+    e_x, e_y, both = to_x - a_x, to_y - a_y, share * (1 - share)
+    a_x, a_y = a_x + share * e_x, a_y + share * e_y
+    weight, far_weight = (1 - share) / determinant, share / far_determinant
+    n_xx = weight * s_yy + far_weight * far_yy - both * e_x * e_x
+    n_xy = -weight * s_xy - far_weight * far_xy - both * e_x * e_y
+    n_yy = weight * s_xx + far_weight * far_xx - both * e_y * e_y
+    x_x, x_y, y_x, y_y = n_xx * xx + n_xy * xy, n_xy * xx + n_yy * xy, n_xx * xy + n_xy * yy, n_xy * xy + n_yy * yy
+    u_x, u_y, v_x, v_y = n_xx * xu + n_xy * yu, n_xy * xu + n_yy * yu, n_xx * xv + n_xy * yv, n_xy * xv + n_yy * yv
+    return State(x + xx * a_x + xy * a_y, y + xy * a_x + yy * a_y, u + xu * a_x + yu * a_y, v + xv * a_x + yv * a_y,
+                 xx - x_x * xx - x_y * xy, xy - x_x * xy - x_y * yy, xu - x_x * xu - x_y * yu, xv - x_x * xv - x_y * yv,
+                 yy - y_x * xy - y_y * yy, yu - y_x * xu - y_y * yu, yv - y_x * xv - y_y * yv,
+                 uu - u_x * xu - u_y * yu, uv - u_x * xv - u_y * yv, vv - v_x * xv - v_y * yv)

@@ -1,28 +1,38 @@
-"""Measurement model: convert the detections of one image to positions, covariances, viewing rays and sizes."""
-from typing import NamedTuple
+"""Measurement model: convert the detections of one image to positions, covariances, viewing rays and sizes.
+
+The noise of boxes without a covariance is assumed, and its scale is learned from innovations. The innovations of a
+filter with the right noise are white (Kailath 1968), and their autocorrelation shows what is wrong (Mehra 1970). With
+too much noise, the filter lags behind a person who turns, and successive innovations have the same direction. With too
+little, it follows the errors of the boxes, and they have opposite directions. The variance is lowered or raised
+accordingly. Unlike the size of innovations, their correlation hardly depends on how much people turn.
+"""
+import math
+from typing import NamedTuple, Tuple
 
 import numpy as np
 
+from ros_3d_bb.core.object_classes import ObjectClass
 from ros_3d_bb.core.params import Param, parameters
-from ros_3d_bb.tracking.types import NEARER_M, wrapped
+from ros_3d_bb.tracking.types import NEARER_M, Detection, wrapped
 
-# Position (x, y), its covariance and whether that is assumed, the distance from the camera and the unit vector from the
-# camera in the ground plane; extents; height of the centre and its variance; whether the image border truncates the
-# width, and the lower and the upper end; support; number of the class (`class_numbers.ClassNumbers`), score, and
-# `Detection.index`.
-MEASUREMENT = np.dtype([('position_m', float, 2), ('noise_m2', float, (2, 2)), ('noise_assumed', bool),
-                        ('distance_m', float), ('ray', float, 2), ('size_m', float, 3), ('z_m', float), ('z_m2', float),
-                        ('cut_sideways', bool), ('cut_ends', bool, 2), ('support', float), ('class_number', int),
-                        ('score', float), ('detection', int)])
-FLOOR_M = 0.02  # lower bound of the standard deviation of a centre: people sway as they walk
-WIDER_M = 0.04  # people are wider than the usual width, to which the estimator completes truncated boxes
-USUAL_PERIOD_S = 1 / 30.0  # image period assumed for the first image of a camera
-FILTER_MEMORY_S = 0.3273  # of the position, with the default parameters
-PART_M = 0.3  # a truncated box narrower than this shows only a part of the body's width
-MAX_SHIFT_M = 0.2
-CUT_SIGMA_M = 0.08  # additional lateral standard deviation of truncated or partly occluded boxes
+FLOOR_M = 0.02  # lower bound of the standard deviation of a centre; chosen: people sway as they walk
+WIDER_M = 0.04  # chosen: people are wider than the usual width, to which the estimator completes truncated boxes
+USUAL_PERIOD_S = 1 / 30.0  # image period assumed for the first image of a camera; chosen: that of a D435
+# Spectral density of the position noise, m² s. Chosen: with it and the default acceleration, errors of the D435, which
+# last 0.5 s, count as if they lasted 0.15 s, as before their duration was measured.
+NOISE_DENSITY = 0.08 * 0.3273 ** 4
+PART_M = 0.3  # a narrower truncated box shows only a part of the body's width; chosen: less than the usual 0.5 m
+MAX_SHIFT_M = 0.2  # chosen: less than half of the usual width
+CUT_SIGMA_M = 0.08  # additional lateral standard deviation of truncated or partly occluded boxes; chosen
 NEAR_M = 0.01  # the viewing ray of a closer box is undefined; the optical axis is used instead
-TOUCHING_RAD = 0.03  # a nearer box occludes another one if the gap between them is smaller than this
+TOUCHING_RAD = 0.03  # a nearer box occludes another one if the gap between them is smaller than this; chosen
+DEFAULT_RANGE_M = 8.0  # of a D435 and YOLOv5n; chosen
+RANGE_GAIN = 0.05  # of the filter that learns the range; chosen
+# Scale of the assumed noise. Chosen; test_noise_scale.py shows the effect.
+GAIN = 0.2  # change of the logarithm of the variance by a pair of innovations, relative to their correlation
+LARGEST = 3.0  # correlations are limited to this multiple of the expected squared innovation
+SETTLED_HITS = 3  # innovations of newer tracks show their unknown velocity
+MIN_LOG_SCALE, MAX_LOG_SCALE = 2 * math.log(0.05), 2 * math.log(2)  # a twentieth to twice the standard deviation
 BOX_ERRORS = 'kalman: errors of boxes (their covariance comes from the error model of bbox3d_node)'
 
 
@@ -34,70 +44,178 @@ class NoiseParams(NamedTuple):
         0.1, 'Standard deviation of boxes without a covariance, lasting errors included.', 'm', live=(0, 1))
 
 
-def measurements_of(detections, view, elapsed_s, params, classes, detector):
-    """Convert the detections of one image to an array of MEASUREMENT; `elapsed_s` is the time since the previous image
-    of the same camera, 0 for the first; `params` are NoiseParams, `classes` ClassNumbers, `detector` a DetectorModel.
+class Kind(NamedTuple):
+    """A class: its name and group, the names of all classes of the group, and `object_classes.ObjectClass`."""
+
+    label: str
+    group: object
+    members: Tuple[str, ...]
+    known: ObjectClass
+
+
+class Kinds(dict):
+    """Kind by class name. A class that the table `object_classes.ObjectClasses` does not list is a group of its own."""
+
+    def __init__(self, table):
+        super(Kinds, self).__init__()
+        self._default = table.default
+        for label, known in table.listed.items():
+            group = table.group_of(label)
+            members = tuple(other for other in table.listed if table.group_of(other) == group)
+            self[label] = Kind(label, group, members, known)
+
+    def __missing__(self, label):
+        return Kind(label, (label,), (label,), self._default)
+
+
+class BoxNoise(NamedTuple):
+    """Noise of the boxes of one image: the standard deviation where it is unknown, and the learned scale of its
+    variance; the standard deviation of lasting errors, and the number of images over which they are correlated.
+    """
+
+    unknown_m: float
+    unknown_scale: float
+    lasting_m: float
+    images: float
+
+
+class Measurement(NamedTuple):
+    """A detection as the filter uses it.
+
+    Centre; covariance (xx, xy, yy) in the plane and variance of the height; whether the covariance is assumed; extents;
+    distance from the camera and unit vector from the camera in the plane; Kind; the Detection, and its number in the
+    image.
+    """
+
+    x: float
+    y: float
+    z: float
+    xx: float
+    xy: float
+    yy: float
+    zz: float
+    is_assumed: bool
+    size_m: Tuple[float, float, float]
+    distance_m: float
+    ray_x: float
+    ray_y: float
+    kind: Kind
+    detection: Detection
+    number: int
+
+
+def correlated_images(elapsed_s, detector, acceleration):
+    """Number of images over which position errors are correlated.
+
+    A filter that treats them as independent underestimates its covariance. The lasting part is therefore multiplied by
+    this number, which makes the filter independent of the frame rate. Errors that last much longer than the memory M of
+    the filter shift the track and hardly change its velocity: with the correlation time T, white noise of the density
+    2 T / (1 + w² T²) has the same power at the frequency w = 1 / M. This is the natural frequency of the steady filter,
+    (q / r)^(1/4), where r is the density of the position noise and q that of the acceleration.
+    """
+    time_s = detector.correlation_time_s
+    correlated_s = time_s / (1 + time_s ** 2 * math.sqrt(acceleration / NOISE_DENSITY))
+    return max(1.0, 2 * correlated_s / (elapsed_s or USUAL_PERIOD_S))
+
+
+def measurements_of(detections, view, noise, kinds):
+    """Convert the detections of one image to a list of Measurement, given its BoxNoise and the Kinds.
 
     If a nearer object partly occludes a detection, or the image border leaves only a part of its width, the centre is
     shifted to half the usual width of the class from the visible edge. The lateral position of such a box is less
     certain.
     """
-    measurements = np.zeros(len(detections), MEASUREMENT)
-    if not len(detections):
-        return measurements
-    (positions_m, sizes_m, covariances_m2, truncated_edges, measurements['support'], labels, measurements['score'],
-     measurements['detection']) = zip(*detections)
-    measurements['class_number'] = numbers = [classes.of(label) for label in labels]
-    positions_m, sizes_m, truncated_edges = np.array(positions_m), np.array(sizes_m), np.array(truncated_edges, bool)
-    unknown_m2 = np.eye(3) * params.noise_unknown ** 2
-    measurements['noise_assumed'] = [known is None for known in covariances_m2]
-    covariances_m2 = np.array([unknown_m2 if known is None else known for known in covariances_m2])
-
-    distances_m, bearings = view.bearings(positions_m)
-    is_near = distances_m < NEAR_M
-    distances_m = np.maximum(distances_m, NEAR_M)
-    rays = (positions_m[:, :2] - view.fixed_from_camera[:2, 3]) / distances_m[:, None]
-    rays[is_near] = view.ahead
-    left_of_rays = np.stack((-rays[:, 1], rays[:, 0]), axis=1)
-
-    hidden = _hidden_side(distances_m, bearings, np.arctan2(sizes_m[:, 0] / 2, distances_m))
-    cut_left, top, cut_right, bottom = truncated_edges.T
-    cut_sideways = cut_left | cut_right
-    cut_side = (cut_left.astype(int) - cut_right) * (sizes_m[:, 0] < PART_M)
-    missing_m = classes.width_m[numbers] + WIDER_M - sizes_m[:, 0]
-    shift_m = np.where(cut_sideways, cut_side, hidden) * np.clip(missing_m / 2, 0, MAX_SHIFT_M)
-
-    measurements['position_m'] = positions_m[:, :2] + shift_m[:, None] * left_of_rays
-    lateral_m2 = (cut_sideways | (hidden != 0)) * CUT_SIGMA_M ** 2
-    for axes, extra_m2 in ((rays, 0), (left_of_rays, lateral_m2)):
-        measurements['noise_m2'] += _noise_along(axes, covariances_m2[:, :2, :2], extra_m2, elapsed_s, detector)
-    measurements['distance_m'], measurements['ray'], measurements['size_m'] = distances_m, rays, sizes_m
-    measurements['z_m'], measurements['z_m2'] = positions_m[:, 2], covariances_m2[:, 2, 2]
-    measurements['cut_sideways'], measurements['cut_ends'] = cut_sideways, np.stack((bottom, top), axis=1)
+    if not detections:
+        return []
+    camera_m, ahead = view.fixed_from_camera[:2, 3].tolist(), view.ahead.tolist()
+    measurements = []
+    for number, (detection, side) in enumerate(zip(detections, _hidden_sides(detections, view))):
+        x, y, _z = map(float, detection.position_m)
+        direction = _direction(x - camera_m[0], y - camera_m[1], ahead)
+        measurements.append(_measurement(detection, number, side, kinds[detection.label], direction, noise))
     return measurements
 
 
-def _hidden_side(distances_m, bearings, half_widths):
-    """Side on which a nearer detection partly occludes each detection: 1 left, -1 right, 0 neither or both; (n,)."""
+def _measurement(detection, number, side, kind, direction, noise):
+    (x, y, z), (ray_x, ray_y) = map(float, detection.position_m), direction[1:]
+    size_m, is_assumed, lasting_m2 = tuple(map(float, detection.size_m)), False, noise.lasting_m ** 2
+    if detection.covariance_m2 is None:
+        xx = yy = zz = noise.unknown_m ** 2
+        cross, is_assumed = 0.0, True
+    else:
+        (xx, xy, _xz), (yx, yy, _yz), (_zx, _zy, zz) = detection.covariance_m2
+        cross = xy + yx
+    # Rounding may have made the variances of a covariance that is nearly singular negative.
+    along = max(float(xx * ray_x * ray_x + cross * ray_x * ray_y + yy * ray_y * ray_y), 0.0)
+    across = max(float(xx * ray_y * ray_y - cross * ray_x * ray_y + yy * ray_x * ray_x), 0.0)
+    along += (noise.images - 1) * min(along, lasting_m2) + FLOOR_M ** 2
+    across += (noise.images - 1) * min(across, lasting_m2) + FLOOR_M ** 2
+    cut_left, _top, cut_right, _bottom = detection.truncated_edges
+    if side or cut_left or cut_right:
+        across += CUT_SIGMA_M ** 2
+    if is_assumed:
+        along, across = noise.unknown_scale * along, noise.unknown_scale * across
+    if cut_left or cut_right:
+        side = int(cut_left) - int(cut_right) if size_m[0] < PART_M else 0
+    shift_m = side * min(max((kind.known.width + WIDER_M - size_m[0]) / 2, 0.0), MAX_SHIFT_M)
+    return Measurement(
+        x - shift_m * ray_y, y + shift_m * ray_x, z, along * ray_x * ray_x + across * ray_y * ray_y,
+        (along - across) * ray_x * ray_y, along * ray_y * ray_y + across * ray_x * ray_x, float(zz), is_assumed, size_m,
+        *direction, kind=kind, detection=detection, number=number)
+
+
+def _direction(x, y, ahead):
+    """Distance and unit vector (x, y) of a place relative to the camera."""
+    distance_m = math.hypot(x, y)
+    return (distance_m, x / distance_m, y / distance_m) if distance_m >= NEAR_M else (NEAR_M, *ahead)
+
+
+def _hidden_sides(detections, view):
+    """Side on which a nearer detection partly occludes each one: 1 left, -1 right, 0 neither or both; a list of int."""
+    if len(detections) == 1:
+        return [0]
+    distances_m, bearings = view.bearings([detection.position_m for detection in detections])
+    distances_m = np.maximum(distances_m, NEAR_M)
+    half_widths = np.arctan2([detection.size_m[0] / 2 for detection in detections], distances_m)
     depths_m = distances_m * np.cos(bearings)
-    to_left = wrapped(bearings[None, :] - bearings[:, None])
-    gaps = np.abs(to_left) - half_widths[None, :] - half_widths[:, None]
-    hides = (depths_m[None, :] < depths_m[:, None] - NEARER_M) & (gaps < TOUCHING_RAD)
+    to_left = wrapped(bearings - bearings[:, None])
+    gaps = np.abs(to_left) - half_widths - half_widths[:, None]
+    hides = (depths_m < depths_m[:, None] - NEARER_M) & (gaps < TOUCHING_RAD)
     left, right = (hides & (to_left > 0)).any(axis=1), (hides & (to_left <= 0)).any(axis=1)
-    return left.astype(int) - right
+    return (left.astype(int) - right).tolist()
 
 
-def _noise_along(axes, covariances_m2, extra_m2, elapsed_s, detector):
-    """Covariances (n, 2, 2) along unit vectors (n, 2), from the single-image covariances.
+def scaled(measurement, scale):
+    """The measurement with the variances of assumed noise multiplied by `scale`."""
+    if not measurement.is_assumed or scale == 1:
+        return measurement
+    x, y, z, xx, xy, yy, *others = measurement
+    return Measurement(x, y, z, scale * xx, scale * xy, scale * yy, *others)
 
-    Position errors are correlated from image to image. A filter that treats them as independent underestimates its
-    covariance. The lasting part is therefore multiplied by the number of images over which it is correlated, which
-    makes the filter independent of the frame rate. Errors that last much longer than the memory of the filter shift the
-    track and hardly change its velocity: with the correlation time T, white noise of the density 2 T / (1 + w² T²) has
-    the same power at the frequency w = 1 / `FILTER_MEMORY_S`.
+
+def learned_log_scale(log_scale, matches):
+    """The logarithm of the scale of the assumed variance after an image.
+
+    In the matches (Track, Measurement), the tracks are predicted to the image, and the measurements have the noise for
+    the association, with a scale of 1 or more. Errors that last are not in the innovations. The learned noise is that
+    part of `noise_unknown` which changes from image to image; the rest is added to the published covariances
+    (`track.learned_prediction`).
     """
-    correlated_s = detector.correlation_time_s / (1 + (detector.correlation_time_s / FILTER_MEMORY_S) ** 2)
-    images = max(1.0, 2 * correlated_s / (elapsed_s or USUAL_PERIOD_S))
-    variance = ((covariances_m2 @ axes[..., None])[..., 0] * axes).sum(axis=1)
-    variance += (images - 1) * np.minimum(variance, detector.lasting_sigma_m ** 2) + FLOOR_M ** 2 + extra_m2
-    return variance[:, None, None] * axes[:, :, None] * axes[:, None, :]
+    scale, total = math.exp(min(log_scale, 0)), 0.0
+    for track, measurement in matches:
+        if measurement.is_assumed and track.hits >= SETTLED_HITS:
+            (before_x, before_y), state = track.innovation_m, track.state
+            product = before_x * (measurement.x - state.x) + before_y * (measurement.y - state.y)
+            expected = state.xx + state.yy + scale * (measurement.xx + measurement.yy)
+            total += min(max(product / expected, -LARGEST), LARGEST)
+    return min(max(log_scale - GAIN * total, MIN_LOG_SCALE), MAX_LOG_SCALE)
+
+
+def learned_range(range_m, matches):
+    """Range of the detector after an image with matches (Track, Measurement): `DEFAULT_RANGE_M`, or the filtered mean
+    distance of the confirmed tracks that are detected farther away. Beyond it, detectors miss people often."""
+    far_m = [measurement.distance_m for track, measurement in matches
+             if measurement.distance_m > DEFAULT_RANGE_M and track.is_confirmed]
+    if not far_m:
+        return range_m
+    return range_m + (1 - (1 - RANGE_GAIN) ** len(far_m)) * (sum(far_m) / len(far_m) - range_m)

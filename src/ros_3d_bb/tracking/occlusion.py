@@ -9,10 +9,11 @@ from typing import NamedTuple, Optional
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking import track_score
-from ros_3d_bb.tracking.track import position_std_of
+from ros_3d_bb.tracking.kalman_filter import State
+from ros_3d_bb.tracking.track import SEEN
 from ros_3d_bb.tracking.types import NEARER_M, OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, wrapped
 
+# All are chosen; `./run bench scenes` and `./run bench tracking` show the effect of others.
 EDGE_RAD = 0.04  # people this close to the image border are not detected reliably
 NEAREST_M = 0.45  # neither are people this close to the camera
 LEAST_IN_IMAGE = 0.2  # minimum share of the body axis inside the image for a person to be detected
@@ -23,92 +24,84 @@ HIDDEN_BEHIND_M = 0.5  # measured depth nearer than the person by more than this
 HIDDEN_SHARE = 0.5
 ACROSS, ALONG = np.meshgrid((-0.6, 0, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))  # depth sample points, in half extents
 
-# Detected: ranks before the results of `classify_visibility` for undetected tracks, VISIBLE, OCCLUDED, OUT_OF_VIEW.
-SEEN = -1
-STATUS = np.array([OCCLUDED, OCCLUDED, OUT_OF_VIEW, VISIBLE])  # indexed by the result; the last entry is for SEEN
+STATUS = {VISIBLE: OCCLUDED, OCCLUDED: OCCLUDED, OUT_OF_VIEW: OUT_OF_VIEW, SEEN: VISIBLE}
 RECENT_NS = NS  # a camera whose latest image is older is ignored
 BEHIND_M = 0.45  # upper bound of the position's standard deviation of a person who stays behind an occluder
 OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
-DEFAULT_RANGE_M = 8.0  # of a D435 and YOLOv5n
-RANGE_GAIN = 0.05  # of the filter that learns the range
 
 
-class CameraVisibility(NamedTuple):
-    """The latest image of a camera, SEEN or the result of `classify_visibility` for each track (n,), the range in which
-    people are expected to be detected, and whether most people fit their tracks (`common_motion`), None if unknown."""
+class CameraState(NamedTuple):
+    """The latest image of a camera, the range in which people are expected to be detected, and whether most people fit
+    their tracks (`common_motion`), None if unknown."""
 
     stamp_ns: int
     view: CameraView
-    visibility: np.ndarray
     range_m: float
     fits: Optional[bool]
 
 
 def recent_others(cameras, camera, stamp_ns):
-    """The CameraVisibility of each camera but `camera` that is not ignored in an image with this stamp."""
-    return [other for name, other in cameras.items() if name != camera and stamp_ns - other.stamp_ns <= RECENT_NS]
+    """The {name: CameraState} of each camera but `camera` that is not ignored in an image with this stamp."""
+    return {name: other for name, other in cameras.items()
+            if name != camera and stamp_ns - other.stamp_ns <= RECENT_NS}
 
 
-def learned_range(range_m, distances_m, confirmed, rows):
-    """Range after an image with the tracks in `rows` detected at `distances_m` (k,): `DEFAULT_RANGE_M`, or the filtered
-    mean distance of the confirmed (n,) ones farther away. Beyond it, detectors miss people often."""
-    is_far = distances_m > DEFAULT_RANGE_M
-    if not is_far.any():
-        return range_m
-    far_m = distances_m[is_far & confirmed[rows]]
-    if not len(far_m):
-        return range_m
-    return range_m + (1 - (1 - RANGE_GAIN) ** len(far_m)) * (far_m.mean() - range_m)
-
-
-def mark_missed(tracks, before, rows, cameras, camera, observed_s, detection_probability):
-    """Update the status of the undetected tracks in `rows`, and the times for which they are undetected and missed.
+def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_probability):
+    """Update undetected tracks in place: status, visibility, and the times for which they are unseen and missed.
 
     An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
     track keeps its previous position.
 
-    `tracks` are predicted to the stamp of the image, `before` are the same tracks after the previous image. `cameras`
-    maps each camera to its CameraVisibility; `camera` is that of the image, which accounts for `observed_s` seconds.
-    `detection_probability` is that of a visible person.
-    Modifies `tracks` and the `visibility` of the image.
+    `missed` are those of the `tracks` that are not detected; they are predicted to the stamp of the image. `before` are
+    the tracks after the previous image. `cameras` maps each camera to its CameraState; `camera` is that of the image,
+    which accounts for `observed_s` seconds. `detection_probability` is that of a visible person.
     """
-    image, missed, before = cameras[camera], tracks[rows], before[rows]
-    visibility = _visibility(missed, tracks, image)
-    held = (visibility == VISIBLE) & (missed['status'] == OCCLUDED)
-    held[held] = _visibility(before[held], tracks, image) == OCCLUDED
-    visibility[held] = OCCLUDED
-    image.visibility[rows] = visibility
-    best = visibility
-    for other in recent_others(cameras, camera, image.stamp_ns):
+    before = {track.id: track for track in before}
+    occluding_m = _positions_of([track for track in tracks if track.is_confirmed and track.missed_s < OCCLUDING_S])
+    image, others = cameras[camera], recent_others(cameras, camera, cameras[camera].stamp_ns)
+    seen = _visibilities(missed, occluding_m, image)
+    staying = _staying([track for track in missed if track.status == OCCLUDED and seen[track.id] == VISIBLE], before,
+                       occluding_m, image)
+    seen.update(dict.fromkeys(staying, OCCLUDED))
+    for name, other in others.items():
         # The person may also stay behind what occludes the view of another camera.
-        hidden = (other.visibility[rows] == OCCLUDED) & (missed['status'] == OCCLUDED) & (visibility != VISIBLE)
-        hidden[hidden] = _visibility(missed[hidden], tracks, other) == VISIBLE
-        hidden[hidden] = _visibility(before[hidden], tracks, other) == OCCLUDED
-        held |= hidden
-        best = np.minimum(best, other.visibility[rows])
-    held &= best == OCCLUDED
-    missed['mean'][held] = before['mean'][held]
-    held &= position_std_of(missed) > BEHIND_M
-    missed['covariance'][held] = before['covariance'][held]
-    missed['unseen_s'] += np.where(best == SEEN, 0, observed_s)
-    missed_s = np.where(best == VISIBLE, observed_s, 0)
-    missed['missed_s'] += missed_s
-    track_score.add_misses(missed, missed_s, detection_probability)
-    missed['status'] = STATUS[best]
-    tracks[rows] = missed
+        hidden = [track for track in missed if track.status == track.visibility.get(name) == OCCLUDED
+                  and seen[track.id] != VISIBLE]
+        there = _visibilities(hidden, occluding_m, other)
+        staying |= _staying([track for track in hidden if there[track.id] == VISIBLE], before, occluding_m, other)
+    for track in missed:
+        track.set_visibility(camera, seen[track.id])
+        best = min([seen[track.id]] + [track.visibility.get(name, OUT_OF_VIEW) for name in others])
+        if best == OCCLUDED and track.id in staying:
+            track.state = _held(track.state, before[track.id].state)
+        track.miss(STATUS[best], 0.0 if best == SEEN else observed_s, observed_s if best == VISIBLE else 0.0,
+                   detection_probability)
 
 
-def _visibility(missed, tracks, image):
-    """Visibility (k,) of missed tracks in the view of a CameraVisibility."""
-    if not len(missed):
-        return np.zeros(0, int)
-    occluding = tracks[tracks['confirmed'] & (tracks['missed_s'] < OCCLUDING_S)]
-    return classify_visibility(image.view, _positions_of(missed), missed['size_m'], _positions_of(occluding),
-                               image.range_m)
+def _visibilities(tracks, occluding_m, image):
+    """The visibility {ID: VISIBLE, OCCLUDED or OUT_OF_VIEW} of tracks in the view of a CameraState."""
+    if not tracks:
+        return {}
+    visibility = classify_visibility(image.view, _positions_of(tracks), np.array([track.size_m for track in tracks]),
+                                     occluding_m, image.range_m)
+    return dict(zip([track.id for track in tracks], visibility.tolist()))
+
+
+def _staying(tracks, before, occluding_m, image):
+    """The IDs of the tracks whose previous position is occluded in the view of a CameraState."""
+    visibility = _visibilities([before[track.id] for track in tracks], occluding_m, image)
+    return set(track_id for track_id, seen in visibility.items() if seen == OCCLUDED)
+
+
+def _held(predicted, former):
+    """The previous State of a person who stays behind an occluder; its position becomes less certain up to a limit."""
+    if predicted.position_m2 > BEHIND_M ** 2:
+        return former
+    return State(*(former[:4] + predicted[4:]))
 
 
 def _positions_of(tracks):
-    return np.column_stack((tracks['mean'][:, :2], tracks['z_m']))
+    return np.array([(track.state.x, track.state.y, track.z_m) for track in tracks]).reshape(-1, 3)
 
 
 def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
@@ -120,9 +113,11 @@ def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
     distances_m, bearings = view.bearings(positions_m)
     visibility = np.full(len(positions_m), VISIBLE)
     visibility[_behind_people(distances_m, bearings, *view.bearings(others_m))] = OCCLUDED
-    if view.depth_at is not None:
-        visibility[_behind_objects(view, positions_m, sizes_m)] = OCCLUDED
     visibility[_out_of_view(view, positions_m, sizes_m, distances_m, bearings, max_range_m)] = OUT_OF_VIEW
+    undecided = np.flatnonzero(visibility == VISIBLE)
+    if view.depth_at is not None and len(undecided):
+        hidden = _behind_objects(view, positions_m[undecided], sizes_m[undecided])
+        visibility[undecided[hidden]] = OCCLUDED
     return visibility
 
 
@@ -172,11 +167,11 @@ def _share_in_image(view, positions_m, heights_m):
     points = centers[:, None] + (AXIS_SAMPLES * heights_m[:, None])[..., None] * rotation[2]
     in_front = points[..., 2] > 0
     points[..., 2][~in_front] = 1  # they have no pixel
-    size = np.array([camera.width, camera.height])
-    half_px = size / 2.0 - EDGE_RAD * np.array([camera.fx, camera.fy])
     with np.errstate(invalid='ignore'):  # nan is outside
-        inside = (np.abs(camera.project(points) - (size - 1) / 2.0) <= half_px).all(axis=-1)
-    return (in_front & inside).mean(axis=1)
+        u, v = np.moveaxis(camera.project(points), -1, 0)
+        inside = np.abs(u - (camera.width - 1) / 2.0) <= camera.width / 2.0 - EDGE_RAD * camera.fx
+        inside &= np.abs(v - (camera.height - 1) / 2.0) <= camera.height / 2.0 - EDGE_RAD * camera.fy
+    return (in_front & inside).sum(axis=1) / len(AXIS_SAMPLES)
 
 
 def _behind_people(distances_m, bearings, others_m, others_bearings):
@@ -187,7 +182,7 @@ def _behind_people(distances_m, bearings, others_m, others_bearings):
 
 def _half_widths(distances_m):
     """Angular half widths of bodies at distances in metres, radians."""
-    return np.arcsin(np.clip(BODY_RADIUS_M / np.maximum(distances_m, 0.01), 0, 1))
+    return np.arcsin(np.minimum(BODY_RADIUS_M / np.maximum(distances_m, 0.01), 1))
 
 
 def _behind_objects(view, positions_m, sizes_m):

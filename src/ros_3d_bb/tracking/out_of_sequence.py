@@ -6,9 +6,9 @@ from typing import NamedTuple
 from ros_3d_bb.core.time_sync import MAX_RATE_HZ, NS
 from ros_3d_bb.tracking.types import CameraView
 
-LATEST_NS = NS // 2  # images that are older than the newest by more than this are rejected
+LATEST_NS = NS // 2  # images that are older than the newest by more than this are rejected; chosen
 MOST_KEPT = LATEST_NS * MAX_RATE_HZ // NS  # maximum number of images in the history, per camera
-MOST_SKIPPED = 1000  # maximum number of skipped images in the history
+MOST_SKIPPED = 1000  # maximum number of skipped images in the history; chosen
 # Late images wait until a replay processes at most this many images for each of them, or until the newest stamp has
 # advanced by MAX_WAIT_NS. Chosen: late cameras then take less than three times the CPU time of the same images in order
 # (test_late_cameras_are_replayed_in_batches), and an image that is late by one or two others does not wait.
@@ -40,8 +40,8 @@ class OutOfSequenceBuffer(object):
     ----------
     step : callable
         step(state, image, observed_s, assign_id) returns the state after an image, which has `tracks` and `now_ns`,
-        and the matches: (track ID, whether the track was confirmed before, index of the detection). `observed_s` is
-        the time in seconds that the image accounts for; assign_id(column) returns the ID of the track that a
+        and the matches: (track ID, whether the track was confirmed before, number of the detection). `observed_s` is
+        the time in seconds that the image accounts for; assign_id(number) returns the ID of the track that a
         detection starts.
     state
         State before the first image.
@@ -55,15 +55,17 @@ class OutOfSequenceBuffer(object):
         self._skipped = collections.deque(maxlen=MOST_SKIPPED)  # (stamp_ns, camera)
         self._late = []  # (order, image) that wait for a replay; None instead of a skipped image
         self._late_since_ns = None  # newest stamp when the first of them arrived
-        self._ids = {}  # IDs of new targets by stamp, camera and column of the detection that started them
+        self._ids = {}  # IDs of new tracks by stamp, camera and number of the detection that started them
 
     def insert(self, image):
         """Process an image, or let it wait. Raises ValueError without any change if it is too late or a duplicate."""
         self._check(image.stamp_ns, image.view.camera)
-        is_late = bool(self._history) and image.order < self._history[-1][1].order
+        is_late = bool(self._history) and image.stamp_ns <= self.state.now_ns and (
+            image.order < self._history[-1][1].order)
         if is_late:
             self._add_late(image.order, image)
-        self._replay_if_due(image.stamp_ns)
+        if self._late:
+            self._replay_if_due(image.stamp_ns)
         if not is_late:
             self._process([image])
 
@@ -91,8 +93,6 @@ class OutOfSequenceBuffer(object):
 
     def _replay_if_due(self, stamp_ns):
         """Replay if this is efficient, or if the late images have waited too long at the stamp of the next image."""
-        if not self._late:
-            return
         first = min(order for order, _image in self._late)
         replayed = len(self._late) + sum(image.order > first for _state, image in self._history)
         has_waited = stamp_ns - self._late_since_ns >= MAX_WAIT_NS
@@ -100,12 +100,14 @@ class OutOfSequenceBuffer(object):
             self.replay()
 
     def _check(self, stamp_ns, camera):
-        now_ns = self.state.now_ns
+        now_ns, count = self.state.now_ns, len(self._history) + len(self._late)
+        if now_ns is None or (stamp_ns > now_ns and count < MOST_KEPT):
+            return
         stamps_ns = sorted(other.stamp_ns for _before, other in list(self._history) + self._late
                            if other is not None and other.view.camera == camera)
         if stamp_ns in stamps_ns:
             raise ValueError('duplicate stamp %.9f of camera %r' % (stamp_ns / NS, camera))
-        if now_ns is not None and stamp_ns < now_ns - LATEST_NS:
+        if stamp_ns < now_ns - LATEST_NS:
             raise ValueError('stamp %.9f is %.3f s older than the newest image; at most %.1f s expected'
                              % (stamp_ns / NS, (now_ns - stamp_ns) / NS, LATEST_NS / NS))
         if len(stamps_ns) >= MOST_KEPT and stamp_ns <= stamps_ns[0] + LATEST_NS:
@@ -124,20 +126,23 @@ class OutOfSequenceBuffer(object):
         """Process images; `known_id` is the last ID assigned before a rewind, None without a rewind."""
         for image in images:
             self._history.append((self.state, image))
-            self.state, matches = self._step(self.state, image, self._observed_s(*image.order),
-                                             functools.partial(self._assign_id, image.order))
+            order = image.order
+            self.state, matches = self._step(self.state, image, self._observed_s(*order),
+                                             functools.partial(self._assign_id, order))
             if known_id is not None:
-                self._restore_ids(image.order, matches, known_id)
+                self._restore_ids(order, matches, known_id)
         self._forget()
 
     def _observed_s(self, stamp_ns, camera):
         """Time since the previous image, or since a later skipped image of the same camera, seconds."""
         before_ns = stamp_ns if self.state.now_ns is None else self.state.now_ns
+        if not self._skipped:
+            return (stamp_ns - before_ns) / NS
         skipped_ns = [skipped_ns for skipped_ns, other in self._skipped if other == camera and skipped_ns < stamp_ns]
         return (stamp_ns - max(skipped_ns + [before_ns])) / NS
 
-    def _assign_id(self, order, column):
-        key = order + (column,)
+    def _assign_id(self, order, number):
+        key = order + (number,)
         if key not in self._ids:
             self.last_id += 1
             self._ids[key] = self.last_id
@@ -145,18 +150,21 @@ class OutOfSequenceBuffer(object):
 
     def _restore_ids(self, order, matches, known_id):
         """Restore the ID of a track that now starts in a late image, but started in a later image before the rewind."""
-        for track_id, was_confirmed, column in matches:
-            key = order + (column,)
+        for track_id, was_confirmed, number in matches:
+            key = order + (number,)
             if key in self._ids and (track_id > known_id or not was_confirmed):
                 former = self._ids.pop(key)
                 self._ids = {other: former if known == track_id else known for other, known in self._ids.items()}
                 for state in [state for state, _image in self._history] + [self.state]:
-                    state.tracks['id'][state.tracks['id'] == track_id] = former
+                    for track in state.tracks:
+                        track.id = former if track.id == track_id else track.id
 
     def _forget(self):
         oldest_ns = self.state.now_ns - LATEST_NS - MAX_WAIT_NS
         while self._history[0][1].stamp_ns < oldest_ns:
             self._history.popleft()
         before_ns = self._history[0][0].now_ns or 0  # earlier entries have no effect any more
-        self._skipped = collections.deque((entry for entry in self._skipped if entry[0] > before_ns), MOST_SKIPPED)
-        self._ids = {key: track_id for key, track_id in self._ids.items() if key[0] >= oldest_ns}
+        if self._skipped:
+            self._skipped = collections.deque((entry for entry in self._skipped if entry[0] > before_ns), MOST_SKIPPED)
+        if self._ids:
+            self._ids = {key: track_id for key, track_id in self._ids.items() if key[0] >= oldest_ns}

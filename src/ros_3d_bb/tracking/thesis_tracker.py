@@ -14,7 +14,7 @@ from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import match_greedily, plane_distances
 from ros_3d_bb.tracking.types import (MOVING_SPEED, NOT_DETECTED, OCCLUDED, PREDICTION_STEP, PREDICTION_TIME, VISIBLE,
-                                      TrackedObject, check_steps, prediction_times_s)
+                                      TrackedObject, TrackerBase, prediction_times_s)
 
 
 @parameters('thesis')
@@ -32,12 +32,10 @@ class ThesisTrackerParams(NamedTuple):
     moving_speed: float = MOVING_SPEED
 
 
-class ThesisTracker(object):
-    """Tracks objects from image to image.
+class ThesisTracker(TrackerBase):
+    """Tracks objects from image to image, as of `types.TrackerBase`, in the order of the stamps.
 
-    Call `update` with the detections of each image in the order of their stamps, `skip` for an image whose detections
-    are unusable, and `reset` after a jump in time. The IDs of tracks are greater than `last_id`. Label and score are
-    those of the latest detection; tracks never change between the groups of the table `classes`.
+    Parameters: ThesisTrackerParams. Label and score are those of the latest detection.
 
     Raises
     ------
@@ -45,26 +43,18 @@ class ThesisTracker(object):
         If a parameter is invalid; the message names it.
     """
 
-    common_motions = 0  # as of `Tracker`; not recognised
-
     def __init__(self, params=ThesisTrackerParams(), last_id=0, classes=ObjectClasses()):
-        self._classes = classes
+        self._classes, self._last_id = classes, last_id
         self.reconfigure(params)
-        self._last_id = last_id
         self.reset()
 
-    def reconfigure(self, params):
-        """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
-        check_steps(params.prediction_time, params.prediction_step)
-        self._params = params
-
     def update(self, stamp_ns, detections, view=None):
-        """Update the tracks with the detections of one image, as `Tracker.update`.
+        """Update the tracks with the detections of one image, as `TrackerBase.update`.
 
         The thesis' tracker does not consider the view. Raises ValueError without any change if the stamp is not later
         than the previous one.
         """
-        params, elapsed_ns = self._params, self._advance(stamp_ns)
+        (params,), elapsed_ns = self._params, self._advance(stamp_ns)
         limit_ns = params.disappearance_limit * NS
         # The limit may be less than the image period: tracks matched in the previous image can be matched in any case.
         tracks = [(track._replace(detection=NOT_DETECTED), unseen_ns + elapsed_ns) for track, unseen_ns in self._tracks
@@ -84,9 +74,11 @@ class ThesisTracker(object):
         for column, detection in enumerate(detections):
             if column not in matched:
                 self._last_id += 1
-                tracks.append((TrackedObject(self._last_id, detection.position_m, detection.size_m, np.zeros(3),
-                                             np.zeros(3), VISIBLE, False, stamp_ns, stamp_ns, None, None, None, None,
-                                             detection.label, detection.score, detection.index), 0))
+                position_m, size_m = np.array(detection.position_m), np.array(detection.size_m)
+                track = TrackedObject(self._last_id, position_m, size_m, np.zeros(3), np.zeros(3), VISIBLE, False,
+                                      stamp_ns, stamp_ns, None, None, None, None, detection.label, detection.score,
+                                      detection.index)
+                tracks.append((track, 0))
         self._tracks = tracks
         times_s = prediction_times_s(params.prediction_time, params.prediction_step)[:, None]
         return [track._replace(status=OCCLUDED if unseen_ns else VISIBLE, prediction_step_s=params.prediction_step,
@@ -96,9 +88,9 @@ class ThesisTracker(object):
 
     def _matched(self, track, stamp_ns, detection):
         """A track with the position and size of a detection, and updated velocities."""
-        elapsed_s = (stamp_ns - track.last_seen_ns) / float(NS)
-        velocity_mps, alpha = (detection.position_m - track.position_m) / elapsed_s, self._params.alpha
-        return track._replace(position_m=detection.position_m, size_m=detection.size_m, last_seen_ns=stamp_ns,
+        elapsed_s, position_m = (stamp_ns - track.last_seen_ns) / float(NS), np.array(detection.position_m)
+        velocity_mps, alpha = (position_m - track.position_m) / elapsed_s, self._params[0].alpha
+        return track._replace(position_m=position_m, size_m=np.array(detection.size_m), last_seen_ns=stamp_ns,
                               instant_velocity_mps=velocity_mps,
                               velocity_mps=alpha * velocity_mps + (1 - alpha) * track.velocity_mps,
                               label=detection.label, score=detection.score, detection=detection.index)

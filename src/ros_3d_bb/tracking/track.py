@@ -1,42 +1,50 @@
-"""Tracks as a structured array: update of matched tracks, start of new ones, and prediction for publishing.
+"""Tracks: the state of one object from image to image, and what is published of it.
 
-Fixed frame, metres, nanoseconds.
+The track score is the log odds that a track is an object and not a series of false detections: the sum of the
+log-likelihood ratios of its detections and misses (Sittler 1964; Blackman and Popoli, Design and Analysis of Modern
+Tracking Systems, 1999, 6.2). Those of successive images are not independent: detectors repeat their errors. An image
+therefore counts in proportion to the time since the previous one, and fully after a correlation time: at high image
+rates, the score depends on the time and not on the number of images.
 """
-import itertools
+import functools
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.core.object_classes import MAX_IN_GROUP
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking import kalman_filter, track_score
-from ros_3d_bb.tracking.types import PREDICTION_STEP, PREDICTION_TIME, VISIBLE, TrackedObject, prediction_times_s
+from ros_3d_bb.tracking import kalman_filter
+from ros_3d_bb.tracking.types import (NOT_DETECTED, PREDICTION_STEP, PREDICTION_TIME, VISIBLE, TrackedObject,
+                                      prediction_times_s)
 
-# `hits` counts the detections of a track, `end_hits` those that showed the lower and the upper end of the body.
-# `cut_ns` are the stamps of the latest detections of which the image border truncated these ends.
-# `log_odds` is the track score (`track_score`).
-# `unseen_s` is the time since the last detection, `missed_s` the part of it during which a detection was expected.
-# `votes` are filtered scores of the classes of the group, of which `class_number` (see `ClassNumbers`) has the highest.
-# `score` is the filtered score of the detections; `detection` is `Detection.index` in the latest image.
-# `innovation_m` is the innovation of the latest image, for `noise_scale`.
-TRACK = np.dtype([('id', int), ('mean', float, 4), ('covariance', float, (4, 4)), ('z_m', float), ('z_m2', float),
-                  ('size_m', float, 3), ('end_hits', int, 2), ('cut_ns', np.int64, 2), ('hits', int),
-                  ('first_ns', np.int64), ('last_ns', np.int64), ('missed_s', float), ('unseen_s', float),
-                  ('status', int), ('log_odds', float), ('confirmed', bool), ('moving', bool), ('class_number', int),
-                  ('votes', float, MAX_IN_GROUP), ('score', float), ('detection', int), ('innovation_m', float, 2)])
-PUBLISHED = 'id', 'status', 'moving', 'first_ns', 'last_ns', 'class_number', 'score', 'detection'
-RECENTLY_MATCHED_NS = NS // 5  # no track starts near a track that was matched less than this ago
+# All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
+HIT_CORRELATION_S = 0.08  # without scores, four images at 30 Hz or three independent ones confirm a track by default
+MISS_CORRELATION_S = 0.15  # the causes of misses, such as poses and partial occlusion, last longer
+UNKNOWN_SCORE, LARGEST_SCORE = 0.5, 0.9999  # assumed if the score is unknown; upper bound, for its log odds
+# Of the score of a detection. A high score does not mean that the position is right, as of a person half hidden.
+MIN_LOG_ODDS, MAX_LOG_ODDS = -2.0, 1.0
+HIT = 0.4  # of a detection where a track is expected: little, because false detections repeat at their place, too
+MAX_TRACK_SCORE = 4.0  # earlier evidence is forgotten: an undetected person is published for 0.4 s
+MIN_TRACK_SCORE = -2.0  # with less (12 % probability), tracks do not start, and undetected tracks are not published
 SMOOTHING = 0.1  # weight of the newest detection in size, height and score
+SMOOTHED_HITS = 10  # number of detections from which on their mean has this weight
 CUT_SMOOTHING = 0.02  # the same for boxes that the image border truncates sideways: the head may be outside
 CUT_LASTS_NS = NS // 2  # hysteresis: an end is visible again this long after it was last truncated
-NEVER_NS = -10 ** 18
 LEAST_HEIGHT_M = 0.1
-STARTING_SUPPORT = 0.2  # minimum support of a detection that starts a track: most positions with less are wrong
-NEW_NS = NS  # people pass each other later than that after they were first detected
-SAME_PERSON_M = 0.15  # two people who are both visible cannot be this close to each other
-AXES = [[0], [1], [3], [4]]  # indices of x, y and their velocities among x, y, z and their velocities
 STILL_MOVING = 0.5  # hysteresis: a moving track stops below this share of `moving_speed`
+NEVER_NS = -10 ** 18
+SEEN = -1  # visibility of a detected track; ranks before those of undetected ones, VISIBLE, OCCLUDED, OUT_OF_VIEW
+LEAST_SPEED2 = 1e-12  # avoids a division by zero
+# Places among the numbers of a published track, see `_numbers_of`: of x, y, z, their velocities, the velocity of the
+# prediction, and the extents; of the covariance of the first six, and of the two terms of the covariances of x, y, z
+# that are multiplied by the powers 0, 1, 2 of the time of a prediction.
+POSITION, VELOCITY, EXPECTED, SIZE, POSITION_VARIANCES = [0, 1, 14], [2, 3, 16], [17, 18, 16], slice(19, 22), [4, 8]
+COVARIANCE = np.array([[4, 5, 16, 6, 7, 16], [5, 8, 16, 9, 10, 16], [16, 16, 15, 16, 16, 16],
+                       [6, 9, 16, 11, 12, 16], [7, 10, 16, 12, 13, 16], [16] * 6])
+_CROSS, _NOTHING = COVARIANCE[:3, 3:], np.full((3, 3), 16)
+AHEAD = np.reshape((COVARIANCE[:3, :3], _CROSS, COVARIANCE[3:, 3:], _NOTHING, _CROSS.T, _NOTHING), (2, 3, 9))
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])  # a covariance (3, 3) of 1 along x and y
 
 
 @parameters('kalman: how certain predictions are')
@@ -54,162 +62,211 @@ class PredictionParams(NamedTuple):
         0.05, 'Standard deviation added for errors that stay the same for seconds.', 'm', live=(0, 0.5))
 
 
-def update_matched(tracks, rows, measurements, stamp_ns, params, classes):
-    """Update the tracks in `rows` in place, which are predicted to the stamp, with one measurement each."""
-    matched = tracks[rows]
-    matched['mean'], matched['covariance'] = kalman_filter.update(matched['mean'], matched['covariance'], measurements,
-                                                                  params)
-    period_s = (stamp_ns - matched['last_ns']) / NS - matched['unseen_s']
-    track_score.add_detections(matched, measurements['score'], period_s, params)
-    matched['hits'] += 1
-    matched['last_ns'], matched['unseen_s'], matched['missed_s'], matched['status'] = stamp_ns, 0, 0, VISIBLE
-    speed_mps = np.hypot(*matched['mean'][:, 2:].T)
-    matched['moving'] = speed_mps >= params.moving_speed * np.where(matched['moving'], STILL_MOVING, 1)
-    _update_size(matched, measurements, stamp_ns)
-    _update_class(matched, measurements, classes)
-    tracks[rows] = matched
+class Rules(NamedTuple):
+    """What the update of a track needs of `tracker.TrackerParams`, and `measurement_model.Kinds`."""
+
+    outliers: kalman_filter.OutlierModel
+    even_log_odds: float
+    confirming_log_odds: float
+    moving_speed: float
+    kinds: dict
+
+    @classmethod
+    def of(cls, params, kinds):
+        """The Rules of TrackerParams."""
+        return cls(kalman_filter.outlier_model(params), _logit(params.even_score),
+                   _logit(params.confirmation_probability), params.moving_speed, kinds)
 
 
-def new_targets(tracks, measurements, stamp_ns, params, classes):
-    """Start tracks from unmatched measurements, except measurements with little support or a low score, and duplicate
-    detections of recently matched or new tracks of the same group of classes.
-
-    Returns the new tracks, whose IDs are not set, and the indices of the measurements that started them.
+class _End(NamedTuple):
+    """Lower or upper end of a body: number of the detections that show it, and stamp of the latest that is truncated.
     """
-    new = np.zeros(len(measurements), TRACK)
-    new['mean'][:, :2] = measurements['position_m']
-    new['covariance'][:, :2, :2] = measurements['noise_m2']
-    speeds_mps = params.initial_speed * classes.initial_speed[measurements['class_number']]
-    new['covariance'][:, [2, 3], [2, 3]] = speeds_mps[:, None] ** 2
-    for name in ('size_m', 'z_m', 'z_m2', 'class_number', 'score', 'detection'):
-        new[name] = measurements[name]
-    new['end_hits'] = ~measurements['cut_ends']
-    new['cut_ns'] = np.where(measurements['cut_ends'], stamp_ns, NEVER_NS)
-    new['hits'], new['first_ns'], new['last_ns'] = 1, stamp_ns, stamp_ns
-    new['log_odds'] = track_score.log_odds_of(measurements['score'], params.even_score)
-    new['votes'][np.arange(len(new)), classes.member[new['class_number']]] = _vote_weights(measurements)
-    is_recent = stamp_ns - tracks['last_ns'] < RECENTLY_MATCHED_NS
-    occupied_m = np.concatenate((tracks['mean'][is_recent, :2], new['mean'][:, :2]))
-    groups = classes.group[np.concatenate((tracks['class_number'][is_recent], new['class_number']))]
-    others, first = list(range(is_recent.sum())), is_recent.sum()
-    kept = []
-    trusted = (measurements['support'] >= STARTING_SUPPORT) & (new['log_odds'] > track_score.MIN_TRACK_SCORE)
-    for row in np.flatnonzero(trusted).tolist():
-        is_far = np.linalg.norm(occupied_m[others] - occupied_m[first + row], axis=1) >= params.duplicate_distance
-        if (is_far | (groups[others] != groups[first + row])).all():
-            kept.append(row)
-            others.append(first + row)
-    return new[kept], kept
+
+    hits: int
+    cut_ns: int
 
 
-def duplicates(tracks, stamp_ns, classes):
-    """Which tracks (n,) are of the object of an older track: both are confirmed, recently matched and at one place, and
-    of one group of classes. Tracks that exist for longer than `NEW_NS` are of different objects, which pass each other.
+class Track(object):
+    """One object. Plain numbers in the fixed frame, metres, nanoseconds.
+
+    `state` is a `kalman_filter.State`. `z_m` is the height of the centre and `z_m2` its variance; `size_m` are the
+    extents, and `lower` and `upper` the ends of the body. `hits` counts the detections, of which `first_ns` and
+    `last_ns` are the first and the latest. `unseen_s` is the time since the latest one, `missed_s` the part of it
+    during which a detection was expected. `visibility` is that in the latest image of each camera: SEEN, or as
+    `status`. `log_odds` is the track score. `kind` is the class of the group that has the most of the filtered scores
+    `votes`; `score` is the filtered score of the detections, `detection` the `Detection.index` in the latest image.
+    `innovation_m` is that of the latest image if its noise is assumed, otherwise 0.
     """
-    duplicate = np.zeros(len(tracks), bool)
-    rows = np.flatnonzero(tracks['confirmed'] & (stamp_ns - tracks['last_ns'] < RECENTLY_MATCHED_NS))
-    is_new = stamp_ns - tracks['first_ns'][rows] < NEW_NS
-    if is_new.any():
-        order = np.argsort(tracks['first_ns'][rows], kind='mergesort')
-        rows, is_new = rows[order], is_new[order]
-        places_m, groups = tracks['mean'][rows, :2], classes.group[tracks['class_number'][rows]]
-        at_one_place = np.linalg.norm(places_m[:, None] - places_m, axis=2) < SAME_PERSON_M
-        duplicate[rows] = is_new & np.tril(at_one_place & (groups[:, None] == groups), -1).any(axis=1)
-    return duplicate
+
+    def __init__(self, track_id, measurement, stamp_ns, camera, speed_mps, even_log_odds):
+        """Start a track; its velocity is unknown, with the standard deviation `speed_mps` along each axis."""
+        detection, speed_m2 = measurement.detection, speed_mps ** 2
+        self.id, self.kind, self.score, self.detection = track_id, measurement.kind, detection.score, detection.index
+        self.state = kalman_filter.State(measurement.x, measurement.y, 0.0, 0.0, measurement.xx, measurement.xy, 0.0,
+                                         0.0, measurement.yy, 0.0, 0.0, speed_m2, 0.0, speed_m2)
+        self.z_m, self.z_m2, self.size_m = measurement.z, measurement.zz, measurement.size_m
+        _left, top, _right, bottom = detection.truncated_edges
+        self.lower, self.upper = (_End(0, stamp_ns) if is_cut else _End(1, NEVER_NS) for is_cut in (bottom, top))
+        self.hits, self.first_ns, self.last_ns, self.unseen_s, self.missed_s = 1, stamp_ns, stamp_ns, 0.0, 0.0
+        self.status, self.visibility, self.innovation_m = VISIBLE, {camera: SEEN}, (0.0, 0.0)
+        self.log_odds, self.is_confirmed, self.is_moving = log_odds_of(detection.score, even_log_odds), False, False
+        self.votes = {measurement.kind.label: _vote(detection.score)}
+
+    def predicted(self, elapsed_s, acceleration):
+        """A copy of this track `elapsed_s` later, not detected, given the acceleration density of people."""
+        track = Track.__new__(Track)
+        track.__dict__.update(self.__dict__)
+        track.state = kalman_filter.predict(self.state, elapsed_s, acceleration * self.kind.known.acceleration)
+        track.detection = NOT_DETECTED
+        return track
+
+    def set_visibility(self, camera, visibility):
+        """Set the visibility in the latest image of a camera. Copies of this track keep the previous one."""
+        if self.visibility.get(camera) != visibility:
+            self.visibility = dict(self.visibility)
+            self.visibility[camera] = visibility
+
+    def update(self, measurement, stamp_ns, camera, rules):
+        """Update this track, predicted to the stamp, with its measurement in the image of a camera."""
+        self.set_visibility(camera, SEEN)
+        detection, state = measurement.detection, self.state
+        is_assumed = measurement.is_assumed
+        self.innovation_m = (measurement.x - state.x, measurement.y - state.y) if is_assumed else (0.0, 0.0)
+        self.state = state = kalman_filter.update(state, measurement, rules.outliers)
+        period_s = (stamp_ns - self.last_ns) / NS - self.unseen_s
+        log_odds = log_odds_of(detection.score, rules.even_log_odds)
+        # At least that of a new track: an object may be where false detections were (as in Page's test, 1954).
+        total = max(self.log_odds + min(period_s / HIT_CORRELATION_S, 1) * (log_odds + HIT), log_odds)
+        self.log_odds = min(total, MAX_TRACK_SCORE)
+        self.is_confirmed = self.is_confirmed or self.log_odds >= rules.confirming_log_odds
+        self.hits, self.last_ns, self.unseen_s, self.missed_s = self.hits + 1, stamp_ns, 0.0, 0.0
+        self.status, self.detection = VISIBLE, detection.index
+        limit_mps = rules.moving_speed * (STILL_MOVING if self.is_moving else 1)
+        self.is_moving = math.hypot(state.u, state.v) >= limit_mps
+        self._update_size(measurement, stamp_ns)
+        self._update_class(measurement.kind, detection.score, rules.kinds)
+
+    def miss(self, status, unseen_s, missed_s, detection_probability):
+        """Mark this track as not detected for `unseen_s` and not detected where a camera should for `missed_s`."""
+        self.status, self.unseen_s, self.missed_s = status, self.unseen_s + unseen_s, self.missed_s + missed_s
+        self.log_odds += min(missed_s / MISS_CORRELATION_S, 1) * math.log(1 - detection_probability)
+        self.innovation_m = 0.0, 0.0
+
+    def _update_size(self, measurement, stamp_ns):
+        """Smooth the extents and the height.
+
+        The lower and the upper end are smoothed separately. A truncated end moves with the other one, so that the
+        height stays constant. An end that has never been visible is placed where the estimator expects it. Detectors
+        place the edge of a truncated person on either side of the limit of truncation, so an end stays truncated for
+        `CUT_LASTS_NS`.
+        """
+        cut_left, top, cut_right, bottom = measurement.detection.truncated_edges
+        self.lower, is_lower_held = _end_after(self.lower, bottom, stamp_ns)
+        self.upper, is_upper_held = _end_after(self.upper, top, stamp_ns)
+        share, largest = max(SMOOTHING, 1 / self.hits), 1.0
+        if cut_left or cut_right:
+            share = largest = CUT_SMOOTHING
+        lower_share = 0.0 if is_lower_held else min(max(SMOOTHING, 1 / max(self.lower.hits, 1)), largest)
+        upper_share = 0.0 if is_upper_held else min(max(SMOOTHING, 1 / max(self.upper.hits, 1)), largest)
+        (width_m, depth_m, height_m), (new_width_m, new_depth_m, new_height_m) = self.size_m, measurement.size_m
+        up_m, taller_m = measurement.z - self.z_m, new_height_m - height_m
+        lower_m, upper_m = lower_share * (up_m - taller_m / 2), upper_share * (up_m + taller_m / 2)
+        if is_lower_held:
+            lower_m = upper_m
+        if is_upper_held:
+            upper_m = lower_m
+        self.size_m = (width_m + share * (new_width_m - width_m), depth_m + share * (new_depth_m - depth_m),
+                       max(height_m + upper_m - lower_m, LEAST_HEIGHT_M))
+        self.z_m += (lower_m + upper_m) / 2
+        self.z_m2 += (lower_share + upper_share) / 2 * (measurement.zz - self.z_m2)
+
+    def _update_class(self, kind, score, kinds):
+        """Filter the score, and those of the classes of the group: the mean of the first detections, then a first-order
+        filter. Unknown scores leave the score as it is.
+        """
+        share = max(SMOOTHING, 1 / self.hits)
+        if score > 0:
+            self.score = self.score + share * (score - self.score) if self.score > 0 else score
+        if len(kind.members) > 1:
+            votes = {label: (1 - share) * vote for label, vote in self.votes.items()}
+            votes[kind.label] = votes.get(kind.label, 0.0) + share * _vote(score)
+            self.votes, self.kind = votes, kinds[max(kind.members, key=lambda label: votes.get(label, 0.0))]
 
 
-def _vote_weights(measurements):
-    """Weights (n,) of the detections for the class of their tracks: their scores, 1 if unknown."""
-    return np.where(measurements['score'] > 0, measurements['score'], 1)
+def _end_after(end, is_cut, stamp_ns):
+    """The _End after a detection, and whether it moves with the other one."""
+    if not is_cut and end.hits >= SMOOTHED_HITS and end.cut_ns < stamp_ns - CUT_LASTS_NS:
+        return end, False  # further detections make no difference
+    cut_ns = stamp_ns if is_cut else end.cut_ns
+    was_cut = not is_cut and stamp_ns - cut_ns < CUT_LASTS_NS
+    hits = end.hits + (not is_cut and not was_cut)
+    return _End(hits, cut_ns), was_cut or is_cut and hits > 0
 
 
-def _update_class(matched, measurements, classes):
-    """Filter the scores of each track with one measurement: of the classes of its group, and of its detections.
+def _vote(score):
+    """Weight of a detection for the class of its track: its score, 1 if unknown."""
+    return score if score > 0 else 1.0
 
-    The filter is the mean of the first measurements, then a first-order filter. Unknown scores leave the score as it
-    is.
+
+def log_odds_of(score, even_log_odds):
+    """Log odds that a detection shows an object: its score is 0..1, 0 if unknown; half of the detections with the score
+    of the log odds `even_log_odds` do.
     """
-    matched['detection'] = measurements['detection']
-    scores, numbers = measurements['score'], measurements['class_number']
-    share = np.maximum(SMOOTHING, 1 / matched['hits'])
-    known = np.where(scores > 0, scores, matched['score'])
-    matched['score'] = np.where(matched['score'] > 0, matched['score'] + share * (known - matched['score']), known)
-    groups = classes.group[numbers]
-    if (classes.size[groups] > 1).any():
-        matched['votes'] *= 1 - share[:, None]
-        matched['votes'][np.arange(len(matched)), classes.member[numbers]] += share * _vote_weights(measurements)
-        matched['class_number'] = classes.numbers[groups, matched['votes'].argmax(axis=1)]
+    log_odds = _logit(min(score if score > 0 else UNKNOWN_SCORE, LARGEST_SCORE)) - even_log_odds
+    return min(max(log_odds, MIN_LOG_ODDS), MAX_LOG_ODDS)
 
 
-def _update_size(matched, measurements, stamp_ns):
-    """Smooth the size and the height of each track with one measurement.
+def _logit(probability):
+    return math.log(probability / (1 - probability))
 
-    The lower and the upper end are smoothed separately. A truncated end moves with the other one, so that the height
-    stays constant. An end that has never been visible is placed where the estimator expects it. Detectors place the
-    edge of a truncated person on either side of the limit of truncation, so an end stays truncated for `CUT_LASTS_NS`.
+
+def learned_prediction(log_scale, assumed_m, params):
+    """Adapt PredictionParams to the learned scale of the variance `assumed_m`².
+
+    If the scale is below 1, the rest of the variance is that of lasting errors, and slow velocities are less noisy.
     """
-    cut, cut_sideways = measurements['cut_ends'], measurements['cut_sideways']
-    matched['cut_ns'] = np.where(cut, stamp_ns, matched['cut_ns'])
-    was_cut = ~cut & (stamp_ns - matched['cut_ns'] < CUT_LASTS_NS)
-    matched['end_hits'] += ~cut & ~was_cut
-    held = was_cut | cut & (matched['end_hits'] > 0)
-    end_share = np.where(held, 0, np.maximum(SMOOTHING, 1 / np.maximum(matched['end_hits'], 1)))
-    share = np.maximum(SMOOTHING, 1 / matched['hits'])
-    share[cut_sideways] = CUT_SMOOTHING
-    end_share = np.minimum(end_share, np.where(cut_sideways, CUT_SMOOTHING, 1)[:, None])
-    change_m = measurements['size_m'] - matched['size_m']
-    up_m, taller_m = measurements['z_m'] - matched['z_m'], change_m[:, 2]
-    lower_m, upper_m = end_share[:, 0] * (up_m - taller_m / 2), end_share[:, 1] * (up_m + taller_m / 2)
-    lower_m = np.where(held[:, 0], upper_m, lower_m)
-    upper_m = np.where(held[:, 1], lower_m, upper_m)
-    matched['size_m'][:, :2] += share[:, None] * change_m[:, :2]
-    matched['size_m'][:, 2] = np.maximum(matched['size_m'][:, 2] + upper_m - lower_m, LEAST_HEIGHT_M)
-    matched['z_m'] += (lower_m + upper_m) / 2
-    matched['z_m2'] += end_share.mean(axis=1) * (measurements['z_m2'] - matched['z_m2'])
+    if log_scale >= 0:
+        return params
+    scale = math.exp(log_scale)
+    lasting_m = math.sqrt(max(params.position_bias ** 2, assumed_m ** 2 * (1 - scale)))
+    return params._replace(position_bias=lasting_m, standing_speed=params.standing_speed * math.sqrt(scale))
 
 
-def position_std_of(tracks):
-    """Standard deviations (n,) of the positions, the larger one of x and y, metres."""
-    return np.sqrt(np.maximum(tracks['covariance'][:, 0, 0], tracks['covariance'][:, 1, 1]))
-
-
-def objects_of(tracks, params, classes):
-    """Convert tracks to a list of TrackedObject with predictions at constant velocity; `params` are PredictionParams,
-    `classes` ClassNumbers.
+def published(tracks, params):
+    """Convert tracks to a list of TrackedObject with predictions at constant velocity; `params` are PredictionParams.
 
     A low velocity is mostly noise of a standing person. The predicted velocity v is therefore scaled by
     v² / (v² + standing_speed²). The covariance of the filter does not include errors that stay constant for seconds,
     such as those of a wrong calibration; `position_bias` is added for them. `prediction_acceleration` accounts for
     turns.
     """
-    if not len(tracks):
+    if not tracks:
         return []
+    numbers = np.array([_numbers_of(track, params.standing_speed ** 2 + LEAST_SPEED2) for track in tracks])
+    numbers[:, POSITION_VARIANCES] += params.position_bias ** 2
+    times_s, powers, turned_m2 = _times(params)
+    positions_m, velocities_mps, sizes_m = numbers[:, POSITION], numbers[:, VELOCITY], numbers[:, SIZE]
+    predictions_m = positions_m[:, None] + times_s[:, None] * numbers[:, None, EXPECTED]
+    predictions_m2 = powers @ (numbers[:, AHEAD[0]] + numbers[:, AHEAD[1]]) + turned_m2
+    return [TrackedObject(track.id, position_m, size_m, velocity_mps, velocity_mps, track.status, track.is_moving,
+                          track.first_ns, track.last_ns, prediction_m, params.prediction_step, covariance,
+                          prediction_m2, track.kind.label, track.score, track.detection)
+            for track, position_m, size_m, velocity_mps, prediction_m, covariance, prediction_m2
+            in zip(tracks, positions_m, sizes_m, velocities_mps, predictions_m, numbers[:, COVARIANCE],
+                   predictions_m2.reshape(len(tracks), -1, 3, 3))]
+
+
+def _numbers_of(track, standing2):
+    """The numbers of a track that are published, in the order of `POSITION` and the others below it."""
+    speed2 = track.state.u ** 2 + track.state.v ** 2
+    share = speed2 / (speed2 + standing2)
+    return track.state + (track.z_m, track.z_m2, 0.0, share * track.state.u, share * track.state.v) + track.size_m
+
+
+@functools.lru_cache(maxsize=16)
+def _times(params):
+    """Times of the predictions (steps,), their powers 0 to 2 (steps, 3), and the variances (steps, 9) that turns add.
+    """
     times_s = prediction_times_s(params.prediction_time, params.prediction_step)
-    velocities_mps, level = tracks['mean'][:, 2:], np.eye(3)[:, :2]
-    speed2 = (velocities_mps ** 2).sum(axis=1, keepdims=True)
-    expected_mps = velocities_mps * speed2 / (speed2 + params.standing_speed ** 2 + 1e-12)
-    velocities_mps = velocities_mps.dot(level.T)
-
-    positions_m = np.column_stack((tracks['mean'][:, :2], tracks['z_m']))
-    predictions_m = positions_m[:, None] + times_s[:, None] * expected_mps.dot(level.T)[:, None]
-    predictions_m2 = level @ _covariances_ahead(tracks['covariance'], times_s, params) @ level.T
-    predictions_m2[..., 2, 2] = tracks['z_m2'][:, None]
-    covariances = np.zeros((len(tracks), 6, 6))
-    covariances[:, AXES, np.transpose(AXES)] = tracks['covariance']
-    covariances[:, [0, 1], [0, 1]] += params.position_bias ** 2
-    covariances[:, 2, 2] = tracks['z_m2']
-
-    columns = {name: tracks[name].tolist() for name in PUBLISHED}
-    labels = [classes.labels[number] for number in columns['class_number']]
-    return list(map(TrackedObject, columns['id'], positions_m, tracks['size_m'].copy(), velocities_mps, velocities_mps,
-                    columns['status'], columns['moving'], columns['first_ns'], columns['last_ns'], predictions_m,
-                    itertools.repeat(params.prediction_step), covariances, predictions_m2, labels, columns['score'],
-                    columns['detection']))
-
-
-def _covariances_ahead(covariance, times_s, params):
-    """Covariances (n, steps, 2, 2) of the predicted positions."""
-    position, velocity, both = covariance[:, None, :2, :2], covariance[:, None, 2:, 2:], covariance[:, None, :2, 2:]
-    times = times_s[:, None, None]
-    turned = params.prediction_acceleration * times ** 3 / 3 + params.position_bias ** 2
-    return position + times * (both + both.transpose(0, 1, 3, 2)) + times ** 2 * velocity + turned * np.eye(2)
+    turned_m2 = params.prediction_acceleration * times_s ** 3 / 3
+    return times_s, np.stack((times_s ** 0, times_s, times_s ** 2), axis=1), turned_m2[:, None] * LEVEL

@@ -1,35 +1,37 @@
 """Multi-object tracker: positions, velocities and predictions of people from the 3D boxes of an image sequence.
 
 Each person is tracked by a constant-velocity Kalman filter in the plane (`kalman_filter`). Detections are assigned to
-tracks by maximum total likelihood (`association`). A detection that a new target explains better starts a track, which
-is published once it is likely to be a person (`track_score`). If most people seem to jump in the same way, the pose of
-the camera jumped, and all tracks are moved (`common_motion`). Undetected people are not dropped immediately: their
-tracks stay published for a short time if a camera should detect them, and for longer if a person or an object occludes
-them (`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep their track ID.
+tracks by maximum total likelihood (`association`). A detection that a new target explains better starts a track
+(`birth`), which is published once it is likely to be a person (`track`). If most people seem to jump in the same way,
+the pose of the camera jumped, and all tracks are moved (`common_motion`). Undetected people are not dropped
+immediately: their tracks stay published for a short time if a camera should detect them, and for longer if a person or
+an object occludes them (`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep
+their track ID.
 """
-from typing import NamedTuple, Optional
-
-import numpy as np
+import math
+import operator
+from typing import NamedTuple, Optional, Sequence
 
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking import kalman_filter, noise_scale, track_score
-from ros_3d_bb.tracking.association import associate, unmatched
-from ros_3d_bb.tracking.class_numbers import ClassNumbers
-from ros_3d_bb.tracking.common_motion import SETTLED_NS, common_motion, may_jump, most_fit, move
-from ros_3d_bb.tracking.measurement_model import BOX_ERRORS, NoiseParams, measurements_of
-from ros_3d_bb.tracking.occlusion import (DEFAULT_RANGE_M, SEEN, CameraVisibility, learned_range, mark_missed,
-                                          recent_others)
+from ros_3d_bb.tracking.association import associate
+from ros_3d_bb.tracking.birth import NEW_NS, duplicates, initiate
+from ros_3d_bb.tracking.common_motion import FEWEST, SETTLED_NS, common_motion, may_jump, most_fit, moved
+from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, BoxNoise, Kinds, NoiseParams,
+                                                  correlated_images, learned_log_scale, learned_range,
+                                                  measurements_of, scaled)
+from ros_3d_bb.tracking.occlusion import CameraState, mark_missed, recent_others
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
-from ros_3d_bb.tracking.track import (TRACK, PredictionParams, duplicates, new_targets, objects_of, position_std_of,
-                                      update_matched)
-from ros_3d_bb.tracking.types import MOVING_SPEED, NOT_DETECTED, OUT_OF_VIEW, VISIBLE, check_steps
+from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, SEEN, PredictionParams, Rules, Track, learned_prediction,
+                                      published)
+from ros_3d_bb.tracking.types import MOVING_SPEED, VISIBLE, TrackerBase
 
-KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new
-MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped
-TENTATIVE_TIMEOUT_S = 0.6  # how long a tentative track is kept without a detection
+KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
+MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped; chosen
+TENTATIVE_TIMEOUT_S = 0.6  # how long a tentative track is kept without a detection; chosen
+BY_ID, FIRST_SEEN = operator.attrgetter('id'), operator.attrgetter('first_ns')
 # Sections of the parameters.
 MOTION, ASSOCIATION = 'kalman: how people move', 'kalman: association of boxes with tracks'
 
@@ -75,26 +77,24 @@ class TrackerParams(NamedTuple):
 
 
 class _State(NamedTuple):
-    """State of the tracker after an image: the tracks, the stamp of the latest image, the `CameraVisibility` of the
-    latest image of each camera, the number of images with a common motion, the stamp of the latest image that most
-    people did not fit (None without), and the learned `noise_scale`.
+    """State of the tracker after an image: the tracks, the stamp of the latest image, the `CameraState` of each camera,
+    the number of images with a common motion, the stamp of the latest image that most people did not fit (None
+    without), and the learned `measurement_model.learned_log_scale`.
     """
 
-    tracks: np.ndarray
-    now_ns: int
+    tracks: Sequence[Track]
+    now_ns: Optional[int]
     cameras: dict
     common_motions: int
     misfit_ns: Optional[int]
     log_noise_scale: float
 
 
-class Tracker(object):
-    """Tracks people and other objects from image to image.
+class Tracker(TrackerBase):
+    """Tracks people and other objects from image to image, as of `types.TrackerBase`.
 
-    Call `update` with the detections of each image, `skip` for an image whose detections are unusable, and `reset`
-    after a jump in time. Images of several cameras may arrive late and in any order. The IDs of tracks are greater than
-    `last_id`. `classes` is the table of the classes of objects: tracks never change between its groups. `detector` is
-    a DetectorModel.
+    Images of several cameras may arrive late and in any order. Parameters: TrackerParams, NoiseParams and
+    PredictionParams. `detector` is a DetectorModel.
 
     Raises
     ------
@@ -104,18 +104,17 @@ class Tracker(object):
 
     def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams(), last_id=0,
                  classes=ObjectClasses(), detector=DetectorModel()):
-        self._classes, self._detector = ClassNumbers(classes), detector
+        self._kinds, self._detector = Kinds(classes), detector
         self.reconfigure(params, noise, prediction)
         self._start(last_id)
 
     def _start(self, last_id, log_noise_scale=0.0):
-        state = _State(np.zeros(0, TRACK), None, {}, 0, None, log_noise_scale)
-        self._buffer = OutOfSequenceBuffer(self._step, state, last_id)
+        self._buffer = OutOfSequenceBuffer(self._step, _State([], None, {}, 0, None, log_noise_scale), last_id)
 
     def reconfigure(self, params, noise, prediction):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
-        check_steps(prediction.prediction_time, prediction.prediction_step)
-        self._params, self._noise, self._prediction = params, noise, prediction
+        super(Tracker, self).reconfigure(params, noise, prediction)
+        self._rules = Rules.of(params, self._kinds)
 
     def reset(self):
         """Delete all tracks, as after a jump in time. IDs are not reused, and the learned noise is kept."""
@@ -126,25 +125,10 @@ class Tracker(object):
         self._buffer.skip(stamp_ns, camera)
 
     def update(self, stamp_ns, detections, view):
-        """Update the tracks with the detections of one image.
+        """Update the tracks with the detections of one image, as `TrackerBase.update`.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            Stamp of the image, nanoseconds.
-        detections : list of Detection
-        view : CameraView
-
-        Returns
-        -------
-        list of TrackedObject
-            Ordered by ID, at the stamp of the newest image. They may not include the detections of images that are
-            several images late yet (`out_of_sequence`).
-
-        Raises
-        ------
-        ValueError
-            If the image is too late or a duplicate; the tracks are unchanged.
+        The result may not include the detections of images that are several images late yet (`out_of_sequence`).
+        Raises ValueError if the image is too late or a duplicate; the tracks are unchanged.
         """
         self._buffer.insert(DetectedImage(stamp_ns, tuple(detections), view))
         return self._published()
@@ -154,76 +138,112 @@ class Tracker(object):
         """Number of images in which the pose of the camera jumped (`common_motion`), since the last reset."""
         return self._buffer.state.common_motions
 
-    def objects(self):
+    def tracks(self):
         """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image; with all images."""
         self._buffer.replay()
         return self._published()
 
     def _published(self):
-        state, params = self._buffer.state, self._params
-        tracks = state.tracks.take(np.argsort(state.tracks['id']))
-        published = tracks['log_odds'] >= track_score.MIN_TRACK_SCORE
-        published &= position_std_of(tracks) < params.max_position_std
-        published |= tracks['status'] == VISIBLE
-        prediction = noise_scale.learned_prediction(state.log_noise_scale, self._noise.noise_unknown, self._prediction)
-        return objects_of(tracks.compress(tracks['confirmed'] & published), prediction, self._classes)
+        state, (params, noise, prediction) = self._buffer.state, self._params
+        largest_m2 = params.max_position_std ** 2
+        tracks = [track for track in sorted(state.tracks, key=BY_ID) if track.is_confirmed and (
+            track.status == VISIBLE or track.log_odds >= MIN_TRACK_SCORE and track.state.position_m2 < largest_m2)]
+        return published(tracks, learned_prediction(state.log_noise_scale, noise.noise_unknown, prediction))
 
-    def _step(self, state, image, observed_s, assign_id):
+    def _step(self, before, image, observed_s, assign_id):
         """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
-        stamp_ns, detections, view = image
-        params, classes, detector, camera = self._params, self._classes, self._detector, view.camera
-        tracks = state.tracks.copy()
-        elapsed_s = 0.0 if state.now_ns is None else (stamp_ns - state.now_ns) / NS
-        density = params.acceleration * classes.acceleration[tracks['class_number']]
-        tracks['mean'], tracks['covariance'] = kalman_filter.predict(tracks['mean'], tracks['covariance'], elapsed_s,
-                                                                     density)
-        tracks['detection'] = NOT_DETECTED
+        tracks = self._predict(before, image.stamp_ns)
+        measurements = self._measure(before, image)
+        matches, fits, is_moved = self._associate(before, tracks, measurements, image)
+        matched = {track.id: (track.is_confirmed, measurement.number) for track, measurement in matches}
+        log_noise_scale = learned_log_scale(before.log_noise_scale, matches)
+        self._update_matched(matches, log_noise_scale - max(before.log_noise_scale, 0), image)
+        cameras = self._cameras_after(before, image, matches, fits)
+        missed = [track for track in tracks if track.id not in matched]
+        if missed:
+            mark_missed(missed, tracks, before.tracks, cameras, image.view.camera, observed_s,
+                        self._detector.detection_probability)
+        tracks = self._delete(tracks, image.stamp_ns)
+        if len(matches) < len(measurements):
+            taken = set(number for _is_confirmed, number in matched.values())
+            unmatched = [measurement for measurement in measurements if measurement.number not in taken]
+            tracks += initiate(tracks, unmatched, image, self._params[0], self._rules, assign_id)
+        misfit_ns = image.stamp_ns if fits is False else before.misfit_ns
+        return _State(tracks, image.stamp_ns, cameras, before.common_motions + is_moved, misfit_ns,
+                      log_noise_scale), [(track_id,) + match for track_id, match in matched.items()]
 
-        latest = state.cameras.get(camera)
-        period_s = (stamp_ns - latest.stamp_ns) / NS if latest else 0.0
-        measurements = measurements_of(detections, view, period_s, self._noise, classes, detector)
-        noise_scale.widen(state.log_noise_scale, measurements)
-        rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
-        known = tracks['confirmed'] & (latest.visibility == SEEN if latest else False)
-        fits, motion = most_fit(tracks, known, measurements, rows, columns), None
-        is_settled = state.misfit_ns is None or stamp_ns - state.misfit_ns > SETTLED_NS
-        if fits is False and is_settled and may_jump(latest, recent_others(state.cameras, camera, stamp_ns)):
-            motion = common_motion(tracks, known, measurements, view, classes, period_s)
-        misfit_ns = stamp_ns if fits is False else state.misfit_ns
+    def _predict(self, before, stamp_ns):
+        """Copies of the tracks, predicted to the image; the next steps change them."""
+        elapsed_s = 0.0 if before.now_ns is None else (stamp_ns - before.now_ns) / NS
+        acceleration = self._params[0].acceleration
+        return [track.predicted(elapsed_s, acceleration) for track in before.tracks]
+
+    def _measure(self, before, image):
+        """The measurements of the image, with the noise for the association: a learned scale that is too small must not
+        separate people from their tracks."""
+        params, noise, _prediction = self._params
+        images = correlated_images(_period_s(before, image), self._detector, params.acceleration)
+        noise = BoxNoise(noise.noise_unknown, math.exp(max(before.log_noise_scale, 0)), self._detector.lasting_sigma_m,
+                         images)
+        return measurements_of(image.detections, image.view, noise, self._kinds)
+
+    def _associate(self, before, tracks, measurements, image):
+        """Assign measurements to tracks; if the pose of the camera jumped, the tracks are moved before.
+
+        Returns the matches [(Track, Measurement)], whether most people fit without a motion (None if unknown), and
+        whether there was one.
+        """
+        view, stamp_ns, params, outliers = image.view, image.stamp_ns, self._params[0], self._rules.outliers
+        matches = associate(tracks, measurements, stamp_ns, params, outliers)
+        if min(len(tracks), len(measurements)) < FEWEST:
+            return matches, None, False
+        latest = before.cameras.get(view.camera)
+        known = [track for track in tracks if latest and track.is_confirmed
+                 and track.visibility.get(view.camera) == SEEN]
+        fits = most_fit(known, matches, len(measurements))
+        is_settled = before.misfit_ns is None or stamp_ns - before.misfit_ns > SETTLED_NS
+        if fits is not False or not is_settled or not may_jump(
+                latest, recent_others(before.cameras, view.camera, stamp_ns).values()):
+            return matches, fits, False
+        motion = common_motion(known, measurements, view, _period_s(before, image))
+        if motion is None:
+            return matches, fits, False
+        for track in tracks:
+            track.state = moved(track.state, *motion, view=view)
+        return associate(tracks, measurements, stamp_ns, params, outliers), fits, True
+
+    def _update_matched(self, matches, log_factor, image):
+        """Update the tracks of the matches, with the variance of assumed noise multiplied by exp(`log_factor`)."""
+        scale = math.exp(log_factor)
+        for track, measurement in matches:
+            track.update(scaled(measurement, scale), image.stamp_ns, image.view.camera, self._rules)
+
+    def _cameras_after(self, before, image, matches, fits):
+        """The CameraState of each camera after an image with matches."""
+        latest = before.cameras.get(image.view.camera)
+        range_m = self._detector.max_range_m
+        if range_m is None:
+            range_m = learned_range(latest.range_m if latest else DEFAULT_RANGE_M, matches)
         if fits is None and latest:
             fits = latest.fits
-        if motion is not None:
-            move(tracks, *motion, view)
-            rows, columns = associate(tracks, measurements, stamp_ns, params, classes)
-        matches = list(zip(tracks['id'][rows].tolist(), tracks['confirmed'][rows].tolist(), columns.tolist()))
-        matched = measurements.take(columns)
-        log_noise_scale = noise_scale.learn(state.log_noise_scale, tracks, rows, matched)
-        update_matched(tracks, rows, matched, stamp_ns, params, classes)
+        cameras = {name: known for name, known in before.cameras.items() if image.stamp_ns - known.stamp_ns <= KNOWN_NS}
+        cameras[image.view.camera] = CameraState(image.stamp_ns, image.view, range_m, fits)
+        return cameras
 
-        range_m = detector.max_range_m
-        if range_m is None:
-            range_m = learned_range(latest.range_m if latest else DEFAULT_RANGE_M, matched['distance_m'],
-                                    tracks['confirmed'], rows)
-        cameras = {name: latest for name, latest in state.cameras.items() if stamp_ns - latest.stamp_ns <= KNOWN_NS}
-        cameras[camera] = CameraVisibility(stamp_ns, view, np.full(len(tracks), SEEN), range_m, fits)
-        missed = unmatched(len(tracks), rows)
-        if len(missed):
-            mark_missed(tracks, state.tracks, missed, cameras, camera, observed_s, detector.detection_probability)
+    def _delete(self, tracks, stamp_ns):
+        """The tracks that are kept. Tentative ones are kept for a short time only."""
+        max_age_s, kept, duplicate_ids = self._params[0].max_age, [], ()
+        if tracks and stamp_ns - max(tracks, key=FIRST_SEEN).first_ns < NEW_NS:
+            duplicate_ids = duplicates(tracks, stamp_ns)
+        for track in tracks:
+            limit_s = max_age_s if track.is_confirmed else TENTATIVE_TIMEOUT_S
+            is_recent = not track.unseen_s or track.unseen_s < limit_s
+            if is_recent and track.state.position_m2 < MAX_POSITION_STD_M ** 2 and track.id not in duplicate_ids:
+                kept.append(track)
+        return kept
 
-        # Tentative tracks are kept for a short time only.
-        max_unseen_s = np.where(tracks['confirmed'], params.max_age, TENTATIVE_TIMEOUT_S)
-        kept = (tracks['unseen_s'] == 0) | (tracks['unseen_s'] < max_unseen_s)
-        kept &= position_std_of(tracks) < MAX_POSITION_STD_M
-        kept &= ~duplicates(tracks, stamp_ns, classes)
-        tracks, unmatched_columns = tracks.compress(kept), unmatched(len(detections), columns)
-        new = tracks[:0]
-        if len(unmatched_columns):
-            new, started = new_targets(tracks, measurements[unmatched_columns], stamp_ns, params, classes)
-            new['id'] = [assign_id(column) for column in unmatched_columns[started].tolist()]
-            tracks = np.concatenate((tracks, new))
-        if len(new) or not kept.all():
-            for name, seen in cameras.items():
-                added = np.full(len(new), SEEN if name == camera else OUT_OF_VIEW)
-                cameras[name] = seen._replace(visibility=np.concatenate((seen.visibility[kept], added)))
-        return _State(tracks, stamp_ns, cameras, state.common_motions + (motion is not None), misfit_ns,
-                      log_noise_scale), matches
+
+def _period_s(before, image):
+    """Time since the previous image of the same camera, seconds; 0 without one."""
+    latest = before.cameras.get(image.view.camera)
+    return (image.stamp_ns - latest.stamp_ns) / NS if latest else 0.0

@@ -1,15 +1,17 @@
 """Input and output types of the trackers. Positions and sizes are in the fixed frame (z up), metres."""
-from typing import Callable, NamedTuple, Optional, Tuple
+import math
+from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import Camera, transform_points, upright_turns
+from ros_3d_bb.camera.camera_model import Camera, upright_turns
 from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import Param
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
 NOT_DETECTED = -1  # index of the box of an object that was not detected
+# Chosen.
 NEARER_M = 0.25  # an occluding person is at least this much nearer to the camera than an occluded one
 MOST_STEPS = 1000  # maximum number of prediction steps, to limit memory
 VERTICAL = 0.02  # upper bound of the horizontal part of the optical axis of a camera that points straight up or down
@@ -24,7 +26,7 @@ MOVING_SPEED = Param(
 
 
 class Detection(NamedTuple):
-    """One object in one image: centre (3,) and extent (3,), x = y = width, z = height.
+    """One object in one image: centre (3,) and extent (3,), x = y = width, z = height; sequences or arrays of float.
 
     `covariance_m2` (3, 3) is the covariance of the centre, None if unknown. `truncated_edges` states whether the image
     border truncates the object at the left, top, right and bottom, as seen by a camera held upright. `support` is the
@@ -32,9 +34,9 @@ class Detection(NamedTuple):
     detector, 0..1, 0 if unknown, and `index` the index of the object's box among those of the image.
     """
 
-    position_m: np.ndarray
-    size_m: np.ndarray
-    covariance_m2: Optional[np.ndarray] = None
+    position_m: Sequence[float]
+    size_m: Sequence[float]
+    covariance_m2: Optional[Sequence[Sequence[float]]] = None
     truncated_edges: Tuple[bool, bool, bool, bool] = (False, False, False, False)
     support: float = 1.0
     label: str = PERSON
@@ -56,32 +58,30 @@ def detections_from_boxes(boxes, fixed_from_camera, classes=ObjectClasses()):
         Pose of the camera's optical frame in the fixed frame.
     classes : object_classes.ObjectClasses
     """
-    if not boxes:
-        return []
-    rotation, turns = fixed_from_camera[:3, :3], upright_turns(fixed_from_camera)
-    centers_m, extents_m = ([box.center_m for box in boxes.values()], [box.size_m[:2] for box in boxes.values()])
-    if turns % 2:
-        centers_m, extents_m = zip(*[_completed_in_portrait(box, classes.of(box.label)) for box in boxes.values()])
-    positions_m, extents_m = transform_points(fixed_from_camera, centers_m), np.array(extents_m)
-    widths_m, heights_m = extents_m[:, ::-1].T if turns % 2 else extents_m.T
-    unknown_m2 = np.zeros((3, 3))
-    covariances_m2 = rotation.dot([unknown_m2 if box.covariance_m2 is None else box.covariance_m2
-                                   for box in boxes.values()]).transpose(1, 0, 2).dot(rotation.T)
-    sizes_m = np.stack((widths_m, widths_m, heights_m), axis=1)
-    return [Detection(position_m, size_m, None if box.covariance_m2 is None else covariance_m2,
-                      box.truncated_edges[-turns:] + box.truncated_edges[:-turns], box.support or 1.0,  # 0: unknown
-                      box.label, box.score, index)
-            for (index, box), position_m, size_m, covariance_m2 in zip(boxes.items(), positions_m, sizes_m,
-                                                                       covariances_m2)]
+    turns, rows, rotation = upright_turns(fixed_from_camera), fixed_from_camera[:3].tolist(), fixed_from_camera[:3, :3]
+    detections = []
+    for index, box in boxes.items():
+        (x, y, z), (width_m, height_m) = map(float, box.center_m), map(float, box.size_m[:2])
+        if turns % 2:
+            (x, y, z), (height_m, width_m) = _completed_in_portrait(box, classes.of(box.label))
+        position_m = tuple([of_x * x + of_y * y + of_z * z + shift_m for of_x, of_y, of_z, shift_m in rows])
+        covariance_m2 = box.covariance_m2
+        if covariance_m2 is not None:
+            covariance_m2 = rotation.dot(covariance_m2).dot(rotation.T).tolist()
+        detections.append(Detection(
+            position_m, (width_m, width_m, height_m), covariance_m2,
+            box.truncated_edges[-turns:] + box.truncated_edges[:-turns], box.support or 1.0,  # 0: unknown
+            box.label, box.score, index))
+    return detections
 
 
 def _completed_in_portrait(box, kind):
-    """Centre (3,) of a box and its extents along the rows and the columns of an image of a camera in portrait.
+    """Centre of a box and its extents along the rows and the columns of an image of a camera in portrait, lists.
 
     The estimator completes a truncated object as if it stood upright in the image: to the usual width along the rows
     and to the usual height along the columns. In portrait, the two are swapped. The visible end stays in place.
     """
-    center_m, extents_m, cut = np.array(box.center_m, float), np.array(box.size_m[:2], float), box.truncated_edges
+    center_m, extents_m, cut = list(map(float, box.center_m)), list(map(float, box.size_m))[:2], box.truncated_edges
     was_completed = np.isclose(extents_m[1], kind.height)
     completed_m = max(extents_m[0], kind.height), kind.width if was_completed else extents_m[1]
     for axis, (cut_low, cut_high) in enumerate(zip(cut[:2], cut[2:])):
@@ -109,10 +109,11 @@ class CameraView(NamedTuple):
     def ahead(self):
         """Unit vector (2,) of the horizontal direction of the optical axis; of the upper edge of the image for a camera
         that points straight up or down."""
-        ahead = self.fixed_from_camera[:2, 2]
-        if ahead.dot(ahead) < VERTICAL ** 2:
-            ahead = -self.fixed_from_camera[:2, 1]
-        return ahead / np.sqrt(ahead.dot(ahead))
+        (_right, up_x, x), (_right, up_y, y) = self.fixed_from_camera[:2, :3].tolist()
+        if x * x + y * y < VERTICAL ** 2:
+            x, y = -up_x, -up_y
+        length = math.sqrt(x * x + y * y)
+        return np.array((x / length, y / length))
 
     def bearings(self, positions_m):
         """Horizontal distances (n,) of positions (n, 2 or 3) from the camera, metres, and their bearings (n,), radians:
@@ -150,6 +151,36 @@ class TrackedObject(NamedTuple):
     label: str = PERSON
     score: float = 0.0
     detection: int = NOT_DETECTED
+
+
+class TrackerBase(object):
+    """Base class of the trackers. The IDs of tracks are greater than `last_id` of the constructor, and tracks never
+    change between the groups of its table of classes, an `object_classes.ObjectClasses`.
+    """
+
+    common_motions = 0  # number of images in which the pose of the camera jumped
+
+    def reconfigure(self, *params):
+        """Use other parameters and keep the tracks; the last ones have `prediction_time` and `prediction_step`. Raises
+        ValueError without any change if one is invalid.
+        """
+        check_steps(params[-1].prediction_time, params[-1].prediction_step)
+        self._params = params
+
+    def update(self, stamp_ns, detections, view):
+        """Update the tracks with a list of Detection in the image of a CameraView. Returns the tracks as a list of
+        TrackedObject, ordered by ID, at the stamp of the newest image. Raises ValueError without any change if the
+        stamp is unusable.
+        """
+        raise NotImplementedError
+
+    def skip(self, stamp_ns, camera=''):
+        """Skip an image whose detections are unusable: tracks do not age. Never raises, as the stamp may be wrong."""
+        raise NotImplementedError
+
+    def reset(self):
+        """Delete all tracks, as after a jump in time. IDs are not reused."""
+        raise NotImplementedError
 
 
 def wrapped(angles):

@@ -212,7 +212,7 @@ def _ellipses(covariances_m2, centers_m):
     semi_axes_m = np.sqrt(CHI2_95 * np.maximum(variances_m2, 0))
     offsets_m = np.matmul(CIRCLE * semi_axes_m[:, np.newaxis], axes.transpose(0, 2, 1))
     outlines_m = (offsets_m + centers_m[:, np.newaxis, :2]).tolist()
-    return [[_point(x, y, z) for x, y in outline_m] for outline_m, z in zip(outlines_m, centers_m[:, 2].tolist())]
+    return [_points([(x, y, z) for x, y in outline_m]) for outline_m, z in zip(outlines_m, centers_m[:, 2].tolist())]
 
 
 def _pose(position_m):
@@ -224,6 +224,16 @@ def _point(x, y, z):
     point = Point()
     point.x, point.y, point.z = x, y, z
     return point
+
+
+def _points(places_m):
+    """As `_point`, for each of several places."""
+    points = []
+    for place_m in places_m:
+        point = Point()
+        point.x, point.y, point.z = place_m
+        points.append(point)
+    return points
 
 
 @functools.lru_cache(maxsize=None)

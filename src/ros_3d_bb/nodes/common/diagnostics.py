@@ -150,7 +150,7 @@ class NodeUpdater(diagnostic_updater.Updater):
         statuses = statuses if isinstance(statuses, list) else [statuses]
         for status in statuses:
             status.name = '%s: %s' % (self._node_name, status.name)
-        self.publisher.publish(DiagnosticArray(header=Header(stamp=rospy.Time.now()), status=statuses))
+        self.publisher.publish(DiagnosticArray(header=Header(stamp=rospy.get_rostime()), status=statuses))
 
 
 def unsubscribed_results():

@@ -1,0 +1,65 @@
+"""The costs of pairs of tracks and measurements: the same for few and for many, and for any first look."""
+from unittest import mock
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+
+from ros_3d_bb.core.object_classes import ObjectClasses
+from ros_3d_bb.tracking import association
+from ros_3d_bb.tracking.association import allowed_costs, associate
+from ros_3d_bb.tracking.kalman_filter import outlier_model
+from ros_3d_bb.tracking.measurement_model import BoxNoise, Kinds, measurements_of
+from ros_3d_bb.tracking.track import Track
+from ros_3d_bb.tracking.tracker import TrackerParams
+from ros_3d_bb.tracking.types import CameraView, Detection
+from support.cylinders import mounted
+
+KINDS, VIEW = Kinds(ObjectClasses()), CameraView(mounted(1.0))
+SEEDS = st.integers(0, 2 ** 32 - 1)
+
+
+def measured(random, count):
+    """Measurements of people and chairs in an area of 4 m x 4 m, with standard deviations of 0.03 to 0.6 m."""
+    return measurements_of([Detection((3 + random.uniform(-2, 2), random.uniform(-2, 2), 0.85),
+                                      (0.5, 0.5, random.uniform(1.5, 1.9)),
+                                      np.eye(3) * 10 ** random.uniform(-3, -0.4),
+                                      label=random.choice(['person', 'person', 'chair'])) for _ in range(count)],
+                           VIEW, BoxNoise(0.1, 1.0, 0.035, random.uniform(1, 5)), KINDS)
+
+
+def scene(seed):
+    """Tracks, some not detected for seconds, and measurements; parameters and their outlier model."""
+    random = np.random.RandomState(seed)
+    params = TrackerParams(outlier_share=random.choice([0.0, 0.1, 0.9]), outlier_offset=random.uniform(0, 2),
+                           outlier_spread=random.uniform(0, 2), new_target_density=10 ** random.uniform(-9, 1))
+    tracks = [Track(number, measurement, 0, '', random.uniform(0, 1), 0.0).predicted(random.uniform(0, 4), 0.08)
+              for number, measurement in enumerate(measured(random, random.randint(0, 8)))]
+    return tracks, measured(random, random.randint(0, 8)), params, outlier_model(params)
+
+
+@given(SEEDS)
+def test_the_first_look_leaves_out_no_allowed_pair(seed):
+    given_scene, gate = scene(seed), association._gate
+    costs = allowed_costs(*given_scene)
+    with mock.patch.object(association, '_gate', lambda *of: (gate(*of)[0], 0.0, 1e9)):
+        assert allowed_costs(*given_scene) == costs
+
+
+@given(SEEDS)
+def test_crowds_have_the_same_costs(seed):
+    given_scene = scene(seed)
+    few = allowed_costs(*given_scene)
+    with mock.patch.object(association, 'CROWD', 1):
+        crowd = allowed_costs(*given_scene)
+    assert set(few) == set(crowd)
+    assert [crowd[pair] for pair in few] == pytest.approx(list(few.values()))
+
+
+@given(SEEDS)
+def test_each_track_and_each_measurement_is_matched_at_most_once_and_within_its_group(seed):
+    tracks, measurements, params, outliers = scene(seed)
+    matches = associate(tracks, measurements, 0, params, outliers)
+    for members in zip(*matches):
+        assert len(set(map(id, members))) == len(matches)
+    assert all(track.kind.group == measurement.kind.group for track, measurement in matches)
