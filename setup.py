@@ -8,7 +8,7 @@ setup(**generate_distutils_setup(
               'ros_3d_bb.nodes', 'ros_3d_bb.nodes.common',
               'ros_3d_bb.pipeline', 'ros_3d_bb.planning', 'ros_3d_bb.sessions', 'ros_3d_bb.tracking',
               'ros_3d_bb.visualization', 'ros_3d_bb_lab', 'ros_3d_bb_lab.evaluation',
-              'ros_3d_bb_lab.evaluation.baselines',
+              'ros_3d_bb_lab.evaluation.baselines', 'ros_3d_bb_lab.evaluation.costmap',
               'ros_3d_bb_lab.evaluation.demo', 'ros_3d_bb_lab.evaluation.gazebo',
               'ros_3d_bb_lab.evaluation.latency',
               'ros_3d_bb_lab.evaluation.navigation', 'ros_3d_bb_lab.evaluation.noise',

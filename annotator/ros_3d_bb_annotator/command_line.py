@@ -2,8 +2,8 @@
 import argparse
 import sys
 
-from ros_3d_bb_annotator.document import ESTIMATOR, Document
-from ros_3d_bb_annotator.export import export
+from ros_3d_bb_annotator.document import Document
+from ros_3d_bb_annotator.export import default_estimator, export
 from ros_3d_bb_annotator.validation import leftovers_of, problems_of
 
 
@@ -14,9 +14,11 @@ def main(arguments=None):
         return _show(arguments.session)
     try:
         document = Document.open(arguments.session)
+        for note in document.notes:
+            print('annotator: note: %s' % note, file=sys.stderr)
         if arguments.export:
             print('%s: %d rows' % (arguments.export, export(
-                document, arguments.export, arguments.estimator or ESTIMATOR, arguments.thesis_form)))
+                document, arguments.export, arguments.estimator or default_estimator(document), arguments.thesis_form)))
         elif arguments.analyse:
             _analyse(document, arguments)
         else:

@@ -6,6 +6,8 @@ from ros_3d_bb.sessions.session_reader import RecordedDetection, SessionError, f
 
 NEW, ANNOTATED, REJECTED, NOBODY = 'new', 'annotated', 'rejected', 'nobody found'
 STATES = NEW, NOBODY, ANNOTATED, REJECTED
+# Field of the stretched depth of the old format. Its name differs from that of depth in metric units.
+STRETCHED_DEPTH = 'stretched_depth'
 
 
 class Mark(NamedTuple):
@@ -99,7 +101,9 @@ def measurement_of(folder, entry, files):
     known = entry if isinstance(entry, dict) else {}
     try:
         with session_errors('frames.json'):
-            frame = frame_of(folder, entry)
+            if known.get('unreadable'):
+                raise SessionError(str(known['unreadable']))
+            frame = frame_of(folder, dict(entry, depth=entry[STRETCHED_DEPTH]) if STRETCHED_DEPTH in known else entry)
     except SessionError as error:
         return EditedMeasurement(str(known.get('id', '')), '', '', problem=str(error),
                                  rejected=str(known['rejected']) if known.get('rejected') else None)

@@ -59,7 +59,7 @@ class MeasurementPane(QtWidgets.QWidget):
         self._document, self._pictures, self._shown = document, PictureCache(document), None
         self.read_ahead = self._pictures.read_ahead
         self.header.setText('This session contains no measurements yet.')
-        self._show_banner(())
+        self._show_banner(document.notes)
 
     def read_again(self):
         """Read the images again when they are shown."""
@@ -73,7 +73,7 @@ class MeasurementPane(QtWidgets.QWidget):
         self._shown = pictures
         self._document.estimates.of(number, pictures.depth)
         self._show_header(measurement)
-        self._show_banner((NOBODY_TEXT,) * (measurement.state == NOBODY))
+        self._show_banner(self._document.notes + (NOBODY_TEXT,) * (measurement.state == NOBODY))
         image = pictures.color_image or pictures.depth_image
         if image is not None:
             self.shared.show_size(image.width(), image.height())
@@ -177,7 +177,7 @@ class MeasurementPane(QtWidgets.QWidget):
             float(position_m[0]) - truth_m[0], float(position_m[2]) - truth_m[2])
         self.truth.show_error(self.error_text(error_m), warning)
         camera = document.camera
-        sight = -camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx
+        sight = (0.0, 0.0) if camera is None else (-camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx)
         self.floor.show_scene(FloorScene(
             document.grid, None if truth_m is None else (truth_m[0], truth_m[2]),
             None if position_m is None else tuple(position_m[[0, 2]].tolist()), sight, self.truth.unit))

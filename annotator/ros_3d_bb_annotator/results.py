@@ -2,8 +2,7 @@
 import os
 
 from ros_3d_bb_annotator import dialogs
-from ros_3d_bb_annotator.document import ESTIMATOR
-from ros_3d_bb_annotator.export import export
+from ros_3d_bb_annotator.export import default_estimator, export
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
 FORMS = ('CSV, one row per person (*.csv)', 'CSV in the form of the thesis (*.csv)')
@@ -63,7 +62,7 @@ class Results(QtCore.QObject):
         """Write the table of errors to a file, or show an error message."""
         document = self._window.document
         try:
-            count = export(document, path, ESTIMATOR, in_thesis_form)
+            count = export(document, path, default_estimator(document), in_thesis_form)
         except (ValueError, OSError) as error:
             dialogs.show_error(self._window, 'The table was not written', error)
             return

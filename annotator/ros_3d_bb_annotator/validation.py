@@ -23,6 +23,8 @@ def problems_of(document):
 
 def leftovers_of(document):
     """Sorted relative paths of files that no measurement refers to, such as those left by a killed program."""
+    if document.is_old_format:
+        return []
     folder = pathlib.Path(document.folder)
     paths = [*folder.glob('.*.tmp'), *folder.glob('color/*'), *folder.glob('depth/*')]
     # read after the files are listed, because a viewer may add measurements concurrently
@@ -37,6 +39,9 @@ def _problems_at(document, index):
         return [measurement.problem]
     try:
         document.color(index)
+        if document.is_old_format:
+            document.stretched_depth(index)
+            return _problems_of_truths(document, index)
         document.depth(index)
     except SessionError as error:
         return [str(error)]
@@ -88,6 +93,8 @@ def view_problems(document, truth_m):
     x_m, _y_m, z_m = truth_m
     if not z_m > 0:
         return ['truth z is %g m; more than 0 expected' % z_m]
+    if document.camera is None:
+        return []
     left_m, right_m = document.camera.deproject(
         [(0, document.camera.cy), (document.camera.width, document.camera.cy)], z_m)[:, 0]
     if left_m - HALF_PERSON_M <= x_m <= right_m + HALF_PERSON_M:

@@ -93,7 +93,7 @@ def fuzz_node(name, seed, count, deadline_s=float('inf')):
                     timer(None)
             now_ns = _check_valid(name, node, connections, now_ns)
             if name in BALANCES:
-                outcomes = balance_of(Status(0.0, name, 0, node._diagnostics.totals(), 0.0, 0.0))
+                outcomes = balance_of(Status(0.0, name, 0, node._diagnostics.totals(), 0.0))
                 assert 0 <= outcomes[3] <= WAITING, '%s: %d inputs, %d published, %d rejected, %d without outcome' % (
                     (name,) + outcomes)
     return sent, time.process_time() - began_s

@@ -115,7 +115,7 @@ def test_visible_people_are_lethal_in_the_local_costmap_and_leave_no_trail(robot
 
 
 @pytest.mark.parametrize('people_m', [np.zeros((0, 2)), STANDING])
-def test_the_robot_does_not_stop_without_a_fault_whether_or_not_somebody_is_in_view(drives, people_m):
+def test_the_robot_does_not_stop_without_a_fault(drives, people_m):
     """It drives around a square for ROS_3D_BB_DRIVE_S seconds."""
     origin_m = np.array([drives.place_m[0], 0.0])
     corners = itertools.cycle(origin_m + CORNERS)

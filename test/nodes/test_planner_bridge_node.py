@@ -18,7 +18,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from support.planner_definitions import message_class
 from support.planners import person
-from support.ros import Recorder, diagnostics_of, header_at, publisher, wait_until
+from support.ros import Recorder, header_at, publisher, wait_until
 
 LATENCY_NS, TIMEOUT_S, SPEED_MPS = NS // 10, 1.0, 1.2
 TOPICS = {'points': ('planner_bridge_node/points', PointCloud2, 'width'),
@@ -89,27 +89,6 @@ def test_outputs_of_the_image_carry_its_stamp(rig, recorders):
         assert people_in(name, message) > 0
     place = recorders['vision'].messages[0].detections[0].bbox.center.position
     assert (place.x, place.y, place.z) == pytest.approx((1, 2, 0.85))
-
-
-def test_outputs_that_planners_keep_are_resent_predicted_and_emptied_once(rig, recorders):
-    rig.send(now_ns() - LATENCY_NS, (1.0, 2.0))
-    wait_until(lambda: all(people_in(name, recorder.messages[-1]) == 0 if recorder.messages else False
-                           for name, recorder in recorders.items()), 'every output emptied')
-    counts = {name: len(recorder.messages) for name, recorder in recorders.items()}
-    assert counts['points'] == counts['vision'] == 2
-    objects = recorders['mpc'].messages[:-1]  # the person walks along y of odom
-    way_m = objects[-1].objects[0].pose.position.y - objects[0].objects[0].pose.position.y
-    assert way_m == pytest.approx(SPEED_MPS * (objects[-1].header.stamp - objects[0].header.stamp).to_sec(), abs=1e-6)
-    people = recorders['people'].messages
-    positions = [message.people[0].position.x for message in people[:-1]]
-    assert len(positions) > 3 and positions == sorted(positions)
-    assert all(message.header.stamp.to_nsec() == 0 for message in people)  # the latest transform
-    assert {name: recorder.messages[-1].header.frame_id for name, recorder in recorders.items()} == {
-        'points': 'base_link', 'people': 'map', 'teb': 'odom', 'mpc': 'odom', 'vision': 'map'}
-    time.sleep(0.5)
-    assert counts == {name: len(recorder.messages) for name, recorder in recorders.items()}
-    level, _sentence, event_counts = diagnostics_of('planner_bridge_node')
-    assert level == 1 and event_counts['outputs emptied'] > 0
 
 
 def test_a_node_that_ends_empties_its_outputs(rig):

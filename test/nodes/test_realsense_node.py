@@ -8,16 +8,10 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC as COLOR, DEPTH_TOPIC as DEPTH, INFO_TOPICS
-from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import transform_from_msg
-from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.drivers.realsense import CameraLost, RgbdFrame
-from ros_3d_bb.nodes import realsense_node
-from support.realsense_recordings import (COLOR_CAMERA, SKIPPED, START_MS, STEP_MS, SUFFIX, colored, sloping_depth,
-                                          write_recording)
-from support.ros import Recorder, diagnostics_of, started, wait_until
+from support.realsense_recordings import SKIPPED, START_MS, STEP_MS, SUFFIX, colored, sloping_depth, write_recording
+from support.ros import Recorder, started
 
 FRAMES = 6
 IMAGE_TOPICS = dict({COLOR: Image, DEPTH: Image}, **{topic: CameraInfo for topic in INFO_TOPICS})
@@ -75,48 +69,3 @@ def test_a_node_that_cannot_start_exits_with_the_reason(recording, param, reason
     process = started('realsense_node', param)
     output, _none = process.communicate(timeout=30)
     assert process.returncode == 1 and reason in output and 'Traceback' not in output
-
-
-class UnreliableCamera(object):
-    """In place of RealSense: missing, then connected with incomplete images, unplugged, and connected again."""
-
-    opened, closed = 0, 0
-    camera, link_from_color, is_over = COLOR_CAMERA, np.eye(4), False
-
-    def __init__(self, _params):
-        UnreliableCamera.opened += 1
-        if UnreliableCamera.opened in (1, 3):
-            raise CameraLost('no images of a RealSense')
-        unplugged = CameraLost('the RealSense has sent no images for 5 s')
-        self._events = ['frame', ValueError('colour without depth'), None, 'frame']
-        self._events += [unplugged] if UnreliableCamera.opened == 2 else ['frame'] * 1000
-
-    def read(self):
-        rospy.sleep(0.05)
-        event = self._events.pop(0)
-        if isinstance(event, Exception):
-            raise event
-        return event and RgbdFrame(rospy.get_rostime().to_nsec(), colored(UnreliableCamera.opened),
-                                   DepthImage(np.full((480, 640), 2500, np.uint16), 0.0001))
-
-    def close(self):
-        UnreliableCamera.closed += 1
-
-
-def test_the_node_waits_for_an_unplugged_camera_and_drops_incomplete_images(recording, monkeypatch):
-    monkeypatch.setattr(realsense_node, 'RealSense', UnreliableCamera)
-    monkeypatch.setattr(realsense_node, 'RETRY_S', 0.1)
-    rospy.set_param('~frame_prefix', '')
-    with Recorder(DEPTH, Image, publisher_expected=False) as depth, Recorder(COLOR, Image, False) as color, \
-            Recorder('/tf_static', TFMessage, False) as frames:
-        realsense_node.RealSenseNode()
-        wait_until(lambda: any(message.data[0] == 4 for message in color.messages), 'images of the second connection')
-        depth.wait_for(3)
-    links = {link.child_frame_id for message in frames.messages for link in message.transforms}
-    assert color.messages[-1].header.frame_id in links and '_color_optical_frame' in links
-    assert UnreliableCamera.opened == 4 and UnreliableCamera.closed == 1
-    assert depth.messages[0].encoding == '32FC1'
-    assert imgmsg_to_depth(depth.messages[0]).values[0, 0] == pytest.approx(0.25)
-    assert abs(color.messages[-1].header.stamp.to_nsec() - rospy.get_rostime().to_nsec()) < 60 * NS
-    _level, _message, counts = diagnostics_of('test_realsense_node')
-    assert counts['camera lost'] >= 3 and counts['images rejected'] >= 1

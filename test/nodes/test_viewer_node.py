@@ -1,7 +1,5 @@
 """viewer_node on simulated images. Needs a master for five topics, services and a window."""
-import itertools
 import os
-import signal
 import subprocess
 from typing import Any, NamedTuple
 
@@ -232,23 +230,3 @@ def test_keys_store_pause_and_quit(rig, window):
     assert process.wait(timeout=20) == 0
     assert calls == [False, True, False, True]  # the detector is resumed at the end
     service.shutdown()
-
-
-def test_a_measurement_has_the_label_that_was_set_just_before_and_ctrl_c_ends_the_window(rig, window):
-    """The window shows the label from rospy's cache, which is updated with a delay."""
-    process, folder = window
-    labels, tries = [], itertools.count()
-
-    def stored():
-        label = 'mark %d' % next(tries)
-        rospy.set_param('window/label', label)
-        if capture('window').success:
-            labels.append(label)
-            return True
-        return False
-    for _measurement in range(10):
-        rig.send()
-        wait_until(stored, 'a measurement')
-    assert [frame.label for frame in entries(folder)] == labels
-    process.send_signal(signal.SIGINT)
-    assert process.wait(timeout=20) == 0

@@ -10,12 +10,9 @@ LONGEST_UNSEEN_S = 4.0  # ~max_age of the tracker
 WAITING_AT_END = 3  # inputs without an outcome: in progress, or waiting for the other half of their pair
 WAITING = 103  # the same during a fault: capacity of `StampSynchronizer` and the worker
 WARM_UP_S, WARM_UP_SHARE = 60.0, 0.15  # start of a process, which is excluded; share of a short soak
-LEAST_SAMPLES = 20  # of memory or CPU time, for a finding
+LEAST_SAMPLES = 20  # of memory, for a finding
 RISE_MB = 20.0  # limit of the rise of the memory maximum without a known cause
 HELD_MB = 150.0  # limit of the rise from any cause: images that arrive while a process hangs
-CPU_RATIO, CPU_MORE_MS = 2.0, 5.0
-LAG_IMAGES = 3.0
-SHORTEST_S = 60.0  # of a soak with enough answers for a comparison
 
 
 class Finding(NamedTuple):
@@ -178,63 +175,6 @@ def memory_is_flat(record):
                    % ((len(growths),) + worst), '%+.0f MB, %+.0f MB' % (HELD_MB, RISE_MB), broken)
 
 
-def cpu_ms_of(record, statuses):
-    """CPU time per published answer outside of faults in both halves of the life of a process, milliseconds.
-
-    None if there are too few samples.
-    """
-    steps = []
-    for before, after in zip(statuses, statuses[1:]):
-        answers = balance_of(after)[1] - balance_of(before)[1]
-        if answers > 0 and record.is_quiet(before.at_s) and record.is_quiet(after.at_s):
-            steps.append((after.cpu_s - before.cpu_s, answers))
-    if len(steps) < LEAST_SAMPLES:
-        return None
-    halves = np.array(steps[:len(steps) // 2]), np.array(steps[len(steps) // 2:])
-    return tuple(float(1e3 * half[:, 0].sum() / half[:, 1].sum()) for half in halves)
-
-
-def cpu_is_flat(record):
-    """Of each process, the second half of its life compared with the first, outside of faults."""
-    found = {key: cpu_ms_of(record, statuses) for key, statuses in processes_of(record).items()}
-    found = {key: halves_ms for key, halves_ms in found.items() if halves_ms is not None}
-    broken = [(record.ended_s, '%s (process %d): %.1f ms per image, then %.1f ms' % (key + (first_ms, last_ms)))
-              for key, (first_ms, last_ms) in found.items() if last_ms > CPU_RATIO * first_ms + CPU_MORE_MS]
-    worst = max([last_ms / max(first_ms, 1.0) for first_ms, last_ms in found.values()], default=0.0)
-    return Finding('CPU time per image is flat', '%d processes, at most %.2f times as much' % (len(found), worst),
-                   '%.0f times and %.0f ms' % (CPU_RATIO, CPU_MORE_MS), broken)
-
-
-def lags_of(record):
-    """Lags (n, 2) of the tracks outside of faults in the first and in the last third: images, and milliseconds.
-
-    The number of images that were sent after that of the tracks does not depend on the speed of the machine.
-    """
-    number_of = {stamp_ns: number for number, (stamp_ns, _sent_s) in enumerate(record.images)}
-    sent_s = np.array([sent_s for _stamp_ns, sent_s in record.images])
-    third_s = (record.ended_s - record.began_s) / 3
-    thirds = [], [], []
-    for at_s, stamp_ns, _tracks in record.tracks:
-        number = number_of.get(stamp_ns)
-        if number is not None and record.is_quiet(at_s) and record.is_quiet(sent_s[number]):
-            third = int(np.clip((at_s - record.began_s) // third_s, 0, 2))
-            thirds[third].append((np.searchsorted(sent_s, at_s) - 1 - number, 1e3 * (at_s - sent_s[number])))
-    return np.array(thirds[0]), np.array(thirds[2])
-
-
-def queues_do_not_grow(record):
-    """Medians of `lags_of`, compared in images."""
-    name, limit, (first, last) = 'queues do not grow', '%.0f more' % LAG_IMAGES, lags_of(record)
-    if not len(first) or not len(last):
-        is_long_enough = record.ended_s - record.began_s > SHORTEST_S
-        return Finding(name, 'too few answers to compare', limit,
-                       [(record.ended_s, 'no answers without a fault')] if is_long_enough else [])
-    medians = tuple(np.median(first, axis=0)) + tuple(np.median(last, axis=0))
-    measured = '%.0f images (%.0f ms) behind in the first third, %.0f (%.0f ms) in the last' % medians
-    return Finding(name, measured, limit,
-                   [(record.ended_s, measured)] if medians[2] > medians[0] + LAG_IMAGES else [])
-
-
 def graph_recovers(record, within_s):
     """An image that is sent after the end of a fault's cause is answered within some seconds."""
     took_s = [(fault, np.inf if fault.recovered_s is None else fault.recovered_s - fault.ended_s)
@@ -247,7 +187,7 @@ def graph_recovers(record, within_s):
 
 
 CHECKS = (every_input_has_an_outcome, stamps_do_not_decrease, stamps_are_those_of_images, ids_are_not_reused,
-          tracks_do_not_outlive_max_age, no_message_crashes_a_node, queues_do_not_grow, memory_is_flat, cpu_is_flat)
+          tracks_do_not_outlive_max_age, no_message_crashes_a_node, memory_is_flat)
 
 
 def findings_of(record, within_s):

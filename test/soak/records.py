@@ -5,13 +5,12 @@ INTERRUPTED = 'interrupted'  # name of a fault while it lasts, and after Ctrl-C
 
 
 class Status(NamedTuple):
-    """Counters of a node on /diagnostics, and the CPU time and memory of its process at that time."""
+    """Counters of a node on /diagnostics, and the memory of its process at that time."""
 
     at_s: float
     node: str
     pid: int
     counts: Dict[str, int]
-    cpu_s: float
     rss_mb: float
 
 
@@ -58,7 +57,3 @@ class Record(NamedTuple):
     def finished_faults(self):
         """Faults whose recovery was awaited. An interrupted one only excuses violations while it lasts."""
         return [fault for fault in self.faults if fault.name != INTERRUPTED]
-
-    def is_quiet(self, at_s):
-        """Whether there is no fault at a time."""
-        return not any(fault.overlaps(at_s, at_s) for fault in self.faults)

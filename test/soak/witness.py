@@ -54,4 +54,4 @@ class Witness(object):
             used = usage_of(pid) if pid and node in BALANCES else None
             if used is not None:
                 counts = {entry.key: int(entry.value) for entry in status.values if entry.value.isdigit()}
-                self.statuses.append(Status(now_s, node, pid, counts, *used))
+                self.statuses.append(Status(now_s, node, pid, counts, used[1]))

@@ -7,7 +7,7 @@ import pytest
 from conftest import DATA
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scenario_scores, scores_of
+from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scores_of
 from ros_3d_bb_lab.evaluation.scenes import position_errors_m
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -82,13 +82,3 @@ def test_positions_are_accurate_despite_occlusion_and_background(scene):
     assert len(ours) > 20 and not np.isnan(ours).any() and ours.max() < 0.4
     assert np.sqrt(np.mean(ours ** 2)) < 0.08
     assert np.count_nonzero(median > 0.4) > 3
-
-
-@pytest.mark.slow
-def test_scores_of_scenes():
-    path = os.path.join(SCENARIOS, 'thesis_a_start.yaml')
-    scores = scenario_scores(path, estimator_named('foreground'), every=40)
-    assert scores['scenario'] == 'thesis_a_start.yaml' and scores['ours']['boxes'] == scores['thesis']['boxes'] > 5
-    assert scores['ours']['rmse_plane_m'] < 0.08 < scores['thesis']['worst_m']
-    empty = scenario_scores(os.path.join(SCENARIOS, 'empty_room.yaml'), estimator_named('foreground'), every=90)
-    assert empty['ours'] == {'boxes': 0, 'missed': 0}

@@ -31,7 +31,7 @@ def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder
     (lambda entry: entry.update(truth_mm={'x': 1, 'z': 'far'}), 'far'),
     (lambda entry: entry.update(stamp='yesterday'), 'stamp is'), (lambda entry: entry.update(color=7), 'int'),
     (lambda entry: entry.update(detections=5), 'int'), (lambda entry: entry.update(detections=[[]]), 'list')])
-def test_an_invalid_entry_is_shown_with_its_fault_and_others_can_be_annotated(folder, break_it, problem):
+def test_an_invalid_entry_is_shown_with_its_fault(folder, break_it, problem):
     change_json(folder, lambda content: break_it(content['frames'][1]))
     document = Document.open(folder)
     assert problem in document.measurements[1].problem and document.measurements[1].state == 'new'

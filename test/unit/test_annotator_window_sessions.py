@@ -1,14 +1,11 @@
 """Window of the annotator: all kinds of sessions, other programs, keys, export and analysis."""
-import os
 
-import cv2
-import numpy as np
 import pytest
 
 from ros_3d_bb_annotator import main_window
 from ros_3d_bb_annotator.document import Document
 from support.small_session import change_json, write_measurement, write_small_session
-from support.window import ALT, CONTROL, SHIFT, Qt, opened
+from support.window import ALT, CONTROL, SHIFT, Qt
 
 
 def message_of(box):
@@ -53,23 +50,6 @@ def test_an_invalid_session_gives_a_message(window_on, tmp_path):
     message = driver.answer(message_of, lambda: was_opened.append(driver.window.open_session(str(tmp_path))))
     assert 'an object with frames expected' in message and str(tmp_path) in message
     assert was_opened == [False] and len(driver.document.measurements) == 4  # the old one stays open
-
-
-@pytest.mark.parametrize('kind, image, problem', [
-    ('depth', np.zeros((48, 64), np.uint8), '16-bit'), ('depth', np.zeros((24, 32), np.uint16), '32 x 24'),
-    ('color', None, 'm0.png'), ('color', np.zeros((48, 64), np.uint8), '8-bit colour image')])
-def test_a_missing_or_invalid_image_is_named_in_its_view(window_on, folder, kind, image, problem):
-    path = os.path.join(folder, kind, 'm0.png')
-    os.remove(path)
-    if image is not None:
-        cv2.imwrite(path, image)
-    driver = window_on(folder)
-    view, other = driver.window.pane.color_view, driver.window.pane.depth_view
-    if kind == 'depth':
-        view, other = other, view
-    assert view.image is None and problem in view.message and other.image is not None
-    driver.press('-480', Qt.Key_Tab, '2050', Qt.Key_Return)
-    assert opened(folder)[0].truth_m == (-0.48, None, 2.05)
 
 
 @pytest.mark.slow

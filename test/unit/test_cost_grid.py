@@ -1,5 +1,4 @@
 """Costs of predicted positions around the robot, against the probability of presence."""
-from unittest import mock
 
 import numpy as np
 import pytest
@@ -29,7 +28,7 @@ def cost_at(costs, x_m, y_m):
     return costs[row, column]
 
 
-def test_certain_predictions_have_the_highest_cost_along_the_way_and_none_beside_it():
+def test_certain_predictions_cost_most_along_the_way_and_nothing_beside():
     costs = presence_costs([walking((1.0, -2.0), (0.0, 1.5))], np.eye(4), ROBOT_RADIUS_M)
     assert costs.dtype == np.int8 and costs.shape == (100, 100)
     for y_m in np.arange(-1.95, 1.0, 0.1):
@@ -51,32 +50,13 @@ def test_costs_follow_the_probability_of_presence():
         assert cost_at(costs, x_m, y_m) / float(HIGHEST) * RISKY == pytest.approx(expected, abs=0.02)
 
 
-def test_the_most_probable_time_of_the_prediction_counts():
-    """Against the formula, one cell and one time after the other; all times of a person are one array operation."""
-    track = walking((3.0, 1.0), (0.5, 1.0), (0.1, 0.9))
-    with mock.patch('numpy.linalg.inv', wraps=np.linalg.inv) as inv:
-        costs = presence_costs([track], np.eye(4), ROBOT_RADIUS_M)
-    assert inv.call_count == 1
-
-    narrowing = np.eye(2) - (1 - ACROSS) * np.outer([-2, 1], [-2, 1]) / 5
-    times_s = np.arange(21) * 0.1
-    variances_m2 = np.interp(times_s, 0.25 * np.arange(9), np.linspace(0.1, 0.9, 9) ** 2)
-    spreads_m2 = [variance_m2 * narrowing @ narrowing + RADIUS_M ** 2 / 4 * np.eye(2) for variance_m2 in variances_m2]
-    for x_m, y_m in ((3.05, 1.05), (3.95, 2.55), (4.55, 3.15), (4.05, 3.95), (4.85, 4.75)):
-        offsets_m = [(x_m - 3.0 - 0.5 * time_s, y_m - 1.0 - time_s) for time_s in times_s]
-        probability = max(RADIUS_M ** 2 / 2 / np.sqrt(np.linalg.det(spread_m2))
-                          * np.exp(-np.dot(offset_m, np.linalg.solve(spread_m2, offset_m)) / 2)
-                          for offset_m, spread_m2 in zip(offsets_m, spreads_m2))
-        assert cost_at(costs, x_m, y_m) == np.rint(HIGHEST * min(probability / RISKY, 1))
-
-
 def test_costs_decrease_as_the_prediction_becomes_uncertain():
     costs = presence_costs([walking((-2.0, 0.0), (2.0, 0.0), (0.1, 1.5))], np.eye(4), ROBOT_RADIUS_M)
     along = [int(cost_at(costs, x_m, 0.05)) for x_m in np.arange(-1.95, 2.0, 0.5)]
     assert along[0] == HIGHEST and along == sorted(along, reverse=True) and along[-1] < HIGHEST / 2
 
 
-def test_a_robot_in_the_way_of_a_person_pays_only_for_going_further_into_it():
+def test_a_robot_in_the_way_pays_only_for_going_further_into_it():
     """A person comes towards the robot from ahead; the probability decreases to the sides."""
     tracks = [walking((2.0, 0.3), (-1.0, 0.0), (0.1, 0.5))]
     costs = presence_costs(tracks, np.eye(4), ROBOT_RADIUS_M)

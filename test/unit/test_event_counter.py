@@ -31,15 +31,6 @@ def test_a_message_is_counted_as_received_whether_it_is_rejected_or_not(events):
     assert '3 numbers' in events.sentences['boxes rejected']
 
 
-def test_other_errors_are_raised_unless_they_are_harmless(events):
-    with pytest.raises(ZeroDivisionError), events.rejecting('boxes'):
-        raise ZeroDivisionError
-    events.is_harmless = lambda error: isinstance(error, ZeroDivisionError)
-    with events.rejecting('boxes'):
-        raise ZeroDivisionError
-    assert not events.counts
-
-
 def test_the_latency_of_a_result_is_the_age_of_its_stamp():
     events = EventCounter(clock=lambda: mock.Mock(to_nsec=lambda: 12500))
     events.record_latency(mock.Mock(to_nsec=lambda: 11700))
@@ -55,8 +46,3 @@ def test_no_count_is_lost_between_threads(events):
             pool.submit(lambda: [events.count('images') for _ in range(5000)])
     sys.setswitchinterval(interval_s)
     assert events.counts == {'images': 20000}
-
-
-def test_dropped_parts_are_counted_one_by_one(events):
-    events.count_dropped('3D boxes', ['box 0 is 11 m wide', 'box 2 is 12 m wide'])
-    assert events.counts == {'3D boxes dropped': 2} and 'box 0 is 11 m wide' in events.sentences['3D boxes dropped']

@@ -46,7 +46,7 @@ def test_the_newest_complete_snapshot_is_kept_while_the_detector_works(delay_2d,
     assert parts_of(snapshots.newest) == (59 - delay_3d,) * 5
 
 
-def test_the_newest_images_are_returned_if_their_boxes_do_not_arrive_in_time():
+def test_the_newest_images_are_returned_without_boxes_that_are_late():
     snapshots = made()
     assert snapshots.is_early
     for number in range(80):

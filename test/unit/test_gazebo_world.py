@@ -42,7 +42,7 @@ def test_people_follow_the_motion_of_the_scenario(world):
         assert times_s[0] == 0 and times_s[-1] >= SCENARIO.duration and (np.diff(times_s) > 0).all()
 
 
-def test_the_room_has_walls_around_its_bounds_and_its_furniture_on_the_floor(world):
+def test_the_room_has_walls_and_its_furniture_on_the_floor(world):
     link = world.find("model[@name='room']/link")
     boxes = [(numbers(shape, 'pose'), numbers(shape, 'geometry/box/size')) for shape in link.findall('collision')]
     assert boxes == [(numbers(shape, 'pose'), numbers(shape, 'geometry/box/size')) for shape in link.findall('visual')]

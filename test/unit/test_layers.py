@@ -37,7 +37,7 @@ ALLOWED = {
         'camera conversions core detection.yolov5 pipeline sessions',
         'genpy rosbag sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
     'ros_3d_bb.diagnosis': (
-        'bags camera conversions core msg pipeline',
+        'bags camera conversions core detection.depth msg pipeline',
         'genpy sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
     'ros_3d_bb.nodes.common': (
         'camera conversions core diagnosis msg pipeline visualization',
@@ -67,6 +67,10 @@ ALLOWED = {
     'ros_3d_bb_lab.evaluation.navigation': (
         'camera conversions core msg nodes.common lab.evaluation lab.simulation',
         'geometry_msgs nav_msgs rospy sensor_msgs std_msgs tf2_msgs yaml'),
+    'ros_3d_bb_lab.evaluation.costmap': (
+        'camera conversions core estimation msg tracking visualization lab.evaluation '
+        'lab.simulation lab.simulation.ros',
+        'cv2 nav_msgs rosgraph_msgs rospy std_msgs tf2_msgs'),
     'ros_3d_bb_lab.evaluation.gazebo': (
         'bags conversions core tracking lab.evaluation lab.simulation', 'rosbag tf2_msgs'),
     'ros_3d_bb_lab.evaluation.latency': (
@@ -74,7 +78,6 @@ ALLOWED = {
         'rosgraph roslib rospy sensor_msgs std_msgs visualization_msgs'),
 }
 QT = {'PyQt5', 'python_qt_binding'}
-SESSION_MODULES = 'command_line', 'document', 'export', 'analysis'  # of the annotator: no windows
 
 
 def modules_in(root):
@@ -183,15 +186,3 @@ def test_the_annotator_imports_no_ros_and_the_noise_analysis_in_one_module():
         assert not any(lies_in(name, package) for name in ours for package in with_ros), module
         of_the_lab += [module] * any(lies_in(name, 'ros_3d_bb_lab') for name in ours)
     assert of_the_lab == ['analysis']
-
-
-@pytest.mark.parametrize('module', SESSION_MODULES)
-def test_the_annotators_sessions_need_no_qt(module):
-    waiting, visited = [module], set()
-    while waiting:
-        module = waiting.pop()
-        visited.add(module)
-        others, ours = imports_of(module, ANNOTATOR, at_the_top=True)
-        own = set(name.split('.')[1] for name in ours if name.startswith('ros_3d_bb_annotator.'))
-        assert not others & QT and 'qt' not in own, module
-        waiting += sorted(own - visited)

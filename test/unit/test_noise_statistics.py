@@ -15,10 +15,12 @@ def drawn(kind, count=300):
 
 
 @pytest.mark.parametrize('kind', ['Laplace', 'Student t', 'two Gaussians'])
-def test_the_distribution_that_made_the_errors_predicts_them_best(kind):
-    found = cluster_statistics(Cluster(1.0, drawn(kind)))
-    assert max(found.log_likelihoods, key=found.log_likelihoods.get) == kind
-    assert not found.looks_gaussian
+def test_other_distributions_are_no_gaussian(kind):
+    assert not cluster_statistics(Cluster(1.0, drawn(kind))).looks_gaussian
+
+
+def test_a_gaussian_is_not_rejected():
+    assert cluster_statistics(Cluster(1.0, drawn('Gaussian'))).looks_gaussian
 
 
 def test_moments_are_those_of_the_thesis():

@@ -10,8 +10,6 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.object_classes import (CLASSES, DEFAULT_CLASS, MAX_CLASSES, MAX_IN_GROUP, ObjectClass,
                                            ObjectClasses, object_classes_from, read_object_classes)
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
-from ros_3d_bb.planning.planner_view import with_class_widths
-from ros_3d_bb.tracking.types import TrackedObject
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 FILE = os.path.join(ROOT, 'config', 'classes.yaml')
@@ -54,16 +52,6 @@ def test_invalid_tables_are_rejected(content, reason):
         object_classes_from(content)
 
 
-@pytest.mark.parametrize('text, reason', [(None, 'No such file'), ('a: [', 'expected'), ('a: &x 1\nb: *x', 'alias'),
-                                          ('!!python/object/apply:os.system [ls]', 'constructor'), ('', 'the keys')])
-def test_the_message_names_the_file(tmp_path, text, reason):
-    path = tmp_path / 'my_classes.yaml'
-    if text is not None:
-        path.write_text(text)
-    with pytest.raises(ValueError, match='(?s)my_classes.yaml.*%s' % reason):
-        read_object_classes(str(path))
-
-
 def test_the_axis_of_unknown_objects_is_half_a_width_behind():
     assert DEFAULT_CLASS.axis_behind(0.6) == pytest.approx(0.3)
     assert CLASSES['person'].axis_behind(0.6) == 0.09
@@ -94,10 +82,3 @@ def test_truncated_boxes_are_completed_to_the_size_of_their_class(label, width_m
     box, = estimate_boxes(DepthImage(depth_mm, 0.001), [(0, 400, 41, 480)], CAMERA, estimator_named('foreground'),
                           labels=[label])
     assert box.size_m[:2] == pytest.approx([width_m, height_m], abs=0.02)
-
-
-def test_planners_keep_clear_of_the_length_of_elongated_objects():
-    tracks = [TrackedObject(1, np.zeros(3), np.array([0.3, 0.3, 0.5]), *[None] * 8, label=label)
-              for label in ('dog', 'person', 'chair')]
-    sizes_m = [track.size_m.tolist() for track in with_class_widths(tracks, ObjectClasses())]
-    assert sizes_m == [[0.55, 0.55, 0.5], [0.3, 0.3, 0.5], [0.3, 0.3, 0.5]]

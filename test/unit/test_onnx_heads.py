@@ -66,11 +66,3 @@ def test_outputs_that_do_not_fit_are_rejected(given, reason):
     outputs = outputs_of('yolov8', BOXES, SCORES, HW)
     with pytest.raises(ValueError, match=reason):
         layout_of(**dict(dict(outputs=outputs, input_hw=HW, metadata={}), **given))
-
-
-def test_other_strides_are_used_if_they_are_given():
-    outputs = outputs_of('yolox', BOXES, SCORES, HW, (16, 32))
-    with pytest.raises(ValueError):
-        layout_of(outputs, HW, {}, 'yolox')
-    layout = layout_of(outputs, HW, {}, strides=[16, 32])
-    np.testing.assert_allclose(detections_in(outputs, layout).boxes, BOXES, atol=1e-3)

@@ -26,11 +26,6 @@ class Filter(NamedTuple):
     shapes: list = Param(('a',), 'What is drawn.', choices=('a', 'b'))
 
 
-def test_missing_values_keep_their_default():
-    assert params_from({}, Camera, Filter) == [Camera(), Filter()]
-    assert params_from({'rate': 5.0, 'stride': 3}, Camera, Filter) == [Camera(rate=5.0), Filter(rate=5.0, stride=3)]
-
-
 @pytest.mark.parametrize('kind, name, given, value', [
     (Camera, 'rate', 5, 5.0), (Camera, 'frame', 0, '0'), (Camera, 'frame', '', ''), (Camera, 'enabled', False, False),
     (Filter, 'classes', ['a', 1], ['a', 1]), (Filter, 'classes', 'a, b', ['a', 'b']),
@@ -60,11 +55,6 @@ def test_values_that_are_not_allowed_are_rejected(given):
     (name, _value), = given.items()
     with pytest.raises(ValueError, match='parameter ~%s ' % name):
         params_from(given, Camera, Filter)
-
-
-@pytest.mark.parametrize('given', [{'rate': 0.5}, {'rate': 60}, {'stride': 0}, {'color': 'bgr'}, {'shapes': []}])
-def test_limits_and_choices_are_allowed(given):
-    assert any(given.items() <= params._asdict().items() for params in params_from(given, Camera, Filter))
 
 
 def test_a_table_has_a_row_for_each_name_with_its_section():

@@ -91,7 +91,7 @@ def made(count, seed=0, noise_m=0.01):
     return truth_m + error_m + noise_m * random.normal(size=truth_m.shape), truth_m
 
 
-def test_without_enough_others_the_limit_is_0_3_m_or_15_percent_of_the_range():
+def test_with_few_measurements_the_limit_is_0_3_m_or_15_percent():
     likely = likely_errors(*made(LEAST_MEASUREMENTS - 1))
     near_m, far_m = np.array([0.0, 1.0]), np.array([0.0, 4.0])
     for measured_m, limit_m in ((near_m, 0.3), (far_m, 0.6)):

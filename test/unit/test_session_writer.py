@@ -1,11 +1,8 @@
 """Writer of measurement sessions: measurements are appended atomically, and read back unchanged."""
-import contextlib
 import multiprocessing
 import os
 import pathlib
 import re
-import signal
-import time
 
 import numpy as np
 import pytest
@@ -19,7 +16,6 @@ from ros_3d_bb.sessions import session_writer
 from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshot
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.sessions.session_writer import append, remove
-from support.small_session import read_json
 
 CAMERA = Camera(64, 48, 60.0, 61.0, 31.5, 23.25, 'plumb_bob', (0.1, -0.2, 0.001, 0.002, 0.03))
 STAMP_NS = 1616161616 * NS + 123456789
@@ -75,16 +71,6 @@ def test_measurements_are_read_back(folder):
         assert (detection.support, detection.truncated, detection.by_hand) == (BOX.support, BOX.truncated, False)
 
 
-def test_the_description_contains_all_fields(folder):
-    append(folder, measurement(), 'A1')
-    entry, = read_json(folder)['frames']
-    assert entry == {
-        'id': '00001_1616161616_123456789', 'color': 'color/00001_1616161616_123456789.png',
-        'depth': 'depth/00001_1616161616_123456789.png', 'stamp': '1616161616.123456789', 'label': 'A1',
-        'detections': [{'box': [10, 0, 30, 48], 'estimate_mm': [123.4, -250.0, 2500.0], 'size_mm': [500.0, 1750.0],
-                        'support': 0.75, 'truncated': True}]}
-
-
 def test_a_measurement_is_removed_with_its_images_unless_it_is_annotated(folder):
     ids = [append(folder, measurement(number))[0] for number in range(3)]
     remove(folder, ids[1])
@@ -118,35 +104,6 @@ def test_concurrent_measurements_are_not_lost(folder):
         read_color(frame, session.camera)
 
 
-def _append_repeatedly(folder, first, reports):
-    for number in range(first, 1000):
-        append(folder, measurement(number))
-        reports.send(number)
-
-
-def test_a_killed_process_leaves_complete_measurements(folder):
-    random, count, kills = np.random.RandomState(4), 0, 6
-    for _kill in range(kills):
-        receiver, sender = multiprocessing.Pipe(duplex=False)
-        process = multiprocessing.get_context('fork').Process(target=_append_repeatedly, args=(folder, count, sender))
-        process.start()
-        sender.close()
-        for _report in range(1 + random.randint(3)):
-            reported = receiver.recv()
-        time.sleep(random.uniform(0, 0.01))  # about one measurement
-        os.kill(process.pid, signal.SIGKILL)
-        process.join()
-        with contextlib.suppress(EOFError):
-            while True:
-                reported = receiver.recv()
-        session = read_session(folder)
-        assert reported + 1 <= len(session.frames) <= reported + 2
-        count = len(session.frames)
-    for number, frame in enumerate(session.frames):
-        np.testing.assert_array_equal(read_color(frame, session.camera), measurement(number).color.pixels)
-        np.testing.assert_array_equal(read_depth(frame, session).values, measurement(number).depth.values)
-
-
 @pytest.mark.parametrize('changes, named', [
     ({'camera': CAMERA._replace(fx=60.5)}, 'intrinsics .*60.5'),
     ({'color': measurement().color._replace(frame_id='another')}, 'frame .*optical.*another'),
@@ -174,13 +131,3 @@ def test_a_full_disk_does_not_change_the_session(folder, monkeypatch, full_at):
     with pytest.raises(OSError):
         append(folder, measurement(1))
     assert content_of(folder) == before
-
-
-def test_depth_in_metres_is_stored_in_millimetres(folder):
-    metres = np.full((48, 64), 2.3456, np.float32)
-    metres[0, :6] = np.nan, np.inf, -np.inf, -1.0, 65.6, 65.535
-    append(folder, measurement(depth=DepthImage(metres, 1.0)))
-    session = read_session(folder)
-    depth = read_depth(session.frames[0], session)
-    assert session.depth_scale_m == 0.001 and depth.values[1, 1] == 2346
-    assert depth.values[0, :6].tolist() == [0, 0, 0, 0, 0, 65535]

@@ -61,7 +61,7 @@ def test_repeated_moves_are_periodic():
     assert speed_of(motion.at(LONG_S)) > 0 or speed_of(motion.at(LONG_S - 1)) > 0
 
 
-def test_a_following_robot_faces_the_person_and_keeps_its_distance_and_limits():
+def test_a_following_robot_faces_the_person_and_keeps_its_distance():
     person = walker(Move(to=(8.0, 0.0), speed=.8), Move(to=(8.0, 6.0), speed=.8), start=(2.0, 0.0))
     robot = Robot((-1.0, -1.0, 3.0), follow=Follow(1, distance=2.0, speed=1.2, rate=1.0))
     motion = robot_motion(robot, [person], LONG_S)

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb_lab.simulation.motion import person_motion
-from ros_3d_bb_lab.simulation.scenario import Move, Person, SceneObject, Scenario, scenario_from
+from ros_3d_bb_lab.simulation.scenario import Move, Person, SceneObject, Scenario
 from ros_3d_bb_lab.simulation.scene_objects import GAP_M, PushedMotion
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
@@ -38,18 +38,3 @@ def test_the_ground_truth_has_objects_after_people():
     tracks = simulator.true_tracks(frame, 10 ** 9)
     assert [track.label for track in tracks] == ['person', 'trolley', 'chair']
     np.testing.assert_allclose(tracks[1].prediction_m[:, :2], [trolley.position_m[:2]] * 8)
-
-
-@pytest.mark.parametrize('entry, reason', [
-    ({'start': [3, 0]}, 'label expected, too'), ({'label': 'dog'}, 'either start or pushed_by'),
-    ({'label': 'dog', 'start': [3, 0], 'pushed_by': 1}, 'either start or pushed_by'),
-    ({'label': 'dog', 'pushed_by': 2}, 'pushed_by is 2; 1 to 1 expected'),
-    ({'label': 'dog', 'pushed_by': 1, 'moves': [{'wait': 1.0}]}, 'only one of both'),
-    ({'label': 'crate', 'start': [3, 0]}, 'a size, or one of chair, dog, trolley expected'),
-    ({'label': 'a;b', 'start': [3, 0]}, 'the name of a class'), ({'label': 7, 'start': [3, 0]}, 'the name of a class'),
-    ({'label': 'dog', 'start': [30, 0]}, 'outside the room'),
-    ({'label': 'dog', 'start': [3, 0], 'speed': 1}, 'unknown key'),
-    ({'label': 'crate', 'start': [3, 0], 'size': [1, 0, 1]}, 'more than 0 expected')])
-def test_invalid_objects_are_rejected(entry, reason):
-    with pytest.raises(ValueError, match=reason):
-        scenario_from({'people': [{'start': [2, 0]}], 'objects': [entry]})

@@ -87,23 +87,6 @@ def test_the_box_encloses_the_pixels_of_the_person(empty_simulator, x, y, facing
     assert (x1, y1, x2) == (columns[0], rows[0], columns[-1] + 1) and 0 <= y2 - rows[-1] - 1 <= 1
 
 
-@pytest.mark.slow
-@given(st.floats(-2, 0), st.floats(-1, 1), st.floats(-.3, .3), st.floats(-.2, .1), st.floats(2.5, 6), st.floats(-1, 1))
-@settings(max_examples=12)
-def test_images_agree_with_the_poses(x, y, yaw, pitch, ahead, beside):
-    robot = Robot((x, y, yaw), pitch=pitch, mount=(.2, .1, .6), odometry_drift=(.1, -.05, .02))
-    frame = Simulator(scene(Person((ahead, beside)), robot=robot), CAMERA).frame(20)
-    truth, = frame.people
-    camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
-    point = camera_from_map.dot(np.append(truth.position_m, 1))[:3]
-    u, v = CAMERA.project(point)
-    if not (5 < u < 155 and 5 < v < 115):
-        return
-    x1, y1, x2, y2 = truth.box_px
-    assert x1 <= u < x2 and y1 <= v < y2
-    assert frame.depth_mm[int(round(v)), int(round(u))] / 1000. == pytest.approx(point[2], abs=.25)
-
-
 def test_a_person_behind_a_pillar_is_occluded(pillar):
     simulator, frames = pillar
     status = [simulator.true_tracks(frame, START_NS)[0].status for frame in frames]

@@ -32,7 +32,7 @@ def walks(steps, random):
 
 
 @given(st.integers(0, 1000), st.integers(2, 12))
-def test_the_thesis_tracks_are_those_of_its_mended_tracker_while_everybody_is_seen(seed, images):
+def test_the_original_tracks_are_those_of_the_mended_tracker(seed, images):
     ours, theirs = ThesisTracker(), OriginalTracker()
     for image, places_m in enumerate(walks(images, np.random.RandomState(seed))):
         stamp_ns, detections = image * benchmark.PERIOD_NS, [Detection(place_m, SIZE) for place_m in places_m]

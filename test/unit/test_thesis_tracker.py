@@ -1,11 +1,8 @@
 """The thesis' tracker: IDs, velocities from the stamps of images, and age of tracks."""
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
-from hypothesis.extra import numpy as hnp
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.association import match_greedily
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, Detection
 
@@ -18,16 +15,6 @@ def at(x, y, z=0.9):
 
 def seconds(value):
     return int(round(value * NS))
-
-
-@given(hnp.arrays(float, st.tuples(st.integers(0, 6), st.integers(0, 6)), elements=st.floats(0, 10)))
-def test_matching_takes_the_nearest_pair_first(distances):
-    pairs = match_greedily(distances)
-    assert len(pairs) == min(distances.shape)
-    left = distances.copy()
-    for row, column in pairs:
-        assert left[row, column] == left.min()
-        left[row], left[:, column] = np.inf, np.inf
 
 
 def test_ids_start_at_1_and_are_not_reused():
@@ -98,15 +85,6 @@ def test_tracks_do_not_age_during_skipped_images():
     assert tracker.update(seconds(11.1), []) == []
 
 
-def test_a_skipped_stamp_far_ahead_has_no_effect():
-    """One stamp was wrong by an hour, and so had no transform."""
-    tracker = ThesisTracker()
-    tracker.update(seconds(1), [at(0, 0)])
-    tracker.skip(seconds(3600))
-    for frame in range(1, 4):
-        assert [track.id for track in tracker.update(seconds(1 + frame / 30), [at(0, 0)])] == [1]
-
-
 @pytest.mark.parametrize('stamp_s', [1.0, 0.5])
 def test_a_late_or_duplicate_image_is_rejected_without_any_change(stamp_s):
     tracker = ThesisTracker()
@@ -115,34 +93,3 @@ def test_a_late_or_duplicate_image_is_rejected_without_any_change(stamp_s):
         tracker.update(seconds(stamp_s), [at(5, 5)])
     tracker.skip(seconds(stamp_s))
     assert [track.id for track in tracker.update(seconds(1.1), [at(0, 0)])] == [1]
-
-
-@given(st.lists(st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), max_size=5), max_size=12))
-def test_each_detection_belongs_to_exactly_one_track(frames):
-    tracker, seen = ThesisTracker(), set()
-    for number, places in enumerate(frames):
-        tracks = tracker.update(seconds(number / 30), [at(*place) for place in places])
-        ids = [track.id for track in tracks]
-        assert ids == sorted(set(ids)) and sum(track.status == VISIBLE for track in tracks) == len(places)
-        assert all(id_ in seen or id_ > max(seen, default=0) for id_ in ids)
-        seen.update(ids)
-
-
-def test_new_parameters_apply_from_the_next_image_on_and_tracks_are_kept():
-    """With alpha 1 the velocity is that between the last two detections."""
-    tracker = ThesisTracker()
-    for frame in range(5):
-        before, = tracker.update(seconds(frame / 10), [at(0.1 * frame, 0)])
-    assert before.velocity_mps[0] < 0.7
-    tracker.reconfigure(ThesisTrackerParams(alpha=1.0, prediction_time=1.0))
-    track, = tracker.update(seconds(0.5), [at(0.5, 0)])
-    assert track.velocity_mps[0] == pytest.approx(1.0) and len(track.prediction_m) == 4
-    assert (track.id, track.first_seen_ns) == (before.id, before.first_seen_ns)
-
-
-@pytest.mark.parametrize('step_s', [0.0, 1e-6])
-def test_rejected_parameters_leave_the_old_ones(step_s):
-    tracker = ThesisTracker()
-    with pytest.raises(ValueError, match='prediction_step'):
-        tracker.reconfigure(ThesisTrackerParams(prediction_step=step_s, prediction_time=1.0))
-    assert len(tracker.update(0, [at(0, 0)])[0].prediction_m) == 8

@@ -52,7 +52,7 @@ def test_norfair_tracks_a_walking_person_in_seconds_and_metres():
     assert undetected[-1] == []
 
 
-def test_the_velocity_of_the_original_is_the_step_of_one_image_times_the_rate():
+def test_the_velocity_of_the_original_is_a_step_times_the_rate():
     tracker = OriginalTracker()
     tracker.update(stamp(1), at((1.0, 0.0)))
     person, = tracker.update(stamp(1) + NS // 100, at((1.1, 0.0)))  # 10 ms later
@@ -60,7 +60,7 @@ def test_the_velocity_of_the_original_is_the_step_of_one_image_times_the_rate():
     assert person.prediction_m[-1, 0] == pytest.approx(1.1 + 2 * 2)
 
 
-def test_the_original_ages_tracks_only_if_there_are_more_of_them_than_boxes():
+def test_the_original_ages_tracks_only_if_they_are_more_than_the_boxes():
     tracker = OriginalTracker()
     tracker.update(stamp(1), at((1.0, 0.0), (3.0, 0.0)))
     for number in range(2, 60):  # a new person gets the ID of one that left

@@ -22,7 +22,7 @@ def test_number_of_parameters_is_the_published_one(release, model):
 @pytest.mark.parametrize('release,model,rows', [('6.0', 'n', 3 * (16 * 24 + 8 * 12 + 4 * 6)),
                                                 ('5.0', 's', 3 * (16 * 24 + 8 * 12 + 4 * 6)),
                                                 ('6.0', 'n6', 3 * (16 * 24 + 8 * 12 + 4 * 6 + 2 * 3))])
-def test_output_has_a_row_for_each_anchor_of_each_cell_and_is_not_changed_by_fusing(release, model, rows):
+def test_output_has_a_row_for_each_anchor_of_each_cell(release, model, rows):
     network, image = random_network(layout(release, model, 3)), torch.rand(1, 3, 128, 192)
     with torch.no_grad():
         output = network(image)

@@ -54,7 +54,7 @@ def test_the_report_shows_images_of_both(bags):
         assert len(recording.boxes) == 39 and len(panels_of(bag, recording)) == 6
 
 
-def test_each_cameras_boxes_are_in_its_namespace_and_all_people_on_one_topic(bags):
+def test_boxes_are_in_the_namespaces_and_people_on_one_topic(bags):
     frames = {camera: set(message.header.frame_id for message in messages_on(bags[1], camera + '/ros_3d_bb/bb_3d'))
               for camera in ('front', 'left')}
     assert frames == {'front': {'front_color_optical_frame'}, 'left': {'left_color_optical_frame'}}
@@ -80,7 +80,7 @@ def test_inconsistent_parameters_are_rejected(params, complaint):
 
 
 @pytest.mark.parametrize('cameras', ['front,rear', 'front, left, rear', 'front'])
-def test_the_pipeline_starts_a_detector_and_bbox3d_for_each_camera_and_one_tracker(cameras):
+def test_the_pipeline_starts_nodes_for_each_camera_and_one_tracker(cameras):
     parameters, _nodes = loaded('pipeline.launch', 'detector:=depth', 'cameras:=' + cameras)
     names = [name.strip() for name in cameras.split(',')]
     started = set(name.rsplit('/', 1)[0] for name in parameters if name.count('/') > 1)

@@ -81,7 +81,7 @@ def test_the_launch_file_passes_only_arguments_of_the_pipeline():
     assert set(default_of('gazebo.launch')) - OWN_ARGUMENTS <= set(default_of('pipeline.launch'))
 
 
-def test_the_launch_file_starts_gazebo_the_robot_with_the_camera_and_the_pipeline(tmp_path):
+def test_the_launch_file_starts_gazebo_the_robot_and_the_pipeline(tmp_path):
     stand_in_gazebo(tmp_path)
     parameters = dumped('gazebo.launch', tmp_path, 'weights:=/some/yolov5n.pt', 'gui:=false', 'y:=-1.5', 'yaw:=0.3')
     given = given_to_stand_ins(parameters)
@@ -93,7 +93,7 @@ def test_the_launch_file_starts_gazebo_the_robot_with_the_camera_and_the_pipelin
     assert parameters['/tracker_node/target_frame'] == 'odom'
 
 
-def test_the_launch_file_passes_the_rate_to_the_camera_and_lockstep_to_gazebo(tmp_path):
+def test_the_rate_is_passed_to_the_camera_and_lockstep_to_gazebo(tmp_path):
     stand_in_gazebo(tmp_path)
     parameters = dumped('gazebo.launch', tmp_path, 'detector:=depth', 'fps:=12', 'lockstep:=true', 'navigation:=true')
     assert '<update_rate>12</update_rate>' in parameters['/robot_description']

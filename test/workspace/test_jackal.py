@@ -35,13 +35,6 @@ def test_camera_mount_is_published_unless_the_description_contains_it(monkeypatc
     assert (nodes['camera_mount'].args if 'camera_mount' in nodes else None) == expected
 
 
-def test_drivers_and_mounts_of_several_cameras_are_not_started():
-    parameters, nodes = loaded('jackal.launch', 'cameras:=front,rear', 'check:=true')
-    assert not {'realsense_node', 'realsense2_camera', 'camera_mount'} & set(nodes)
-    assert {'yolov5_node', 'bbox3d_node', 'tracker_node', 'doctor'} == set(nodes)
-    assert parameters['/tracker_node/cameras'] == 'front,rear' and '/rear/bbox3d_node/estimator' in parameters
-
-
 def test_nodes_are_respawned_on_the_robot_only(camera_package):
     """Elsewhere only with respawn:=true, because configuration errors would be logged repeatedly."""
     arguments = ['driver:=pyrealsense2', 'planner:=costmap']
@@ -62,15 +55,6 @@ def test_computer_moves_the_pipeline_but_not_the_camera():
     assert set(nodes) - remote == {'realsense_node', 'camera_mount'}
 
 
-def test_desk_starts_rviz_or_the_viewer():
-    _parameters, nodes = loaded('desk.launch', 'frame_world:=odom')
-    assert set(nodes) == {'rviz'} and nodes['rviz'].args.endswith('-f odom')
-    parameters, nodes = loaded('desk.launch', 'viewer:=true', 'rviz:=false', 'session:=/some/session',
-                               'detector:=depth')
-    assert set(nodes) == {'viewer_node'} and parameters['/viewer_node/session'] == '/some/session'
-    assert dict(nodes['viewer_node'].remap_args)['detector/enable'] == 'depth_detector_node/enable'
-
-
 @pytest.fixture
 def jackal(tmp_path, monkeypatch):
     """The description of a robot that includes the camera as jackal.urdf.xacro does, given environment variables."""
@@ -83,7 +67,7 @@ def jackal(tmp_path, monkeypatch):
     return described
 
 
-def test_the_camera_is_at_the_position_in_the_thesis_without_the_frames_of_the_driver(jackal):
+def test_the_camera_is_at_the_position_in_the_thesis(jackal):
     description = jackal()
     np.testing.assert_allclose(base_from('camera_link', description)[:3, 3], (0.17, 0, 0.20), atol=1e-12)
     assert [link.get('name') for link in description.findall('link')] == ['base_link', 'camera_link']

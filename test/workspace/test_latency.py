@@ -70,7 +70,7 @@ def test_invalid_arguments_and_bags_are_rejected(benchmark, arguments, status, r
     assert process.returncode == status and reason in printed
 
 
-def test_the_topics_of_a_limit_are_those_of_the_node_without_diagnostics_and_reconfiguration():
+def test_the_topics_of_a_limit_are_those_of_the_node():
     published = [['/tracks', ['/tracker']], ['/rosout', ['/tracker']], ['/diagnostics', ['/tracker', '/other']],
                  ['/tracker/parameter_updates', ['/tracker']], ['/boxes', ['/other']]]
     subscribed = [['/boxes', ['/tracker']], ['/tf', ['/tracker', '/other']], ['/clock', ['/tracker']],

@@ -148,7 +148,7 @@ def test_tracks_that_are_not_visible_are_paler_and_have_a_question_mark(status, 
         assert 0.1 < unseen[namespace, 3].color.a < seen[namespace, 3].color.a / 2
 
 
-def test_new_parameters_apply_to_the_next_image_and_unused_markers_are_deleted():
+def test_new_parameters_apply_to_the_next_image():
     """The history continues, because it is recorded even while it is not drawn."""
     writer = MarkerWriter(MarkerParams(marker_namespaces=['cylinder', 'id']))
     writer.write([track(3)], header())

@@ -1,10 +1,8 @@
 """Parameters and nodes of navigation.launch, without the planners. test/nodes/navigation.test runs it with them."""
-import os
 
 import pytest
-import yaml
 
-from support.launching import ROOT, loaded
+from support.launching import loaded
 
 MOVE_BASE, BRIDGE = '/move_base/', '/planner_bridge_node/'
 
@@ -83,13 +81,3 @@ def test_the_footprint_of_the_local_planner_and_the_costmap_is_one(planner):
     assert footprint == parameters[MOVE_BASE + 'global_costmap/footprint']
     if planner == 'teb':
         assert parameters[MOVE_BASE + 'TebLocalPlannerROS/footprint_model/vertices'] == footprint
-
-
-def test_each_plugin_of_a_costmap_has_parameters_or_the_defaults_of_a_map():
-    folder = os.path.join(ROOT, 'config', 'move_base')
-    with open(os.path.join(folder, 'costmap_common.yaml')) as stream:
-        common = yaml.safe_load(stream)
-    for name in ('local_costmap', 'global_costmap_map', 'global_costmap_rolling', 'global_costmap_social'):
-        with open(os.path.join(folder, name + '.yaml')) as stream:
-            costmap = dict(common, **yaml.safe_load(stream))
-        assert {layer['name'] for layer in costmap['plugins']} <= set(costmap) | {'static_layer'}

@@ -47,7 +47,7 @@ def test_a_recorded_trial_is_not_repeated(tmp_path, monkeypatch):
 
 
 @pytest.mark.long
-def test_a_robot_that_knows_nothing_of_people_drives_into_the_one_in_its_way(tmp_path):
+def test_a_robot_that_knows_nothing_of_people_drives_into_one(tmp_path):
     environment = planner_environment()
     results, logs = str(tmp_path / 'results.json'), tmp_path / 'logs'
     logs.mkdir()

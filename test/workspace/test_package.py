@@ -121,13 +121,6 @@ def test_values_outside_of_the_table_are_rejected(name):
                 params_from({key: value}, *kinds)
 
 
-@pytest.mark.parametrize('name', sorted(NODES))
-def test_parameters_are_live_only_in_nodes_with_a_reconfigure_server(name):
-    module = sys.modules[NODES[name].node_class.__module__]
-    is_live = any(param.live for param in table_of(node_pages.parameter_types(NODES[name].node_class)).values())
-    assert is_live == hasattr(module, 'ReconfigureServer')
-
-
 @pytest.mark.parametrize('path, node', sorted(
     (path, node.name) for node in NODES.values() for path in node_pages.config_paths(node)))
 def test_parameter_files_are_read_as_the_defaults(path, node):

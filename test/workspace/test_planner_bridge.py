@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 import rospy
 from geometry_msgs.msg import TransformStamped
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
@@ -140,7 +138,7 @@ def test_an_output_waits_for_the_transform_of_its_own_frame_only():
         assert bridge.counts['no transform'] == 3
 
 
-def test_without_transform_each_output_is_emptied_once_in_the_frame_of_its_last_array():
+def test_without_transform_each_output_is_emptied_once():
     """The ring stays away, which costmap_2d notices (expected_update_rate)."""
     with bridge_with('costmap, people') as bridge:
         bridge.send_tf(START_NS, 'base_link', (0, 0, 0))
@@ -193,33 +191,6 @@ def test_the_empty_arrays_of_the_shutdown_are_the_last_messages():
         assert len(bridge.newest(POINTS)[1]) == len(bridge.newest(PEOPLE)[1]) == 0
         assert not np.any(bridge.message(COSTS).data)
         assert [bridge.count(topic) for topic in (POINTS, COSTS, RING, PEOPLE)] == [2, 2, 1, 2]
-
-
-STEPS = st.lists(st.tuples(st.sampled_from(['tracks', 'tick']), st.floats(-1.5, 1.5), st.floats(-1.5, 1.5)),
-                 min_size=1, max_size=25)
-
-
-@given(STEPS)
-@settings(deadline=None, max_examples=60)
-def test_planners_keep_people_for_as_long_as_their_tracks_are_of_now_whatever_the_clock_does(steps):
-    """Against a model: the clock jumps by any time, and tracks carry stamps of the past and of the future."""
-    with bridge_with('people') as bridge:
-        arrival_ns = stamp_ns = shown_m = None
-        for what, jump_s, off_s in steps:
-            bridge.set_time(bridge.now_ns + int(jump_s * NS))
-            now_ns, off_ns = bridge.now_ns, int(off_s * NS)
-            if what == 'tracks':
-                bridge.send(now_ns + off_ns, person(1, 0, 0))
-                if abs(off_ns) <= NS:
-                    arrival_ns, stamp_ns, shown_m = now_ns, now_ns + off_ns, max(-off_ns, 0) / NS
-            else:
-                bridge.tick()
-                if arrival_ns is not None and not 0 <= now_ns - arrival_ns <= NS:
-                    arrival_ns = shown_m = None
-                elif arrival_ns is not None and now_ns - arrival_ns >= NS // 10:
-                    shown_m = max(now_ns - stamp_ns, 0) / NS
-            found = bridge.newest(PEOPLE)[1] if bridge.count(PEOPLE) else []
-            assert [place.position.x for place in found] == ([] if shown_m is None else [pytest.approx(shown_m)])
 
 
 def test_people_have_the_stamp_0_and_the_position_of_now():

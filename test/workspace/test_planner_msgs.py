@@ -173,7 +173,7 @@ def test_costmap_points_are_exact_on_large_maps(x, y, yaw, roll_deg, pitch_deg):
     assert message.header.frame_id == 'base_link'
 
 
-def test_the_ring_reaches_as_far_as_the_costmap_clears_and_further_than_it_marks():
+def test_the_ring_reaches_as_far_as_the_costmap_clears():
     sources = people_layer()
     assert sources['people']['obstacle_range'] < sources['clearing']['raytrace_range'] <= (
         PlannerBridgeParams().clearing_range)

@@ -199,7 +199,7 @@ def positions_in(path, topic):
                 for _topic, message, _time in bag.read_messages([topic])]
 
 
-@pytest.mark.parametrize('name', sorted(DRIVERS))
+@pytest.mark.parametrize('name', sorted(set(DRIVERS) - {'oak, example'}))  # whose images are those of oak
 def test_people_are_tracked_with_the_topics_of_a_recipe(name, tmp_path, capfd):
     driver, recipe = DRIVERS[name], arguments_of(RECIPES[name])
     write_stream(driver, str(tmp_path / 'in.bag'))

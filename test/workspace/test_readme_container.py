@@ -42,16 +42,6 @@ def launched(command):
     return set(loaded(launch_file, *arguments)[1])
 
 
-def test_sources_of_the_image_exist():
-    with open(os.path.join(ROOT, 'docker', 'Dockerfile')) as stream:
-        text = stream.read()
-    copied = [name for line in re.findall(r'^COPY (.*) \S+$', text, re.MULTILINE) for name in line.split()
-              if not name.startswith('--')]
-    assert copied[:2] == ['run', 'tools'] and all(os.path.exists(os.path.join(ROOT, name)) for name in copied)
-    workdir, entrypoint = (re.search(pattern, text).group(1) for pattern in (r'WORKDIR (.*)', r'ENTRYPOINT \["(.*)"\]'))
-    assert os.access(os.path.join(ROOT, os.path.relpath(entrypoint, workdir)), os.X_OK)
-
-
 def test_commands_of_the_robot_start_its_nodes(services):
     nodes = {name: launched(VARIABLE.sub(r'\2', service['command'])) for name, service in services.items()}
     assert 'realsense_node' in nodes['camera']

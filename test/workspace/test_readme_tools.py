@@ -37,8 +37,7 @@ STAMPED = claimed('message = Int32MultiArray', 'python')
 # Options that shorten a benchmark.
 BENCHMARKS = [(claimed('./run bench accuracy --boxes'), ''), (claimed('./run bench accuracy --scenarios'), ''),
               (claimed('./run bench scenes'), ''), (claimed('./run bench speed\n'), ' --images 1'),
-              (claimed('./run bench tracking --seed'), ' --seconds 3 --repetitions 1'),
-              (claimed('./run bench latency'), ' --cases free --seconds 2')]
+              (claimed('./run bench tracking --seed'), ' --seconds 2 --repetitions 1')]
 DETECTORS = claimed('./run bench detector')
 DETECTIONS = claimed('./run bench tracking --detections')
 YAML = [claimed('max_obstacles:', 'yaml')]

@@ -1,7 +1,4 @@
-"""A short soak: the whole graph under roslaunch, with faults.
-
-Two invariants depend on the speed of the machine, which other programs change; here they only have to be reported.
-"""
+"""A short soak: the whole graph under roslaunch, with faults."""
 import json
 import os
 import subprocess
@@ -16,7 +13,6 @@ TEST = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 SCENE = {'duration': 2.0, 'rate': 5.0, 'people': [{'start': [3.0, 0.6], 'facing': 3.1, 'repeat': True, 'moves': [
     {'to': [3.0, -0.6], 'speed': 0.6}, {'to': [3.0, 0.6], 'speed': 0.6}]}, {'start': [4.0, -0.7], 'facing': 3.1}]}
 TIMEOUT_S = 1200
-SPEED_DEPENDENT = {'queues do not grow', 'CPU time per image is flat'}
 
 
 @pytest.fixture
@@ -48,13 +44,11 @@ def test_a_short_soak_violates_no_invariant(soaking, tmp_path):
     printed, progress = process.communicate(timeout=TIMEOUT_S)
     assert (tmp_path / 'soak.json').exists(), printed + progress
     found = json.loads((tmp_path / 'soak.json').read_text())
-    broken = set(invariant['name'] for invariant in found['invariants'] if not invariant['holds'])
-    assert broken <= SPEED_DEPENDENT and process.returncode == bool(broken), printed + progress
-    assert SPEED_DEPENDENT < set(invariant['name'] for invariant in found['invariants'])
+    assert process.returncode == 0 and all(invariant['holds'] for invariant in found['invariants']), printed + progress
     assert all(fault['recovered_s'] is not None for fault in found['faults'])
     assert len(found['faults']) >= len(FAULTS)
     assert set(process['node'] for process in found['processes']) == {
         'depth_detector_node', 'bbox3d_node', 'tracker_node', 'planner_bridge_node'}
     assert found['arrays']['ros_3d_bb/tracks'] > 0 and found['sent']['camera/color/image_raw'] > 0
-    assert '%d images sent' % found['images'] in printed and 'tracker_node' in printed
+    assert '%d images sent' % found['images'] in printed
     assert processes_naming(str(tmp_path)) == 0

@@ -51,25 +51,6 @@ def test_an_image_that_awaits_its_transform_while_time_jumps_back_is_dropped(rig
     assert [track.id for track in front.tracks] == [2]
 
 
-def test_an_image_without_transform_from_before_a_jump_has_no_effect(rig):
-    """If it were counted as skipped, tracks would not age in the rear camera's next image."""
-    for number in range(200):
-        rig.send(START_NS + number * PERIOD_NS, 'front')
-    rig.transforms.missing.add('rear')
-    rig.transforms.while_waiting['rear'] = lambda: rig.send(START_NS, 'front')
-    assert rig.send(START_NS + 200 * PERIOD_NS, 'rear') is None
-    rig.transforms.missing.clear()
-    for number in range(1, 21):
-        rig.now_ns = number * PERIOD_NS
-        front = rig.send(START_NS + number * PERIOD_NS, 'front')
-    assert len(front.tracks) == 1
-    counts = []
-    for number in (32, 44):  # the second miss ends the track
-        rig.now_ns = number * PERIOD_NS
-        counts.append(len(rig.send(START_NS + number * PERIOD_NS, 'rear', count=0).tracks))
-    assert counts == [1, 0]
-
-
 def test_the_node_publishes_nothing_from_before_a_jump():
     """The tf buffer is asked for the rear camera's transform when the front camera's stamps go back."""
     with masterless({'tf_timeout': 0.0, 'cameras': 'front, rear'}) as connections:

@@ -10,25 +10,30 @@ from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.bags.bag_reader import BagReader, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
-from ros_3d_bb.camera.alignment import EdgeComparison, frames_fault
+from ros_3d_bb.camera.alignment import EdgeComparison, frames_fault, size_fault
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, IMAGE_KINDS, STATIC_TOPIC, TF_TOPIC, uncompressed
 from ros_3d_bb.conversions.image_msgs import DEPTH_SCALES, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from
 from ros_3d_bb.core.time_sync import NS, SAME_NS
+from ros_3d_bb.diagnosis.camera_mount import camera_mount
 from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, INFO, ROLES
 from ros_3d_bb.diagnosis.observations import COMPRESSED_IMAGE, IMAGE, KEPT, Newest, Observations, Stream, TfSeen
 from ros_3d_bb.diagnosis.tf_tree import links_in
 from ros_3d_bb.pipeline.depth_registration import RAW
 
-COMPARED_NS = NS // 4  # between two comparisons of edges
+COMPARED_NS, PAIRS = NS // 4, 16  # between two comparisons of edges; newest images that are kept
 BAG_SECONDS = 10.0  # cache length of tf2
 
 
 class EdgeObserver(object):
-    """Compare the edges of colour and depth images with the same stamp, at most every `COMPARED_NS`."""
+    """Compare the edges of colour and depth images with the same stamp, at most every `COMPARED_NS`.
+
+    Up to `PAIRS` images of them, RGB and DepthImage, are kept in `pairs`.
+    """
 
     def __init__(self, color, depth):
         self._edges, self._color, self._depth, self._compared_ns = EdgeComparison(), color, depth, 0
+        self.pairs = collections.deque(maxlen=PAIRS)
         color.on_message = depth.on_message = self._compare
 
     def fault(self):
@@ -44,7 +49,8 @@ class EdgeObserver(object):
                 and abs(stamp_ns - self._compared_ns) >= COMPARED_NS):
             self._compared_ns = stamp_ns
             with contextlib.suppress(ValueError):  # reported as an invalid encoding
-                self._edges.add(imgmsg_to_rgb(color), imgmsg_to_depth(depth))
+                self.pairs.append((imgmsg_to_rgb(color), imgmsg_to_depth(depth)))
+                self._edges.add(*self.pairs[-1])
 
 
 class Observation(object):
@@ -125,9 +131,18 @@ def observe_bag(path, name_of, target_frame, depth='aligned'):
         _read(reader, observed, depth_info, transforms)
     info = observed[INFO].newest
     frame_id = info.header.frame_id if depth == RAW and info is not None else ''  # that of the 3D boxes
-    tf = observed[DEPTH].tf_seen(transforms.lookup, transforms.frames_as_yaml, target_frame, frame_id)
-    return observations_of(observed, depth_info, topics, BAG_SECONDS, is_bag=True, edges_fault=edges.fault(), tf=tf,
-                           depth_is_raw=depth == RAW, raw_topics=raw_topics, depth_info_topic=depth_info.topic)
+    seen = observations_of(observed, depth_info, topics, BAG_SECONDS, is_bag=True, edges_fault=edges.fault(),
+                           tf=observed[DEPTH].tf_seen(transforms.lookup, transforms.frames_as_yaml, target_frame,
+                                                      frame_id), depth_is_raw=depth == RAW, raw_topics=raw_topics,
+                           depth_info_topic=depth_info.topic)
+    if depth == RAW:
+        return seen
+    is_aligned = seen.color_info is not None and seen.depth is not None and not (
+        seen.color_info.fault or seen.depth.fault or seen.edges_fault
+        or size_fault(seen.color_info.converted, *seen.depth.converted.shape[::-1]))
+    if is_aligned and edges.pairs and seen.tf is not None and seen.tf.fault:
+        return seen._replace(mount=camera_mount(edges.pairs, seen.color_info.converted))
+    return seen
 
 
 def _raw_topics(reader, topics):

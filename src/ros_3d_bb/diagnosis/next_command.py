@@ -7,9 +7,7 @@ from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, IMAGES, TRACKS
 from ros_3d_bb.diagnosis.topic_faults import other_topic
 from ros_3d_bb.pipeline.depth_registration import RAW
 
-# Options for the pose of a camera without tf, and a hint.
-POSE = (' --camera-height HEIGHT --camera-tilt TILT',
-        '; fill in the height of the camera above the floor, metres, and its tilt, radians, positive if it looks down')
+MIN_ROLL_RAD = 0.02  # smaller ones are within the error of the fitted floor
 
 
 def next_command(bag, seen, found):
@@ -43,9 +41,9 @@ def next_command(bag, seen, found):
     if missing and all(others.values()):
         return ('rosrun ros_3d_bb doctor %s%s%s' % (quote(bag), option, _remappings(dict(names, **others))),
                 'checks the topics that probably are the missing ones')
-    if missing or faults - {'transforms'}:
+    if missing or faults - {'transforms', 'image rotation'}:
         return '', ''
-    pose, hint = POSE if faults else ('', '')
+    pose, hint = _pose(seen.mount) if faults else ('', '')
     command = 'rosrun ros_3d_bb process_bag %s tracked.bag --detector depth%s%s%s && %s' % (
         quote(bag), option, _remappings(names, ' --remap '), pose, report % 'tracked.bag')
     return command, 'tracks people and draws them' + hint
@@ -57,6 +55,18 @@ def _raw_topic(seen, is_misaligned):
     if is_misaligned and depth.count and not seen.edges_fault:
         return depth.topic
     return nearest_name('/' + DEPTH_TOPICS[RAW][0], seen.raw_topics) if seen.raw_topics else ''
+
+
+def _pose(mount):
+    """Return the options for the pose of a camera without tf, from its CameraMount or None, and a hint."""
+    turned = ' --image-rotation %d' % (90 * mount.turns) if mount is not None and mount.turns else ''
+    if mount is None or mount.height_m is None:
+        return (' --camera-height HEIGHT --camera-tilt TILT' + turned,
+                '; fill in the height of the camera above the floor, metres, and its tilt, radians, positive if it '
+                'looks down')
+    roll = ' --camera-roll %.2f' % mount.roll_rad if abs(mount.roll_rad) > MIN_ROLL_RAD else ''
+    return (' --camera-height %.2f --camera-tilt %.2f%s%s' % (mount.height_m, mount.tilt_rad, roll, turned),
+            '; height and tilt are those of the floor in the depth images: correct them if they are known')
 
 
 def _remappings(names, separator=' '):

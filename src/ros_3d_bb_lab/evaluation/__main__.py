@@ -3,7 +3,7 @@ import importlib
 import sys
 
 MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.benchmark', 'scenes': 'scene_benchmark', 'speed': 'speed',
-           'latency': 'latency.benchmark', 'detector': 'detector_benchmark',
+           'latency': 'latency.benchmark', 'detector': 'detector_benchmark', 'costmap': 'costmap.benchmark',
            'navigation': 'navigation.benchmark', 'gazebo': 'gazebo.benchmark'}
 
 

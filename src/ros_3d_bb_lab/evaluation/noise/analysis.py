@@ -1,19 +1,15 @@
-"""Noise analysis: statistics of both axes, comparison with theory, and the resulting error models."""
+"""Noise analysis: statistics of both axes, and the resulting error models."""
 import datetime
 import os
-from typing import Any, NamedTuple, Optional, Tuple
-
-import numpy as np
+from typing import NamedTuple, Optional, Tuple
 
 from ros_3d_bb.estimation.error_model import ErrorModel, MeasuredRange, Provenance, Spread, XBias, checked
 from ros_3d_bb.sessions.plausibility import Outlier
 from ros_3d_bb_lab.evaluation.error_model_fit import GROWTH_OUTSIDE, LEAST_SIGMA_M, Y_SIGMA_M, fit_error_model
-from ros_3d_bb_lab.evaluation.noise import theory
 from ros_3d_bb_lab.evaluation.noise.statistics import AxisStatistics, axis_statistics, share_between_positions
 from ros_3d_bb_lab.evaluation.noise.tables import MeasurementTable, clusters_of
 
 Z_DEGREE, X_DEGREE = 2, 1
-RMS_FIT_FROM_M = 1.5  # below, the error is not quadratic in the distance (thesis 5.2)
 
 
 class Inputs(NamedTuple):
@@ -28,14 +24,6 @@ class Inputs(NamedTuple):
     estimator: str
     camera: str
     outliers: Tuple[Outlier, ...] = ()
-
-    @property
-    def is_thesis(self):
-        """Whether the measurements are those of the thesis: its tables, or a session of its camera."""
-        names = set(os.path.basename(str(table.name)) for table in (self.z, self.x, self.x_variance))
-        camera = self.z.camera
-        return names <= set(theory.THESIS_TABLES) or (
-            camera is not None and abs(camera.fx - theory.COLOR_FOCAL_PX) < 0.01)
 
     @classmethod
     def of_tables(cls, z, x, x_variance, estimator, camera):
@@ -57,8 +45,8 @@ class Inputs(NamedTuple):
 class Analysis(NamedTuple):
     """Results of `./run noise`.
 
-    `x` contains the mean errors, and `x_variance` the variances. `rms_poly` is the polynomial fitted to the RMS error
-    of z from RMS_FIT_FROM_M on, or None; `z_between` and `x_between` are from `share_between_positions`.
+    `x` contains the mean errors, and `x_variance` the variances. `z_between` and `x_between` are from
+    `share_between_positions`.
 
     `model` is the cross-validated error model; if it is None, `no_model` is the reason. `thesis_form` is the error
     model in the form of the thesis, with the same polynomials and the largest variance at all positions; None if its
@@ -69,7 +57,6 @@ class Analysis(NamedTuple):
     z: AxisStatistics
     x: AxisStatistics
     x_variance: AxisStatistics
-    rms_poly: Any
     z_between: Optional[float]
     x_between: Optional[float]
     thesis_form: Optional[ErrorModel]
@@ -99,7 +86,7 @@ def analyse(inputs, progress=lambda share: None):
     progress(0.3)
     model, reason = _or_reason(fit_error_model, known.measured_m, known.truth_m, **origin)
     progress(1.0)
-    return Analysis(inputs, z, x, x_variance, _rms_poly(z), share_between_positions(inputs.z, 'Z'),
+    return Analysis(inputs, z, x, x_variance, share_between_positions(inputs.z, 'Z'),
                     share_between_positions(inputs.x_variance, 'X'), thesis_form, model, reason, origin['date'])
 
 
@@ -109,14 +96,10 @@ def summary_of(analysis):
     x.update(max_variance_m2=variance['max_variance_m2'], max_sigma_m=variance['max_sigma_m'],
              variance_clusters=variance['clusters'])
     scores = None if analysis.model is None else dict(analysis.model.cross_validated._asdict())
-    is_thesis = analysis.inputs.is_thesis
     outliers = [{'name': outlier.name, 'measured_m': outlier.measured_m.tolist(), 'truth_m': outlier.truth_m.tolist()}
                 for outlier in analysis.inputs.outliers]
     return {'z': _axis_summary(analysis.z), 'x': x, 'cross_validated': scores, 'outliers': outliers,
-            'left_out': [list(pair) for pair in analysis.inputs.z.left_out], 'theory': None if not is_thesis else {
-        'subpixel_px': theory.SUBPIXEL_PX, 'focal_times_baseline_px_m': theory.STEREO_PX_M,
-        'color_focal_px': theory.COLOR_FOCAL_PX,
-        'thesis_focal_px': theory.focal_px(theory.THESIS_FOV_DEG, theory.THESIS_WIDTH_PX)}}
+            'left_out': [list(pair) for pair in analysis.inputs.z.left_out]}
 
 
 def _axis_summary(axis):
@@ -141,10 +124,3 @@ def _thesis_form(z, x, x_variance, origin):
         Spread(max(x_variance.max_sigma_m, LEAST_SIGMA_M), 0.0, 0.0), Y_SIGMA_M,
         MeasuredRange(min(z_m), max(z_m), max(abs(value) for value in x_m), min(z_m)), GROWTH_OUTSIDE,
         Provenance(measurements=count, positions=len(z_m), **origin), None))
-
-
-def _rms_poly(z):
-    far = [cluster for cluster in z.clusters if cluster.truth_m >= RMS_FIT_FROM_M]
-    if len(far) <= Z_DEGREE:
-        return None
-    return np.polyfit([cluster.truth_m for cluster in far], [cluster.rms_m for cluster in far], Z_DEGREE)

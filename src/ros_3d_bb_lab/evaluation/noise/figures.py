@@ -3,8 +3,6 @@ import matplotlib
 import numpy as np
 from scipy import stats
 
-from ros_3d_bb_lab.evaluation.noise import theory
-from ros_3d_bb_lab.evaluation.noise.analysis import RMS_FIT_FROM_M
 from ros_3d_bb_lab.evaluation.noise.tables import clusters_of
 
 matplotlib.use('Agg')  # works without a display
@@ -13,7 +11,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 SIZE_IN, DPI = (7.2, 4.2), 110
 COLUMNS = 3
 MANY_CLUSTERS = 12
-MEASURED, FITTED, THEORY, OTHER = '#0072b2', '#d55e00', '#000000', '0.55'  # different for all colour vision
+MEASURED, FITTED = '#0072b2', '#d55e00'  # different for all colour vision
 
 
 def write_figures(folder, analysis, progress=lambda share: None):
@@ -31,14 +29,11 @@ def write_figures(folder, analysis, progress=lambda share: None):
         ('z_distribution.png', 'density of the error in Z, and the fitted Gaussian', _histograms,
          (clusters_of(tables.z, 'Z'), 'Z')),
         ('x_distribution.png', 'density of the error in X, and the fitted Gaussian', _histograms,
-         (clusters_of(tables.x_variance, 'X'), 'X')),
-        ('depth_error.png', 'error in Z by distance, and the theory of stereo cameras', _rms, (analysis,))]
+         (clusters_of(tables.x_variance, 'X'), 'X'))]
     if not len(tables.z.complete().truth_m):
         drawings = drawings[1:]
     if analysis.model is None:
         drawings = [drawing for drawing in drawings if drawing[0] != 'sigma.png']
-    if not tables.is_thesis:
-        drawings.pop()
     for number, (name, _caption, draw, arguments) in enumerate(drawings):
         progress(number / len(drawings))
         draw(folder / name, *arguments)
@@ -86,29 +81,6 @@ def _sigmas(path, analysis):
                   label='remaining RMS error in %s, positions' % name)
     axes.set_ylim(bottom=0)
     _finish(figure, axes, path, 'true Z [m]', 'error [m]')
-
-
-def _rms(path, analysis):
-    """RMS of the depth error by distance, and the theoretical error of stereo cameras."""
-    truth_m = [cluster.truth_m for cluster in analysis.z.clusters]
-    distance_m = np.linspace(0, 1.05 * max(truth_m), 100)
-    figure, axes = plt.subplots(figsize=SIZE_IN)
-    axes.plot(truth_m, [cluster.rms_m for cluster in analysis.z.clusters], 'o', color=MEASURED,
-              label='measured RMS, bias included')
-    axes.plot(truth_m, [cluster.sigma_m for cluster in analysis.z.clusters], 'x', color=MEASURED,
-              label='measured standard deviation')
-    if analysis.rms_poly is not None:
-        far_m = distance_m[distance_m >= RMS_FIT_FROM_M]
-        axes.plot(far_m, np.polyval(analysis.rms_poly, far_m), color=FITTED,
-                  label='fit to RMS: ' + polynomial_text(analysis.rms_poly, 'd'))
-    axes.plot(distance_m, theory.stereo_rms_m(distance_m, theory.STEREO_PX_M), color=THEORY,
-              label='theory, stereo pair: f·b = %.2f px·m' % theory.STEREO_PX_M)
-    for name, focal, style in (
-            ("theory, thesis' 69°", theory.focal_px(theory.THESIS_FOV_DEG, theory.THESIS_WIDTH_PX), '--'),
-            ('theory, colour intrinsics', theory.COLOR_FOCAL_PX, ':')):
-        axes.plot(distance_m, theory.stereo_rms_m(distance_m, focal * theory.THESIS_BASELINE_M), style, color=OTHER,
-                  label='%s: f = %.0f px' % (name, focal))
-    _finish(figure, axes, path, 'distance [m]', 'depth error [m]')
 
 
 def _error_by_truth(path, axis, name):

@@ -1,31 +1,31 @@
 """Output of the noise analysis: a folder with a report, its figures, a summary and error models, and a short text."""
 import json
 
+import numpy as np
+
 from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.sessions.plausibility import position_text
 from ros_3d_bb_lab.evaluation.html_report import html_report
-from ros_3d_bb_lab.evaluation.noise import theory
-from ros_3d_bb_lab.evaluation.noise.analysis import RMS_FIT_FROM_M, summary_of
+from ros_3d_bb_lab.evaluation.noise.analysis import summary_of
 from ros_3d_bb_lab.evaluation.noise.figures import polynomial_text, write_figures
-from ros_3d_bb_lab.evaluation.noise.statistics import DISTRIBUTIONS, LEAST_TO_TEST
+from ros_3d_bb_lab.evaluation.noise.statistics import LEAST_TO_TEST
 from ros_3d_bb_lab.evaluation.noise.tables import LEAST_IN_CLUSTER, small_clusters
 from ros_3d_bb_lab.evaluation.report_blocks import Figure, Heading, Paragraph, Table, numbered
 
 TITLE = 'Position errors of a depth camera'
-SIMILAR = 0.05  # log-likelihood per measurement; smaller differences are not significant
 ESTIMATORS = {'foreground': 'foreground (that of bbox3d_node)', 'median': 'median (that of the thesis)',
               'recorded': 'recorded (as stored with the measurements)', '': 'unknown'}
 
 
 def write_results(folder, analysis, progress=lambda share: None):
-    """Write the report as HTML and PDF, its figures, summary.json and the error models into a folder (pathlib.Path).
+    """Write the report as HTML, its figures, summary.json and the error models into a folder (pathlib.Path).
 
     Returns the figures as pairs (path, caption). The folder is created if it does not exist. `progress` is called with
     the share 0..1 that is done. Raises OSError.
     """
     folder.mkdir(parents=True, exist_ok=True)
     captions = write_figures(folder, analysis, lambda share: progress(0.6 * share))
-    sections = _summary, _setup, _left_out, _z, _x, _model, _distributions, _theory
+    sections = _summary, _setup, _left_out, _z, _x, _model, _distributions
     blocks = [block for section in sections for block in section(analysis)]
     blocks = list(numbered(block._replace(caption=captions[block.name]) if isinstance(block, Figure) else block
                            for block in blocks if not isinstance(block, Figure) or block.name in captions))
@@ -48,7 +48,7 @@ def text_of(analysis):
 
 
 def _summary(analysis):
-    inputs, model = analysis.inputs, analysis.model
+    model = analysis.model
     rows = [('measurements (mean error)', _count(analysis.x), _count(analysis.z)),
             ('measurements (variance)', _count(analysis.x_variance), _count(analysis.z)),
             ('mean error f [m]', polynomial_text(analysis.x.poly, 'x'), polynomial_text(analysis.z.poly, 'z')),
@@ -60,19 +60,10 @@ def _summary(analysis):
     if model is not None:
         rows.append(('RMSE after correction, positions left out [m]', '%.3f' % model.cross_validated.rmse_x_m,
                      '%.3f' % model.cross_validated.rmse_z_m))
-    if inputs.is_thesis:
-        rows += [('thesis: mean error f [m]',) + tuple(
-                     polynomial_text(theory.THESIS_RESULTS[axis][0], axis.lower()) for axis in 'XZ'),
-                 ('thesis: largest variance σ² [m²]',) + tuple(
-                     '%.5f' % theory.THESIS_RESULTS[axis][1] for axis in 'XZ')]
     pieces = [
         Paragraph('This report describes how far positions of people, as measured by a depth camera, are from their '
                   'true positions, and a model of these errors. Error is measured minus true. X is to the right of the '
                   'camera and Z ahead of it, in its optical frame.'), Table('main results', header, tuple(rows))]
-    if inputs.is_thesis:
-        pieces.append(Paragraph(
-            'The rows of the thesis are those of its chapter 5.' if inputs.estimator in ('', 'median', 'recorded') else
-            'The rows of the thesis are those of its chapter 5, with its own estimator (median), and more data.'))
     far = max(analysis.z.clusters, key=lambda cluster: abs(cluster.mean_m))
     text = ('At Z = %.2f m the mean error in Z is %+.3f m, %.1f times the standard deviation there: inflating '
             'obstacles by σ alone does not cover it. The error model corrects the mean error.' % (
@@ -100,7 +91,7 @@ def _setup(analysis):
         rows += [('image', '%d × %d pixels' % camera[:2]), ('focal lengths', 'fx %.2f, fy %.2f pixels' % camera[2:4]),
                  ('principal point', 'cx %.2f, cy %.2f pixels' % camera[4:6]),
                  ('field of view', '%.1f° × %.1f°' % tuple(
-                     theory.fov_deg(focal, size) for focal, size in zip(camera[2:4], camera[:2]))),
+                     np.degrees(2 * np.arctan(size / (2 * focal))) for focal, size in zip(camera[2:4], camera[:2]))),
                  ('distortion', '%s: %s' % (camera.distortion_model, ', '.join(
                      '%g' % value for value in camera.distortion)) if camera.distortion else 'none')]
     return [Heading('Measurements and camera'), Table('measurements and camera', ('', 'value'), tuple(rows)),
@@ -163,11 +154,8 @@ def _distributions(analysis):
                   'with equal errors, are not tested.' % (sum(cluster.looks_gaussian for cluster in tested),
                                                           len(tested), LEAST_TO_TEST)),
         Figure('z_distribution.png', ''), Figure('x_distribution.png', ''),
-        Paragraph('The last columns compare distributions by the mean log density of held-out measurements in '
-                  'five-fold cross-validation; * marks the largest value, the best distribution. '
-                  + _best_text(analysis)),
-        Table('normality tests, and mean log densities', header + tuple(name for name, _fit in DISTRIBUTIONS),
-              tuple(_distribution_row(name, cluster) for name, cluster in analysis.variance_clusters))]
+        Table('normality tests', header, tuple(
+            _distribution_row(name, cluster) for name, cluster in analysis.variance_clusters))]
 
 
 def _model(analysis):
@@ -213,33 +201,6 @@ def _model_pieces(model):
             ('coverage of the 95 % ellipse', '%.0f %%' % (100 * scores.coverage_95))))]
 
 
-def _theory(analysis):
-    """Comparison with the theory of the thesis, whose baseline is known."""
-    if not analysis.inputs.is_thesis:
-        return []
-    far = analysis.z.clusters[-1]
-    thesis_px = theory.focal_px(theory.THESIS_FOV_DEG, theory.THESIS_WIDTH_PX)
-    color_deg = theory.fov_deg(theory.COLOR_FOCAL_PX, theory.THESIS_WIDTH_PX)
-    return [
-        Heading('Error in Z and the theory of stereo cameras (thesis 5.2)'),
-        Paragraph('A stereo camera with a matching error of s pixels has a depth error of d² · s / (f · b) at distance '
-                  'd, for one pixel on a plane. The curved surface of a person and the detector increase the error; '
-                  'averaging over many pixels decreases it. The measured RMS includes the mean error; the standard '
-                  'deviation does not. At %.2f m: RMS %.4f m, standard deviation %.4f m, theory %.4f m.%s' % (
-                      far.truth_m, far.rms_m, far.sigma_m, theory.stereo_rms_m(far.truth_m, theory.STEREO_PX_M),
-                      '' if analysis.rms_poly is None else ' The fit to the RMS begins at %.1f m.' % RMS_FIT_FROM_M)),
-        Figure('depth_error.png', ''),
-        Paragraph('The thesis derives f = %.0f px from the 69° of the data sheet. These are the field of view of the '
-                  'whole 16:9 colour sensor, but the images of 640×480 pixels (4:3) are cropped: the intrinsics of '
-                  'the camera are f = %.1f px, %.1f°. With 69° the theoretical error is %.0f %% too large. '
-                  'Depth is measured by the infrared stereo pair, not by the colour camera, and aligning it to colour '
-                  "does not change its error. The pair's f · b follows from the depth images of the thesis: all "
-                  'depths are 610.14 m / n with integer n (1/32 pixel of disparity), so f · b is %.3f px·m, and f is '
-                  '%.0f px with the baseline of 50 mm. This f is used here, with s = %.2f px as recommended by Intel.'
-                  % (thesis_px, theory.COLOR_FOCAL_PX, color_deg, 100 * (theory.COLOR_FOCAL_PX / thesis_px - 1),
-                     theory.STEREO_PX_M, theory.STEREO_PX_M / theory.THESIS_BASELINE_M, theory.SUBPIXEL_PX))]
-
-
 def _cluster_table(axis, name, caption):
     return Table(caption, ('true %s [m]' % name, 'n', 'mean error [m]', 'standard deviation [m]', 'variance [m²]',
                            'RMS [m]'),
@@ -251,29 +212,10 @@ def _cluster_table(axis, name, caption):
 def _distribution_row(name, cluster):
     row = ('%s = %.2f m' % (name, cluster.truth_m), '%d' % cluster.count)
     if not cluster.tested:
-        return row + ('not tested', '', '', '') + ('',) * len(DISTRIBUTIONS)
-    best = max(cluster.log_likelihoods.values())
+        return row + ('not tested', '', '', '')
     return row + (
         '%.4f' % cluster.shapiro_p, '%.2f' % cluster.anderson, '%.2f' % cluster.anderson_critical,
-        'not rejected' if cluster.looks_gaussian else 'no') + tuple(
-            '%.2f%s' % (cluster.log_likelihoods[kind], ' *' if cluster.log_likelihoods[kind] == best else '')
-            for kind, _fit in DISTRIBUTIONS)
-
-
-def _best_text(analysis):
-    """Distribution with the highest log-likelihood over all clusters, weighted by their number of measurements."""
-    clusters = [cluster for _name, cluster in analysis.variance_clusters if cluster.tested]
-    if not clusters:
-        return ''
-    count = float(sum(cluster.count for cluster in clusters))
-    means = {name: sum(cluster.count * cluster.log_likelihoods[name] for cluster in clusters) / count
-             for name, _fit in DISTRIBUTIONS}
-    best = max(means, key=means.get)
-    gain = means[best] - means['Gaussian']
-    text = 'Over all clusters: ' + ', '.join('%s %.3f' % (name, means[name]) for name, _fit in DISTRIBUTIONS) + '. '
-    if gain < SIMILAR:
-        return text + 'No distribution exceeds the Gaussian by more than %.2f.' % SIMILAR
-    return text + 'Best: %s, %.3f per measurement above the Gaussian.' % (best, gain)
+        'not rejected' if cluster.looks_gaussian else 'no')
 
 
 def _between_text(share, axis, other):

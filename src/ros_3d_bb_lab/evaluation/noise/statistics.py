@@ -1,4 +1,4 @@
-"""Statistics of clusters of errors: moments, normality tests, and held-out likelihoods of distributions."""
+"""Statistics of clusters of errors: moments and normality tests."""
 from typing import NamedTuple, Optional
 
 import numpy as np
@@ -6,11 +6,6 @@ from scipy import stats
 
 from ros_3d_bb_lab.evaluation.noise.tables import AXES
 
-LEAST_SCALE_M = 0.001  # values are rounded to millimetres: limits the density to what this resolution supports
-FOLDS = 5
-EM_STEPS = 60
-FREEDOMS = (1, 2, 4, 8, 16, 64)  # of Student's t distribution, from heavy tails to nearly Gaussian
-NARROWEST_PART = 0.25  # of a mixture, relative to the total standard deviation; prevents a collapse to one value
 SIGNIFICANCE = 0.05
 LEAST_TO_TEST = 8  # measurements; the critical values of Anderson-Darling are undefined below
 
@@ -19,8 +14,7 @@ class ClusterStatistics(NamedTuple):
     """Statistics of one cluster, in metres.
 
     `variance_m2` is divided by n, as in the thesis. The other fields are results of the Shapiro-Wilk and
-    Anderson-Darling tests and held-out log-likelihoods per measurement; None if all errors are equal, or if there are
-    fewer than 8.
+    Anderson-Darling tests; None if all errors are equal, or if there are fewer than 8.
     """
 
     truth_m: float
@@ -31,7 +25,6 @@ class ClusterStatistics(NamedTuple):
     shapiro_p: Optional[float] = None
     anderson: Optional[float] = None
     anderson_critical: Optional[float] = None
-    log_likelihoods: Optional[dict] = None
 
     @property
     def sigma_m(self):
@@ -104,63 +97,4 @@ def cluster_statistics(cluster):
     anderson = stats.anderson(error_m, 'norm')
     return found._replace(
         shapiro_p=float(stats.shapiro(error_m)[1]), anderson=float(anderson[0]),
-        anderson_critical=float(anderson[1][list(anderson[2]).index(5.0)]),
-        log_likelihoods={name: held_out_log_likelihood(error_m, fit) for name, fit in DISTRIBUTIONS})
-
-
-def held_out_log_likelihood(values_m, fit):
-    """Mean log-density of values under the distributions that `fit` estimates by five-fold cross-validation."""
-    fold = np.random.RandomState(0).permutation(len(values_m)) % FOLDS
-    total = sum(fit(values_m[fold != number])(values_m[fold == number]).sum() for number in np.unique(fold))
-    return float(total / len(values_m))
-
-
-def fit_gaussian(values_m):
-    """Log-density function of the maximum-likelihood Gaussian."""
-    return stats.norm(values_m.mean(), max(values_m.std(), LEAST_SCALE_M)).logpdf
-
-
-def fit_laplace(values_m):
-    """Log-density function of the maximum-likelihood Laplace distribution."""
-    location, scale = stats.laplace.fit(values_m)
-    return stats.laplace(location, max(scale, LEAST_SCALE_M)).logpdf
-
-
-def fit_student(values_m):
-    """Log-density function of the maximum-likelihood Student t distribution."""
-    candidates = [stats.t(freedom, *_student_location_scale(values_m, freedom)).logpdf for freedom in FREEDOMS]
-    return max(candidates, key=lambda density: density(values_m).sum())
-
-
-def _student_location_scale(values_m, freedom):
-    """Maximum-likelihood location and scale for given degrees of freedom, by expectation maximisation."""
-    location_m, scale_m = np.median(values_m), max(values_m.std(), LEAST_SCALE_M)
-    for _ in range(EM_STEPS):
-        weights = (freedom + 1) / (freedom + ((values_m - location_m) / scale_m) ** 2)
-        location_m = (weights * values_m).sum() / weights.sum()
-        scale_m = max(np.sqrt((weights * (values_m - location_m) ** 2).mean()), LEAST_SCALE_M)
-    return location_m, scale_m
-
-
-def fit_mixture(values_m):
-    """Log-density function of a mixture of two Gaussians, fitted by expectation maximisation from both halves."""
-    upper = values_m > np.median(values_m)
-    narrowest_m = max(LEAST_SCALE_M, NARROWEST_PART * values_m.std())
-    share = np.stack((~upper, upper)).astype(float)  # (2, n): responsibilities
-    for _ in range(EM_STEPS):
-        weights = np.maximum(share.mean(axis=1), 1e-6)
-        means_m = (share * values_m).sum(axis=1) / (weights * len(values_m))
-        deviations_m2 = (values_m - means_m[:, np.newaxis]) ** 2
-        sigmas_m = np.maximum(np.sqrt((share * deviations_m2).sum(axis=1) / (weights * len(values_m))), narrowest_m)
-        parts = _log_parts(values_m, weights, means_m, sigmas_m)
-        share = np.exp(parts - np.logaddexp(*parts))
-    return lambda at_m: np.logaddexp(*_log_parts(at_m, weights, means_m, sigmas_m))
-
-
-def _log_parts(values_m, weights, means_m, sigmas_m):
-    deviations = (values_m - means_m[:, np.newaxis]) / sigmas_m[:, np.newaxis]
-    return np.log(weights / (np.sqrt(2 * np.pi) * sigmas_m))[:, np.newaxis] - deviations ** 2 / 2
-
-
-DISTRIBUTIONS = (('Gaussian', fit_gaussian), ('Laplace', fit_laplace), ('Student t', fit_student),
-                 ('two Gaussians', fit_mixture))
+        anderson_critical=float(anderson[1][list(anderson[2]).index(5.0)]))

@@ -1,0 +1,218 @@
+"""Benchmark of people in a real costmap_2d on simulated scenes: recall, false cells and trails.
+
+Scenes are rendered and tracked first. Then their tracks and transforms are played on simulated time to
+planner_bridge_node and a costmap_2d_node with the people layer of config/move_base/local_costmap.yaml.
+"""
+import argparse
+import contextlib
+import json
+import os
+import sys
+import tempfile
+import time
+from typing import NamedTuple, Tuple
+
+import numpy as np
+import rospy
+from nav_msgs.msg import OccupancyGrid
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.conversions.camera_msgs import START_NS, transform_messages
+from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, time_from, tracks_to_msg
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.estimation.error_model import read_error_model
+from ros_3d_bb.msg import TrackedObjectArray
+from ros_3d_bb.tracking.types import VISIBLE
+from ros_3d_bb_lab.evaluation.costmap.costmap_score import Costmap, Sighting, score_costmaps
+from ros_3d_bb_lab.evaluation.costmap.picture import draw_costmap
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, describe_machine, scenario_path
+from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
+from ros_3d_bb_lab.evaluation.scene_benchmark import RANGE_M, depth_detector, yolov5_detector
+from ros_3d_bb_lab.evaluation.scenes import run_scene
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME
+from ros_3d_bb_lab.simulation.scenario import read_scenario
+from ros_3d_bb_lab.simulation.simulator import Simulator
+
+SCENES = 'turning_robot', 'corridor', 'demo', 'behind_a_pillar', 'thesis_e_passing', 'following_robot'
+LATENCY_S = 0.1  # from an image to its tracks
+TICK_S, ODOM_S, LOCALISATION_S = 0.01, 0.02, 0.1  # periods of /clock, of odom in tf, and of the map in tf
+GAP_NS, LEAD_S = 100 * NS, 0.5  # between scenes, and of tf before the first image
+STARTING_S = 30.0
+COSTMAP_S, PATIENCE_S = 0.4, 1.0  # longest time between costmaps, and how long to wait for one in real time
+COLUMNS = '%-20s %8s %7s %8s %12s %6s %10s'
+HEADINGS = 'scene', 'costmaps', 'people', 'recall', 'false cells', 'trails', 'trail p95'
+LAUNCH = """<launch>
+  <param name="/use_sim_time" value="true"/>
+  <include file="$(find ros_3d_bb)/launch/planner_bridge.launch"/>
+  <node pkg="costmap_2d" type="costmap_2d_node" name="costmap_node" output="screen">
+    <rosparam command="load" file="$(find ros_3d_bb)/config/move_base/local_costmap.yaml" ns="costmap"/>
+    <rosparam ns="costmap">
+      {global_frame: odom, robot_base_frame: base_link, robot_radius: 0.1, width: 18.0, height: 18.0,
+       publish_frequency: 10.0, always_send_full_costmap: true,
+       plugins: [{name: people_layer, type: "costmap_2d::ObstacleLayer"}]}
+    </rosparam>
+  </node>
+</launch>"""
+
+
+class Scene(NamedTuple):
+    """A tracked scene: its name, the Simulator, a Step per image (`scenes.Step`), and the range of the detector."""
+
+    name: str
+    simulator: Simulator
+    steps: list
+    range_m: Tuple[float, float]
+
+
+def tracked_scene(name, path, yolov5=None):
+    """Render and track the scenario in a file with the depth detector or the one given."""
+    simulator = Simulator(read_scenario(path))
+    steps = run_scene(simulator, yolov5 or depth_detector(simulator), 1, read_error_model(SIMULATED_ERROR_MODEL))
+    return Scene(name, simulator, steps, RANGE_M['yolov5' if yolov5 else 'depth'])
+
+
+def sightings_of(scene):
+    """What each image of a scene shows within the range of the detector, as a list of Sighting."""
+    return [Sighting(step.frame.time_s,
+                     np.array([_is_visible(person, step.frame, scene.range_m) for person in step.moment.truth]),
+                     np.reshape([track.position_m[:2] for track in step.moment.tracks], (-1, 2)))
+            for step in scene.steps]
+
+
+def _is_visible(person, frame, range_m):
+    depth_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), person.position_m)[2]
+    return person.status == VISIBLE and range_m[0] <= depth_m <= range_m[1]
+
+
+class Player(object):
+    """Plays scenes to the nodes and collects their costmaps. `rospy.init_node` must have been called."""
+
+    def __init__(self, speed):
+        self._speed, self._now_ns, self._grids = speed, START_NS, []
+        self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=100)
+        self._tf_pub = rospy.Publisher('/tf', TFMessage, queue_size=100)
+        self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=100)
+        rospy.Subscriber('/costmap_node/costmap/costmap', OccupancyGrid, self._grids.append, queue_size=100,
+                         buff_size=2 ** 24)
+
+    def start(self, scene):
+        """Play the first moment of a scene until the first costmap arrives. Raises RuntimeError if none does."""
+        deadline_s = time.monotonic() + STARTING_S
+        while not self._grids:
+            if time.monotonic() > deadline_s:
+                raise RuntimeError('no costmap within %g s; see the log of costmap_2d_node above' % STARTING_S)
+            self._tick(scene, 0.0, True)
+
+    def play(self, scene):
+        """Play a scene. Returns its costmaps, a list of Costmap."""
+        self._now_ns += GAP_NS
+        for _tick in range(int(LEAD_S / TICK_S)):  # tf begins before the first image
+            self._tick(scene, 0.0, True)
+        start_ns = self._now_ns
+        del self._grids[:]
+        waiting = list(scene.steps)
+        for number in range(int(scene.simulator.scenario.duration / TICK_S)):
+            seconds = number * TICK_S
+            self._tick(scene, seconds, number % round(LOCALISATION_S / TICK_S) == 0,
+                       number % round(ODOM_S / TICK_S) == 0)
+            while waiting and waiting[0].frame.time_s + LATENCY_S <= seconds:
+                step = waiting.pop(0)
+                header = Header(stamp=time_from(start_ns + int(step.frame.time_s * NS)), frame_id=MAP_FRAME)
+                self._tracks_pub.publish(tracks_to_msg(step.moment.tracks, header))
+        return [_costmap(scene, grid, start_ns) for grid in self._grids if grid.header.stamp.to_nsec() >= start_ns]
+
+    def _tick(self, scene, seconds, with_map, with_odom=True):
+        stamp = time_from(self._now_ns)
+        self._clock_pub.publish(Clock(stamp))
+        poses = scene.simulator.poses_at(seconds)
+        links = [(MAP_FRAME, ODOM_FRAME, poses.map_from_odom)] * with_map
+        links += [(ODOM_FRAME, BASE_FRAME, poses.odom_from_base)] * with_odom
+        if links:
+            self._tf_pub.publish(TFMessage(transform_messages(stamp, links)))
+        self._now_ns += int(TICK_S * NS)
+        time.sleep(TICK_S / self._speed)
+        deadline_s = time.monotonic() + PATIENCE_S
+        while self._is_late() and time.monotonic() < deadline_s:  # the machine is busy
+            time.sleep(0.002)
+
+    def _is_late(self):
+        return self._grids and self._now_ns - self._grids[-1].header.stamp.to_nsec() > COSTMAP_S * NS
+
+
+def _costmap(scene, grid, start_ns):
+    """Convert an OccupancyGrid in odom."""
+    seconds, origin = (grid.header.stamp.to_nsec() - start_ns) / NS, grid.info.origin.position
+    lethal = np.array(grid.data, np.int8).reshape(grid.info.height, grid.info.width) == 100
+    return Costmap(seconds, lethal, np.array([origin.x, origin.y]), grid.info.resolution,
+                   scene.simulator.poses_at(seconds).map_from_odom)
+
+
+def result_of(scene, costmaps):
+    """Score the costmaps of a scene, see `score_costmaps`."""
+    return score_costmaps(costmaps, sightings_of(scene), scene.simulator.positions_at)
+
+
+def row(name, result):
+    """Format a result as a line of the table."""
+    shares = ['-' if result[key] is None else '%.1f %%' % (100 * result[key]) for key in ('recall', 'false_cells')]
+    trail = '-' if result['trail_p95_s'] is None else '%.2f s' % result['trail_p95_s']
+    return COLUMNS % (name, result['costmaps'], result['people'], shares[0], shares[1], result['trails'], trail)
+
+
+def main():
+    """Run the command `./run bench costmap`."""
+    arguments = _arguments()
+    print(describe_machine())
+    print(COLUMNS % HEADINGS, flush=True)
+    try:
+        yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
+        scenes = [tracked_scene(name, path, yolov5) for name, path in arguments.scenes.items()]
+    except (ValueError, OSError) as error:
+        sys.exit('./run bench costmap: %s' % error)
+    results = {}
+    with running_nodes():
+        rospy.init_node('costmap_benchmark', disable_signals=True)
+        player = Player(arguments.speed)
+        player.start(scenes[0])
+        for scene in scenes:
+            costmaps = player.play(scene)
+            results[scene.name] = result_of(scene, costmaps)
+            print(row(scene.name, results[scene.name]), flush=True)
+            if arguments.picture and scene is scenes[0]:
+                draw_costmap(arguments.picture, scene, min(costmaps, key=lambda costmap: abs(
+                    costmap.time_s - arguments.at)))
+    if arguments.json:
+        with open(arguments.json, 'w') as stream:
+            json.dump({'machine': describe_machine(), 'scenes': results}, stream, indent=1)
+
+
+@contextlib.contextmanager
+def running_nodes():
+    """Context in which roscore, the bridge and the costmap run on a free port."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, port = os.path.join(folder, 'costmap.launch'), free_port()
+        with open(path, 'w') as stream:
+            stream.write(LAUNCH)
+        os.environ['ROS_MASTER_URI'] = 'http://localhost:%d' % port
+        with running_roslaunch([path], port, sys.stderr):
+            yield
+
+
+def _arguments():
+    parser = argparse.ArgumentParser(prog='./run bench costmap', description=__doc__)
+    parser.add_argument('--scenes', type=_scenario_paths, default=','.join(SCENES), metavar='A,B',
+                        help='names in config/scenarios or files, separated by commas (default: %(default)s)')
+    parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, people are detected in depth')
+    parser.add_argument('--speed', type=float, default=1.0,
+                        help='speed of time; less than 1 on a busy machine (default: 1)')
+    parser.add_argument('--picture', metavar='FILE', help='image of the first scene to write')
+    parser.add_argument('--at', type=float, default=5.0, metavar='S', help='time of the picture (default: 5)')
+    parser.add_argument('--json', metavar='FILE', help='file to which the results are also written')
+    return parser.parse_args()
+
+
+def _scenario_paths(names):
+    return {name: scenario_path(name) for name in names.split(',')}

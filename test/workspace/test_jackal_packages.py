@@ -1,0 +1,204 @@
+"""Names and sizes in the packages of a Jackal are those that launch files and parameters use, and the description of
+a Jackal takes the camera.
+"""
+import os
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+import roslaunch
+import yaml
+
+from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
+from support.jackal import ACCESSORIES, bounds_of_links, described, properties, unpack
+from support.launching import ROOT, loaded
+from support.urdf import base_from
+
+CAMERAS = {name: os.path.join(ROOT, 'urdf', name) for name in ('jackal_d435i.urdf.xacro', 'd435i.urdf.xacro')}
+DRIVER_FRAMES = ('link', 'color_frame', 'color_optical_frame', 'depth_frame', 'depth_optical_frame',
+                 'aligned_depth_to_color_frame')
+
+
+@pytest.fixture(scope='module')
+def packages(tmp_path_factory):
+    """Folder of the packages of a Jackal."""
+    return unpack(tmp_path_factory.mktemp('packages'))
+
+
+@pytest.fixture(scope='module')
+def jackal(packages):
+    """Description of a Jackal with the camera, as a function of environment variables."""
+    def with_camera(camera='jackal_d435i.urdf.xacro', **variables):
+        return described(packages, JACKAL_URDF_EXTRAS=CAMERAS[camera], **variables)
+    return with_camera
+
+
+@pytest.fixture(scope='module')
+def content(packages):
+    """Content of a YAML file of the packages, as a function of its name."""
+    return lambda name: yaml.safe_load((packages / name).read_text())
+
+
+def params_of_amcl(packages):
+    launch_file = ElementTree.parse(str(packages / 'jackal_navigation/launch/include/amcl.launch'))
+    return {param.get('name'): param.get('value') for param in launch_file.iter('param')}
+
+
+def test_frames_are_those_of_filter_localisation_and_costmaps(packages, content):
+    parameters, _nodes = loaded('navigation.launch')
+    local_frames = [parameters['/move_base/local_costmap/' + name] for name in ('global_frame', 'robot_base_frame')]
+    ekf, amcl = content('jackal_control/config/robot_localization.yaml'), params_of_amcl(packages)
+    assert local_frames == [ekf['odom_frame'], ekf['base_link_frame']] and ekf['world_frame'] == ekf['odom_frame']
+    assert local_frames == [amcl['odom_frame_id'], amcl['base_frame_id']]
+
+    tracks, _nodes = loaded('jackal.launch', 'driver:=none')
+    assert parameters['/move_base/global_costmap/global_frame'] == amcl['global_frame_id']
+    assert tracks['/tracker_node/target_frame'] == amcl['global_frame_id']
+
+
+@pytest.mark.parametrize('folder, arguments', [
+    ('map_nav_params', []), ('odom_nav_params', ['global_costmap:=rolling', 'frame_world:=odom'])])
+def test_frames_of_the_global_costmap_are_those_of_the_demos(content, folder, arguments):
+    parameters, _nodes = loaded('navigation.launch', *arguments)
+    costmap = content('jackal_navigation/params/%s/global_costmap_params.yaml' % folder)['global_costmap']
+    for name in ('global_frame', 'robot_base_frame'):
+        assert parameters['/move_base/global_costmap/' + name] == costmap[name]
+
+
+def test_topics_are_those_of_move_base_and_twist_mux(packages, content):
+    parameters, nodes = loaded('navigation.launch')
+    costmap = content('jackal_navigation/params/costmap_common_params.yaml')
+    scan = costmap['obstacles_layer']['scan']['topic']
+    assert parameters['/move_base/local_costmap/obstacle_layer/scan/topic'] == scan
+    move_base = ElementTree.parse(str(packages / 'jackal_navigation/launch/include/move_base.launch'))
+    odom, = (remap.get('to') for remap in move_base.iter('remap') if remap.get('from') == 'odom')
+    assert parameters['/move_base/DWAPlannerROS/odom_topic'] == odom
+
+    inputs = {entry['name']: entry for entry in content('jackal_control/config/twist_mux.yaml')['topics']}
+    external = inputs.pop('external')
+    assert dict(nodes['move_base'].remap_args)['cmd_vel'] == external['topic']
+    # The joystick overrides move_base.
+    assert inputs and all(entry['priority'] > external['priority'] for entry in inputs.values())
+    assert 1 / parameters['/move_base/controller_frequency'] < external['timeout']
+
+
+@pytest.mark.parametrize('local_planner, group', [('dwa', 'DWAPlannerROS'), ('teb', 'TebLocalPlannerROS')])
+def test_commands_are_within_the_limits_of_the_controller(content, local_planner, group):
+    parameters, _nodes = loaded('navigation.launch', 'local_planner:=' + local_planner)
+    controller = content('jackal_control/config/control.yaml')['jackal_velocity_controller']
+    for axis, suffix in (('linear', 'x'), ('angular', 'theta')):
+        limits, = controller[axis].values()
+        assert parameters['/move_base/%s/max_vel_%s' % (group, suffix)] <= limits['max_velocity']
+        assert parameters['/move_base/%s/acc_lim_%s' % (group, suffix)] <= limits['max_acceleration']
+    # The controller stops the robot when commands stay away.
+    assert 1 / parameters['/move_base/controller_frequency'] < controller['cmd_vel_timeout']
+
+
+@pytest.mark.parametrize('topic', [None, 'rear/scan'])
+def test_the_scan_is_the_topic_of_the_laser_of_the_jackal(packages, monkeypatch, topic):
+    launch_file = ElementTree.parse(str(packages / 'jackal_navigation/launch/amcl_demo.launch'))
+    expected, = (arg.get('default') for arg in launch_file.getroot().findall('arg')
+                 if arg.get('name') == 'scan_topic')
+    monkeypatch.delenv('JACKAL_LASER_TOPIC', raising=False)
+    if topic:
+        monkeypatch.setenv('JACKAL_LASER_TOPIC', topic)
+    parameters, _nodes = loaded('navigation.launch')
+    for costmap in ('local', 'global'):
+        assert (parameters['/move_base/%s_costmap/obstacle_layer/scan/topic' % costmap]
+                == roslaunch.substitution_args.resolve_args(expected))
+
+
+def footprint_of(parameters):
+    """Half length and width of the padded footprint of the costmaps, metres."""
+    corners = np.abs(parameters['/move_base/local_costmap/footprint'])
+    assert (corners == corners[0]).all()
+    return corners[0] + parameters['/move_base/local_costmap/footprint_padding']
+
+
+def test_the_footprint_contains_chassis_wheels_and_fenders_but_not_the_bumper(packages, content, jackal):
+    half = footprint_of(loaded('navigation.launch')[0])
+    chassis = np.abs(content('jackal_navigation/params/costmap_common_params.yaml')['footprint'])
+    size = properties(packages)
+    wheels = size['wheelbase'] / 2 + size['wheel_radius'], (size['track'] + size['wheel_width']) / 2
+    fender = np.abs(bounds_of_links(jackal(), packages)['front_fender_link'])[:, :2]
+    for part in (chassis, wheels, fender):
+        assert (np.asarray(part) <= half).all()
+    # doc/planners.md gives the footprint for this accessory.
+    bumper = bounds_of_links(jackal(JACKAL_WIBOTIC_BUMPER='1'), packages)['wibotic_bumper']
+    assert half[0] < bumper[1][0] < 0.33
+
+
+def test_the_floor_is_where_the_wheels_touch_it(packages):
+    assert abs(DepthDetectorParams().floor_height - properties(packages)['footprint_vertical_offset']) < 1e-3
+
+
+@pytest.mark.parametrize('camera', sorted(CAMERAS))
+@pytest.mark.parametrize('variable, link', [row[:2] for row in ACCESSORIES])
+def test_links_of_accessories_and_frames_of_cameras_differ(jackal, camera, variable, link):
+    description = jackal(camera, **{variable: '1'})
+    links = [link.get('name') for link in description.findall('link')]
+    assert link in links and len(set(links)) == len(links) and 'camera_link' in links
+    if camera == 'jackal_d435i.urdf.xacro':  # without the frames that the driver publishes
+        links.remove('camera_link')
+        names = {'%s_%s' % (camera, frame) for camera in ('camera', 'front', 'rear') for frame in DRIVER_FRAMES}
+        assert not names & set(links)
+
+
+@pytest.mark.parametrize('variables, expected', [
+    ({}, set()),
+    ({'JACKAL_LASER': '1'}, {'front_laser_mount'}),
+    ({'JACKAL_ARK_ENCLOSURE': '1'}, {'ark_enclosure_link'}),
+    ({'JACKAL_LASER': '1', 'JACKAL_D435I_OFFSET': '0.22 0 0.20'}, set())])
+def test_accessories_in_the_place_of_the_camera(packages, jackal, variables, expected):
+    """doc/jackal.md lists them, with a position that is free."""
+    description = jackal(**variables)
+    body = description.find("link[@name='camera_link']/collision")
+    centre = base_from('camera_link', description)[:3, 3] + numbers(body.find('origin').get('xyz'))
+    half = numbers(body.find('geometry/box').get('size')) / 2
+    found = {link for link, (low, high) in bounds_of_links(description, packages).items()
+             if ((low < centre + half) & (centre - half < high)).all()}
+    assert found == expected
+
+
+def numbers(text):
+    return np.array([float(value) for value in text.split()])
+
+
+def test_the_camera_is_at_the_position_in_the_thesis(jackal):
+    base_from_camera = base_from('camera_link', jackal())
+    np.testing.assert_allclose(base_from_camera, [[1, 0, 0, 0.17], [0, 1, 0, 0], [0, 0, 1, 0.20], [0, 0, 0, 1]],
+                               atol=1e-12)
+
+
+def test_the_housing_is_on_the_top_plate_and_behind_the_lens(jackal):
+    description = jackal()
+    plate_m = base_from('front_mount', description)[2, 3]
+    for kind in ('visual', 'collision'):
+        body = description.find("link[@name='camera_link']/" + kind)
+        x, y, z = numbers(body.find('origin').get('xyz'))
+        depth, width, height = numbers(body.find('geometry/box').get('size'))
+        assert (depth, width, height) == (0.025, 0.09, 0.025) and x + depth / 2 <= 0 and y == -0.0175
+        assert 0 < 0.20 + z - height / 2 - plate_m < 0.01
+
+
+def test_only_camera_link_is_added_because_the_driver_publishes_the_others(jackal):
+    description = jackal()
+    links = [link.get('name') for link in description.findall('link')]
+    children = [joint.find('child').get('link') for joint in description.findall('joint')]
+    assert sorted(links) == sorted(children + ['base_link']) and len(set(links)) == len(links)
+    assert [link for link in links if link.startswith('camera')] == ['camera_link']
+    assert all(np.isfinite(base_from(link, description)).all() for link in links)
+
+
+def test_variables_set_position_and_tilt(jackal):
+    base_from_camera = base_from('camera_link', jackal(JACKAL_D435I_OFFSET='0.1 -0.05 0.4',
+                                                       JACKAL_D435I_RPY='0 0.5 0'))
+    np.testing.assert_allclose(base_from_camera[:3, 3], (0.1, -0.05, 0.4))
+    np.testing.assert_allclose(base_from_camera[:3, 0], (np.cos(0.5), 0, -np.sin(0.5)), atol=1e-12)  # tilted down
+
+
+def test_a_variable_selects_the_mesh_for_the_visual_geometry_only(jackal):
+    link = jackal(JACKAL_D435I_MESH='1').find("link[@name='camera_link']")
+    assert link.find('visual/geometry/mesh').get('filename') == 'package://realsense2_description/meshes/d435.dae'
+    assert len(link.findall('visual')) == 1 and link.find('visual/geometry/box') is None
+    assert link.find('collision/geometry/box') is not None
