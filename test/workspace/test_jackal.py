@@ -31,7 +31,7 @@ def test_one_command_starts_camera_and_pipeline(camera_package):
 def test_camera_mount_is_published_unless_the_description_contains_it(monkeypatch, extras, arguments, expected):
     monkeypatch.setenv('JACKAL_URDF_EXTRAS', extras)
     _parameters, nodes = loaded('jackal.launch', 'driver:=pyrealsense2', *arguments)
-    assert {'realsense_node', 'yolov5_node', 'bbox3d_node', 'tracker_node'} <= set(nodes) and 'rviz' not in nodes
+    assert {'realsense_node', 'people_node'} <= set(nodes) and 'rviz' not in nodes
     assert (nodes['camera_mount'].args if 'camera_mount' in nodes else None) == expected
 
 
@@ -39,11 +39,11 @@ def test_nodes_are_respawned_on_the_robot_only(camera_package):
     """Elsewhere only with respawn:=true, because configuration errors would be logged repeatedly."""
     arguments = ['driver:=pyrealsense2', 'planner:=costmap']
     _parameters, nodes = loaded('jackal.launch', *arguments)
-    assert len(nodes) == 6 and all(node.respawn and node.respawn_delay == 1 for node in nodes.values())
+    assert len(nodes) == 4 and all(node.respawn and node.respawn_delay == 1 for node in nodes.values())
     _parameters, nodes = loaded('jackal.launch', 'respawn:=false', *arguments)
     assert not any(node.respawn for node in nodes.values())
     _parameters, nodes = loaded('pipeline.launch', 'planner:=costmap', 'weights:=yolov5n.pt')
-    assert len(nodes) == 4 and not any(node.respawn for node in nodes.values())
+    assert len(nodes) == 2 and not any(node.respawn for node in nodes.values())
     assert given_to_stand_ins(dumped('jackal.launch', camera_package))['respawn'] == 'true'
 
 
@@ -51,7 +51,7 @@ def test_computer_moves_the_pipeline_but_not_the_camera():
     _parameters, nodes = loaded('jackal.launch', 'driver:=pyrealsense2', 'computer:=192.168.131.20',
                                 'planner:=costmap')
     remote = set(name for name, node in nodes.items() if node.machine_name == 'people')
-    assert remote == {'yolov5_node', 'bbox3d_node', 'tracker_node', 'planner_bridge_node'}
+    assert remote == {'people_node', 'planner_bridge_node'}
     assert set(nodes) - remote == {'realsense_node', 'camera_mount'}
 
 

@@ -13,7 +13,7 @@ def loaded(*arguments):
 
 def test_without_camera_realsense2_camera_is_not_needed():
     parameters, nodes = loaded()
-    assert set(nodes) == {'yolov5_node', 'bbox3d_node', 'tracker_node', 'viewer_node'}
+    assert set(nodes) == {'people_node', 'viewer_node'}
     assert parameters['/viewer_node/session'] == '/a session' and parameters['/viewer_node/window'] is True
     assert parameters['/tracker_node/target_frame'] == 'map'
     assert nodes['viewer_node'].required
@@ -33,15 +33,15 @@ def test_the_camera_can_be_read_by_realsense_node():
 
 @pytest.mark.parametrize('detector', ['yolov5', 'depth'])
 def test_the_viewer_pauses_the_running_detector(detector):
-    _parameters, nodes = loaded('detector:=' + detector)
+    parameters, nodes = loaded('detector:=' + detector)
     service = dict(nodes['viewer_node'].remap_args)['detector/enable']
-    assert service.split('/')[0] in nodes and service.endswith('_node/enable')
+    assert service.endswith('_node/enable') and '/%s/floor_frame' % service.split('/')[0] in parameters
 
 
 def test_viewer_and_pipeline_have_the_same_topics():
     _parameters, nodes = loaded('camera_image:=a/color', 'camera_depth:=a/depth', 'camera_info:=a/info',
                                 'bb_topic:=a/boxes', 'record:=/some where/a.bag')
-    remaps = [dict(nodes[name].remap_args) for name in ('viewer_node', 'bbox3d_node')]
+    remaps = [dict(nodes[name].remap_args) for name in ('viewer_node', 'people_node')]
     for topic, name in (('camera/color/image_raw', 'a/color'), ('camera/color/camera_info', 'a/info'),
                         ('camera/aligned_depth_to_color/image_raw', 'a/depth'), ('yolo_bounding_box', 'a/boxes')):
         assert [remap[topic] for remap in remaps] == [name] * 2

@@ -12,14 +12,14 @@ from support.processes import processes_naming
 from support.real_planners import planner_environment
 
 ARGUMENTS = ['scenario:=/some/scene.yaml', 'record:=/some/record.json']
-PIPELINE = {'bbox3d_node', 'tracker_node'}
+PIPELINE = {'ours': {'bbox3d_node', 'tracker_node'}, 'thesis': {'people_node'}}
 
 
 @pytest.mark.parametrize('mode', MODES)
 def test_modes_differ_in_what_move_base_knows_of_people(mode):
     parameters, nodes = loaded('navigation_benchmark.launch', 'mode:=' + mode, *ARGUMENTS)
     is_tracked = mode in ('ours', 'thesis')
-    assert PIPELINE & set(nodes) == (PIPELINE if is_tracked else set())
+    assert {'people_node', 'bbox3d_node', 'tracker_node'} & set(nodes) == PIPELINE.get(mode, set())
     assert parameters['/simulator_node/boxes'] == is_tracked
     assert parameters.get('/tracker_node/tracker') == {'ours': 'kalman', 'thesis': 'thesis'}.get(mode)
     assert (['ground_truth', 'ros_3d_bb/tracks'] in nodes['simulator_node'].remap_args) == (mode == 'truth')

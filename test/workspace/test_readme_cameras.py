@@ -222,10 +222,13 @@ def test_people_are_tracked_with_the_topics_of_a_recipe(name, tmp_path, capfd):
 @pytest.mark.parametrize('name', sorted(DRIVERS))
 def test_launch_files_use_the_topics_of_a_recipe(name):
     _parameters, nodes = loaded('pipeline.launch', *arguments_in(RECIPES[name]))
+    _parameters, separate = loaded('pipeline.launch', 'single_process:=false', *arguments_in(RECIPES[name]))
+    nodes.update(separate)
     color, info, depth = DRIVERS[name].topics[:3]
     depth_topic = DEPTH_TOPICS[arguments_of(RECIPES[name]).get('depth', 'aligned')][0]
-    for node, topics in (('/yolov5_node', {COLOR_TOPIC: color}),
-                         ('/bbox3d_node', {COLOR_TOPIC: color, INFO_TOPICS[0]: info, depth_topic: depth}),
-                         ('/tracker_node', {INFO_TOPICS[0]: info, depth_topic: depth})):
-        remaps = dict(nodes[node.lstrip('/')].remap_args)
+    everything = {COLOR_TOPIC: color, INFO_TOPICS[0]: info, depth_topic: depth}
+    for node, topics in (('people_node', everything), ('bbox3d_node', everything),
+                         ('yolov5_node', {COLOR_TOPIC: color}),
+                         ('tracker_node', {INFO_TOPICS[0]: info, depth_topic: depth})):
+        remaps = dict(nodes[node].remap_args)
         assert {topic: remaps[topic] for topic in topics} == topics
