@@ -141,21 +141,23 @@ class EstimationStage(object):
         depth, frame_id = self._aligned(raw, depth_msg.header.frame_id, camera)
         stamp = depth_msg.header.stamp if boxes2d.stamp_ns is None else time_from(boxes2d.stamp_ns)
         gap_s = abs((stamp - depth_msg.header.stamp).to_sec())
-        implausible, usable = [], self._usable_boxes(boxes2d)
+        usable = self._usable_boxes(boxes2d)
         turns, level_from_camera = _orientation(self._params.image_rotation, self._up(frame_id))
         upright_rects_px = turned_boxes(usable.boxes, turns, camera.width, camera.height).tolist()
         estimates = estimate_boxes(turned_depth(depth, turns), list(map(tuple, upright_rects_px)),
-                                   turned_camera(camera, turns), self._estimator, implausible, level_from_camera,
+                                   turned_camera(camera, turns), self._estimator, level_from_camera,
                                    usable.labels)
-        boxes3d = [box._replace(score=score) for box, score in zip(estimates, usable.scores.tolist())
-                   if box is not None]
+        found = [box._replace(score=score) for box, score in zip(estimates, usable.scores.tolist())
+                 if box is not None]
+        boxes3d = [box for box in found if box.is_plausible]
+        implausible = [box for box in found if not box.is_plausible] if len(boxes3d) < len(found) else []
         for box in _as_received(implausible, turns, camera):
             self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
                               '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
                               % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
-        self._check_scale(boxes3d + implausible, raw.scale_m)
+        self._check_scale(found, raw.scale_m)
         counts = {'boxes estimated': len(boxes3d),
-                  'boxes without depth': len(estimates) - len(boxes3d) - len(implausible)}
+                  'boxes without depth': len(estimates) - len(found)}
         boxes3d = corrected_boxes(boxes3d, self._error_model, gap_s)
         if self._error_model is not None and boxes3d:
             outside_m = self._error_model.distance_outside([box.center_m for box in boxes3d])
