@@ -48,34 +48,18 @@ class Layer(NamedTuple):
     low_mm: int
     counts: np.ndarray
 
-    def distance_mm(self, rank):
-        """The distance at a rank, from `first` to before `end`."""
-        return self.low_mm + int(self.counts.searchsorted(rank, 'right'))
-
     def mean_mm(self, first, end):
         """Mean of the distances from the rank `first` to before `end`."""
-        low_mm, high_mm = self.distance_mm(first), self.distance_mm(end - 1)
-        nearer = int(self.counts[low_mm - self.low_mm:high_mm - self.low_mm].sum())
-        return high_mm - (nearer - first * (high_mm - low_mm)) / (end - first)
+        low, high = self.counts.searchsorted((first, end - 1), 'right').tolist()
+        nearer = int(self.counts[low:high].sum()) - first * (high - low)
+        return self.low_mm + high - nearer / (end - first)
 
 
 class RectSamples(object):
     """Samples of the visible part of a rectangle in the level frame, each an element of flat arrays.
 
-    Parameters
-    ----------
-    depth : depth_image.DepthImage
-    rect_px : (x1, y1, x2, y2)
-    rays : list
-        See `image_rays`.
-
-    Attributes
-    ----------
-    rect_px
-    shape : (int, int)
-        Numbers of rows and columns.
-    measured : int
-        Number of samples with depth and a viewing ray, masked or not.
+    `rays` are those of `image_rays`; `shape` are the numbers of rows and columns, and `measured` is the number of
+    samples with depth and a viewing ray, masked or not.
     """
 
     def __init__(self, depth, rect_px, rays):
@@ -124,8 +108,8 @@ class RectSamples(object):
 
     def on_body(self, layer):
         """Which samples are on the body of a Layer."""
-        nearest_mm, farthest_mm = layer.distance_mm(layer.first), layer.distance_mm(layer.end - 1)
-        return self._ahead_mm - np.uint16(nearest_mm) <= farthest_mm - nearest_mm
+        nearest_mm = max(layer.trunk_mm - BODY_HALF_DEPTH_MM, 0)
+        return self._ahead_mm - np.uint16(nearest_mm) <= layer.trunk_mm + BODY_HALF_DEPTH_MM - nearest_mm
 
     def edges(self, on_body, lowest_m=None):
         """Left and right edge of the body whose samples are given, metres; those above `lowest_m`, if there are any."""
@@ -205,7 +189,7 @@ def nearest_dominant_layer(distances_mm, weights):
     # unknown, the last one what is farther.
     low_mm = max(start_mm - _AROUND_MM - 1, -1)
     size = min(_LAYER_MM + 2 * _AROUND_MM + 1, UNKNOWN_MM - low_mm)
-    around = np.minimum(distances_mm - _modulo(low_mm), np.uint16(size))
+    around = np.minimum(distances_mm - np.uint16(low_mm % 2 ** 16), np.uint16(size))
     counts = np.bincount(around, minlength=size + 1).cumsum()
     ranks = memoryview(counts)
     start = start_mm - low_mm
@@ -219,8 +203,8 @@ def _start_of_layer(distances_mm, weights, nearest_mm):
     """Least distance in the nearest dominant layer; it may be less than 0."""
     farthest_mm = int((distances_mm + np.uint16(1)).max()) - 1
     bins = (farthest_mm - nearest_mm) // BIN_MM + 1 + LAYER_BINS
-    # Unknown distances are in the first bins, or after the last one.
-    numbers = (distances_mm - _modulo(nearest_mm - BIN_MM * _EMPTY_BINS)) // np.uint16(BIN_MM)
+    # Differences are modulo 2 ** 16: unknown distances are in the first bins, or after the last one.
+    numbers = (distances_mm - np.uint16((nearest_mm - BIN_MM * _EMPTY_BINS) % 2 ** 16)) // np.uint16(BIN_MM)
     histogram = np.bincount(numbers, weights, bins)[:bins]
     histogram[:_EMPTY_BINS] = 0
     sums = histogram.cumsum()
@@ -228,11 +212,6 @@ def _start_of_layer(distances_mm, weights, nearest_mm):
     first = int((layers >= FIRST_LAYER_SHARE * layers.max()).argmax())
     best = first + int(layers[first:first + LAYER_BINS].argmax())
     return nearest_mm + BIN_MM * (best - LAYER_BINS // 2)
-
-
-def _modulo(value):
-    """An integer modulo 2 ** 16, as are differences of distances."""
-    return np.uint16(value % (UNKNOWN_MM + 1))
 
 
 def _median(ranks, low, high):

@@ -48,13 +48,17 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     """
     rects_px = list(map(tuple, rects_px))
     flat_px = without_distortion(rects_px, geometry.camera)
-    truncated = [truncated_edges(rect_px, geometry.area_px) for rect_px in rects_px]
     rays = image_rays(geometry.camera, geometry.level_axes)
+    samples, truncated, usable, boxes = [], [], [], [None] * len(rects_px)
     with np.errstate(invalid='ignore'):  # nan: the distortion model has no ray for every pixel
-        samples = [RectSamples(depth, rect_px, rays) for rect_px in rects_px]
-    usable = [number for number, each in enumerate(samples) if _is_usable(each, flat_px[number])]
+        for number, rect_px in enumerate(rects_px):
+            truncated.append(truncated_edges(rect_px, geometry.area_px))
+            samples.append(RectSamples(depth, rect_px, rays))
+            rows, columns = samples[number].shape
+            has_depth = samples[number].measured >= max(LEAST_MEASURED * rows * columns, 1)
+            if has_depth and math.isfinite(sum(flat_px[number])):
+                usable.append(number)
     overlaps = Overlaps(samples, usable, geometry.camera, kinds, truncated)
-    boxes = [None] * len(rects_px)
     while overlaps.pending:
         for number in overlaps.take_foremost():
             seen = _visible_extents(samples[number], flat_px[number], geometry, number in overlaps.repeats)
@@ -65,11 +69,6 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
                 overlaps.mask_behind(number, int(1000 * axis_m) + BODY_HALF_DEPTH_MM)
             boxes[number] = box
     return boxes
-
-
-def _is_usable(samples, flat_px):
-    rows, columns = samples.shape
-    return samples.measured >= max(LEAST_MEASURED * rows * columns, 1) and math.isfinite(sum(flat_px))
 
 
 def _visible_extents(samples, flat_px, geometry, may_repeat):
@@ -110,7 +109,8 @@ def _box(seen, rect_px, truncated, kind, geometry):
     top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, kind.height)
     width_m = max(right_m - left_m, LEAST_WIDTH_M)
     axis_m = layer_m + kind.axis_behind(width_m)
-    across_m, down_m = ((low_m + high_m) / 2 * axis_m / layer_m for low_m, high_m in
-                        ((left_m, right_m), (top_m, bottom_m)))
-    center_m = np.array([x * across_m + y * down_m + z * axis_m for x, y, z in zip(*geometry.level_axes)])
-    return Box3D(center_m, np.array((width_m, bottom_m - top_m, width_m)), rect_px, support, truncated), axis_m
+    along_ray = axis_m / layer_m
+    across_m, down_m = (left_m + right_m) / 2 * along_ray, (top_m + bottom_m) / 2 * along_ray
+    to_across, to_down, to_ahead = geometry.level_axes
+    center_m = [x * across_m + y * down_m + z * axis_m for x, y, z in zip(to_across, to_down, to_ahead)]
+    return Box3D(np.array(center_m), np.array((width_m, bottom_m - top_m, width_m)), rect_px, support, truncated), axis_m

@@ -17,23 +17,16 @@ MOST_TIES = 256  # pairs of rectangles whose layers beside each other are determ
 class Overlaps(object):
     """Rectangles of an image, those of nearer objects first.
 
-    Parameters
-    ----------
-    samples : sequence of depth_samples.RectSamples
-    usable : sequence of int
-        Numbers of the rectangles with enough depth for an estimate.
-    camera : camera_model.Camera
-    kinds : sequence of object_classes.ObjectClass
-        That of each rectangle.
-    truncated : sequence of (bool, bool, bool, bool)
-        Which edges of each rectangle touch the image border.
+    `samples` are the RectSamples, `kinds` the ObjectClasses and `truncated` the truncated edges of all rectangles;
+    `usable` are the numbers of those with enough depth for an estimate.
     """
 
     def __init__(self, samples, usable, camera, kinds, truncated):
         self._samples, self._kinds = samples, kinds
         self._clearly_lower_px = CLEARLY_LOWER * camera.height
         self._areas_px, self._lowest_px, self._nearest_m = [], [], []
-        for (x1, y1, x2, y2), kind, edges in zip([each.rect_px for each in samples], kinds, truncated):
+        for each, kind, edges in zip(samples, kinds, truncated):
+            x1, y1, x2, y2 = each.rect_px
             self._areas_px.append((x2 - x1) * (y2 - y1))
             self._lowest_px.append(min(y2, camera.height * (1 - CUT_ROWS)))
             usual_m = 0 if any(edges) else max(kind.width, kind.height)
@@ -41,10 +34,9 @@ class Overlaps(object):
             self._nearest_m.append(LEAST_SIZE * usual_m * camera.fy / max(x2 - x1, y2 - y1, 1))
         self.pending = set(usable)  # without an estimate yet
         self._changed = set(usable)  # since the layer was determined
-        self._shared_px = _shared_areas(usable, samples)
-        self._layers_m, self._beside_m = {}, {}
-        self._nearer = [set() for _each in samples]  # pending rectangles of nearer objects that overlap each one
-        self._ties = 0
+        self._shared_px = _shared_areas(usable, samples)  # with each pending rectangle that overlaps another one
+        self._nearer = {number: set() for number in usable}  # pending rectangles of nearer objects that overlap it
+        self._layers_m, self._beside_m, self._ties = {}, {}, 0
         self.repeats = set()  # may be of the object of a larger rectangle
 
     def take_foremost(self):
@@ -57,10 +49,10 @@ class Overlaps(object):
         smaller, as a person on a couch.
         """
         self._update()
-        nearer, most = self._nearer, len(self.pending) // MANY
-        foremost = [number for number in self.pending if len(nearer[number]) <= most]
-        if self.pending and all([nearer[number] for number in self.pending]):  # three or more, in a circle
-            foremost = [max(self.pending, key=lambda number: (self._lowest_px[number], self._areas_px[number], -number))]
+        occluders, most = {number: len(self._nearer[number]) for number in self.pending}, len(self.pending) // MANY
+        foremost = [number for number in occluders if occluders[number] <= most]
+        if occluders and min(occluders.values()) > 0:  # three or more occlude each other in a circle
+            foremost = [max(occluders, key=lambda number: (self._lowest_px[number], self._areas_px[number], -number))]
         for number in foremost:
             self._remove(number)
         return foremost
@@ -146,9 +138,9 @@ class Overlaps(object):
 
 
 def _shared_areas(usable, samples):
-    """Areas that rectangles share with each other one that they overlap, pixels: {number: area} of each."""
-    shared_px = [{} for _each in samples]
-    by_left = sorted((samples[number].rect_px + (number,) for number in usable))
+    """Areas that rectangles share with each other one that they overlap, pixels: {number: {other: area}}."""
+    by_left = sorted([samples[number].rect_px + (number,) for number in usable])
+    shared_px = {number: {} for number in usable}
     for rank, (_left, top, right, bottom, number) in enumerate(by_left):
         for other_left, other_top, other_right, other_bottom, other in by_left[rank + 1:]:
             if other_left >= right:
