@@ -12,18 +12,18 @@ from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
 
-# A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated:
+# A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated. Chosen:
 # detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person
 # who is not truncated there loses little, because only boxes of less than the usual size are completed.
 BORDER_PX, BORDER_SHARE = 4, 0.02
 LEVEL = np.eye(3)  # of a camera that is held level
 LEVEL_AXES = tuple(map(tuple, LEVEL.tolist()))
-LEAST_AHEAD = 0.05  # lower bound of the horizontal part of a ray
+LEAST_AHEAD = 0.05  # lower bound of the horizontal part of a ray; chosen
 
 
 class ImageGeometry(NamedTuple):
-    """Geometry of one image: its camera, the part of it with depth (see `DepthImage.measured_area`), and the rotation
-    (3, 3) from the optical frame to the level frame (see `level_rotation`).
+    """Geometry of one image: its camera, the part of it with depth (see `DepthImage.measured_area`), and the axes of
+    the level frame in the optical frame, the rows of `level_rotation`.
     """
 
     camera: Camera
@@ -58,7 +58,8 @@ class Box3D(NamedTuple):
     @property
     def is_plausible(self):
         """Whether the centre is nearer than `FARTHEST_M`, and width and height are between 0 and `LARGEST_M`."""
-        (x_m, y_m, z_m), (width_m, height_m, _width_m) = self.center_m.tolist(), self.size_m.tolist()
+        x_m, y_m, z_m = self.center_m.tolist()
+        width_m, height_m, _width_m = self.size_m.tolist()
         return (0 < width_m < LARGEST_M and 0 < height_m < LARGEST_M
                 and abs(x_m) < FARTHEST_M and abs(y_m) < FARTHEST_M and abs(z_m) < FARTHEST_M)
 
@@ -94,9 +95,8 @@ def slopes_down(flat_px, geometry):
     camera, (x1, y1, x2, y2) = geometry.camera, flat_px
     _across, (down_x, down_y, down_z), (ahead_x, ahead_y, ahead_z) = geometry.level_axes
     x = ((x1 + x2) / 2.0 - camera.cx) / camera.fx
-    top, bottom = (y1 - camera.cy) / camera.fy, (y2 - camera.cy) / camera.fy
-    return ((down_x * x + down_y * top + down_z) / max(ahead_x * x + ahead_y * top + ahead_z, LEAST_AHEAD),
-            (down_x * x + down_y * bottom + down_z) / max(ahead_x * x + ahead_y * bottom + ahead_z, LEAST_AHEAD))
+    return [(down_x * x + down_y * y + down_z) / max(ahead_x * x + ahead_y * y + ahead_z, LEAST_AHEAD)
+            for y in ((y1 - camera.cy) / camera.fy, (y2 - camera.cy) / camera.fy)]
 
 
 def without_distortion(rects_px, camera):

@@ -32,18 +32,8 @@ class Samples(NamedTuple):
 
 
 def sample_depth(depth, rect_px, stride_px):
-    """Sample a rectangle on a centred grid of every `stride_px` pixels, clipped to the image (thesis 3.4.2).
-
-    Parameters
-    ----------
-    depth : depth_image.DepthImage
-    rect_px : (x1, y1, x2, y2)
-        There are no samples in an empty or reversed rectangle.
-    stride_px : int
-
-    Returns
-    -------
-    Samples
+    """Samples of a DepthImage in a rectangle, on a centred grid of every `stride_px` pixels, clipped to the image
+    (thesis 3.4.2). There are none in an empty or reversed rectangle.
     """
     height, width = depth.shape
     x1, y1, x2, y2 = map(int, rect_px)
@@ -51,7 +41,7 @@ def sample_depth(depth, rect_px, stride_px):
 
 
 def sample_grid(depth, rect_px):
-    """Sample the visible part of a rectangle on the grid of the foreground estimator, as `sample_depth`."""
+    """Samples of a DepthImage in the visible part of a rectangle, on the grid of the foreground estimator."""
     return _samples_at(depth, *grid_in(tuple(map(int, rect_px)), depth.shape))
 
 
@@ -157,18 +147,10 @@ def check_rect(rect_px):
 
 
 def level_rotation(up):
-    """Rotation (3, 3) from the optical frame to the level frame.
+    """Rotation (3, 3) from the optical frame to the level frame, given the unit vector `up` (3,) in the optical frame.
 
-    Parameters
-    ----------
-    up : array_like, (3,)
-        Unit vector in the optical frame.
-
-    Returns
-    -------
-    numpy.ndarray, (3, 3)
-        `LEVEL` if the camera points so steeply up or down, or is rolled so far, that people do not stand upright in the
-        image (`MAX_TILT_RAD`, `MAX_ROLL_RAD`).
+    It is `LEVEL` if the camera points so steeply up or down, or is rolled so far, that people do not stand upright in
+    the image (`MAX_TILT_RAD`, `MAX_ROLL_RAD`).
     """
     down = -np.asarray(up, float)
     if abs(down[2]) > np.sin(MAX_TILT_RAD) or down[1] < np.cos(MAX_ROLL_RAD) * np.hypot(down[0], down[1]):

@@ -23,8 +23,7 @@ UNKNOWN_MM, FARTHEST_LAYER_M = 65535, 65.0  # chosen: 16 bits hold the farthest 
 # not part of the person, and a wall close behind must not shift the median.
 BODY_HALF_DEPTH_MM, TRUNK_HALF_DEPTH_MM = 350, 250
 BIN_MM, LAYER_BINS = 50, 5  # of the depth histogram; chosen: a layer is as thick as a trunk
-# The nearest layer with at least this share of the largest layer weight is the person. Chosen: flying pixels and what
-# covers a small part of a person have less.
+# The nearest layer with at least this share of the largest layer weight is the person. Chosen: flying pixels have less.
 FIRST_LAYER_SHARE = 0.5
 EDGE_PERCENT = 5  # of the samples ignored at the left and at the right; chosen: arms, flying pixels
 # Chosen: a camera with more tilt (sine) sees the floor beside the feet, which is as far away as the body, this high.
@@ -130,7 +129,7 @@ class RectSamples(object):
 def image_rays(camera, level_axes):
     """Components along the axes of the level frame of the viewing rays of all pixels, with z = 1 in the optical frame.
 
-    Returns three pairs of arrays, of which the sum is meant: (1, w) and (h, 1), or (h, w) and None if the lens distorts.
+    Returns three pairs of arrays, whose sum is meant: (1, w) and (h, 1), or (h, w) and None if the lens distorts.
     """
     x, y = camera.rays(np.arange(camera.width)[np.newaxis], np.arange(camera.height)[:, np.newaxis])
     x, y = x.astype(np.float32), y.astype(np.float32)
@@ -185,8 +184,8 @@ def nearest_dominant_layer(distances_mm, weights):
         return None
     start_mm = _start_of_layer(distances_mm, weights, nearest_mm)
 
-    # Counts of distances in millimetres around the layer replace sorting. The first one contains what is nearer or
-    # unknown, the last one what is farther.
+    # Counts of distances in millimetres around the layer, instead of sorting. The first and the last count contain all
+    # other distances; those in the first one precede all ranks.
     low_mm = max(start_mm - _AROUND_MM - 1, -1)
     size = min(_LAYER_MM + 2 * _AROUND_MM + 1, UNKNOWN_MM - low_mm)
     around = np.minimum(distances_mm - np.uint16(low_mm % 2 ** 16), np.uint16(size))
@@ -221,9 +220,8 @@ def _median(ranks, low, high):
 
 
 def edges(positions):
-    """Lowest and highest value of a uniform distribution with these positions (n,): percentiles, extrapolated.
-
-    The positions are reordered.
+    """Lowest and highest value of a uniform distribution with these positions (n,), which are reordered: percentiles,
+    extrapolated.
     """
     last = len(positions) - 1
     rank, part = divmod(last * EDGE_PERCENT, 100)

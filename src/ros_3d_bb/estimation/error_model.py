@@ -6,7 +6,6 @@ ground truth, and a fit as a function of the measured position would pull every 
 A node knows only the measured position, so `ErrorModel.corrected` solves measured = truth + bias(truth). The model is
 fitted by ros_3d_bb_lab.evaluation.error_model_fit; its file format is described in config/error_models/README.md.
 """
-import math
 from typing import NamedTuple, Optional
 
 import numpy as np
@@ -17,13 +16,12 @@ from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
 
-STEEPEST_BIAS = 0.5  # m/m; chosen: each step of the solver halves the error at least
-SOLVER_STEPS = 20  # chosen: 1 m to 1 µm
+STEEPEST_BIAS, SOLVER_STEPS = 0.5, 20  # m/m; chosen: each step at least halves the remaining error, 1 m to 1 µm
 NEAREST_SHARE = 0.2  # lower bound of a corrected range, relative to the measured range; chosen
 UNCALIBRATED_SIGMA_M = 0.1  # of positions without an error model; chosen
 # Additional standard deviations along x and z: per unit of support below the first value, and of boxes at the image
-# border. Fitted once to simulated crowds of six and eight people, with the camera 0.27 m and 1 m high; there is no
-# command that repeats it. Checked in other crowds by test_covariances_hold_for_any_support.
+# border. Fitted once to simulated crowds of six and eight people; there is no command that repeats it. Checked in other
+# crowds by test_covariances_hold_for_any_support.
 WELL_SUPPORTED, SUPPORT_SIGMAS_M, TRUNCATED_SIGMAS_M = 0.65, (0.4, 0.0, 0.25), (0.06, 0.0, 0.03)
 WALKING_MPS = (0.8, 0.0, 0.8)  # standard deviation of the velocity of people; chosen
 
@@ -114,13 +112,12 @@ class ErrorModel(NamedTuple):
         Outside the measured range, the bias is that at the limit of the range. y is scaled with z, along the ray.
         Raises ValueError if a position is not in front of the camera.
         """
-        position_m = np.asarray(position_m, float)
-        if not (position_m[..., 2] > 0).all():
-            raise ValueError('z is %g m; a position in front of the camera expected' % np.min(position_m[..., 2]))
         return _each(self.corrected_point, position_m)
 
     def corrected_point(self, measured_x_m, measured_y_m, measured_z_m):
-        """As `corrected`, of one position with z > 0."""
+        """As `corrected`, of one position."""
+        if not measured_z_m > 0:
+            raise ValueError('z is %g m; a position in front of the camera expected' % measured_z_m)
         z_m = measured_z_m
         for _step in range(SOLVER_STEPS):
             last_m, z_m = z_m, measured_z_m - self._z_bias_at(z_m)
@@ -128,11 +125,9 @@ class ErrorModel(NamedTuple):
                 break
         z_m = max(z_m, NEAREST_SHARE * measured_z_m)
 
-        x_m, slope, limit_m = measured_x_m - self.x_bias.offset_m, self._x_slope_at(z_m), self.measured_range.x_max_m
-        if abs(x_m / (1 + slope)) <= limit_m:
-            x_m /= 1 + slope
-        else:
-            x_m -= slope * math.copysign(limit_m, x_m)
+        x_m, slope = measured_x_m - self.x_bias.offset_m, self._x_slope_at(z_m)
+        outside_m = x_m - slope * self.measured_range.x_max_m * (1 if x_m > 0 else -1)
+        x_m = x_m / (1 + slope) if abs(x_m / (1 + slope)) <= self.measured_range.x_max_m else outside_m
         return x_m, measured_y_m * z_m / measured_z_m, z_m
 
     def biased(self, position_m):
@@ -140,10 +135,9 @@ class ErrorModel(NamedTuple):
         return _each(self._biased_point, position_m)
 
     def _biased_point(self, x_m, y_m, z_m):
-        limit_m, measured_z_m = self.measured_range.x_max_m, z_m + self._z_bias_at(z_m)
+        measured_z_m, limit_m = z_m + self._z_bias_at(z_m), self.measured_range.x_max_m
         inside_m = min(max(x_m, -limit_m), limit_m)
-        measured_x_m = x_m + inside_m * self._x_slope_at(z_m) + self.x_bias.offset_m
-        return measured_x_m, y_m * measured_z_m / z_m, measured_z_m
+        return (x_m + inside_m * self._x_slope_at(z_m) + self.x_bias.offset_m, y_m * measured_z_m / z_m, measured_z_m)
 
     def check_estimator(self, name):
         """Raise ValueError if the model was fitted for another estimator."""
@@ -159,15 +153,12 @@ class ErrorModel(NamedTuple):
 
     def variances_m2(self, x_m, _y_m, z_m):
         """Variances of x, y and z of a corrected position: by its range, and by its distance to the measured range."""
-        outside_m2 = (self.growth_outside * self._outside(x_m, 0, z_m)) ** 2
+        outside_m2 = (self.growth_outside * self.distance_outside(x_m, z_m)) ** 2
         return (self.x_sigma.variance_at(z_m) + outside_m2, self.y_sigma_m ** 2 + outside_m2,
                 self.z_sigma.variance_at(z_m) + outside_m2)
 
-    def distance_outside(self, position_m):
-        """Distance (...) of corrected positions (..., 3) to the measured range, metres; 0 inside."""
-        return _each(self._outside, position_m, ())
-
-    def _outside(self, x_m, _y_m, z_m):
+    def distance_outside(self, x_m, z_m):
+        """Distance of a corrected position to the measured range, metres; 0 inside."""
         limits = self.measured_range
         return max(0.0, limits.z_min_m - z_m, z_m - limits.z_max_m) + max(0.0, abs(x_m) - limits.x_max_m)
 
@@ -183,11 +174,10 @@ class ErrorModel(NamedTuple):
         return self.x_bias.slope + self.x_bias.per_angle_m / inside_m
 
 
-def _each(function, position_m, shape=(3,)):
-    """Results (..., *shape) of a function of x, y and z at positions (..., 3)."""
+def _each(function, position_m):
+    """Results (..., 3) of a function of x, y and z at positions (..., 3)."""
     position_m = np.asarray(position_m, float)
-    results = [function(*point_m) for point_m in position_m.reshape(-1, 3).tolist()]
-    return np.reshape(results, position_m.shape[:-1] + shape)
+    return np.reshape([function(*point_m) for point_m in position_m.reshape(-1, 3).tolist()], position_m.shape)
 
 
 def corrected_boxes(boxes, model=None, gap_s=0.0):
@@ -197,25 +187,19 @@ def corrected_boxes(boxes, model=None, gap_s=0.0):
     Without a model, positions are not corrected, and their standard deviation is `UNCALIBRATED_SIGMA_M`. `gap_s` is the
     time between the colour and the depth image, in which people move.
     """
-    return [_corrected_box(box, model, gap_s) for box in boxes]
-
-
-def _corrected_box(box, model, gap_s):
-    center_m, variances_m2 = box.center_m.tolist(), 3 * (UNCALIBRATED_SIGMA_M ** 2,)
-    if model is not None:
-        if center_m[2] > 0:  # the axis of a very near person may be behind the image plane of a tilted camera
-            center_m = model.corrected_point(*center_m)
-        variances_m2 = model.variances_m2(*center_m)
-    x_m2, y_m2, z_m2 = map(sum, zip(variances_m2, _added_variances_m2(box, gap_s)))
-    covariance_m2 = np.array(((x_m2, 0.0, 0.0), (0.0, y_m2, 0.0), (0.0, 0.0, z_m2)))
-    return box._replace(center_m=np.array(center_m), covariance_m2=covariance_m2)
-
-
-def _added_variances_m2(box, gap_s):
-    """Additional variances of x, y and z of a box by its support, its truncation, and the motion in `gap_s`."""
-    unsupported, is_truncated = max(0.0, WELL_SUPPORTED - box.support), box.truncated
-    return [(unsupported * support_m) ** 2 + is_truncated * truncated_m ** 2 + (gap_s * walking_mps) ** 2
-            for support_m, truncated_m, walking_mps in zip(SUPPORT_SIGMAS_M, TRUNCATED_SIGMAS_M, WALKING_MPS)]
+    corrected = []
+    for box in boxes:
+        center_m, variances_m2 = box.center_m.tolist(), 3 * (UNCALIBRATED_SIGMA_M ** 2,)
+        if model is not None:
+            if center_m[2] > 0:  # the axis of a very near person may be behind the image plane of a tilted camera
+                center_m = model.corrected_point(*center_m)
+            variances_m2 = model.variances_m2(*center_m)
+        covariance_m2, truncated, unsupported = np.zeros((3, 3)), box.truncated, max(0.0, WELL_SUPPORTED - box.support)
+        for axis, variance_m2 in enumerate(variances_m2):
+            covariance_m2[axis, axis] = (variance_m2 + (unsupported * SUPPORT_SIGMAS_M[axis]) ** 2
+                                         + truncated * TRUNCATED_SIGMAS_M[axis] ** 2 + (gap_s * WALKING_MPS[axis]) ** 2)
+        corrected.append(box._replace(center_m=np.array(center_m), covariance_m2=covariance_m2))
+    return corrected
 
 
 def checked(model):
@@ -226,8 +210,8 @@ def checked(model):
         raise ValueError('measured_range is %s; 0 < z_min_m <= x_z_min_m <= z_max_m and x_max_m > 0 expected'
                          % (tuple(limits),))
     z_m = np.linspace(limits.z_min_m, limits.z_max_m, 101)
-    x_slopes = [model._x_slope_at(each_m) for each_m in z_m.tolist()]
-    for name, slopes in (('z_bias', np.polyval(np.polyder(model.z_bias), z_m)), ('x_bias', x_slopes)):
+    for name, slopes in (('z_bias', np.polyval(np.polyder(model.z_bias), z_m)),
+                         ('x_bias', list(map(model._x_slope_at, z_m.tolist())))):
         steepest = np.abs(slopes).max()
         if steepest > STEEPEST_BIAS:
             raise ValueError('%s changes by %.2g m a metre; at most %g expected, because the bias must be invertible'

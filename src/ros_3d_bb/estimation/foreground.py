@@ -14,8 +14,7 @@ from ros_3d_bb.estimation.overlaps import Overlaps
 LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate; chosen: a lidar gives twice as many
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the layer for an estimate; chosen
 LEAST_WIDTH_M = 0.05  # chosen: of a body that is one pixel wide
-# Minimum share of both sides of a rectangle that background behind an object fills. Chosen: a body fills less.
-FILLED = 0.4
+FILLED = 0.4  # minimum share of both sides of a rectangle that background behind an object fills; chosen
 
 
 def estimate_foreground(depth, rects_px, geometry, kinds):
@@ -31,13 +30,7 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
     largest gets a box: what remains in the others is background, which continues beyond their left and right sides.
 
-    Parameters
-    ----------
-    depth : depth_image.DepthImage
-    rects_px : sequence of (x1, y1, x2, y2)
-    geometry : ImageGeometry
-    kinds : sequence of object_classes.ObjectClass
-        That of each rectangle.
+    `depth` is a DepthImage, `geometry` its ImageGeometry, and `kinds` are the ObjectClasses of the rectangles.
 
     Returns
     -------
@@ -111,6 +104,6 @@ def _box(seen, rect_px, truncated, kind, geometry):
     axis_m = layer_m + kind.axis_behind(width_m)
     along_ray = axis_m / layer_m
     across_m, down_m = (left_m + right_m) / 2 * along_ray, (top_m + bottom_m) / 2 * along_ray
-    to_across, to_down, to_ahead = geometry.level_axes
-    center_m = [x * across_m + y * down_m + z * axis_m for x, y, z in zip(to_across, to_down, to_ahead)]
-    return Box3D(np.array(center_m), np.array((width_m, bottom_m - top_m, width_m)), rect_px, support, truncated), axis_m
+    center_m = [x * across_m + y * down_m + z * axis_m for x, y, z in zip(*geometry.level_axes)]
+    size_m = np.array((width_m, bottom_m - top_m, width_m))
+    return Box3D(np.array(center_m), size_m, rect_px, support, truncated), axis_m

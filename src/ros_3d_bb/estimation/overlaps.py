@@ -1,13 +1,12 @@
-"""Occlusion: order of the objects in overlapping rectangles by their depth, and masks of what nearer ones show in them.
-"""
+"""Occlusion: order of the objects in overlapping rectangles by depth, and masks of what nearer ones show in them."""
 from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, UNKNOWN_MM
 
-# Nearer people stand lower in the image. The lower edges of truncated boxes are compared at this height.
-CUT_ROWS = 1 / 30.0  # share of the image height
+# All are chosen, and checked by test_difficult_views.py.
+CUT_ROWS = 1 / 30.0  # share of the image height at which the lower edges of truncated boxes are compared
 SAME_LAYER_M = 0.25  # largest difference of the layers of parts of one body
 CLEARLY_NEARER_M = 0.1
-CLEARLY_LOWER = 0.02  # share of the image height
-LEAST_SIZE = 0.65  # minimum share of its usual size that an object appears to have at its layer
+CLEARLY_LOWER = 0.02  # share of the image height: nearer people stand lower in the image
+LEAST_SIZE = 0.65  # minimum share of its usual size that an object appears to have at its layer: a hidden chair, 0.6
 LEAST_BESIDE = 0.25  # minimum share of a rectangle beside another one that shows a layer of its own
 CONTAINED = 0.8  # minimum share of a second rectangle of an object in the first one
 MANY = 200  # from this number of rectangles on, those that few others occlude are foremost, too: for speed
@@ -29,8 +28,7 @@ class Overlaps(object):
             x1, y1, x2, y2 = each.rect_px
             self._areas_px.append((x2 - x1) * (y2 - y1))
             self._lowest_px.append(min(y2, camera.height * (1 - CUT_ROWS)))
-            usual_m = 0 if any(edges) else max(kind.width, kind.height)
-            # Nearer objects would be unusually small.
+            usual_m = 0 if any(edges) else max(kind.width, kind.height)  # nearer objects would be unusually small
             self._nearest_m.append(LEAST_SIZE * usual_m * camera.fy / max(x2 - x1, y2 - y1, 1))
         self.pending = set(usable)  # without an estimate yet
         self._changed = set(usable)  # since the layer was determined
@@ -82,11 +80,10 @@ class Overlaps(object):
     def _compare(self, number, other):
         """Determine which of two overlapping rectangles is of the nearer object, and whether it repeats the other."""
         farther_m = self._layers_m[number] - self._layers_m[other]
+        self._beside_m.pop((number, other), None)
+        self._beside_m.pop((other, number), None)
         if abs(farther_m) < SAME_LAYER_M:
             farther_m = self._determine_beside(number, other) - self._determine_beside(other, number)
-        else:
-            self._beside_m.pop((number, other), None)
-            self._beside_m.pop((other, number), None)
         if not self._is_nearer(other, number, farther_m):
             number, other, farther_m = other, number, -farther_m
         self._nearer[number].add(other)
@@ -97,7 +94,6 @@ class Overlaps(object):
 
     def _determine_beside(self, number, other):
         """Determine the layer of a rectangle beside another one, metres; its layer if there is none beside it."""
-        self._beside_m.pop((number, other), None)
         is_beside = self._shared_px[number][other] <= (1 - LEAST_BESIDE) * self._areas_px[number]
         if is_beside and self._ties < MOST_TIES:
             self._ties += 1

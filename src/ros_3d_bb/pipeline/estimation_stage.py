@@ -160,8 +160,8 @@ class EstimationStage(object):
                   'boxes without depth': len(estimates) - len(found)}
         boxes3d = corrected_boxes(boxes3d, self._error_model, gap_s)
         if self._error_model is not None and boxes3d:
-            outside_m = self._error_model.distance_outside([box.center_m for box in boxes3d])
-            counts['boxes outside of the measured range'] = int((outside_m > 0).sum())
+            outside = [box for box in boxes3d if self._error_model.distance_outside(box.center_m[0], box.center_m[2])]
+            counts['boxes outside of the measured range'] = len(outside)
         counts['images estimated'] = 1
         self._events.count_all(counts)
 
