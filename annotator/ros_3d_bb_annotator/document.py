@@ -11,6 +11,7 @@ import numpy as np
 
 from ros_3d_bb.camera.depth_image import FARTHEST_M
 from ros_3d_bb.core.atomic_file import FILE_NAME, locked_update
+from ros_3d_bb.estimation.box3d import plausible
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.sessions.session_reader import (Session, SessionError, camera_of, boxes_of_others, read_color,
                                                read_depth, read_description, session_errors)
@@ -104,7 +105,8 @@ class Document(object):
         if not any(detection.box_px == box_px and not detection.by_hand for detection in detections):
             others_px = boxes_of_others(box_px, others_px)  # a box by hand replaces those of the same person
         depth = self.depth(index) if depth is None else depth
-        return estimate_boxes(depth, [box_px] + list(others_px), self.camera, estimator_named(ESTIMATOR))[0]
+        boxes = estimate_boxes(depth, [box_px] + list(others_px), self.camera, estimator_named(ESTIMATOR))
+        return plausible(boxes[0])
 
     def errors(self, index):
         """Estimate minus truth (x, z, distance on the floor) of the selected person, metres; None if one is missing."""

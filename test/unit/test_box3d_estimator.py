@@ -7,8 +7,9 @@ from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.object_classes import PERSON_CLASS
 from ros_3d_bb.estimation.box3d import ImageGeometry, complete_truncated_extent, truncated_edges
-from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimate_median, estimator_named
-from ros_3d_bb.estimation.depth_samples import GRID_COLUMNS, GRID_ROWS, sample_depth, sample_grid
+from ros_3d_bb.estimation.box3d_estimator import (check_rect, estimate_boxes, estimate_median, estimator_named,
+                                                  sample_depth, sample_grid)
+from ros_3d_bb.estimation.depth_samples import GRID_COLUMNS, GRID_ROWS
 from ros_3d_bb.estimation.foreground import estimate_foreground
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 

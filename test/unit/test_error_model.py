@@ -55,7 +55,7 @@ def test_covariance_is_the_spread_inside_and_grows_outside():
 
 
 def test_distance_to_the_measured_range():
-    assert MODEL.distance_outside([[0, 0, 2], [-1.7, 0, 4.3], [0, 0, 0.4]]) == pytest.approx([0, 0.5, 0.1])
+    assert [MODEL.distance_outside(*each) for each in ((0, 2), (-1.7, 4.3), (0, 0.4))] == pytest.approx([0, 0.5, 0.1])
 
 
 def test_positions_behind_the_camera_are_rejected():

@@ -2,7 +2,7 @@
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.estimation.depth_samples import sample_depth
+from ros_3d_bb.estimation.box3d_estimator import sample_depth
 from ros_3d_bb.visualization.image_overlay import INVALID_COLOR, VALID_COLOR, draw_samples, depth_to_grey
 
 

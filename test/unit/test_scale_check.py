@@ -45,9 +45,8 @@ def test_heights_that_disagree_are_no_fault():
 
 
 def boxes_of(depth, rects_px, camera, level_from_camera=LEVEL):
-    implausible = []
-    boxes = estimate_boxes(depth, rects_px, camera, estimator_named('foreground'), implausible, level_from_camera)
-    return list(filter(None, boxes)) + implausible
+    boxes = estimate_boxes(depth, rects_px, camera, estimator_named('foreground'), level_from_camera)
+    return list(filter(None, boxes))
 
 
 def test_the_scale_of_a_session_is_correct(session_folder):

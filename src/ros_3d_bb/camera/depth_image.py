@@ -38,12 +38,13 @@ class DepthImage(NamedTuple):
         away.
         """
         height, width = self.values.shape
-        left, right = _black_ends((self.values[::BORDER_STEP] > 0).any(axis=0))
-        top, bottom = _black_ends((self.values[:, ::BORDER_STEP] > 0).any(axis=1))
+        left, right = _black_ends(self.values[::BORDER_STEP].T)
+        top, bottom = _black_ends(self.values[:, ::BORDER_STEP])
         return left, top, width - right, height - bottom
 
 
-def _black_ends(measured):
-    """Number of lines without depth at both ends, given which of the lines (n,) have depth."""
-    ends = int(measured.argmax()), int(measured[::-1].argmax())
-    return [count if count <= WIDEST_BORDER * len(measured) else 0 for count in ends]
+def _black_ends(lines):
+    """Number of lines without depth at both ends of an array (lines, pixels); 0 if there are more than the widest."""
+    widest = int(WIDEST_BORDER * len(lines))
+    return [int(np.logical_or.reduce(end > 0, axis=1).argmax())
+            for end in (lines[:widest + 1], lines[:-widest - 2:-1])]

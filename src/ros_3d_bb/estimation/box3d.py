@@ -12,22 +12,23 @@ from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
 
-# A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated:
+# A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated. Chosen:
 # detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person
 # who is not truncated there loses little, because only boxes of less than the usual size are completed.
 BORDER_PX, BORDER_SHARE = 4, 0.02
 LEVEL = np.eye(3)  # of a camera that is held level
-LEAST_AHEAD = 0.05  # lower bound of the horizontal part of a ray
+LEVEL_AXES = tuple(map(tuple, LEVEL.tolist()))
+LEAST_AHEAD = 0.05  # lower bound of the horizontal part of a ray; chosen
 
 
 class ImageGeometry(NamedTuple):
-    """Geometry of one image: its camera, the part of it with depth (see `DepthImage.measured_area`), and the rotation
-    (3, 3) from the optical frame to the level frame (see `level_rotation`).
+    """Geometry of one image: its camera, the part of it with depth (see `DepthImage.measured_area`), and the axes of
+    the level frame in the optical frame, the rows of `level_rotation`.
     """
 
     camera: Camera
     area_px: Tuple[int, int, int, int]
-    level_from_camera: np.ndarray = LEVEL
+    level_axes: Tuple[Tuple[float, float, float], ...] = LEVEL_AXES
 
 
 class Box3D(NamedTuple):
@@ -57,9 +58,15 @@ class Box3D(NamedTuple):
     @property
     def is_plausible(self):
         """Whether the centre is nearer than `FARTHEST_M`, and width and height are between 0 and `LARGEST_M`."""
+        x_m, y_m, z_m = self.center_m.tolist()
         width_m, height_m, _width_m = self.size_m.tolist()
-        return (all([abs(along_m) < FARTHEST_M for along_m in self.center_m.tolist()])
-                and 0 < width_m < LARGEST_M and 0 < height_m < LARGEST_M)
+        return (0 < width_m < LARGEST_M and 0 < height_m < LARGEST_M
+                and abs(x_m) < FARTHEST_M and abs(y_m) < FARTHEST_M and abs(z_m) < FARTHEST_M)
+
+
+def plausible(box):
+    """The Box3D if it is plausible; otherwise, and without a box, None."""
+    return box if box is not None and box.is_plausible else None
 
 
 def truncated_edges(rect_px, area_px):
@@ -72,8 +79,7 @@ def truncated_edges(rect_px, area_px):
     x1, y1, x2, y2 = rect_px
     left, top, right, bottom = area_px
     across_px, down_px = BORDER_PX + BORDER_SHARE * (x2 - x1), BORDER_PX + BORDER_SHARE * (y2 - y1)
-    return (bool(x1 <= left + across_px), bool(y1 <= top + down_px), bool(x2 >= right - across_px),
-            bool(y2 >= bottom - down_px))
+    return x1 <= left + across_px, y1 <= top + down_px, x2 >= right - across_px, y2 >= bottom - down_px
 
 
 def complete_truncated_extent(low, high, cut_low, cut_high, usual):
@@ -85,24 +91,24 @@ def complete_truncated_extent(low, high, cut_low, cut_high, usual):
 
 
 def slopes_down(flat_px, geometry):
-    """y / z in the level frame of the rays through the middles of the upper and of the lower edges, (2, n)."""
-    camera, level_from_camera = geometry.camera, geometry.level_from_camera
-    x = ((flat_px[:, 0] + flat_px[:, 2]) / 2.0 - camera.cx) / camera.fx
-    y = (flat_px[:, 1::2].T - camera.cy) / camera.fy
-    (down_x, down_y, down_z), (ahead_x, ahead_y, ahead_z) = level_from_camera[1:].tolist()
-    return (down_x * x + down_y * y + down_z) / np.maximum(ahead_x * x + ahead_y * y + ahead_z, LEAST_AHEAD)
+    """y / z in the level frame of the rays through the middles of the upper and of the lower edge of a rectangle."""
+    camera, (x1, y1, x2, y2) = geometry.camera, flat_px
+    _across, (down_x, down_y, down_z), (ahead_x, ahead_y, ahead_z) = geometry.level_axes
+    x = ((x1 + x2) / 2.0 - camera.cx) / camera.fx
+    return [(down_x * x + down_y * y + down_z) / max(ahead_x * x + ahead_y * y + ahead_z, LEAST_AHEAD)
+            for y in ((y1 - camera.cy) / camera.fy, (y2 - camera.cy) / camera.fy)]
 
 
 def without_distortion(rects_px, camera):
-    """Undistort rectangles (n, 4) by the midpoints of their edges; nan if a midpoint has no undistorted position.
+    """Undistort rectangles (x1, y1, x2, y2) by the midpoints of their edges; nan if one has no undistorted position.
 
     Outside the image, where the distortion is unknown, the distortion at the image border is used.
     """
     if not camera.distortion_model:
         return rects_px
-    x1, y1, x2, y2 = rects_px.T
+    x1, y1, x2, y2 = np.array(rects_px).T
     x, y = (x1 + x2) / 2.0, (y1 + y2) / 2.0
     middles = np.stack((x1, y, x, y1, x2, y, x, y2), axis=1).reshape(-1, 4, 2)
     inside = np.clip(middles, 0, (camera.width, camera.height))
     flat_px = middles + camera.undistort(inside) - inside
-    return np.stack((flat_px[:, 0, 0], flat_px[:, 1, 1], flat_px[:, 2, 0], flat_px[:, 3, 1]), axis=1)
+    return flat_px[:, (0, 1, 2, 3), (0, 1, 0, 1)].tolist()

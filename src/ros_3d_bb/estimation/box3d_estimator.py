@@ -4,14 +4,61 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ros_3d_bb.camera.depth_image import FARTHEST_M
 from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.estimation.box3d import LEVEL, Box3D, ImageGeometry, truncated_edges, without_distortion
-from ros_3d_bb.estimation.depth_layers import BODY_HALF_DEPTH_MM
-from ros_3d_bb.estimation.depth_samples import sample_depth, sample_grid
+from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, grid_in
 from ros_3d_bb.estimation.foreground import estimate_foreground
 
+# A camera with more tilt or roll does not show people upright; chosen.
 MAX_TILT_RAD, MAX_ROLL_RAD = np.radians(65), np.radians(45)
+
+
+class Samples(NamedTuple):
+    """Grid of depth samples in one rectangle: columns (w,), rows (h,), depth_m (h, w), metres, and valid (h, w),
+    whether depth was measured.
+    """
+
+    columns: np.ndarray
+    rows: np.ndarray
+    depth_m: np.ndarray
+    valid: np.ndarray
+
+    @property
+    def pixels(self):
+        """Pixel coordinates (u, v) of the grid, (h, w, 2)."""
+        return np.stack(np.meshgrid(self.columns, self.rows), axis=-1)
+
+
+def sample_depth(depth, rect_px, stride_px):
+    """Samples of a DepthImage in a rectangle, on a centred grid of every `stride_px` pixels, clipped to the image
+    (thesis 3.4.2). There are none in an empty or reversed rectangle.
+    """
+    height, width = depth.shape
+    x1, y1, x2, y2 = map(int, rect_px)
+    return _samples_at(depth, _ticks(y1, y2, height, stride_px), _ticks(x1, x2, width, stride_px))
+
+
+def sample_grid(depth, rect_px):
+    """Samples of a DepthImage in the visible part of a rectangle, on the grid of the foreground estimator."""
+    return _samples_at(depth, *grid_in(tuple(map(int, rect_px)), depth.shape))
+
+
+def _samples_at(depth, rows, columns):
+    """Samples in rows and columns (slices)."""
+    height, width = depth.shape
+    depth_m = depth.part(rows, columns).astype(float) * depth.scale_m
+    valid = (depth_m > 0) & (depth_m <= FARTHEST_M)
+    return Samples(np.arange(width)[columns], np.arange(height)[rows], depth_m, valid)
+
+
+def _ticks(low, high, limit, stride):
+    """Slice of positions `stride` apart, centred in low..high and clipped to 0..limit; exact for ints of any size."""
+    count = -(-(high - low) // stride)
+    first = low + (high - low - (count - 1) * stride - 1) // 2
+    first += max(0, -(first // stride)) * stride
+    return slice(first, max(first, min(high, limit)), stride) if first < limit else slice(0, 0)
 
 
 def estimate_median(samples, rect_px, geometry):
@@ -23,7 +70,7 @@ def estimate_median(samples, rect_px, geometry):
     camera = geometry.camera
     across, down = camera.rays(samples.columns, samples.rows[:, np.newaxis])
     seen = samples.valid & ~np.isnan(across)  # the distortion model does not define a ray for every pixel
-    (flat_px,) = without_distortion(np.array([rect_px]), camera)
+    (flat_px,) = without_distortion([rect_px], camera)
     if not (np.isfinite(flat_px).all() and seen.any()):
         return None
     points = np.stack((across * samples.depth_m, down * samples.depth_m, samples.depth_m), axis=-1)[seen]
@@ -64,7 +111,7 @@ def estimator_named(name, stride_px=20, classes=ObjectClasses()):
     raise ValueError('estimator is %r; foreground or median expected' % name)
 
 
-def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_from_camera=LEVEL, labels=None):
+def estimate_boxes(depth, rects_px, camera, estimator, level_from_camera=LEVEL, labels=None):
     """Estimate the 3D boxes of all rectangles of one image.
 
     Parameters
@@ -73,8 +120,6 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_f
     rects_px : list of (x1, y1, x2, y2)
     camera : camera_model.Camera
     estimator : Estimator
-    implausible : list, optional
-        Estimates that are not plausible (see `Box3D.is_plausible`) are appended.
     level_from_camera : numpy.ndarray, (3, 3), optional
         Rotation to the level frame, see `level_rotation`. By default the camera is held level.
     labels : sequence of str, optional
@@ -83,21 +128,15 @@ def estimate_boxes(depth, rects_px, camera, estimator, implausible=None, level_f
     Returns
     -------
     list of Box3D or None
-        In the order of the rectangles; None without a plausible estimate.
+        In the order of the rectangles; None without an estimate. Not all of them are plausible, see
+        `Box3D.is_plausible`.
     """
     if len(rects_px) == 0:  # most images show no people
         return []
     labels = labels or [PERSON] * len(rects_px)
-    geometry = ImageGeometry(camera, depth.measured_area(), level_from_camera)
+    geometry = ImageGeometry(camera, depth.measured_area(), tuple(map(tuple, level_from_camera.tolist())))
     boxes = estimator.estimate(depth, rects_px, geometry, list(map(estimator.classes.of, labels)))
-    for number, box in enumerate(boxes):
-        if box is None:
-            continue
-        box = box._replace(label=labels[number])
-        boxes[number] = box if box.is_plausible else None
-        if implausible is not None and not box.is_plausible:
-            implausible.append(box)
-    return boxes
+    return [box and (box if label == box.label else box._replace(label=label)) for box, label in zip(boxes, labels)]
 
 
 def check_rect(rect_px):
@@ -108,18 +147,10 @@ def check_rect(rect_px):
 
 
 def level_rotation(up):
-    """Rotation (3, 3) from the optical frame to the level frame.
+    """Rotation (3, 3) from the optical frame to the level frame, given the unit vector `up` (3,) in the optical frame.
 
-    Parameters
-    ----------
-    up : array_like, (3,)
-        Unit vector in the optical frame.
-
-    Returns
-    -------
-    numpy.ndarray, (3, 3)
-        `LEVEL` if the camera points so steeply up or down, or is rolled so far, that people do not stand upright in the
-        image (`MAX_TILT_RAD`, `MAX_ROLL_RAD`).
+    It is `LEVEL` if the camera points so steeply up or down, or is rolled so far, that people do not stand upright in
+    the image (`MAX_TILT_RAD`, `MAX_ROLL_RAD`).
     """
     down = -np.asarray(up, float)
     if abs(down[2]) > np.sin(MAX_TILT_RAD) or down[1] < np.cos(MAX_ROLL_RAD) * np.hypot(down[0], down[1]):

@@ -16,14 +16,14 @@ from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
 
-STEEPEST_BIAS = 0.5  # m/m; a steeper bias cannot be inverted safely
-NEAREST_SHARE = 0.2  # lower bound of a corrected range, relative to the measured range
-UNCALIBRATED_SIGMA_M = 0.1  # of positions without an error model
-# Additional standard deviations across and along the optical axis: per unit of support below the first value, and of
-# boxes at the image border. Fitted to simulated crowds of six and eight people, with the camera 0.27 m and 1 m high.
-WELL_SUPPORTED, SUPPORT_SIGMAS_M, TRUNCATED_SIGMAS_M = 0.65, np.array([0.4, 0, 0.25]), np.array([0.06, 0, 0.03])
-WALKING_MPS = np.array([0.8, 0, 0.8])  # standard deviation of the velocity of people
-SOLVER_STEPS = 20  # each step at least halves the remaining error: 1 m to 1 µm
+STEEPEST_BIAS, SOLVER_STEPS = 0.5, 20  # m/m; chosen: each step at least halves the remaining error, 1 m to 1 µm
+NEAREST_SHARE = 0.2  # lower bound of a corrected range, relative to the measured range; chosen
+UNCALIBRATED_SIGMA_M = 0.1  # of positions without an error model; chosen
+# Additional standard deviations along x and z: per unit of support below the first value, and of boxes at the image
+# border. Fitted once to simulated crowds of six and eight people; there is no command that repeats it. Checked in other
+# crowds by test_covariances_hold_for_any_support.
+WELL_SUPPORTED, SUPPORT_SIGMAS_M, TRUNCATED_SIGMAS_M = 0.65, (0.4, 0.0, 0.25), (0.06, 0.0, 0.03)
+WALKING_MPS = (0.8, 0.0, 0.8)  # standard deviation of the velocity of people; chosen
 
 
 class XBias(NamedTuple):
@@ -48,8 +48,11 @@ class Spread(NamedTuple):
 
     def at(self, z_m):
         """Standard deviation at range z_m, metres, with the shape of z_m."""
-        z_m = np.asarray(z_m, float)
-        return np.sqrt(self.constant_m ** 2 + (self.growth * z_m ** 2) ** 2 + (self.near_m2 / z_m) ** 2)
+        return np.sqrt(self.variance_at(np.asarray(z_m, float)))
+
+    def variance_at(self, z_m):
+        """Variance at range z_m (float or array), square metres."""
+        return self.constant_m ** 2 + (self.growth * z_m ** 2) ** 2 + (self.near_m2 / z_m) ** 2
 
 
 class MeasuredRange(NamedTuple):
@@ -109,28 +112,32 @@ class ErrorModel(NamedTuple):
         Outside the measured range, the bias is that at the limit of the range. y is scaled with z, along the ray.
         Raises ValueError if a position is not in front of the camera.
         """
-        position_m = np.asarray(position_m, float)
-        if not (position_m[..., 2] > 0).all():
-            raise ValueError('z is %g m; a position in front of the camera expected' % np.min(position_m[..., 2]))
-        measured_x_m, y_m, measured_z_m = np.moveaxis(position_m, -1, 0)
+        return _each(self.corrected_point, position_m)
 
+    def corrected_point(self, measured_x_m, measured_y_m, measured_z_m):
+        """As `corrected`, of one position."""
+        if not measured_z_m > 0:
+            raise ValueError('z is %g m; a position in front of the camera expected' % measured_z_m)
         z_m = measured_z_m
-        for _ in range(SOLVER_STEPS):
-            z_m = measured_z_m - self._z_bias_at(z_m)
-        z_m = np.maximum(z_m, NEAREST_SHARE * measured_z_m)
+        for _step in range(SOLVER_STEPS):
+            last_m, z_m = z_m, measured_z_m - self._z_bias_at(z_m)
+            if z_m == last_m:
+                break
+        z_m = max(z_m, NEAREST_SHARE * measured_z_m)
 
-        x_m, slope, limit_m = measured_x_m - self.x_bias.offset_m, self._x_slope_at(z_m), self.measured_range.x_max_m
-        inside_m = x_m / (1 + slope)
-        x_m = np.where(np.abs(inside_m) <= limit_m, inside_m, x_m - slope * limit_m * np.sign(x_m))
-        return np.stack((x_m, y_m * z_m / measured_z_m, z_m), axis=-1)
+        x_m, slope = measured_x_m - self.x_bias.offset_m, self._x_slope_at(z_m)
+        outside_m = x_m - slope * self.measured_range.x_max_m * (1 if x_m > 0 else -1)
+        x_m = x_m / (1 + slope) if abs(x_m / (1 + slope)) <= self.measured_range.x_max_m else outside_m
+        return x_m, measured_y_m * z_m / measured_z_m, z_m
 
     def biased(self, position_m):
         """Noise-free measurements of true positions, (..., 3). Inverse of `corrected`."""
-        x_m, y_m, z_m = np.moveaxis(np.asarray(position_m, float), -1, 0)
-        inside_m = np.clip(x_m, -self.measured_range.x_max_m, self.measured_range.x_max_m)
-        measured_z_m = z_m + self._z_bias_at(z_m)
-        measured_x_m = x_m + inside_m * self._x_slope_at(z_m) + self.x_bias.offset_m
-        return np.stack((measured_x_m, y_m * measured_z_m / z_m, measured_z_m), axis=-1)
+        return _each(self._biased_point, position_m)
+
+    def _biased_point(self, x_m, y_m, z_m):
+        measured_z_m, limit_m = z_m + self._z_bias_at(z_m), self.measured_range.x_max_m
+        inside_m = min(max(x_m, -limit_m), limit_m)
+        return (x_m + inside_m * self._x_slope_at(z_m) + self.x_bias.offset_m, y_m * measured_z_m / z_m, measured_z_m)
 
     def check_estimator(self, name):
         """Raise ValueError if the model was fitted for another estimator."""
@@ -142,29 +149,35 @@ class ErrorModel(NamedTuple):
 
         The covariance is diagonal: the measurements show no correlation of x and z errors along the ray.
         """
-        z_m = np.asarray(position_m, float)[..., 2]
-        sigmas_m = np.stack((self.x_sigma.at(z_m), np.full(z_m.shape, self.y_sigma_m), self.z_sigma.at(z_m)), axis=-1)
-        outside_m = self.growth_outside * self.distance_outside(position_m)
-        return (sigmas_m ** 2 + outside_m[..., np.newaxis] ** 2)[..., np.newaxis] * np.eye(3)
+        return _each(self.variances_m2, position_m)[..., np.newaxis] * np.eye(3)
 
-    def distance_outside(self, position_m):
-        """Distance (...) of corrected positions (..., 3) to the measured range, metres; 0 inside."""
-        position_m, limits = np.asarray(position_m, float), self.measured_range
-        z_m = position_m[..., 2]
-        return (np.maximum(0, np.maximum(limits.z_min_m - z_m, z_m - limits.z_max_m))
-                + np.maximum(0, np.abs(position_m[..., 0]) - limits.x_max_m))
+    def variances_m2(self, x_m, _y_m, z_m):
+        """Variances of x, y and z of a corrected position: by its range, and by its distance to the measured range."""
+        outside_m2 = (self.growth_outside * self.distance_outside(x_m, z_m)) ** 2
+        return (self.x_sigma.variance_at(z_m) + outside_m2, self.y_sigma_m ** 2 + outside_m2,
+                self.z_sigma.variance_at(z_m) + outside_m2)
+
+    def distance_outside(self, x_m, z_m):
+        """Distance of a corrected position to the measured range, metres; 0 inside."""
+        limits = self.measured_range
+        return max(0.0, limits.z_min_m - z_m, z_m - limits.z_max_m) + max(0.0, abs(x_m) - limits.x_max_m)
 
     def _z_bias_at(self, z_m):
-        # Horner's method: polyval and clip are five times slower for the few boxes of an image.
-        inside_m = np.minimum(np.maximum(z_m, self.measured_range.z_min_m), self.measured_range.z_max_m)
-        bias_m = 0 * inside_m
+        inside_m = min(max(z_m, self.measured_range.z_min_m), self.measured_range.z_max_m)
+        bias_m = 0.0
         for coefficient in self.z_bias:
             bias_m = bias_m * inside_m + coefficient
         return bias_m
 
     def _x_slope_at(self, z_m):
-        nearest_m, farthest_m = self.measured_range.x_z_min_m, self.measured_range.z_max_m
-        return self.x_bias.slope + self.x_bias.per_angle_m / np.clip(z_m, nearest_m, farthest_m)
+        inside_m = min(max(z_m, self.measured_range.x_z_min_m), self.measured_range.z_max_m)
+        return self.x_bias.slope + self.x_bias.per_angle_m / inside_m
+
+
+def _each(function, position_m):
+    """Results (..., 3) of a function of x, y and z at positions (..., 3)."""
+    position_m = np.asarray(position_m, float)
+    return np.reshape([function(*point_m) for point_m in position_m.reshape(-1, 3).tolist()], position_m.shape)
 
 
 def corrected_boxes(boxes, model=None, gap_s=0.0):
@@ -174,21 +187,19 @@ def corrected_boxes(boxes, model=None, gap_s=0.0):
     Without a model, positions are not corrected, and their standard deviation is `UNCALIBRATED_SIGMA_M`. `gap_s` is the
     time between the colour and the depth image, in which people move.
     """
-    if not boxes:
-        return []
-    centers_m = np.array([box.center_m for box in boxes])
-    covariances_m2 = UNCALIBRATED_SIGMA_M ** 2 * np.eye(3)
-    if model is not None:
-        ahead = centers_m[:, 2] > 0  # the axis of a very near person may be behind the image plane of a tilted camera
-        centers_m[ahead] = model.corrected(centers_m[ahead])
-        covariances_m2 = model.covariance(centers_m)
-    unsupported = np.array([max(0.0, WELL_SUPPORTED - box.support) for box in boxes])
-    truncated = np.array([box.truncated for box in boxes])
-    variances_m2 = np.outer(unsupported ** 2, SUPPORT_SIGMAS_M ** 2) + np.outer(truncated, TRUNCATED_SIGMAS_M ** 2)
-    variances_m2 += (gap_s * WALKING_MPS) ** 2
-    covariances_m2 = covariances_m2 + variances_m2[..., np.newaxis] * np.eye(3)
-    return [box._replace(center_m=center_m, covariance_m2=covariance_m2)
-            for box, center_m, covariance_m2 in zip(boxes, centers_m, covariances_m2)]
+    corrected = []
+    for box in boxes:
+        center_m, variances_m2 = box.center_m.tolist(), 3 * (UNCALIBRATED_SIGMA_M ** 2,)
+        if model is not None:
+            if center_m[2] > 0:  # the axis of a very near person may be behind the image plane of a tilted camera
+                center_m = model.corrected_point(*center_m)
+            variances_m2 = model.variances_m2(*center_m)
+        covariance_m2, truncated, unsupported = np.zeros((3, 3)), box.truncated, max(0.0, WELL_SUPPORTED - box.support)
+        for axis, variance_m2 in enumerate(variances_m2):
+            covariance_m2[axis, axis] = (variance_m2 + (unsupported * SUPPORT_SIGMAS_M[axis]) ** 2
+                                         + truncated * TRUNCATED_SIGMAS_M[axis] ** 2 + (gap_s * WALKING_MPS[axis]) ** 2)
+        corrected.append(box._replace(center_m=np.array(center_m), covariance_m2=covariance_m2))
+    return corrected
 
 
 def checked(model):
@@ -199,7 +210,8 @@ def checked(model):
         raise ValueError('measured_range is %s; 0 < z_min_m <= x_z_min_m <= z_max_m and x_max_m > 0 expected'
                          % (tuple(limits),))
     z_m = np.linspace(limits.z_min_m, limits.z_max_m, 101)
-    for name, slopes in (('z_bias', np.polyval(np.polyder(model.z_bias), z_m)), ('x_bias', model._x_slope_at(z_m))):
+    for name, slopes in (('z_bias', np.polyval(np.polyder(model.z_bias), z_m)),
+                         ('x_bias', list(map(model._x_slope_at, z_m.tolist())))):
         steepest = np.abs(slopes).max()
         if steepest > STEEPEST_BIAS:
             raise ValueError('%s changes by %.2g m a metre; at most %g expected, because the bias must be invertible'

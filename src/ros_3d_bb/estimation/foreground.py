@@ -1,19 +1,20 @@
 """3D boxes from the depth layers of the objects in all rectangles of an image; see `box3d` for the conventions.
 
-Depth layers are layers of z in the level frame, because people stand upright there.
+The order of the objects and their masks are in `overlaps`, the layers in `depth_samples`.
 """
+import math
+
 import numpy as np
 
 from ros_3d_bb.estimation.box3d import (Box3D, complete_truncated_extent, slopes_down, truncated_edges,
                                         without_distortion)
-from ros_3d_bb.estimation.depth_layers import BODY_HALF_DEPTH_MM, SortedDistances
-from ros_3d_bb.estimation.depth_samples import GRID_COLUMNS, GRID_ROWS, RectSamples
+from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, FEET_M, LOOKS_DOWN, RectSamples, image_rays
 from ros_3d_bb.estimation.overlaps import Overlaps
 
-LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate; a lidar gives twice as many
-LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the person's layer for an estimate
-LEAST_WIDTH_M = 0.05
-FILLED = 0.4  # minimum share of both sides of a rectangle that background behind an object fills
+LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate; chosen: a lidar gives twice as many
+LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the layer for an estimate; chosen
+LEAST_WIDTH_M = 0.05  # chosen: of a body that is one pixel wide
+FILLED = 0.4  # minimum share of both sides of a rectangle that background behind an object fills; chosen
 
 
 def estimate_foreground(depth, rects_px, geometry, kinds):
@@ -29,13 +30,7 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
     largest gets a box: what remains in the others is background, which continues beyond their left and right sides.
 
-    Parameters
-    ----------
-    depth : depth_image.DepthImage
-    rects_px : sequence of (x1, y1, x2, y2)
-    geometry : ImageGeometry
-    kinds : sequence of object_classes.ObjectClass
-        That of each rectangle.
+    `depth` is a DepthImage, `geometry` its ImageGeometry, and `kinds` are the ObjectClasses of the rectangles.
 
     Returns
     -------
@@ -44,66 +39,71 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
         less than `LEAST_SUPPORT` of those with depth, if the rectangle cannot be undistorted, or if it is a second one
         of the same object.
     """
-    image = _Image(depth, rects_px, geometry, kinds)
-    boxes = [None] * len(rects_px)
-    while image.overlaps.pending.any():
-        for number, box in image.estimates(image.overlaps.take_foremost()):
+    rects_px = list(map(tuple, rects_px))
+    flat_px = without_distortion(rects_px, geometry.camera)
+    rays = image_rays(geometry.camera, geometry.level_axes)
+    samples, truncated, usable, boxes = [], [], [], [None] * len(rects_px)
+    with np.errstate(invalid='ignore'):  # nan: the distortion model has no ray for every pixel
+        for number, rect_px in enumerate(rects_px):
+            truncated.append(truncated_edges(rect_px, geometry.area_px))
+            samples.append(RectSamples(depth, rect_px, rays))
+            rows, columns = samples[number].shape
+            has_depth = samples[number].measured >= max(LEAST_MEASURED * rows * columns, 1)
+            if has_depth and math.isfinite(sum(flat_px[number])):
+                usable.append(number)
+    overlaps = Overlaps(samples, usable, geometry.camera, kinds, truncated)
+    while overlaps.pending:
+        for number in overlaps.take_foremost():
+            seen = _visible_extents(samples[number], flat_px[number], geometry, number in overlaps.repeats)
+            if seen is None:
+                continue
+            box, axis_m = _box(seen, rects_px[number], truncated[number], kinds[number], geometry)
+            if box.is_plausible:
+                overlaps.mask_behind(number, int(1000 * axis_m) + BODY_HALF_DEPTH_MM)
             boxes[number] = box
     return boxes
 
 
-class _Image(object):
-    """Samples of all rectangles of an image, and the boxes estimated from them; see `estimate_foreground`."""
+def _visible_extents(samples, flat_px, geometry, may_repeat):
+    """Left, right, upper and lower end of the object in a rectangle and its distance, metres, and its support.
 
-    def __init__(self, depth, rects_px, geometry, kinds):
-        self._rects_px, self._kinds = list(map(tuple, rects_px)), kinds
-        self._camera_from_level = geometry.level_from_camera.T
-        rects_px = np.array(rects_px, np.int64)
-        flat_px = without_distortion(rects_px, geometry.camera)
-        self._slopes_down = slopes_down(flat_px, geometry)
-        self._truncated = [truncated_edges(rect_px, geometry.area_px) for rect_px in self._rects_px]
-        self._samples = samples = RectSamples(depth, rects_px, geometry)
-        usable = samples.measured >= np.maximum(LEAST_MEASURED * samples.counts.prod(axis=1), 1)
-        usable &= np.isfinite(flat_px).all(axis=1)
-        self.overlaps = Overlaps(samples, usable, geometry.camera, kinds, self._truncated)
+    Returns None without an object of its own. `may_repeat` is whether it may be the background of another object.
+    """
+    layer = samples.layer()
+    count = layer.end - layer.first
+    support = count / samples.measured
+    if support < LEAST_SUPPORT:
+        return None
+    on_body = samples.on_body(layer)
+    if may_repeat and _fills_sides(on_body.reshape(samples.shape)):
+        return None
+    # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
+    layer_m = layer.mean_mm(layer.first + count // 10, layer.end - count // 10) / 1000
+    upper, lower = slopes_down(flat_px, geometry)
+    top_m, bottom_m = layer_m * upper, layer_m * lower
+    looks_down = geometry.level_axes[1][2] > LOOKS_DOWN
+    left_m, right_m = samples.edges(on_body, bottom_m - FEET_M if looks_down else None)
+    return left_m, right_m, top_m, bottom_m, layer_m, support
 
-    def estimates(self, group):
-        """Pairs (number, Box3D) of the rectangles in `group` (k,) that have a box; what these occlude is masked."""
-        ahead_mm = self._samples.ahead_mm[group]
-        ordered = SortedDistances(ahead_mm)
-        layers_mm = self._samples.layers(group, ahead_mm, ordered)
-        first, end = ordered.within(layers_mm, BODY_HALF_DEPTH_MM)
-        supports = (end - first) / self._samples.measured[group]
-        # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
-        tenth = (end - first) // 10
-        layers_m = ordered.means(first + tenth, end - tenth) / 1000
-        nearest_mm, farthest_mm = (ordered.at(rank).astype(np.uint16)[:, None] for rank in (first, end - 1))
-        top_m, bottom_m = layers_m * self._slopes_down[:, group]
-        on_body = (ahead_mm >= nearest_mm) & (ahead_mm <= farthest_mm)
-        left_m, right_m = self._samples.edges(group, on_body, bottom_m)
-        valid = (supports >= LEAST_SUPPORT) & ~(self.overlaps.repeats[group] & self._fills_sides(group, on_body))
-        values = zip(valid.tolist(), group.tolist(), supports.tolist(), layers_m.tolist(), left_m.tolist(),
-                     right_m.tolist(), top_m.tolist(), bottom_m.tolist())
-        return [(number, self._box(number, support, *extents_m)) for is_valid, number, support, *extents_m in values
-                if is_valid]
 
-    def _fills_sides(self, group, on_body):
-        """Whether the samples (k, samples) `on_body` fill at least `FILLED` of both sides of rectangles."""
-        on_body, members = on_body.reshape(-1, GRID_ROWS, GRID_COLUMNS), np.arange(len(group))
-        rows, columns = self._samples.counts[group].T
-        return np.all([np.count_nonzero(on_body[members, :, column], axis=1) >= FILLED * rows
-                       for column in (0, columns - 1)], axis=0)
+def _fills_sides(on_body):
+    """Whether samples (h, w) on a body fill both sides of a rectangle."""
+    return min(np.count_nonzero(on_body[:, side]) for side in (0, -1)) >= FILLED * len(on_body)
 
-    def _box(self, number, support, layer_m, left_m, right_m, top_m, bottom_m):
-        rect_px, kind = self._rects_px[number], self._kinds[number]
-        cut_left, cut_top, cut_right, cut_bottom = cut = self._truncated[number]
-        left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, kind.width)
-        top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, kind.height)
-        surface_m = np.array([(left_m + right_m) / 2, (top_m + bottom_m) / 2, layer_m])
-        width_m = max(right_m - left_m, LEAST_WIDTH_M)
-        behind_m = kind.axis_behind(width_m)
-        center_m = self._camera_from_level.dot(surface_m * (1 + behind_m / layer_m))
-        box = Box3D(center_m, np.array([width_m, bottom_m - top_m, width_m]), rect_px, support, cut)
-        if box.is_plausible:
-            self.overlaps.mask_behind(number, int(1000 * (layer_m + behind_m)) + BODY_HALF_DEPTH_MM)
-        return box
+
+def _box(seen, rect_px, truncated, kind, geometry):
+    """The Box3D of an object, completed where the image border truncates it, and the distance of its axis, metres.
+
+    `seen` are its visible extents, and `kind` is its ObjectClass.
+    """
+    left_m, right_m, top_m, bottom_m, layer_m, support = seen
+    cut_left, cut_top, cut_right, cut_bottom = truncated
+    left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, kind.width)
+    top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, kind.height)
+    width_m = max(right_m - left_m, LEAST_WIDTH_M)
+    axis_m = layer_m + kind.axis_behind(width_m)
+    along_ray = axis_m / layer_m
+    across_m, down_m = (left_m + right_m) / 2 * along_ray, (top_m + bottom_m) / 2 * along_ray
+    center_m = [x * across_m + y * down_m + z * axis_m for x, y, z in zip(*geometry.level_axes)]
+    size_m = np.array((width_m, bottom_m - top_m, width_m))
+    return Box3D(np.array(center_m), size_m, rect_px, support, truncated), axis_m

@@ -95,23 +95,24 @@ class EstimationStage(object):
         list of box3d.Box3D
             In the optical frame of the image as received.
         """
-        implausible, usable = [], self._usable_boxes(boxes2d)
+        usable = self._usable_boxes(boxes2d)
         rects_px = list(map(tuple, frame.upright_rects(usable.boxes).tolist()))
-        estimates = estimate_boxes(frame.depth, rects_px, frame.camera, self._estimator, implausible,
-                                   _level_rotation(frame.up), usable.labels)
-        boxes3d = [box._replace(score=score) for box, score in zip(estimates, usable.scores.tolist())
-                   if box is not None]
+        estimates = estimate_boxes(frame.depth, rects_px, frame.camera, self._estimator, _level_rotation(frame.up),
+                                   usable.labels)
+        found = [box._replace(score=score) for box, score in zip(estimates, usable.scores.tolist())
+                 if box is not None]
+        boxes3d = [box for box in found if box.is_plausible]
+        implausible = [box for box in found if not box.is_plausible] if len(boxes3d) < len(found) else []
         for box in _as_received(implausible, frame):
             self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
                               '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
                               % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], LARGEST_M)))
-        self._check_scale(boxes3d + implausible, frame.depth_unit_m)
-        counts = {'boxes estimated': len(boxes3d),
-                  'boxes without depth': len(estimates) - len(boxes3d) - len(implausible)}
+        self._check_scale(found, frame.depth_unit_m)
+        counts = {'boxes estimated': len(boxes3d), 'boxes without depth': len(estimates) - len(found)}
         boxes3d = corrected_boxes(boxes3d, self._error_model, abs(frame.stamp_ns - frame.depth_stamp_ns) / NS)
         if self._error_model is not None and boxes3d:
-            outside_m = self._error_model.distance_outside([box.center_m for box in boxes3d])
-            counts['boxes outside of the measured range'] = int((outside_m > 0).sum())
+            outside = [box for box in boxes3d if self._error_model.distance_outside(box.center_m[0], box.center_m[2])]
+            counts['boxes outside of the measured range'] = len(outside)
         counts['images estimated'] = 1
         self._events.count_all(counts)
         return _as_received(boxes3d, frame)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Optional
 import numpy as np
 
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.estimation.box3d import truncated_edges
+from ros_3d_bb.estimation.box3d import plausible, truncated_edges
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import read_error_model, write_error_model
 from ros_3d_bb.sessions.session_reader import annotated_people, read_color, read_depth, read_session
@@ -77,7 +77,7 @@ def _raw_positions(session, boxes, estimator):
     for number, (frame, rect_px) in enumerate(zip(session.frames, boxes)):
         if rect_px is not None:
             box, = estimate_boxes(read_depth(frame, session), [rect_px], session.camera, estimator)
-            raw_m[number] = np.nan if box is None else box.center_m
+            raw_m[number] = box.center_m if plausible(box) else np.nan
     return raw_m
 
 

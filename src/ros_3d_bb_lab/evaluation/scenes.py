@@ -9,6 +9,7 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
+from ros_3d_bb.estimation.box3d import plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes
 from ros_3d_bb.tracking.association import match_greedily
@@ -67,7 +68,7 @@ def _detections(depth, detected, camera, map_from_camera, error_model):
                                estimator_named('foreground'),
                                level_from_camera=level_rotation(map_from_camera[2, :3]))
     found = corrected_boxes([box._replace(score=score) for box, score in zip(estimated, detected.scores[usable])
-                             if box is not None], error_model)
+                             if plausible(box)], error_model)
     return detections_from_boxes(dict(enumerate(found)), map_from_camera)
 
 
@@ -87,7 +88,7 @@ def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6
         for person, box in zip(people, boxes):
             x_m, _y, z_m = transform_points(camera_from_map, person.position_m)
             if nearest_m <= z_m <= farthest_m:
-                errors_m.append(np.nan if box is None else np.hypot(box.center_m[0] - x_m, box.center_m[2] - z_m))
+                errors_m.append(np.hypot(box.center_m[0] - x_m, box.center_m[2] - z_m) if plausible(box) else np.nan)
     return np.array(errors_m)
 
 

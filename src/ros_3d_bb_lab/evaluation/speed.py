@@ -20,9 +20,8 @@ import numpy as np
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d import ImageGeometry
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_median, estimator_named
-from ros_3d_bb.estimation.depth_samples import sample_depth
+from ros_3d_bb.estimation.box3d import ImageGeometry, plausible
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_median, estimator_named, sample_depth
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
@@ -99,7 +98,7 @@ class Ours(object):
 
     def estimate(self, depth, rects_px):
         """3D boxes in the frame of the camera."""
-        return [box for box in estimate_boxes(depth, rects_px, self._camera, self._estimator) if box is not None]
+        return list(filter(plausible, estimate_boxes(depth, rects_px, self._camera, self._estimator)))
 
     def track(self, stamp_ns, boxes):
         """Update the tracks with one image. Returns the tracks."""

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Tuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d import truncated_edges
+from ros_3d_bb.estimation.box3d import plausible, truncated_edges
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.sessions.plausibility import likely_errors, outlier_of
 from ros_3d_bb.sessions.session_reader import SessionError, annotated_people, read_depth, read_session
@@ -166,7 +166,7 @@ def _estimate(frame, session, name):
     if name == 'recorded':
         return frame.estimate_m
     boxes = estimate_boxes(read_depth(frame, session), frame.boxes_px, session.camera, estimator_named(name))
-    return boxes[0].center_m if boxes and boxes[0] is not None else None
+    return boxes[0].center_m if boxes and plausible(boxes[0]) else None
 
 
 def _is_cut(frame, camera):
