@@ -15,11 +15,11 @@ def place_in(view, x, y):
 
 def test_the_error_of_a_typed_truth_is_shown_and_enter_saves_it(drive, folder):
     drive.press('-476.5', Qt.Key_Tab, '2050')
-    assert 'X −28 mm, Z +40 mm' in drive.window.pane.truth.error_label.text() and drive.measurement(0).truth_m is None
+    assert 'X −29 mm, Z +40 mm' in drive.window.pane.truth.error_label.text() and drive.measurement(0).truth_m is None
     drive.press(Qt.Key_Return)
     assert opened(folder)[0].truth_m == (-0.4765, None, 2.05)
     assert drive.window.current == 1 and drive.window.progress.text() == '1 of 4 done'
-    assert 'X −28 mm, Z +40 mm' in drive.window.last_entry.text()
+    assert 'X −29 mm, Z +40 mm' in drive.window.last_entry.text()
     drive.press('-0,5 m', Qt.Key_Tab, '2.1m', Qt.Key_Tab, '-30', Qt.Key_Return)
     assert opened(folder)[1].truth_m == (-0.5, -0.03, 2.1) and drive.window.current == 2
 
