@@ -45,7 +45,7 @@ def launched(command):
 def test_commands_of_the_robot_start_its_nodes(services):
     nodes = {name: launched(VARIABLE.sub(r'\2', service['command'])) for name, service in services.items()}
     assert 'realsense_node' in nodes['camera']
-    assert {'bbox3d_node', 'tracker_node', 'planner_bridge_node'} <= nodes['pipeline']
+    assert {'people_node', 'planner_bridge_node'} <= nodes['pipeline']
 
 
 @pytest.mark.parametrize('block', BLOCKS, ids=lambda block: str(block.line))
@@ -55,4 +55,4 @@ def test_blocks_of_the_page_name_files_that_exist_and_the_image(block, services,
     assert all(os.path.isfile(os.path.join(ROOT, name)) for name in files)
     assert 'ros_3d_bb' in given or os.path.relpath(COMPOSE, ROOT) in files
     for pipeline in (line[len('PIPELINE='):] for line in given if line.startswith('PIPELINE=')):
-        assert 'yolov5_node' in launched(services['pipeline']['command'].split('$')[0] + pipeline)
+        assert 'people_node' in launched(services['pipeline']['command'].split('$')[0] + pipeline)

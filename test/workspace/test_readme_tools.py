@@ -103,7 +103,7 @@ def test_a_robot_is_set_up(reader):
     reader.types(RUNTIMES_ON_MELODIC, replaced=[('python3 -m pip', 'pip3')])
     for block in (WEIGHTS, DESCRIPTION, UPSTART):
         reader.types(block)
-    assert {'/simulator_node', '/depth_detector_node', '/tracker_node'} <= set(first_nodes.split())
+    assert {'/simulator_node', '/people_node'} <= set(first_nodes.split())
     logged = reader.log.read_text().splitlines()
     assert os.path.exists(str(reader.home / 'catkin_ws' / 'src' / 'ros_3d_bb' / 'package.xml'))
     for command in ('git clone URL ros_3d_bb', 'rosdep install --from-paths src --ignore-src', 'catkin_make',
@@ -111,7 +111,7 @@ def test_a_robot_is_set_up(reader):
                     'systemctl restart ros', 'systemctl daemon-reload', 'systemctl start people'):
         assert command in logged
     assert [line for line in logged if line.startswith('wget https://github.com/ultralytics/yolov5/releases')]
-    assert '/yolov5_node' in logged and '/camera_mount' in logged  # robot_upstart could load the launch file
+    assert '/people_node' in logged and '/camera_mount' in logged  # robot_upstart could load the launch file
     setup = (reader.etc / 'setup.bash').read_text()
     description = re.search('JACKAL_URDF_EXTRAS=(.*)', setup).group(1)
     assert os.path.exists(description) and '/catkin_ws/devel/setup.bash' in setup
