@@ -9,8 +9,8 @@ CLEARLY_LOWER = 0.02  # share of the image height: nearer people stand lower in 
 LEAST_SIZE = 0.65  # minimum share of its usual size that an object appears to have at its layer: a hidden chair, 0.6
 LEAST_BESIDE = 0.25  # minimum share of a rectangle beside another one that shows a layer of its own
 CONTAINED = 0.8  # minimum share of a second rectangle of an object in the first one
-# For speed, more than in a crowd: of more rectangles, those that few others occlude are foremost, too, and a part of the
-# overlaps is ignored; so many layers of rectangles beside each other are determined at once.
+# For speed, and more than in a crowd: of more rectangles, those that few others occlude are foremost, too, and a part
+# of the overlaps is ignored; so many layers of rectangles beside each other are determined at once.
 MANY, MOST_TIES = 200, 256
 
 
