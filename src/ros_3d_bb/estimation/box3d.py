@@ -79,7 +79,8 @@ def truncated_edges(rect_px, area_px):
     x1, y1, x2, y2 = rect_px
     left, top, right, bottom = area_px
     across_px, down_px = BORDER_PX + BORDER_SHARE * (x2 - x1), BORDER_PX + BORDER_SHARE * (y2 - y1)
-    return x1 <= left + across_px, y1 <= top + down_px, x2 >= right - across_px, y2 >= bottom - down_px
+    return (bool(x1 <= left + across_px), bool(y1 <= top + down_px), bool(x2 >= right - across_px),
+            bool(y2 >= bottom - down_px))
 
 
 def complete_truncated_extent(low, high, cut_low, cut_high, usual):

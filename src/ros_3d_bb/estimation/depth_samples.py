@@ -57,13 +57,16 @@ class Layer(NamedTuple):
 class RectSamples(object):
     """Samples of the visible part of a rectangle in the level frame, each an element of flat arrays.
 
-    `rays` are those of `image_rays`; `shape` are the numbers of rows and columns, and `measured` is the number of
+    `rays` are the `camera_rays`; `shape` are the numbers of rows and columns, and `measured` is the number of
     samples with depth and a viewing ray, masked or not.
     """
 
-    def __init__(self, depth, rect_px, rays):
-        self.rect_px, self._rays = rect_px, rays
+    def __init__(self, depth, rect_px, rays, level_axes):
+        self.rect_px, self._level_axes = rect_px, level_axes
         self._rows, self._columns = grid_in(rect_px, depth.shape)
+        x, y = rays
+        x = x[:, self._columns] if len(x) == 1 else x[self._rows, self._columns]
+        self._rays = x, y[self._rows] if y.shape[1] == 1 else y[self._rows, self._columns]
         self._depth_m = _depths(depth.part(self._rows, self._columns), depth.scale_m)
         self.shape = self._depth_m.shape
         ahead_m = self._along(2)
@@ -76,9 +79,8 @@ class RectSamples(object):
 
     def _along(self, axis):
         """Positions along an axis of the level frame, metres."""
-        x, y = self._rays[axis]
-        rays = x[self._rows, self._columns] if y is None else x[:, self._columns] + y[self._rows]
-        return (rays * self._depth_m).ravel()
+        (x, y), (to_x, to_y, to_z) = self._rays, self._level_axes[axis]
+        return ((to_x * x + (to_y * y + to_z)) * self._depth_m).ravel()
 
     def _layer_in(self, ahead_mm):
         return nearest_dominant_layer(ahead_mm, (_ROW_WEIGHTS[self.shape[0]] * self._column_weights).ravel())
@@ -125,16 +127,11 @@ class RectSamples(object):
                                            _rank(columns, left):_rank(columns, right)]
 
 
-@functools.lru_cache(maxsize=8)  # the camera and its tilt are the same in most images
-def image_rays(camera, level_axes):
-    """Components along the axes of the level frame of the viewing rays of all pixels, with z = 1 in the optical frame.
-
-    Returns three pairs of arrays, whose sum is meant: (1, w) and (h, 1), or (h, w) and None if the lens distorts.
-    """
+@functools.lru_cache(maxsize=8)
+def camera_rays(camera):
+    """Viewing rays x / z and y / z of all pixels: (1, w) and (h, 1), or both (h, w) if the lens distorts."""
     x, y = camera.rays(np.arange(camera.width)[np.newaxis], np.arange(camera.height)[:, np.newaxis])
-    x, y = x.astype(np.float32), y.astype(np.float32)
-    pairs = [(to_x * x, to_y * y + to_z) for to_x, to_y, to_z in level_axes]
-    return [(x + y, None) for x, y in pairs] if camera.distortion_model else pairs
+    return x.astype(np.float32), y.astype(np.float32)
 
 
 def grid_in(rect_px, shape):

@@ -20,8 +20,7 @@ STEEPEST_BIAS, SOLVER_STEPS = 0.5, 20  # m/m; chosen: each step at least halves 
 NEAREST_SHARE = 0.2  # lower bound of a corrected range, relative to the measured range; chosen
 UNCALIBRATED_SIGMA_M = 0.1  # of positions without an error model; chosen
 # Additional standard deviations along x and z: per unit of support below the first value, and of boxes at the image
-# border. Fitted once to simulated crowds of six and eight people; there is no command that repeats it. Checked in other
-# crowds by test_covariances_hold_for_any_support.
+# border. Fitted once to simulated crowds, without a command to repeat it; test_difficult_views.py checks the coverage.
 WELL_SUPPORTED, SUPPORT_SIGMAS_M, TRUNCATED_SIGMAS_M = 0.65, (0.4, 0.0, 0.25), (0.06, 0.0, 0.03)
 WALKING_MPS = (0.8, 0.0, 0.8)  # standard deviation of the velocity of people; chosen
 

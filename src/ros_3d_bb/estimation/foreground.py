@@ -8,7 +8,7 @@ import numpy as np
 
 from ros_3d_bb.estimation.box3d import (Box3D, complete_truncated_extent, slopes_down, truncated_edges,
                                         without_distortion)
-from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, FEET_M, LOOKS_DOWN, RectSamples, image_rays
+from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, FEET_M, LOOKS_DOWN, RectSamples, camera_rays
 from ros_3d_bb.estimation.overlaps import Overlaps
 
 LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate; chosen: a lidar gives twice as many
@@ -41,12 +41,12 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     """
     rects_px = list(map(tuple, rects_px))
     flat_px = without_distortion(rects_px, geometry.camera)
-    rays = image_rays(geometry.camera, geometry.level_axes)
+    rays = camera_rays(geometry.camera)
     samples, truncated, usable, boxes = [], [], [], [None] * len(rects_px)
     with np.errstate(invalid='ignore'):  # nan: the distortion model has no ray for every pixel
         for number, rect_px in enumerate(rects_px):
             truncated.append(truncated_edges(rect_px, geometry.area_px))
-            samples.append(RectSamples(depth, rect_px, rays))
+            samples.append(RectSamples(depth, rect_px, rays, geometry.level_axes))
             rows, columns = samples[number].shape
             has_depth = samples[number].measured >= max(LEAST_MEASURED * rows * columns, 1)
             if has_depth and math.isfinite(sum(flat_px[number])):

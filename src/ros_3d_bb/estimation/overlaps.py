@@ -1,7 +1,7 @@
 """Occlusion: order of the objects in overlapping rectangles by depth, and masks of what nearer ones show in them."""
 from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, UNKNOWN_MM
 
-# All are chosen, and checked by test_difficult_views.py.
+# All are chosen; test_difficult_views.py checks them.
 CUT_ROWS = 1 / 30.0  # share of the image height at which the lower edges of truncated boxes are compared
 SAME_LAYER_M = 0.25  # largest difference of the layers of parts of one body
 CLEARLY_NEARER_M = 0.1
@@ -9,8 +9,9 @@ CLEARLY_LOWER = 0.02  # share of the image height: nearer people stand lower in 
 LEAST_SIZE = 0.65  # minimum share of its usual size that an object appears to have at its layer: a hidden chair, 0.6
 LEAST_BESIDE = 0.25  # minimum share of a rectangle beside another one that shows a layer of its own
 CONTAINED = 0.8  # minimum share of a second rectangle of an object in the first one
-MANY = 200  # from this number of rectangles on, those that few others occlude are foremost, too: for speed
-MOST_TIES = 256  # pairs of rectangles whose layers beside each other are determined at once: more than in a crowd
+# For speed, and more than in a crowd: of more rectangles, those that few others occlude are foremost, too, and a part
+# of the overlaps is ignored; so many layers of rectangles beside each other are determined at once.
+MANY, MOST_TIES = 200, 256
 
 
 class Overlaps(object):
@@ -139,7 +140,7 @@ def _shared_areas(usable, samples):
     shared_px = {number: {} for number in usable}
     for rank, (_left, top, right, bottom, number) in enumerate(by_left):
         for other_left, other_top, other_right, other_bottom, other in by_left[rank + 1:]:
-            if other_left >= right:
+            if other_left >= right or len(shared_px[number]) >= MANY:
                 break
             rows_px = min(bottom, other_bottom) - max(top, other_top)
             if rows_px > 0:
