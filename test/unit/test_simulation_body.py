@@ -43,7 +43,7 @@ def test_bones_are_connected_at_their_joints(posture):
 def test_the_lowest_point_is_on_the_floor(body, posture):
     vertices = body.posed(posture).vertices
     assert vertices[:, 2].min() == 0
-    assert vertices[:, 2].max() < body.build.height_m + .025  # in the middle of a step
+    assert vertices[:, 2].max() < body.build.height_m + .04  # walking on the toes raises the head by 3.7 cm
 
 
 @given(builds)
