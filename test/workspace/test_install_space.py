@@ -82,11 +82,6 @@ def test_launch_config_rviz_and_scripts_are_installed(installed):
     assert os.path.exists(os.path.join(share, 'LICENSE'))
 
 
-@pytest.mark.parametrize('name', [name for name in PROGRAMS if name not in NODES])
-def test_each_tool_prints_its_usage(installed, name):
-    assert 'usage: ' + name in run_in(installed, 'rosrun ros_3d_bb', name, '--help')
-
-
 @pytest.fixture(scope='module')
 def master():
     """The URI of a ROS master."""

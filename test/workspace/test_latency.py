@@ -61,15 +61,6 @@ def test_results_are_written_and_no_process_remains(bag, benchmark, tmp_path):
     assert processes_naming(str(tmp_path)) == 0
 
 
-@pytest.mark.parametrize('arguments, status, reason', [
-    (('--cases', 'fre'), 2, "'fre' is unknown"), (('--cases', 'yolov5-512'), 2, 'need --weights'),
-    (('--seconds', '0'), 2, 'more than 0'), (('--cases', 'free', '--bag', __file__), 1, 'cannot be read')])
-def test_invalid_arguments_and_bags_are_rejected(benchmark, arguments, status, reason):
-    process = benchmark('--bag', 'some.bag', *arguments)
-    printed, _nothing = process.communicate()
-    assert process.returncode == status and reason in printed
-
-
 def test_the_topics_of_a_limit_are_those_of_the_node():
     published = [['/tracks', ['/tracker']], ['/rosout', ['/tracker']], ['/diagnostics', ['/tracker', '/other']],
                  ['/tracker/parameter_updates', ['/tracker']], ['/boxes', ['/other']]]
