@@ -6,6 +6,7 @@ ground truth, and a fit as a function of the measured position would pull every 
 A node knows only the measured position, so `ErrorModel.corrected` solves measured = truth + bias(truth). The model is
 fitted by ros_3d_bb_lab.evaluation.error_model_fit; its file format is described in config/error_models/README.md.
 """
+import math
 from typing import NamedTuple, Optional
 
 import numpy as np
@@ -124,9 +125,12 @@ class ErrorModel(NamedTuple):
                 break
         z_m = max(z_m, NEAREST_SHARE * measured_z_m)
 
-        x_m, slope = measured_x_m - self.x_bias.offset_m, self._x_slope_at(z_m)
-        outside_m = x_m - slope * self.measured_range.x_max_m * (1 if x_m > 0 else -1)
-        x_m = x_m / (1 + slope) if abs(x_m / (1 + slope)) <= self.measured_range.x_max_m else outside_m
+        x_m, scale = measured_x_m - self.x_bias.offset_m, 1 + self._x_slope_at(z_m)
+        limit_m = self.measured_range.x_max_m
+        if scale and abs(x_m) <= limit_m * abs(scale):
+            x_m /= scale
+        else:
+            x_m -= (scale - 1) * math.copysign(limit_m, x_m)
         return x_m, measured_y_m * z_m / measured_z_m, z_m
 
     def biased(self, position_m):
