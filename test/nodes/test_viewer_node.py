@@ -226,7 +226,8 @@ def test_keys_store_pause_and_quit(rig, window):
     for presses in (1, 2, 3):
         press_key('p')
         wait_until(lambda: len(calls) == presses, 'the call of the detector')
-    wait_until(lambda: press(TITLE, 'q') or process.poll() is not None, 'the window')  # it can close before press returns
+    # It can close before press returns.
+    wait_until(lambda: press(TITLE, 'q') or process.poll() is not None, 'the window')
     assert process.wait(timeout=20) == 0
     assert calls == [False, True, False, True]  # the detector is resumed at the end
     service.shutdown()

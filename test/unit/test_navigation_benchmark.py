@@ -66,8 +66,8 @@ def test_the_summary_of_trials():
 def test_people_are_visible_in_the_newest_image_of_any_camera():
     Track = namedtuple('Track', 'id status')
     visible = VisiblePeople(cameras=2)
-    shown = [[track.id for track in visible.of([Track(1, one), Track(2, other)])]
-             for one, other in ((VISIBLE, OUT_OF_VIEW), (OUT_OF_VIEW, VISIBLE), (OCCLUDED, VISIBLE), (VISIBLE, OCCLUDED))]
+    images = (VISIBLE, OUT_OF_VIEW), (OUT_OF_VIEW, VISIBLE), (OCCLUDED, VISIBLE), (VISIBLE, OCCLUDED)
+    shown = [[track.id for track in visible.of([Track(1, one), Track(2, other)])] for one, other in images]
     assert shown == [[1], [1, 2], [2], [1, 2]]
 
 

@@ -12,8 +12,7 @@ import yaml
 
 from ros_3d_bb_lab.evaluation.defaults import describe_machine
 from ros_3d_bb_lab.evaluation.launching import launch
-from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import (CAMERAS, GOAL_M, RATE_HZ, SCENES,
-                                                                  scenario_of)
+from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import CAMERAS, GOAL_M, RATE_HZ, SCENES, scenario_of
 from ros_3d_bb_lab.evaluation.navigation.trial_result import summaries
 
 MODES = 'ours', 'none', 'laser', 'depth', 'thesis', 'visible', 'truth'
