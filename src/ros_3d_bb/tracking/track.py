@@ -86,6 +86,19 @@ class _End(NamedTuple):
     cut_ns: int
 
 
+class LatestBox(NamedTuple):
+    """Position of the latest detection, and the height of its upper end, or of the image border that truncates it."""
+
+    x: float
+    y: float
+    head_m: float
+
+    @classmethod
+    def of(cls, measurement):
+        """The LatestBox of a Measurement."""
+        return cls(measurement.x, measurement.y, measurement.z + measurement.size_m[2] / 2)
+
+
 class Track(object):
     """One object. Plain numbers in the fixed frame, metres, nanoseconds.
 
@@ -93,9 +106,10 @@ class Track(object):
     extents, and `lower` and `upper` the ends of the body. `hits` counts the detections, of which `first_ns` and
     `last_ns` are the first and the latest. `unseen_s` is the time since the latest one, `missed_s` the part of it
     during which a detection was expected. `visibility` is that in the latest image of each camera: SEEN, or as
-    `status`. `log_odds` is the track score. `kind` is the class of the group that has the most of the filtered scores
-    `votes`; `score` is the filtered score of the detections, `detection` the `Detection.index` in the latest image.
-    `innovation_m` is that of the latest image if its noise is assumed, otherwise 0.
+    `status`. `latest` is the `LatestBox`. `log_odds` is the track score. `kind` is the class of the group that has the
+    most of the filtered scores `votes`; `score` is the filtered score of the detections, `detection` the
+    `Detection.index` in the latest image. `innovation_m` is that of the latest image if its noise is assumed, otherwise
+    0.
     """
 
     def __init__(self, track_id, measurement, stamp_ns, camera, speed_mps, even_log_odds):
@@ -107,6 +121,7 @@ class Track(object):
         self.z_m, self.z_m2, self.size_m = measurement.z, measurement.zz, measurement.size_m
         _left, top, _right, bottom = detection.truncated_edges
         self.lower, self.upper = (_End(0, stamp_ns) if is_cut else _End(1, NEVER_NS) for is_cut in (bottom, top))
+        self.latest = LatestBox.of(measurement)
         self.hits, self.first_ns, self.last_ns, self.unseen_s, self.missed_s = 1, stamp_ns, stamp_ns, 0.0, 0.0
         self.status, self.visibility, self.innovation_m = VISIBLE, {camera: SEEN}, (0.0, 0.0)
         self.log_odds, self.is_confirmed, self.is_moving = log_odds_of(detection.score, even_log_odds), False, False
@@ -132,6 +147,7 @@ class Track(object):
         detection, state = measurement.detection, self.state
         is_assumed = measurement.is_assumed
         self.innovation_m = (measurement.x - state.x, measurement.y - state.y) if is_assumed else (0.0, 0.0)
+        self.latest = LatestBox.of(measurement)
         self.state = state = kalman_filter.update(state, measurement, rules.outliers)
         period_s = (stamp_ns - self.last_ns) / NS - self.unseen_s
         log_odds = log_odds_of(detection.score, rules.even_log_odds)

@@ -19,6 +19,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import associate
 from ros_3d_bb.tracking.birth import NEW_NS, duplicates, initiate
 from ros_3d_bb.tracking.common_motion import FEWEST, SETTLED_NS, common_motion, may_jump, most_fit, moved
+from ros_3d_bb.tracking.manoeuvres import match_manoeuvres
 from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, BoxNoise, Kinds, NoiseParams,
                                                   correlated_images, learned_log_scale, learned_range,
                                                   measurements_of, scaled)
@@ -155,6 +156,8 @@ class Tracker(TrackerBase):
         tracks = self._predict(before, image.stamp_ns)
         measurements = self._measure(before, image)
         matches, fits, is_moved = self._associate(before, tracks, measurements, image)
+        if len(matches) < len(measurements) and not is_moved:
+            matches += self._match_manoeuvres(before, tracks, measurements, matches, image)
         matched = {track.id: (track.is_confirmed, measurement.number) for track, measurement in matches}
         log_noise_scale = learned_log_scale(before.log_noise_scale, matches)
         self._update_matched(matches, log_noise_scale - max(before.log_noise_scale, 0), image)
@@ -211,6 +214,14 @@ class Tracker(TrackerBase):
         for track in tracks:
             track.state = moved(track.state, *motion, view=view)
         return associate(tracks, measurements, stamp_ns, params, outliers), fits, True
+
+    def _match_manoeuvres(self, before, tracks, measurements, matches, image):
+        """The further matches [(Track, Measurement)] of people who leave the gate, see `manoeuvres`."""
+        latest = before.cameras.get(image.view.camera)
+        if latest is None:
+            return []
+        return match_manoeuvres(tracks, measurements, matches, latest.stamp_ns, image.stamp_ns,
+                                self._params[0].height_sigma)
 
     def _update_matched(self, matches, log_factor, image):
         """Update the tracks of the matches, with the variance of assumed noise multiplied by exp(`log_factor`)."""
