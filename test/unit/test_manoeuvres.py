@@ -1,4 +1,5 @@
-"""Manoeuvres: people who start to run, turn, stop or sit down between two images of a slow detector.
+"""Manoeuvres: people who start to run, turn, stop or sit down between two images of a slow detector, and people whom it
+finds now and then.
 
 The camera stands at the origin of the map, 1 m up, and looks along x.
 """
@@ -61,6 +62,12 @@ def test_a_person_who_turns_or_stops_keeps_the_id(rate_hz, velocity_mps):
 def test_a_person_who_sits_down_stands_up_bends_or_raises_an_arm_keeps_the_id(rate_hz, heights_m):
     outputs = play(rate_hz, 4, lambda time_s: [(3.0, 0.0, float(np.interp(time_s, (2, 2.6), heights_m)))])
     assert len(ids(outputs)) == 1
+
+
+@pytest.mark.parametrize('rate_hz', [3, 5, 10, 30])
+def test_a_person_found_in_every_second_image_is_published(rate_hz):
+    outputs = play(rate_hz, 10, lambda time_s: [(3.0, 0.0)] if round(time_s * rate_hz) % 2 == 0 else [])
+    assert len(ids(outputs)) == 1 and any(outputs[:int(5 * rate_hz)])
 
 
 def test_a_person_beside_one_who_is_not_detected_gets_another_id():

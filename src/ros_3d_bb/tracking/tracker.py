@@ -31,7 +31,7 @@ from ros_3d_bb.tracking.types import MOVING_SPEED, VISIBLE, TrackerBase
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped; chosen
-TENTATIVE_TIMEOUT_S = 0.6  # how long a tentative track is kept without a detection; chosen
+TENTATIVE_TIMEOUT_S = 0.75  # how long a tentative track is kept without a detection; chosen
 BY_ID, FIRST_SEEN = operator.attrgetter('id'), operator.attrgetter('first_ns')
 # Sections of the parameters.
 MOTION, ASSOCIATION = 'kalman: how people move', 'kalman: association of boxes with tracks'
