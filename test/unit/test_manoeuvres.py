@@ -85,3 +85,15 @@ def test_of_two_people_within_reach_none_takes_the_box_of_a_third():
         return [(4.0, -0.3, 1.8), (4.0, 0.3, 1.5)] if time_s < 2 else [(4.35, 0.0, 1.2)]
     outputs = play(5, 2.4, boxes_at)
     assert all(track.size_m[2] > 1.4 for tracks in outputs for track in tracks)
+
+
+def test_boxes_that_never_become_a_track_are_counted():
+    """Three boxes, each too far from the one before to be of the same person; then a person who stays."""
+    tracker = Tracker()
+    play(5, 0.6, lambda time_s: [(3.0, 15.0 * time_s)], tracker)
+    assert not tracker.untracked_boxes  # their tracks are tentative
+    for number in range(3, 20):
+        tracker.update(START_NS + number * NS // 5, [at(3.0, -3.0)], VIEW)
+    assert tracker.untracked_boxes == 3
+    tracker.reset()
+    assert not tracker.untracked_boxes
