@@ -8,6 +8,8 @@ import pytest
 from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, TrackedObject
 from ros_3d_bb_lab.evaluation.tracking import benchmark
+from ros_3d_bb_lab.evaluation.tracking.detection_generator import FALSE
+from ros_3d_bb_lab.evaluation.tracking.rates_benchmark import with_sources
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import START_NS, read_recordings
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S
 from support.error_models import MODEL
@@ -89,6 +91,36 @@ def test_the_command_scores_recorded_detections(monkeypatch, tmp_path, capsys):
     assert scores['ours']['recall'] > 80 and scores['ours']['precision'] == 100
     assert set(scores['ours']['coverage_95_by_range']) == {'0-8', '8-16', '16-40'}
     assert 'coverage_95 0-8 m, 2s' in capsys.readouterr().out
+
+
+def test_boxes_show_the_nearest_people_one_to_one(tmp_path):
+    run, = read_recordings(str(write_recording(tmp_path / 'one')))
+    image = run.images[0]
+    person, place_m = image.truth.ids[0], np.append(image.truth.position_m[0], 1.0)
+    box = image.detections[0]
+    boxes = [box._replace(position_m=place_m + (0, offset_m, 0)) for offset_m in (0.3, 0.1, 0.7)]
+    run = run._replace(images=(image._replace(detections=boxes), image._replace(detections=[])))
+    assert [image.sources for image in with_sources(run).images] == [[FALSE, person, FALSE], []]
+
+
+@pytest.mark.needs('trackeval')
+def test_the_command_compares_rates_with_perfect_association(monkeypatch, tmp_path, capsys):
+    """Of one person, perfect association is not better than ours."""
+    write_recording(tmp_path / 'one')
+    monkeypatch.delenv('ROS_3D_BB_DATA', raising=False)
+    monkeypatch.setattr(benchmark, 'PEDESTRIANS_EVERY', (10,))
+    monkeypatch.setattr(benchmark, 'RECORDINGS_EVERY', (1, 2))
+    path = tmp_path / 'scores.json'
+    monkeypatch.setattr(sys, 'argv', ['./run bench tracking', '--rates', '--seconds', '2', '--repetitions', '1',
+                                      '--detections', str(tmp_path / 'one'), '--json', str(path)])
+    benchmark.main()
+    result = json.loads(path.read_text())
+    assert list(result['pedestrians']) == ['3.0'] and list(result['recorded_detections']) == ['10.0', '5.0']
+    for scores in result['recorded_detections'].values():
+        assert set(scores) == {'ours', 'perfect_association'} and set(scores['ours']) == {'hota', 'idf1', 'id_switches'}
+        assert scores['ours']['hota'] > 50 and scores['ours']['id_switches'] == 0
+        assert scores['perfect_association'] == pytest.approx(scores['ours'], abs=1e-6)
+    assert 'recorded_detections   10.0 Hz  perfect_association' in capsys.readouterr().out
 
 
 @pytest.mark.needs('norfair', 'trackeval')

@@ -128,6 +128,14 @@ def test_invalid_boxes_do_not_affect_the_others(rig):
     assert rig.events.counts['3D boxes dropped'] == 60 and rig.events.counts['images tracked'] == 61
 
 
+def test_boxes_that_became_no_track_are_counted(rig):
+    """One box of something that is not there again, beside a person."""
+    rig.add_boxes(boxes(START_NS, 'camera', [(2, 0, 3)]), 0)
+    for frame in range(1, 60):
+        rig.send(START_NS + frame * PERIOD_NS)
+    assert rig.events.counts['3D boxes that became no track'] == 1
+
+
 def test_an_image_without_any_valid_box_does_not_age_tracks(rig):
     """It differs from an image without people. The track is still published after a second of such images."""
     stamp_ns, before = stand(rig)

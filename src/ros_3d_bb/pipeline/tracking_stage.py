@@ -173,10 +173,12 @@ class TrackingStage(object):
             raise ValueError('none of their %d boxes is valid; tracks are kept as they are' % len(faults))
         if camera:
             self._check_frame(message.header.frame_id, camera)
-        motions = self._tracker.common_motions
+        motions, untracked = self._tracker.common_motions, self._tracker.untracked_boxes
         tracks = self._tracker.update(stamp_ns, detections_from_boxes(boxes, fixed_from_camera, self._classes),
                                       self._view(message.header, fixed_from_camera, camera, camera_name))
         self._events.count('images tracked')
+        if self._tracker.untracked_boxes > untracked:
+            self._events.count('3D boxes that became no track', self._tracker.untracked_boxes - untracked)
         if self._tracker.common_motions > motions:
             self._events.warn('common motion compensated', 'the people at %.3f jumped together: the pose of the camera '
                               'in %s jumped, as after an error of the odometry; all tracks are moved with them'

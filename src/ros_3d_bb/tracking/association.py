@@ -44,7 +44,7 @@ def allowed_costs(tracks, measurements, params, outliers):
     costs = {}
     for row, column, cost in pairs:
         track, measurement = tracks[row], measurements[column]
-        cost += _height_cost(track, measurement, params.height_sigma)
+        cost += height_cost(track, measurement, params.height_sigma)
         if cost < gates[column][0] and track.kind.group == measurement.kind.group:
             costs[row, column] = cost
     return costs
@@ -114,7 +114,7 @@ def _likely_pairs_of_crowd(tracks, measurements, gates, outliers):
     return zip(rows[is_likely].tolist(), columns[is_likely].tolist(), costs[is_likely].tolist())
 
 
-def _height_cost(track, measurement, sigma_m):
+def height_cost(track, measurement, sigma_m):
     """Association cost of the height difference: its negative log likelihood, 0 for the same height.
 
     The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track. The

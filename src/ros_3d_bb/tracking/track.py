@@ -25,6 +25,7 @@ UNKNOWN_SCORE, LARGEST_SCORE = 0.5, 0.9999  # assumed if the score is unknown; u
 # Of the score of a detection. A high score does not mean that the position is right, as of a person half hidden.
 MIN_LOG_ODDS, MAX_LOG_ODDS = -2.0, 1.0
 HIT = 0.4  # of a detection where a track is expected: little, because false detections repeat at their place, too
+KNOWN_IMAGES = 4  # images that the expected rate of detections counts for, against the observed rate of a new track
 MAX_TRACK_SCORE = 4.0  # earlier evidence is forgotten: an undetected person is published for 0.4 s
 MIN_TRACK_SCORE = -2.0  # with less (12 % probability), tracks do not start, and undetected tracks are not published
 SMOOTHING = 0.1  # weight of the newest detection in size, height and score
@@ -86,6 +87,19 @@ class _End(NamedTuple):
     cut_ns: int
 
 
+class LatestBox(NamedTuple):
+    """Position of the latest detection, and the height of its upper end, or of the image border that truncates it."""
+
+    x: float
+    y: float
+    head_m: float
+
+    @classmethod
+    def of(cls, measurement):
+        """The LatestBox of a Measurement."""
+        return cls(measurement.x, measurement.y, measurement.z + measurement.size_m[2] / 2)
+
+
 class Track(object):
     """One object. Plain numbers in the fixed frame, metres, nanoseconds.
 
@@ -93,7 +107,8 @@ class Track(object):
     extents, and `lower` and `upper` the ends of the body. `hits` counts the detections, of which `first_ns` and
     `last_ns` are the first and the latest. `unseen_s` is the time since the latest one, `missed_s` the part of it
     during which a detection was expected. `visibility` is that in the latest image of each camera: SEEN, or as
-    `status`. `log_odds` is the track score. `kind` is the class of the group that has the most of the filtered scores
+    `status`. `latest` is the `LatestBox`, `misses` counts the images before the confirmation in which a detection was
+    expected. `log_odds` is the track score. `kind` is the class of the group that has the most of the filtered scores
     `votes`; `score` is the filtered score of the detections, `detection` the `Detection.index` in the latest image.
     `innovation_m` is that of the latest image if its noise is assumed, otherwise 0.
     """
@@ -107,6 +122,7 @@ class Track(object):
         self.z_m, self.z_m2, self.size_m = measurement.z, measurement.zz, measurement.size_m
         _left, top, _right, bottom = detection.truncated_edges
         self.lower, self.upper = (_End(0, stamp_ns) if is_cut else _End(1, NEVER_NS) for is_cut in (bottom, top))
+        self.latest, self.misses = LatestBox.of(measurement), 0
         self.hits, self.first_ns, self.last_ns, self.unseen_s, self.missed_s = 1, stamp_ns, stamp_ns, 0.0, 0.0
         self.status, self.visibility, self.innovation_m = VISIBLE, {camera: SEEN}, (0.0, 0.0)
         self.log_odds, self.is_confirmed, self.is_moving = log_odds_of(detection.score, even_log_odds), False, False
@@ -132,6 +148,7 @@ class Track(object):
         detection, state = measurement.detection, self.state
         is_assumed = measurement.is_assumed
         self.innovation_m = (measurement.x - state.x, measurement.y - state.y) if is_assumed else (0.0, 0.0)
+        self.latest = LatestBox.of(measurement)
         self.state = state = kalman_filter.update(state, measurement, rules.outliers)
         period_s = (stamp_ns - self.last_ns) / NS - self.unseen_s
         log_odds = log_odds_of(detection.score, rules.even_log_odds)
@@ -149,6 +166,11 @@ class Track(object):
     def miss(self, status, unseen_s, missed_s, detection_probability):
         """Mark this track as not detected for `unseen_s` and not detected where a camera should for `missed_s`."""
         self.status, self.unseen_s, self.missed_s = status, self.unseen_s + unseen_s, self.missed_s + missed_s
+        if not self.is_confirmed and missed_s:
+            # Some people are detected in half of the images only, but again and again at the same place: the mean of
+            # the expected rate, which counts as `KNOWN_IMAGES`, and of the observed one.
+            self.misses += 1
+            detection_probability *= (self.hits + KNOWN_IMAGES) / (self.hits + self.misses + KNOWN_IMAGES)
         self.log_odds += min(missed_s / MISS_CORRELATION_S, 1) * math.log(1 - detection_probability)
         self.innovation_m = 0.0, 0.0
 

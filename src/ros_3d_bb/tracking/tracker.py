@@ -19,6 +19,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import associate
 from ros_3d_bb.tracking.birth import NEW_NS, duplicates, initiate
 from ros_3d_bb.tracking.common_motion import FEWEST, SETTLED_NS, common_motion, may_jump, most_fit, moved
+from ros_3d_bb.tracking.manoeuvres import match_manoeuvres
 from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, BoxNoise, Kinds, NoiseParams,
                                                   correlated_images, learned_log_scale, learned_range,
                                                   measurements_of, scaled)
@@ -30,7 +31,7 @@ from ros_3d_bb.tracking.types import MOVING_SPEED, VISIBLE, TrackerBase
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped; chosen
-TENTATIVE_TIMEOUT_S = 0.6  # how long a tentative track is kept without a detection; chosen
+TENTATIVE_TIMEOUT_S = 0.75  # how long a tentative track is kept without a detection; chosen
 BY_ID, FIRST_SEEN = operator.attrgetter('id'), operator.attrgetter('first_ns')
 # Sections of the parameters.
 MOTION, ASSOCIATION = 'kalman: how people move', 'kalman: association of boxes with tracks'
@@ -79,7 +80,7 @@ class TrackerParams(NamedTuple):
 class _State(NamedTuple):
     """State of the tracker after an image: the tracks, the stamp of the latest image, the `CameraState` of each camera,
     the number of images with a common motion, the stamp of the latest image that most people did not fit (None
-    without), and the learned `measurement_model.learned_log_scale`.
+    without), the learned `measurement_model.learned_log_scale`, and the number of boxes that never became a track.
     """
 
     tracks: Sequence[Track]
@@ -88,6 +89,7 @@ class _State(NamedTuple):
     common_motions: int
     misfit_ns: Optional[int]
     log_noise_scale: float
+    untracked_boxes: int
 
 
 class Tracker(TrackerBase):
@@ -109,7 +111,7 @@ class Tracker(TrackerBase):
         self._start(last_id)
 
     def _start(self, last_id, log_noise_scale=0.0):
-        self._buffer = OutOfSequenceBuffer(self._step, _State([], None, {}, 0, None, log_noise_scale), last_id)
+        self._buffer = OutOfSequenceBuffer(self._step, _State([], None, {}, 0, None, log_noise_scale, 0), last_id)
 
     def reconfigure(self, params, noise, prediction):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
@@ -138,6 +140,11 @@ class Tracker(TrackerBase):
         """Number of images in which the pose of the camera jumped (`common_motion`), since the last reset."""
         return self._buffer.state.common_motions
 
+    @property
+    def untracked_boxes(self):
+        """Number of boxes that never became a track, since the last reset: their tracks ended unpublished."""
+        return self._buffer.state.untracked_boxes
+
     def tracks(self):
         """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image; with all images."""
         self._buffer.replay()
@@ -155,6 +162,8 @@ class Tracker(TrackerBase):
         tracks = self._predict(before, image.stamp_ns)
         measurements = self._measure(before, image)
         matches, fits, is_moved = self._associate(before, tracks, measurements, image)
+        if len(matches) < len(measurements) and not is_moved:
+            matches += self._match_manoeuvres(before, tracks, measurements, matches, image)
         matched = {track.id: (track.is_confirmed, measurement.number) for track, measurement in matches}
         log_noise_scale = learned_log_scale(before.log_noise_scale, matches)
         self._update_matched(matches, log_noise_scale - max(before.log_noise_scale, 0), image)
@@ -163,14 +172,15 @@ class Tracker(TrackerBase):
         if missed:
             mark_missed(missed, tracks, before.tracks, cameras, image.view.camera, observed_s,
                         self._detector.detection_probability)
-        tracks = self._delete(tracks, image.stamp_ns)
+        tracks, untracked_boxes = self._delete(tracks, image.stamp_ns)
         if len(matches) < len(measurements):
             taken = set(number for _is_confirmed, number in matched.values())
             unmatched = [measurement for measurement in measurements if measurement.number not in taken]
             tracks += initiate(tracks, unmatched, image, self._params[0], self._rules, assign_id)
         misfit_ns = image.stamp_ns if fits is False else before.misfit_ns
-        return _State(tracks, image.stamp_ns, cameras, before.common_motions + is_moved, misfit_ns,
-                      log_noise_scale), [(track_id,) + match for track_id, match in matched.items()]
+        state = _State(tracks, image.stamp_ns, cameras, before.common_motions + is_moved, misfit_ns, log_noise_scale,
+                       before.untracked_boxes + untracked_boxes)
+        return state, [(track_id,) + match for track_id, match in matched.items()]
 
     def _predict(self, before, stamp_ns):
         """Copies of the tracks, predicted to the image; the next steps change them."""
@@ -212,6 +222,14 @@ class Tracker(TrackerBase):
             track.state = moved(track.state, *motion, view=view)
         return associate(tracks, measurements, stamp_ns, params, outliers), fits, True
 
+    def _match_manoeuvres(self, before, tracks, measurements, matches, image):
+        """The further matches [(Track, Measurement)] of people who leave the gate, see `manoeuvres`."""
+        latest = before.cameras.get(image.view.camera)
+        if latest is None:
+            return []
+        return match_manoeuvres(tracks, measurements, matches, latest.stamp_ns, image.stamp_ns,
+                                self._params[0].height_sigma)
+
     def _update_matched(self, matches, log_factor, image):
         """Update the tracks of the matches, with the variance of assumed noise multiplied by exp(`log_factor`)."""
         scale = math.exp(log_factor)
@@ -231,8 +249,9 @@ class Tracker(TrackerBase):
         return cameras
 
     def _delete(self, tracks, stamp_ns):
-        """The tracks that are kept. Tentative ones are kept for a short time only."""
-        max_age_s, kept, duplicate_ids = self._params[0].max_age, [], ()
+        """The tracks that are kept, tentative ones for a short time only; and the number of boxes of the tentative
+        tracks that end."""
+        max_age_s, kept, untracked_boxes, duplicate_ids = self._params[0].max_age, [], 0, ()
         if tracks and stamp_ns - max(tracks, key=FIRST_SEEN).first_ns < NEW_NS:
             duplicate_ids = duplicates(tracks, stamp_ns)
         for track in tracks:
@@ -240,7 +259,9 @@ class Tracker(TrackerBase):
             is_recent = not track.unseen_s or track.unseen_s < limit_s
             if is_recent and track.state.position_m2 < MAX_POSITION_STD_M ** 2 and track.id not in duplicate_ids:
                 kept.append(track)
-        return kept
+            elif not track.is_confirmed:
+                untracked_boxes += track.hits
+        return kept, untracked_boxes
 
 
 def _period_s(before, image):

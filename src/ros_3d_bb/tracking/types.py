@@ -159,6 +159,7 @@ class TrackerBase(object):
     """
 
     common_motions = 0  # number of images in which the pose of the camera jumped
+    untracked_boxes = 0  # number of boxes that never became a track
 
     def reconfigure(self, *params):
         """Use other parameters and keep the tracks; the last ones have `prediction_time` and `prediction_step`. Raises

@@ -24,6 +24,8 @@ from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import SimulatedDetection
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb_lab.evaluation.tracking.prediction_benchmark import predictions
+from ros_3d_bb_lab.evaluation.tracking.rates_benchmark import (PEDESTRIANS_EVERY, RECORDINGS_EVERY, Part,
+                                                               scores_by_rate, with_sources)
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings, with_error_model
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
 from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, detection_of, simulate, view_of
@@ -163,6 +165,8 @@ def _text(key, value):
 
 def bench(arguments):
     """Run the comparison and print it. Returns the settings and the scores of each tracker, as written by --json."""
+    if arguments.rates:
+        return _bench_rates(arguments)
     if arguments.detections:
         return _bench_detections(arguments)
     sequences = read_sequences(arguments.data) if arguments.data else made_sequences(arguments.seed)
@@ -198,6 +202,18 @@ def _bench_detections(arguments):
             'error_model': arguments.error_model, 'trackers': trackers}
 
 
+def _bench_rates(arguments):
+    """Compare our tracker with perfect association by image rate, as `bench`, on the pedestrians, and on the recorded
+    detections if there are any."""
+    sequences = read_sequences(arguments.data) if arguments.data else made_sequences(arguments.seed)
+    runs = list(runs_of(sequences, arguments.seed, arguments.repetitions, arguments.seconds))
+    parts = [Part('pedestrians', runs, PEDESTRIANS_EVERY)]
+    if arguments.detections:
+        recordings = read_recordings(arguments.detections, 1, arguments.min_score, not arguments.no_odometry)
+        parts.append(Part('recorded_detections', [with_sources(run) for run in recordings], RECORDINGS_EVERY))
+    return {part.name: scores_by_rate(part, (CONTESTANTS[0], BOUND)) for part in parts}
+
+
 def main():
     """Run the command `./run bench tracking`."""
     arguments = _arguments()
@@ -218,6 +234,8 @@ def _arguments():
                         'it exists, otherwise generated trajectories)' % ','.join(COLUMNS))
     parser.add_argument('--detections', metavar='DIR', help='track recorded 3D detections instead: a folder of '
                         'recordings, see doc/benchmarks.md')
+    parser.add_argument('--rates', action='store_true', help='compare our tracker with perfect data association by '
+                        'image rate instead: the pedestrians, and the recordings of --detections if it is given')
     parser.add_argument('--every', type=int, default=1, metavar='N', help='of --detections: use each N-th image')
     parser.add_argument('--min-score', type=float, default=-math.inf, metavar='S',
                         help='of --detections: leave out boxes with lower scores (default: none)')

@@ -1,0 +1,64 @@
+"""Sudden motions: people who start to run, turn, stop or sit down between two images, and leave the gate.
+
+At low image rates, the filter expects such a person elsewhere. A track that was detected in the latest image and a box
+that is within reach of that detection belong together all the same, unless another track or box is within reach, too:
+the association decides contested pairs by their likelihood.
+
+The reach is the distance that a person covers in the time between two images. It is measured from the latest box and
+not from the prediction, because the prediction overshoots where a person turns. A track without a box in the latest
+image has no such reach: the person may be occluded, and the box that of another one.
+"""
+import collections
+import math
+
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.association import HIDDEN_FEET_COST, height_cost
+from ros_3d_bb.tracking.kalman_filter import faster
+from ros_3d_bb.tracking.track import LatestBox
+
+# All are chosen; `./run bench tracking --rates` shows the effect of others.
+RUNNING_MPS = 6.0  # of new tracks, whose velocity is unknown: people run no faster indoors
+TURNING_MPS = 1.5  # beside the speed of the track: walking people start, stop and turn within this change of velocity
+BESIDE_M = 0.1  # difference of two boxes of a standing person
+RISING_MPS = 2.0  # of heads: people who sit down, stand up or bend are slower
+BESIDE_SIGMAS = 2.0  # difference of the heads of two boxes of a standing person, relative to `height_sigma`
+SETTLED_NS = NS // 2  # the velocity of a track is known this long after its first detection
+
+
+def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_sigma_m):
+    """The pairs (Track, Measurement) outside of the gate that have no other candidates.
+
+    `matches` are those of the association, `latest_ns` is the stamp of the latest image of the camera. The velocities
+    of the tracks become as uncertain as their motion to the measurement.
+    """
+    seen = [track for track in tracks if latest_ns <= track.last_ns < stamp_ns]
+    candidates = [(track, measurement) for track in seen for measurement in measurements
+                  if _is_within_reach(track, measurement, stamp_ns, height_sigma_m)]
+    matched = set(id(part) for match in matches for part in match)
+    counts = collections.Counter(id(part) for pair in candidates for part in pair)
+    pairs = [pair for pair in candidates if all(counts[id(part)] == 1 and id(part) not in matched for part in pair)]
+    for track, measurement in pairs:
+        elapsed_s = (stamp_ns - track.last_ns) / NS
+        speed_mps = max(_distance_m(track, measurement) - BESIDE_M, 0) / elapsed_s
+        track.state = faster(track.state, elapsed_s, speed_mps ** 2)
+    return pairs
+
+
+def _is_within_reach(track, measurement, stamp_ns, height_sigma_m):
+    """Whether the object of a track may be at a measurement."""
+    if track.kind.group != measurement.kind.group:
+        return False
+    elapsed_s, box = (stamp_ns - track.last_ns) / NS, LatestBox.of(measurement)
+    if stamp_ns - track.first_ns < SETTLED_NS:
+        speed_mps = RUNNING_MPS
+        is_similar = height_cost(track, measurement, height_sigma_m) < HIDDEN_FEET_COST
+    else:
+        speed_mps = math.hypot(track.state.u, track.state.v) + TURNING_MPS
+        rise_m = RISING_MPS * elapsed_s + BESIDE_SIGMAS * height_sigma_m
+        is_similar = track.is_confirmed and abs(box.head_m - track.latest.head_m) < rise_m
+    return is_similar and _distance_m(track, box) < speed_mps * elapsed_s + BESIDE_M
+
+
+def _distance_m(track, box):
+    """Distance of a box from the latest one of a track."""
+    return math.hypot(box.x - track.latest.x, box.y - track.latest.y)

@@ -1,0 +1,99 @@
+"""Manoeuvres: people who start to run, turn, stop or sit down between two images of a slow detector, and people whom it
+finds now and then.
+
+The camera stands at the origin of the map, 1 m up, and looks along x.
+"""
+import math
+
+import numpy as np
+import pytest
+
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.tracker import Tracker
+from ros_3d_bb.tracking.types import CameraView, Detection
+
+VIEW = CameraView(transform_from((0, 0, 1), OPTICAL_ROTATION))
+START_NS, NOISE_M, WALKING_MPS = 1000 * NS, 0.03, 1.4
+RATES_HZ = [3, 5, 7.5, 10, 15, 30]
+
+
+def at(x, y, height=1.7):
+    return Detection(np.array([x, y, height / 2]), np.array([0.5, 0.5, height]), np.eye(3) * 0.04 ** 2)
+
+
+def play(rate_hz, seconds, boxes_at, tracker=None):
+    """The published tracks of each image, of boxes (x, y) or (x, y, height) at `boxes_at(seconds)`, with noise."""
+    random, tracker, outputs = np.random.RandomState(1), tracker or Tracker(), []
+    for number in range(int(seconds * rate_hz)):
+        boxes = [at(x + random.normal(0, NOISE_M), y + random.normal(0, NOISE_M), *height)
+                 for x, y, *height in boxes_at(number / rate_hz)]
+        outputs.append(tracker.update(START_NS + int(number / rate_hz * NS), boxes, VIEW))
+    return outputs
+
+
+def ids(outputs):
+    return set(track.id for tracks in outputs for track in tracks)
+
+
+@pytest.mark.parametrize('rate_hz', RATES_HZ)
+@pytest.mark.parametrize('speed_mps', [2.5, 4.0, 5.0])
+def test_a_runner_is_published_with_one_id_from_the_fourth_image_on(rate_hz, speed_mps):
+    outputs = play(rate_hz, 6.5 / speed_mps, lambda time_s: [(6.0, speed_mps * time_s - 3.3)])
+    assert len(ids(outputs)) == 1 and all(outputs[4:])
+
+
+@pytest.mark.parametrize('rate_hz', RATES_HZ)
+@pytest.mark.parametrize('velocity_mps', [(WALKING_MPS, 0.0), (0.0, -WALKING_MPS), (0.0, 0.0)])
+def test_a_person_who_turns_or_stops_keeps_the_id(rate_hz, velocity_mps):
+    """From one image to the next, as it seems to a slow detector."""
+    def boxes_at(time_s):
+        before_s, after_s = min(time_s, 3.0), max(time_s - 3.0, 0.0)
+        return [(4.0 + velocity_mps[0] * after_s, WALKING_MPS * (before_s - 3.0) + velocity_mps[1] * after_s)]
+    outputs = play(rate_hz, 5, boxes_at)
+    assert len(ids(outputs)) == 1
+    for number, tracks in list(enumerate(outputs))[-2:]:
+        (x, y), = boxes_at(number / rate_hz)
+        assert math.hypot(tracks[0].position_m[0] - x, tracks[0].position_m[1] - y) < 0.3
+
+
+@pytest.mark.parametrize('rate_hz', RATES_HZ)
+@pytest.mark.parametrize('heights_m', [(1.7, 1.2), (1.2, 1.7), (1.8, 1.1), (1.7, 2.1)])
+def test_a_person_who_sits_down_stands_up_bends_or_raises_an_arm_keeps_the_id(rate_hz, heights_m):
+    outputs = play(rate_hz, 4, lambda time_s: [(3.0, 0.0, float(np.interp(time_s, (2, 2.6), heights_m)))])
+    assert len(ids(outputs)) == 1
+
+
+@pytest.mark.parametrize('rate_hz', [3, 5, 10, 30])
+def test_a_person_found_in_every_second_image_is_published(rate_hz):
+    outputs = play(rate_hz, 10, lambda time_s: [(3.0, 0.0)] if round(time_s * rate_hz) % 2 == 0 else [])
+    assert len(ids(outputs)) == 1 and any(outputs[:int(5 * rate_hz)])
+
+
+def test_a_person_beside_one_who_is_not_detected_gets_another_id():
+    """The box is within reach of the last detection of the other person, but two images later."""
+    def boxes_at(time_s):
+        return [(4.0, 0.0)] if time_s < 1.9 else [] if time_s < 2.3 else [(4.0, 0.9)]
+    outputs = play(5, 5, boxes_at)
+    before, after = ids(outputs[:9]), ids([outputs[-1]])
+    assert len(before) == len(after) == 1 and not before & after
+
+
+def test_of_two_people_within_reach_none_takes_the_box_of_a_third():
+    """A slow detector misses two people who stand 0.6 m apart, and finds a third one between them."""
+    def boxes_at(time_s):
+        return [(4.0, -0.3, 1.8), (4.0, 0.3, 1.5)] if time_s < 2 else [(4.35, 0.0, 1.2)]
+    outputs = play(5, 2.4, boxes_at)
+    assert all(track.size_m[2] > 1.4 for tracks in outputs for track in tracks)
+
+
+def test_boxes_that_never_become_a_track_are_counted():
+    """Three boxes, each too far from the one before to be of the same person; then a person who stays."""
+    tracker = Tracker()
+    play(5, 0.6, lambda time_s: [(3.0, 15.0 * time_s)], tracker)
+    assert not tracker.untracked_boxes  # their tracks are tentative
+    for number in range(3, 20):
+        tracker.update(START_NS + number * NS // 5, [at(3.0, -3.0)], VIEW)
+    assert tracker.untracked_boxes == 3
+    tracker.reset()
+    assert not tracker.untracked_boxes
