@@ -45,24 +45,35 @@ def pose_jump(latest, known, measurements, view, period_s):
     """
     if latest is None or period_s <= 0 or not known or not measurements:
         return None
-    motion = np.subtract(_pose_change(latest.view, view), np.multiply(latest.velocity, period_s))
+    motion = [change - period_s * velocity for change, velocity in zip(_pose_change(latest.view, view), latest.velocity)]
+    half = period_s ** 2 / 2
+    farthest_m = max(measurement.distance_m for measurement in measurements)
+    if math.hypot(motion[0], motion[1]) + abs(motion[2]) * farthest_m <= LEAST_M + ROBOT_MPS2 * half:
+        return None
+    known = known[:MOST]
     jacobians = _jacobians([(track.state.x, track.state.y) for track in known], view)
     shifts = jacobians.dot(motion)
-    half = period_s ** 2 / 2
     if np.linalg.norm(shifts, axis=1).max() <= LEAST_M + ROBOT_MPS2 * half:
         return None
     spread = np.diag(np.square((ROBOT_MPS2 * half, ROBOT_MPS2 * half, ROBOT_RADPS2 * half)))
     innovations, inverses = _innovations(known, measurements)
     nearest = [np.minimum(_distances2(innovations - shift, inverses), GATE).min(axis=1).sum()
                for shift in (0.0, shifts[:, None])]
-    return (motion, spread) if nearest[0] - nearest[1] > USUAL else None
+    return (np.array(motion), spread) if nearest[0] - nearest[1] > USUAL else None
 
 
 def _pose_change(before, after):
     """Translation and rotation (x, y, angle) of the camera between two CameraView."""
-    x, y = (after.fixed_from_camera[:2, 3] - before.fixed_from_camera[:2, 3]).tolist()
-    (ahead_x, ahead_y), (was_x, was_y) = after.ahead.tolist(), before.ahead.tolist()
-    return x, y, math.atan2(was_x * ahead_y - was_y * ahead_x, was_x * ahead_x + was_y * ahead_y)
+    if before.fixed_from_camera is after.fixed_from_camera:
+        return 0.0, 0.0, 0.0
+    (*was_across, was_x), (*was_along, was_y) = before.fixed_from_camera[:2].tolist()
+    (*across, x), (*along, y) = after.fixed_from_camera[:2].tolist()
+    return x - was_x, y - was_y, math.atan2(_dot(along, was_across) - _dot(across, was_along),
+                                            _dot(across, was_across) + _dot(along, was_along))
+
+
+def _dot(first, second):
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
 
 
 def may_jump(latest, others):
