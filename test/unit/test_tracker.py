@@ -443,7 +443,6 @@ def test_the_prediction_of_people_who_manoeuvre_is_less_certain():
         assert area_m4(velocity_mps) > 1.5 * straight
 
 
-
 @pytest.mark.parametrize('rate_hz', [5, 7.5])
 def test_the_velocities_of_people_who_turn_together_follow_the_turn(rate_hz):
     """Three people side by side turn right within half a second, at 4 m/s2: the motion is not that of the frame."""

@@ -45,7 +45,8 @@ def pose_jump(latest, known, measurements, view, period_s):
     """
     if latest is None or period_s <= 0 or not known or not measurements:
         return None
-    motion = [change - period_s * velocity for change, velocity in zip(_pose_change(latest.view, view), latest.velocity)]
+    changes = _pose_change(latest.view, view)
+    motion = [change - period_s * velocity for change, velocity in zip(changes, latest.velocity)]
     half = period_s ** 2 / 2
     farthest_m = max(measurement.distance_m for measurement in measurements)
     if math.hypot(motion[0], motion[1]) + abs(motion[2]) * farthest_m <= LEAST_M + ROBOT_MPS2 * half:
