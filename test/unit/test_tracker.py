@@ -399,6 +399,50 @@ def test_people_keep_their_ids_when_the_odometry_jumps(jump_m, angle, rate_hz):
     np.testing.assert_allclose(speeds_mps, turned(CROWD_MPS, angle), atol=0.25)
 
 
+@pytest.mark.parametrize('rate_hz', [3, 5, 10, 30])
+@pytest.mark.parametrize('people', [1, 2])
+@pytest.mark.parametrize('jump_m', [(0.3, 0), (0, -0.3), (0.4, 0.5)])
+def test_a_jump_of_the_pose_gives_standing_people_no_velocity(jump_m, people, rate_hz):
+    """The robot drives; the people are too few to show the jump by themselves."""
+    random, tracker = np.random.RandomState(2), Tracker()
+    for frame in range(int(4 * rate_hz)):
+        time_s = frame / rate_hz
+        offset_m = np.multiply(jump_m, time_s >= 2)
+        pose = mounted(1)
+        pose[:2, 3] = offset_m + (0.3 * time_s, 0)
+        places = CROWD[:people] + offset_m + random.normal(0, 0.02, (people, 2))
+        tracks = tracker.update(START_NS + int(round(time_s * NS)), [at(*place) for place in places],
+                                CameraView(pose, CAMERA))
+        if time_s >= 3:
+            assert ids(tracks) == [1, 2][:people]
+            assert max(np.linalg.norm(track.velocity_mps) for track in tracks) < 0.2
+    assert tracker.common_motions == 1
+
+
+def test_a_person_who_steps_aside_does_not_move_the_frame_of_a_robot_that_starts():
+    """The robot starts with 2 m/s2; the person steps by 0.5 m."""
+    tracker = Tracker()
+    for frame in range(20):
+        time_s = frame / 5
+        pose = mounted(1)
+        pose[0, 3] = max(time_s - 2, 0) ** 2
+        tracker.update(START_NS + int(round(time_s * NS)), [at(3 + pose[0, 3], 0.5 * (time_s >= 2))],
+                       CameraView(pose, CAMERA))
+    assert not tracker.common_motions
+
+
+def test_the_prediction_of_people_who_manoeuvre_is_less_certain():
+    """The ellipse after 2 s is larger while a person stops or turns than while the same person walks on."""
+    def area_m4(velocity_mps):
+        def places(time_s):
+            walked_m = np.multiply((0, 1.2), min(time_s, 3) - 3) + np.multiply(velocity_mps, max(time_s - 3, 0))
+            return [at(4 + walked_m[0], walked_m[1])]
+        return np.linalg.det(play(Tracker(), 3.5, places, 10)[-1][0].prediction_covariance_m2[-1, :2, :2])
+    straight = area_m4((0, 1.2))
+    for velocity_mps in ((0, 0), (1.2, 0), (0, -1.2)):
+        assert area_m4(velocity_mps) > 1.5 * straight
+
+
 @pytest.mark.parametrize('rate_hz', [5, 7.5])
 def test_the_velocities_of_people_who_turn_together_follow_the_turn(rate_hz):
     """Three people side by side turn right within half a second, at 4 m/s2: the motion is not that of the frame."""

@@ -4,9 +4,14 @@ A motion (3,) is a translation in the plane and a rotation about the camera, (x,
 pair of a track and a measurement votes for the motions that explain it alone (as in RANSAC, Fischler and Bolles 1981).
 The best one is refined by least squares, weighted with the covariances of the innovations.
 
+The pose itself shows a jump, too, if the camera could not have moved like that, as after a correction of the
+localisation. This needs a single person only, who must fit the jump better than the pose without it.
+
 A pose jumps once. A motion that people's own acceleration explains, or that goes on, is that of people who turn or stop
 together, and is left to the filter.
 """
+import math
+
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
@@ -20,7 +25,56 @@ LEAST_M, LARGEST_M = 0.1, 1.0  # of a jump; chosen: less is left to the filter, 
 SETTLED_NS = NS  # people must have fitted for this long before a jump; chosen: the duration of a turn
 PEOPLE_MPS2 = 4.0  # upper bound of the acceleration of people; chosen: they stop and turn with 3 to 4 m/s2
 PRIOR_STD = np.array([0.5, 0.5, 0.1])  # of a jump; chosen: the fit of people in one direction is well-conditioned
+ROBOT_MPS2, ROBOT_RADPS2 = 2.0, 2.0  # acceleration of a robot, standard deviation of that of its camera; chosen
 FITS = 3  # the pairs are selected and the motion is fitted this many times; chosen
+
+
+def camera_velocity(latest, view, period_s):
+    """Mean velocity (x, y, angle) of a camera since its previous image, a CameraState; 0 without one."""
+    if latest is None or period_s <= 0:
+        return 0.0, 0.0, 0.0
+    x, y, angle = _pose_change(latest.view, view)
+    return x / period_s, y / period_s, angle / period_s
+
+
+def pose_jump(latest, known, measurements, view, period_s):
+    """Motion of the frame and its covariance (3, 3), as of `common_motion`, by which the pose of the camera deviates
+    from a constant velocity since its previous image, the CameraState `latest`.
+
+    None unless it moves the known people by more than a robot can accelerate, and they fit it better.
+    """
+    if latest is None or period_s <= 0 or not known or not measurements:
+        return None
+    changes = _pose_change(latest.view, view)
+    motion = [change - period_s * velocity for change, velocity in zip(changes, latest.velocity)]
+    half = period_s ** 2 / 2
+    farthest_m = max(measurement.distance_m for measurement in measurements)
+    if math.hypot(motion[0], motion[1]) + abs(motion[2]) * farthest_m <= LEAST_M + ROBOT_MPS2 * half:
+        return None
+    known = known[:MOST]
+    jacobians = _jacobians([(track.state.x, track.state.y) for track in known], view)
+    shifts = jacobians.dot(motion)
+    if np.linalg.norm(shifts, axis=1).max() <= LEAST_M + ROBOT_MPS2 * half:
+        return None
+    spread = np.diag(np.square((ROBOT_MPS2 * half, ROBOT_MPS2 * half, ROBOT_RADPS2 * half)))
+    innovations, inverses = _innovations(known, measurements)
+    nearest = [np.minimum(_distances2(innovations - shift, inverses), GATE).min(axis=1).sum()
+               for shift in (0.0, shifts[:, None])]
+    return (np.array(motion), spread) if nearest[0] - nearest[1] > USUAL else None
+
+
+def _pose_change(before, after):
+    """Translation and rotation (x, y, angle) of the camera between two CameraView."""
+    if before.fixed_from_camera is after.fixed_from_camera:
+        return 0.0, 0.0, 0.0
+    (*was_across, was_x), (*was_along, was_y) = before.fixed_from_camera[:2].tolist()
+    (*across, x), (*along, y) = after.fixed_from_camera[:2].tolist()
+    return x - was_x, y - was_y, math.atan2(_dot(along, was_across) - _dot(across, was_along),
+                                            _dot(across, was_across) + _dot(along, was_along))
+
+
+def _dot(first, second):
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
 
 
 def may_jump(latest, others):
@@ -62,15 +116,12 @@ def common_motion(known, measurements, view, period_s):
     not.
     """
     known = known[:MOST]
-    states = [track.state for track in known]
-    innovations = np.array([[(to.x - state.x, to.y - state.y) for to in measurements] for state in states])
-    inverses = np.linalg.inv([[((state.xx + to.xx, state.xy + to.xy), (state.xy + to.xy, state.yy + to.yy))
-                               for to in measurements] for state in states])
+    innovations, inverses = _innovations(known, measurements)
     allowed = np.linalg.norm(innovations, axis=2) < LARGEST_M
     allowed &= np.array([[track.kind.group == to.kind.group for to in measurements] for track in known])
     if not allowed.any():
         return None
-    jacobians = _jacobians([(state.x, state.y) for state in states], view)
+    jacobians = _jacobians([(track.state.x, track.state.y) for track in known], view)
     motions = _motions_of_one(innovations, jacobians)[allowed].reshape(-1, 3)
     for _fit in range(FITS):
         rows, columns = _explained(motions, innovations, inverses, jacobians, allowed)
@@ -81,6 +132,14 @@ def common_motion(known, measurements, view, period_s):
     moved_m = np.linalg.norm(jacobians[rows].dot(motion), axis=1).mean()
     is_significant = motion.dot(np.linalg.solve(covariance, motion)) > SIGNIFICANT
     return (motion, covariance) if is_significant and moved_m > LEAST_M + PEOPLE_MPS2 * period_s ** 2 / 2 else None
+
+
+def _innovations(known, measurements):
+    """Innovations (n, m, 2) of all pairs of tracks and measurements, and their inverse covariances (n, m, 2, 2)."""
+    states = [track.state for track in known]
+    innovations = np.array([[(to.x - state.x, to.y - state.y) for to in measurements] for state in states])
+    return innovations, np.linalg.inv([[((state.xx + to.xx, state.xy + to.xy), (state.xy + to.xy, state.yy + to.yy))
+                                        for to in measurements] for state in states])
 
 
 def moved(state, motion, covariance, view):

@@ -4,7 +4,7 @@ The latest image of each camera classifies each undetected track, and the best r
 cannot see is therefore neither out of view nor missed while another camera detects it, sees it occluded or should
 detect it. A camera that stops sending images is ignored after a short time.
 """
-from typing import NamedTuple, Optional
+from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -31,13 +31,14 @@ OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
 
 
 class CameraState(NamedTuple):
-    """The latest image of a camera, the range in which people are expected to be detected, and whether most people fit
-    their tracks (`common_motion`), None if unknown."""
+    """The latest image of a camera, the range in which people are expected to be detected, whether most people fit
+    their tracks (`common_motion`), None if unknown, and the velocity (x, y, angle) of the camera, m/s and rad/s."""
 
     stamp_ns: int
     view: CameraView
     range_m: float
     fits: Optional[bool]
+    velocity: Tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def recent_others(cameras, camera, stamp_ns):

@@ -37,10 +37,18 @@ STILL_MOVING = 0.5  # hysteresis: a moving track stops below this share of `movi
 NEVER_NS = -10 ** 18
 SEEN = -1  # visibility of a detected track; ranks before those of undetected ones, VISIBLE, OCCLUDED, OUT_OF_VIEW
 LEAST_SPEED2 = 1e-12  # avoids a division by zero
+# Prediction. Chosen for recorded pedestrians by kind of motion; `./run bench prediction` shows the effect of others.
+SLOW_S = 0.3  # time constant of the slow velocity, from which the velocity differs in manoeuvres
+SLOW_SHARE = 0.4  # of the slow velocity in that of the prediction: people sway as they walk
+MANOEUVRE = 2.0  # squared ratio of this difference to the standard deviation at which a manoeuvre has the weight 1/2
+# People who walk accelerate less than those who start: density relative to that at rest, and the squared speed at which
+# it is halfway between.
+WALKING_SHARE, WALKING_M2PS2 = 1 / 3.0, 0.36
 # Places among the numbers of a published track, see `_numbers_of`: of x, y, z, their velocities, the velocity of the
-# prediction, and the extents; of the covariance of the first six, and of the two terms of the covariances of x, y, z
-# that are multiplied by the powers 0, 1, 2 of the time of a prediction.
+# prediction, the extents, and the share of `manoeuvre_acceleration`; of the covariance of the first six, and of the two
+# terms of the covariances of x, y, z that are multiplied by the powers 0, 1, 2 of the time of a prediction.
 POSITION, VELOCITY, EXPECTED, SIZE, POSITION_VARIANCES = [0, 1, 14], [2, 3, 16], [17, 18, 16], slice(19, 22), [4, 8]
+MANOEUVRING = 22
 COVARIANCE = np.array([[4, 5, 16, 6, 7, 16], [5, 8, 16, 9, 10, 16], [16, 16, 15, 16, 16, 16],
                        [6, 9, 16, 11, 12, 16], [7, 10, 16, 12, 13, 16], [16] * 6])
 _CROSS, _NOTHING = COVARIANCE[:3, 3:], np.full((3, 3), 16)
@@ -55,8 +63,11 @@ class PredictionParams(NamedTuple):
     prediction_time: float = PREDICTION_TIME
     prediction_step: float = PREDICTION_STEP
     prediction_acceleration: float = Param(
-        0.03, 'How much more people turn than the filter models: density of a white acceleration.', 'm^2/s^3',
+        0.02, 'How much more people turn than the filter models: density of a white acceleration.', 'm^2/s^3',
         live=(0, 1))
+    manoeuvre_acceleration: float = Param(
+        0.45, 'The same in addition, of people who start. Those who stop or turn while they walk have a third of it.',
+        'm^2/s^3', live=(0, 2))
     standing_speed: float = Param(
         0.15, 'A velocity much lower than this is not extrapolated: it is mostly noise.', 'm/s', live=(0, 1))
     position_bias: float = Param(
@@ -110,7 +121,8 @@ class Track(object):
     `status`. `latest` is the `LatestBox`, `misses` counts the images before the confirmation in which a detection was
     expected. `log_odds` is the track score. `kind` is the class of the group that has the most of the filtered scores
     `votes`; `score` is the filtered score of the detections, `detection` the `Detection.index` in the latest image.
-    `innovation_m` is that of the latest image if its noise is assumed, otherwise 0.
+    `innovation_m` is that of the latest image if its noise is assumed, otherwise 0. `slow_mps` is the velocity,
+    filtered over `SLOW_S`.
     """
 
     def __init__(self, track_id, measurement, stamp_ns, camera, speed_mps, even_log_odds):
@@ -125,6 +137,7 @@ class Track(object):
         self.latest, self.misses = LatestBox.of(measurement), 0
         self.hits, self.first_ns, self.last_ns, self.unseen_s, self.missed_s = 1, stamp_ns, stamp_ns, 0.0, 0.0
         self.status, self.visibility, self.innovation_m = VISIBLE, {camera: SEEN}, (0.0, 0.0)
+        self.slow_mps = 0.0, 0.0
         self.log_odds, self.is_confirmed, self.is_moving = log_odds_of(detection.score, even_log_odds), False, False
         self.votes = {measurement.kind.label: _vote(detection.score)}
 
@@ -150,7 +163,10 @@ class Track(object):
         self.innovation_m = (measurement.x - state.x, measurement.y - state.y) if is_assumed else (0.0, 0.0)
         self.latest = LatestBox.of(measurement)
         self.state = state = kalman_filter.update(state, measurement, rules.outliers)
-        period_s = (stamp_ns - self.last_ns) / NS - self.unseen_s
+        elapsed_s = (stamp_ns - self.last_ns) / NS
+        period_s, share = elapsed_s - self.unseen_s, max(1 - math.exp(-elapsed_s / SLOW_S), 1 / self.hits)
+        slow_u, slow_v = self.slow_mps
+        self.slow_mps = slow_u + share * (state.u - slow_u), slow_v + share * (state.v - slow_v)
         log_odds = log_odds_of(detection.score, rules.even_log_odds)
         # At least that of a new track: an object may be where false detections were (as in Page's test, 1954).
         total = max(self.log_odds + min(period_s / HIT_CORRELATION_S, 1) * (log_odds + HIT), log_odds)
@@ -257,19 +273,22 @@ def learned_prediction(log_scale, assumed_m, params):
 def published(tracks, params):
     """Convert tracks to a list of TrackedObject with predictions at constant velocity; `params` are PredictionParams.
 
-    A low velocity is mostly noise of a standing person. The predicted velocity v is therefore scaled by
-    v² / (v² + standing_speed²). The covariance of the filter does not include errors that stay constant for seconds,
-    such as those of a wrong calibration; `position_bias` is added for them. `prediction_acceleration` accounts for
-    turns.
+    People sway as they walk. The predicted velocity v is therefore between that of the filter and the slow one. A low
+    velocity is mostly noise of a standing person, so v is scaled by v² / (v² + standing_speed²). The covariance of the
+    filter does not include errors that stay constant for seconds, such as those of a wrong calibration; `position_bias`
+    is added for them. A prediction is a mixture of two Gaussians with the same mean: the person goes on, with
+    `prediction_acceleration`, or is in a manoeuvre, with `manoeuvre_acceleration` in addition. The covariance is that
+    of the mixture.
     """
     if not tracks:
         return []
     numbers = np.array([_numbers_of(track, params.standing_speed ** 2 + LEAST_SPEED2) for track in tracks])
     numbers[:, POSITION_VARIANCES] += params.position_bias ** 2
-    times_s, powers, turned_m2 = _times(params)
+    times_s, powers, spread = _times(params)
+    densities = params.prediction_acceleration + params.manoeuvre_acceleration * numbers[:, MANOEUVRING]
     positions_m, velocities_mps, sizes_m = numbers[:, POSITION], numbers[:, VELOCITY], numbers[:, SIZE]
     predictions_m = positions_m[:, None] + times_s[:, None] * numbers[:, None, EXPECTED]
-    predictions_m2 = powers @ (numbers[:, AHEAD[0]] + numbers[:, AHEAD[1]]) + turned_m2
+    predictions_m2 = powers @ (numbers[:, AHEAD[0]] + numbers[:, AHEAD[1]]) + densities[:, None, None] * spread
     return [TrackedObject(track.id, position_m, size_m, velocity_mps, velocity_mps, track.status, track.is_moving,
                           track.first_ns, track.last_ns, prediction_m, params.prediction_step, covariance,
                           prediction_m2, track.kind.label, track.score, track.detection)
@@ -280,15 +299,32 @@ def published(tracks, params):
 
 def _numbers_of(track, standing2):
     """The numbers of a track that are published, in the order of `POSITION` and the others below it."""
-    speed2 = track.state.u ** 2 + track.state.v ** 2
+    u, v = _expected_velocity(track)
+    speed2 = u * u + v * v
     share = speed2 / (speed2 + standing2)
-    return track.state + (track.z_m, track.z_m2, 0.0, share * track.state.u, share * track.state.v) + track.size_m
+    manoeuvring = _manoeuvre_weight(track) * (
+        WALKING_SHARE + (1 - WALKING_SHARE) * WALKING_M2PS2 / (WALKING_M2PS2 + speed2))
+    return track.state + (track.z_m, track.z_m2, 0.0, share * u, share * v) + track.size_m + (manoeuvring,)
+
+
+def _expected_velocity(track):
+    """Velocity (x, y) of the prediction: between that of the filter and the slow one."""
+    (slow_u, slow_v), state = track.slow_mps, track.state
+    return state.u + SLOW_SHARE * (slow_u - state.u), state.v + SLOW_SHARE * (slow_v - state.v)
+
+
+def _manoeuvre_weight(track):
+    """Probability 0..1 that a person is in a manoeuvre: the velocity has changed by more than its covariance explains.
+    """
+    (slow_u, slow_v), state = track.slow_mps, track.state
+    change2 = (slow_u - state.u) ** 2 + (slow_v - state.v) ** 2
+    return change2 / (change2 + MANOEUVRE * (state.uu + state.vv) / 2 + LEAST_SPEED2)
 
 
 @functools.lru_cache(maxsize=16)
 def _times(params):
-    """Times of the predictions (steps,), their powers 0 to 2 (steps, 3), and the variances (steps, 9) that turns add.
+    """Times of the predictions (steps,), their powers 0 to 2 (steps, 3), and the variances (steps, 9) that a white
+    acceleration of density 1 adds.
     """
     times_s = prediction_times_s(params.prediction_time, params.prediction_step)
-    turned_m2 = params.prediction_acceleration * times_s ** 3 / 3
-    return times_s, np.stack((times_s ** 0, times_s, times_s ** 2), axis=1), turned_m2[:, None] * LEVEL
+    return (times_s, np.stack((times_s ** 0, times_s, times_s ** 2), axis=1), (times_s ** 3 / 3)[:, None] * LEVEL)

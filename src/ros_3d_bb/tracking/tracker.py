@@ -18,7 +18,8 @@ from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import associate
 from ros_3d_bb.tracking.birth import NEW_NS, duplicates, initiate
-from ros_3d_bb.tracking.common_motion import FEWEST, SETTLED_NS, common_motion, may_jump, most_fit, moved
+from ros_3d_bb.tracking.common_motion import (FEWEST, SETTLED_NS, camera_velocity, common_motion, may_jump, most_fit,
+                                              moved, pose_jump)
 from ros_3d_bb.tracking.manoeuvres import match_manoeuvres
 from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, BoxNoise, Kinds, NoiseParams,
                                                   correlated_images, learned_log_scale, learned_range,
@@ -203,24 +204,31 @@ class Tracker(TrackerBase):
         Returns the matches [(Track, Measurement)], whether most people fit without a motion (None if unknown), and
         whether there was one.
         """
-        view, stamp_ns, params, outliers = image.view, image.stamp_ns, self._params[0], self._rules.outliers
+        stamp_ns, params, outliers = image.stamp_ns, self._params[0], self._rules.outliers
+        latest, period_s = before.cameras.get(image.view.camera), _period_s(before, image)
+        known = [track for track in tracks if latest and track.is_confirmed
+                 and track.visibility.get(image.view.camera) == SEEN]
+        motion = pose_jump(latest, known, measurements, image.view, period_s)
+        if motion is not None:
+            return self._associate_moved(tracks, measurements, image, motion), None, True
         matches = associate(tracks, measurements, stamp_ns, params, outliers)
         if min(len(tracks), len(measurements)) < FEWEST:
             return matches, None, False
-        latest = before.cameras.get(view.camera)
-        known = [track for track in tracks if latest and track.is_confirmed
-                 and track.visibility.get(view.camera) == SEEN]
         fits = most_fit(known, matches, len(measurements))
         is_settled = before.misfit_ns is None or stamp_ns - before.misfit_ns > SETTLED_NS
         if fits is not False or not is_settled or not may_jump(
-                latest, recent_others(before.cameras, view.camera, stamp_ns).values()):
+                latest, recent_others(before.cameras, image.view.camera, stamp_ns).values()):
             return matches, fits, False
-        motion = common_motion(known, measurements, view, _period_s(before, image))
+        motion = common_motion(known, measurements, image.view, period_s)
         if motion is None:
             return matches, fits, False
+        return self._associate_moved(tracks, measurements, image, motion), fits, True
+
+    def _associate_moved(self, tracks, measurements, image, motion):
+        """Move all tracks by a motion of the frame, in place, and assign the measurements."""
         for track in tracks:
-            track.state = moved(track.state, *motion, view=view)
-        return associate(tracks, measurements, stamp_ns, params, outliers), fits, True
+            track.state = moved(track.state, *motion, view=image.view)
+        return associate(tracks, measurements, image.stamp_ns, self._params[0], self._rules.outliers)
 
     def _match_manoeuvres(self, before, tracks, measurements, matches, image):
         """The further matches [(Track, Measurement)] of people who leave the gate, see `manoeuvres`."""
@@ -245,7 +253,8 @@ class Tracker(TrackerBase):
         if fits is None and latest:
             fits = latest.fits
         cameras = {name: known for name, known in before.cameras.items() if image.stamp_ns - known.stamp_ns <= KNOWN_NS}
-        cameras[image.view.camera] = CameraState(image.stamp_ns, image.view, range_m, fits)
+        cameras[image.view.camera] = CameraState(
+            image.stamp_ns, image.view, range_m, fits, camera_velocity(latest, image.view, _period_s(before, image)))
         return cameras
 
     def _delete(self, tracks, stamp_ns):

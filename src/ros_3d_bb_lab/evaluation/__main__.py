@@ -2,9 +2,10 @@
 import importlib
 import sys
 
-MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.benchmark', 'scenes': 'scene_benchmark', 'speed': 'speed',
-           'latency': 'latency.benchmark', 'detector': 'detector_benchmark', 'costmap': 'costmap.benchmark',
-           'navigation': 'navigation.benchmark', 'gazebo': 'gazebo.benchmark'}
+MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.benchmark', 'prediction': 'tracking.motion_benchmark',
+           'scenes': 'scene_benchmark', 'speed': 'speed', 'latency': 'latency.benchmark',
+           'detector': 'detector_benchmark', 'costmap': 'costmap.benchmark', 'navigation': 'navigation.benchmark',
+           'gazebo': 'gazebo.benchmark'}
 
 
 def main():

@@ -45,18 +45,34 @@ def _mean(values):
 
 def _person_errors(tracker, person):
     """Yield the errors of both predictions, metres, and the squared Mahalanobis distance of that of the tracker."""
+    times_s, points_m = person.times_s, person.points_m
+    for row, track in enumerate(tracked(tracker, times_s, points_m)):
+        later = np.flatnonzero(np.abs(times_s - times_s[row] - HORIZON_S) < MAX_STEP_ERROR_S)
+        if row + 1 < OBSERVED or not len(later) or track is None:
+            continue
+        future_m, velocity_mps = points_m[later[0]], step_velocity_mps(times_s, points_m, row, 1)
+        mean_m, covariance_m2 = predicted(track)
+        error_m = mean_m - future_m
+        distance = error_m.dot(np.linalg.solve(covariance_m2, error_m))
+        yield (np.linalg.norm(points_m[row] + HORIZON_S * velocity_mps - future_m), np.linalg.norm(error_m), distance)
+
+
+def tracked(tracker, times_s, points_m):
+    """Yield the latest published track, None without one, of a person at times (n,) and places (n, 2), after each."""
     tracker.reset()
     view = CameraView(np.eye(4))
-    times_s, points_m = person.times_s, person.points_m
-    for row, (time_s, point_m) in enumerate(zip(times_s, points_m)):
+    for time_s, point_m in zip(times_s, points_m):
         detection = Detection(np.append(point_m, SIZE_M[2] / 2), SIZE_M)
         tracks = tracker.update(int(round((time_s - times_s[0] + 1) * NS)), [detection], view)
-        later = np.flatnonzero(np.abs(times_s - time_s - HORIZON_S) < MAX_STEP_ERROR_S)
-        if row + 1 < OBSERVED or not len(later) or not tracks:
-            continue
-        future_m, velocity_mps = points_m[later[0]], (point_m - points_m[row - 1]) / (time_s - times_s[row - 1])
-        newest = max(tracks, key=lambda track: track.last_seen_ns)
-        step = int(round(HORIZON_S / newest.prediction_step_s)) - 1
-        error_m = newest.prediction_m[step, :2] - future_m
-        distance = error_m.dot(np.linalg.solve(newest.prediction_covariance_m2[step, :2, :2], error_m))
-        yield np.linalg.norm(point_m + HORIZON_S * velocity_mps - future_m), np.linalg.norm(error_m), distance
+        yield max(tracks, key=lambda track: track.last_seen_ns) if tracks else None
+
+
+def predicted(track):
+    """Position (2,) and covariance (2, 2) of a TrackedObject after `HORIZON_S`."""
+    step = int(round(HORIZON_S / track.prediction_step_s)) - 1
+    return track.prediction_m[step, :2], track.prediction_covariance_m2[step, :2, :2]
+
+
+def step_velocity_mps(times_s, points_m, row, steps):
+    """Velocity (2,) over the `steps` before a row of times (n,) and places (n, 2)."""
+    return (points_m[row] - points_m[row - steps]) / (times_s[row] - times_s[row - steps])
