@@ -85,7 +85,7 @@ def test_truncated_boxes_are_completed_to_the_size_of_their_class(label, width_m
 
 
 @pytest.mark.parametrize('label,name', [('Person', 'person'), ('pedestrian', 'person'), ('HUMAN', 'person'),
-                                        ('people', 'person'), ('Dog', 'Dog'), ('personal computer', 'personal computer')])
+                                        ('people', 'person'), ('Dog', 'Dog'), ('personnel', 'personnel')])
 def test_people_have_several_names(label, name):
     assert ObjectClasses().standard_name(label) == name
 

@@ -80,8 +80,8 @@ class ObjectClasses(NamedTuple):
         return self.listed.get(label, self.default)
 
     def standard_name(self, label):
-        """The class name by which a class is known: `PERSON` for its other names in data sets, such as Pedestrian, unless
-        the table lists them."""
+        """Name of a class in this package: `PERSON` for its other names in data sets, such as Pedestrian, unless the
+        table lists them."""
         return PERSON if label not in self.listed and label.lower() in PEOPLE else label
 
     def group_of(self, label):

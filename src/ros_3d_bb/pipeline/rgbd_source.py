@@ -138,8 +138,8 @@ class RgbdSource(object):
             return None
 
     def _on_frame(self, trigger, depth_msg, camera):
-        """Pass matched messages on, those of a depth image that is nearest to several colour images once: positions have
-        the stamp of the depth image."""
+        """Pass matched messages on, but only once if a depth image is nearest to several colour images: positions have
+        its stamp."""
         depth_stamp_ns = stamp_of(depth_msg)
         if depth_stamp_ns == self._used_ns and _stamp_ns(trigger) not in (None, depth_stamp_ns):
             self._events.count('images with a used depth image')

@@ -73,7 +73,8 @@ class Snapshots(object):
 
     def _on_frame(self, stamped_color, stamped_depth, camera):
         (stamp_ns, color), (depth_stamp_ns, depth) = stamped_color, stamped_depth
-        went_back = self._images.add(stamp_ns, 0, (depth_stamp_ns, color, depth, camera))  # the arrival time is not used
+        images = depth_stamp_ns, color, depth, camera
+        went_back = self._images.add(stamp_ns, 0, images)  # the arrival time is not used
         if went_back:
             self._boxes2d.clear()
             self._boxes3d.clear()
