@@ -34,6 +34,14 @@ def test_parts_are_combined_in_any_order(order):
     assert snapshots.newest == (7 * PERIOD, 7, 7, 7, 7, 7)
 
 
+def test_3d_boxes_have_the_stamp_of_the_depth_image():
+    snapshots, depth_ns = made(), 7 * PERIOD + 4 * MS
+    send(snapshots, 7, ('color', 'camera', 'boxes2d'))
+    snapshots.add_depth(depth_ns, 0, 'depth')
+    snapshots.add_boxes3d(depth_ns, 0, 'boxes3d')
+    assert snapshots.newest == (7 * PERIOD, 7, 'depth', 7, 7, 'boxes3d')
+
+
 @given(st.integers(0, 29), st.integers(0, 5))
 def test_the_newest_complete_snapshot_is_kept_while_the_detector_works(delay_2d, more_delay_3d):
     delay_3d = min(29, delay_2d + more_delay_3d)

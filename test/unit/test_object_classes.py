@@ -7,8 +7,8 @@ import yaml
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.core.object_classes import (CLASSES, DEFAULT_CLASS, MAX_CLASSES, MAX_IN_GROUP, ObjectClass,
-                                           ObjectClasses, object_classes_from, read_object_classes)
+from ros_3d_bb.core.object_classes import (CLASSES, DEFAULT_CLASS, MAX_CLASSES, MAX_IN_GROUP, PERSON_CLASS,
+                                           ObjectClass, ObjectClasses, object_classes_from, read_object_classes)
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -82,3 +82,14 @@ def test_truncated_boxes_are_completed_to_the_size_of_their_class(label, width_m
     box, = estimate_boxes(DepthImage(depth_mm, 0.001), [(0, 400, 41, 480)], CAMERA, estimator_named('foreground'),
                           labels=[label])
     assert box.size_m[:2] == pytest.approx([width_m, height_m], abs=0.02)
+
+
+@pytest.mark.parametrize('label,name', [('Person', 'person'), ('pedestrian', 'person'), ('HUMAN', 'person'),
+                                        ('people', 'person'), ('Dog', 'Dog'), ('personnel', 'personnel')])
+def test_people_have_several_names(label, name):
+    assert ObjectClasses().standard_name(label) == name
+
+
+def test_a_listed_name_of_people_is_kept():
+    table = ObjectClasses({'person': PERSON_CLASS, 'pedestrian': PERSON_CLASS._replace(height=1.6)})
+    assert table.standard_name('pedestrian') == 'pedestrian' and table.standard_name('Human') == 'person'

@@ -7,8 +7,8 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.conversions.perception_msgs import (boxes2d_to_msg, boxes3d_to_msg, camera_from_msg, time_from,
-                                                   usable_boxes3d)
+from ros_3d_bb.conversions.perception_msgs import (boxes2d_to_msg, boxes3d_to_msg, camera_from_msg, header_of,
+                                                   time_from, usable_boxes3d)
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
@@ -72,6 +72,22 @@ def test_each_image_has_the_tilt_of_the_camera_at_its_time():
         run.add_boxes([PERSON_PX])
     lengths_m = [box.center_m[2] for box in run.boxes3d]
     assert lengths_m[0] == lengths_m[1] == lengths_m[3] != lengths_m[2]
+
+
+def test_boxes_have_the_stamp_of_their_depth_image_which_is_used_once():
+    """Colour images have twice the rate of depth images, and other stamps."""
+    events, headers = EventCounter(), []
+    source = RgbdSource(Bbox3dParams(), events, lambda *messages: headers.append(header_of(source.frame(*messages))))
+    source.add_camera_info(CAMERA_INFO, 0)
+    depth_stamps_ns = [1000 * NS + number * NS // 15 for number in range(5)]
+    for stamp_ns in depth_stamps_ns:
+        header = Header(stamp=time_from(stamp_ns), frame_id='camera')
+        source.add_depth(fill_image(Image(header=header), scene(6.0), '32FC1'), 0)
+    for number in range(8):
+        header = Header(stamp=time_from(1000 * NS + NS // 100 + number * NS // 30), frame_id='camera')
+        source.add_boxes(boxes2d_to_msg(np.array([PERSON_PX]), header), 0)
+    assert [header.stamp.to_nsec() for header in headers] == depth_stamps_ns
+    assert events.counts['images with a used depth image'] == 3
 
 
 def estimate(depth_m, rects_px, events, estimator='foreground', labels=None, scores=None, **params):

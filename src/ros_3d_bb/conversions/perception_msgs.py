@@ -201,8 +201,8 @@ def transform_from_msg(message):
 
 
 def header_of(frame):
-    """Return the header of the results of an RgbdFrame."""
-    return Header(stamp=time_from(frame.stamp_ns), frame_id=frame.frame_id)
+    """Return the header of the 3D boxes in an RgbdFrame, whose positions are those at the stamp of the depth image."""
+    return Header(stamp=time_from(frame.depth_stamp_ns), frame_id=frame.frame_id)
 
 
 def boxes3d_to_msg(boxes, header, camera):

@@ -2,6 +2,7 @@
 import re
 
 PERSON = 'person'  # class of objects whose class is not given
+PEOPLE = PERSON, 'people', 'pedestrian', 'human'  # names of this class in data sets, in lower case
 # Classes of the COCO data set by number, as YOLO and most other detectors name them (80 of the 91 of Lin et al., 2014).
 COCO = (
     'person,bicycle,car,motorcycle,airplane,bus,train,truck,boat,traffic light,fire hydrant,stop sign,parking meter,'

@@ -5,7 +5,7 @@ from typing import NamedTuple, Optional
 import numpy as np
 import yaml
 
-from ros_3d_bb.core.labels import PERSON, label_fault
+from ros_3d_bb.core.labels import PEOPLE, PERSON, label_fault
 from ros_3d_bb.core.limits import LARGEST_M
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
@@ -78,6 +78,11 @@ class ObjectClasses(NamedTuple):
     def of(self, label):
         """The ObjectClass of a class name."""
         return self.listed.get(label, self.default)
+
+    def standard_name(self, label):
+        """Name of a class in this package: `PERSON` for its other names in data sets, such as Pedestrian, unless the
+        table lists them."""
+        return PERSON if label not in self.listed and label.lower() in PEOPLE else label
 
     def group_of(self, label):
         """Name of the group of a class: that of the table, or the class itself."""

@@ -123,7 +123,8 @@ def estimate_boxes(depth, rects_px, camera, estimator, level_from_camera=LEVEL, 
     level_from_camera : numpy.ndarray, (3, 3), optional
         Rotation to the level frame, see `level_rotation`. By default the camera is held level.
     labels : sequence of str, optional
-        Class names of the rectangles. By default they are those of people.
+        Class names of the rectangles, also as in other data sets (`ObjectClasses.standard_name`). By default they are
+        those of people.
 
     Returns
     -------
@@ -133,7 +134,7 @@ def estimate_boxes(depth, rects_px, camera, estimator, level_from_camera=LEVEL, 
     """
     if len(rects_px) == 0:  # most images show no people
         return []
-    labels = labels or [PERSON] * len(rects_px)
+    labels = list(map(estimator.classes.standard_name, labels or [PERSON] * len(rects_px)))
     geometry = ImageGeometry(camera, depth.measured_area(), tuple(map(tuple, level_from_camera.tolist())))
     boxes = estimator.estimate(depth, rects_px, geometry, list(map(estimator.classes.of, labels)))
     return [box and (box if label == box.label else box._replace(label=label)) for box, label in zip(boxes, labels)]

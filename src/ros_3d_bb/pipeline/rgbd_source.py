@@ -42,7 +42,8 @@ class RgbdSource(object):
         self._registration = DepthRegistration(transforms, depth_info_topic) if params.depth == RAW else None
         self._color_frame, self._cache_s = '', cache_s
         self._sync = StampSynchronizer(int(cache_s * NS), int(params.stamp_tolerance * NS), int(assumed_delay_s * NS),
-                                       on_match, self._on_lost)
+                                       self._on_frame, self._on_lost)
+        self._on_match, self._used_ns = on_match, None
 
     @property
     def assumed_delay_s(self):
@@ -101,11 +102,10 @@ class RgbdSource(object):
         """
         received = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
         depth, frame_id = self._aligned(received, depth_msg.header.frame_id, camera)
-        depth_stamp_ns = depth_msg.header.stamp.to_nsec()
-        if isinstance(trigger, Boxes2D):
-            stamp_ns, color = depth_stamp_ns if trigger.stamp_ns is None else trigger.stamp_ns, None
-        else:
-            stamp_ns, color = trigger.header.stamp.to_nsec(), imgmsg_to_rgb(trigger)
+        depth_stamp_ns, stamp_ns = depth_msg.header.stamp.to_nsec(), _stamp_ns(trigger)
+        if stamp_ns is None:
+            stamp_ns = depth_stamp_ns
+        color = None if isinstance(trigger, Boxes2D) else imgmsg_to_rgb(trigger)
         frame = RgbdFrame(stamp_ns, depth_stamp_ns, frame_id, camera, depth, received.scale_m, color,
                           camera_from_floor=self._camera_from_floor(frame_id))
         return upright_frame(frame, self._params.image_rotation)
@@ -137,9 +137,18 @@ class RgbdSource(object):
                                   % (self._params.floor_frame, frame_id, error))
             return None
 
+    def _on_frame(self, trigger, depth_msg, camera):
+        """Pass matched messages on, but only once if a depth image is nearest to several colour images: positions have
+        its stamp."""
+        depth_stamp_ns = stamp_of(depth_msg)
+        if depth_stamp_ns == self._used_ns and _stamp_ns(trigger) not in (None, depth_stamp_ns):
+            self._events.count('images with a used depth image')
+            return
+        self._used_ns = depth_stamp_ns
+        self._on_match(trigger, depth_msg, camera)
+
     def _on_lost(self, trigger, before_jump):
-        is_boxes = isinstance(trigger, Boxes2D)
-        inputs, stamp_ns = ('2D boxes', trigger.stamp_ns) if is_boxes else ('colour images', stamp_of(trigger))
+        inputs, stamp_ns = '2D boxes' if isinstance(trigger, Boxes2D) else 'colour images', _stamp_ns(trigger)
         if before_jump:
             self._events.count('%s from before a time jump' % inputs)
             return
@@ -162,3 +171,8 @@ class RgbdSource(object):
                     % (stamp_ns / NS, self._depth_topic, newest_ns / NS, self._cache_s, too_old_s))
         return ('no depth image with their stamp %.3f received on %s: %s'
                 % (stamp_ns / NS, self._depth_topic, self._sync.gap_text(stamp_ns)))
+
+
+def _stamp_ns(trigger):
+    """Stamp of a colour image, or of the one that 2D boxes are in; None if these have no stamp."""
+    return trigger.stamp_ns if isinstance(trigger, Boxes2D) else stamp_of(trigger)

@@ -35,8 +35,8 @@ class Snapshots(object):
     """Combines messages of five topics, which may arrive in any order, to snapshots.
 
     `add_depth`, `add_camera`, `add_boxes2d` and `add_boxes3d` are called with stamp, arrival time and value, as
-    `add_color`. The stamps of boxes must be equal to that of the colour image. Depth and camera are matched as in
-    `StampSynchronizer`. If time jumps back, older messages are dropped.
+    `add_color`. 2D boxes have the stamp of the colour image, and 3D boxes that of the depth image. Depth and camera
+    are matched as in `StampSynchronizer`. If time jumps back, older messages are dropped.
 
     Images are kept for `length_ns` until their boxes arrive. The stamps of colour and depth image differ by at most
     `tolerance_ns`. `on_lost` is called with the stamp of a colour image whose depth image or camera did not arrive.
@@ -47,18 +47,22 @@ class Snapshots(object):
         self._sync = StampSynchronizer(length_ns, tolerance_ns, 0, self._on_frame, self._on_lost_color)
         self._report_lost = on_lost
         self._images, self._boxes2d, self._boxes3d = (MessageCache(length_ns) for _part in range(3))
-        self.add_depth, self.add_camera = self._sync.add_depth, self._sync.add_camera
+        self.add_camera = self._sync.add_camera
         self.add_boxes2d, self.add_boxes3d = self._boxes2d.add, self._boxes3d.add
         self._first_ns = None
 
     def add_color(self, stamp_ns, now_ns, color):
         self._sync.add_boxes(stamp_ns, now_ns, (stamp_ns, color))
 
+    def add_depth(self, stamp_ns, now_ns, depth):
+        self._sync.add_depth(stamp_ns, now_ns, (stamp_ns, depth))
+
     @property
     def newest(self):
         """Newest snapshot that is complete, or else the most complete one; None before the first image."""
-        snapshots = [Snapshot(entry.stamp_ns, *entry.value, _value_at(self._boxes2d, entry.stamp_ns),
-                              _value_at(self._boxes3d, entry.stamp_ns)) for entry in reversed(self._images)]
+        snapshots = [Snapshot(stamp_ns, *images, _value_at(self._boxes2d, stamp_ns),
+                              _value_at(self._boxes3d, depth_stamp_ns))
+                     for stamp_ns, _arrival_ns, (depth_stamp_ns, *images) in reversed(self._images)]
         return max(snapshots, default=None,
                    key=lambda snapshot: (snapshot.boxes2d is not None) + (snapshot.boxes3d is not None))
 
@@ -67,9 +71,10 @@ class Snapshots(object):
         """Whether boxes may be missing because images have been arriving for less than `length_ns`."""
         return self._first_ns is None or self._images.newest_ns - self._first_ns < self._length_ns
 
-    def _on_frame(self, stamped_color, depth, camera):
-        stamp_ns, color = stamped_color
-        went_back = self._images.add(stamp_ns, 0, (color, depth, camera))  # the arrival time is not used
+    def _on_frame(self, stamped_color, stamped_depth, camera):
+        (stamp_ns, color), (depth_stamp_ns, depth) = stamped_color, stamped_depth
+        images = depth_stamp_ns, color, depth, camera
+        went_back = self._images.add(stamp_ns, 0, images)  # the arrival time is not used
         if went_back:
             self._boxes2d.clear()
             self._boxes3d.clear()
