@@ -4,7 +4,8 @@ import random
 
 import genpy
 import numpy as np
-from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion, Transform, TransformStamped, Vector3
+from geometry_msgs.msg import (Point, Pose, PoseWithCovariance, Quaternion, Transform, TransformStamped, Twist,
+                               Vector3)
 from sensor_msgs.msg import CompressedImage, RegionOfInterest
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from tf2_msgs.msg import TFMessage
@@ -83,6 +84,7 @@ def good_messages(stamp_ns):
     box = BoundingBox3D(center=Pose(Point(0, 0, 3), Quaternion(w=1)), size=Vector3(0.5, 1.7, 0.5))
     messages[BOXES3D_TOPIC] = BoundingBox3DArray(header=header, boxes=[box])
     messages[TRACKS_TOPIC] = TrackedObjectArray(header=header)
+    messages['cmd_vel_in'] = Twist(linear=Vector3(0.5, 0, 0), angular=Vector3(0, 0, 0.1))
     return messages
 
 
@@ -105,7 +107,8 @@ def makers(source, now_ns, good, compressed_share=0.0):
     return {INFO_TOPICS[0]: lambda: camera_info(source, now_ns, good[INFO_TOPICS[0]]),
             DEPTH_TOPIC: lambda: image_on(DEPTH_TOPIC), COLOR_TOPIC: lambda: image_on(COLOR_TOPIC),
             BOXES_TOPIC: lambda: boxes2d(source, now_ns), BOXES3D_TOPIC: lambda: boxes3d(source, now_ns),
-            TRACKS_TOPIC: lambda: tracks(source, now_ns)}
+            TRACKS_TOPIC: lambda: tracks(source, now_ns),
+            'cmd_vel_in': lambda: Twist(Vector3(*source.numbers(3)), Vector3(*source.numbers(3)))}
 
 
 def image(source, now_ns, good):
