@@ -85,6 +85,18 @@ def test_a_person_is_recognised_at_once_while_the_old_track_is_occluded():
                     person(3, 3.1, 0, first_s=1.2)) == 3
 
 
+@pytest.mark.parametrize('turn_mps, followed', [(1.0, 3), (0.1, 1)])
+def test_an_id_switch_to_a_person_who_crosses_is_noticed(turn_mps, followed):
+    """Track 1 of a person who walks along x goes on across it, and a new one begins where the person is."""
+    selector = TargetSelector()
+    for time_s in np.arange(1, 2.01, 0.1):
+        selected(selector, time_s, person(1, 2 + 0.7 * time_s, 0, vx=0.7))
+    for time_s in np.arange(2.1, 3.01, 0.1):
+        own = person(1, 2 + 0.7 * time_s, -turn_mps * (time_s - 2), vx=0.7, vy=-turn_mps)
+        found = selected(selector, time_s, own, person(3, 2 + 0.7 * time_s, 0, vx=0.7, first_s=2.25))
+    assert found == followed
+
+
 def test_the_search_ends():
     selector = TargetSelector()
     selected(selector, 1, person(1, 2, 0))

@@ -15,8 +15,11 @@ from ros_3d_bb.planning.planner_view import position_after, predicted_to
 from ros_3d_bb.planning.safe_speed import highest_safe_speed
 from ros_3d_bb.tracking.types import VISIBLE
 
-# A lost person is within NEAR_M of the prediction, and TURNING_MPS more for each second; chosen.
-NEAR_M, TURNING_MPS = 0.5, 1.0
+# A lost person is within NEAR_M of the prediction, and TURNING_MPS more for each second, up to FARTHEST_M; chosen.
+NEAR_M, TURNING_MPS, FARTHEST_M = 0.5, 1.0, 2.0
+# A change of IDs is searched for in the last PATH_NS, and changes a track from SWITCHING_NS before the new one begins;
+# the old one then is at least LEAST_STRANGE (see `_strangeness`) from its path. Chosen.
+PATH_NS, SWITCHING_NS, LEAST_STRANGE = 3 * NS, NS // 2, 0.3
 CLEARLY = 0.5  # ratio of two distances from which on the smaller one is clearly smaller; chosen
 LONGEST_PREDICTION_S = 2.0  # people who are lost for longer have probably turned or stopped; chosen
 GAIN = 1.0  # speed by distance, 1/s; chosen
@@ -66,6 +69,7 @@ class TargetSelector(object):
     def __init__(self):
         self.target, self.has_given_up = None, False
         self._seen = {}  # (track, stamp) when it was last visible, by track ID
+        self._path = []  # (track, stamp) of the target in the last PATH_NS
 
     def select(self, tracks, stamp_ns, robot_m, params):
         """The track of the person among the tracks at a stamp, or None if the person is lost.
@@ -76,20 +80,36 @@ class TargetSelector(object):
             self.target = _chosen(tracks, robot_m, params.track_id)
         if self.target is None or self.has_given_up:
             return None
+        self._seen = {key: entry for key, entry in self._seen.items()
+                      if key == self.target.id or stamp_ns - entry[1] <= params.recover_within * NS}
         self._seen.update((track.id, (track, stamp_ns)) for track in tracks if track.status == VISIBLE)
         lost_s = (stamp_ns - self._seen[self.target.id][1]) / NS
         if lost_s > 0:
-            self._recover(tracks, stamp_ns, params)
-            lost_s = (stamp_ns - self._seen[self.target.id][1]) / NS
+            self._recover(tracks, stamp_ns)
+        else:
+            self._check_identity(tracks, stamp_ns)
+        lost_s = (stamp_ns - self._seen[self.target.id][1]) / NS
         self.target = self._seen[self.target.id][0]
         self.has_given_up = lost_s > params.recover_within
         return next((track for track in tracks if track.id == self.target.id and lost_s <= params.lost_after), None)
 
-    def _recover(self, tracks, stamp_ns, params):
+    def _check_identity(self, tracks, stamp_ns):
+        """Change to the new track of the person where the tracker has given the old one to a person who crosses: the
+        old one has left the path that was predicted before the new one began, and the new one is on it."""
+        self._path = [entry for entry in self._path if 0 <= stamp_ns - entry[1] <= PATH_NS]
+        own = self._seen[self.target.id]
+        for track in tracks:
+            before = [entry for entry in self._path if entry[1] < track.first_seen_ns - SWITCHING_NS]
+            if before and track.status == VISIBLE and track.label == self.target.label:
+                old = own[0]._replace(first_seen_ns=stamp_ns)
+                limit = CLEARLY * min(_strangeness(old, before[-1], stamp_ns), 1.0)
+                if _strangeness(track, before[-1], stamp_ns) < limit and limit > CLEARLY * LEAST_STRANGE:
+                    self.target = track
+        self._path.append(self._seen[self.target.id])
+
+    def _recover(self, tracks, stamp_ns):
         """Make the new track of the lost person the target, if it is clear which one that is."""
         now = set(track.id for track in tracks if track.status == VISIBLE)
-        self._seen = {key: entry for key, entry in self._seen.items()
-                      if key == self.target.id or stamp_ns - entry[1] <= params.recover_within * NS}
         lost = [entry for key, entry in self._seen.items() if key not in now and key != self.target.id]
         mine = self._seen[self.target.id]
         new = sorted(((_strangeness(track, mine, stamp_ns), track.id) for track in tracks
@@ -118,7 +138,7 @@ def _strangeness(track, seen, stamp_ns):
     lost_s = (stamp_ns - seen_ns) / NS
     expected_m = position_after(lost, min(lost_s, LONGEST_PREDICTION_S))
     distance_m = np.linalg.norm((track.position_m - expected_m)[:2])
-    return distance_m / (NEAR_M + TURNING_MPS * lost_s) if track.first_seen_ns > seen_ns else np.inf
+    return distance_m / min(NEAR_M + TURNING_MPS * lost_s, FARTHEST_M) if track.first_seen_ns > seen_ns else np.inf
 
 
 class Follower(object):
