@@ -4,7 +4,7 @@ import sys
 
 MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.benchmark', 'scenes': 'scene_benchmark', 'speed': 'speed',
            'latency': 'latency.benchmark', 'detector': 'detector_benchmark', 'costmap': 'costmap.benchmark',
-           'navigation': 'navigation.benchmark', 'gazebo': 'gazebo.benchmark'}
+           'laser': 'costmap.laser_benchmark', 'navigation': 'navigation.benchmark', 'gazebo': 'gazebo.benchmark'}
 
 
 def main():
