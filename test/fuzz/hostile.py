@@ -6,7 +6,7 @@ import genpy
 import numpy as np
 from geometry_msgs.msg import (Point, Pose, PoseWithCovariance, Quaternion, Transform, TransformStamped, Twist,
                                Vector3)
-from sensor_msgs.msg import CompressedImage, LaserScan, PointCloud2, PointField, RegionOfInterest
+from sensor_msgs.msg import CompressedImage, LaserScan, PointField, RegionOfInterest
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from tf2_msgs.msg import TFMessage
 

@@ -14,7 +14,6 @@ from geometry_msgs.msg import Twist
 from std_msgs.msg import Float32, UInt32
 from std_srvs.srv import SetBool
 
-from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from support.processes import pid_of
 from support.ros import Recorder, launched, wait_until

@@ -1,7 +1,7 @@
 """Highest speed at which a robot can stop before it reaches the places where people will be.
 
-Robot frame, metres, radians, seconds. The robot is a disc around the origin of its frame, which moves straight or along a
-circle.
+Robot frame, metres, radians, seconds. The robot is a disc around the origin of its frame, which moves straight or
+along a circle.
 """
 import math
 from typing import NamedTuple

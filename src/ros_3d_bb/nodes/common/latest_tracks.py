@@ -21,8 +21,8 @@ class Tracks(NamedTuple):
 
 
 class TracksAround(NamedTuple):
-    """Tracks with their stamp and frame, their age in seconds, and the current pose of their frame in that of the robot,
-    (4, 4)."""
+    """Tracks with their stamp and frame, their age in seconds, and the current pose of their frame in that of the
+    robot, (4, 4)."""
 
     tracks: list
     stamp_ns: int

@@ -112,8 +112,7 @@ class Player(object):
     def play(self, scene):
         """Play a scene. Returns its costmaps, a list of Costmap."""
         self._now_ns += GAP_NS
-        for _tick in range(int(LEAD_S / TICK_S)):  # tf begins before the first image
-            self._tick(scene, 0.0, True)
+        self._lead(scene)
         self.start_ns = self._now_ns
         del self._grids[:]
         waiting = list(scene.steps)
@@ -125,7 +124,17 @@ class Player(object):
                 step = waiting.pop(0)
                 header = Header(stamp=time_from(self.start_ns + int(step.frame.time_s * NS)), frame_id=MAP_FRAME)
                 self._tracks_pub.publish(tracks_to_msg(step.moment.tracks, header))
-        return [costmap_of(scene, grid, self.start_ns) for grid in self._grids if grid.header.stamp.to_nsec() >= self.start_ns]
+        return self.costmaps_of(scene, self._grids)
+
+    def costmaps_of(self, scene, grids):
+        """Convert the OccupancyGrids since the start of the scene to Costmaps."""
+        return [_costmap(scene, grid, self.start_ns) for grid in grids
+                if grid.header.stamp.to_nsec() >= self.start_ns]
+
+    def _lead(self, scene):
+        """Play the first moment of a scene, so that tf begins before the first image."""
+        for _tick in range(int(LEAD_S / TICK_S)):
+            self._tick(scene, 0.0, True)
 
     def _tick(self, scene, seconds, with_map, with_odom=True):
         stamp = time_from(self._now_ns)
@@ -145,7 +154,7 @@ class Player(object):
         return self._grids and self._now_ns - self._grids[-1].header.stamp.to_nsec() > COSTMAP_S * NS
 
 
-def costmap_of(scene, grid, start_ns):
+def _costmap(scene, grid, start_ns):
     """Convert an OccupancyGrid in odom."""
     seconds, origin = (grid.header.stamp.to_nsec() - start_ns) / NS, grid.info.origin.position
     lethal = np.array(grid.data, np.int8).reshape(grid.info.height, grid.info.width) == 100

@@ -1,4 +1,4 @@
-"""Benchmark of people in the laser layer of a real costmap_2d, with their scan and without people (people_removal_node).
+"""Benchmark of people in the laser layer of a real costmap_2d, with and without people_removal_node.
 
 The laser is planar, in the frame of the robot, and sees walls, furniture and people as upright cylinders. Scenes are
 tracked and played as in `benchmark`.
@@ -15,13 +15,13 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb_lab.evaluation.costmap.benchmark import (SCENES, Player, costmap_of, running_nodes, scenario_paths,
-                                                        tracked_scene)
+from ros_3d_bb_lab.evaluation.costmap.benchmark import SCENES, Player, running_nodes, scenario_paths, tracked_scene
 from ros_3d_bb_lab.evaluation.defaults import describe_machine
 from ros_3d_bb_lab.simulation.collision import Rectangle
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME
 
 SCAN_S, BEAMS, FIELD_OF_VIEW, RANGE_M = 0.05, 541, np.radians(270), 10.0  # as a Hokuyo or SICK of a Jackal
+CLEARING_BEAMS = 1500  # through each cell
 NEAR_M = 0.2  # cells at most this far from walls and furniture are those of the room
 COLUMNS = '%-20s %9s %15s %15s %13s %13s'
 HEADINGS = 'scene', 'costmaps', 'of people: scan', 'scan_static', 'of the room', 'scan_static'
@@ -36,7 +36,7 @@ COSTMAP = """<node pkg="costmap_2d" type="costmap_2d_node" name="%s" output="scr
     <rosparam command="load" file="$(find ros_3d_bb)/config/move_base/local_costmap.yaml" ns="costmap"/>
     <rosparam command="load" file="$(find ros_3d_bb)/config/move_base/costmap_common.yaml" ns="costmap"/>
     <rosparam ns="costmap">
-      {global_frame: odom, robot_base_frame: base_link, width: 12.0, height: 12.0, publish_frequency: 10.0,
+      {global_frame: odom, robot_base_frame: base_link, width: 8.0, height: 8.0, publish_frequency: 10.0,
        always_send_full_costmap: true, plugins: [{name: obstacle_layer, type: "costmap_2d::ObstacleLayer"}]}
     </rosparam>
     <param name="costmap/obstacle_layer/scan/topic" value="%s"/>
@@ -91,19 +91,30 @@ def counts_of(costmap, room):
 
 
 class LaserPlayer(Player):
-    """As Player, with a laser. `scene` must be set before it plays."""
+    """As Player, with a laser. Before each scene, scans all around without a return clear the costmaps, whose corners
+    are within their raytrace_range.
+
+    Attribute `with_people`: the OccupancyGrids of the layer of the scan with people.
+    """
 
     def __init__(self, speed):
         super(LaserPlayer, self).__init__(speed)
         self._scan_pub, self.with_people = rospy.Publisher('scan', LaserScan, queue_size=10), []
-        self._due_ns = 0
+        self._due_ns, self._is_clearing = 0, False
         rospy.Subscriber('/costmap_with_people/costmap/costmap', OccupancyGrid, self.with_people.append,
                          queue_size=100, buff_size=2 ** 24)
+
+    def _lead(self, scene):
+        self._is_clearing = True
+        super(LaserPlayer, self)._lead(scene)
+        self._is_clearing = False
 
     def _tick(self, scene, seconds, with_map, with_odom=True):
         if self._now_ns >= self._due_ns:
             self._due_ns = self._now_ns + int(SCAN_S * NS)
-            self._scan_pub.publish(scan_message(scene.simulator, seconds, time_from(self._now_ns)))
+            stamp = time_from(self._now_ns)
+            self._scan_pub.publish(message_of(np.full(CLEARING_BEAMS, np.inf), 2 * np.pi, stamp) if self._is_clearing
+                                   else scan_message(scene.simulator, seconds, stamp))
         super(LaserPlayer, self)._tick(scene, seconds, with_map, with_odom)
 
 
@@ -114,9 +125,14 @@ def scan_message(simulator, seconds, stamp):
     pose = np.append(map_from_base[:2, 3], np.arctan2(map_from_base[1, 0], map_from_base[0, 0]))
     radii_m = [body.width_m / 2 for body in simulator.bodies]
     ranges_m = scan_ranges(pose, simulator.scenario.room, simulator.positions_at(seconds), radii_m)
-    return LaserScan(header=Header(stamp=stamp, frame_id=BASE_FRAME), angle_min=-FIELD_OF_VIEW / 2,
-                     angle_max=FIELD_OF_VIEW / 2, angle_increment=FIELD_OF_VIEW / (BEAMS - 1), scan_time=SCAN_S,
-                     range_min=0.05, range_max=RANGE_M, ranges=ranges_m.tolist())
+    return message_of(ranges_m, FIELD_OF_VIEW, stamp)
+
+
+def message_of(ranges_m, field_of_view, stamp):
+    """Convert ranges (n,) to a LaserScan in the frame of the robot."""
+    return LaserScan(header=Header(stamp=stamp, frame_id=BASE_FRAME), angle_min=-field_of_view / 2,
+                     angle_max=field_of_view / 2, angle_increment=field_of_view / (len(ranges_m) - 1),
+                     scan_time=SCAN_S, range_min=0.05, range_max=RANGE_M, ranges=ranges_m.tolist())
 
 
 def result_of(scene, costmaps, with_people):
@@ -150,8 +166,7 @@ def main():
         for scene in scenes:
             del player.with_people[:]
             costmaps = player.play(scene)
-            with_people = [costmap_of(scene, grid, player.start_ns) for grid in player.with_people
-                           if grid.header.stamp.to_nsec() >= player.start_ns]
+            with_people = player.costmaps_of(scene, player.with_people)
             result = results[scene.name] = result_of(scene, costmaps, with_people)
             print(COLUMNS % (scene.name, result['costmaps'], '%.1f' % result['of_people'],
                              '%.1f' % result['of_people_static'], '%.0f' % result['of_room'],
