@@ -4,8 +4,9 @@ import random
 
 import genpy
 import numpy as np
-from geometry_msgs.msg import Point, Pose, PoseWithCovariance, Quaternion, Transform, TransformStamped, Vector3
-from sensor_msgs.msg import CompressedImage, RegionOfInterest
+from geometry_msgs.msg import (Point, Pose, PoseWithCovariance, Quaternion, Transform, TransformStamped, Twist,
+                               Vector3)
+from sensor_msgs.msg import CompressedImage, LaserScan, PointField, RegionOfInterest
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from tf2_msgs.msg import TFMessage
 
@@ -16,6 +17,7 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOP
 from ros_3d_bb.conversions.image_msgs import LAYOUTS
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg,
                                                    time_from)
+from ros_3d_bb.conversions.planner_msgs import points_to_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
 from support.compressed import compressed_fields
@@ -83,6 +85,10 @@ def good_messages(stamp_ns):
     box = BoundingBox3D(center=Pose(Point(0, 0, 3), Quaternion(w=1)), size=Vector3(0.5, 1.7, 0.5))
     messages[BOXES3D_TOPIC] = BoundingBox3DArray(header=header, boxes=[box])
     messages[TRACKS_TOPIC] = TrackedObjectArray(header=header)
+    messages['~scan'] = LaserScan(header=header, angle_increment=0.1, ranges=[1.0, 2.0, 3.0])
+    messages['~points'] = points_to_msg(np.ones((3, 3)), header)
+    messages['~depth'], messages['~camera_info'] = messages[DEPTH_TOPIC], messages[INFO_TOPICS[0]]
+    messages['cmd_vel_in'] = Twist(linear=Vector3(0.5, 0, 0), angular=Vector3(0, 0, 0.1))
     return messages
 
 
@@ -105,7 +111,13 @@ def makers(source, now_ns, good, compressed_share=0.0):
     return {INFO_TOPICS[0]: lambda: camera_info(source, now_ns, good[INFO_TOPICS[0]]),
             DEPTH_TOPIC: lambda: image_on(DEPTH_TOPIC), COLOR_TOPIC: lambda: image_on(COLOR_TOPIC),
             BOXES_TOPIC: lambda: boxes2d(source, now_ns), BOXES3D_TOPIC: lambda: boxes3d(source, now_ns),
-            TRACKS_TOPIC: lambda: tracks(source, now_ns)}
+            TRACKS_TOPIC: lambda: tracks(source, now_ns),
+            '~scan': lambda: LaserScan(header=source.header(now_ns), angle_min=source.score(),
+                                       angle_increment=source.score(),
+                                       ranges=[source.score() for _beam in range(source.choice((0, 3)))]),
+            '~points': lambda: cloud(source, now_ns), '~depth': lambda: image_on(DEPTH_TOPIC),
+            '~camera_info': lambda: camera_info(source, now_ns, good[INFO_TOPICS[0]]),
+            'cmd_vel_in': lambda: Twist(Vector3(*source.numbers(3)), Vector3(*source.numbers(3)))}
 
 
 def image(source, now_ns, good):
@@ -212,6 +224,17 @@ def boxes3d(source, now_ns):
     return message
 
 
+def cloud(source, now_ns):
+    """A mostly damaged point cloud."""
+    message = points_to_msg(np.array(source.numbers(9)).reshape(3, 3).clip(-1e30, 1e30), source.header(now_ns))
+    _damage(source, message, (
+        lambda: {'height': source.choice(UINT32)}, lambda: {'width': source.choice(UINT32)},
+        lambda: {'point_step': source.choice(UINT32)}, lambda: {'row_step': source.choice(UINT32)},
+        lambda: {'data': source.bytes_of(source.choice((0, 1, 36)))}, lambda: {'is_bigendian': True},
+        lambda: {'fields': [PointField(name, source.choice(UINT32), source.choice((7, 8)), 1) for name in 'xyz']}))
+    return message
+
+
 def tracks(source, now_ns):
     """Tracks."""
     message = TrackedObjectArray(header=source.header(now_ns))
@@ -230,5 +253,7 @@ def tracks(source, now_ns):
             track.label, track.score = source.choice(NAMES + TEXTS), source.score()
         if source.random() < 0.3:
             track.pose.covariance, track.twist.covariance = source.numbers(36), source.numbers(36)
+        for pose in track.prediction if source.random() < 0.3 else ():
+            pose.covariance = source.numbers(36)
         message.objects.append(track)
     return message

@@ -13,7 +13,10 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.yolov5.predictions import Backend
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
+from ros_3d_bb.nodes.follow_node import FollowNode
+from ros_3d_bb.nodes.people_removal_node import PeopleRemovalNode
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeNode
+from ros_3d_bb.nodes.speed_limit_node import SpeedLimitNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.nodes.viewer_node import ViewerNode
 from ros_3d_bb.nodes.yolov5_node import Yolov5Node
@@ -60,7 +63,11 @@ TARGETS = {
     'tracker_node': Target(lambda _source: TrackerNode(), {'tf_timeout': 0.0}, TRACKS_TOPIC),
     'yolov5_node': Target(_yolov5, {'weights': 'noise.pt', 'image_size': 64}, BOXES_TOPIC),
     'depth_detector_node': Target(lambda _source: DepthDetectorNode(), {}, BOXES_TOPIC),
+    'people_removal_node': Target(lambda _source: PeopleRemovalNode(),
+                                  {'inputs': 'scan, points, depth', 'tf_timeout': 0.0}, '~scan_static'),
     'planner_bridge_node': Target(lambda _source: PlannerBridgeNode(), {'tf_timeout': 0.0}, '~points'),
+    'follow_node': Target(lambda _source: FollowNode(), {'enabled': True}, ''),
+    'speed_limit_node': Target(lambda _source: SpeedLimitNode(), {}, 'cmd_vel'),
     'viewer_node': Target(lambda _source: ViewerNode(), {'window': False}, '')}
 
 

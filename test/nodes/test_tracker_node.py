@@ -7,13 +7,14 @@ import pytest
 import rospy
 from dynamic_reconfigure.client import Client
 from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import OccupancyGrid
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObject, TrackedObjectArray
-from support.ros import TIMEOUT_S, Recorder, header_at, publisher
+from support.ros import TIMEOUT_S, Recorder, diagnostics_of, header_at, publisher, wait_until
 from support.two_cameras import boxes
 
 PERIOD, CAMERA = NS // 10, 'camera_color_optical_frame'
@@ -138,3 +139,20 @@ def test_parameters_that_are_set_together_change_together(rig, tracks, tuned, no
     over.set()
     thread.join()
     assert both <= seen <= both | {(8, 0.25)}  # that of the start
+
+
+def test_no_track_starts_in_ignored_areas_nor_behind_cells_of_the_map(rig, tracks, tuned, now):
+    """A person 3 m ahead, one in an area at 5 m, and a poster on a wall at 7 m; the wall ends before y = 2."""
+    grid = OccupancyGrid(header=header_at(0, 'map'), data=[100] * 20)
+    grid.info.width, grid.info.height, grid.info.resolution = 1, 20, 0.1
+    grid.info.origin.position.x, grid.info.origin.position.y, grid.info.origin.orientation.w = 7.0, -1.0, 1.0
+    publisher('static_map', OccupancyGrid).publish(grid)
+    wait_until(lambda: diagnostics_of('tracker_node')[2].get('maps'), 'the map')
+    tuned({'ignored_areas': '[[[4.5, -0.5], [5.5, -0.5], [5.5, 0.5], [4.5, 0.5]]]'})
+    with Recorder('visualization_marker_array', MarkerArray) as markers:
+        for frame in range(10):
+            rig.send(now + frame * PERIOD, (1.0, 0.2, 3.0), (0.0, 0.2, 5.0), (0.0, 0.2, 7.2), (-2.0, 0.2, 7.2))
+        message = tracks.wait_for(10)[-1]
+        assert 'ignored_area' in [marker.ns for marker in markers.wait_for(1)[0].markers]
+    assert sorted(round(track.pose.pose.position.y) for track in message.objects) == [-1, 2]
+    assert diagnostics_of('tracker_node')[2]['boxes in ignored areas'] >= 20

@@ -40,13 +40,14 @@ ALLOWED = {
         'bags camera conversions core detection.depth msg pipeline',
         'genpy sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
     'ros_3d_bb.nodes.common': (
-        'camera conversions core diagnosis msg pipeline visualization',
+        'camera conversions core diagnosis msg pipeline planning visualization',
         'diagnostic_msgs diagnostic_updater dynamic_reconfigure genpy rosgraph rosgraph_msgs rospkg rospy '
         'sensor_msgs std_msgs std_srvs tf2_ros'),
     'ros_3d_bb.nodes': (
         'bags camera conversions core detection detection.depth detection.yolov5 diagnosis drivers msg nodes.common '
         'pipeline planning sessions tracking visualization',
-        'rosgraph rosgraph_msgs rospy sensor_msgs std_msgs std_srvs tf2_ros visualization_msgs'),
+        'actionlib_msgs geometry_msgs nav_msgs rosgraph rosgraph_msgs rospy sensor_msgs std_msgs std_srvs tf2_ros '
+        'visualization_msgs'),
     'ros_3d_bb_lab.simulation': ('camera core tracking', 'cv2 yaml'),
     'ros_3d_bb_lab.simulation.ros': (
         'bags camera conversions core msg nodes.common lab.simulation',

@@ -7,9 +7,10 @@ from visualization_msgs.msg import Marker
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject
-from ros_3d_bb.visualization.markers import NAMESPACES, PALETTE, MarkerParams, MarkerWriter
+from ros_3d_bb.visualization.markers import AREA, NAMESPACES as ALL_NAMESPACES, PALETTE, MarkerParams, MarkerWriter
 
-ALL = MarkerParams(marker_namespaces=list(NAMESPACES))
+NAMESPACES = [name for name in ALL_NAMESPACES if name != AREA]  # of tracks
+ALL = MarkerParams(marker_namespaces=NAMESPACES)
 SECOND_NS = 1000 * NS
 
 
@@ -157,3 +158,13 @@ def test_new_parameters_apply_to_the_next_image():
     assert sorted(keys(markers)) == [('cylinder', 3), ('history', 3)]
     assert keys(markers, Marker.DELETE) == [('id', 3)]
     assert all(marker.lifetime.to_sec() == 0.5 for marker in markers.markers if marker.action == Marker.ADD)
+
+
+def test_ignored_areas_are_closed_outlines_on_the_floor_until_they_are_removed():
+    writer = MarkerWriter(MarkerParams())
+    writer.areas_m = [np.array([[1.0, 2.0], [3.0, 2.0], [3.0, 4.0]])]
+    marker, = writer.write([], header(SECOND_NS)).markers
+    assert (marker.ns, marker.id, marker.type) == (AREA, 0, Marker.LINE_STRIP)
+    np.testing.assert_allclose(xyz(marker)[:, :2], [[1, 2], [3, 2], [3, 4], [1, 2]])
+    writer.areas_m = []
+    assert keys(writer.write([], header(2 * SECOND_NS)), Marker.DELETE) == [(AREA, 0)]

@@ -3,11 +3,13 @@ import os
 
 import numpy as np
 import pytest
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.image_msgs import fill_image
+from ros_3d_bb.conversions.map_msgs import occupied_from_msg
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.time_sync import NS
@@ -166,3 +168,23 @@ def test_the_error_model_gives_the_tracker_the_range_of_the_detector(tmp_path):
 def test_a_missing_error_model_is_named(tracker):
     with pytest.raises(ValueError, match='nowhere.yaml.*absolute path expected'):
         Rig(tracker=tracker, error_model='nowhere.yaml')
+
+
+def map_in(frame_id, **fields):
+    grid = OccupancyGrid(header=Header(frame_id=frame_id), data=[100, 0, 64, -1])
+    grid.info.width, grid.info.height, grid.info.resolution, grid.info.origin.orientation.w = 2, 2, 0.1, 1.0
+    for name, value in fields.items():
+        setattr(grid.info, name, value)
+    return grid
+
+
+@pytest.mark.parametrize('message, words', [
+    (map_in('odom'), "its frame is 'odom'"), (map_in('map', width=3), 'it has 4 cells of 0.1 m, 3 x 2'),
+    (map_in('map', resolution=0.0), 'of 0 m'), (map_in('map', resolution=float('nan')), 'of nan m')])
+def test_a_map_in_another_frame_or_without_cells_is_rejected(rig, message, words):
+    with pytest.raises(ValueError, match=words):
+        rig.set_map(message)
+
+
+def test_cells_are_occupied_from_65_on(rig):
+    assert occupied_from_msg(map_in('map')).cells.tolist() == [[True, False], [False, False]]

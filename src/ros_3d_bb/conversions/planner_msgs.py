@@ -4,7 +4,7 @@ Message classes of optional packages are passed as an argument, the `msg` module
 `types.TrackedObject` in the frame of the header.
 """
 import numpy as np
-from geometry_msgs.msg import Point, Point32, Pose, Quaternion
+from geometry_msgs.msg import Point, Point32, Pose, PoseStamped, Quaternion, Twist
 from nav_msgs.msg import MapMetaData, OccupancyGrid
 from sensor_msgs.msg import PointCloud2, PointField
 
@@ -91,3 +91,23 @@ def grid_to_msg(costs, cell_m, origin_m, header):
     info = MapMetaData(header.stamp, cell_m, costs.shape[1], costs.shape[0],
                        Pose(Point(origin_m[0], origin_m[1], 0), Quaternion(w=1.0)))
     return OccupancyGrid(header, info, costs.ravel().tolist())
+
+
+def velocity_to_msg(x, y, angular):
+    """Convert a velocity in the plane to geometry_msgs/Twist."""
+    message = Twist()
+    message.linear.x, message.linear.y, message.angular.z = x, y, angular
+    return message
+
+
+def velocity_from_msg(message):
+    """Velocity along x, along y and about z of a geometry_msgs/Twist. Raises ValueError if it is not finite."""
+    velocity = message.linear.x, message.linear.y, message.angular.z
+    if not np.isfinite(velocity).all():
+        raise ValueError('the velocity is (%g, %g, %g); finite numbers expected' % velocity)
+    return velocity
+
+
+def pose_to_msg(x, y, yaw, header):
+    """Convert a pose in the plane to geometry_msgs/PoseStamped."""
+    return PoseStamped(header, Pose(Point(x, y, 0.0), Quaternion(0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2))))

@@ -2,6 +2,7 @@
 import functools
 
 import rospy
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import Image
 from visualization_msgs.msg import MarkerArray
 
@@ -43,6 +44,8 @@ class TrackerNode(object):
         Calibration, used to determine which tracks are out of view; not with ~tracker thesis.
     camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
         Depth image, used to determine which tracks are occluded; not with ~tracker thesis or without ~use_depth.
+    map : nav_msgs/OccupancyGrid
+        Static map in ~target_frame, in whose occupied cells no track starts; only with ~use_map.
     /tf : tf2_msgs/TFMessage
         Pose of the camera in ~target_frame.
     /tf_static : tf2_msgs/TFMessage
@@ -70,6 +73,9 @@ class TrackerNode(object):
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
         for camera in self._stage.cameras:
             self._subscribe(camera, params.depth, part.subscribes)
+        if params.use_map:
+            subscribe('map', OccupancyGrid, self._on_map, 1)
+        self._markers.areas_m = self._stage.ignored_areas
         ReconfigureServer(given, self._reconfigure, part.namespace)
 
     def _subscribe(self, camera, depth, with_boxes):
@@ -92,6 +98,11 @@ class TrackerNode(object):
         with self._stage.lock:
             self._stage.reconfigure(tracking)
             self._markers.reconfigure(marker_params)
+            self._markers.areas_m = self._stage.ignored_areas
+
+    def _on_map(self, message):
+        with self._diagnostics.receiving('maps'):
+            self._stage.set_map(message)
 
     def _on_camera_info(self, message, camera):
         with self._diagnostics.receiving('camera_info'):

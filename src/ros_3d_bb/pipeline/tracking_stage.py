@@ -12,10 +12,11 @@ from ros_3d_bb.camera.alignment import POSE, target_frame_fault
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
+from ros_3d_bb.conversions.map_msgs import occupied_from_msg
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of, time_from, usable_boxes3d
 from ros_3d_bb.core.camera_clocks import CameraClocks
 from ros_3d_bb.core.object_classes import read_object_classes
-from ros_3d_bb.core.params import CLASSES_FILE, DEPTH, DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.params import CLASSES_FILE, DEPTH, DEPTH_SCALE, SET_BY_LAUNCH, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, MessageCache
 from ros_3d_bb.estimation.error_model import error_model_of_param
 from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
@@ -52,6 +53,7 @@ class TrackerNodeParams(NamedTuple):
     stamp_tolerance: float = STAMP_TOLERANCE
     classes_file: str = CLASSES_FILE
     tf_timeout: float = Param(0.2, 'How long to wait for the transform at the stamp of the boxes.', 's')
+    use_map: bool = Param(False, 'Whether no track starts in occupied cells of the static map.', section=SET_BY_LAUNCH)
 
 
 class TrackingStage(object):
@@ -117,6 +119,20 @@ class TrackingStage(object):
     def _params_of_tracker(self, tracking):
         return [params for params in tracking if type(params) in self._kinds]
 
+    @property
+    def ignored_areas(self):
+        """Polygons, arrays (n, 2) in the fixed frame, in which no track starts."""
+        return self._tracker.ignored.polygons
+
+    def set_map(self, message):
+        """Start no tracks in the occupied cells of a nav_msgs/OccupancyGrid. Raises ValueError if it is in another
+        frame than the tracks."""
+        if message.header.frame_id.lstrip('/') != self._params.target_frame.lstrip('/'):
+            raise ValueError('its frame is %r, and that of the tracks %r; the same expected, and no cells are ignored'
+                             % (message.header.frame_id, self._params.target_frame))
+        with self.lock:
+            self._tracker.set_map(occupied_from_msg(message))
+
     def add_camera_info(self, message, camera=''):
         """Add a sensor_msgs/CameraInfo. Raises ValueError if it is invalid."""
         self._intrinsics[camera] = camera_from_msg(message)
@@ -174,8 +190,13 @@ class TrackingStage(object):
         if camera:
             self._check_frame(message.header.frame_id, camera)
         motions, untracked = self._tracker.common_motions, self._tracker.untracked_boxes
-        tracks = self._tracker.update(stamp_ns, detections_from_boxes(boxes, fixed_from_camera, self._classes),
+        detections = detections_from_boxes(boxes, fixed_from_camera, self._classes)
+        tracks = self._tracker.update(stamp_ns, detections,
                                       self._view(message.header, fixed_from_camera, camera, camera_name))
+        ignored = sum(self._tracker.ignored.contains(detection.position_m, fixed_from_camera[:2, 3])
+                      for detection in detections)
+        if ignored:
+            self._events.count('boxes in ignored areas', ignored)
         self._events.count('images tracked')
         if self._tracker.untracked_boxes > untracked:
             self._events.count('3D boxes that became no track', self._tracker.untracked_boxes - untracked)
@@ -259,6 +280,8 @@ def _check(params):
     if params.cameras and params.camera_frame:
         raise ValueError('parameter ~camera_frame is %r, and ~cameras are %s; expected with a single camera only'
                          % (params.camera_frame, ', '.join(params.cameras)))
+    if params.use_map and params.tracker == 'thesis':
+        raise ValueError('parameter ~tracker is thesis, and ~use_map is true; this tracker uses no map')
     if params.cameras and params.tracker == 'thesis':
         raise ValueError('parameter ~tracker is thesis, and ~cameras are %s; this tracker supports a single camera only'
                          % ', '.join(params.cameras))

@@ -29,7 +29,8 @@ def _fault_of(track):
         return ('track %d has position %s, velocity %s, size %s and prediction %s; finite numbers and a size of more '
                 'than 0 and less than %g m expected' % (track.id, track.position_m, track.velocity_mps, track.size_m,
                                                         track.prediction_m.tolist(), LARGEST_M))
-    if track.covariance is not None and not (np.abs(track.covariance) < FARTHEST_M).all():
+    if track.covariance is not None and not ((np.abs(track.covariance) < FARTHEST_M).all() and (
+            np.abs(track.prediction_covariance_m2) < FARTHEST_M).all()):
         return 'track %d has a covariance that is not finite' % track.id
     if len(track.prediction_m) and not track.prediction_step_s > 0:
         return ('track %d has predictions in steps of %g s; a positive step expected'

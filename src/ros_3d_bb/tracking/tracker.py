@@ -20,6 +20,7 @@ from ros_3d_bb.tracking.association import associate
 from ros_3d_bb.tracking.birth import NEW_NS, duplicates, initiate
 from ros_3d_bb.tracking.common_motion import (FEWEST, SETTLED_NS, camera_velocity, common_motion, may_jump, most_fit,
                                               moved, pose_jump)
+from ros_3d_bb.tracking.ignored_areas import IgnoredAreas, polygons_from
 from ros_3d_bb.tracking.manoeuvres import match_manoeuvres
 from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, BoxNoise, Kinds, NoiseParams,
                                                   correlated_images, learned_log_scale, learned_range,
@@ -35,6 +36,7 @@ MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped; c
 TENTATIVE_TIMEOUT_S = 0.75  # how long a tentative track is kept without a detection; chosen
 BY_ID, FIRST_SEEN = operator.attrgetter('id'), operator.attrgetter('first_ns')
 # Sections of the parameters.
+PLACES = 'kalman: where no track starts'
 MOTION, ASSOCIATION = 'kalman: how people move', 'kalman: association of boxes with tracks'
 
 
@@ -76,6 +78,13 @@ class TrackerParams(NamedTuple):
         'new target is more likely: with the default parameters after 3 s, except for people who stop behind an '
         'occluder. With 0, every missed person gets a new ID.', 's', live=(0, 30))
     moving_speed: float = MOVING_SPEED
+    ignored_areas: str = Param(
+        '', 'Polygons of the fixed frame in which no track starts, as around mirrors and posters: a list of lists of '
+        'corners, such as [[[1, 2], [3, 2], [3, 4]]]; empty: none. Tracked people can walk through. Tracks in an area '
+        'end when it is set.', 'm', live=True, section=PLACES)
+    map_depth: float = Param(
+        0.3, 'With a map, no track starts in occupied cells and up to this distance behind them, as seen by the '
+        'camera.', 'm', limits=(0, 2), live=(0, 1), section=PLACES)
 
 
 class _State(NamedTuple):
@@ -107,17 +116,37 @@ class Tracker(TrackerBase):
 
     def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams(), last_id=0,
                  classes=ObjectClasses(), detector=DetectorModel()):
-        self._kinds, self._detector = Kinds(classes), detector
-        self.reconfigure(params, noise, prediction)
+        self._kinds, self._detector, self.ignored = Kinds(classes), detector, IgnoredAreas()
         self._start(last_id)
+        self.reconfigure(params, noise, prediction)
 
     def _start(self, last_id, log_noise_scale=0.0):
         self._buffer = OutOfSequenceBuffer(self._step, _State([], None, {}, 0, None, log_noise_scale, 0), last_id)
 
     def reconfigure(self, params, noise, prediction):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
+        areas = self.ignored._replace(polygons=polygons_from(params.ignored_areas), map_depth_m=params.map_depth)
         super(Tracker, self).reconfigure(params, noise, prediction)
         self._rules = Rules.of(params, self._kinds)
+        if areas.differs_from(self.ignored):
+            self._ignore(areas)
+
+    def set_map(self, occupied):
+        """Start no tracks in the cells of a static map, `ignored_areas.OccupiedCells`. With the first map, those there
+        end."""
+        areas = self.ignored._replace(occupied=occupied)
+        if self.ignored.occupied is None:
+            self._ignore(areas)
+        self.ignored = areas
+
+    def _ignore(self, areas):
+        """Use other IgnoredAreas. The tracks in them, which have started there, end."""
+        self._buffer.replay()
+        self.ignored, state = areas, self._buffer.state
+        cameras_m = [camera.view.fixed_from_camera[:2, 3] for camera in state.cameras.values()]
+        tracks = [track for track in state.tracks if not any(
+            areas.contains((track.state.x, track.state.y), camera_m) for camera_m in cameras_m)]
+        self._buffer = OutOfSequenceBuffer(self._step, state._replace(tracks=tracks), self._buffer.last_id)
 
     def reset(self):
         """Delete all tracks, as after a jump in time. IDs are not reused, and the learned noise is kept."""
@@ -176,7 +205,9 @@ class Tracker(TrackerBase):
         tracks, untracked_boxes = self._delete(tracks, image.stamp_ns)
         if len(matches) < len(measurements):
             taken = set(number for _is_confirmed, number in matched.values())
-            unmatched = [measurement for measurement in measurements if measurement.number not in taken]
+            camera_m = image.view.fixed_from_camera[:2, 3]
+            unmatched = [measurement for measurement in measurements if measurement.number not in taken
+                         and not self.ignored.contains((measurement.x, measurement.y), camera_m)]
             tracks += initiate(tracks, unmatched, image, self._params[0], self._rules, assign_id)
         misfit_ns = image.stamp_ns if fits is False else before.misfit_ns
         state = _State(tracks, image.stamp_ns, cameras, before.common_motions + is_moved, misfit_ns, log_noise_scale,

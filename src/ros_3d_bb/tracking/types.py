@@ -8,6 +8,7 @@ from ros_3d_bb.camera.camera_model import Camera, upright_turns
 from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import Param
+from ros_3d_bb.tracking.ignored_areas import IgnoredAreas
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
 NOT_DETECTED = -1  # index of the box of an object that was not detected
@@ -160,6 +161,7 @@ class TrackerBase(object):
 
     common_motions = 0  # number of images in which the pose of the camera jumped
     untracked_boxes = 0  # number of boxes that never became a track
+    ignored = IgnoredAreas()  # where no track starts
 
     def reconfigure(self, *params):
         """Use other parameters and keep the tracks; the last ones have `prediction_time` and `prediction_step`. Raises

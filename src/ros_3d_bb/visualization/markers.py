@@ -14,7 +14,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 
 MARKERS_TOPIC = 'visualization_marker_array'
-NAMESPACES = 'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse', 'prediction_ellipse'
+NAMESPACES = 'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse', 'ignored_area', 'prediction_ellipse'
 BLUE, GREEN, RED = (0.1, 0.3, 1.0), (0.1, 0.9, 0.2), (0.95, 0.1, 0.1)
 AMBER, GREY, WHITE = (1.0, 0.65, 0.1), (0.65, 0.65, 0.65), (0.95, 0.95, 0.95)
 # Neighbours differ most. None is red, green or grey, because arrows and tracks that are not visible have these colours.
@@ -29,6 +29,7 @@ VELOCITY_SCALE, PREDICTION_SCALE = Vector3(0.07, 0.14, 0), Vector3(0.04, 0.11, 0
 # Height of the text, and widths of the lines.
 TEXT_SCALE, HISTORY_SCALE = Vector3(0, 0, 0.35), Vector3(0.05, 0, 0)
 ELLIPSE_SCALE, PREDICTION_ELLIPSE_SCALE = Vector3(0.03, 0, 0), Vector3(0.015, 0, 0)
+AREA, AREA_SCALE = 'ignored_area', Vector3(0.06, 0, 0)
 UPRIGHT = Quaternion(0, 0, 0, 1)
 CHI2_95 = 5.991  # 95 % quantile of chi squared with 2 degrees of freedom: squared semi-axes in standard deviations
 CIRCLE = np.array([(np.cos(angle), np.sin(angle)) for angle in np.linspace(0, 2 * np.pi, 25)])
@@ -46,7 +47,8 @@ class MarkerParams(NamedTuple):
         'id: the track ID, with the class of objects other than people, followed by a question mark while the object '
         'is not detected; velocity: red, to the position in 1 s; prediction: green, to the last predicted position; '
         'history: the path walked, fading; '
-        'ellipse: contains the position with a probability of 95 %; prediction_ellipse: the same at each half second '
+        'ellipse: contains the position with a probability of 95 %; ignored_area: where no track starts '
+        '(ignored_areas); prediction_ellipse: the same at each half second '
         'ahead.', choices=NAMESPACES, live=True)
     marker_color: str = Param(
         'id', 'Colour of cylinders, history and ellipses. id: one of ten colours by track ID, which shows ID '
@@ -80,21 +82,25 @@ class MarkerWriter(object):
 
     A marker is updated while its track exists, and deleted when the track ends. Without new messages RViz removes it
     after its lifetime (0: never).
+
+    Attribute `areas_m`: polygons (n, 2) in the fixed frame in which no track starts.
     """
 
     def __init__(self, params=MarkerParams()):
         self._drawn = set()  # (namespace, id)
         self._histories = {}  # by track ID: an anchor (3,), and the path relative to it, [(stamp_ns, Point)]
         self._outlines = {}  # of the ellipses, by track ID
+        self.areas_m = ()
         self.reconfigure(params)
 
     def reconfigure(self, params):
         """Draw the next tracks with other parameters."""
         self._params = params
         self._lifetime = genpy.Duration.from_sec(params.marker_lifetime)
-        shapes = (self._cylinder, self._id, self._velocity, self._prediction, self._history, self._ellipse,
-                  self._prediction_ellipses)
-        self._shapes = [(name, shape) for name, shape in zip(NAMESPACES, shapes) if name in params.marker_namespaces]
+        shapes = {'cylinder': self._cylinder, 'id': self._id, 'velocity': self._velocity,
+                  'prediction': self._prediction, 'history': self._history, 'ellipse': self._ellipse,
+                  'prediction_ellipse': self._prediction_ellipses}
+        self._shapes = [(name, shape) for name, shape in shapes.items() if name in params.marker_namespaces]
 
     def write(self, tracks, header):
         """Create the visualization_msgs/MarkerArray of the tracks (`types.TrackedObject`) of one image; the header has
@@ -111,11 +117,21 @@ class MarkerWriter(object):
                     markers.append(Marker(header, namespace, track.id, look.type, Marker.ADD, look.pose or pose,
                                           look.scale, look.color, self._lifetime, False, look.points, look.colors,
                                           look.text, '', False))
+        if AREA in self._params.marker_namespaces:
+            markers += [self._area(number, polygon, header) for number, polygon in enumerate(self.areas_m)]
         drawn = {(marker.ns, marker.id) for marker in markers}
         markers += [Marker(header=header, ns=namespace, id=track_id, action=Marker.DELETE)
                     for namespace, track_id in sorted(self._drawn - drawn)]
         self._drawn = drawn
         return MarkerArray(markers=markers)
+
+    def _area(self, number, polygon, header):
+        """Closed outline of a polygon on the floor."""
+        anchor_m = np.append(polygon[0], FLOOR_OFFSET_M)
+        corners = [_point(x, y, 0.0) for x, y in (np.vstack((polygon, polygon[:1])) - polygon[0]).tolist()]
+        return Marker(header=header, ns=AREA, id=number, type=Marker.LINE_STRIP, action=Marker.ADD,
+                      pose=_pose(anchor_m), scale=AREA_SCALE, color=_color(GREY, 0.9), lifetime=self._lifetime,
+                      points=corners)
 
     def _extended_history(self, track, now_ns):
         """History of a track with its current position, without steps that a jump back in time makes future ones."""

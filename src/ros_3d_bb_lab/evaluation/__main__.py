@@ -4,8 +4,8 @@ import sys
 
 MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.benchmark', 'prediction': 'tracking.motion_benchmark',
            'scenes': 'scene_benchmark', 'speed': 'speed', 'latency': 'latency.benchmark',
-           'detector': 'detector_benchmark', 'costmap': 'costmap.benchmark', 'navigation': 'navigation.benchmark',
-           'gazebo': 'gazebo.benchmark'}
+           'detector': 'detector_benchmark', 'costmap': 'costmap.benchmark', 'laser': 'costmap.laser_benchmark',
+           'navigation': 'navigation.benchmark', 'gazebo': 'gazebo.benchmark'}
 
 
 def main():

@@ -88,10 +88,13 @@ def _is_visible(person, frame, range_m):
 
 
 class Player(object):
-    """Plays scenes to the nodes and collects their costmaps. `rospy.init_node` must have been called."""
+    """Plays scenes to the nodes and collects their costmaps. `rospy.init_node` must have been called.
+
+    Attribute `start_ns`: stamp of the first image of the last scene.
+    """
 
     def __init__(self, speed):
-        self._speed, self._now_ns, self._grids = speed, START_NS, []
+        self._speed, self._now_ns, self._grids, self.start_ns = speed, START_NS, [], START_NS
         self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=100)
         self._tf_pub = rospy.Publisher('/tf', TFMessage, queue_size=100)
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=100)
@@ -109,9 +112,8 @@ class Player(object):
     def play(self, scene):
         """Play a scene. Returns its costmaps, a list of Costmap."""
         self._now_ns += GAP_NS
-        for _tick in range(int(LEAD_S / TICK_S)):  # tf begins before the first image
-            self._tick(scene, 0.0, True)
-        start_ns = self._now_ns
+        self._lead(scene)
+        self.start_ns = self._now_ns
         del self._grids[:]
         waiting = list(scene.steps)
         for number in range(int(scene.simulator.scenario.duration / TICK_S)):
@@ -120,9 +122,19 @@ class Player(object):
                        number % round(ODOM_S / TICK_S) == 0)
             while waiting and waiting[0].frame.time_s + LATENCY_S <= seconds:
                 step = waiting.pop(0)
-                header = Header(stamp=time_from(start_ns + int(step.frame.time_s * NS)), frame_id=MAP_FRAME)
+                header = Header(stamp=time_from(self.start_ns + int(step.frame.time_s * NS)), frame_id=MAP_FRAME)
                 self._tracks_pub.publish(tracks_to_msg(step.moment.tracks, header))
-        return [_costmap(scene, grid, start_ns) for grid in self._grids if grid.header.stamp.to_nsec() >= start_ns]
+        return self.costmaps_of(scene, self._grids)
+
+    def costmaps_of(self, scene, grids):
+        """Convert the OccupancyGrids since the start of the scene to Costmaps."""
+        return [_costmap(scene, grid, self.start_ns) for grid in grids
+                if grid.header.stamp.to_nsec() >= self.start_ns]
+
+    def _lead(self, scene):
+        """Play the first moment of a scene, so that tf begins before the first image."""
+        for _tick in range(int(LEAD_S / TICK_S)):
+            self._tick(scene, 0.0, True)
 
     def _tick(self, scene, seconds, with_map, with_odom=True):
         stamp = time_from(self._now_ns)
@@ -190,12 +202,12 @@ def main():
 
 
 @contextlib.contextmanager
-def running_nodes():
-    """Context in which roscore, the bridge and the costmap run on a free port."""
+def running_nodes(launch=LAUNCH):
+    """Context in which roscore and the nodes of a launch file run on a free port."""
     with tempfile.TemporaryDirectory() as folder:
         path, port = os.path.join(folder, 'costmap.launch'), free_port()
         with open(path, 'w') as stream:
-            stream.write(LAUNCH)
+            stream.write(launch)
         os.environ['ROS_MASTER_URI'] = 'http://localhost:%d' % port
         with running_roslaunch([path], port, sys.stderr):
             yield
@@ -203,7 +215,7 @@ def running_nodes():
 
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench costmap', description=__doc__)
-    parser.add_argument('--scenes', type=_scenario_paths, default=','.join(SCENES), metavar='A,B',
+    parser.add_argument('--scenes', type=scenario_paths, default=','.join(SCENES), metavar='A,B',
                         help='names in config/scenarios or files, separated by commas (default: %(default)s)')
     parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, people are detected in depth')
     parser.add_argument('--speed', type=float, default=1.0,
@@ -214,5 +226,6 @@ def _arguments():
     return parser.parse_args()
 
 
-def _scenario_paths(names):
+def scenario_paths(names):
+    """{name: path} of scenarios that are separated by commas."""
     return {name: scenario_path(name) for name in names.split(',')}

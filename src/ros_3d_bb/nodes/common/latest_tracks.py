@@ -1,0 +1,97 @@
+"""The newest tracks that a node has received, as long as they are recent."""
+from typing import Any, NamedTuple
+
+import rospy
+import tf2_ros
+
+from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, stamp_of, tracks_from_msg
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.msg import TrackedObjectArray
+from ros_3d_bb.nodes.common.subscribers import subscribe
+from ros_3d_bb.nodes.common.tf_lookup import Transforms
+from ros_3d_bb.planning.planner_view import usable_tracks
+
+
+class Tracks(NamedTuple):
+    """Valid tracks of one image; their stamp and frame."""
+
+    tracks: list
+    stamp_ns: int
+    frame_id: str
+
+
+class TracksAround(NamedTuple):
+    """Tracks with their stamp and frame, their age in seconds, and the current pose of their frame in that of the
+    robot, (4, 4)."""
+
+    tracks: list
+    stamp_ns: int
+    frame_id: str
+    age_s: float
+    robot_from_tracks: Any
+
+
+class LatestTracks(object):
+    """Receive tracks, and give out the newest ones until their image is older than a timeout.
+
+    `on_tracks` is called with each new Tracks.
+
+    Subscribes
+    ----------
+    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
+        Tracks.
+    """
+
+    def __init__(self, diagnostics, timeout_s, on_tracks):
+        self._diagnostics, self._timeout_s, self._on_tracks = diagnostics, timeout_s, on_tracks
+        self._newest = None
+        subscribe(TRACKS_TOPIC, TrackedObjectArray, self._on_message, 2)
+
+    def newest(self):
+        """Return the newest Tracks and their age in seconds; None, 0 if they are too old or the clock went back."""
+        newest = self._newest
+        age_s = 0.0 if newest is None else (rospy.get_rostime().to_nsec() - newest.stamp_ns) / NS
+        return (newest, max(age_s, 0.0)) if newest is not None and abs(age_s) <= self._timeout_s else (None, 0.0)
+
+    def _on_message(self, message):
+        with self._diagnostics.receiving('tracks'):
+            tracks, faults = usable_tracks(tracks_from_msg(message))
+            self._diagnostics.count_dropped('tracks', faults)
+            received = Tracks(tracks, stamp_of(message), message.header.frame_id)
+            self._newest = received
+            self._on_tracks(received)
+            self._diagnostics.record_latency(message.header.stamp)
+
+
+class RobotTracks(LatestTracks):
+    """As LatestTracks, with the pose of the robot.
+
+    Subscribes
+    ----------
+    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
+        Tracks.
+    /tf : tf2_msgs/TFMessage
+        Pose of the robot in the frame of the tracks.
+    /tf_static : tf2_msgs/TFMessage
+        As /tf.
+    """
+
+    def __init__(self, diagnostics, timeout_s, robot_frame, on_tracks):
+        if not robot_frame:
+            raise ValueError('parameter ~robot_frame is empty; a frame such as base_link expected')
+        self._robot_frame, self._transforms = robot_frame, Transforms(wait_s=0)
+        diagnostics.show('tf age', self._transforms.age)
+        super(RobotTracks, self).__init__(diagnostics, timeout_s, on_tracks)
+
+    def around(self):
+        """Return TracksAround, None if the tracks are too old or the pose is unknown."""
+        newest, age_s = self.newest()
+        if newest is None:
+            return None
+        try:
+            robot_from_tracks = self._transforms.lookup(self._robot_frame, newest.frame_id, rospy.Time())
+        except tf2_ros.TransformException as error:
+            self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; the robot stands until there is one'
+                                   % (newest.frame_id, self._robot_frame, error))
+            return None
+        return TracksAround(*newest, age_s=age_s, robot_from_tracks=robot_from_tracks)

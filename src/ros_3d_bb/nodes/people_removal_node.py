@@ -1,0 +1,127 @@
+"""ROS node that removes tracked people from laser scans, point clouds and depth images."""
+import functools
+from typing import NamedTuple
+
+import rospy
+import tf2_ros
+from sensor_msgs.msg import CameraInfo, Image, LaserScan, PointCloud2
+
+from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
+from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of
+from ros_3d_bb.conversions.range_msgs import cloud_without, depth_without, points_of_cloud, scan_without
+from ros_3d_bb.core.params import TRACKS_TIMEOUT, Param, parameters
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.latest_tracks import LatestTracks
+from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.subscribers import subscribe
+from ros_3d_bb.nodes.common.tf_lookup import Transforms
+from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, pixels_inside, scan_points
+
+KINDS = {'scan': LaserScan, 'points': PointCloud2, 'depth': Image}
+
+
+@parameters()
+class PeopleRemovalParams(NamedTuple):
+    """Parameters of people_removal_node."""
+
+    inputs: list = Param(('scan',), choices=tuple(KINDS))
+    timeout: float = TRACKS_TIMEOUT
+    margin: float = Param(
+        0.2, 'Measurements up to this distance from the body of a person, in addition to the standard deviation of the '
+        'predicted position, are removed.', 'm', limits=(0.0, 2.0))
+    tf_timeout: float = Param(0.1, 'How long to wait for the transform at the stamp of the measurements.', 's')
+
+
+class PeopleRemovalNode(object):
+    """Remove tracked people from laser scans, point clouds and depth images.
+
+    The outputs are for costmaps, SLAM and localisation, which take people for obstacles that stay. People are where
+    their tracks predict them at the stamp of the measurements. Without tracks for ~timeout, or without a transform,
+    measurements pass as they are. Parameters: config/people_removal.yaml.
+
+    Subscribes
+    ----------
+    ~scan : sensor_msgs/LaserScan
+        Planar laser scan; with ~inputs scan.
+    ~points : sensor_msgs/PointCloud2
+        Point cloud with x, y and z as FLOAT32; with ~inputs points.
+    ~depth : sensor_msgs/Image
+        Depth image; with ~inputs depth.
+    ~camera_info : sensor_msgs/CameraInfo
+        Calibration of the depth image; with ~inputs depth.
+    /tf : tf2_msgs/TFMessage
+        Poses of the sensors in the frame of the tracks.
+    /tf_static : tf2_msgs/TFMessage
+        As /tf.
+
+    Publishes
+    ---------
+    ~scan_static : sensor_msgs/LaserScan
+        The scan with NaN (REP 117: invalid) in place of people, which neither marks nor clears.
+    ~points_static : sensor_msgs/PointCloud2
+        The cloud without people; NaN in place of them if it is organised.
+    ~depth_static : sensor_msgs/Image
+        The depth image with invalid pixels in place of people.
+    """
+
+    def __init__(self):
+        params, = read_params(PeopleRemovalParams)
+        if not params.inputs:
+            raise ValueError('parameter ~inputs is empty; some of %s expected' % ', '.join(KINDS))
+        self._params, self._camera = params, None
+        self._diagnostics, self._transforms = Diagnostics(), Transforms(params.tf_timeout)
+        self._diagnostics.show('tf age', self._transforms.age)
+        self._tracks = LatestTracks(self._diagnostics, params.timeout, lambda _tracks: None)
+        removers = {'scan': self._without_in_scan, 'points': self._without_in_cloud, 'depth': self._without_in_depth}
+        self._pubs = {name: rospy.Publisher('~%s_static' % name, KINDS[name], queue_size=2) for name in params.inputs}
+        if 'depth' in params.inputs:
+            subscribe('~camera_info', CameraInfo, self._on_camera_info, 1)
+        for name in params.inputs:
+            subscribe('~' + name, KINDS[name], functools.partial(self._on_message, name, removers[name]), 2)
+
+    def _on_camera_info(self, message):
+        with self._diagnostics.receiving('camera_info'):
+            self._camera = camera_from_msg(message)
+
+    def _on_message(self, name, remover, message):
+        with self._diagnostics.receiving(name):
+            if self._pubs[name].get_num_connections():
+                self._pubs[name].publish(self._without_people(name, remover, message))
+
+    def _without_people(self, name, remover, message):
+        """Return the message without people, or itself if it is unknown where they are."""
+        newest, _age_s = self._tracks.newest()
+        try:
+            if newest is not None:
+                ahead_s = (stamp_of(message) - newest.stamp_ns) / NS
+                cylinders = cylinders_of(newest.tracks, ahead_s, self._params.margin)
+                fixed_from_sensor = self._transforms.lookup(newest.frame_id, message.header.frame_id,
+                                                            message.header.stamp)
+                self._diagnostics.count(name + ' without people')
+                return remover(message, fixed_from_sensor, cylinders) if len(cylinders) else message
+            self._diagnostics.warn('no recent tracks', 'no recent tracks: people are not removed')
+        except tf2_ros.TransformException as error:
+            self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; people are not removed from %s'
+                                   % (message.header.frame_id, newest.frame_id, error, name))
+        return message
+
+    def _without_in_scan(self, message, fixed_from_sensor, cylinders):
+        points_m = scan_points(message.ranges, message.angle_min, message.angle_increment)
+        return scan_without(message, are_inside(transform_points(fixed_from_sensor, points_m), cylinders))
+
+    def _without_in_cloud(self, message, fixed_from_sensor, cylinders):
+        points_m = transform_points(fixed_from_sensor, points_of_cloud(message))
+        return cloud_without(message, are_inside(points_m, cylinders))
+
+    def _without_in_depth(self, message, fixed_from_sensor, cylinders):
+        depth = imgmsg_to_depth(message)
+        if self._camera is None or depth.shape != (self._camera.height, self._camera.width):
+            raise ValueError('there is no camera_info with its size, %d x %d' % depth.shape[::-1])
+        return depth_without(message.header, depth, pixels_inside(depth, self._camera, fixed_from_sensor, cylinders))
+
+
+def main():
+    """Run the node."""
+    run_node('people_removal_node', PeopleRemovalNode)

@@ -1,0 +1,87 @@
+"""ROS node that limits the speed of a robot near people."""
+from typing import NamedTuple
+
+import rospy
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Float32
+
+from ros_3d_bb.conversions.planner_msgs import velocity_from_msg, velocity_to_msg
+from ros_3d_bb.core.params import ROBOT_FRAME, TRACKS_TIMEOUT, parameters
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.latest_tracks import RobotTracks
+from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
+from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.subscribers import subscribe
+from ros_3d_bb.planning.safe_speed import SafeSpeedParams, highest_safe_speed, limited_velocity
+
+PERIOD_S = 0.05  # between two limits; chosen: that of move_base's controller, and a tenth of the default timeout
+AHEAD = 0.0, 0.0, 0.0
+
+
+@parameters()
+class SpeedLimitParams(NamedTuple):
+    """Parameters of speed_limit_node, beside those of the safe speed."""
+
+    robot_frame: str = ROBOT_FRAME
+    timeout: float = TRACKS_TIMEOUT
+
+
+class SpeedLimitNode(object):
+    """Publish the highest safe speed among tracked people, and limit velocity commands to it.
+
+    Each command on cmd_vel_in gives one on cmd_vel, with the same path. The speed is safe if the robot can stop before
+    it reaches a person, wherever the person will be until then, see `highest_safe_speed`. Without tracks for ~timeout,
+    or without the pose of the robot, the limit is 0, and rotations in place end, too. People who are not tracked,
+    such as those behind the camera, are unknown to the node. It does not publish by itself: the base must stop if it
+    receives no commands. Parameters: config/speed_limit.yaml.
+
+    Subscribes
+    ----------
+    cmd_vel_in : geometry_msgs/Twist
+        Commands: velocity along x and y, and about z.
+
+    Publishes
+    ---------
+    cmd_vel : geometry_msgs/Twist
+        Limited commands.
+    ~speed_limit : std_msgs/Float32
+        Highest safe speed on the path of the last command, straight ahead without one, m/s; 20 times per second.
+    """
+
+    def __init__(self):
+        params, self._safety = given = read_params(SpeedLimitParams, SafeSpeedParams)
+        self._diagnostics, self._velocity = Diagnostics(), AHEAD
+        self._limit_pub = rospy.Publisher('~speed_limit', Float32, queue_size=1)
+        self._velocity_pub = rospy.Publisher('cmd_vel', Twist, queue_size=1)
+        self._tracks = RobotTracks(self._diagnostics, params.timeout, params.robot_frame, lambda _tracks: None)
+        subscribe('cmd_vel_in', Twist, self._on_command, 1)
+        ReconfigureServer(given, self._reconfigure)
+        self._timer = rospy.Timer(rospy.Duration.from_sec(PERIOD_S), self._on_timer, reset=True)
+
+    def _reconfigure(self, _params, safety):
+        self._safety = safety
+
+    def _on_command(self, message):
+        with self._diagnostics.receiving('commands'):
+            self._velocity = velocity = velocity_from_msg(message)
+            limit = self._limit(velocity)
+            limited = AHEAD if limit is None else limited_velocity(velocity, limit)
+            self._velocity_pub.publish(velocity_to_msg(*limited))
+            self._diagnostics.count('commands forwarded' if limited == velocity else 'commands limited')
+
+    def _on_timer(self, _event):
+        with self._diagnostics.rejecting('limits'):
+            self._limit_pub.publish(Float32(self._limit(self._velocity) or 0.0))
+
+    def _limit(self, velocity):
+        """Return the highest safe speed; None without recent tracks."""
+        around = self._tracks.around()
+        if around is None:
+            self._diagnostics.warn('no recent tracks', 'no recent tracks: the robot stands until there are some')
+            return None
+        return highest_safe_speed(around.tracks, around.age_s, around.robot_from_tracks, velocity, self._safety)
+
+
+def main():
+    """Run the node."""
+    run_node('speed_limit_node', SpeedLimitNode)

@@ -1,0 +1,215 @@
+"""Follow one person: which track is the person, and the velocity with which the robot keeps its distance.
+
+Positions are in the frame of the tracks, or in that of the robot where this is stated; metres, radians, seconds.
+"""
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.core.labels import PERSON
+from ros_3d_bb.core.params import Param, parameters
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.planning.planner_view import position_after, predicted_to
+from ros_3d_bb.planning.safe_speed import highest_safe_speed
+from ros_3d_bb.tracking.types import VISIBLE
+
+# A lost person is within NEAR_M of the prediction, and TURNING_MPS more for each second, up to FARTHEST_M; chosen.
+NEAR_M, TURNING_MPS, FARTHEST_M = 0.5, 1.0, 2.0
+# A change of IDs is searched for in the last PATH_NS, and changes a track from SWITCHING_NS before the new one begins;
+# the old one then is at least LEAST_STRANGE (see `_strangeness`) from its path. Chosen.
+PATH_NS, SWITCHING_NS, LEAST_STRANGE = 3 * NS, NS // 2, 0.3
+CLEARLY = 0.5  # ratio of two distances from which on the smaller one is clearly smaller; chosen
+LONGEST_PREDICTION_S = 2.0  # people who are lost for longer have probably turned or stopped; chosen
+GAIN = 1.0  # speed by distance, 1/s; chosen
+TURN_GAIN = 2.0  # rate by bearing, 1/s; chosen
+NEW_GOAL_M, NEW_GOAL_RAD = 0.2, 0.3  # changes of a goal for which it is sent again; chosen
+SLOWEST_MPS = 0.1  # speed from which the path counts in which the robot starts to move
+
+
+@parameters('following')
+class FollowParams(NamedTuple):
+    """Parameters of Follower."""
+
+    track_id: int = Param(
+        0, 'Track ID of the person to follow; 0: the nearest visible person.', limits=(0, 2 ** 31 - 1),
+        live=(0, 1000))
+    distance: float = Param(
+        2.0, 'Distance from the axis of the person to the origin of the robot.', 'm', limits=(0.3, 10.0),
+        live=(0.5, 4))
+    max_speed: float = Param(1.0, 'Highest speed.', 'm/s', limits=(0.05, 10.0), live=(0.1, 2))
+    max_rate: float = Param(1.0, 'Highest angular velocity.', 'rad/s', limits=(0.05, 10.0), live=(0.1, 3))
+    acceleration: float = Param(
+        0.8, 'Highest acceleration. The highest deceleration is ~deceleration.', 'm/s^2', limits=(0.05, 10.0),
+        live=(0.1, 3))
+    angular_acceleration: float = Param(
+        2.0, 'Highest angular acceleration.', 'rad/s^2', limits=(0.05, 50.0), live=(0.5, 5))
+    lost_after: float = Param(
+        1.0, 'The robot stops when the person has not been visible for this time. Until then it follows the '
+        'prediction.', 's', limits=(0.0, 10.0), live=(0, 3))
+    recover_within: float = Param(
+        15.0, 'For this time the robot waits for a lost person, and follows again when the same track is visible, or a '
+        'new one that is clearly that of the person. Then it stands until it is enabled again.', 's',
+        limits=(0.0, 600.0), live=(0, 60))
+
+
+class TargetSelector(object):
+    """Which track is the person to follow.
+
+    The first one is chosen by ID, or is the nearest visible person. From then on no other person is chosen. If the
+    tracker has lost the person, it gives a new ID to the person who reappears. That track is recognised by its place:
+    it must be clearly nearer to where the person is expected than other new tracks, and than it is to where another
+    lost person is expected.
+
+    Attributes: `target`, the TrackedObject when the person was last visible, None before the choice, and
+    `has_given_up`, whether the person was lost for too long.
+    """
+
+    def __init__(self):
+        self.target, self.has_given_up = None, False
+        self._seen = {}  # (track, stamp) when it was last visible, by track ID
+        self._path = []  # (track, stamp) of the target in the last PATH_NS
+
+    def select(self, tracks, stamp_ns, robot_m, params):
+        """The track of the person among the tracks at a stamp, or None if the person is lost.
+
+        `robot_m` (2,) is the position of the robot, `params` are FollowParams.
+        """
+        if self.target is None:
+            self.target = _chosen(tracks, robot_m, params.track_id)
+        if self.target is None or self.has_given_up:
+            return None
+        self._seen = {key: entry for key, entry in self._seen.items()
+                      if key == self.target.id or stamp_ns - entry[1] <= params.recover_within * NS}
+        self._seen.update((track.id, (track, stamp_ns)) for track in tracks if track.status == VISIBLE)
+        lost_s = (stamp_ns - self._seen[self.target.id][1]) / NS
+        if lost_s > 0:
+            self._recover(tracks, stamp_ns)
+        else:
+            self._check_identity(tracks, stamp_ns)
+        lost_s = (stamp_ns - self._seen[self.target.id][1]) / NS
+        self.target = self._seen[self.target.id][0]
+        self.has_given_up = lost_s > params.recover_within
+        return next((track for track in tracks if track.id == self.target.id and lost_s <= params.lost_after), None)
+
+    def _check_identity(self, tracks, stamp_ns):
+        """Change to the new track of the person where the tracker has given the old one to a person who crosses: the
+        old one has left the path that was predicted before the new one began, and the new one is on it."""
+        self._path = [entry for entry in self._path if 0 <= stamp_ns - entry[1] <= PATH_NS]
+        own = self._seen[self.target.id]
+        for track in tracks:
+            before = [entry for entry in self._path if entry[1] < track.first_seen_ns - SWITCHING_NS]
+            if before and track.status == VISIBLE and track.label == self.target.label:
+                old = own[0]._replace(first_seen_ns=stamp_ns)
+                limit = CLEARLY * min(_strangeness(old, before[-1], stamp_ns), 1.0)
+                if _strangeness(track, before[-1], stamp_ns) < limit and limit > CLEARLY * LEAST_STRANGE:
+                    self.target = track
+        self._path.append(self._seen[self.target.id])
+
+    def _recover(self, tracks, stamp_ns):
+        """Make the new track of the lost person the target, if it is clear which one that is."""
+        now = set(track.id for track in tracks if track.status == VISIBLE)
+        lost = [entry for key, entry in self._seen.items() if key not in now and key != self.target.id]
+        mine = self._seen[self.target.id]
+        new = sorted(((_strangeness(track, mine, stamp_ns), track.id) for track in tracks
+                      if track.status == VISIBLE and track.label == self.target.label), key=lambda each: each[0])
+        if not new or new[0][0] > 1:
+            return
+        strangeness, track_id = new[0]
+        others = [other for other, _id in new[1:]] + [
+            _strangeness(self._seen[track_id][0], entry, stamp_ns) for entry in lost]
+        if strangeness < CLEARLY * min(others, default=np.inf):
+            del self._seen[self.target.id]
+            self.target = self._seen[track_id][0]
+
+
+def _chosen(tracks, robot_m, track_id):
+    """The visible track with this ID; for 0, the nearest visible person. None without one."""
+    people = [track for track in tracks if track.status == VISIBLE and (
+        track.id == track_id if track_id else track.label == PERSON)]
+    return min(people, key=lambda track: np.linalg.norm(track.position_m[:2] - robot_m), default=None)
+
+
+def _strangeness(track, seen, stamp_ns):
+    """Distance of a track from where a lost one, (track, stamp) when last seen, is expected, relative to the distance
+    within which it must be; infinite if both existed at the same time."""
+    lost, seen_ns = seen
+    lost_s = (stamp_ns - seen_ns) / NS
+    expected_m = position_after(lost, min(lost_s, LONGEST_PREDICTION_S))
+    distance_m = np.linalg.norm((track.position_m - expected_m)[:2])
+    return distance_m / min(NEAR_M + TURNING_MPS * lost_s, FARTHEST_M) if track.first_seen_ns > seen_ns else np.inf
+
+
+class Follower(object):
+    """Velocity commands that follow one person, for a robot that sees in the direction of its x axis.
+
+    Attribute `person`: the track of the person at the last update, None if there is none or the person is lost.
+    """
+
+    def __init__(self, params, safety):
+        self.reconfigure(params, safety)
+        self.restart()
+
+    def reconfigure(self, params, safety):
+        """Change the parameters, FollowParams and SafeSpeedParams. Another `track_id` is chosen at once."""
+        if getattr(self, '_params', params).track_id != params.track_id:
+            self.selector = TargetSelector()
+        self._params, self._safety = params, safety
+
+    def restart(self):
+        """Forget the person, and stand still."""
+        self.selector, self.person, self._velocity = TargetSelector(), None, (0.0, 0.0)
+
+    def update(self, tracks, stamp_ns, robot_from_tracks):
+        """Take the tracks of an image. `robot_from_tracks` (4, 4) is the pose of their frame at this time."""
+        robot_m = np.linalg.inv(robot_from_tracks)[:2, 3]
+        self.person = self.selector.select(tracks, stamp_ns, robot_m, self._params)
+
+    def command(self, tracks, age_s, robot_from_tracks, step_s):
+        """Linear and angular velocity, a time `step_s` after the last ones, for tracks of the age `age_s`.
+
+        Both are 0 once the robot stands and there is no person to follow.
+        """
+        wanted = (0.0, 0.0) if self.person is None else self._wanted(age_s, robot_from_tracks)
+        limit = highest_safe_speed(tracks, age_s, robot_from_tracks, (max(wanted[0], SLOWEST_MPS), 0.0, wanted[1]),
+                                   self._safety)
+        params, (linear, angular) = self._params, self._velocity
+        change = params.angular_acceleration * step_s
+        self._velocity = (
+            max(min(wanted[0], limit, linear + params.acceleration * step_s),
+                linear - self._safety.deceleration * step_s),
+            min(max(wanted[1], angular - change), angular + change))
+        return self._velocity
+
+    def stop(self):
+        """Stand still at once."""
+        self._velocity = (0.0, 0.0)
+
+    def goal(self, age_s, robot_from_tracks):
+        """Pose (x, y, yaw) in the frame of the tracks where the robot keeps its distance from the person, and looks at
+        the person; None without a person."""
+        if self.person is None:
+            return None
+        robot_m, person_m = np.linalg.inv(robot_from_tracks)[:2, 3], position_after(self.person, age_s)[:2]
+        x, y = person_m - robot_m
+        yaw, ahead_m = math.atan2(y, x), max(math.hypot(x, y) - self._params.distance, 0.0)
+        return robot_m[0] + ahead_m * math.cos(yaw), robot_m[1] + ahead_m * math.sin(yaw), yaw
+
+    def _wanted(self, age_s, robot_from_tracks):
+        """Velocities that keep the distance from the person, and turn towards the person."""
+        params, (person,) = self._params, predicted_to([self.person], age_s)
+        x, y, _z = transform_points(robot_from_tracks, person.position_m)
+        velocity_mps = robot_from_tracks[:2, :2].dot(person.velocity_mps[:2])
+        distance_m, bearing = max(math.hypot(x, y), 1e-3), math.atan2(y, x)
+        leaving_mps = (velocity_mps[0] * x + velocity_mps[1] * y) / distance_m
+        speed_mps = (leaving_mps + GAIN * (distance_m - params.distance)) * max(math.cos(bearing), 0.0)
+        passing = (velocity_mps[1] * x - velocity_mps[0] * y) / distance_m ** 2  # rate of the bearing, rad/s
+        rate = TURN_GAIN * bearing + passing
+        return (min(max(speed_mps, 0.0), params.max_speed), min(max(rate, -params.max_rate), params.max_rate))
+
+
+def is_new_goal(before, goal):
+    """Whether a goal (x, y, yaw) differs enough from the one before, which may be None, to be sent."""
+    return before is None or (math.hypot(goal[0] - before[0], goal[1] - before[1]) > NEW_GOAL_M
+                              or math.cos(goal[2] - before[2]) < math.cos(NEW_GOAL_RAD))

@@ -1,0 +1,105 @@
+"""Highest speed at which a robot can stop before it reaches the places where people will be.
+
+Robot frame, metres, radians, seconds. The robot is a disc around the origin of its frame, which moves straight or
+along a circle.
+"""
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ros_3d_bb.core.params import Param, parameters
+from ros_3d_bb.planning.planner_view import covariances_after, position_after
+
+TIME_STEP_S, PATH_STEP_M = 0.05, 0.05
+
+
+@parameters('safe speed')
+class SafeSpeedParams(NamedTuple):
+    """Parameters of `highest_safe_speed`."""
+
+    robot_radius: float = Param(
+        0.35, 'Radius of the robot around the origin of its frame.', 'm', limits=(0.05, 5.0))
+    reaction_time: float = Param(
+        0.3, 'Time from a command to the beginning of the deceleration, in which the robot keeps its speed.', 's',
+        limits=(0.0, 5.0), live=(0, 1))
+    deceleration: float = Param(
+        1.0, 'Deceleration of which the robot is always capable, at its highest load and on any floor.', 'm/s^2',
+        limits=(0.05, 10.0), live=(0.1, 3))
+    people_clearance: float = Param(
+        0.1, 'Distance from people at which the robot stops.', 'm', limits=(0.0, 5.0), live=(0, 1))
+    position_sigmas: float = Param(
+        2.0, 'Standard deviations of the predicted positions that are kept free.', limits=(0.0, 5.0), live=(0, 3))
+    highest_speed: float = Param(
+        2.0, 'Limit where there are no people.', 'm/s', limits=(0.05, 10.0), live=(0.1, 3))
+
+
+def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params):
+    """Highest speed, m/s, from which the robot stops before the ellipses of all people in its way.
+
+    The separation distance of ISO/TS 15066 (5.5.4), with the distance in which the robot stops, v T + v²/2a, on one
+    side, and on the other side the free distance along its path to the nearest ellipse in which a person may be at any
+    time until the robot stands. The ellipse is the predicted position with `position_sigmas` of its covariance, around
+    which the body, the robot and `people_clearance` are added. A person in whose ellipse the robot already stands does
+    not keep it from leaving.
+
+    Parameters
+    ----------
+    tracks : list of TrackedObject
+    age_s : float
+        Time since the stamp of the tracks.
+    robot_from_tracks : numpy.ndarray, (4, 4)
+        Current pose of the frame of the tracks.
+    velocity : sequence of float
+        Of the robot: along x, along y, and angular. Only the path counts, which is that straight ahead without a
+        linear velocity.
+    params : SafeSpeedParams
+    """
+    reaction_s, deceleration = params.reaction_time, params.deceleration
+    longest_s = reaction_s + params.highest_speed / deceleration
+    longest_m = params.highest_speed * (reaction_s + longest_s) / 2
+    ahead_s = np.arange(0, longest_s + TIME_STEP_S, TIME_STEP_S)
+    places_m = _path(velocity, np.arange(0, longest_m + 2 * PATH_STEP_M, PATH_STEP_M))
+    speed_mps = params.highest_speed
+    for track in tracks:
+        free_m = _free_distances(track, age_s + ahead_s, robot_from_tracks, places_m, params)
+        by_distance = np.sqrt((deceleration * reaction_s) ** 2 + 2 * deceleration * free_m) - deceleration * reaction_s
+        by_time = deceleration * (ahead_s - TIME_STEP_S - reaction_s)  # slower robots stand before the person is there
+        speed_mps = min(speed_mps, np.maximum(by_distance, by_time).min())
+    return float(speed_mps)
+
+
+def limited_velocity(velocity, limit):
+    """Velocity, along x, along y and angular, with at most this speed on the same path. Rotations in place are not
+    limited.
+    """
+    speed_mps = math.hypot(*velocity[:2])
+    factor = limit / speed_mps if speed_mps > limit else 1.0
+    return tuple([factor * part for part in velocity])
+
+
+def _path(velocity, lengths_m):
+    """Places (n, 2) at distances (n,) along the path with this velocity."""
+    x, y, rate = velocity
+    speed_mps = math.hypot(x, y)
+    turn = lengths_m * (rate / speed_mps if speed_mps else 0.0)
+    along = np.column_stack((np.sinc(turn / np.pi), np.sinc(turn / 2 / np.pi) ** 2 * turn / 2))
+    cos, sin = (x / speed_mps, y / speed_mps) if speed_mps else (1.0, 0.0)
+    return lengths_m[:, np.newaxis] * along.dot([[cos, sin], [-sin, cos]])
+
+
+def _free_distances(track, ahead_s, robot_from_tracks, places_m, params):
+    """Distances (n,) along a path, places (m, 2) with steps of `PATH_STEP_M`, to the ellipses of a person at times
+    (n,); infinite where the path does not meet them.
+    """
+    rotation, shift_m = robot_from_tracks[:2, :2], robot_from_tracks[:2, 3]
+    centers_m = position_after(track, ahead_s)[:, :2].dot(rotation.T) + shift_m
+    covariances_m2 = np.matmul(np.matmul(rotation, covariances_after(track, ahead_s)[:, :2, :2]), rotation.T)
+    variances_m2, axes = np.linalg.eigh(covariances_m2)
+    radius_m = track.size_m[0] / 2 + params.robot_radius + params.people_clearance
+    semi_axes_m = radius_m + params.position_sigmas * np.sqrt(np.maximum(variances_m2, 0))
+    offsets_m = np.matmul(places_m - centers_m[:, np.newaxis], axes)
+    distances = np.linalg.norm(offsets_m / semi_axes_m[:, np.newaxis], axis=2)  # from the centre; 1: on the ellipse
+    is_met = (distances <= 1) & (np.gradient(distances, axis=1) < 0)
+    first = np.where(is_met.any(axis=1), is_met.argmax(axis=1), np.inf)
+    return np.maximum(first - 1, 0) * PATH_STEP_M

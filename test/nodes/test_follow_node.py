@@ -1,0 +1,116 @@
+"""follow_node drives the simulated robot behind a person, past people who cross. Needs a master and simulated time.
+
+People are detected in the rendered images, without weights. ROS_3D_BB_FOLLOW_S is the time of the scene.
+"""
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+import rospy
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Float32, UInt32
+from std_srvs.srv import SetBool
+
+from ros_3d_bb.msg import TrackedObjectArray
+from support.processes import pid_of
+from support.ros import Recorder, launched, wait_until
+
+FOLLOWED_S = float(os.environ.get('ROS_3D_BB_FOLLOW_S', 25))
+STARTING_S, LEADER, SAME_M, STOP_S = 60.0, 1, 0.8, 1.0
+SCENE = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'config', 'scenarios', 'follow.yaml')
+
+
+class Witness(object):
+    """Compares the person whom the robot follows with the truth."""
+
+    def __init__(self):
+        self._lock, self._truth, self._target = threading.Lock(), {}, 0
+        self.persons, self.distances_m, self.targets = [], [], []
+        self.clearances, self.velocities = (Recorder(topic, kind, publisher_expected=False) for topic, kind in (
+            ('clearance', Float32), ('cmd_vel', Twist)))
+        self.collisions = Recorder('collisions', UInt32, publisher_expected=False)
+        rospy.Subscriber('ground_truth', TrackedObjectArray, self._on_truth, queue_size=100)
+        rospy.Subscriber('ros_3d_bb/tracks', TrackedObjectArray, self._on_tracks, queue_size=100)
+        rospy.Subscriber('follow_node/target', UInt32, self._on_target, queue_size=100)
+
+    def _on_truth(self, message):
+        with self._lock:
+            self._truth[message.header.stamp.to_nsec()] = message
+
+    def _on_target(self, message):
+        self._target = message.data
+        self.targets.append((rospy.get_time(), message.data))
+
+    def _on_tracks(self, message):
+        """Note which person of the truth the followed track is."""
+        with self._lock:
+            truth = self._truth.pop(message.header.stamp.to_nsec(), None)
+        followed = [track for track in message.objects if track.id == self._target]
+        if truth is not None and followed:
+            place = position_of(followed[0])
+            distances_m = {each.id: np.linalg.norm(position_of(each) - place) for each in truth.objects}
+            nearest = min(distances_m, key=distances_m.get)
+            self.persons.append((message.header.stamp.to_sec(), nearest, distances_m[nearest]))
+
+
+def position_of(track):
+    return np.array([track.pose.pose.position.x, track.pose.pose.position.y])
+
+
+@pytest.fixture(scope='module')
+def witness():
+    rospy.init_node('test_follow_node')
+    with launched('simulation.launch', 'scenario:=' + SCENE, 'drive:=true', 'rviz:=false', 'single_process:=true'), \
+            launched('follow.launch', 'enabled:=true'):
+        witness = Witness()
+        wait_until(lambda: witness.persons, 'a person to follow', STARTING_S)
+        yield witness
+
+
+def speed(witness):
+    last = witness.velocities.messages[-1]
+    return abs(last.linear.x) + abs(last.angular.z)
+
+
+def test_the_robot_follows_the_same_person_past_others(witness):
+    began_s = rospy.get_time()
+    wait_until(lambda: rospy.get_time() - began_s >= FOLLOWED_S, 'the end of the drive', 2000.0 + 4 * FOLLOWED_S)
+    persons = [person for _stamp_s, person, _error_m in witness.persons]
+    lost_s = [(after_s - before_s) for (before_s, target), (after_s, _next) in zip(
+        witness.targets, witness.targets[1:] + [(rospy.get_time(), 0)]) if target == 0 and before_s > began_s]
+    print('%.0f s: the followed track was that of the leader in %d of %d images; changes of the ID: %s; lost %d times, '
+          '%.1f s in all, at most %.1f s; collisions: %d; smallest clearance %.2f m' % (
+              rospy.get_time() - began_s, persons.count(LEADER), len(persons), [each for _s, each in witness.targets],
+              len(lost_s), sum(lost_s), max(lost_s or [0.0]), witness.collisions.messages[-1].data,
+              min(message.data for message in witness.clearances.messages)))
+    assert set(persons) == {LEADER}
+    assert len(persons) > 0.6 * FOLLOWED_S * 8
+    assert not any(message.data for message in witness.collisions.messages)
+    linear = np.array([message.linear.x for message in witness.velocities.messages])
+    assert 0.4 < linear.max() <= 1.0 and linear.min() >= 0
+
+
+def test_the_robot_stops_when_the_tracks_stop_and_the_node_is_silent(witness):
+    rospy.ServiceProxy('follow_node/enable', SetBool)(True)
+    wait_until(lambda: speed(witness) > 0.1, 'motion', STARTING_S)
+    pid = pid_of('people_node')
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        stopped_s = rospy.get_time()
+        wait_until(lambda: speed(witness) == 0.0, 'zero velocity')
+        assert rospy.get_time() - stopped_s < STOP_S
+        count = len(witness.velocities.messages)
+        assert witness.velocities.stays_at(count, 1.0)
+    finally:
+        os.kill(pid, signal.SIGCONT)
+    wait_until(lambda: speed(witness) > 0.1, 'motion with new tracks', STARTING_S)
+
+
+def test_disabling_stops_the_robot_at_once(witness):
+    rospy.ServiceProxy('follow_node/enable', SetBool)(False)
+    wait_until(lambda: speed(witness) == 0.0, 'zero velocity', 1.0)
+    time.sleep(0.2)
+    assert witness.velocities.stays_at(len(witness.velocities.messages), 0.5)

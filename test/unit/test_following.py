@@ -1,0 +1,201 @@
+"""Following one person: the choice of the track, the recovery, and the motion of a robot that obeys the commands."""
+import numpy as np
+import pytest
+
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.planning.following import Follower, FollowParams, TargetSelector, is_new_goal
+from ros_3d_bb.planning.safe_speed import SafeSpeedParams
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
+from ros_3d_bb_lab.simulation.driving import moved
+from ros_3d_bb_lab.simulation.simulator import upright
+from support.tracks import track_at
+
+PARAMS, SAFETY = FollowParams(), SafeSpeedParams()
+ORIGIN, STEP_S = np.zeros(2), 0.05
+
+
+def person(number, x, y, status=VISIBLE, vx=0.0, vy=0.0, first_s=0.0):
+    track = track_at([x, y, 0.9], [vx, vy, 0], moving=bool(vx or vy), number=number)
+    return track._replace(status=status, first_seen_ns=int(first_s * NS))
+
+
+def selected(selector, seconds, *tracks, **params):
+    """ID of the selected track."""
+    track = selector.select(tracks, int(seconds * NS), ORIGIN, PARAMS._replace(**params))
+    return None if track is None else track.id
+
+
+def test_the_nearest_visible_person_is_chosen_and_kept():
+    selector = TargetSelector()
+    dog = person(4, 0.5, 0)._replace(label='dog')
+    assert selected(selector, 1, person(1, 3, 0), person(2, 2, 0, OCCLUDED), person(3, 2.5, 0), dog) == 3
+    assert selected(selector, 2, person(1, 1, 0), person(3, 4, 0)) == 3
+
+
+def test_a_given_track_is_awaited():
+    selector = TargetSelector()
+    assert selected(selector, 1, person(1, 3, 0), track_id=2) is None
+    assert selected(selector, 2, person(1, 3, 0), person(2, 4, 0, OUT_OF_VIEW), track_id=2) is None
+    assert selected(selector, 3, person(1, 3, 0), person(2, 4, 0), track_id=2) == 2
+
+
+def test_a_person_who_is_not_visible_is_lost_after_a_second_and_followed_again_with_the_same_id():
+    selector = TargetSelector()
+    selected(selector, 1, person(1, 3, 0))
+    assert selected(selector, 1.9, person(1, 3, 0, OCCLUDED), person(2, 2, 0)) == 1
+    assert selected(selector, 2.1, person(1, 3, 0, OCCLUDED), person(2, 2, 0)) is None
+    assert selected(selector, 3.0, person(1, 3, 0), person(2, 2, 0)) == 1
+
+
+def test_a_track_that_is_missing_for_a_moment_is_kept():
+    selector = TargetSelector()
+    selected(selector, 1, person(1, 3, 0), person(2, 2, 3))
+    assert selected(selector, 1.3, person(2, 2, 3)) is None
+    assert selected(selector, 1.4, person(1, 3, 0), person(2, 2, 3)) == 1
+
+
+@pytest.mark.parametrize('others, followed', [
+    ([person(2, 4, 0, first_s=3)], 2),  # where the person is expected
+    ([person(2, 4, 0, first_s=3), person(3, 4, 1.5, first_s=2)], 2),  # clearly nearer
+    ([person(2, 4.4, 0, first_s=3), person(3, 4, 0.6, first_s=2)], None),  # either can be the person
+    ([person(2, 4, 0, first_s=0.5)], None),  # known before
+    ([person(2, 12, 0, first_s=3)], None),  # too far away
+    ([person(2, 4, 0, OCCLUDED, first_s=3)], None),
+    ([person(2, 4, 0, first_s=3)._replace(label='dog')], None)])
+def test_a_new_track_is_the_lost_person_if_it_is_clearly_the_nearest(others, followed):
+    selector = TargetSelector()
+    selected(selector, 1, person(1, 2, 0, vx=1.0))
+    assert selected(selector, 3.2, *others) == followed
+    assert selected(selector, 3.4, *others) == followed
+
+
+def test_a_new_track_is_not_the_lost_person_if_it_can_be_another_lost_one():
+    selector = TargetSelector()
+    crossing = person(2, 4, 1.0, vy=-0.5)
+    selected(selector, 1, person(1, 3.5, 0), crossing)
+    assert selected(selector, 3, person(3, 4, 0.1, first_s=2.9)) is None
+    assert selected(selector, 3.2, person(3, 4, 0.1, first_s=2.9), person(2, 3.2, 3, vy=-0.5)) == 3
+
+
+def test_a_person_is_recognised_at_once_while_the_old_track_is_occluded():
+    """A person who crosses can drag the track along."""
+    selector = TargetSelector()
+    selected(selector, 1, person(1, 3, 0), person(2, 3, 1))
+    assert selected(selector, 1.5, person(1, 2.8, -0.4, OCCLUDED), person(2, 2.5, -0.5),
+                    person(3, 3.1, 0, first_s=1.2)) == 3
+
+
+@pytest.mark.parametrize('turn_mps, followed', [(1.0, 3), (0.1, 1)])
+def test_an_id_switch_to_a_person_who_crosses_is_noticed(turn_mps, followed):
+    """Track 1 of a person who walks along x goes on across it, and a new one begins where the person is."""
+    selector = TargetSelector()
+    for time_s in np.arange(1, 2.01, 0.1):
+        selected(selector, time_s, person(1, 2 + 0.7 * time_s, 0, vx=0.7))
+    for time_s in np.arange(2.1, 3.01, 0.1):
+        own = person(1, 2 + 0.7 * time_s, -turn_mps * (time_s - 2), vx=0.7, vy=-turn_mps)
+        found = selected(selector, time_s, own, person(3, 2 + 0.7 * time_s, 0, vx=0.7, first_s=2.25))
+    assert found == followed
+
+
+def test_the_search_ends():
+    selector = TargetSelector()
+    selected(selector, 1, person(1, 2, 0))
+    assert selected(selector, 16.5) is None and selector.has_given_up
+    assert selected(selector, 17, person(1, 2, 0)) is None
+
+
+class Drive(object):
+    """A robot at the origin that obeys the commands for a person on a path; tracks arrive 10 times per second, 0.1 s
+    old."""
+
+    def __init__(self, place_after, others=lambda _seconds: [], **params):
+        self._place_after, self._others = place_after, others
+        self.follower, self.pose = Follower(PARAMS._replace(**params), SAFETY), np.zeros(3)
+        self.seconds, self.distances_m, self.velocities = 0.0, [], [(0.0, 0.0)]
+
+    def run(self, seconds):
+        for _step in range(int(round(seconds / STEP_S))):
+            stamp_s = max(self.seconds - 0.1 - self.seconds % 0.1, 0)
+            x, y = self._place_after(stamp_s)
+            vx, vy = (np.array(self._place_after(stamp_s + 0.05)) - (x, y)) / 0.05
+            tracks = [person(1, x, y, vx=vx, vy=vy)] + self._others(stamp_s)
+            robot_from_tracks = np.linalg.inv(upright(*self.pose[:2], z=0, yaw=self.pose[2]))
+            self.follower.update(tracks, int(stamp_s * NS), robot_from_tracks)
+            velocity = self.follower.command(tracks, self.seconds - stamp_s, robot_from_tracks, STEP_S)
+            self.pose, self.seconds = moved(self.pose, np.array(velocity), STEP_S), self.seconds + STEP_S
+            self.velocities.append(velocity)
+            self.distances_m.append(np.linalg.norm(self.pose[:2] - self._place_after(self.seconds)))
+        return self
+
+    def limits_are_kept(self):
+        velocities = np.array(self.velocities)
+        changes = np.diff(velocities, axis=0) / STEP_S
+        return (velocities[:, 0].min() >= 0 and velocities[:, 0].max() <= PARAMS.max_speed
+                and np.abs(velocities[:, 1]).max() <= PARAMS.max_rate
+                and changes[:, 0].max() <= PARAMS.acceleration + 1e-6
+                and changes[:, 0].min() >= -SAFETY.deceleration - 1e-6
+                and np.abs(changes[:, 1]).max() <= PARAMS.angular_acceleration + 1e-6)
+
+
+def test_the_robot_keeps_its_distance_from_a_person_who_walks_ahead():
+    drive = Drive(lambda seconds: (2.5 + 0.7 * seconds, 0.3)).run(15)
+    assert drive.distances_m[-1] == pytest.approx(PARAMS.distance, abs=0.05) and drive.limits_are_kept()
+
+
+def test_the_robot_follows_around_a_corner():
+    drive = Drive(lambda seconds: (2.5 + 0.7 * min(seconds, 8), 0.7 * max(seconds - 8, 0))).run(25)
+    assert drive.limits_are_kept() and drive.pose[2] == pytest.approx(np.pi / 2, abs=0.1)
+    assert min(drive.distances_m) > 0.8 * PARAMS.distance and drive.distances_m[-1] < 1.2 * PARAMS.distance
+
+
+def test_the_robot_turns_to_a_person_who_comes_near_and_does_not_reverse():
+    drive = Drive(lambda seconds: (max(3.5 - 0.5 * seconds, 1.0), 0.8)).run(8)
+    bearing = np.arctan2(0.8 - drive.pose[1], 1.0 - drive.pose[0])
+    assert drive.limits_are_kept() and drive.pose[2] == pytest.approx(bearing, abs=0.05)
+    assert max(velocity[0] for velocity in drive.velocities[80:]) < 0.1
+
+
+def test_the_robot_waits_for_a_person_who_crosses():
+    crossing = Drive(lambda seconds: (4.0 + 0.7 * seconds, 0.0),
+                     lambda seconds: [person(2, 3.5, 2.5 - 0.6 * seconds, vy=-0.6)]).run(12)
+    alone = Drive(lambda seconds: (4.0 + 0.7 * seconds, 0.0)).run(12)
+    assert crossing.limits_are_kept()
+    speeds_mps = [np.array(drive.velocities)[60:100, 0].min() for drive in (crossing, alone)]
+    assert speeds_mps[0] < 0.3 < 0.7 < speeds_mps[1]
+    assert crossing.distances_m[-1] < 4.5  # and goes on behind
+
+
+def test_the_robot_decelerates_when_the_person_is_lost():
+    drive = Drive(lambda seconds: (2.5 + 0.7 * seconds, 0.0)).run(8)
+    here = np.linalg.inv(upright(*drive.pose[:2], z=0, yaw=0))
+    drive.follower.update([], int(8 * NS), here)
+    velocities = [drive.follower.command([], 0.1, here, STEP_S) for _step in range(40)]
+    assert velocities[0][0] == pytest.approx(drive.velocities[-1][0] - SAFETY.deceleration * STEP_S)
+    assert velocities[-1] == (0.0, 0.0) and drive.follower.person is None
+
+
+def test_another_id_is_followed_at_once_and_other_changes_keep_the_person():
+    follower = Follower(PARAMS, SAFETY)
+    tracks = [person(1, 2, 0), person(2, 3, 0)]
+    follower.update(tracks, NS, np.eye(4))
+    follower.reconfigure(PARAMS._replace(distance=2.0), SAFETY)
+    follower.update([person(1, 4, 0), person(2, 3, 0)], 2 * NS, np.eye(4))
+    assert follower.person.id == 1
+    follower.reconfigure(PARAMS._replace(track_id=2), SAFETY)
+    follower.update(tracks, 3 * NS, np.eye(4))
+    assert follower.person.id == 2
+
+
+def test_goals_keep_the_distance_and_look_at_the_person():
+    follower = Follower(PARAMS, SAFETY)
+    assert follower.goal(0.0, np.eye(4)) is None
+    follower.update([person(1, 3, 4)], NS, np.eye(4))
+    yaw = np.arctan2(4, 3)
+    assert follower.goal(0.0, np.eye(4)) == pytest.approx((3.0 * np.cos(yaw), 3.0 * np.sin(yaw), yaw))
+    follower.update([person(1, 0.6, 0)], 2 * NS, np.eye(4))
+    assert follower.goal(0.0, np.eye(4)) == pytest.approx((0, 0, 0))
+
+
+def test_goals_are_sent_again_when_they_have_changed():
+    assert is_new_goal(None, (1, 2, 3)) and is_new_goal((1, 2, 3), (1.3, 2, 3)) and is_new_goal((1, 2, 3), (1, 2, 3.4))
+    assert not is_new_goal((1, 2, np.pi), (1.1, 2, -np.pi + 0.1))

@@ -1,0 +1,106 @@
+"""Polygons and cells of a map in which no track starts, and people who walk through them."""
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.ignored_areas import IgnoredAreas, OccupiedCells, polygons_from
+from ros_3d_bb.tracking.measurement_model import NoiseParams
+from ros_3d_bb.tracking.track import PredictionParams
+from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
+from ros_3d_bb.tracking.types import CameraView, Detection
+
+SQUARE = '[[[3, -0.5], [4, -0.5], [4, 0.5], [3, 0.5]]]'
+CAMERA_M = np.zeros(2)
+VIEW = CameraView(transform_from((0, 0, 1), OPTICAL_ROTATION), Camera(640, 480, 533.0, 533.0, 319.5, 239.5))
+
+
+def play(tracker, start_s, seconds, *places_at):
+    """IDs of the tracks in each image, 10 times per second, of people at `places_at` (functions of time)."""
+    found = []
+    for time_s in np.arange(start_s, start_s + seconds, 0.1):
+        detections = [Detection([x, y, 0.85], [0.5, 0.5, 1.7], np.eye(3) * 0.04 ** 2)
+                      for x, y in (place_at(time_s) for place_at in places_at)]
+        found.append([track.id for track in tracker.update(int(time_s * NS), detections, VIEW)])
+    return found
+
+
+def at(x, y):
+    return lambda _time_s: (x, y)
+
+
+def test_no_track_starts_in_a_polygon_and_others_do():
+    assert play(Tracker(TrackerParams(ignored_areas=SQUARE)), 1, 2, at(3.5, 0.2), at(3.5, 0.8))[-1] == [1]
+    assert play(Tracker(), 1, 2, at(3.5, 0.2), at(3.5, 0.8))[-1] == [1, 2]
+
+
+def test_a_tracked_person_who_walks_through_keeps_the_id():
+    found = play(Tracker(TrackerParams(ignored_areas=SQUARE)), 1, 4, lambda time_s: (3.5, 1.8 - 0.9 * (time_s - 1)))
+    assert found[8:] == [[1]] * 32
+
+
+def test_a_new_area_ends_the_tracks_in_it_and_keeps_the_others():
+    tracker = Tracker()
+    assert play(tracker, 1, 2, at(3.5, 0.2), at(3.5, 1.2))[-1] == [1, 2]
+    tracker.reconfigure(TrackerParams(acceleration=0.1), NoiseParams(), PredictionParams())
+    assert play(tracker, 3, 1, at(3.5, 0.2), at(3.5, 1.2))[-1] == [1, 2]
+    tracker.reconfigure(TrackerParams(ignored_areas=SQUARE), NoiseParams(), PredictionParams())
+    assert play(tracker, 4, 1, at(3.5, 0.2), at(3.5, 1.2)) == [[2]] * 10
+
+
+def test_a_poster_on_a_wall_of_the_map_is_no_person_and_a_person_before_the_wall_is_one():
+    wall = np.zeros((60, 60), bool)
+    wall[:, 40] = True  # x from 4.0 to 4.1 of the map
+    tracker = Tracker()
+    tracker.set_map(OccupiedCells(wall, 0.1, (0.0, -3.0, 0.0)))
+    assert play(tracker, 1, 2, at(4.25, 0.0), at(3.7, -0.8))[-1] == [1]
+
+
+def test_the_first_map_ends_the_tracks_on_it_and_later_ones_do_not():
+    tracker, wall = Tracker(), np.ones((10, 10), bool)
+    assert play(tracker, 1, 2, at(3.5, 0.2))[-1] == [1]
+    tracker.set_map(OccupiedCells(~wall, 0.1, (3.0, 0.0, 0.0)))
+    tracker.set_map(OccupiedCells(wall, 0.1, (3.0, 0.0, 0.0)))
+    assert play(tracker, 3, 1, at(3.5, 0.2))[-1] == [1]
+    tracker = Tracker()
+    play(tracker, 1, 2, at(3.5, 0.2))
+    tracker.set_map(OccupiedCells(wall, 0.1, (3.0, 0.0, 0.0)))
+    assert play(tracker, 3, 1, at(3.5, 0.2))[-1] == []
+
+
+@given(st.floats(-3, 3), st.floats(-5, 5), st.floats(-5, 5), st.integers(0, 11), st.integers(0, 7))
+def test_cells_are_found_in_maps_of_any_pose(yaw, x, y, column, row):
+    cells = np.zeros((8, 12), bool)
+    cells[row, column] = True
+    local_m = 0.2 * (np.array([column, row]) + 0.5)
+    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    center_m = turn.dot(local_m) + (x, y)
+    occupied = OccupiedCells(cells, 0.2, (x, y, yaw))
+    beside_m = center_m + 0.21 * turn[:, 0]
+    assert occupied.at([center_m, beside_m, center_m - 10 * turn[:, 1]]).tolist() == [True, False, False]
+
+
+def test_only_places_behind_the_surface_are_ignored():
+    areas = IgnoredAreas(occupied=OccupiedCells(np.ones((1, 1), bool), 0.1, (2.0, -0.05, 0.0)), map_depth_m=0.3)
+    assert [areas.contains((x, 0.0), CAMERA_M) for x in (1.9, 2.05, 2.3, 2.5)] == [False, True, True, False]
+    assert not areas.contains((1.8, 0.0), (1.0, 0.0)) and areas.contains((1.8, 0.0), (3.0, 0.0))
+
+
+@given(st.floats(0, 2 * np.pi), st.floats(0.1, 3))
+def test_a_point_is_inside_a_regular_polygon_within_its_incircle(angle, radius_m):
+    turns = np.arange(7) * 2 * np.pi / 7
+    areas = IgnoredAreas([np.column_stack((np.cos(turns), np.sin(turns))) * 2])
+    place_m = radius_m * np.array([np.cos(angle), np.sin(angle)])
+    if radius_m < 2 * np.cos(np.pi / 7) - 1e-6 or radius_m > 2 + 1e-6:
+        assert areas.contains(place_m, CAMERA_M) == (radius_m < 2)
+
+
+@pytest.mark.parametrize('text', ['[[1, 2]]', '[[[1, 2], [3, 4]]]', 'a', '[[[1, 2], [3, 4], [5, NaN]]]', '{}1', '3',
+                                  '[[[1, 2, 3], [4, 5, 6], [7, 8, 9]]]', '[[[1, 2], [3, 4], [5]]]'])
+def test_other_texts_are_rejected_without_a_change(text):
+    tracker = Tracker(TrackerParams(ignored_areas=SQUARE))
+    with pytest.raises(ValueError, match='ignored_areas'):
+        tracker.reconfigure(TrackerParams(ignored_areas=text), NoiseParams(), PredictionParams())
+    assert len(tracker.ignored.polygons) == 1 and polygons_from('') == []

@@ -1,0 +1,105 @@
+"""The highest safe speed against the motion of the robot and people that it assumes."""
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ros_3d_bb.planning.planner_view import position_after
+from ros_3d_bb.planning.safe_speed import SafeSpeedParams, highest_safe_speed, limited_velocity
+from support.tracks import track_at
+
+PARAMS = SafeSpeedParams(position_sigmas=0.0)
+RADIUS_M = 0.25 + PARAMS.robot_radius + PARAMS.people_clearance
+HERE = np.eye(4)
+
+
+def speed_among(*tracks, velocity=(1.0, 0.0, 0.0), params=PARAMS, age_s=0.0, robot_from_tracks=HERE):
+    return highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params)
+
+
+def stopping_distance(speed_mps, params=PARAMS):
+    return speed_mps * params.reaction_time + speed_mps ** 2 / (2 * params.deceleration)
+
+
+def place_after(speed_mps, elapsed_s):
+    """Distance (n,) that the robot has moved along x when it brakes from a speed."""
+    braking_s = np.clip(elapsed_s - PARAMS.reaction_time, 0, speed_mps / PARAMS.deceleration)
+    return speed_mps * np.minimum(elapsed_s, PARAMS.reaction_time) + (
+        speed_mps * braking_s - PARAMS.deceleration * braking_s ** 2 / 2)
+
+
+def nearest_m(speed_mps, track, times_s):
+    """Smallest distance of the centre of the robot, until it stands, from that of a person."""
+    robot_m = np.column_stack((place_after(speed_mps, times_s), np.zeros((len(times_s), 2))))
+    return np.linalg.norm((position_after(track, times_s) - robot_m)[:, :2], axis=1).min()
+
+
+@pytest.mark.parametrize('distance_m', [1.0, 1.5, 2.0, 2.6])
+def test_the_robot_stops_before_a_standing_person(distance_m):
+    speed_mps = speed_among(track_at([distance_m, 0.2, 0.9], [0, 0, 0], moving=False))
+    free_m = distance_m - np.sqrt(RADIUS_M ** 2 - 0.2 ** 2)
+    assert free_m - 0.11 <= stopping_distance(speed_mps) <= free_m
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.floats(0.8, 6), st.floats(-3, 3), st.floats(-2, 2), st.floats(-2, 2))
+def test_at_a_safe_speed_the_robot_touches_nobody_who_walks_as_predicted(x, y, vx, vy):
+    track = track_at([x, y, 0.9], [vx, vy, 0])
+    speed_mps = speed_among(track)
+    times_s = np.arange(0, PARAMS.reaction_time + speed_mps / PARAMS.deceleration, 0.01)
+    if nearest_m(0, track, times_s) > RADIUS_M:  # people may walk into a robot that stands
+        assert nearest_m(speed_mps, track, times_s) > RADIUS_M - PARAMS.people_clearance
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.floats(0, 2 * np.pi), st.floats(1, 4), st.floats(-1, 1), st.floats(-1, 1))
+def test_more_people_later_tracks_and_less_certain_positions_never_allow_more_speed(angle, distance_m, vx, vy):
+    first = track_at(distance_m * np.array([np.cos(angle), np.sin(angle), 0]), [vx, vy, 0],
+                     covariance=np.diag([.02, .05, 0, 0, 0, 0]))
+    first = first._replace(prediction_covariance_m2=np.tile(first.covariance[:3, :3], (8, 1, 1)))
+    alone = speed_among(first)
+    assert speed_among(first, track_at([2, 0.5, 0.9], [0, 0, 0])) <= alone
+    assert speed_among(first, params=PARAMS._replace(position_sigmas=2.0)) <= alone
+    assert speed_among(first, params=PARAMS._replace(deceleration=0.5)) <= alone + 1e-9
+
+
+def test_people_beside_and_behind_the_way_do_not_count():
+    assert speed_among(track_at([-1.5, 0, 0.9], [0, 0, 0]), track_at([1.5, 1.0, 0.9], [0, 0, 0])) == 2.0
+    assert speed_among(track_at([-1.5, 0, 0.9], [0, 0, 0]), velocity=(-0.5, 0.0, 0.0)) < 1.2
+    assert speed_among(track_at([1.5, 1.0, 0.9], [0, 0, 0]), velocity=(0.5, 0.0, 0.4)) < 1.3
+
+
+def test_a_person_who_will_cross_counts_only_if_the_robot_is_still_moving_then():
+    assert speed_among(track_at([0.9, 2.2, 0.9], [0, -1.0, 0])) < 1.4
+    assert speed_among(track_at([0.9, 4.2, 0.9], [0, -1.0, 0])) == 2.0
+
+
+def test_a_robot_at_a_person_may_only_leave():
+    near = track_at([0.5, 0.1, 0.9], [0, 0, 0], moving=False)
+    assert speed_among(near) == 0.0
+    assert speed_among(near, velocity=(-0.5, 0.0, 0.0)) == 2.0
+
+
+def test_positions_are_those_of_now_in_the_frame_of_the_robot():
+    walking = track_at([0.0, 4.0, 0.9], [0, -1.0, 0])
+    robot_from_tracks = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])  # it looks along y
+    now = speed_among(track_at([3.0, 0.0, 0.9], [-1.0, 0, 0]))
+    assert speed_among(walking, age_s=1.0, robot_from_tracks=robot_from_tracks) == pytest.approx(now)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.floats(-np.pi, np.pi), st.floats(-1, 1))
+def test_all_directions_of_travel_are_equal(heading, rate):
+    def turned(x, y):
+        return x * np.cos(heading) - y * np.sin(heading), x * np.sin(heading) + y * np.cos(heading)
+    ahead = speed_among(track_at([1.6, 0.5, 0.9], [-0.3, 0, 0]), velocity=(0.8, 0, rate))
+    there = speed_among(track_at(turned(1.6, 0.5) + (0.9,), turned(-0.3, 0) + (0,)), velocity=turned(0.8, 0) + (rate,))
+    assert there == pytest.approx(ahead, abs=0.06)  # a step of the path
+
+
+def test_limited_velocities_stay_on_their_path():
+    assert limited_velocity((1.0, 0.0, 0.5), 0.4) == pytest.approx((0.4, 0, 0.2))
+    assert limited_velocity((-0.6, 0.8, 0.5), 0.5) == pytest.approx((-0.3, 0.4, 0.25))
+    assert limited_velocity((0.3, 0.0, 0.5), 0.4) == (0.3, 0.0, 0.5)
+    assert limited_velocity((0.5, 0.0, 0.5), 0.0) == (0.0, 0.0, 0.0)
+    assert limited_velocity((0.0, 0.0, 0.5), 0.0) == (0.0, 0.0, 0.5)  # the robot is round

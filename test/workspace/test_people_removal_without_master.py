@@ -1,0 +1,121 @@
+"""people_removal_node without a master: scans, clouds and depth images with and without tracks."""
+import contextlib
+
+import numpy as np
+import pytest
+from sensor_msgs.msg import CameraInfo, Image, LaserScan, PointCloud2, PointField
+from std_msgs.msg import Header
+
+from fuzz.hostile import transforms
+from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
+from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, time_from
+from ros_3d_bb.conversions.planner_msgs import points_to_msg
+from ros_3d_bb.conversions.range_msgs import cloud_without, points_of_cloud
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.msg import TrackedObjectArray
+from ros_3d_bb.nodes.people_removal_node import PeopleRemovalNode
+from support.masterless import masterless, on_the_wire
+from support.planners import person
+from support.ros import camera_info
+
+STAMP_NS = 1000 * NS
+
+
+@contextlib.contextmanager
+def node_with(inputs, *people, age_ns=NS // 10):
+    with masterless({'inputs': inputs, 'tf_timeout': 0.0}) as connections:
+        node = PeopleRemovalNode()
+        connections.now = time_from(STAMP_NS)
+        connections.send('/tf', transforms(STAMP_NS))
+        header = Header(stamp=time_from(STAMP_NS - age_ns), frame_id='map')
+        connections.send(TRACKS_TOPIC, TrackedObjectArray(header=header, objects=list(people)))
+        connections.counts = node._diagnostics.counts
+        yield connections
+
+
+def sent(connections, name, message):
+    connections.send('~' + name, on_the_wire(message))
+    return connections.publishers['~%s_static' % name].newest
+
+
+def scan(frame_id='base_link'):
+    """Three beams: right, ahead and left, of which the middle one ends at 2 m."""
+    return LaserScan(header=Header(stamp=time_from(STAMP_NS), frame_id=frame_id), angle_min=-0.5, angle_increment=0.5,
+                     range_max=30.0, ranges=[3.0, 2.0, 3.0])
+
+
+def walking(x, y):
+    """A person on whom the middle beam ends now, 0.1 s after the image."""
+    return person(1, x - 0.1, y, speed=1.0)
+
+
+def test_beams_that_end_at_a_person_become_nan():
+    with node_with('scan', walking(2.0, 0.1)) as connections:
+        found = sent(connections, 'scan', scan())
+        assert np.isnan(found.ranges).tolist() == [False, True, False] and found.header == scan().header
+        assert connections.counts['scan without people'] == 1
+
+
+@pytest.mark.parametrize('frame_id, age_ns, counter', [
+    ('base_link', NS, 'no recent tracks'), ('nowhere', NS // 10, 'no transform')])
+def test_measurements_pass_where_it_is_unknown_where_people_are(frame_id, age_ns, counter):
+    with node_with('scan', walking(2.0, 0.1), age_ns=age_ns) as connections:
+        assert sent(connections, 'scan', scan(frame_id)).ranges == (3.0, 2.0, 3.0)
+        assert connections.counts[counter] == 1
+
+
+@pytest.mark.parametrize('height', [1, 2])
+def test_points_of_people_are_dropped_or_nan_in_an_organised_cloud(height):
+    points = np.array([[2.0, 0.1, 0.5], [4.0, 0.1, 0.5], [2.0, 2.0, 0.5], [2.0, 0.0, 1.0]])
+    cloud = points_to_msg(points, Header(stamp=time_from(STAMP_NS), frame_id='base_link'))
+    cloud.height, cloud.width = height, 4 // height
+    cloud.row_step = cloud.width * cloud.point_step
+    with node_with('points', walking(2.0, 0.1)) as connections:
+        found = sent(connections, 'points', cloud)
+    left = points_of_cloud(found)
+    if height == 1:
+        np.testing.assert_allclose(left, points[1:3])
+    else:
+        assert np.isnan(left).all(axis=1).tolist() == [True, False, False, True] and not found.is_dense
+        np.testing.assert_allclose(left[1:3], points[1:3])
+
+
+def test_pixels_of_people_become_invalid():
+    depth_mm = np.full((48, 64), 4000, np.uint16)
+    depth_mm[8:44, 26:38] = 2000
+    header = Header(stamp=time_from(STAMP_NS), frame_id='camera')
+    image = fill_image(Image(header=header), depth_mm, '16UC1')
+    with node_with('depth', walking(2.0, 0.0)) as connections:
+        connections.send('~depth', image)
+        assert '~depth_static' in connections.publishers and connections.counts['depth rejected'] == 1
+        connections.send('~camera_info', camera_info(STAMP_NS))
+        values = imgmsg_to_depth(sent(connections, 'depth', image)).values
+    assert (values[20:30, 26:38] == 0).all() and (values[depth_mm == 4000] == 4000).all()
+
+
+@pytest.mark.parametrize('change, words', [
+    ({'fields': [PointField('x', 0, PointField.FLOAT32, 1)]}, 'fields x; x, y and z'),
+    ({'data': bytes(24)}, '24 bytes in rows of 36'), ({'row_step': 40}, 'rows of 40'),
+    ({'point_step': 8}, 'x, y and z of type FLOAT32 expected')])
+def test_clouds_of_other_layouts_are_rejected(change, words):
+    cloud = points_to_msg(np.zeros((3, 3)), Header())
+    for name, value in change.items():
+        setattr(cloud, name, value)
+    with pytest.raises(ValueError, match=words):
+        points_of_cloud(cloud)
+
+
+def test_other_fields_of_a_cloud_are_kept():
+    kind = np.dtype([('rgb', '<u4'), ('x', '<f4'), ('y', '<f4'), ('z', '<f4')])
+    points = np.array([(7, 1, 2, 3), (8, 4, 5, 6)], kind)
+    fields = [PointField('rgb', 0, PointField.UINT32, 1)] + [
+        PointField(name, 4 * number, PointField.FLOAT32, 1) for number, name in enumerate('xyz', 1)]
+    cloud = PointCloud2(height=1, width=2, fields=fields, point_step=16, row_step=32, data=points.tobytes())
+    np.testing.assert_allclose(points_of_cloud(cloud), [[1, 2, 3], [4, 5, 6]])
+    assert np.frombuffer(cloud_without(cloud, np.array([True, False])).data, kind).tolist() == [(8, 4, 5, 6)]
+
+
+def test_an_uncalibrated_camera_is_rejected():
+    with node_with('depth') as connections:
+        connections.send('~camera_info', CameraInfo())
+        assert connections.counts['camera_info rejected'] == 1
