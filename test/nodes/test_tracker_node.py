@@ -147,12 +147,12 @@ def test_no_track_starts_in_ignored_areas_nor_behind_cells_of_the_map(rig, track
     grid.info.width, grid.info.height, grid.info.resolution = 1, 20, 0.1
     grid.info.origin.position.x, grid.info.origin.position.y, grid.info.origin.orientation.w = 7.0, -1.0, 1.0
     publisher('static_map', OccupancyGrid).publish(grid)
-    wait_until(lambda: diagnostics_of('tracker_node')[2].get('maps'), 'the map')
+    wait_until(lambda: diagnostics_of('tracker_node')[2].get('maps used'), 'the map')
     tuned({'ignored_areas': '[[[4.5, -0.5], [5.5, -0.5], [5.5, 0.5], [4.5, 0.5]]]'})
     with Recorder('visualization_marker_array', MarkerArray) as markers:
         for frame in range(10):
             rig.send(now + frame * PERIOD, (1.0, 0.2, 3.0), (0.0, 0.2, 5.0), (0.0, 0.2, 7.2), (-2.0, 0.2, 7.2))
-        message = tracks.wait_for(10)[-1]
+            message = tracks.wait_for(frame + 1)[-1]
         assert 'ignored_area' in [marker.ns for marker in markers.wait_for(1)[0].markers]
     assert sorted(round(track.pose.pose.position.y) for track in message.objects) == [-1, 2]
     assert diagnostics_of('tracker_node')[2]['boxes in ignored areas'] >= 20

@@ -103,6 +103,7 @@ class TrackerNode(object):
     def _on_map(self, message):
         with self._diagnostics.receiving('maps'):
             self._stage.set_map(message)
+            self._diagnostics.count('maps used')
 
     def _on_camera_info(self, message, camera):
         with self._diagnostics.receiving('camera_info'):
