@@ -207,15 +207,6 @@ def test_unknown_estimators_and_strides_are_rejected(name, stride, complaint):
         estimator_named(name, stride)
 
 
-@pytest.mark.parametrize('left_px,right_px,area_px', [
-    (6, 4, (6, 0, 96, 40)), (12, 12, (12, 0, 88, 40)), (12, 11, (12, 0, 89, 40)),  # registered
-    (12, 6, (0, 0, 100, 40)), (12, 0, (0, 0, 100, 40)), (20, 20, (0, 0, 100, 40))])  # the background is far away
-def test_a_wide_border_without_depth_is_one_of_two_that_are_alike(left_px, right_px, area_px):
-    values = np.full((40, 100), 2000, np.uint16)
-    values[:, :left_px] = values[:, 100 - right_px:] = 0
-    assert DepthImage(values, 0.001).measured_area() == area_px
-
-
 @pytest.mark.parametrize('rect,cut', [((10, 10, 210, 410), 't'), ((9, 13, 209, 413), ''), ((8, 13, 208, 413), 'l'),
                                       ((9, 20, 109, 400), ''), ((500, 20, 634, 400), 'r'), ((500, 20, 633, 400), ''),
                                       ((90, 200, 190, 471), 'b'), ((90, 200, 190, 470), ''),

@@ -51,7 +51,7 @@ ALLOWED = {
     'ros_3d_bb_lab.simulation': ('camera core tracking', 'cv2 yaml'),
     'ros_3d_bb_lab.simulation.ros': (
         'bags camera conversions core msg nodes.common lab.simulation',
-        'geometry_msgs nav_msgs rosgraph_msgs rospy std_msgs tf2_msgs'),
+        'geometry_msgs nav_msgs rosgraph_msgs rospy sensor_msgs std_msgs tf2_msgs'),
     'ros_3d_bb_lab.evaluation.baselines': ('camera core tracking', 'norfair'),
     'ros_3d_bb_lab.evaluation': (
         'camera core detection detection.depth detection.yolov5 estimation sessions tracking '
@@ -66,12 +66,12 @@ ALLOWED = {
         'conversions core tracking visualization lab.evaluation lab.simulation.ros',
         'matplotlib rosbag'),
     'ros_3d_bb_lab.evaluation.navigation': (
-        'camera conversions core msg nodes.common lab.evaluation lab.simulation',
+        'camera conversions core msg nodes.common tracking lab.evaluation lab.simulation lab.simulation.ros',
         'geometry_msgs nav_msgs rospy sensor_msgs std_msgs tf2_msgs yaml'),
     'ros_3d_bb_lab.evaluation.costmap': (
         'camera conversions core estimation msg tracking visualization lab.evaluation '
         'lab.simulation lab.simulation.ros',
-        'cv2 nav_msgs rosgraph_msgs rospy std_msgs tf2_msgs'),
+        'cv2 nav_msgs rosgraph_msgs rospy sensor_msgs std_msgs tf2_msgs'),
     'ros_3d_bb_lab.evaluation.gazebo': (
         'bags conversions core tracking lab.evaluation lab.simulation', 'rosbag tf2_msgs'),
     'ros_3d_bb_lab.evaluation.latency': (

@@ -5,8 +5,6 @@ import numpy as np
 
 FARTHEST_M = 100.0  # beyond the range of any depth camera
 WIDEST_BORDER, BORDER_STEP = 0.05, 12  # of images without depth: share of the image; pixels between samples
-# Chosen: both borders of a depth camera that sees less than the colour camera are wider, and alike; Azure Kinect: 12 %.
-WIDEST_BORDERS, ALIKE = 0.15, 0.02
 
 
 class DepthImage(NamedTuple):
@@ -36,8 +34,8 @@ class DepthImage(NamedTuple):
     def measured_area(self):
         """Rectangle (x1, y1, x2, y2) of the image without its black border, where registration leaves no depth.
 
-        A border of more than `WIDEST_BORDER` of the width or height is not due to registration, unless the opposite one
-        is as wide: its background is far away.
+        A border of more than `WIDEST_BORDER` of the width or height is not due to registration: its background is far
+        away.
         """
         height, width = self.values.shape
         left, right = _black_ends(self.values[::BORDER_STEP].T)
@@ -47,8 +45,6 @@ class DepthImage(NamedTuple):
 
 def _black_ends(lines):
     """Number of lines without depth at both ends of an array (lines, pixels); 0 if there are more than the widest."""
-    most = int(WIDEST_BORDERS * len(lines)) + 1
-    ends = [int(np.logical_or.reduce(end > 0, axis=1).argmax()) for end in (lines[:most], lines[:-most - 1:-1])]
-    if abs(ends[0] - ends[1]) <= ALIKE * len(lines):
-        return ends
-    return [count if count <= WIDEST_BORDER * len(lines) else 0 for count in ends]
+    widest = int(WIDEST_BORDER * len(lines))
+    return [int(np.logical_or.reduce(end > 0, axis=1).argmax())
+            for end in (lines[:widest + 1], lines[:-widest - 2:-1])]

@@ -1,4 +1,5 @@
 """Closed-loop benchmark: move_base drives the simulated robot among people.
 
-May import: camera, conversions, core, msg, nodes.common, lab.evaluation, lab.simulation.
+May import: camera, conversions, core, msg, nodes.common, tracking, lab.evaluation, lab.simulation,
+lab.simulation.ros.
 """

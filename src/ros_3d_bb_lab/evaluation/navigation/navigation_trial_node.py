@@ -5,7 +5,6 @@ import threading
 import time
 from typing import NamedTuple
 
-import numpy as np
 import rospy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Twist
 from nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry
@@ -21,11 +20,10 @@ from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.startup import read_params, run_node
-from ros_3d_bb_lab.evaluation.navigation.ideal_sensors import (SCAN_ANGLE_RAD, SCAN_BEAMS, SCAN_RANGE_M, VisiblePeople,
-                                                               scan_ranges)
-from ros_3d_bb_lab.evaluation.navigation.trial_result import (CELL_M, Pace, distance_m, occupancy,
-                                                              points_of, stops, was_driving)
-from ros_3d_bb_lab.simulation.collision import Rectangle
+from ros_3d_bb_lab.evaluation.navigation.trial_result import (CELL_M, SHINS_M, Pace, VisiblePeople, distance_m,
+                                                              occupancy, points_of, stops, was_driving)
+from ros_3d_bb_lab.simulation.laser import FIELD_OF_VIEW, planar_pose, scan_ranges
+from ros_3d_bb_lab.simulation.ros.driven_robot import scan_to_msg
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 
@@ -100,7 +98,7 @@ class NavigationTrialNode(object):
         self._params, = read_params(NavigationTrialParams)
         self._scenario = read_scenario(self._params.scenario)
         self._pace, self._costmap_seen, self._cameras = Pace(), False, {}
-        self._position, self._yaw, self._speeds_mps, self._clearances_m = None, 0.0, [], []
+        self._pose, self._speeds_mps, self._clearances_m = None, [], []
         self._collisions, self._driving_collisions = 0, 0
         self._map_pub = rospy.Publisher('map', OccupancyGrid, queue_size=1, latch=True)
         self._goal_pub = rospy.Publisher('move_base_simple/goal', PoseStamped, queue_size=1)
@@ -119,7 +117,6 @@ class NavigationTrialNode(object):
             self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
             rospy.Subscriber(TRUTH_TOPIC, TrackedObjectArray, self._publish_visible)
         if self._params.scan:
-            self._furniture = [Rectangle(item.at, item.yaw, item.size[:2]) for item in self._scenario.room.furniture]
             self._scan_pub = rospy.Publisher('scan', LaserScan, queue_size=10)
             rospy.Subscriber(TRUTH_TOPIC, TrackedObjectArray, self._publish_scan)
         if self._params.cloud:
@@ -168,7 +165,7 @@ class NavigationTrialNode(object):
         deadline_s, ready_ns = time.monotonic() + START_TIMEOUT_S, None
         wanted = set(self._sources())
         while time.monotonic() < deadline_s and not rospy.is_shutdown():
-            is_ready = (self._costmap_seen and self._position is not None and wanted <= self._pace.sources
+            is_ready = (self._costmap_seen and self._pose is not None and wanted <= self._pace.sources
                         and self._goal_pub.get_num_connections() and self._limit_pub.get_num_connections())
             ready_ns = (ready_ns or self._now_ns()) if is_ready else None
             if is_ready and self._now_ns() > ready_ns + WARM_UP_S * NS:
@@ -184,7 +181,7 @@ class NavigationTrialNode(object):
             if limit_ns is not None:
                 self._limit_pub.publish(Time(time_from(limit_ns)))
             elapsed_s = (self._now_ns() - start_ns) / NS
-            if distance_m(self._position, (self._params.goal_x, self._params.goal_y)) < REACHED_M:
+            if distance_m(self._pose[:2], (self._params.goal_x, self._params.goal_y)) < REACHED_M:
                 return elapsed_s
             if elapsed_s > self._params.timeout:
                 return None
@@ -197,8 +194,7 @@ class NavigationTrialNode(object):
     def _on_tf(self, message):
         links = {link.child_frame_id: transform_from_msg(link) for link in message.transforms}
         if ODOM_FRAME in links and BASE_FRAME in links:
-            map_from_base = links[ODOM_FRAME].dot(links[BASE_FRAME])
-            self._position, self._yaw = map_from_base[:2, 3], np.arctan2(map_from_base[1, 0], map_from_base[0, 0])
+            self._pose = planar_pose(links[ODOM_FRAME].dot(links[BASE_FRAME]))
 
     def _on_collisions(self, message):
         if message.data > self._collisions:
@@ -220,13 +216,11 @@ class NavigationTrialNode(object):
 
     def _publish_scan(self, message):
         """The robot moves less than a beam between the image and the newest transform."""
-        if self._position is None:
+        if self._pose is None:
             return
         people = [(track.pose.pose.position.x, track.pose.pose.position.y) for track in message.objects]
-        self._scan_pub.publish(LaserScan(
-            header=Header(stamp=message.header.stamp, frame_id=BASE_FRAME), angle_min=-SCAN_ANGLE_RAD / 2,
-            angle_max=SCAN_ANGLE_RAD / 2, angle_increment=SCAN_ANGLE_RAD / (SCAN_BEAMS - 1), range_max=SCAN_RANGE_M,
-            ranges=scan_ranges(self._position, self._yaw, people, self._furniture)))
+        ranges_m = scan_ranges(self._pose, self._scenario.room, people, [SHINS_M] * len(people))
+        self._scan_pub.publish(scan_to_msg(ranges_m, FIELD_OF_VIEW, message.header.stamp))
         self._pace.heard('scan', message.header.stamp.to_nsec())
 
 

@@ -1,13 +1,17 @@
-"""Trials of the navigation benchmark: their pace, the map and the points for move_base, and the results."""
+"""Trials of the navigation benchmark: their pace, the inputs of move_base, and the results."""
+import collections
+
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.simulation.collision import Rectangle
 
 CELL_M = 0.05
 OCCUPIED = 100
 STANDING_MPS, DRIVING_MPS = 0.05, 0.15
 CONTACT_SPEEDS = 5  # odometry of 50 ms
+SHINS_M = 0.15  # radius of a person at the height of a planar laser, both legs
 POINT_STEP_PX, FARTHEST_POINT_M = 8, 6.0
 
 
@@ -51,9 +55,22 @@ class Pace(object):
         return limit_ns
 
 
+class VisiblePeople(object):
+    """People whom at least one camera shows. The cameras take turns, and each reports all people with a status."""
+
+    def __init__(self, cameras):
+        self._visible = collections.deque(maxlen=cameras)
+
+    def of(self, tracks):
+        """Those of the tracks (with `id` and `status`) that are visible in the newest image of any camera."""
+        self._visible.append({track.id for track in tracks if track.status == VISIBLE})
+        return [track for track in tracks if any(track.id in visible for visible in self._visible)]
+
+
 def points_of(depth, camera):
     """Points (n, 3) of every `POINT_STEP_PX`-th pixel of a DepthImage up to `FARTHEST_POINT_M`, in the camera frame."""
-    v, u = (part.ravel() for part in np.mgrid[:depth.shape[0]:POINT_STEP_PX, :depth.shape[1]:POINT_STEP_PX])
+    v, u = (part.ravel() for part in np.mgrid[:depth.shape[0]:SHINS_M = 0.15  # radius of a person at the height of a planar laser, both legs
+POINT_STEP_PX, :depth.shape[1]:POINT_STEP_PX])
     depth_m, is_valid = depth.at(u, v)
     is_valid &= depth_m <= FARTHEST_POINT_M
     return camera.deproject(np.stack([u, v], axis=-1)[is_valid].astype(float), depth_m[is_valid])

@@ -1,13 +1,15 @@
-"""ROS interface of the simulated robot: transforms, velocity commands, odometry and collisions."""
+"""ROS interface of the simulated robot: transforms, velocity commands, odometry, scans and collisions."""
 import rospy
 from geometry_msgs.msg import Point, Quaternion, Twist
 from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32, Header, UInt32
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import quaternion_from
 from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb_lab.simulation.driven_world import DrivenWorld
+from ros_3d_bb_lab.simulation.laser import RANGE_M
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, ODOM_FRAME, transforms_of
 
 QUEUE_SIZE = 100  # messages of a second, for subscribers that are briefly busy
@@ -65,3 +67,10 @@ def odometry_message(simulator, state, velocity, stamp):
     message.pose.pose.orientation = Quaternion(*quaternion_from(odom_from_base).tolist())
     message.twist.twist.linear.x, message.twist.twist.angular.z = (float(part) for part in velocity)
     return message
+
+
+def scan_to_msg(ranges_m, field_of_view, stamp):
+    """Convert ranges (n,) to a LaserScan in the frame of the robot."""
+    return LaserScan(header=Header(stamp=stamp, frame_id=BASE_FRAME), angle_min=-field_of_view / 2,
+                     angle_max=field_of_view / 2, angle_increment=field_of_view / (len(ranges_m) - 1),
+                     range_min=0.05, range_max=RANGE_M, ranges=ranges_m.tolist())
