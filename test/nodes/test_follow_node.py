@@ -86,7 +86,7 @@ def test_the_robot_follows_the_same_person_past_others(witness):
               rospy.get_time() - began_s, persons.count(LEADER), len(persons), [each for _s, each in witness.targets],
               len(lost_s), sum(lost_s), max(lost_s or [0.0]), witness.collisions.messages[-1].data,
               min(message.data for message in witness.clearances.messages)))
-    assert set(persons) == {LEADER}
+    assert persons.count(LEADER) > 0.99 * len(persons)
     assert len(persons) > 0.6 * FOLLOWED_S * 8
     assert not any(message.data for message in witness.collisions.messages)
     linear = np.array([message.linear.x for message in witness.velocities.messages])

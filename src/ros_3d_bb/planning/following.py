@@ -17,10 +17,10 @@ from ros_3d_bb.tracking.types import VISIBLE
 
 # A lost person is within NEAR_M of the prediction, and TURNING_MPS more for each second, up to FARTHEST_M; chosen.
 NEAR_M, TURNING_MPS, FARTHEST_M = 0.5, 1.0, 2.0
-# A change of IDs is searched for in the last PATH_NS, and changes a track from SWITCHING_NS before the new one begins;
-# the old one then is at least LEAST_STRANGE (see `_strangeness`) from its path. Chosen.
-PATH_NS, SWITCHING_NS, LEAST_STRANGE = 3 * NS, NS // 2, 0.3
-CLEARLY = 0.5  # ratio of two distances from which on the smaller one is clearly smaller; chosen
+# A change of IDs is searched for in the last PATH_NS, and changes a track from SWITCHING_NS before the new one; chosen.
+PATH_NS, SWITCHING_NS = 3 * NS, NS // 2
+# A strangeness (see `_strangeness`) is clearly less than another one by this ratio and this difference; chosen.
+CLEARLY, LEAST_STRANGE = 0.5, 0.3
 LONGEST_PREDICTION_S = 2.0  # people who are lost for longer have probably turned or stopped; chosen
 GAIN = 1.0  # speed by distance, 1/s; chosen
 TURN_GAIN = 2.0  # rate by bearing, 1/s; chosen
@@ -98,28 +98,32 @@ class TargetSelector(object):
         old one has left the path that was predicted before the new one began, and the new one is on it."""
         self._path = [entry for entry in self._path if 0 <= stamp_ns - entry[1] <= PATH_NS]
         own = self._seen[self.target.id]
-        for track in tracks:
-            before = [entry for entry in self._path if entry[1] < track.first_seen_ns - SWITCHING_NS]
-            if before and track.status == VISIBLE and track.label == self.target.label:
-                old = own[0]._replace(first_seen_ns=stamp_ns)
-                limit = CLEARLY * min(_strangeness(old, before[-1], stamp_ns), 1.0)
-                if _strangeness(track, before[-1], stamp_ns) < limit and limit > CLEARLY * LEAST_STRANGE:
-                    self.target = track
+        new = [track for track in tracks if self._path and track.first_seen_ns > self._path[0][1] + SWITCHING_NS]
+        if new:
+            first_ns = min(track.first_seen_ns for track in new)
+            before = [entry for entry in self._path if entry[1] < first_ns - SWITCHING_NS][-1]
+            old = own[0]._replace(first_seen_ns=stamp_ns)
+            self._change_to_nearest(new, before, stamp_ns, [_strangeness(old, before, stamp_ns)])
         self._path.append(self._seen[self.target.id])
 
     def _recover(self, tracks, stamp_ns):
         """Make the new track of the lost person the target, if it is clear which one that is."""
-        now = set(track.id for track in tracks if track.status == VISIBLE)
-        lost = [entry for key, entry in self._seen.items() if key not in now and key != self.target.id]
-        mine = self._seen[self.target.id]
-        new = sorted(((_strangeness(track, mine, stamp_ns), track.id) for track in tracks
-                      if track.status == VISIBLE and track.label == self.target.label), key=lambda each: each[0])
-        if not new or new[0][0] > 1:
+        self._change_to_nearest(tracks, self._seen[self.target.id], stamp_ns, [])
+
+    def _change_to_nearest(self, tracks, before, stamp_ns, others):
+        """Make the track that is nearest to where `before`, (track, stamp), is expected the target, if its strangeness
+        is clearly less than those of the other tracks, than `others`, and than its own as that of another lost
+        person."""
+        visible = set(track.id for track in tracks if track.status == VISIBLE)
+        near = sorted(((_strangeness(track, before, stamp_ns), track.id) for track in tracks
+                       if track.id in visible and track.label == self.target.label), key=lambda each: each[0])
+        if not near or near[0][0] > 1:
             return
-        strangeness, track_id = new[0]
-        others = [other for other, _id in new[1:]] + [
+        strangeness, track_id = near[0]
+        lost = [entry for key, entry in self._seen.items() if key != self.target.id and entry[1] < stamp_ns]
+        others = others + [other for other, _id in near[1:]] + [
             _strangeness(self._seen[track_id][0], entry, stamp_ns) for entry in lost]
-        if strangeness < CLEARLY * min(others, default=np.inf):
+        if max(strangeness / CLEARLY, strangeness + LEAST_STRANGE) < min(others, default=np.inf):
             del self._seen[self.target.id]
             self.target = self._seen[track_id][0]
 

@@ -45,7 +45,7 @@ def detect_in_scene(simulator, detect, every=1, error_model=None):
         stamp_ns = int(round(frame.time_s * NS))
         people = [track for track in simulator.true_tracks(frame, stamp_ns) if track.label == PERSON]
         step = Step(frame._replace(color=None, depth_mm=None), detected.boxes, Moment(stamp_ns, people, []))
-        detections = _detections(depth, detected, simulator.camera, frame.poses.map_from_camera, error_model)
+        detections = detections_in(depth, detected, simulator.camera, frame.poses.map_from_camera, error_model)
         view = CameraView(frame.poses.map_from_camera, simulator.camera, frame.camera,
                           functools.partial(depths_towards, simulator.camera, depth))
         yield step, detections, view
@@ -60,7 +60,7 @@ def run_scene(simulator, detect, every=1, error_model=None):
     return steps
 
 
-def _detections(depth, detected, camera, map_from_camera, error_model):
+def detections_in(depth, detected, camera, map_from_camera, error_model):
     """Convert 2D detections to detections in the map, as bbox3d_node and tracker_node do."""
     rects_px = np.rint(detected.boxes).astype(int)
     usable = (rects_px[:, :2] < rects_px[:, 2:]).all(axis=1)
