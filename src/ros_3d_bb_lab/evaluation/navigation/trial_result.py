@@ -69,8 +69,7 @@ class VisiblePeople(object):
 
 def points_of(depth, camera):
     """Points (n, 3) of every `POINT_STEP_PX`-th pixel of a DepthImage up to `FARTHEST_POINT_M`, in the camera frame."""
-    v, u = (part.ravel() for part in np.mgrid[:depth.shape[0]:SHINS_M = 0.15  # radius of a person at the height of a planar laser, both legs
-POINT_STEP_PX, :depth.shape[1]:POINT_STEP_PX])
+    v, u = (part.ravel() for part in np.mgrid[:depth.shape[0]:POINT_STEP_PX, :depth.shape[1]:POINT_STEP_PX])
     depth_m, is_valid = depth.at(u, v)
     is_valid &= depth_m <= FARTHEST_POINT_M
     return camera.deproject(np.stack([u, v], axis=-1)[is_valid].astype(float), depth_m[is_valid])
