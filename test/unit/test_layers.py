@@ -71,7 +71,7 @@ ALLOWED = {
     'ros_3d_bb_lab.evaluation.costmap': (
         'camera conversions core estimation msg tracking visualization lab.evaluation '
         'lab.simulation lab.simulation.ros',
-        'cv2 nav_msgs rosgraph_msgs rospy std_msgs tf2_msgs'),
+        'cv2 nav_msgs rosgraph_msgs rospy sensor_msgs std_msgs tf2_msgs'),
     'ros_3d_bb_lab.evaluation.gazebo': (
         'bags conversions core tracking lab.evaluation lab.simulation', 'rosbag tf2_msgs'),
     'ros_3d_bb_lab.evaluation.latency': (
