@@ -48,6 +48,7 @@ def test_people_in_an_area_are_counted():
         tracks = publisher('ros_3d_bb/tracks', TrackedObjectArray)
         with Recorder('count_people/count', Int32) as counts:
             tracks.publish(tracks_at((1, 1), (3, 1.9), (3, 2.1), (-1, 1)))
+            counts.wait_for(1)
             tracks.publish(tracks_at())
             assert [count.data for count in counts.wait_for(2)] == [2, 0]
 
