@@ -273,8 +273,9 @@ def messages_page():
 def pages():
     """{path: text} of all pages."""
     made = {'doc/nodes/%s.md' % node.name: node_page(node) for node in nodes()}
-    return dict(made, **{'doc/nodes/index.md': nodes_page(), 'doc/launch_files.md': launch_page(),
-                        'doc/messages.md': messages_page()})
+    made.update({'doc/nodes/index.md': nodes_page(), 'doc/launch_files.md': launch_page(),
+                 'doc/messages.md': messages_page()})
+    return made
 
 
 def config_files():

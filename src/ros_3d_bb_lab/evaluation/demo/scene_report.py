@@ -29,7 +29,8 @@ from matplotlib import gridspec, pyplot  # noqa: E402 (the backend must be selec
 
 PANELS, COLUMNS = 6, 3
 SIZE_IN, LINE_IN, DPI = (14.56, 14.5), 0.17, 100
-CSV_COLUMNS = ('stamp_s', 'id', 'label', 'status', 'x_m', 'y_m', 'vx_mps', 'vy_mps', 'var_x_m2', 'cov_xy_m2', 'var_y_m2')
+CSV_COLUMNS = ('stamp_s', 'id', 'label', 'status', 'x_m', 'y_m', 'vx_mps', 'vy_mps', 'var_x_m2', 'cov_xy_m2',
+               'var_y_m2')
 TRUTH_COLOR, ROBOT_COLOR = '#aaaaaa', '#141414'
 
 
@@ -95,9 +96,9 @@ def write_csv(bag_path, csv_path):
         for _topic, message, _time in bag.read_messages(['/' + TRACKS_TOPIC]):
             stamp = '%d.%09d' % (message.header.stamp.secs, message.header.stamp.nsecs)
             for track in tracks_from_msg(message):
-                known = track.covariance is not None
-                rows.writerow([stamp, track.id, track.label, track.status, *track.position_m[:2], *track.velocity_mps[:2],
-                               *(track.covariance[[0, 0, 1], [0, 1, 1]] if known else [''] * 3)])
+                covariance = [''] * 3 if track.covariance is None else track.covariance[[0, 0, 1], [0, 1, 1]]
+                rows.writerow([stamp, track.id, track.label, track.status, *track.position_m[:2],
+                               *track.velocity_mps[:2], *covariance])
 
 
 def lines_of(header, rows):
@@ -217,7 +218,7 @@ def main():
     parser.add_argument('picture', nargs='?', help='image file to write (default: the name of the bag with .png)')
     parser.add_argument('--color-topic', default='', metavar='TOPIC',
                         help='colour images in the bag, if their topic is not %s' % COLOR_TOPIC)
-    parser.add_argument('--csv', default='', metavar='FILE', help='also write the tracks of each image to this CSV file')
+    parser.add_argument('--csv', default='', metavar='FILE', help='also write the tracks to this CSV file')
     arguments = parser.parse_args()
     picture = arguments.picture or os.path.splitext(arguments.bag)[0] + '.png'
     try:
