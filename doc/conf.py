@@ -1,4 +1,4 @@
-"""Sphinx: the README, doc/, config/ and the changelog as a site. `./run doc` builds it; nothing is fetched from a network.
+"""Sphinx: README, doc/, config/ and changelog as a site. `./run doc` builds it; nothing is fetched from a network.
 
 The root of the repository is the folder of the sources, so that Sphinx checks every link between pages, and to files.
 """
